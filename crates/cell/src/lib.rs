@@ -1,0 +1,3 @@
+//! Scenario and model files, resolved into one validated cell.
+
+pub mod shape;

@@ -1,0 +1,1 @@
+//! The six lengths that define the kinematics of a UR arm.

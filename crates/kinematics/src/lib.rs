@@ -1,0 +1,48 @@
+//! Kinematics and rigid-body dynamics of the six-joint UR arms.
+//!
+//! Metres, radians, kilograms and seconds throughout. Joint vectors are ordered
+//! `shoulder_pan, shoulder_lift, elbow, wrist_1, wrist_2, wrist_3`.
+//!
+//! Frames: `base_link` is ROS's; `base` is the UR controller's, `base_link` turned by 180 degrees
+//! about z, and the frame of the DH chain; `flange` here always means DH frame 6, which ROS calls
+//! `tool0` and the controller shows at a zero TCP.
+
+mod chain;
+mod dynamics;
+mod geometry;
+mod limits;
+mod rotation;
+
+pub use chain::{Chain, ChainJoint};
+pub use dynamics::{Body, Dynamics};
+pub use limits::{JointLimit, JointLimits};
+pub use rotation::{pose_from_rotation_vector, rotation_angle_between, rotation_vector};
+
+/// Number of joints of the arm.
+pub const JOINT_COUNT: usize = 6;
+
+/// One value per joint: positions in rad, velocities in rad/s, torques in N m.
+pub type Joints = nalgebra::Vector6<f64>;
+
+/// A rigid transform `a_from_b`.
+pub type Pose = nalgebra::Isometry3<f64>;
+
+/// ROS joint names, in order.
+pub const JOINT_NAMES: [&str; JOINT_COUNT] = [
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+];
+
+/// Short joint names, in order, as reports print them.
+pub const JOINT_LABELS: [&str; JOINT_COUNT] = [
+    "shoulder_pan",
+    "shoulder_lift",
+    "elbow",
+    "wrist_1",
+    "wrist_2",
+    "wrist_3",
+];
