@@ -1,1 +1,218 @@
 //! The six lengths that define the kinematics of a UR arm.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+use crate::{Chain, ChainJoint, Joints, Pose, rotation_angle_between};
+
+/// Standard Denavit-Hartenberg lengths of a UR arm, m.
+///
+/// Link twists are `pi/2, 0, 0, pi/2, -pi/2, 0`; `a2` and `a3` are negative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UrGeometry {
+    /// Height of the shoulder axis over the base plane.
+    pub d1: f64,
+    /// Length of the upper arm, negative.
+    pub a2: f64,
+    /// Length of the forearm, negative.
+    pub a3: f64,
+    /// Offset of wrist 1 along the shoulder axis.
+    pub d4: f64,
+    /// Offset of wrist 2.
+    pub d5: f64,
+    /// Offset of the flange.
+    pub d6: f64,
+}
+
+/// A chain that is not, even roughly, that of a UR arm.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "the joint origins are not those of a UR arm: the nearest UR geometry misses the flange by \
+     {position_error_m:.4} m and {angle_error_rad:.4} rad"
+)]
+pub struct NotUrGeometry {
+    /// Largest position error over the probed postures, m.
+    pub position_error_m: f64,
+    /// Largest angle error over the probed postures, rad.
+    pub angle_error_rad: f64,
+}
+
+/// A chain within this of a nominal UR arm is a calibrated one: six real UR3s differ from nominal
+/// by at most 3.2 mm at a tip 200 mm beyond the flange.
+const CALIBRATED_POSITION_M: f64 = 0.02;
+const CALIBRATED_ANGLE_RAD: f64 = 0.05;
+
+impl UrGeometry {
+    /// UR3 (CB3): Universal Robots, DH parameters for calculations of kinematics and dynamics.
+    pub const UR3: Self = Self {
+        d1: 0.1519,
+        a2: -0.24365,
+        a3: -0.21325,
+        d4: 0.11235,
+        d5: 0.08535,
+        d6: 0.0819,
+    };
+
+    /// Pose of the flange in the controller's `base` frame: the product of the six DH transforms
+    /// (equations 1 to 3 of the paper), as plain matrices.
+    pub fn base_from_flange(&self, q: &Joints) -> Pose {
+        let rows = [
+            (q[0], self.d1, 0.0, FRAC_PI_2),
+            (q[1], 0.0, self.a2, 0.0),
+            (q[2], 0.0, self.a3, 0.0),
+            (q[3], self.d4, 0.0, FRAC_PI_2),
+            (q[4], self.d5, 0.0, -FRAC_PI_2),
+            (q[5], self.d6, 0.0, 0.0),
+        ];
+        rows.iter()
+            .fold(Pose::identity(), |base_from_link, &(theta, d, a, alpha)| {
+                base_from_link
+                    * Pose::from_parts(
+                        Translation3::new(0.0, 0.0, d),
+                        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), theta),
+                    )
+                    * Pose::from_parts(
+                        Translation3::new(a, 0.0, 0.0),
+                        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), alpha),
+                    )
+            })
+    }
+
+    /// The same arm as a chain from `base_link`, with the joint frames of ROS's `ur_description`.
+    pub fn chain(&self) -> Chain {
+        let z = Vector3::z_axis();
+        let joint = |x: f64, y: f64, height: f64, roll: f64, pitch: f64, yaw: f64| ChainJoint {
+            parent_from_joint: Pose::from_parts(
+                Translation3::new(x, y, height),
+                UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+            ),
+            axis: z,
+        };
+        Chain {
+            joints: [
+                joint(0.0, 0.0, self.d1, 0.0, 0.0, PI),
+                joint(0.0, 0.0, 0.0, FRAC_PI_2, 0.0, 0.0),
+                joint(self.a2, 0.0, 0.0, 0.0, 0.0, 0.0),
+                joint(self.a3, 0.0, self.d4, 0.0, 0.0, 0.0),
+                joint(0.0, -self.d5, 0.0, FRAC_PI_2, 0.0, 0.0),
+                joint(0.0, self.d6, 0.0, FRAC_PI_2, PI, PI),
+            ],
+            wrist_3_from_flange: Pose::identity(),
+        }
+    }
+
+    /// Nearest UR geometry of a chain, read off its joint axes at `q = 0`.
+    ///
+    /// # Errors
+    /// [`NotUrGeometry`] if the two disagree by more than any factory calibration explains.
+    pub fn of_chain(chain: &Chain) -> Result<Self, NotUrGeometry> {
+        let base_from_base_link = base_from_base_link();
+        let links = chain
+            .link_poses(&Joints::zeros())
+            .map(|pose| base_from_base_link * pose);
+        let origin = |i: usize| links[i].translation.vector;
+        let flange = base_from_base_link * chain.base_link_from_flange(&Joints::zeros());
+        // At q = 0 the arm is stretched along -x; axes 2, 3, 4 and 6 point along -y, axis 5 down.
+        let d1 = origin(1).z;
+        let (a2, reach) = (origin(2).x, origin(3).x);
+        let d4 = -origin(4).y;
+        let d5 = d1 - origin(5).z;
+        let d6 = -flange.translation.vector.y - d4;
+        let geometry = Self {
+            d1,
+            a2,
+            a3: reach - a2,
+            d4,
+            d5,
+            d6,
+        };
+        let (mut position_error_m, mut angle_error_rad): (f64, f64) = (0.0, 0.0);
+        for probe in PROBES {
+            let q = Joints::from_column_slice(&probe);
+            let nominal = geometry.base_from_flange(&q);
+            let actual = base_from_base_link * chain.base_link_from_flange(&q);
+            position_error_m = position_error_m
+                .max((nominal.translation.vector - actual.translation.vector).norm());
+            angle_error_rad =
+                angle_error_rad.max(rotation_angle_between(&nominal.rotation, &actual.rotation));
+        }
+        // Written so that NaN fails too.
+        if position_error_m <= CALIBRATED_POSITION_M && angle_error_rad <= CALIBRATED_ANGLE_RAD {
+            Ok(geometry)
+        } else {
+            Err(NotUrGeometry {
+                position_error_m,
+                angle_error_rad,
+            })
+        }
+    }
+}
+
+/// Postures that move every joint, for telling a UR chain from others.
+const PROBES: [[f64; 6]; 4] = [
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [0.7, -1.1, 1.3, 0.4, -0.9, 0.5],
+    [-2.1, 0.6, -0.8, 2.2, 1.7, -1.4],
+    [1.5, -2.4, 2.0, -0.6, 0.8, 2.9],
+];
+
+/// `base_link` in the controller's base frame: turned by 180 degrees about z, exactly.
+pub(crate) fn base_from_base_link() -> Pose {
+    Pose::from_parts(
+        Translation3::identity(),
+        nalgebra::Unit::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 1.0)),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twenty times the rounding of seven products of lengths below 0.5 m.
+    const FK_M: f64 = 2e-15;
+
+    #[test]
+    fn the_chain_is_the_dh_product_turned_by_half_a_revolution() {
+        let chain = UrGeometry::UR3.chain();
+        for probe in PROBES {
+            let q = Joints::from_column_slice(&probe);
+            let dh = UrGeometry::UR3.base_from_flange(&q);
+            let ros = base_from_base_link() * chain.base_link_from_flange(&q);
+            assert!((dh.translation.vector - ros.translation.vector).norm() < FK_M);
+            assert!(rotation_angle_between(&dh.rotation, &ros.rotation) < FK_M);
+        }
+    }
+
+    #[test]
+    fn the_stretched_arm_stands_where_the_maker_says() {
+        let flange = UrGeometry::UR3
+            .chain()
+            .base_link_from_flange(&Joints::zeros());
+        let expected = Vector3::new(0.4569, 0.19425, 0.06655);
+        assert!((flange.translation.vector - expected).norm() < FK_M);
+    }
+
+    #[test]
+    fn geometry_is_read_back_from_its_chain() {
+        let geometry = UrGeometry {
+            d1: 0.2,
+            a2: -0.5,
+            a3: -0.4,
+            d4: 0.13,
+            d5: 0.1,
+            d6: 0.09,
+        };
+        let read = UrGeometry::of_chain(&geometry.chain()).unwrap();
+        assert!((read.d5 - geometry.d5).abs() < FK_M && (read.d6 - geometry.d6).abs() < FK_M);
+        assert!((read.a3 - geometry.a3).abs() < FK_M && (read.d4 - geometry.d4).abs() < FK_M);
+    }
+
+    #[test]
+    fn another_arm_is_refused() {
+        let mut chain = UrGeometry::UR3.chain();
+        chain.joints[3].parent_from_joint.rotation =
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.4);
+        assert!(UrGeometry::of_chain(&chain).is_err());
+    }
+}

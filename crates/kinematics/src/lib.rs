@@ -10,11 +10,14 @@
 mod chain;
 mod dynamics;
 mod geometry;
+pub mod ik;
 mod limits;
 mod rotation;
+pub mod trajectory;
 
 pub use chain::{Chain, ChainJoint};
 pub use dynamics::{Body, Dynamics};
+pub use geometry::{NotUrGeometry, UrGeometry};
 pub use limits::{JointLimit, JointLimits};
 pub use rotation::{pose_from_rotation_vector, rotation_angle_between, rotation_vector};
 

@@ -1,0 +1,414 @@
+//! The resolved cell: robot, tool and everything that can be hit.
+
+use nalgebra::Vector3;
+use needlebench_kinematics::{Body, Chain, Dynamics, JOINT_COUNT, JointLimits, Joints, Pose};
+use serde::Serialize;
+
+use crate::shape::{Shape, Solid, Visual};
+
+/// Where a model came from, for the provenance of a result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ModelSource {
+    /// File as the scenario names it, or `builtin:` and the model's name.
+    pub file: String,
+    /// SHA-256 of the file's bytes, lower-case hex.
+    pub sha256: String,
+}
+
+/// A link of the arm: geometry in the link's own frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Link {
+    /// Short name as reports print it: `base`, `shoulder`, `upper_arm`, `forearm`, `wrist_1` ...
+    pub name: String,
+    /// Collision geometry.
+    pub solids: Vec<Solid>,
+    /// Surfaces for pictures.
+    pub visuals: Vec<Visual>,
+}
+
+/// The arm, placed in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Robot {
+    /// Name from the URDF.
+    pub name: String,
+    /// Pose of ROS's `base_link` in the world.
+    pub world_from_base_link: Pose,
+    /// Joints from `base_link` to the flange (`tool0`).
+    pub chain: Chain,
+    /// The fixed link (geometry in `base_link`).
+    pub base: Link,
+    /// The six moving links.
+    pub links: [Link; JOINT_COUNT],
+    /// Mass properties of the moving links, without the tool.
+    pub bodies: [Body; JOINT_COUNT],
+    /// Limits of the joints.
+    pub limits: JointLimits,
+    /// The URDF.
+    pub source: ModelSource,
+    /// What was assumed or replaced while the URDF was read; belongs in every report.
+    pub notes: Vec<String>,
+}
+
+impl Robot {
+    /// Controller's base frame in `base_link`: turned by 180 degrees about z.
+    pub fn base_link_from_base() -> Pose {
+        // Exact: (0, 0, 1, 0) as a quaternion, where a rotation by `PI` would be off by 1.2e-16.
+        Pose::from_parts(
+            nalgebra::Translation3::identity(),
+            nalgebra::Unit::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 1.0)),
+        )
+    }
+
+    /// Controller's base frame in the world.
+    pub fn world_from_base(&self) -> Pose {
+        self.world_from_base_link * Self::base_link_from_base()
+    }
+
+    /// Poses of the six moving links in the world.
+    pub fn world_from_links(&self, q: &Joints) -> [Pose; JOINT_COUNT] {
+        self.chain
+            .link_poses(q)
+            .map(|pose| self.world_from_base_link * pose)
+    }
+
+    /// Pose of the flange in the world.
+    pub fn world_from_flange(&self, q: &Joints) -> Pose {
+        self.world_from_base_link * self.chain.base_link_from_flange(q)
+    }
+}
+
+/// The needle that the guide is made for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Needle {
+    /// Gauge number.
+    pub gauge: u32,
+    /// Outer diameter, m.
+    pub outer_diameter_m: f64,
+    /// Length of the cannula from hub to tip, m.
+    pub length_m: f64,
+}
+
+/// A needle guide, in the frame of the flange.
+///
+/// The z axes of `guide_entry`, `guide_exit` and `needle_tip` point along the insertion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tool {
+    /// Name of the tool, e.g. `offset`.
+    pub name: String,
+    /// Collision geometry of everything but the guide tube.
+    pub solids: Vec<Solid>,
+    /// Collision geometry of the guide tube, whose gap to the skin is intended.
+    pub guide_solids: Vec<Solid>,
+    /// Surfaces for pictures.
+    pub visuals: Vec<Visual>,
+    /// Mass properties of the whole tool.
+    pub body: Body,
+    /// Where the needle enters the guide.
+    pub flange_from_guide_entry: Pose,
+    /// Where the needle leaves the guide.
+    pub flange_from_guide_exit: Pose,
+    /// Diameter of the bore, m.
+    pub bore_m: f64,
+    /// The needle.
+    pub needle: Needle,
+    /// The URDF.
+    pub source: ModelSource,
+}
+
+impl Tool {
+    /// Length of the guide tube, m.
+    pub fn guide_length_m(&self) -> f64 {
+        (self.flange_from_guide_exit.translation.vector
+            - self.flange_from_guide_entry.translation.vector)
+            .norm()
+    }
+}
+
+/// What a collision body is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BodyKind {
+    /// The arm's fixed link.
+    Base,
+    /// A moving link of the arm.
+    Link,
+    /// The tool, but for its guide tube.
+    Tool,
+    /// The guide tube.
+    GuideTube,
+    /// Volume behind the guide that needle and hand need; not a physical body.
+    NeedleCorridor,
+    /// The phantom's skin.
+    Phantom,
+    /// CT table.
+    Table,
+    /// CT gantry.
+    Gantry,
+    /// The robot's mount.
+    Mount,
+}
+
+/// What a collision body moves with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Frame {
+    /// Fixed; solids are given in the world.
+    World,
+    /// Moves with moving link 0..6; solids are given in that link's frame.
+    Link(usize),
+}
+
+/// A rigid group of solids.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CollisionBody {
+    /// Unique name: `upper_arm`, `tool`, `guide_tube`, `phantom`, `table` ...
+    pub name: String,
+    /// What it is.
+    pub kind: BodyKind,
+    /// What it moves with.
+    pub frame: Frame,
+    /// Its geometry in that frame.
+    pub solids: Vec<Solid>,
+}
+
+/// Classes of clearance, as reports name them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ClearanceClass {
+    /// Moving links against the skin.
+    RobotPhantom,
+    /// Links and tool against the table.
+    RobotTable,
+    /// Links and tool against the gantry.
+    RobotGantry,
+    /// Links and tool against the mount.
+    RobotMount,
+    /// The arm and its tool against themselves.
+    #[serde(rename = "self")]
+    SelfCollision,
+    /// The tool, without its guide tube, against the skin.
+    ToolPhantom,
+    /// The guide tube against the skin: the intended stand-off.
+    GuideStandoff,
+    /// The needle's and hand's volume behind the guide against everything it does not belong to.
+    NeedleCorridor,
+    /// The planned needle line against bone, vessel and organ.
+    NeedleRoute,
+}
+
+impl ClearanceClass {
+    /// Name as in reports and scenario files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RobotPhantom => "robot_phantom",
+            Self::RobotTable => "robot_table",
+            Self::RobotGantry => "robot_gantry",
+            Self::RobotMount => "robot_mount",
+            Self::SelfCollision => "self",
+            Self::ToolPhantom => "tool_phantom",
+            Self::GuideStandoff => "guide_standoff",
+            Self::NeedleCorridor => "needle_corridor",
+            Self::NeedleRoute => "needle_route",
+        }
+    }
+
+    /// Whether touching in this class is a collision of physical bodies.
+    pub fn is_physical(self) -> bool {
+        !matches!(self, Self::NeedleCorridor | Self::NeedleRoute)
+    }
+}
+
+/// Two bodies of which the distance matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BodyPair {
+    /// Index into [`Cell::bodies`]; always a moving body.
+    pub a: usize,
+    /// Index into [`Cell::bodies`].
+    pub b: usize,
+    /// Class that the pair counts for.
+    pub class: ClearanceClass,
+}
+
+/// Everything that the arm works among.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cell {
+    /// The arm.
+    pub robot: Robot,
+    /// Its tool.
+    pub tool: Tool,
+    /// Acceleration of gravity in the world, m/s^2.
+    pub gravity_m_s2: Vector3<f64>,
+    /// Reflected rotor inertia per joint, kg m^2.
+    pub armature_kgm2: Joints,
+    /// All collision bodies: base, links, tool, guide tube, corridor, then the surroundings.
+    pub bodies: Vec<CollisionBody>,
+    /// The pairs that are checked; adjacent links and what is bolted together are left out.
+    pub pairs: Vec<BodyPair>,
+}
+
+/// Volume behind the guide entry that has to stay free: a cylinder about the guide axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NeedleCorridor {
+    /// Radius, m.
+    pub radius_m: f64,
+    /// Length behind the guide entry, m.
+    pub length_m: f64,
+}
+
+impl Cell {
+    /// Puts robot, tool and surroundings together and derives the pairs to check.
+    pub fn assemble(
+        robot: Robot,
+        tool: Tool,
+        corridor: NeedleCorridor,
+        surroundings: Vec<CollisionBody>,
+        armature_kgm2: Joints,
+        gravity_m_s2: Vector3<f64>,
+    ) -> Self {
+        let mut bodies = vec![CollisionBody {
+            name: robot.base.name.clone(),
+            kind: BodyKind::Base,
+            frame: Frame::World,
+            solids: placed(&robot.base.solids, &robot.world_from_base_link),
+        }];
+        for (i, link) in robot.links.iter().enumerate() {
+            bodies.push(CollisionBody {
+                name: link.name.clone(),
+                kind: BodyKind::Link,
+                frame: Frame::Link(i),
+                solids: link.solids.clone(),
+            });
+        }
+        let wrist_3 = Frame::Link(JOINT_COUNT - 1);
+        let flange = &robot.chain.wrist_3_from_flange;
+        bodies.push(CollisionBody {
+            name: "tool".into(),
+            kind: BodyKind::Tool,
+            frame: wrist_3,
+            solids: placed(&tool.solids, flange),
+        });
+        bodies.push(CollisionBody {
+            name: "guide_tube".into(),
+            kind: BodyKind::GuideTube,
+            frame: wrist_3,
+            solids: placed(&tool.guide_solids, flange),
+        });
+        bodies.push(CollisionBody {
+            name: "needle_corridor".into(),
+            kind: BodyKind::NeedleCorridor,
+            frame: wrist_3,
+            solids: vec![Solid {
+                name: "needle_corridor".into(),
+                shape: Shape::Cylinder {
+                    radius_m: corridor.radius_m,
+                    half_length_m: 0.5 * corridor.length_m,
+                },
+                parent_from_shape: flange
+                    * tool.flange_from_guide_entry
+                    * Pose::translation(0.0, 0.0, -0.5 * corridor.length_m),
+            }],
+        });
+        bodies.extend(surroundings);
+        bodies.retain(|body| !body.solids.is_empty());
+
+        let mut pairs = Vec::new();
+        for a in 0..bodies.len() {
+            for b in a + 1..bodies.len() {
+                if let Some(class) = pair_class(&bodies[a], &bodies[b]) {
+                    // The moving body first; both move for `self` pairs and the corridor's.
+                    let (a, b) = if bodies[a].frame == Frame::World {
+                        (b, a)
+                    } else {
+                        (a, b)
+                    };
+                    pairs.push(BodyPair { a, b, class });
+                }
+            }
+        }
+        Self {
+            robot,
+            tool,
+            gravity_m_s2,
+            armature_kgm2,
+            bodies,
+            pairs,
+        }
+    }
+
+    /// The arm with its tool as rigid bodies, for inverse dynamics.
+    pub fn dynamics(&self) -> Dynamics {
+        let mut bodies = self.robot.bodies;
+        let tool_in_link = self
+            .tool
+            .body
+            .transformed(&self.robot.chain.wrist_3_from_flange);
+        bodies[JOINT_COUNT - 1] = bodies[JOINT_COUNT - 1].combined_with(&tool_in_link);
+        Dynamics {
+            chain: self.robot.chain,
+            bodies,
+            armature_kgm2: self.armature_kgm2,
+            gravity_m_s2: self.robot.world_from_base_link.rotation.inverse() * self.gravity_m_s2,
+        }
+    }
+
+    /// Pose of the guide's exit in the world; z along the insertion.
+    pub fn world_from_guide_exit(&self, q: &Joints) -> Pose {
+        self.robot.world_from_flange(q) * self.tool.flange_from_guide_exit
+    }
+
+    /// World poses of all [`Cell::bodies`] at joint positions `q`.
+    pub fn world_from_bodies(&self, q: &Joints) -> Vec<Pose> {
+        let links = self.robot.world_from_links(q);
+        self.bodies
+            .iter()
+            .map(|body| match body.frame {
+                Frame::World => Pose::identity(),
+                Frame::Link(i) => links[i],
+            })
+            .collect()
+    }
+}
+
+fn placed(solids: &[Solid], new_from_old: &Pose) -> Vec<Solid> {
+    solids
+        .iter()
+        .map(|solid| Solid {
+            parent_from_shape: new_from_old * solid.parent_from_shape,
+            ..solid.clone()
+        })
+        .collect()
+}
+
+/// Class of a pair, or `None` where the distance means nothing: two fixed bodies, neighbours
+/// in the chain, parts that are bolted together.
+fn pair_class(a: &CollisionBody, b: &CollisionBody) -> Option<ClearanceClass> {
+    use BodyKind::{Base, Gantry, GuideTube, Link, Mount, NeedleCorridor, Phantom, Table, Tool};
+    let (first, second) = if a.kind <= b.kind { (a, b) } else { (b, a) };
+    // A tool whose own wrist or bracket stands behind its guide shows that as a constant.
+    let blocks_own_corridor = second.kind == NeedleCorridor && matches!(first.kind, Link | Tool);
+    if a.frame == b.frame && !blocks_own_corridor {
+        return None;
+    }
+    Some(match (first.kind, second.kind) {
+        (Base | Link, Link) => {
+            let index = |body: &CollisionBody| match body.frame {
+                Frame::World => 0,
+                Frame::Link(i) => i + 1,
+            };
+            if index(first).abs_diff(index(second)) == 1 {
+                return None;
+            }
+            ClearanceClass::SelfCollision
+        }
+        (Base | Link, Tool | GuideTube) => ClearanceClass::SelfCollision,
+        (_, NeedleCorridor) | (NeedleCorridor, Phantom | Table | Gantry | Mount) => {
+            ClearanceClass::NeedleCorridor
+        }
+        (Link, Phantom) => ClearanceClass::RobotPhantom,
+        (Tool, Phantom) => ClearanceClass::ToolPhantom,
+        (GuideTube, Phantom) => ClearanceClass::GuideStandoff,
+        (Link | Tool | GuideTube, Table) => ClearanceClass::RobotTable,
+        (Link | Tool | GuideTube, Gantry) => ClearanceClass::RobotGantry,
+        (Link | Tool | GuideTube, Mount) => ClearanceClass::RobotMount,
+        _ => return None,
+    })
+}

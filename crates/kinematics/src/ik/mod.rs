@@ -1,0 +1,32 @@
+//! Inverse kinematics: closed form with all eight configurations, and Gauss-Newton.
+//!
+//! Equation numbers are those of Abdelaziz, Luo, Jiang and Chen, *Multiple configurations for
+//! puncturing robot positioning*, in corrected form where the printed one is wrong.
+
+mod closed_form;
+mod configuration;
+mod gauss_newton;
+mod solve;
+
+pub use closed_form::{ClosedForm, ClosedFormSolution, Unreachable, closed_form};
+pub use configuration::{Configuration, Elbow, Shoulder, Wrist};
+pub use gauss_newton::{GaussNewtonOptions, GaussNewtonResult, gauss_newton};
+pub use solve::{Kinematics, Solution, SolutionKind, Solutions};
+
+use std::f64::consts::{PI, TAU};
+
+/// Angle wrapped to `(-pi, pi]`, rad.
+pub fn wrap_angle(angle_rad: f64) -> f64 {
+    if angle_rad > -PI && angle_rad <= PI {
+        return angle_rad;
+    }
+    let wrapped = angle_rad - TAU * (angle_rad / TAU).round();
+    if wrapped <= -PI {
+        wrapped + TAU
+    } else {
+        wrapped
+    }
+}
+
+#[cfg(test)]
+mod tests;

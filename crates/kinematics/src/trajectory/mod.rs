@@ -1,0 +1,301 @@
+//! Joint trajectories: straight joint motions, straight tool lines, holds.
+//!
+//! Every moving segment starts and ends at rest and follows a seven-phase (double-S) profile, so
+//! position, velocity and acceleration are continuous and the jerk is bounded.
+
+mod line;
+mod profile;
+
+pub use line::{LineError, LinePath};
+pub use profile::{DoubleS, ProfileLimits};
+
+use crate::{JOINT_COUNT, Joints};
+
+/// Reference of all joints at one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointState {
+    /// Positions, rad.
+    pub position: Joints,
+    /// Velocities, rad/s.
+    pub velocity: Joints,
+    /// Accelerations, rad/s^2.
+    pub acceleration: Joints,
+}
+
+impl JointState {
+    /// At rest.
+    pub fn at_rest(position: Joints) -> Self {
+        Self {
+            position,
+            velocity: Joints::zeros(),
+            acceleration: Joints::zeros(),
+        }
+    }
+}
+
+/// Bounds that a motion keeps, per joint and for the tool on a straight line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionLimits {
+    /// Joint speeds, rad/s.
+    pub velocity: Joints,
+    /// Joint accelerations, rad/s^2.
+    pub acceleration: Joints,
+    /// Joint jerks, rad/s^3.
+    pub jerk: Joints,
+    /// Speed, acceleration and jerk of the guide along a straight line: m/s, m/s^2, m/s^3.
+    pub line: ProfileLimits,
+}
+
+/// Part of a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Phase {
+    /// From the start posture to the pre-entry pose.
+    Transfer,
+    /// Straight along the needle axis to the guide's final place.
+    Approach,
+    /// Standing still at the final place.
+    Hold,
+}
+
+impl Phase {
+    /// Name as reports print it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Transfer => "transfer",
+            Self::Approach => "approach",
+            Self::Hold => "hold",
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Course {
+    /// `from + fraction * delta`.
+    Straight {
+        from: Joints,
+        delta: Joints,
+        profile: DoubleS,
+    },
+    /// Along a line of the tool; the profile runs in metres, slowed down by `time_scale >= 1`.
+    Line {
+        path: LinePath,
+        profile: DoubleS,
+        time_scale: f64,
+    },
+    /// At rest.
+    Hold { position: Joints },
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Segment {
+    phase: Phase,
+    start_s: f64,
+    duration_s: f64,
+    course: Course,
+}
+
+/// A motion of all joints, from rest to rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointTrajectory {
+    segments: Vec<Segment>,
+    end: Joints,
+}
+
+impl JointTrajectory {
+    /// A trajectory of no duration at `start`; segments are then appended.
+    pub fn starting_at(start: Joints) -> Self {
+        Self {
+            segments: Vec::new(),
+            end: start,
+        }
+    }
+
+    /// Appends the straight joint motion to `to`, all joints synchronised.
+    #[must_use]
+    pub fn then_straight_to(mut self, phase: Phase, to: Joints, limits: &MotionLimits) -> Self {
+        let from = self.end;
+        let delta = to - from;
+        // Every joint moves as `fraction * delta_i`: the slowest joint sets the fraction's limits.
+        let slowest = |limit: &Joints| {
+            (0..JOINT_COUNT)
+                .filter(|&i| delta[i] != 0.0)
+                .map(|i| limit[i] / delta[i].abs())
+                .fold(f64::INFINITY, f64::min)
+        };
+        if delta == Joints::zeros() {
+            return self;
+        }
+        let profile = DoubleS::new(
+            1.0,
+            &ProfileLimits {
+                velocity: slowest(&limits.velocity),
+                acceleration: slowest(&limits.acceleration),
+                jerk: slowest(&limits.jerk),
+            },
+        );
+        let duration_s = profile.duration_s();
+        self.push(
+            phase,
+            duration_s,
+            Course::Straight {
+                from,
+                delta,
+                profile,
+            },
+        );
+        self.end = to;
+        self
+    }
+
+    /// Appends a straight line of the tool, which has to start where this trajectory ends.
+    ///
+    /// The profile keeps the line's limits; where a joint would exceed its own, the whole line is
+    /// slowed down uniformly until none does.
+    #[must_use]
+    pub fn then_along(mut self, phase: Phase, path: LinePath, limits: &MotionLimits) -> Self {
+        debug_assert!(
+            (path.start() - self.end).amax() < 1e-9,
+            "line starts elsewhere"
+        );
+        if path.length_m() <= 0.0 {
+            return self;
+        }
+        let profile = DoubleS::new(path.length_m(), &limits.line);
+        let time_scale = line_time_scale(&path, &profile, limits);
+        self.end = path.end();
+        let duration_s = profile.duration_s() * time_scale;
+        self.push(
+            phase,
+            duration_s,
+            Course::Line {
+                path,
+                profile,
+                time_scale,
+            },
+        );
+        self
+    }
+
+    /// Appends a rest.
+    #[must_use]
+    pub fn then_hold(mut self, phase: Phase, duration_s: f64) -> Self {
+        let position = self.end;
+        self.push(phase, duration_s, Course::Hold { position });
+        self
+    }
+
+    fn push(&mut self, phase: Phase, duration_s: f64, course: Course) {
+        let start_s = self.duration_s();
+        self.segments.push(Segment {
+            phase,
+            start_s,
+            duration_s,
+            course,
+        });
+    }
+
+    /// Time of the last segment's end, s.
+    pub fn duration_s(&self) -> f64 {
+        self.segments
+            .last()
+            .map_or(0.0, |segment| segment.start_s + segment.duration_s)
+    }
+
+    /// Last position, rad.
+    pub fn end(&self) -> Joints {
+        self.end
+    }
+
+    /// Phases with their start and end times, s.
+    pub fn phases(&self) -> Vec<(Phase, f64, f64)> {
+        self.segments
+            .iter()
+            .map(|segment| {
+                (
+                    segment.phase,
+                    segment.start_s,
+                    segment.start_s + segment.duration_s,
+                )
+            })
+            .collect()
+    }
+
+    /// Phase at a time; the last one after the end.
+    pub fn phase_at(&self, time_s: f64) -> Phase {
+        self.segment_at(time_s)
+            .map_or(Phase::Hold, |segment| segment.phase)
+    }
+
+    /// Reference at a time; at rest before the start and after the end.
+    pub fn sample(&self, time_s: f64) -> JointState {
+        let Some(segment) = self.segment_at(time_s) else {
+            return JointState::at_rest(self.end);
+        };
+        let local_s = (time_s - segment.start_s).clamp(0.0, segment.duration_s);
+        match &segment.course {
+            Course::Straight {
+                from,
+                delta,
+                profile,
+            } => {
+                let fraction = profile.sample(local_s);
+                JointState {
+                    position: from + delta * fraction.position,
+                    velocity: delta * fraction.velocity,
+                    acceleration: delta * fraction.acceleration,
+                }
+            }
+            Course::Line {
+                path,
+                profile,
+                time_scale,
+            } => {
+                let along = profile.sample(local_s / time_scale);
+                let (velocity, acceleration) = (
+                    along.velocity / time_scale,
+                    along.acceleration / time_scale.powi(2),
+                );
+                let point = path.sample(along.position);
+                JointState {
+                    position: point.position,
+                    velocity: point.first * velocity,
+                    acceleration: point.second * velocity.powi(2) + point.first * acceleration,
+                }
+            }
+            Course::Hold { position } => JointState::at_rest(*position),
+        }
+    }
+
+    fn segment_at(&self, time_s: f64) -> Option<&Segment> {
+        let next = self
+            .segments
+            .partition_point(|segment| segment.start_s <= time_s);
+        self.segments.get(next.saturating_sub(1))
+    }
+}
+
+/// Samples at which a line's joint speeds are compared with the limits.
+const LINE_SAMPLES: u32 = 512;
+
+fn line_time_scale(path: &LinePath, profile: &DoubleS, limits: &MotionLimits) -> f64 {
+    let mut scale: f64 = 1.0;
+    for k in 0..=LINE_SAMPLES {
+        let t = profile.duration_s() * f64::from(k) / f64::from(LINE_SAMPLES);
+        let along = profile.sample(t);
+        let point = path.sample(along.position);
+        let (v, a, j) = (along.velocity, along.acceleration, along.jerk);
+        let velocity = point.first * v;
+        let acceleration = point.second * v.powi(2) + point.first * a;
+        let jerk = point.third * v.powi(3) + point.second * (3.0 * v * a) + point.first * j;
+        for i in 0..JOINT_COUNT {
+            scale = scale
+                .max(velocity[i].abs() / limits.velocity[i])
+                .max((acceleration[i].abs() / limits.acceleration[i]).sqrt())
+                .max((jerk[i].abs() / limits.jerk[i]).cbrt());
+        }
+    }
+    scale
+}
+
+#[cfg(test)]
+mod tests;
