@@ -1,10 +1,31 @@
 //! Scenario and model files, resolved into one validated cell.
+//!
+//! [`load_scenario`] is the way in: it reads a scenario and all that it names and gives a
+//! [`ResolvedScenario`], or [`Finding`]s that say what to mend and where.
 
+mod files;
+mod finding;
+pub mod fixtures;
+mod goal;
+mod mesh;
 mod model;
+pub mod phantom;
+mod resolve;
+mod robot;
+pub mod scenario;
 pub mod shape;
 mod tessellate;
+mod toml_text;
+mod tool;
+mod urdf;
 
+pub use files::{PackagePaths, sha256_hex};
+pub use finding::{Finding, nearest_name};
+pub use goal::{Expectation, Goal, PlacedPhantom, REJECTION_RULES, Roll};
+pub use mesh::convex_hull;
 pub use model::{
     BodyKind, BodyPair, Cell, ClearanceClass, CollisionBody, Frame, Link, ModelSource, Needle,
     NeedleCorridor, Robot, Tool,
 };
+pub use resolve::{Overrides, ResolvedScenario, load_robot, load_scenario, resolve_scenario};
+pub use robot::MissingInertia;

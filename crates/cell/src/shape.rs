@@ -36,6 +36,30 @@ pub enum Shape {
     Convex(Arc<ConvexMesh>),
 }
 
+impl Shape {
+    /// Radius of a ball about the shape's origin that holds it, m.
+    pub fn bounding_radius_m(&self) -> f64 {
+        match self {
+            Self::Sphere { radius_m } => *radius_m,
+            Self::Cylinder {
+                radius_m,
+                half_length_m,
+            } => radius_m.hypot(*half_length_m),
+            Self::Capsule {
+                radius_m,
+                half_length_m,
+            } => radius_m + half_length_m,
+            Self::Cuboid { half_extents_m } => half_extents_m.norm(),
+            Self::Convex(mesh) => mesh
+                .0
+                .vertices_m
+                .iter()
+                .map(|vertex| vertex.coords.norm())
+                .fold(0.0, f64::max),
+        }
+    }
+}
+
 /// A closed triangle mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TriangleMesh {

@@ -1,1 +1,26 @@
-//! engine
+//! Physics engines behind one interface: the same robot, the same geometry, the same servo.
+//!
+//! A [`Plant`] is the arm in an engine: it advances one step under joint torques. [`simulate`]
+//! drives any plant along a trajectory with the [`Servo`] and returns a [`Recording`]. Both plants
+//! are built from the one [`Cell`](needlebench_cell::Cell), so that what differs between their
+//! recordings is the engines' doing.
+
+mod contact_groups;
+mod error;
+pub mod mujoco;
+mod plant;
+mod rapier;
+mod recording;
+mod servo;
+mod simulate;
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+mod test_cell;
+
+pub use error::EngineError;
+pub use mujoco::{MujocoIntegrator, MujocoPlant, MujocoSettings};
+pub use plant::{Contact, EngineIdentity, Plant, PlantState};
+pub use rapier::{RapierPlant, RapierSettings};
+pub use recording::{Cost, Recording};
+pub use servo::{Servo, ServoGains, ServoOutput};
+pub use simulate::{Hooks, simulate};

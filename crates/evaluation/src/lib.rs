@@ -1,1 +1,18 @@
-//! evaluation
+//! Recordings to measurements, criteria and the report.
+//!
+//! Definitions are those of the field: see each field's documentation. SI units and radians.
+
+mod clearance;
+mod criteria;
+mod judge;
+mod motion;
+mod needle;
+pub mod report;
+
+pub use clearance::{
+    ClearanceSeries, measure_clearance, needle_route, posture_clearance, sample_indices,
+};
+pub use criteria::{Criterion, check_configuration};
+pub use judge::{counts_as_clearance, judge, recommend};
+pub use motion::{EngineDifference, MotionMeasurement, engine_difference, measure_motion};
+pub use needle::{NeedleMeasurement, measure_needle};

@@ -1,1 +1,15 @@
-//! needlebench
+//! The testbench: pipeline, command line and output formats.
+//!
+//! Data goes to standard output, logs and progress to standard error.
+
+mod cli;
+mod command;
+pub mod exit;
+mod output;
+pub mod picture;
+mod pipeline;
+mod progress;
+mod provenance;
+
+pub use cli::{command_line, main};
+pub use pipeline::{EngineChoice, RunOptions, ScenarioRun, run_scenario};

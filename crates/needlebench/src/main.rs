@@ -1,1 +1,7 @@
-fn main() {}
+//! The `needlebench` program.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    needlebench::main()
+}

@@ -1,1 +1,12 @@
-//! planning
+//! From goals to candidates and motions: which configurations work, and why others do not.
+//!
+//! For each goal all eight configurations get a [`ConfigurationPlan`], never fewer: one that
+//! cannot work carries the rules that reject it, the first failing one first.
+
+mod motion;
+mod plan;
+mod rejection;
+
+pub use motion::MotionChecker;
+pub use plan::{Candidate, ConfigurationPlan, GoalPlan, Planner, PostureMargins};
+pub use rejection::{Rejection, Rule};

@@ -118,6 +118,15 @@ impl LinePath {
         self.knots[self.knots.len() - 1].position
     }
 
+    /// The same line with whole turns added to joints.
+    pub fn shifted(&self, shift: &Joints) -> Self {
+        let mut path = self.clone();
+        for knot in &mut path.knots {
+            knot.position += shift;
+        }
+        path
+    }
+
     /// Point at distance `s_m` from the start: quintic Hermite interpolation.
     pub fn sample(&self, s_m: f64) -> PathPoint {
         let intervals = self.knots.len() - 1;

@@ -1,0 +1,158 @@
+//! Model files: shipped inside the program, or on disk.
+
+use std::fmt::Write as _;
+use std::path::{Component, Path, PathBuf};
+
+use include_dir::{Dir, include_dir};
+use sha2::{Digest, Sha256};
+
+use crate::{Finding, ModelSource};
+
+static BUILTIN: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/../../models");
+
+/// Prefix of shipped models in scenario files and reports.
+const BUILTIN_PREFIX: &str = "builtin:";
+
+/// Where a file is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Location {
+    /// Path inside the shipped `models` folder.
+    Builtin(PathBuf),
+    /// Path on disk.
+    Disk(PathBuf),
+}
+
+/// Search paths for `package://NAME/...`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct PackagePaths(Vec<(String, PathBuf)>);
+
+impl PackagePaths {
+    /// Reads `NAME=DIR` arguments.
+    ///
+    /// # Errors
+    /// A [`Finding`] for an argument without `=` or a folder that does not exist.
+    pub fn from_arguments(arguments: &[String]) -> Result<Self, Finding> {
+        let mut paths = Vec::new();
+        for argument in arguments {
+            let Some((name, folder)) = argument.split_once('=') else {
+                return Err(Finding::new(
+                    "--package-path",
+                    format!("`{argument}` is not NAME=DIR"),
+                )
+                .hint("for example --package-path ur_description=/opt/ur_description"));
+            };
+            if !Path::new(folder).is_dir() {
+                return Err(Finding::new(
+                    "--package-path",
+                    format!("the folder `{folder}` of package `{name}` does not exist"),
+                ));
+            }
+            paths.push((name.to_owned(), PathBuf::from(folder)));
+        }
+        Ok(Self(paths))
+    }
+}
+
+impl Location {
+    /// Reads a model reference of a scenario: the name of a shipped model, or a path relative to
+    /// the scenario's folder. `folder` and `extension` say where shipped ones are.
+    pub(crate) fn of_model(reference: &str, folder: &str, extension: &str, base: &Path) -> Self {
+        let name = reference.strip_prefix(BUILTIN_PREFIX).unwrap_or(reference);
+        let builtin = PathBuf::from(folder).join(format!("{name}.{extension}"));
+        let is_name = !name.contains(['/', '\\']) && Path::new(name).extension().is_none();
+        if is_name && (reference != name || BUILTIN.get_file(&builtin).is_some()) {
+            return Self::Builtin(builtin);
+        }
+        Self::Disk(base.join(reference))
+    }
+
+    /// Names of the shipped models in a folder.
+    pub(crate) fn builtin_names(folder: &str, extension: &str) -> Vec<String> {
+        let mut names: Vec<String> = BUILTIN
+            .get_dir(folder)
+            .into_iter()
+            .flat_map(Dir::files)
+            .filter(|file| {
+                file.path()
+                    .extension()
+                    .is_some_and(|found| found == extension)
+            })
+            .filter_map(|file| Some(file.path().file_stem()?.to_str()?.to_owned()))
+            .collect();
+        names.sort();
+        names
+    }
+
+    /// As users see it.
+    pub(crate) fn display(&self) -> String {
+        match self {
+            Self::Builtin(path) => format!("{BUILTIN_PREFIX}{}", path.display()),
+            Self::Disk(path) => path.display().to_string(),
+        }
+    }
+
+    pub(crate) fn read(&self) -> Result<Vec<u8>, String> {
+        match self {
+            Self::Builtin(path) => BUILTIN
+                .get_file(path)
+                .map(|file| file.contents().to_vec())
+                .ok_or_else(|| "no such shipped model".to_owned()),
+            Self::Disk(path) => std::fs::read(path).map_err(|error| error.to_string()),
+        }
+    }
+
+    /// A mesh file that a URDF at `self` names.
+    pub(crate) fn mesh(&self, name: &str, packages: &PackagePaths) -> Result<Self, String> {
+        if let Some(rest) = name.strip_prefix("package://") {
+            let (package, inside) = rest.split_once('/').unwrap_or((rest, ""));
+            return packages
+                .0
+                .iter()
+                .find(|(known, _)| known == package)
+                .map(|(_, folder)| Self::Disk(folder.join(inside)))
+                .ok_or_else(|| {
+                    format!("package `{package}` is not known: give --package-path {package}=DIR")
+                });
+        }
+        let name = name.strip_prefix("file://").unwrap_or(name);
+        let sibling = |path: &Path| path.parent().unwrap_or(Path::new("")).join(name);
+        Ok(match self {
+            Self::Builtin(path) => Self::Builtin(normalized(&sibling(path))),
+            Self::Disk(path) => Self::Disk(sibling(path)),
+        })
+    }
+}
+
+/// Removes `.` and `..`, which the shipped folder does not resolve.
+fn normalized(path: &Path) -> PathBuf {
+    let mut parts = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::ParentDir => {
+                parts.pop();
+            }
+            Component::CurDir => {}
+            other => parts.push(other),
+        }
+    }
+    parts
+}
+
+/// Name and SHA-256 of a file.
+pub(crate) fn source_of(file: String, bytes: &[u8]) -> ModelSource {
+    ModelSource {
+        file,
+        sha256: sha256_hex(bytes),
+    }
+}
+
+/// SHA-256 of bytes, as lower-case hex.
+pub fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes)
+        .iter()
+        .fold(String::new(), |mut text, byte| {
+            // Writing to a String cannot fail.
+            let _ = write!(text, "{byte:02x}");
+            text
+        })
+}

@@ -1,0 +1,269 @@
+//! A parametric chest phantom made of convex solids.
+//!
+//! Frame `phantom`: anatomical LPS. +x to the patient's left, +y posterior, +z towards the head;
+//! origin in the mid-sagittal plane, at half depth and half length. Metres.
+//!
+//! The same parameters always give the same phantom, bit for bit. The sources of the numbers are
+//! in `models/chest_phantom/README.md`.
+
+mod envelope;
+mod error;
+mod half_spaces;
+mod loft;
+mod markers;
+mod organs;
+mod parameters;
+mod skeleton;
+mod solids;
+
+#[cfg(test)]
+mod tests;
+
+use std::fmt;
+
+use nalgebra::{Point3, UnitQuaternion, UnitVector3};
+use serde::{Deserialize, Serialize};
+
+pub use error::PhantomError;
+pub use parameters::{LesionParameters, MarkerParameters, PhantomParameters};
+
+#[cfg(test)]
+pub(crate) use loft::assert_convex_and_closed;
+
+use crate::shape::{Shape, Solid};
+use envelope::Envelope;
+use half_spaces::HalfSpaces;
+
+const SKIN_RGBA: [f32; 4] = [0.90, 0.72, 0.60, 0.35];
+const LESION_RGBA: [f32; 4] = [0.95, 0.80, 0.10, 1.0];
+
+/// Names of the shipped sizes.
+pub const SIZE_PRESETS: [&str; 6] = {
+    let mut names = [""; 6];
+    let mut k = 0;
+    while k < names.len() {
+        names[k] = parameters::PRESETS[k].0;
+        k += 1;
+    }
+    names
+};
+
+/// What a part of the phantom is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Tissue {
+    /// The outer surface.
+    Skin,
+    /// Ribs with their cartilages, sternum, spine.
+    Bone,
+    /// Arteries and veins.
+    Vessel,
+    /// Lungs, heart, liver.
+    Organ,
+    /// A target.
+    Lesion,
+    /// A registration marker on the skin.
+    Marker,
+}
+
+impl fmt::Display for Tissue {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.pad(match self {
+            Self::Skin => "skin",
+            Self::Bone => "bone",
+            Self::Vessel => "vessel",
+            Self::Organ => "organ",
+            Self::Lesion => "lesion",
+            Self::Marker => "marker",
+        })
+    }
+}
+
+/// One convex piece of the phantom.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhantomPart {
+    /// Unique within the phantom; the same as the solid's name.
+    pub name: String,
+    /// What the piece is made of.
+    pub tissue: Tissue,
+    /// Groups the pieces of one structure, e.g. `rib_left_4`, `spine`, `lung_right`; for a lesion,
+    /// the organ around it. `None` for the skin.
+    pub organ: Option<String>,
+    /// The solid, in the phantom frame.
+    pub solid: Solid,
+    /// Red, green, blue, opacity, each 0 to 1 (sRGB).
+    pub color_rgba: [f32; 4],
+}
+
+/// A spherical target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lesion {
+    /// Unique among the lesions. The part is named `lesion_` and this.
+    pub name: String,
+    /// Centre, phantom frame.
+    pub center_m: Point3<f64>,
+    /// Diameter, m.
+    pub diameter_m: f64,
+    /// The organ that contains the whole lesion, if one does.
+    pub organ: Option<String>,
+}
+
+/// A registration marker on the skin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marker {
+    /// Unique among the markers; also the name of the white disc's part.
+    pub name: String,
+    /// Centre of the disc's outer face, where black and white quadrants meet; phantom frame.
+    pub center_m: Point3<f64>,
+    /// Outward normal of the disc and of the skin under it, phantom frame.
+    pub normal: UnitVector3<f64>,
+}
+
+/// The chest phantom.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Phantom {
+    /// What it was built from.
+    pub parameters: PhantomParameters,
+    /// All pieces. The skin is the first; it encloses all others but the markers.
+    pub parts: Vec<PhantomPart>,
+    /// Targets, in the order of the parameters.
+    pub lesions: Vec<Lesion>,
+    /// Skin markers, in the order of the parameters.
+    pub markers: Vec<Marker>,
+    skin_faces: HalfSpaces,
+}
+
+impl Phantom {
+    /// Parameters of a shipped size: one of [`SIZE_PRESETS`].
+    pub fn size_preset(name: &str) -> Result<PhantomParameters, PhantomError> {
+        PhantomParameters::preset(name)
+    }
+
+    /// Builds the phantom, and checks that every part but the markers is inside the skin.
+    pub fn build(parameters: &PhantomParameters) -> Result<Self, PhantomError> {
+        parameters.validate()?;
+        let envelope = Envelope::new(parameters)?;
+        let frame = envelope.frame();
+        let skin = PhantomPart {
+            name: "skin".to_owned(),
+            tissue: Tissue::Skin,
+            organ: None,
+            solid: solids::convex(
+                "skin".to_owned(),
+                envelope.skin_mesh(),
+                needlebench_kinematics::Pose::identity(),
+            ),
+            color_rgba: SKIN_RGBA,
+        };
+        let skin_faces = HalfSpaces::of(&skin.solid).expect("the skin is a convex mesh");
+
+        let mut inner = skeleton::bones(parameters, &envelope, &frame);
+        inner.extend(organs::organs(&envelope, &frame));
+        for part in &inner {
+            let depth_m = skin_faces.depth_of_solid_m(&part.solid);
+            if depth_m < 0.0 {
+                return Err(PhantomError::PartOutsideSkin {
+                    part: part.name.clone(),
+                    by_mm: -1e3 * depth_m,
+                });
+            }
+        }
+
+        let mut lesions = Vec::with_capacity(parameters.lesions.len());
+        for wanted in &parameters.lesions {
+            let (lesion, part) = lesion(wanted, &skin_faces, &inner)?;
+            lesions.push(lesion);
+            inner.push(part);
+        }
+        let mut parts = vec![skin];
+        parts.extend(inner);
+        let mut markers = Vec::with_capacity(parameters.markers.len());
+        for placement in &parameters.markers {
+            let (marker, marker_parts) = markers::marker(placement, parameters, &skin_faces)?;
+            markers.push(marker);
+            parts.extend(marker_parts);
+        }
+        Ok(Self {
+            parameters: parameters.clone(),
+            parts,
+            lesions,
+            markers,
+            skin_faces,
+        })
+    }
+
+    /// The outer surface: one closed convex mesh, phantom frame.
+    pub fn skin(&self) -> &Solid {
+        &self.parts[0].solid
+    }
+
+    /// Where a line pierces the skin: the distances `s` in m of `origin + s * direction` (phantom
+    /// frame) at which it enters and leaves.
+    ///
+    /// Exact for the polyhedral skin. Negative distances lie behind the origin: an origin inside
+    /// has `enter_m < 0 < leave_m`. `None` when the line misses the skin or only grazes it.
+    pub fn skin_intersection(
+        &self,
+        origin: &Point3<f64>,
+        direction: &UnitVector3<f64>,
+    ) -> Option<(f64, f64)> {
+        self.skin_faces.clip_line(origin, direction)
+    }
+
+    /// Whether a point (phantom frame) is inside the skin or on it.
+    pub fn skin_contains(&self, point: &Point3<f64>) -> bool {
+        self.skin_signed_depth(point) >= 0.0
+    }
+
+    /// Depth of a point (phantom frame) under the skin, m: positive inside, negative outside.
+    ///
+    /// Exact inside. Outside, the magnitude is a lower bound of the distance, exact opposite a
+    /// face: the distance to the furthest face plane that the point is in front of.
+    pub fn skin_signed_depth(&self, point: &Point3<f64>) -> f64 {
+        self.skin_faces.depth_m(point)
+    }
+}
+
+/// Places a lesion and finds the organ that contains it.
+fn lesion(
+    wanted: &LesionParameters,
+    skin: &HalfSpaces,
+    anatomy: &[PhantomPart],
+) -> Result<(Lesion, PhantomPart), PhantomError> {
+    let center_m = Point3::from(wanted.center_mm.map(|mm| 1e-3 * mm));
+    let radius_m = 0.5e-3 * wanted.diameter_mm;
+    let beyond_m = radius_m - skin.depth_m(&center_m);
+    if beyond_m > 0.0 {
+        return Err(PhantomError::LesionOutsideSkin {
+            lesion: wanted.name.clone(),
+            center_mm: wanted.center_mm,
+            by_mm: 1e3 * beyond_m,
+        });
+    }
+    let organ = anatomy
+        .iter()
+        .filter(|part| part.tissue == Tissue::Organ)
+        .find(|part| {
+            HalfSpaces::of(&part.solid).is_some_and(|faces| faces.depth_m(&center_m) >= radius_m)
+        })
+        .and_then(|part| part.organ.clone());
+    let name = format!("lesion_{}", wanted.name);
+    let part = PhantomPart {
+        name: name.clone(),
+        tissue: Tissue::Lesion,
+        organ: organ.clone(),
+        solid: Solid {
+            name,
+            shape: Shape::Sphere { radius_m },
+            parent_from_shape: solids::pose(center_m, UnitQuaternion::identity()),
+        },
+        color_rgba: LESION_RGBA,
+    };
+    let lesion = Lesion {
+        name: wanted.name.clone(),
+        center_m,
+        diameter_m: 2.0 * radius_m,
+        organ,
+    };
+    Ok((lesion, part))
+}

@@ -1,0 +1,372 @@
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+use super::loft::assert_convex_and_closed;
+use super::*;
+
+/// Rounding of coordinates below 1 m, with two decimal digits to spare.
+const ROUNDING_M: f64 = 1e-12;
+
+fn every_size() -> impl Iterator<Item = Phantom> {
+    SIZE_PRESETS
+        .iter()
+        .map(|name| Phantom::build(&Phantom::size_preset(name).unwrap()).unwrap())
+}
+
+fn part<'a>(phantom: &'a Phantom, name: &str) -> &'a Solid {
+    let found = phantom.parts.iter().find(|part| part.name == name);
+    &found.unwrap_or_else(|| panic!("no part {name}")).solid
+}
+
+fn faces(phantom: &Phantom, name: &str) -> HalfSpaces {
+    HalfSpaces::of(part(phantom, name)).unwrap()
+}
+
+/// Points on the surface of a part, about 2 mm apart or closer.
+fn surface(solid: &Solid) -> Vec<Point3<f64>> {
+    const RINGS: usize = 24;
+    const SPOKES: usize = 24;
+    let local: Vec<Point3<f64>> = match &solid.shape {
+        Shape::Capsule {
+            radius_m,
+            half_length_m,
+        }
+        | Shape::Cylinder {
+            radius_m,
+            half_length_m,
+        } => (0..=RINGS)
+            .flat_map(|ring| (0..SPOKES).map(move |spoke| (ring, spoke)))
+            .map(|(ring, spoke)| {
+                let (sine, cosine) = (TAU * spoke as f64 / SPOKES as f64).sin_cos();
+                let z_m = half_length_m * (2.0 * ring as f64 / RINGS as f64 - 1.0);
+                Point3::new(radius_m * cosine, radius_m * sine, z_m)
+            })
+            .collect(),
+        Shape::Cuboid { half_extents_m } => [-1.0, 0.0, 1.0]
+            .into_iter()
+            .flat_map(|x| [-1.0, 1.0].map(|y| [x, y]))
+            .flat_map(|[x, y]| (-12..=12).map(move |z| [x, y, f64::from(z) / 12.0]))
+            .map(|corner| Point3::from(Vector3::from(corner).component_mul(half_extents_m)))
+            .collect(),
+        Shape::Sphere { .. } | Shape::Convex(_) => panic!("not a bone's shape"),
+    };
+    local
+        .into_iter()
+        .map(|point| solid.parent_from_shape * point)
+        .collect()
+}
+
+#[test]
+fn skin_is_as_broad_deep_and_long_as_stated() {
+    for phantom in every_size() {
+        let Shape::Convex(mesh) = &phantom.skin().shape else {
+            panic!("the skin is a mesh");
+        };
+        let size = &phantom.parameters;
+        for (axis, size_mm) in [size.breadth_mm, size.depth_mm, size.length_mm]
+            .into_iter()
+            .enumerate()
+        {
+            let values = || mesh.0.vertices_m.iter().map(|vertex| vertex[axis]);
+            let half_m = 0.5e-3 * size_mm;
+            assert!((values().fold(f64::MIN, f64::max) - half_m).abs() < ROUNDING_M);
+            assert!((values().fold(f64::MAX, f64::min) + half_m).abs() < ROUNDING_M);
+        }
+    }
+}
+
+#[test]
+fn every_mesh_of_every_size_is_convex_and_closed() {
+    for phantom in every_size() {
+        for part in &phantom.parts {
+            if let Shape::Convex(mesh) = &part.solid.shape {
+                assert!(assert_convex_and_closed(mesh) > 0.0, "{}", part.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_lesion_of_every_size_is_inside_a_lung() {
+    for phantom in every_size() {
+        assert!(phantom.lesions.len() >= 5);
+        for lesion in &phantom.lesions {
+            let side = if lesion.center_m.x > 0.0 {
+                "lung_left"
+            } else {
+                "lung_right"
+            };
+            assert_eq!(lesion.organ.as_deref(), Some(side), "{}", lesion.name);
+            assert!((0.008..=0.030).contains(&lesion.diameter_m));
+        }
+    }
+}
+
+#[test]
+fn bones_lie_under_soft_tissue() {
+    /// The thinnest cover in the shipped sizes is 7.1 mm, over the first vertebra's end.
+    const COVER_M: f64 = 0.006;
+    for phantom in every_size() {
+        for part in phantom.parts.iter().filter(|p| p.tissue == Tissue::Bone) {
+            let depth_m = phantom.skin_faces.depth_of_solid_m(&part.solid);
+            assert!(depth_m > COVER_M, "{}: {depth_m} m", part.name);
+        }
+    }
+}
+
+#[test]
+fn no_bone_enters_lung_heart_or_liver() {
+    for phantom in every_size() {
+        for organ in ["lung_left", "lung_right", "heart", "liver"] {
+            let faces = faces(&phantom, organ);
+            for bone in phantom.parts.iter().filter(|p| p.tissue == Tissue::Bone) {
+                for point in surface(&bone.solid) {
+                    assert!(faces.depth_m(&point) < 0.0, "{} in {organ}", bone.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn lungs_heart_and_spine_are_apart() {
+    for phantom in every_size() {
+        let heart = part(&phantom, "heart");
+        for name in ["lung_left", "lung_right"] {
+            assert!(faces(&phantom, name).gap_m(heart) > 0.0, "{name}");
+        }
+        let left = part(&phantom, "lung_left");
+        assert!(faces(&phantom, "lung_right").gap_m(left) > 0.0);
+        for bone in &phantom.parts {
+            if bone.organ.as_deref() == Some("spine") {
+                assert!(faces(&phantom, "heart").gap_m(&bone.solid) > 0.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn lungs_fill_the_rib_cage_without_reaching_the_ribs() {
+    /// The ribs' inner side stays 3.5 mm off the nominal pleura; the lungs' tips, which are not
+    /// scaled with the walls, pass it by up to 2 mm in the smallest size.
+    const BEYOND_M: f64 = 2.5e-3;
+    for phantom in every_size() {
+        let envelope = Envelope::new(&phantom.parameters).unwrap();
+        let mut breadth_m = 0.0;
+        for name in ["lung_left", "lung_right"] {
+            let solid = part(&phantom, name);
+            let Shape::Convex(mesh) = &solid.shape else {
+                panic!("a lung is a mesh");
+            };
+            let points = mesh
+                .0
+                .vertices_m
+                .iter()
+                .map(|p| solid.parent_from_shape * p);
+            breadth_m += points.clone().map(|p| p.x.abs()).fold(0.0, f64::max);
+            for p in points {
+                let cage = envelope.cage_section(p.z).grown_by(BEYOND_M);
+                let across = (p.x / cage.half_width_m).abs().powf(cage.exponent);
+                let along = ((p.y - cage.center_y_m) / cage.half_depth_m).abs();
+                assert!(across + along.powf(cage.exponent) < 1.0, "{name} at {p}");
+            }
+        }
+        assert!(breadth_m > 0.95 * 2.0 * envelope.widest_cage().half_width_m);
+    }
+}
+
+#[test]
+fn chest_wall_is_as_thick_as_stated_where_it_is_measured() {
+    /// The lung keeps up to 7 mm from the cage there, since it closes towards its apex; nowhere is
+    /// it nearer than the parameter says.
+    const EXCESS_MM: f64 = 7.0;
+    for phantom in every_size() {
+        let size = &phantom.parameters;
+        for (name, sign) in [("lung_left", 1.0), ("lung_right", -1.0)] {
+            let z_m = 0.42 * 0.5e-3 * size.length_mm;
+            let in_front = Point3::new(sign * 0.25e-3 * size.breadth_mm, -1.0, z_m);
+            let backwards = Vector3::y_axis();
+            let (skin_m, _) = phantom.skin_intersection(&in_front, &backwards).unwrap();
+            let (lung_m, _) = faces(&phantom, name)
+                .clip_line(&in_front, &backwards)
+                .unwrap();
+            let excess_mm = 1e3 * (lung_m - skin_m) - size.chest_wall_mm;
+            assert!((0.0..EXCESS_MM).contains(&excess_mm), "{name} {excess_mm}");
+        }
+    }
+}
+
+#[test]
+fn anatomy_is_the_right_way_round() {
+    let phantom = Phantom::build(&PhantomParameters::default()).unwrap();
+    let center = |name: &str| part(&phantom, name).parent_from_shape.translation.vector;
+    assert!(center("heart").x > 0.0 && center("heart").y < 0.0);
+    assert!(center("liver").x < 0.0 && center("liver").z < center("lung_right").z);
+    assert!(center("vertebra_t7").y > 0.0 && center("sternum_body").y < 0.0);
+    assert!(center("vertebra_t1").z > center("vertebra_t12").z);
+    assert!(center("lung_left").x > 0.0 && center("lung_right").x < 0.0);
+    for number in 1..=10 {
+        for (side, sign) in [("left", 1.0), ("right", -1.0)] {
+            let piece = |k: u32| center(&format!("rib_{side}_{number}.{k}"));
+            assert!(sign * piece(5).x > 0.0);
+            assert!(piece(1).z > piece(11).z, "ribs descend forwards");
+            assert!(piece(1).y > piece(11).y);
+        }
+    }
+}
+
+#[test]
+fn part_names_are_unique_and_tissues_print_in_lower_case() {
+    for phantom in every_size() {
+        let names: BTreeSet<_> = phantom.parts.iter().map(|part| &part.name).collect();
+        assert_eq!(names.len(), phantom.parts.len());
+        for part in &phantom.parts {
+            assert_eq!(part.name, part.solid.name);
+            let json = serde_json::to_string(&part.tissue).unwrap();
+            assert_eq!(json, format!("\"{}\"", part.tissue));
+        }
+        let tissues: BTreeSet<_> = phantom.parts.iter().map(|part| part.tissue).collect();
+        assert_eq!(tissues.len(), 6);
+    }
+}
+
+#[test]
+fn same_parameters_give_the_same_phantom() {
+    assert!(every_size().eq(every_size()));
+}
+
+#[test]
+fn markers_lie_on_the_skin_and_never_in_it() {
+    for phantom in every_size() {
+        let thickness_m = 1e-3 * phantom.parameters.marker_thickness_mm;
+        assert!(phantom.markers.len() >= 6);
+        for marker in &phantom.markers {
+            let on_skin = marker.center_m - thickness_m * marker.normal.into_inner();
+            assert!(phantom.skin_signed_depth(&on_skin).abs() < ROUNDING_M);
+            assert!((phantom.skin_signed_depth(&marker.center_m) + thickness_m).abs() < ROUNDING_M);
+        }
+        for part in phantom.parts.iter().filter(|p| p.tissue == Tissue::Marker) {
+            assert!(phantom.skin_faces.gap_m(&part.solid) > -ROUNDING_M);
+        }
+    }
+}
+
+#[test]
+fn markers_can_be_told_apart_by_their_distances() {
+    /// Well above the error with which a marker can be located in CT (0.5 mm).
+    const DISTINCT_M: f64 = 1e-3;
+    /// A marker's distances to all others, sorted.
+    fn signature(phantom: &Phantom, index: usize) -> Vec<f64> {
+        let center_m = phantom.markers[index].center_m;
+        let others = phantom
+            .markers
+            .iter()
+            .map(|m| (m.center_m - center_m).norm());
+        let mut distances_m: Vec<f64> = others.collect();
+        distances_m.sort_by(f64::total_cmp);
+        distances_m
+    }
+    for phantom in every_size() {
+        for a in 0..phantom.markers.len() {
+            for b in 0..a {
+                let widest_m = signature(&phantom, a)
+                    .iter()
+                    .zip(signature(&phantom, b))
+                    .map(|(x, y)| (x - y).abs())
+                    .fold(0.0, f64::max);
+                assert!(widest_m > DISTINCT_M, "markers {a} and {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn lesion_outside_the_skin_is_refused_and_one_in_the_wall_has_no_organ() {
+    let mut parameters = PhantomParameters::default();
+    parameters.lesions[0].center_mm = [0.0, -125.0, 0.0];
+    assert!(matches!(
+        Phantom::build(&parameters),
+        Err(PhantomError::LesionOutsideSkin { lesion, .. }) if lesion == "right_upper_lobe"
+    ));
+    parameters.lesions[0].center_mm = [0.0, -110.0, 0.0];
+    let phantom = Phantom::build(&parameters).unwrap();
+    assert_eq!(phantom.lesions[0].organ, None);
+}
+
+#[test]
+fn marker_above_the_skin_is_refused() {
+    let mut parameters = PhantomParameters::default();
+    parameters.markers[0].height_mm = 203.0;
+    assert!(matches!(
+        Phantom::build(&parameters),
+        Err(PhantomError::MarkerOffSkin { marker, .. }) if marker == "marker_1"
+    ));
+}
+
+#[test]
+fn walls_that_leave_no_room_are_refused() {
+    let thick = |change: fn(&mut PhantomParameters)| {
+        let mut parameters = PhantomParameters::default();
+        change(&mut parameters);
+        Phantom::build(&parameters).unwrap_err()
+    };
+    for error in [
+        thick(|p| p.lateral_wall_mm = 110.0),
+        thick(|p| p.chest_wall_mm = 140.0),
+        thick(|p| p.chest_wall_mm = 16.0),
+    ] {
+        assert!(matches!(error, PhantomError::NoRoom { .. }), "{error}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn any_size_builds_a_closed_convex_skin_or_says_why_not(
+        breadth_mm in 150.0..600.0_f64,
+        depth_mm in 120.0..600.0_f64,
+        length_mm in 200.0..700.0_f64,
+        wall_mm in 15.0..80.0_f64,
+    ) {
+        let parameters = PhantomParameters {
+            breadth_mm,
+            depth_mm,
+            length_mm,
+            chest_wall_mm: wall_mm + 8.0,
+            lateral_wall_mm: wall_mm,
+            lesions: Vec::new(),
+            markers: Vec::new(),
+            ..PhantomParameters::default()
+        };
+        if let Ok(phantom) = Phantom::build(&parameters) {
+            let Shape::Convex(mesh) = &phantom.skin().shape else {
+                unreachable!("the skin is a mesh");
+            };
+            prop_assert!(assert_convex_and_closed(mesh) > 0.0);
+        }
+    }
+
+    #[test]
+    fn line_enters_and_leaves_on_the_skin(
+        target in prop::array::uniform3(-0.09..0.09_f64),
+        direction in prop::array::uniform3(-1.0..1.0_f64),
+        back_m in 0.0..2.0_f64,
+    ) {
+        prop_assume!(Vector3::from(direction).norm() > 0.1);
+        let phantom = Phantom::build(&PhantomParameters::default()).unwrap();
+        let direction = UnitVector3::new_normalize(Vector3::from(direction));
+        let inside = Point3::from(target);
+        prop_assert!(phantom.skin_contains(&inside));
+        let origin = inside - back_m * direction.into_inner();
+        let (enter_m, leave_m) = phantom.skin_intersection(&origin, &direction).unwrap();
+        prop_assert!(enter_m < back_m && back_m < leave_m);
+        for s in [enter_m, leave_m] {
+            let point = origin + s * direction.into_inner();
+            prop_assert!(phantom.skin_signed_depth(&point).abs() < ROUNDING_M);
+        }
+    }
+}

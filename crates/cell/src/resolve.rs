@@ -1,0 +1,741 @@
+//! From a scenario file to a resolved cell with goals.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use needlebench_kinematics::trajectory::{MotionLimits, ProfileLimits};
+use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, Pose};
+
+use crate::files::{Location, source_of};
+use crate::fixtures::{self, Fixture};
+use crate::goal::{PlacedPhantom, Surroundings, resolve_goal};
+use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
+use crate::phantom::{Phantom, PhantomParameters};
+use crate::robot::{MissingInertia, read_robot};
+use crate::scenario::{PhantomSection, Posture, Scenario};
+use crate::shape::Shape;
+use crate::toml_text::TomlText;
+use crate::tool::{ToolOverrides, read_tool};
+use crate::{Finding, Goal, PackagePaths, Robot, nearest_name};
+
+/// Standard gravity, m/s^2.
+const GRAVITY_M_S2: f64 = 9.80665;
+
+/// Outer diameters of needles by gauge, mm: the nominal sizes of the needle gauge chart.
+const NEEDLE_OUTER_DIAMETER_MM: [(u32, f64); 11] = [
+    (14, 2.108),
+    (15, 1.829),
+    (16, 1.651),
+    (17, 1.473),
+    (18, 1.270),
+    (19, 1.067),
+    (20, 0.9081),
+    (21, 0.8192),
+    (22, 0.7176),
+    (23, 0.6414),
+    (25, 0.5144),
+];
+
+/// What the command line may replace in a scenario.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Overrides {
+    /// URDF of another robot, relative to the working directory.
+    pub robot_urdf: Option<PathBuf>,
+    /// Search paths for `package://`.
+    pub packages: PackagePaths,
+    /// What to do when a moving link has no mass.
+    pub missing_inertia: Option<MissingInertia>,
+}
+
+/// A scenario with everything that it names read, checked and placed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResolvedScenario {
+    /// The file as it was read.
+    pub scenario: Scenario,
+    /// The file.
+    pub source: ModelSource,
+    /// Robot, tool and all that can be hit.
+    pub cell: Cell,
+    /// The phantom, if there is one.
+    pub phantom: Option<PlacedPhantom>,
+    /// Table, gantry and mount, for pictures.
+    pub fixtures: Vec<Fixture>,
+    /// Where needles are to go.
+    pub goals: Vec<Goal>,
+    /// Where every motion starts.
+    pub start: Joints,
+    /// Limits of the motion: the scenario's and the URDF's, whichever are lower.
+    pub motion: MotionLimits,
+    /// Parameter file of the phantom.
+    pub phantom_source: Option<ModelSource>,
+    /// What was assumed or adjusted; belongs in every report.
+    pub notes: Vec<String>,
+}
+
+/// Reads a robot without a scenario: the one of the overrides, or the shipped UR3, with its
+/// `base_link` at the world's origin.
+///
+/// # Errors
+/// What is wrong with the URDF.
+pub fn load_robot(overrides: &Overrides) -> Result<Robot, Finding> {
+    let location = match &overrides.robot_urdf {
+        Some(path) => Location::Disk(path.clone()),
+        None => Location::of_model("ur3", "ur3", "urdf", Path::new("")),
+    };
+    let missing_inertia = overrides.missing_inertia.unwrap_or_default();
+    read_robot(
+        &location,
+        &overrides.packages,
+        missing_inertia,
+        Pose::identity(),
+    )
+}
+
+/// Reads, resolves and validates a scenario file.
+///
+/// # Errors
+/// Every [`Finding`] of the first stage that has any: text, values, models, goals.
+pub fn load_scenario(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
+    let file = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        vec![Finding::new(
+            &file,
+            format!("cannot read the scenario: {error}"),
+        )]
+    })?;
+    resolve_scenario(
+        &file,
+        &text,
+        path.parent().unwrap_or(Path::new("")),
+        overrides,
+    )
+}
+
+/// Resolves a scenario's text; `base` is the folder that its paths are relative to.
+///
+/// # Errors
+/// As [`load_scenario`].
+pub fn resolve_scenario(
+    file: &str,
+    text: &str,
+    base: &Path,
+    overrides: &Overrides,
+) -> Result<ResolvedScenario, Vec<Finding>> {
+    let one = |finding: Finding| vec![finding];
+    let toml = TomlText::parse(file, text).map_err(one)?;
+    let scenario: Scenario = toml.deserialize().map_err(one)?;
+    let findings = check_values(&toml, &scenario);
+    if !findings.is_empty() {
+        return Err(findings);
+    }
+    let mut notes = Vec::new();
+    let robot_location = match &overrides.robot_urdf {
+        Some(path) => Location::Disk(path.clone()),
+        None => Location::of_model(&scenario.robot.urdf, "ur3", "urdf", base),
+    };
+    let world_from_base_link =
+        pose_of(scenario.robot.base_position_mm, scenario.robot.base_rpy_deg);
+    let robot = read_robot(
+        &robot_location,
+        &overrides.packages,
+        overrides
+            .missing_inertia
+            .unwrap_or(scenario.robot.missing_inertia),
+        world_from_base_link,
+    )
+    .map_err(|finding| {
+        one(with_model_names(
+            &toml,
+            finding,
+            &robot_location,
+            "robot.urdf",
+            "ur3",
+        ))
+    })?;
+    notes.extend(robot.notes.iter().cloned());
+
+    let tool_location = Location::of_model(&scenario.tool.urdf, "needle_guide", "urdf", base);
+    let tool_overrides = tool_overrides(&toml, &scenario).map_err(one)?;
+    let tool = read_tool(
+        &tool_location,
+        &overrides.packages,
+        &tool_overrides,
+        &mut notes,
+    )
+    .map_err(|finding| {
+        one(with_model_names(
+            &toml,
+            finding,
+            &tool_location,
+            "tool.urdf",
+            "needle_guide",
+        ))
+    })?;
+
+    let table = scenario.table.as_ref().map(fixtures::table).transpose();
+    let table = table.map_err(|e| one(toml.finding("table", e.to_string())))?;
+    let gantry = scenario.gantry.as_ref().map(fixtures::gantry).transpose();
+    let gantry = gantry.map_err(|e| one(toml.finding("gantry", e.to_string())))?;
+    let mount = scenario
+        .mount
+        .as_ref()
+        .map(|mount| fixtures::mount(mount, &world_from_base_link))
+        .transpose()
+        .map_err(|e| one(toml.finding("mount", e.to_string())))?;
+    let (phantom, phantom_source) = match &scenario.phantom {
+        None => (None, None),
+        Some(section) => {
+            let (placed, source) = place_phantom(&toml, section, &scenario, base).map_err(one)?;
+            (Some(placed), Some(source))
+        }
+    };
+
+    let mut fixtures = Vec::new();
+    let mut surroundings = Vec::new();
+    if let Some(placed) = &phantom {
+        let mut skin = placed.phantom.skin().clone();
+        skin.parent_from_shape = placed.world_from_phantom * skin.parent_from_shape;
+        surroundings.push(static_body("phantom", BodyKind::Phantom, vec![skin]));
+    }
+    for (name, kind, fixture) in [
+        ("table", BodyKind::Table, table),
+        ("gantry", BodyKind::Gantry, gantry),
+        ("mount", BodyKind::Mount, mount),
+    ] {
+        if let Some(fixture) = fixture {
+            surroundings.push(static_body(name, kind, fixture.solids.clone()));
+            fixtures.push(fixture);
+        }
+    }
+
+    let goals = {
+        let context = Surroundings {
+            robot: &robot,
+            tool: &tool,
+            phantom: phantom.as_ref(),
+            fixtures: &surroundings
+                .iter()
+                .filter(|body| body.kind != BodyKind::Phantom)
+                .cloned()
+                .collect::<Vec<_>>(),
+        };
+        let (mut goals, mut findings) = (Vec::new(), Vec::new());
+        for (index, section) in scenario.goals.iter().enumerate() {
+            match resolve_goal(&toml, index, section, &context, &mut notes) {
+                Ok(goal) => goals.push(goal),
+                Err(finding) => findings.push(finding),
+            }
+        }
+        if !findings.is_empty() {
+            return Err(findings);
+        }
+        goals
+    };
+
+    let start = Joints::from_column_slice(&scenario.start.joints_deg.map(f64::to_radians));
+    if let Some(joint) = robot.limits.first_violation(&start) {
+        let limit = robot.limits.0[joint];
+        return Err(one(toml.finding(
+            &format!("start.joints_deg[{joint}]"),
+            format!(
+                "{} starts at {:.1} deg, outside {:.1} to {:.1} deg",
+                JOINT_LABELS[joint],
+                start[joint].to_degrees(),
+                limit.lower_rad.to_degrees(),
+                limit.upper_rad.to_degrees()
+            ),
+        )));
+    }
+    let motion = motion_limits(&scenario, &robot.limits.velocities_rad_s());
+    let corridor = NeedleCorridor {
+        radius_m: scenario.tool.corridor_radius_mm * 1e-3,
+        length_m: scenario
+            .tool
+            .corridor_length_mm
+            .map_or(tool.needle.length_m, |mm| mm * 1e-3),
+    };
+    let cell = Cell::assemble(
+        robot,
+        tool,
+        corridor,
+        surroundings,
+        Joints::from_column_slice(&scenario.controller.armature_kgm2),
+        Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
+    );
+    Ok(ResolvedScenario {
+        source: source_of(file.to_owned(), text.as_bytes()),
+        cell,
+        phantom,
+        fixtures,
+        goals,
+        start,
+        motion,
+        phantom_source,
+        notes,
+        scenario,
+    })
+}
+
+fn static_body(name: &str, kind: BodyKind, solids: Vec<crate::shape::Solid>) -> CollisionBody {
+    CollisionBody {
+        name: name.to_owned(),
+        kind,
+        frame: Frame::World,
+        solids,
+    }
+}
+
+fn pose_of(position_mm: [f64; 3], rpy_deg: [f64; 3]) -> Pose {
+    let [roll, pitch, yaw] = rpy_deg.map(f64::to_radians);
+    Pose::from_parts(
+        Translation3::from(Vector3::from(position_mm) * 1e-3),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    )
+}
+
+/// A model that a scenario names but that does not exist: points at the key and lists what does.
+fn with_model_names(
+    toml: &TomlText<'_>,
+    finding: Finding,
+    location: &Location,
+    key: &str,
+    folder: &str,
+) -> Finding {
+    if location.read().is_ok() || finding.file != location.display() {
+        return finding;
+    }
+    let names = Location::builtin_names(folder, "urdf");
+    let given = location.display();
+    let stem = Path::new(&given)
+        .file_stem()
+        .and_then(|stem| stem.to_str())
+        .unwrap_or("");
+    let hint = match nearest_name(stem, names.iter().map(String::as_str)) {
+        Some(near) => format!("did you mean `{near}`? Shipped: {}", names.join(", ")),
+        None => format!(
+            "a path relative to the scenario, or a shipped model: {}",
+            names.join(", ")
+        ),
+    };
+    let mut finding = finding.hint(hint);
+    if toml.span_of(key).is_some() {
+        let placed = toml.finding(key, format!("{}: {}", location.display(), finding.message));
+        finding = Finding {
+            hint: finding.hint,
+            ..placed
+        };
+    }
+    finding
+}
+
+fn tool_overrides(toml: &TomlText<'_>, scenario: &Scenario) -> Result<ToolOverrides, Finding> {
+    let tool = &scenario.tool;
+    let needle_outer_diameter_m = match tool.needle_gauge {
+        None => None,
+        Some(gauge) => {
+            let known = NEEDLE_OUTER_DIAMETER_MM
+                .iter()
+                .find(|(each, _)| *each == gauge);
+            let Some((_, diameter_mm)) = known else {
+                return Err(toml
+                    .finding(
+                        "tool.needle_gauge",
+                        format!("there is no {gauge} gauge needle here"),
+                    )
+                    .hint("14 to 23, and 25"));
+            };
+            Some(diameter_mm * 1e-3)
+        }
+    };
+    Ok(ToolOverrides {
+        bore_m: tool.bore_mm.map(|mm| mm * 1e-3),
+        needle_gauge: tool.needle_gauge,
+        needle_outer_diameter_m,
+        needle_length_m: tool.needle_length_mm.map(|mm| mm * 1e-3),
+    })
+}
+
+fn place_phantom(
+    toml: &TomlText<'_>,
+    section: &PhantomSection,
+    scenario: &Scenario,
+    base: &Path,
+) -> Result<(PlacedPhantom, ModelSource), Finding> {
+    let location = Location::of_model(&section.model, "chest_phantom", "toml", base);
+    let bytes = location.read().map_err(|error| {
+        let names = Location::builtin_names("chest_phantom", "toml");
+        toml.finding("phantom.model", format!("{}: {error}", location.display()))
+            .hint(
+                match nearest_name(&section.model, names.iter().map(String::as_str)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("a path, or one of {}", names.join(", ")),
+                },
+            )
+    })?;
+    let file = location.display();
+    let text = String::from_utf8(bytes)
+        .map_err(|error| Finding::new(&file, format!("not UTF-8 text: {error}")))?;
+    let parameter_text = TomlText::parse(&file, &text)?;
+    let mut parameters: PhantomParameters = parameter_text.deserialize()?;
+    let sizes = [
+        (&mut parameters.breadth_mm, section.breadth_mm),
+        (&mut parameters.depth_mm, section.depth_mm),
+        (&mut parameters.length_mm, section.length_mm),
+    ];
+    let mut resized = false;
+    for (size, wanted) in sizes {
+        if let Some(wanted) = wanted {
+            *size = wanted;
+            resized = true;
+        }
+    }
+    let phantom = Phantom::build(&parameters).map_err(|error| {
+        if resized {
+            toml.finding("phantom", error.to_string())
+        } else {
+            Finding::new(&file, error.to_string())
+        }
+    })?;
+    let mut world_from_phantom = Pose::from_parts(
+        Translation3::from(Vector3::from(section.position_mm) * 1e-3),
+        orientation(section),
+    );
+    if section.rest_on_table {
+        let Some(table) = &scenario.table else {
+            return Err(toml
+                .finding("phantom.rest_on_table", "there is no [table] to rest on")
+                .hint("add a [table], or set `rest_on_table = false` and give the full position"));
+        };
+        let skin = phantom.skin();
+        let Shape::Convex(mesh) = &skin.shape else {
+            unreachable!("the phantom's skin is a convex mesh")
+        };
+        let lowest_m = mesh
+            .0
+            .vertices_m
+            .iter()
+            .map(|vertex| {
+                (world_from_phantom.rotation
+                    * (skin.parent_from_shape * Point3::from(vertex.coords)).coords)
+                    .z
+            })
+            .fold(f64::INFINITY, f64::min);
+        world_from_phantom.translation.vector.z =
+            (table.top_height_mm + section.position_mm[2]) * 1e-3 - lowest_m;
+    }
+    let source = source_of(file, text.as_bytes());
+    Ok((
+        PlacedPhantom {
+            phantom,
+            world_from_phantom,
+        },
+        source,
+    ))
+}
+
+/// Orientation of the phantom (left, posterior, superior) in the world.
+fn orientation(section: &PhantomSection) -> UnitQuaternion<f64> {
+    // With the head towards world x; columns are where left, posterior and superior point.
+    let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+    let columns = match section.posture {
+        Posture::Supine => [-y, -z, x],
+        Posture::Prone => [y, z, x],
+        Posture::LeftLateral => [-z, y, x],
+        Posture::RightLateral => [z, -y, x],
+    };
+    let posture = UnitQuaternion::from_rotation_matrix(
+        &nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&columns)),
+    );
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), section.head_yaw_deg.to_radians())
+        * posture
+        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), section.body_roll_deg.to_radians())
+}
+
+fn motion_limits(scenario: &Scenario, urdf_velocity: &Joints) -> MotionLimits {
+    let motion = &scenario.motion;
+    let wanted = Joints::repeat(motion.joint_velocity_deg_s.to_radians());
+    MotionLimits {
+        velocity: wanted.zip_map(urdf_velocity, f64::min),
+        acceleration: Joints::repeat(motion.joint_acceleration_deg_s2.to_radians()),
+        jerk: Joints::repeat(motion.joint_jerk_deg_s3.to_radians()),
+        line: ProfileLimits {
+            velocity: motion.line_velocity_mm_s * 1e-3,
+            acceleration: motion.line_acceleration_mm_s2 * 1e-3,
+            jerk: motion.line_jerk_mm_s3 * 1e-3,
+        },
+    }
+}
+
+/// Values outside their sensible ranges: a factor of a thousand is mostly a wrong unit.
+fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let mut range = |key: &str, value: f64, least: f64, most: f64, unit: &str| {
+        if !(least..=most).contains(&value) {
+            findings.push(
+                toml.finding(
+                    key,
+                    format!("`{key}` is {value} {unit}, outside {least} to {most}"),
+                )
+                .hint(format!("the value is in {unit}")),
+            );
+        }
+    };
+    for (i, value) in scenario.robot.base_position_mm.iter().enumerate() {
+        range(
+            &format!("robot.base_position_mm[{i}]"),
+            *value,
+            -5000.0,
+            5000.0,
+            "mm",
+        );
+    }
+    if let Some(phantom) = &scenario.phantom {
+        for (i, value) in phantom.position_mm.iter().enumerate() {
+            range(
+                &format!("phantom.position_mm[{i}]"),
+                *value,
+                -5000.0,
+                5000.0,
+                "mm",
+            );
+        }
+    }
+    let tool = &scenario.tool;
+    range(
+        "tool.corridor_radius_mm",
+        tool.corridor_radius_mm,
+        0.5,
+        200.0,
+        "mm",
+    );
+    for (key, value, least, most) in [
+        (
+            "tool.corridor_length_mm",
+            tool.corridor_length_mm,
+            1.0,
+            1000.0,
+        ),
+        ("tool.needle_length_mm", tool.needle_length_mm, 20.0, 500.0),
+        ("tool.bore_mm", tool.bore_mm, 0.2, 10.0),
+    ] {
+        if let Some(value) = value {
+            range(key, value, least, most, "mm");
+        }
+    }
+    let motion = &scenario.motion;
+    range(
+        "motion.joint_velocity_deg_s",
+        motion.joint_velocity_deg_s,
+        0.1,
+        360.0,
+        "deg/s",
+    );
+    range(
+        "motion.joint_acceleration_deg_s2",
+        motion.joint_acceleration_deg_s2,
+        1.0,
+        3000.0,
+        "deg/s^2",
+    );
+    range(
+        "motion.joint_jerk_deg_s3",
+        motion.joint_jerk_deg_s3,
+        10.0,
+        1e6,
+        "deg/s^3",
+    );
+    range(
+        "motion.line_velocity_mm_s",
+        motion.line_velocity_mm_s,
+        0.1,
+        1000.0,
+        "mm/s",
+    );
+    range(
+        "motion.line_acceleration_mm_s2",
+        motion.line_acceleration_mm_s2,
+        1.0,
+        1e4,
+        "mm/s^2",
+    );
+    range(
+        "motion.line_jerk_mm_s3",
+        motion.line_jerk_mm_s3,
+        10.0,
+        1e6,
+        "mm/s^3",
+    );
+    range("motion.hold_s", motion.hold_s, 0.1, 60.0, "s");
+    let planning = &scenario.planning;
+    range(
+        "planning.min_clearance_mm",
+        planning.min_clearance_mm,
+        -10.0,
+        500.0,
+        "mm",
+    );
+    range(
+        "planning.min_singularity_sine",
+        planning.min_singularity_sine,
+        0.0,
+        0.9,
+        "",
+    );
+    range(
+        "planning.min_shoulder_distance_mm",
+        planning.min_shoulder_distance_mm,
+        0.0,
+        300.0,
+        "mm",
+    );
+    range(
+        "planning.sample_spacing_mm",
+        planning.sample_spacing_mm,
+        0.1,
+        100.0,
+        "mm",
+    );
+    range(
+        "planning.roll_samples",
+        f64::from(planning.roll_samples),
+        1.0,
+        3600.0,
+        "directions",
+    );
+    let controller = &scenario.controller;
+    for i in 0..JOINT_COUNT {
+        range(
+            &format!("controller.stiffness_nm_rad[{i}]"),
+            controller.stiffness_nm_rad[i],
+            0.0,
+            1e6,
+            "N m/rad",
+        );
+        range(
+            &format!("controller.damping_nms_rad[{i}]"),
+            controller.damping_nms_rad[i],
+            0.0,
+            1e5,
+            "N m s/rad",
+        );
+        range(
+            &format!("controller.armature_kgm2[{i}]"),
+            controller.armature_kgm2[i],
+            0.0,
+            10.0,
+            "kg m^2",
+        );
+    }
+    let engines = &scenario.engines;
+    range("engines.timestep_ms", engines.timestep_ms, 0.01, 5.0, "ms");
+    range("engines.friction", engines.friction, 0.0, 10.0, "");
+    let rapier = &engines.rapier;
+    range(
+        "engines.rapier.contact_natural_frequency_hz",
+        rapier.contact_natural_frequency_hz,
+        1.0,
+        1e6,
+        "Hz",
+    );
+    range(
+        "engines.rapier.contact_damping_ratio",
+        rapier.contact_damping_ratio,
+        1e-3,
+        1e3,
+        "",
+    );
+    range(
+        "engines.rapier.contact_sweeps",
+        f64::from(rapier.contact_sweeps),
+        1.0,
+        1000.0,
+        "sweeps",
+    );
+    let mujoco = &engines.mujoco;
+    range(
+        "engines.mujoco.contact_stiffness_per_s2",
+        mujoco.contact_stiffness_per_s2,
+        1.0,
+        1e9,
+        "1/s^2",
+    );
+    range(
+        "engines.mujoco.contact_damping_per_s",
+        mujoco.contact_damping_per_s,
+        0.1,
+        1e6,
+        "1/s",
+    );
+    range(
+        "engines.mujoco.contact_impedance",
+        mujoco.contact_impedance,
+        0.01,
+        0.9999,
+        "",
+    );
+    range(
+        "engines.harness_timeout_s",
+        engines.harness_timeout_s,
+        0.1,
+        3600.0,
+        "s",
+    );
+    let recording = &scenario.recording;
+    range(
+        "recording.period_ms",
+        recording.period_ms,
+        engines.timestep_ms,
+        1000.0,
+        "ms",
+    );
+    range(
+        "criteria.settling_band_mm",
+        scenario.criteria.settling_band_mm,
+        1e-6,
+        100.0,
+        "mm",
+    );
+
+    let is_name = |name: &str| {
+        !name.is_empty()
+            && name
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
+    };
+    let mut name = |key: &str, value: &str| {
+        if !is_name(value) {
+            findings.push(
+                toml.finding(key, format!("`{value}` is not a usable name"))
+                    .hint("letters, digits, `-` and `_`: names become file names"),
+            );
+        }
+    };
+    name("name", &scenario.name);
+    for (i, goal) in scenario.goals.iter().enumerate() {
+        name(&format!("goals[{i}].name"), &goal.name);
+    }
+    for (i, goal) in scenario.goals.iter().enumerate() {
+        if scenario.goals[..i]
+            .iter()
+            .any(|earlier| earlier.name == goal.name)
+        {
+            findings.push(toml.finding(
+                &format!("goals[{i}].name"),
+                format!("two goals are named `{}`", goal.name),
+            ));
+        }
+    }
+    if scenario.goals.is_empty() {
+        findings.push(
+            toml.finding("goals", "the scenario has no goal")
+                .hint("add a [[goals]]"),
+        );
+    }
+    if scenario.engines.run.is_empty() {
+        findings.push(
+            toml.finding("engines.run", "no engine is named")
+                .hint("[\"rapier\", \"mujoco\"]"),
+        );
+    }
+    findings
+}

@@ -1,0 +1,531 @@
+//! The arm, from any URDF with the UR joint names.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use needlebench_kinematics::{
+    Body, Chain, ChainJoint, JOINT_COUNT, JOINT_NAMES, JointLimit, JointLimits, Pose, UrGeometry,
+};
+
+use crate::files::{Location, source_of};
+use crate::mesh::{convex_hull, read_stl};
+use crate::shape::{Shape, Solid, TriangleMesh, Visual};
+use crate::urdf::{Element, Geometry, JointKind, Urdf, UrdfJoint, UrdfLink};
+use crate::{Finding, Link, PackagePaths, Robot, nearest_name};
+
+/// Short names of the seven links, base first.
+const LINK_LABELS: [&str; JOINT_COUNT + 1] = [
+    "base",
+    "shoulder",
+    "upper_arm",
+    "forearm",
+    "wrist_1",
+    "wrist_2",
+    "wrist_3",
+];
+
+/// What to do when a moving link has no mass.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    serde::Serialize,
+    serde::Deserialize,
+    schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum MissingInertia {
+    /// Refuse the robot.
+    #[default]
+    Error,
+    /// Take the link's mass, centre of mass and inertia from the shipped UR3 and say so in the
+    /// report.
+    NominalUr3,
+}
+
+/// Grey of surfaces without a colour.
+const DEFAULT_COLOR: [f32; 4] = [0.7, 0.72, 0.75, 1.0];
+
+/// Reads the arm from a URDF.
+pub(crate) fn read_robot(
+    location: &Location,
+    packages: &PackagePaths,
+    missing_inertia: MissingInertia,
+    world_from_base_link: Pose,
+) -> Result<Robot, Finding> {
+    let urdf = read_urdf(location)?;
+    let mut notes = Vec::new();
+    let (joints, tip) = arm_joints(&urdf)?;
+
+    // Fixed joints between two revolute ones are folded into the next joint's origin.
+    let mut chain_joints = Vec::with_capacity(JOINT_COUNT);
+    let mut limits = Vec::with_capacity(JOINT_COUNT);
+    let mut parent = "base_link";
+    for joint in &joints {
+        let between = urdf
+            .joints_between(parent, &joint.child)
+            .expect("the joints were found along this path");
+        let parent_from_joint = between
+            .iter()
+            .fold(Pose::identity(), |pose, each| pose * each.parent_from_joint);
+        chain_joints.push(ChainJoint {
+            parent_from_joint,
+            axis: joint.axis,
+        });
+        limits.push(joint_limit(&urdf, joint)?);
+        parent = &joint.child;
+    }
+    let chain = Chain {
+        joints: chain_joints.try_into().expect("six joints"),
+        wrist_3_from_flange: fixed_pose(&urdf, parent, &tip),
+    };
+    UrGeometry::of_chain(&chain).map_err(|error| {
+        Finding::new(&urdf.file, error.to_string())
+            .hint("needlebench works with six-joint UR arms and their factory calibrations")
+    })?;
+
+    // Every URDF link belongs to the nearest moving link above it.
+    let mut owned: Vec<Vec<(&UrdfLink, Pose)>> = vec![Vec::new(); JOINT_COUNT + 1];
+    for link in &urdf.links {
+        let (owner, owner_from_link) = owner_of(&urdf, &joints, &link.name)?;
+        owned[owner].push((link, owner_from_link));
+    }
+    let mut links = Vec::with_capacity(JOINT_COUNT + 1);
+    let mut bodies = Vec::with_capacity(JOINT_COUNT);
+    for (index, members) in owned.iter().enumerate() {
+        let label = LINK_LABELS[index];
+        links.push(read_link(
+            &urdf, location, packages, label, members, &mut notes,
+        )?);
+        if index > 0 {
+            let body = body_of(
+                &urdf,
+                members,
+                label,
+                joints[index - 1],
+                missing_inertia,
+                &mut notes,
+            )?;
+            bodies.push(body);
+        }
+    }
+    let base = links.remove(0);
+    Ok(Robot {
+        name: urdf.name.clone(),
+        world_from_base_link,
+        chain,
+        base,
+        links: links.try_into().expect("six links"),
+        bodies: bodies.try_into().expect("six bodies"),
+        limits: JointLimits(limits.try_into().expect("six limits")),
+        source: source_of(location.display(), urdf.text.as_bytes()),
+        notes,
+    })
+}
+
+/// Reads and parses a URDF; says which shipped ones there are if it does not exist.
+pub(crate) fn read_urdf(location: &Location) -> Result<Urdf, Finding> {
+    let file = location.display();
+    let bytes = location
+        .read()
+        .map_err(|error| Finding::new(&file, format!("cannot read the URDF: {error}")))?;
+    Urdf::parse(&file, &bytes)
+}
+
+/// The six joints in order, and the link that is the flange.
+fn arm_joints(urdf: &Urdf) -> Result<(Vec<&UrdfJoint>, String), Finding> {
+    let names: Vec<&str> = urdf
+        .joints
+        .iter()
+        .map(|joint| joint.name.as_str())
+        .collect();
+    let mut joints = Vec::with_capacity(JOINT_COUNT);
+    for expected in JOINT_NAMES {
+        let Some(joint) = urdf.joints.iter().find(|joint| joint.name == expected) else {
+            let finding = Finding::new(&urdf.file, format!("it has no joint '{expected}'"))
+                .key(format!("joint '{expected}'"));
+            return Err(match nearest_name(expected, names.iter().copied()) {
+                Some(near) => finding.hint(format!(
+                    "joints need ROS's UR names; did you mean to rename '{near}'?"
+                )),
+                None => finding.hint("joints need ROS's UR names, without a prefix"),
+            });
+        };
+        if !matches!(joint.kind, JointKind::Revolute | JointKind::Continuous) {
+            return Err(urdf.finding(&joint.span, format!("joint '{expected}' is not revolute")));
+        }
+        joints.push(joint);
+    }
+    for link in ["base_link", "tool0"] {
+        if urdf.link(link).is_none() {
+            return Err(Finding::new(&urdf.file, format!("it has no link '{link}'"))
+                .key(format!("link '{link}'"))
+                .hint(if link == "tool0" {
+                    "`tool0` is the flange frame: z out of the flange, joined to wrist 3 by a \
+                     fixed joint"
+                } else {
+                    "`base_link` is ROS's base frame of the arm"
+                }));
+        }
+    }
+    let path = urdf
+        .joints_between("base_link", "tool0")
+        .ok_or_else(|| Finding::new(&urdf.file, "`tool0` is not below `base_link`"))?;
+    let moving: Vec<&str> = path
+        .iter()
+        .filter(|joint| joint.kind != JointKind::Fixed)
+        .map(|joint| joint.name.as_str())
+        .collect();
+    if moving != JOINT_NAMES {
+        return Err(Finding::new(
+            &urdf.file,
+            format!(
+                "the moving joints from base_link to tool0 are {}",
+                moving.join(", ")
+            ),
+        )
+        .hint(format!("expected {}", JOINT_NAMES.join(", "))));
+    }
+    if let Some(other) = urdf
+        .joints
+        .iter()
+        .find(|joint| joint.kind != JointKind::Fixed && !moving.contains(&joint.name.as_str()))
+    {
+        return Err(urdf
+            .finding(
+                &other.span,
+                format!(
+                    "joint '{}' moves but is not one of the arm's six",
+                    other.name
+                ),
+            )
+            .hint("make it fixed: only the arm's joints are driven"));
+    }
+    Ok((joints, "tool0".to_owned()))
+}
+
+fn fixed_pose(urdf: &Urdf, ancestor: &str, link: &str) -> Pose {
+    urdf.joints_between(ancestor, link)
+        .into_iter()
+        .flatten()
+        .fold(Pose::identity(), |pose, joint| {
+            pose * joint.parent_from_joint
+        })
+}
+
+/// Index of the moving link (0 for the base) that a URDF link is fixed to, and its pose there.
+fn owner_of(urdf: &Urdf, joints: &[&UrdfJoint], link: &str) -> Result<(usize, Pose), Finding> {
+    let mut owner_from_link = Pose::identity();
+    let mut at = link;
+    loop {
+        if let Some(index) = joints.iter().position(|joint| joint.child == at) {
+            return Ok((index + 1, owner_from_link));
+        }
+        if at == "base_link" {
+            return Ok((0, owner_from_link));
+        }
+        match urdf.joint_above(at) {
+            Some(joint) => {
+                owner_from_link = joint.parent_from_joint * owner_from_link;
+                at = &joint.parent;
+            }
+            // Above base_link: the robot is placed by its base_link, so that is where it belongs.
+            None => {
+                let root_from_base_link = fixed_pose(urdf, at, "base_link");
+                return Ok((0, root_from_base_link.inverse() * owner_from_link));
+            }
+        }
+    }
+}
+
+fn joint_limit(urdf: &Urdf, joint: &UrdfJoint) -> Result<JointLimit, Finding> {
+    let Some(limit) = joint.limit else {
+        return Err(urdf
+            .finding(
+                &joint.span,
+                format!("joint '{}' has no <limit>", joint.name),
+            )
+            .hint(
+                "it needs effort (N m), velocity (rad/s) and, if revolute, lower and upper (rad)",
+            ));
+    };
+    let (lower_rad, upper_rad) = match joint.kind {
+        JointKind::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
+        _ => (limit.lower, limit.upper),
+    };
+    for (name, value, unit) in [
+        ("velocity", limit.velocity, "rad/s"),
+        ("effort", limit.effort, "N m"),
+    ] {
+        if value <= 0.0 {
+            return Err(urdf.finding(
+                &joint.span,
+                format!(
+                    "the {name} limit of joint '{}' is {value} {unit}",
+                    joint.name
+                ),
+            ));
+        }
+    }
+    if lower_rad >= upper_rad {
+        return Err(urdf.finding(
+            &joint.span,
+            format!(
+                "the limits of joint '{}' leave no range: {lower_rad} to {upper_rad} rad",
+                joint.name
+            ),
+        ));
+    }
+    Ok(JointLimit {
+        lower_rad,
+        upper_rad,
+        velocity_rad_s: limit.velocity,
+        effort_nm: limit.effort,
+    })
+}
+
+fn body_of(
+    urdf: &Urdf,
+    members: &[(&UrdfLink, Pose)],
+    label: &str,
+    joint: &UrdfJoint,
+    missing_inertia: MissingInertia,
+    notes: &mut Vec<String>,
+) -> Result<Body, Finding> {
+    let body = members
+        .iter()
+        .fold(Body::massless(), |sum, (link, owner_from_link)| {
+            sum.combined_with(
+                &link
+                    .inertial
+                    .unwrap_or(Body::massless())
+                    .transformed(owner_from_link),
+            )
+        });
+    if body.mass_kg > 0.0 && body.inertia_kgm2.symmetric_eigenvalues().min() > 0.0 {
+        return Ok(body);
+    }
+    let what = if body.mass_kg > 0.0 {
+        "no moment of inertia"
+    } else {
+        "no mass"
+    };
+    if missing_inertia == MissingInertia::Error {
+        let span = urdf
+            .link(&joint.child)
+            .map_or(joint.span.clone(), |link| link.span.clone());
+        return Err(urdf
+            .finding(&span, format!("link '{}' has {what}", joint.child))
+            .key(format!("link '{}'", joint.child))
+            .hint(
+                "give it an <inertial>, or set `missing_inertia = \"nominal-ur3\"` under [robot] \
+                 (`--missing-inertia nominal-ur3`) to take the shipped UR3's",
+            ));
+    }
+    notes.push(format!(
+        "link '{}' has {what}: the shipped UR3's {label} is used",
+        joint.child
+    ));
+    nominal_body(label, missing_inertia)
+}
+
+/// Mass properties of a link of the shipped UR3.
+fn nominal_body(label: &str, _missing: MissingInertia) -> Result<Body, Finding> {
+    let location = Location::of_model("ur3", "ur3", "urdf", std::path::Path::new(""));
+    let nominal = read_robot(
+        &location,
+        &PackagePaths::default(),
+        MissingInertia::Error,
+        Pose::identity(),
+    )?;
+    let index = LINK_LABELS
+        .iter()
+        .position(|each| *each == label)
+        .unwrap_or(1);
+    Ok(nominal.bodies[index - 1])
+}
+
+fn read_link(
+    urdf: &Urdf,
+    location: &Location,
+    packages: &PackagePaths,
+    label: &str,
+    members: &[(&UrdfLink, Pose)],
+    notes: &mut Vec<String>,
+) -> Result<Link, Finding> {
+    let mut solids = Vec::new();
+    let mut visuals = Vec::new();
+    for (link, owner_from_link) in members {
+        solids.extend(read_solids(
+            urdf,
+            location,
+            packages,
+            link,
+            owner_from_link,
+            notes,
+        )?);
+        visuals.extend(read_visuals(
+            urdf,
+            location,
+            packages,
+            link,
+            owner_from_link,
+            notes,
+        )?);
+    }
+    rename_unique(&mut solids, label);
+    if visuals.is_empty() {
+        visuals = solids
+            .iter()
+            .map(|solid| visual_of(solid, DEFAULT_COLOR))
+            .collect();
+    }
+    Ok(Link {
+        name: label.to_owned(),
+        solids,
+        visuals,
+    })
+}
+
+/// Collision geometry of one URDF link, in the frame of its owner.
+pub(crate) fn read_solids(
+    urdf: &Urdf,
+    location: &Location,
+    packages: &PackagePaths,
+    link: &UrdfLink,
+    owner_from_link: &Pose,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Solid>, Finding> {
+    let mut solids = Vec::new();
+    for element in &link.collisions {
+        let shape = match shape_of(&element.geometry) {
+            Some(shape) => shape,
+            None => {
+                let mesh = read_mesh(urdf, location, packages, element)?;
+                let hull = convex_hull(&mesh.vertices_m).map_err(|why| {
+                    urdf.finding(
+                        &element.span,
+                        format!("collision mesh of '{}': {why}", link.name),
+                    )
+                })?;
+                notes.push(format!(
+                    "collision mesh of '{}' is used as its convex hull ({} vertices), which \
+                     contains it",
+                    link.name,
+                    hull.0.vertices_m.len()
+                ));
+                Shape::Convex(Arc::new(hull))
+            }
+        };
+        solids.push(Solid {
+            name: element.name.clone().unwrap_or_default(),
+            shape,
+            parent_from_shape: owner_from_link * element.link_from_element,
+        });
+    }
+    Ok(solids)
+}
+
+/// Surfaces of one URDF link, in the frame of its owner. What cannot be read is left out and noted.
+pub(crate) fn read_visuals(
+    urdf: &Urdf,
+    location: &Location,
+    packages: &PackagePaths,
+    link: &UrdfLink,
+    owner_from_link: &Pose,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Visual>, Finding> {
+    let mut visuals = Vec::new();
+    for element in &link.visuals {
+        let mesh = match shape_of(&element.geometry) {
+            Some(shape) => shape.surface(PICTURE_CHORD_ERROR_M),
+            None => match read_mesh(urdf, location, packages, element) {
+                Ok(mesh) => mesh,
+                Err(finding) => {
+                    notes.push(format!(
+                        "the visual mesh of '{}' is left out of pictures: {}",
+                        link.name, finding.message
+                    ));
+                    continue;
+                }
+            },
+        };
+        visuals.push(Visual {
+            mesh: Arc::new(mesh),
+            parent_from_visual: owner_from_link * element.link_from_element,
+            color_rgba: element.color_rgba.unwrap_or(DEFAULT_COLOR),
+        });
+    }
+    Ok(visuals)
+}
+
+/// Fineness of curved surfaces in pictures.
+const PICTURE_CHORD_ERROR_M: f64 = 2e-4;
+
+/// A solid as a coloured surface.
+pub(crate) fn visual_of(solid: &Solid, color_rgba: [f32; 4]) -> Visual {
+    Visual {
+        mesh: Arc::new(solid.shape.surface(PICTURE_CHORD_ERROR_M)),
+        parent_from_visual: solid.parent_from_shape,
+        color_rgba,
+    }
+}
+
+/// Gives solids names that are unique in the cell: `label.index` unless the file names them so.
+pub(crate) fn rename_unique(solids: &mut [Solid], label: &str) {
+    for (index, solid) in solids.iter_mut().enumerate() {
+        if !solid.name.starts_with(&format!("{label}.")) {
+            solid.name = format!("{label}.{index}");
+        }
+    }
+}
+
+fn shape_of(geometry: &Geometry) -> Option<Shape> {
+    Some(match geometry {
+        Geometry::Box { size_m: [x, y, z] } => Shape::Cuboid {
+            half_extents_m: Vector3::new(*x, *y, *z) * 0.5,
+        },
+        Geometry::Cylinder { radius_m, length_m } => Shape::Cylinder {
+            radius_m: *radius_m,
+            half_length_m: 0.5 * length_m,
+        },
+        Geometry::Sphere { radius_m } => Shape::Sphere {
+            radius_m: *radius_m,
+        },
+        Geometry::Mesh { .. } => return None,
+    })
+}
+
+fn read_mesh(
+    urdf: &Urdf,
+    location: &Location,
+    packages: &PackagePaths,
+    element: &Element,
+) -> Result<TriangleMesh, Finding> {
+    let Geometry::Mesh { filename, scale } = &element.geometry else {
+        unreachable!("only called for meshes")
+    };
+    let span: &Range<usize> = &element.span;
+    let mesh_location = location.mesh(filename, packages).map_err(|why| {
+        urdf.finding(span, format!("mesh `{filename}`: {why}"))
+            .key("filename")
+    })?;
+    if !filename.to_lowercase().ends_with(".stl") {
+        return Err(urdf
+            .finding(span, format!("mesh `{filename}` is not an STL file"))
+            .key("filename")
+            .hint("convert it to STL"));
+    }
+    let bytes = mesh_location.read().map_err(|error| {
+        urdf.finding(span, format!("mesh `{}`: {error}", mesh_location.display()))
+            .key("filename")
+    })?;
+    read_stl(&bytes, *scale).map_err(|why| {
+        urdf.finding(span, format!("mesh `{}`: {why}", mesh_location.display()))
+            .key("filename")
+    })
+}

@@ -1,0 +1,193 @@
+//! TOML files into structs, with messages that name file, line, key and value.
+
+use std::ops::Range;
+
+use serde::de::DeserializeOwned;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::{Finding, nearest_name};
+
+/// A parsed file together with where everything stands in it.
+#[derive(Debug)]
+pub(crate) struct TomlText<'a> {
+    pub file: &'a str,
+    pub text: &'a str,
+    table: Spanned<DeTable<'a>>,
+}
+
+impl<'a> TomlText<'a> {
+    pub(crate) fn parse(file: &'a str, text: &'a str) -> Result<Self, Finding> {
+        let table = DeTable::parse(text).map_err(|error| {
+            let finding = Finding::new(file, error.message().to_owned());
+            match error.span() {
+                Some(span) => finding.at(text, span),
+                None => finding,
+            }
+        })?;
+        let parsed = Self { file, text, table };
+        parsed.refuse_non_finite()?;
+        Ok(parsed)
+    }
+
+    /// The whole file as a struct.
+    pub(crate) fn deserialize<T: DeserializeOwned>(&self) -> Result<T, Finding> {
+        let deserializer = toml::Deserializer::parse(self.text)
+            .map_err(|error| Finding::new(self.file, error.message().to_owned()))?;
+        serde_path_to_error::deserialize(deserializer).map_err(|error| {
+            let mut key = error.path().to_string();
+            let inner = error.into_inner();
+            let message = inner.message().to_owned();
+            let mut finding = Finding::new(self.file, &message);
+            if let Some(span) = inner.span() {
+                finding = finding.at(self.text, span);
+            }
+            let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+            if message.starts_with("unknown field")
+                && let [unknown, known @ ..] = quoted.as_slice()
+            {
+                // The path ends at the unknown key or at the table that holds it.
+                if !key.ends_with(unknown) {
+                    key = if key == "." {
+                        (*unknown).to_owned()
+                    } else {
+                        format!("{key}.{unknown}")
+                    };
+                }
+                finding.message = format!("unknown key `{unknown}`");
+                finding.hint = Some(unknown_key_hint(unknown, known));
+            } else if message.starts_with("unknown variant")
+                && let [unknown, known @ ..] = quoted.as_slice()
+            {
+                finding.message = format!("`{unknown}` is not a value that `{key}` can have");
+                finding.hint = Some(match nearest_name(unknown, known.iter().copied()) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("one of {}", known.join(", ")),
+                });
+            } else {
+                let value = finding.span.clone().and_then(|span| self.text.get(span));
+                if let Some(value) = value.filter(|value| !value.contains('\n')) {
+                    finding.message = format!("{message}, got `{value}`");
+                }
+                finding.hint = unit_hint(&key, &message);
+            }
+            finding.key(key)
+        })
+    }
+
+    /// Where the value of a key stands: `goals[0].entry_mm` and so on.
+    pub(crate) fn span_of(&self, path: &str) -> Option<Range<usize>> {
+        let mut at: Option<(&DeValue<'_>, Range<usize>)> = None;
+        for part in path.split('.') {
+            let (name, indices) = part
+                .split_once('[')
+                .map_or((part, ""), |(n, rest)| (n, rest));
+            let table = match at {
+                None => self.table.get_ref(),
+                Some((DeValue::Table(table), _)) => table,
+                Some(_) => return at.map(|(_, span)| span),
+            };
+            let found = table.get(name)?;
+            at = Some((found.get_ref(), found.span()));
+            for index in indices.split('[').filter(|text| !text.is_empty()) {
+                let index: usize = index.trim_end_matches(']').parse().ok()?;
+                let Some((DeValue::Array(array), _)) = at else {
+                    return None;
+                };
+                let found = array.iter().nth(index)?;
+                at = Some((found.get_ref(), found.span()));
+            }
+        }
+        at.map(|(_, span)| span)
+    }
+
+    /// A finding about a key of this file; a missing key's is placed at the table that lacks it.
+    pub(crate) fn finding(&self, key: &str, message: impl Into<String>) -> Finding {
+        let finding = Finding::new(self.file, message).key(key);
+        let mut path = key;
+        loop {
+            if let Some(span) = self.span_of(path) {
+                return finding.at(self.text, span);
+            }
+            match path.rfind('.') {
+                Some(dot) => path = &path[..dot],
+                None => return finding,
+            }
+        }
+    }
+
+    fn refuse_non_finite(&self) -> Result<(), Finding> {
+        fn walk(
+            path: &str,
+            value: &Spanned<DeValue<'_>>,
+        ) -> Option<(String, Range<usize>, String)> {
+            match value.get_ref() {
+                DeValue::Float(number) => {
+                    let text = number.as_str().replace('_', "");
+                    let finite = text.parse::<f64>().is_ok_and(f64::is_finite);
+                    (!finite).then(|| (path.to_owned(), value.span(), text))
+                }
+                DeValue::Array(array) => array
+                    .iter()
+                    .enumerate()
+                    .find_map(|(i, item)| walk(&format!("{path}[{i}]"), item)),
+                DeValue::Table(table) => table
+                    .iter()
+                    .find_map(|(key, item)| walk(&format!("{path}.{}", key.get_ref()), item)),
+                _ => None,
+            }
+        }
+        let table = self.table.get_ref();
+        let found = table
+            .iter()
+            .find_map(|(key, item)| walk(key.get_ref(), item));
+        match found {
+            None => Ok(()),
+            Some((key, span, text)) => Err(Finding::new(
+                self.file,
+                format!("`{key}` is {text}, which is not a finite number"),
+            )
+            .key(key)
+            .at(self.text, span)),
+        }
+    }
+}
+
+fn unknown_key_hint(unknown: &str, known: &[&str]) -> String {
+    // The same quantity in another unit, or without one.
+    let stem = |key: &str| {
+        key.rsplit_once('_')
+            .filter(|(_, unit)| {
+                matches!(
+                    *unit,
+                    "m" | "mm" | "cm" | "deg" | "rad" | "s" | "ms" | "kg" | "nm" | "um"
+                )
+            })
+            .map_or(key.to_owned(), |(stem, _)| stem.to_owned())
+    };
+    if let Some(same) = known.iter().find(|key| stem(key) == stem(unknown)) {
+        return format!("did you mean `{same}`? The key says the unit");
+    }
+    match nearest_name(unknown, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if known.is_empty() => "it takes no keys".to_owned(),
+        None => format!("known keys: {}", known.join(", ")),
+    }
+}
+
+fn unit_hint(key: &str, message: &str) -> Option<String> {
+    let wants_number = message.contains("expected f64") || message.contains("expected a float");
+    if !wants_number {
+        return None;
+    }
+    let key = key.split('[').next().unwrap_or(key);
+    let unit = match key.rsplit('_').next()? {
+        "mm" => "millimetres",
+        "deg" => "degrees",
+        "s" => "seconds",
+        "ms" => "milliseconds",
+        "rad" => "radians",
+        _ => "the unit in its name",
+    };
+    Some(format!("give a plain number, in {unit}"))
+}

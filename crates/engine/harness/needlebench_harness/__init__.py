@@ -1,0 +1,1 @@
+"""Steps MuJoCo models on behalf of a client at the other end of a binary pipe."""

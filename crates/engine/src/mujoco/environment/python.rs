@@ -1,0 +1,182 @@
+//! Finds a Python that the pinned wheels exist for.
+
+use std::env;
+use std::ffi::OsStr;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use super::command::{CommandFailure, run};
+use super::{EnvironmentError, EnvironmentOptions};
+
+/// Oldest and newest Python that MuJoCo 4.0.0 has wheels for.
+const OLDEST: (u32, u32) = (3, 11);
+const NEWEST: (u32, u32) = (3, 15);
+
+/// In the order in which they are tried.
+///
+/// `python3` is what the user means by Python, and nearly always suits: asking it alone keeps the
+/// start short. The others help where it is too old.
+const NAMES: [&str; 7] = [
+    "python3",
+    "python3.13",
+    "python3.12",
+    "python3.11",
+    "python3.14",
+    "python3.15",
+    "python",
+];
+
+/// Answers one line: version, bits, implementation, whether there is a GIL, executable.
+const PROBE: &str = "import platform, sys, sysconfig
+print(platform.python_version(), sys.maxsize.bit_length() + 1, sys.implementation.name, \
+int(not sysconfig.get_config_var('Py_GIL_DISABLED')), sys.executable)";
+
+const PROBE_LIMIT: Duration = Duration::from_secs(20);
+
+/// A Python that will do.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Python {
+    /// The interpreter itself, behind any launcher script.
+    pub(super) executable: PathBuf,
+    /// Full version, such as `3.11.7`.
+    pub(super) version: String,
+}
+
+/// A Python that was tried and will not do.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RejectedPython {
+    /// What was tried.
+    pub path: PathBuf,
+    /// Why it will not do.
+    pub reason: String,
+}
+
+impl fmt::Display for RejectedPython {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "\n  {}: {}", self.path.display(), self.reason)
+    }
+}
+
+/// The Python that the options name, or else the first on the search path that will do.
+pub(super) fn find(options: &EnvironmentOptions) -> Result<Python, EnvironmentError> {
+    if let Some(chosen) = &options.python {
+        let path = if chosen.components().count() == 1 {
+            on_path(options, chosen.as_os_str()).next()
+        } else {
+            None
+        };
+        let path = path.unwrap_or_else(|| chosen.clone());
+        return probe(&path).map_err(|reason| EnvironmentError::ChosenPython { path, reason });
+    }
+    let mut rejected = Vec::new();
+    for name in NAMES {
+        for path in on_path(options, OsStr::new(name)) {
+            match probe(&path) {
+                Ok(python) => return Ok(python),
+                Err(reason) => rejected.push(RejectedPython { path, reason }),
+            }
+        }
+    }
+    Err(EnvironmentError::NoPython { rejected })
+}
+
+/// Files of a name on the search path, in its order.
+pub(super) fn on_path<'a>(
+    options: &'a EnvironmentOptions,
+    name: &'a OsStr,
+) -> impl Iterator<Item = PathBuf> + 'a {
+    let folders = options.search_path.iter().flat_map(env::split_paths);
+    folders
+        .map(move |folder| {
+            let mut file = folder.join(name).into_os_string();
+            file.push(env::consts::EXE_SUFFIX);
+            PathBuf::from(file)
+        })
+        .filter(|file| file.is_file())
+}
+
+fn probe(path: &Path) -> Result<Python, String> {
+    let answer = run(Command::new(path).args(["-I", "-c", PROBE]), PROBE_LIMIT);
+    match answer {
+        Ok(line) => judge(&line),
+        Err(CommandFailure::Exit {
+            status,
+            stderr_tail,
+        }) => {
+            let first_line = stderr_tail.lines().next().unwrap_or_default();
+            Err(format!("does not run: {status} {first_line}"))
+        }
+        Err(failure) => Err(format!("does not run: {failure}")),
+    }
+}
+
+fn judge(answer: &str) -> Result<Python, String> {
+    let unreadable = || format!("does not answer like a Python: {answer:?}");
+    let mut words = answer.splitn(5, ' ');
+    let mut word = || words.next().filter(|word| !word.is_empty());
+    let (Some(version), Some(bits), Some(implementation), Some(gil), Some(executable)) =
+        (word(), word(), word(), word(), word())
+    else {
+        return Err(unreadable());
+    };
+    let mut numbers = version.split('.').map(str::parse::<u32>);
+    let (Some(Ok(major)), Some(Ok(minor))) = (numbers.next(), numbers.next()) else {
+        return Err(unreadable());
+    };
+    let name = format!("{implementation} {version}, {bits} bit");
+    if implementation != "cpython" || gil != "1" {
+        return Err(format!("{name}: not the standard CPython"));
+    }
+    if bits != "64" {
+        return Err(format!("{name}: MuJoCo needs 64 bit"));
+    }
+    let wheels = format!(
+        "MuJoCo {} is made for Python {}.{} to {}.{}",
+        super::MUJOCO_VERSION,
+        OLDEST.0,
+        OLDEST.1,
+        NEWEST.0,
+        NEWEST.1
+    );
+    if (major, minor) < OLDEST {
+        return Err(format!("Python {version} is too old: {wheels}"));
+    }
+    if (major, minor) > NEWEST {
+        return Err(format!("Python {version} is too new: {wheels}"));
+    }
+    Ok(Python {
+        executable: PathBuf::from(executable),
+        version: version.to_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn probe_answer_names_version_and_executable() {
+        let python = judge("3.12.1 64 cpython 1 /opt/my python/bin/python3").unwrap();
+        assert_eq!(python.version, "3.12.1");
+        assert_eq!(python.executable, Path::new("/opt/my python/bin/python3"));
+    }
+
+    #[test]
+    fn unsuitable_pythons_are_refused_with_their_reason() {
+        for (answer, reason) in [
+            ("3.10.13 64 cpython 1 /p", "too old"),
+            ("2.7.18 64 cpython 1 /p", "too old"),
+            ("3.99.0 64 cpython 1 /p", "too new"),
+            ("3.11.2 32 cpython 1 /p", "64 bit"),
+            ("3.11.2 64 pypy 1 /p", "not the standard"),
+            ("3.13.0 64 cpython 0 /p", "not the standard"),
+            ("hello", "does not answer"),
+            ("", "does not answer"),
+        ] {
+            let refused = judge(answer).unwrap_err();
+            assert!(refused.contains(reason), "{answer}: {refused}");
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! MuJoCo, stepped in lock-step by a Python process at the other end of a pipe.
+
+mod environment;
+mod mjcf;
+mod plant;
+mod process;
+mod tail;
+
+pub use environment::{Environment, EnvironmentError, EnvironmentOptions, ensure, ensure_with};
+pub use plant::{MujocoIntegrator, MujocoPlant, MujocoSettings};
+pub use process::{
+    ContactSummary, GeomDistance, HarnessError, HarnessProcess, HarnessState, HarnessVersions,
+    InverseDynamics, PlantHandle,
+};

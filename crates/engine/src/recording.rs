@@ -1,0 +1,46 @@
+//! What a simulation leaves behind.
+
+use std::time::Duration;
+
+use needlebench_kinematics::Joints;
+use needlebench_kinematics::trajectory::JointState;
+
+use crate::{EngineIdentity, PlantState};
+
+/// Motion of one plant under one servo.
+///
+/// All vectors but `torque_nm` have one entry more than there were steps; entry 0 is the state
+/// after the reset. Everything but `cost` is the same, bit for bit, whenever it is computed.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// The engine.
+    pub engine: EngineIdentity,
+    /// Length of a step, s.
+    pub timestep_s: f64,
+    /// Time of each state, s.
+    pub time_s: Vec<f64>,
+    /// Observed states.
+    pub state: Vec<PlantState>,
+    /// The trajectory at the same times, as planned.
+    pub reference: Vec<JointState>,
+    /// Torque that acted over each step, N m; entry `k` between states `k` and `k + 1`.
+    pub torque_nm: Vec<Joints>,
+    /// Steps in which the effort limit cut the torque of at least one joint.
+    pub saturated_steps: usize,
+    /// What it cost; differs from run to run.
+    pub cost: Cost,
+}
+
+/// Cost of a simulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Cost {
+    /// Wall-clock time of the whole run, reset and servo included.
+    pub wall: Duration,
+}
+
+impl Recording {
+    /// Number of steps.
+    pub fn steps(&self) -> usize {
+        self.torque_nm.len()
+    }
+}

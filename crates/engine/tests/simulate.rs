@@ -1,0 +1,157 @@
+//! The run loop, on rapier.
+
+mod common;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use needlebench_engine::{
+    EngineError, Hooks, RapierPlant, RapierSettings, Recording, Servo, ServoGains, simulate,
+};
+use needlebench_kinematics::Joints;
+use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
+
+const TIMESTEP_S: f64 = 1e-3;
+const START: Joints = Joints::new(0.2, -1.6, 1.5, -1.2, -1.4, 0.3);
+
+fn trajectory() -> JointTrajectory {
+    let limits = MotionLimits {
+        velocity: Joints::repeat(1.0),
+        acceleration: Joints::repeat(2.0),
+        jerk: Joints::repeat(20.0),
+        line: ProfileLimits {
+            velocity: 0.1,
+            acceleration: 0.5,
+            jerk: 5.0,
+        },
+    };
+    JointTrajectory::starting_at(START)
+        .then_straight_to(Phase::Transfer, START.add_scalar(0.2), &limits)
+        .then_hold(Phase::Hold, 0.3)
+}
+
+fn servo() -> Servo {
+    let cell = common::ur3(Vec::new());
+    Servo {
+        dynamics: cell.dynamics(),
+        gains: ServoGains::default(),
+        effort_limit_nm: cell.robot.limits.efforts_nm(),
+    }
+}
+
+fn run(servo: &Servo, timestep_s: f64, hooks: Hooks<'_>) -> Result<Recording, EngineError> {
+    let cell = common::ur3(Vec::new());
+    let mut plant = RapierPlant::new(&cell, timestep_s, &RapierSettings::default())?;
+    simulate(&mut plant, servo, &trajectory(), hooks)
+}
+
+#[test]
+fn recording_covers_the_trajectory() {
+    let recording = run(&servo(), TIMESTEP_S, Hooks::default()).unwrap();
+    let steps = recording.steps();
+    assert_eq!(
+        [
+            recording.time_s.len(),
+            recording.state.len(),
+            recording.reference.len()
+        ],
+        [steps + 1; 3]
+    );
+    let duration_s = trajectory().duration_s();
+    assert!(recording.time_s[steps] >= duration_s - 1e-9);
+    assert!(recording.time_s[steps] < duration_s + TIMESTEP_S);
+    assert_eq!(recording.state[0].position, START);
+    assert_eq!(recording.reference[steps].position, trajectory().end());
+}
+
+#[test]
+fn two_runs_are_equal_bit_for_bit() {
+    let first = run(&servo(), TIMESTEP_S, Hooks::default()).unwrap();
+    let second = run(&servo(), TIMESTEP_S, Hooks::default()).unwrap();
+    assert_eq!(first.engine, second.engine);
+    assert_eq!(first.state, second.state);
+    assert_eq!(first.torque_nm, second.torque_nm);
+}
+
+#[test]
+fn cancelled_run_stops_at_the_next_step() {
+    let cancel = AtomicBool::new(false);
+    let mut last_s = 0.0;
+    let mut progress = |time_s| {
+        last_s = time_s;
+        cancel.store(time_s > 0.1, Ordering::Relaxed);
+    };
+    let hooks = Hooks {
+        cancel: Some(&cancel),
+        progress: Some(&mut progress),
+    };
+    assert!(matches!(
+        run(&servo(), TIMESTEP_S, hooks),
+        Err(EngineError::Cancelled)
+    ));
+    assert!((last_s - 0.101).abs() < 1e-9, "{last_s}");
+}
+
+#[test]
+fn unstable_gains_are_reported_as_divergence() {
+    let mut servo = servo();
+    servo.gains.kd_nms_per_rad = [600.0; 6];
+    servo.effort_limit_nm = Joints::repeat(f64::INFINITY);
+    assert!(servo.stability_ratio(TIMESTEP_S) > 1.0);
+    let error = run(&servo, TIMESTEP_S, Hooks::default()).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            EngineError::Diverged { .. } | EngineError::Unstable { .. }
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn saturated_steps_are_counted() {
+    let mut servo = servo();
+    servo.effort_limit_nm = Joints::repeat(20.0);
+    let recording = run(&servo, TIMESTEP_S, Hooks::default()).unwrap();
+    assert!(recording.saturated_steps > 0);
+    assert!(
+        recording
+            .torque_nm
+            .iter()
+            .all(|torque| torque.amax() <= 20.0)
+    );
+}
+
+#[test]
+fn bad_numbers_are_refused_before_the_first_step() {
+    for timestep_s in [0.0, -1e-3, f64::NAN, f64::INFINITY] {
+        let error = run(&servo(), timestep_s, Hooks::default()).unwrap_err();
+        assert!(matches!(error, EngineError::BadTimestep { .. }), "{error}");
+    }
+    let mut negative = servo();
+    negative.gains.kp_nm_per_rad[3] = -1.0;
+    let mut nan = servo();
+    nan.effort_limit_nm[2] = f64::NAN;
+    for servo in [negative, nan] {
+        let error = run(&servo, TIMESTEP_S, Hooks::default()).unwrap_err();
+        assert!(matches!(error, EngineError::BadSetting { .. }), "{error}");
+    }
+}
+
+#[test]
+fn body_without_mass_is_refused() {
+    let mut cell = common::ur3(Vec::new());
+    cell.robot.bodies[3].mass_kg = 0.0;
+    let error = RapierPlant::new(&cell, TIMESTEP_S, &RapierSettings::default())
+        .err()
+        .unwrap();
+    assert!(
+        matches!(
+            error,
+            EngineError::BadBody {
+                joint: "wrist_1",
+                ..
+            }
+        ),
+        "{error}"
+    );
+}

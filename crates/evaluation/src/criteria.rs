@@ -1,0 +1,231 @@
+//! Criteria of a scenario on the values of a configuration.
+
+use needlebench_cell::scenario::{ClearanceCriteria, CriteriaSection};
+
+use crate::report::{ConfigurationReport, CriterionResult};
+
+/// A limit that a value has to keep.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Criterion {
+    /// Key of the scenario's `[criteria]`.
+    pub key: &'static str,
+    /// Limit, in SI units.
+    pub limit: f64,
+    /// Unit.
+    pub unit: &'static str,
+    /// The value has to be at least the limit instead of at most.
+    pub at_least: bool,
+}
+
+impl Criterion {
+    fn at_most(
+        key: &'static str,
+        limit: Option<f64>,
+        scale: f64,
+        unit: &'static str,
+    ) -> Option<Self> {
+        limit.map(|limit| Self {
+            key,
+            limit: limit * scale,
+            unit,
+            at_least: false,
+        })
+    }
+
+    /// Whether a value meets it; a value that is missing does not.
+    fn met_by(&self, value: Option<f64>) -> bool {
+        value.is_some_and(|value| {
+            if self.at_least {
+                value >= self.limit
+            } else {
+                value <= self.limit
+            }
+        })
+    }
+}
+
+const MM: f64 = 1e-3;
+
+/// Checks a configuration that works against all criteria.
+///
+/// Values of the engines are checked for each engine that ran, clearances over all of them.
+pub fn check_configuration(
+    goal: &str,
+    configuration: &ConfigurationReport,
+    criteria: &CriteriaSection,
+    both_engines_ran: bool,
+) -> Vec<CriterionResult> {
+    let mut results = Vec::new();
+    let mut check =
+        |criterion: Option<Criterion>, engine: Option<&str>, value: Option<f64>, detail: String| {
+            let Some(criterion) = criterion else { return };
+            results.push(CriterionResult {
+                goal: goal.to_owned(),
+                label: Some(configuration.label.to_owned()),
+                engine: engine.map(str::to_owned),
+                criterion: criterion.key.to_owned(),
+                value,
+                limit: Some(criterion.limit),
+                unit: criterion.unit,
+                pass: criterion.met_by(value),
+                detail,
+            });
+        };
+    let most = Criterion::at_most;
+    for (engine, report) in &configuration.engines {
+        let (needle, motion) = (&report.needle, &report.motion);
+        let engine = Some(engine.as_str());
+        check(
+            most(
+                "max_tip_position_error_mm",
+                criteria.max_tip_position_error_mm,
+                MM,
+                "m",
+            ),
+            engine,
+            Some(needle.tip_position_error_m),
+            String::new(),
+        );
+        check(
+            most(
+                "max_needle_angle_error_deg",
+                criteria.max_needle_angle_error_deg.map(f64::to_radians),
+                1.0,
+                "rad",
+            ),
+            engine,
+            Some(needle.needle_angle_error_rad),
+            String::new(),
+        );
+        check(
+            most(
+                "max_guide_position_error_mm",
+                criteria.max_guide_position_error_mm,
+                MM,
+                "m",
+            ),
+            engine,
+            Some(needle.guide_position_error_m),
+            String::new(),
+        );
+        check(
+            most(
+                "max_settling_time_s",
+                criteria.max_settling_time_s,
+                1.0,
+                "s",
+            ),
+            engine,
+            motion.settling_time_s,
+            format!("into a band of {:.4} mm", criteria.settling_band_mm),
+        );
+        check(
+            most(
+                "max_peak_torque_ratio",
+                criteria.max_peak_torque_ratio,
+                1.0,
+                "1",
+            ),
+            engine,
+            Some(motion.peak_torque_ratio),
+            String::new(),
+        );
+        if !criteria.allow_contact {
+            let contact = &motion.contact;
+            check(
+                Some(Criterion {
+                    key: "allow_contact",
+                    limit: 0.0,
+                    unit: "N",
+                    at_least: false,
+                }),
+                engine,
+                Some(if contact.occurred {
+                    contact.peak_force_n.max(f64::MIN_POSITIVE)
+                } else {
+                    0.0
+                }),
+                contact.first_pair.as_ref().map_or(String::new(), |[a, b]| {
+                    format!(
+                        "{a} touches {b} at {:.2} s",
+                        contact.first_time_s.unwrap_or(0.0)
+                    )
+                }),
+            );
+        }
+    }
+    if both_engines_ran {
+        let difference = configuration.engine_difference;
+        check(
+            most(
+                "max_engine_difference_peak_mm",
+                criteria.max_engine_difference_peak_mm,
+                MM,
+                "m",
+            ),
+            None,
+            difference.map(|difference| difference.peak_tip_m),
+            String::new(),
+        );
+        check(
+            most(
+                "max_engine_difference_settled_mm",
+                criteria.max_engine_difference_settled_mm,
+                MM,
+                "m",
+            ),
+            None,
+            difference.map(|difference| difference.settled_tip_m),
+            String::new(),
+        );
+    }
+    for (class, limit_mm) in clearance_limits(&criteria.min_clearance_mm) {
+        // A class that the cell has no part for cannot be violated.
+        let Some(found) = configuration.clearance.classes.get(class) else {
+            continue;
+        };
+        check(
+            limit_mm.map(|mm| Criterion {
+                key: class,
+                limit: mm * MM,
+                unit: "m",
+                at_least: true,
+            }),
+            None,
+            Some(found.minimum_m),
+            format!(
+                "{} and {} in the {}",
+                found.pair[0], found.pair[1], found.phase
+            ),
+        );
+    }
+    for result in &mut results {
+        if result.criterion.starts_with("robot_")
+            || [
+                "self",
+                "tool_phantom",
+                "guide_standoff",
+                "needle_corridor",
+                "needle_route",
+            ]
+            .contains(&result.criterion.as_str())
+        {
+            result.criterion = format!("min_clearance_mm.{}", result.criterion);
+        }
+    }
+    results
+}
+
+fn clearance_limits(limits: &ClearanceCriteria) -> [(&'static str, Option<f64>); 9] {
+    [
+        ("robot_phantom", limits.robot_phantom),
+        ("robot_table", limits.robot_table),
+        ("robot_gantry", limits.robot_gantry),
+        ("robot_mount", limits.robot_mount),
+        ("self", limits.self_collision),
+        ("tool_phantom", limits.tool_phantom),
+        ("guide_standoff", limits.guide_standoff),
+        ("needle_corridor", limits.needle_corridor),
+        ("needle_route", limits.needle_route),
+    ]
+}

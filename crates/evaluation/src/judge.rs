@@ -1,0 +1,165 @@
+//! Verdict and recommendation.
+
+use needlebench_cell::scenario::CriteriaSection;
+use needlebench_cell::{Expectation, Goal};
+use needlebench_kinematics::ik::Configuration;
+
+use crate::check_configuration;
+use crate::report::{
+    ConfigurationReport, CriterionResult, GoalReport, Recommendation, Status, Verdict,
+};
+
+/// Judges all configurations of all goals: sets each status and recommendation, and returns the
+/// verdict with every criterion that was checked.
+///
+/// A configuration that works is `failed` if it misses a criterion. The verdict is `fail` if any
+/// configuration is, unless that was expected; if a goal has fewer working configurations than
+/// asked for; or if a configuration's outcome is not the expected one.
+pub fn judge(
+    goals: &mut [GoalReport],
+    planned: &[Goal],
+    criteria: &CriteriaSection,
+    both_engines_ran: bool,
+) -> (Verdict, Vec<CriterionResult>) {
+    let mut results = Vec::new();
+    let mut failed = false;
+    for (report, goal) in goals.iter_mut().zip(planned) {
+        for configuration in &mut report.configurations {
+            let expected = Configuration::from_label(configuration.label)
+                .and_then(|each| goal.expected.get(&each));
+            if configuration.rejections.is_empty() {
+                let checked =
+                    check_configuration(&goal.name, configuration, criteria, both_engines_ran);
+                let met = checked.iter().all(|result| result.pass);
+                let measured = !configuration.engines.is_empty();
+                configuration.status = if met && measured {
+                    Status::Ok
+                } else {
+                    Status::Failed
+                };
+                if configuration.status == Status::Failed && expected != Some(&Expectation::Failed)
+                {
+                    failed = true;
+                }
+                results.extend(checked);
+            } else {
+                configuration.status = Status::Rejected;
+            }
+            if let Some(expected) = expected {
+                let result = check_expectation(&goal.name, configuration, expected);
+                failed |= !result.pass;
+                results.push(result);
+            }
+        }
+        let working = report
+            .configurations
+            .iter()
+            .filter(|each| each.status == Status::Ok)
+            .count();
+        let wanted = f64::from(criteria.min_working_configurations);
+        let enough = working as f64 >= wanted;
+        failed |= !enough;
+        results.push(CriterionResult {
+            goal: goal.name.clone(),
+            label: None,
+            engine: None,
+            criterion: "min_working_configurations".to_owned(),
+            value: Some(working as f64),
+            limit: Some(wanted),
+            unit: "1",
+            pass: enough,
+            detail: String::new(),
+        });
+        report.recommended = recommend(&report.configurations);
+    }
+    (if failed { Verdict::Fail } else { Verdict::Pass }, results)
+}
+
+fn check_expectation(
+    goal: &str,
+    configuration: &ConfigurationReport,
+    expected: &Expectation,
+) -> CriterionResult {
+    let first_rule = configuration
+        .rejections
+        .first()
+        .map(|rejection| rejection.rule);
+    let actual = first_rule.unwrap_or(configuration.status.name());
+    let wanted = match expected {
+        Expectation::Ok => "ok",
+        Expectation::Failed => "failed",
+        Expectation::Rejected(rule) => rule,
+    };
+    CriterionResult {
+        goal: goal.to_owned(),
+        label: Some(configuration.label.to_owned()),
+        engine: None,
+        criterion: "expected".to_owned(),
+        value: None,
+        limit: None,
+        unit: "1",
+        pass: actual == wanted,
+        detail: format!("expected {wanted}, got {actual}"),
+    }
+}
+
+/// Clearance beyond which more of it is no better: nobody works nearer to the arm than this.
+const AMPLE_CLEARANCE_M: f64 = 0.1;
+
+/// The working configuration with the most clearance; joint margin decides between equals.
+pub fn recommend(configurations: &[ConfigurationReport]) -> Option<Recommendation> {
+    let clearance = |each: &ConfigurationReport| each.clearance.minimum_m.unwrap_or(0.0);
+    let margin = |each: &ConfigurationReport| each.margins.map_or(0.0, |m| m.joint_limit);
+    let mut working: Vec<&ConfigurationReport> = configurations
+        .iter()
+        .filter(|each| each.status == Status::Ok)
+        .collect();
+    working.sort_by(|a, b| {
+        let capped = |each| clearance(each).min(AMPLE_CLEARANCE_M);
+        capped(b)
+            .total_cmp(&capped(a))
+            .then(margin(b).total_cmp(&margin(a)))
+    });
+    let best = working.first()?;
+    let least = best
+        .clearance
+        .classes
+        .iter()
+        .filter(|(class, _)| counts_as_clearance(class))
+        .min_by(|a, b| a.1.minimum_m.total_cmp(&b.1.minimum_m));
+    let pair = least.map_or(String::new(), |(_, found)| {
+        format!(" ({} to {}, {})", found.pair[0], found.pair[1], found.phase)
+    });
+    let reason = if clearance(best) >= AMPLE_CLEARANCE_M {
+        format!(
+            "largest joint margin ({:.0} % of the half range) of those with at least {:.0} mm of \
+             clearance",
+            100.0 * margin(best),
+            1e3 * AMPLE_CLEARANCE_M
+        )
+    } else {
+        let rest = match working.get(1) {
+            Some(next) => format!(
+                "; next is {} with {:.1} mm",
+                next.label,
+                1e3 * clearance(next)
+            ),
+            None => "; no other one works".to_owned(),
+        };
+        format!(
+            "largest least clearance of {} working: {:.1} mm{pair}{rest}",
+            working.len(),
+            1e3 * clearance(best)
+        )
+    };
+    Some(Recommendation {
+        label: best.label.to_owned(),
+        reason,
+    })
+}
+
+/// Classes that make up the least clearance of a configuration: physical bodies, but not the
+/// intended stand-off.
+pub fn counts_as_clearance(class: &str) -> bool {
+    !matches!(class, "guide_standoff" | "needle_corridor" | "needle_route")
+}

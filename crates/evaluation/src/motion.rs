@@ -1,0 +1,163 @@
+//! How a plant followed its trajectory.
+
+use needlebench_cell::{Cell, Goal};
+use needlebench_engine::Recording;
+use needlebench_kinematics::Joints;
+use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
+use serde::Serialize;
+
+use crate::needle::tip_of;
+
+/// Contact of arm or tool during a motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct ContactMeasurement {
+    /// Whether anything touched.
+    pub occurred: bool,
+    /// Time of the first touch, s.
+    pub first_time_s: Option<f64>,
+    /// Phase of the first touch.
+    pub first_phase: Option<&'static str>,
+    /// Bodies that touched first.
+    pub first_pair: Option<[String; 2]>,
+    /// Largest sum of normal forces, N.
+    pub peak_force_n: f64,
+    /// Integral of the sum of normal forces, N s.
+    pub impulse_ns: f64,
+    /// Deepest penetration, m.
+    pub deepest_penetration_m: f64,
+}
+
+/// Time and effort of one simulated motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MotionMeasurement {
+    /// Time from the end of the planned motion until the needle's tip stays within the band about
+    /// its commanded place, s; none if it never does.
+    pub settling_time_s: Option<f64>,
+    /// Half-width of that band, m.
+    pub settling_band_m: f64,
+    /// Largest distance of the needle's tip from its reference at the same time, m.
+    pub peak_tracking_error_m: f64,
+    /// Largest torque over its joint's limit.
+    pub peak_torque_ratio: f64,
+    /// Largest joint speed over its joint's limit.
+    pub peak_speed_ratio: f64,
+    /// Steps in which a torque was cut at its limit.
+    pub saturated_steps: usize,
+    /// Largest torque in the last step minus the torque that gravity asks for there, N m.
+    pub holding_torque_error_nm: f64,
+    /// Contact.
+    pub contact: ContactMeasurement,
+}
+
+/// Difference of two engines that followed the same trajectory.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct EngineDifference {
+    /// Largest distance of the two tips at the same time, m.
+    pub peak_tip_m: f64,
+    /// Distance of the two tips at the end, m.
+    pub settled_tip_m: f64,
+}
+
+/// Measures a recording.
+pub fn measure_motion(
+    cell: &Cell,
+    goal: &Goal,
+    trajectory: &JointTrajectory,
+    recording: &Recording,
+    settling_band_m: f64,
+) -> MotionMeasurement {
+    let reference_tip = |q: &Joints| tip_of(cell, goal, &cell.robot.world_from_flange(q));
+    let commanded = reference_tip(&trajectory.end());
+    let motion_end_s = trajectory
+        .phases()
+        .iter()
+        .filter(|(phase, _, _)| *phase != Phase::Hold)
+        .map(|(_, _, end_s)| *end_s)
+        .fold(0.0, f64::max);
+    let mut peak_tracking_error_m: f64 = 0.0;
+    let mut last_outside_s = None;
+    let mut peak_speed_ratio: f64 = 0.0;
+    let mut contact = ContactMeasurement::default();
+    let velocity_limit = cell.robot.limits.velocities_rad_s();
+    for ((state, reference), &time_s) in recording
+        .state
+        .iter()
+        .zip(&recording.reference)
+        .zip(&recording.time_s)
+    {
+        let tip = tip_of(cell, goal, &state.world_from_flange);
+        peak_tracking_error_m =
+            peak_tracking_error_m.max((tip - reference_tip(&reference.position)).norm());
+        if (tip - commanded).norm() > settling_band_m {
+            last_outside_s = Some(time_s);
+        }
+        peak_speed_ratio =
+            peak_speed_ratio.max(state.velocity.abs().component_div(&velocity_limit).max());
+        if state.contact.count > 0 {
+            if !contact.occurred {
+                contact.occurred = true;
+                contact.first_time_s = Some(time_s);
+                contact.first_phase = Some(trajectory.phase_at(time_s).name());
+                contact.first_pair = state
+                    .contact
+                    .pair
+                    .map(|(a, b)| [a, b].map(|index| cell.bodies[index as usize].name.clone()));
+            }
+            contact.peak_force_n = contact.peak_force_n.max(state.contact.normal_force_n);
+            contact.impulse_ns += state.contact.normal_force_n * recording.timestep_s;
+            contact.deepest_penetration_m = contact
+                .deepest_penetration_m
+                .max(state.contact.deepest_penetration_m);
+        }
+    }
+    let effort_limit = cell.robot.limits.efforts_nm();
+    let peak_torque_ratio = recording
+        .torque_nm
+        .iter()
+        .map(|torque| torque.abs().component_div(&effort_limit).max())
+        .fold(0.0, f64::max);
+    let end_s = recording.time_s.last().copied().unwrap_or(0.0);
+    let settling_time_s = match last_outside_s {
+        None => Some(0.0),
+        Some(outside_s) if outside_s >= end_s => None,
+        Some(outside_s) => Some((outside_s + recording.timestep_s - motion_end_s).max(0.0)),
+    };
+    let holding_torque_error_nm = recording
+        .torque_nm
+        .last()
+        .zip(recording.state.last())
+        .map_or(0.0, |(torque, state)| {
+            (torque - cell.dynamics().gravity_torque(&state.position)).amax()
+        });
+    MotionMeasurement {
+        settling_time_s,
+        settling_band_m,
+        peak_tracking_error_m,
+        peak_torque_ratio,
+        peak_speed_ratio,
+        saturated_steps: recording.saturated_steps,
+        holding_torque_error_nm,
+        contact,
+    }
+}
+
+/// Compares the tips of two recordings of one trajectory, step by step.
+pub fn engine_difference(
+    cell: &Cell,
+    goal: &Goal,
+    a: &Recording,
+    b: &Recording,
+) -> EngineDifference {
+    let distances = a.state.iter().zip(&b.state).map(|(a, b)| {
+        (tip_of(cell, goal, &a.world_from_flange) - tip_of(cell, goal, &b.world_from_flange)).norm()
+    });
+    let (mut peak_tip_m, mut settled_tip_m): (f64, f64) = (0.0, 0.0);
+    for distance_m in distances {
+        peak_tip_m = peak_tip_m.max(distance_m);
+        settled_tip_m = distance_m;
+    }
+    EngineDifference {
+        peak_tip_m,
+        settled_tip_m,
+    }
+}

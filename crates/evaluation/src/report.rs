@@ -1,0 +1,295 @@
+//! The report: every value that a run gives, with the keys that others build on.
+
+use std::collections::BTreeMap;
+
+use needlebench_engine::EngineIdentity;
+use serde::Serialize;
+
+use crate::motion::{EngineDifference, MotionMeasurement};
+use crate::needle::NeedleMeasurement;
+
+/// Version of the report's keys.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Result of a scenario.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Version of the keys.
+    pub schema_version: u32,
+    /// The scenario.
+    pub scenario: ScenarioSummary,
+    /// `pass` or `fail`.
+    pub verdict: Verdict,
+    /// Every criterion that was checked.
+    pub criteria: Vec<CriterionResult>,
+    /// The goals.
+    pub goals: Vec<GoalReport>,
+    /// Engines that failed, and how; their results are missing.
+    pub engine_failures: Vec<EngineFailure>,
+    /// What was assumed or adjusted.
+    pub notes: Vec<String>,
+    /// Where the numbers come from.
+    pub provenance: Provenance,
+    /// Wall-clock times; the only part that differs between two runs of the same inputs.
+    pub timings: BTreeMap<String, f64>,
+}
+
+/// Which scenario it was.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ScenarioSummary {
+    /// Its name.
+    pub name: String,
+    /// Its description.
+    pub description: String,
+    /// Its file, as given.
+    pub file: String,
+}
+
+/// Whether all criteria were met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// All were met.
+    Pass,
+    /// One was not.
+    Fail,
+}
+
+/// One criterion on one value.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CriterionResult {
+    /// Goal.
+    pub goal: String,
+    /// Configuration; none for criteria on the goal as a whole.
+    pub label: Option<String>,
+    /// Engine; none for criteria on both or on the plan.
+    pub engine: Option<String>,
+    /// Key of the scenario's `[criteria]`, or `expected`.
+    pub criterion: String,
+    /// The value; none where there is none to measure.
+    pub value: Option<f64>,
+    /// The limit.
+    pub limit: Option<f64>,
+    /// Unit of both.
+    pub unit: &'static str,
+    /// Met or not.
+    pub pass: bool,
+    /// What it is about, in words.
+    pub detail: String,
+}
+
+/// An engine that failed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct EngineFailure {
+    /// The engine.
+    pub engine: String,
+    /// Goal and configuration it was running, if any.
+    pub during: Option<String>,
+    /// What happened and how to mend it.
+    pub message: String,
+}
+
+/// One goal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GoalReport {
+    /// Its name.
+    pub name: String,
+    /// Lesion that is aimed at.
+    pub lesion: Option<String>,
+    /// Entry point in the world.
+    pub entry_m: Option<[f64; 3]>,
+    /// Target in the world.
+    pub target_m: [f64; 3],
+    /// Direction of insertion in the world.
+    pub axis: [f64; 3],
+    /// From guide exit to needle tip.
+    pub insertion_length_m: f64,
+    /// Planned gap between guide exit and entry point.
+    pub standoff_m: Option<f64>,
+    /// All eight configurations.
+    pub configurations: Vec<ConfigurationReport>,
+    /// The one to choose; none if none works.
+    pub recommended: Option<Recommendation>,
+}
+
+/// Which configuration to choose.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Recommendation {
+    /// Its label.
+    pub label: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// What became of a configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// It works and meets all criteria.
+    Ok,
+    /// It cannot work.
+    Rejected,
+    /// It works but misses a criterion, or no engine could measure it.
+    Failed,
+}
+
+impl Status {
+    /// As in the report.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Rejected => "rejected",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// One rule that rejects a configuration.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RejectionReport {
+    /// Name of the rule.
+    pub rule: &'static str,
+    /// The value that breaks it.
+    pub value: f64,
+    /// The limit.
+    pub limit: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+    /// Which joint, pair and phase.
+    pub detail: String,
+}
+
+/// Margins of the final posture.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MarginsReport {
+    /// 1 in the middle of every joint's range, 0 at a limit.
+    pub joint_limit: f64,
+    /// `|sin q5|`.
+    pub wrist_sine: f64,
+    /// `|sin q3|`.
+    pub elbow_sine: f64,
+    /// `sqrt(rho^2 - d4^2)`.
+    pub shoulder_m: f64,
+    /// `sqrt(det J J^T)` of the flange, m^3.
+    pub manipulability_m3: f64,
+}
+
+/// One phase of the planned motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PhaseReport {
+    /// `transfer`, `approach` or `hold`.
+    pub phase: &'static str,
+    /// Its start.
+    pub start_s: f64,
+    /// Its end.
+    pub end_s: f64,
+}
+
+/// One configuration of a goal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ConfigurationReport {
+    /// Table 2's words.
+    pub label: &'static str,
+    /// What became of it.
+    pub status: Status,
+    /// Rules that reject it, first failing one first.
+    pub rejections: Vec<RejectionReport>,
+    /// Final joint positions.
+    pub joints_rad: Option<[f64; 6]>,
+    /// Angle of the guide about the needle.
+    pub roll_rad: Option<f64>,
+    /// Whole turns added to the positions in (-pi, pi].
+    pub wrap: Option<[i32; 6]>,
+    /// Position residual of the inverse kinematics.
+    pub ik_residual_m: Option<f64>,
+    /// Orientation residual of the inverse kinematics.
+    pub ik_residual_rad: Option<f64>,
+    /// Joint that may take any value at this pose.
+    pub free_joint: Option<&'static str>,
+    /// Margins of the final posture.
+    pub margins: Option<MarginsReport>,
+    /// Planned motion.
+    pub motion: Vec<PhaseReport>,
+    /// Needle metrics of the commanded posture, by our forward kinematics.
+    pub commanded: Option<NeedleMeasurement>,
+    /// Measurements per engine: `rapier`, `mujoco`.
+    pub engines: BTreeMap<String, EngineReport>,
+    /// Difference of the engines; none unless both ran.
+    pub engine_difference: Option<EngineDifference>,
+    /// Clearances over the motion, of the final posture where nothing was simulated.
+    pub clearance: ClearanceReport,
+    /// Files written for it, relative to the results folder.
+    pub files: Vec<String>,
+}
+
+/// What one engine measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EngineReport {
+    /// Needle metrics of the settled state, from the engine's own body poses.
+    #[serde(flatten)]
+    pub needle: NeedleMeasurement,
+    /// Time and effort.
+    #[serde(flatten)]
+    pub motion: MotionMeasurement,
+    /// Least clearances over the recorded motion.
+    pub clearance: ClearanceReport,
+}
+
+/// Least clearance of a class.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ClassClearance {
+    /// Signed distance: positive apart, negative the penetration depth.
+    pub minimum_m: f64,
+    /// Proven lower bound over the whole motion; none: the minimum is over samples.
+    pub certified_lower_bound_m: Option<f64>,
+    /// The two solids.
+    pub pair: [String; 2],
+    /// Nearest (or deepest) points of the two, in the world.
+    pub witness_points_m: [[f64; 3]; 2],
+    /// Phase of the motion; `final_posture` without one, `insertion` for the needle's route.
+    pub phase: &'static str,
+    /// Time in the motion.
+    pub time_s: Option<f64>,
+    /// Engine whose motion it is.
+    pub engine: Option<String>,
+}
+
+/// Clearances by class; a class that the cell has no part for is absent.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct ClearanceReport {
+    /// By class name.
+    #[serde(flatten)]
+    pub classes: BTreeMap<&'static str, ClassClearance>,
+    /// Least over the classes of physical bodies, the guide's intended stand-off left out.
+    pub minimum_m: Option<f64>,
+}
+
+/// Where a report's numbers come from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Provenance {
+    /// Version of needlebench.
+    pub version: String,
+    /// Git revision of the program, with `-dirty` where it was changed; `unknown` outside git.
+    pub git_revision: String,
+    /// SHA-256 of the lock file of the build.
+    pub cargo_lock_sha256: String,
+    /// Engines with their settings.
+    pub engines: Vec<EngineIdentity>,
+    /// Files that went in, with their SHA-256.
+    pub inputs: Vec<InputFile>,
+    /// The scenario's seed.
+    pub seed: u64,
+    /// Which model is the truth.
+    pub truth: &'static str,
+}
+
+/// A file that went into a result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct InputFile {
+    /// `scenario`, `robot`, `tool`, `phantom`.
+    pub role: &'static str,
+    /// As named.
+    pub file: String,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+}

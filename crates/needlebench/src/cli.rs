@@ -1,0 +1,276 @@
+//! Arguments of the command line.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+
+use crate::command;
+use crate::exit::ExitStatus;
+use crate::pipeline::EngineChoice;
+
+/// Testbench for needle-guide robots: which of the eight arm configurations put the needle guide
+/// on its place, how far off the needle's tip is, and how close anything comes to anything.
+#[derive(Debug, Parser)]
+#[command(name = "needlebench", version = VERSION, propagate_version = true, max_term_width = 100)]
+#[command(
+    after_help = "Exit status: 0 all criteria met, 1 a criterion failed, 2 bad input, \
+                        3 the environment or an engine failed, 130 interrupted."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (",
+    env!("NEEDLEBENCH_GIT_REVISION"),
+    ")"
+);
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Plan, simulate and measure every configuration of every goal.
+    #[command(after_help = "Example: needlebench run scenarios/table3.toml --out out/table3")]
+    Run(RunArguments),
+    /// Parse, resolve and validate scenarios without simulating.
+    #[command(after_help = "Example: needlebench check scenarios/*.toml")]
+    Check(CheckArguments),
+    /// All joint positions for a pose of the flange or a goal of a scenario.
+    #[command(
+        after_help = "Example: needlebench ik --pose 0.1942,-0.3593,0.1701,-0.8567,2.7197,-1.1407"
+    )]
+    Ik(IkArguments),
+    /// Pose of the flange and of every link for joint positions.
+    #[command(
+        after_help = "Example: needlebench fk --joints -0.735,2.370,1.883,-1.967,1.274,0.114"
+    )]
+    Fk(FkArguments),
+    /// Signed clearance of one posture in a scenario's cell.
+    #[command(
+        after_help = "Example: needlebench clearance scenarios/table3.toml --joints 0,-1.57,-1,-1.57,1.57,0"
+    )]
+    Clearance(ClearanceArguments),
+    /// JSON schema of scenario files, for editors.
+    #[command(after_help = "Example: needlebench schema scenario > scenario.schema.json")]
+    Schema {
+        /// Which file format.
+        #[arg(value_enum)]
+        format: SchemaFormat,
+    },
+    /// What this machine has and lacks for running both engines.
+    #[command(after_help = "Example: needlebench doctor")]
+    Doctor {
+        /// Print one JSON document.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Completions for a shell.
+    #[command(after_help = "Example: needlebench completions bash > needlebench.bash")]
+    Completions {
+        /// The shell.
+        #[arg(value_enum)]
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Formats that have a schema.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SchemaFormat {
+    /// Scenario files.
+    Scenario,
+}
+
+/// Another robot than the scenario's.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct RobotArguments {
+    /// URDF of another UR arm instead of the scenario's or the shipped UR3.
+    #[arg(long, value_name = "URDF")]
+    pub robot: Option<PathBuf>,
+    /// Folder of a ROS package that the URDF's meshes name; may be given several times.
+    #[arg(long, value_name = "NAME=DIR")]
+    pub package_path: Vec<String>,
+    /// What to do when a moving link has no mass.
+    #[arg(long, value_enum, value_name = "POLICY")]
+    pub missing_inertia: Option<MissingInertiaArgument>,
+}
+
+/// What to do when a moving link has no mass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MissingInertiaArgument {
+    /// Refuse the robot.
+    Error,
+    /// Take the shipped UR3's mass properties and say so in the report.
+    NominalUr3,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RunArguments {
+    /// Scenario files.
+    #[arg(required = true, value_name = "SCENARIO")]
+    pub scenarios: Vec<PathBuf>,
+    /// Engines, instead of the scenario's own choice.
+    #[arg(long, value_enum)]
+    pub engine: Option<EngineChoice>,
+    /// Folder for results; each scenario gets a folder of its name in it.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Print the report as one JSON document instead of the table.
+    #[arg(long)]
+    pub json: bool,
+    /// Write JUnit XML of all scenarios to this file besides the one in the results folder.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+    /// Threads; the number of cores if left out. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: Option<u16>,
+    /// Draw no pictures.
+    #[arg(long)]
+    pub no_pictures: bool,
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckArguments {
+    /// Scenario files.
+    #[arg(required = true, value_name = "SCENARIO")]
+    pub scenarios: Vec<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+/// Methods of inverse kinematics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum IkMethod {
+    /// All configurations.
+    ClosedForm,
+    /// One, near the seed.
+    GaussNewton,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct IkArguments {
+    /// Scenario, of which `--goal` is solved.
+    #[arg(value_name = "SCENARIO", conflicts_with = "pose", requires = "goal")]
+    pub scenario: Option<PathBuf>,
+    /// Goal of the scenario.
+    #[arg(long, requires = "scenario")]
+    pub goal: Option<String>,
+    /// Pose of the flange in the controller's base frame: x,y,z (m) and rotation vector (rad).
+    #[arg(
+        long,
+        value_name = "x,y,z,rx,ry,rz",
+        allow_hyphen_values = true,
+        required_unless_present = "scenario"
+    )]
+    pub pose: Option<Six>,
+    /// Method.
+    #[arg(long, value_enum, default_value = "closed-form")]
+    pub method: IkMethod,
+    /// Joint positions to start from or to be near to, rad.
+    #[arg(long, value_name = "q1,..,q6", allow_hyphen_values = true)]
+    pub seed: Option<Six>,
+    /// List whole turns within the joint limits too.
+    #[arg(long)]
+    pub wraps: bool,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct FkArguments {
+    /// Joint positions, shoulder pan to wrist 3, rad.
+    #[arg(long, value_name = "q1,..,q6", allow_hyphen_values = true)]
+    pub joints: Six,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ClearanceArguments {
+    /// Scenario whose cell is used.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// Joint positions, shoulder pan to wrist 3, rad.
+    #[arg(long, value_name = "q1,..,q6", allow_hyphen_values = true)]
+    pub joints: Six,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+/// Six comma-separated finite numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Six(pub [f64; 6]);
+
+impl std::str::FromStr for Six {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let words: Vec<&str> = text.split(',').map(str::trim).collect();
+        let count = words.len();
+        let words: [&str; 6] = words
+            .try_into()
+            .map_err(|_| format!("needs six numbers separated by commas, got {count}"))?;
+        let mut numbers = [0.0; 6];
+        for (number, word) in numbers.iter_mut().zip(words) {
+            *number = word
+                .parse()
+                .map_err(|_| format!("`{word}` is not a number"))?;
+            if !f64::is_finite(*number) {
+                return Err(format!("`{word}` is not finite"));
+            }
+        }
+        Ok(Self(numbers))
+    }
+}
+
+/// The command line, for completions and documentation.
+pub fn command_line() -> clap::Command {
+    Cli::command()
+}
+
+/// Runs the program.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command {
+        Command::Run(arguments) => command::run(&arguments),
+        Command::Check(arguments) => command::check(&arguments),
+        Command::Ik(arguments) => command::ik(&arguments),
+        Command::Fk(arguments) => command::fk(&arguments),
+        Command::Clearance(arguments) => command::clearance(&arguments),
+        Command::Schema { format } => command::schema(format),
+        Command::Doctor { json } => command::doctor(json),
+        Command::Completions { shell } => command::completions(shell),
+    };
+    match result {
+        Ok(status) => status.into(),
+        Err(error) => {
+            // A closed pipe (`needlebench ... | head`) is the reader's choice.
+            let closed = error
+                .downcast_ref::<std::io::Error>()
+                .is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe);
+            if closed {
+                return ExitStatus::Success.into();
+            }
+            anstream::eprintln!("error: {error:#}");
+            ExitStatus::EnvironmentFailed.into()
+        }
+    }
+}

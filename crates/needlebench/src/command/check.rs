@@ -1,0 +1,65 @@
+//! `needlebench check`.
+
+use anyhow::Result;
+use needlebench_cell::{Finding, load_scenario};
+use serde::Serialize;
+
+use super::{overrides, print_json};
+use crate::cli::CheckArguments;
+use crate::exit::ExitStatus;
+use crate::output::findings::print_findings;
+
+#[derive(Serialize)]
+struct CheckAnswer {
+    schema_version: u32,
+    ok: bool,
+    findings: Vec<Finding>,
+    notes: Vec<String>,
+}
+
+/// Parses, resolves and validates scenarios.
+pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
+    let mut findings = Vec::new();
+    let mut notes = Vec::new();
+    match overrides(&arguments.robot) {
+        Err(finding) => findings.push(finding),
+        Ok(overrides) => {
+            for path in &arguments.scenarios {
+                match load_scenario(path, &overrides) {
+                    Ok(resolved) => {
+                        if !arguments.json {
+                            anstream::println!(
+                                "{}: ok ({} goals, {} bodies, {} pairs)",
+                                path.display(),
+                                resolved.goals.len(),
+                                resolved.cell.bodies.len(),
+                                resolved.cell.pairs.len()
+                            );
+                            for note in &resolved.notes {
+                                anstream::println!("  note: {note}");
+                            }
+                        }
+                        notes.extend(resolved.notes);
+                    }
+                    Err(found) => findings.extend(found),
+                }
+            }
+        }
+    }
+    let ok = findings.is_empty();
+    if arguments.json {
+        print_json(&CheckAnswer {
+            schema_version: 1,
+            ok,
+            findings,
+            notes,
+        })?;
+    } else {
+        print_findings(&findings);
+    }
+    Ok(if ok {
+        ExitStatus::Success
+    } else {
+        ExitStatus::BadInput
+    })
+}

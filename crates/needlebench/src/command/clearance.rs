@@ -1,0 +1,111 @@
+//! `needlebench clearance`.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use needlebench_cell::Cell;
+use needlebench_clearance::{ClearanceModel, PairClearance};
+use needlebench_kinematics::Joints;
+use serde::Serialize;
+
+use super::{load, overrides, print_json};
+use crate::cli::ClearanceArguments;
+use crate::exit::ExitStatus;
+use crate::output::findings::print_findings;
+
+#[derive(Serialize)]
+struct ClearanceAnswer {
+    schema_version: u32,
+    classes: BTreeMap<&'static str, ClassAnswer>,
+    pairs: Vec<PairAnswer>,
+}
+
+#[derive(Serialize)]
+struct ClassAnswer {
+    minimum_m: f64,
+    pair: [String; 2],
+    witness_points_m: [[f64; 3]; 2],
+}
+
+#[derive(Serialize)]
+struct PairAnswer {
+    pair: [String; 2],
+    class: &'static str,
+    distance_m: f64,
+    solids: [String; 2],
+    witness_points_m: [[f64; 3]; 2],
+}
+
+fn witnesses(pair: &PairClearance) -> [[f64; 3]; 2] {
+    [
+        pair.separation.point_on_a.coords.into(),
+        pair.separation.point_on_b.coords.into(),
+    ]
+}
+
+fn solids(cell: &Cell, pair: &PairClearance) -> [String; 2] {
+    let (a, b) = pair.solid_names(cell);
+    [a.to_owned(), b.to_owned()]
+}
+
+/// Prints the clearance of one posture.
+pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus> {
+    let overrides = match overrides(&arguments.robot) {
+        Ok(overrides) => overrides,
+        Err(finding) => {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let Some(resolved) = load(&arguments.scenario, &overrides) else {
+        return Ok(ExitStatus::BadInput);
+    };
+    let cell = &resolved.cell;
+    let model = ClearanceModel::new(cell);
+    let q = Joints::from_column_slice(&arguments.joints.0);
+    let classes: BTreeMap<&'static str, ClassAnswer> = model
+        .minimum_per_class(&q)
+        .iter()
+        .map(|pair| {
+            let answer = ClassAnswer {
+                minimum_m: pair.separation.distance_m,
+                pair: solids(cell, pair),
+                witness_points_m: witnesses(pair),
+            };
+            (pair.class.name(), answer)
+        })
+        .collect();
+    let pairs: Vec<PairAnswer> = model
+        .all_pairs(&q)
+        .iter()
+        .map(|found| {
+            let bodies = cell.pairs[found.pair];
+            PairAnswer {
+                pair: [bodies.a, bodies.b].map(|body| cell.bodies[body].name.clone()),
+                class: found.class.name(),
+                distance_m: found.separation.distance_m,
+                solids: solids(cell, found),
+                witness_points_m: witnesses(found),
+            }
+        })
+        .collect();
+    if arguments.json {
+        print_json(&ClearanceAnswer {
+            schema_version: 1,
+            classes,
+            pairs,
+        })?;
+        return Ok(ExitStatus::Success);
+    }
+    let mut table = crate::output::plain_table(&["class", "clearance (mm)", "between", "and"]);
+    for (class, answer) in &classes {
+        table.add_row([
+            (*class).to_owned(),
+            format!("{:.3}", answer.minimum_m * 1e3),
+            answer.pair[0].clone(),
+            answer.pair[1].clone(),
+        ]);
+    }
+    anstream::println!("{table}");
+    Ok(ExitStatus::Success)
+}

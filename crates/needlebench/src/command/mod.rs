@@ -1,0 +1,77 @@
+//! What each command does.
+
+mod check;
+mod clearance;
+mod doctor;
+mod kinematics;
+mod run;
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::Result;
+use needlebench_cell::{
+    Finding, MissingInertia, Overrides, PackagePaths, ResolvedScenario, load_scenario,
+};
+use serde::Serialize;
+
+pub(crate) use check::check;
+pub(crate) use clearance::clearance;
+pub(crate) use doctor::doctor;
+pub(crate) use kinematics::{fk, ik};
+pub(crate) use run::run;
+
+use crate::cli::{MissingInertiaArgument, RobotArguments, SchemaFormat};
+use crate::exit::ExitStatus;
+use crate::output::findings::print_findings;
+
+/// Reads a scenario; prints what is wrong with it and gives `None` if it cannot be used.
+fn load(path: &Path, overrides: &Overrides) -> Option<ResolvedScenario> {
+    match load_scenario(path, overrides) {
+        Ok(resolved) => Some(resolved),
+        Err(findings) => {
+            print_findings(&findings);
+            None
+        }
+    }
+}
+
+fn overrides(arguments: &RobotArguments) -> Result<Overrides, Finding> {
+    Ok(Overrides {
+        robot_urdf: arguments.robot.clone(),
+        packages: PackagePaths::from_arguments(&arguments.package_path)?,
+        missing_inertia: arguments.missing_inertia.map(|policy| match policy {
+            MissingInertiaArgument::Error => MissingInertia::Error,
+            MissingInertiaArgument::NominalUr3 => MissingInertia::NominalUr3,
+        }),
+    })
+}
+
+/// Prints one JSON document to standard output.
+fn print_json(value: &impl Serialize) -> Result<()> {
+    let mut out = anstream::stdout().lock();
+    serde_json::to_writer_pretty(&mut out, value).map_err(std::io::Error::from)?;
+    writeln!(out)?;
+    Ok(())
+}
+
+/// Prints the schema of a file format.
+pub(crate) fn schema(format: SchemaFormat) -> Result<ExitStatus> {
+    match format {
+        SchemaFormat::Scenario => print_json(&needlebench_cell::scenario::scenario_schema())?,
+    }
+    Ok(ExitStatus::Success)
+}
+
+/// Prints completions for a shell.
+pub(crate) fn completions(shell: clap_complete::Shell) -> Result<ExitStatus> {
+    let mut script = Vec::new();
+    clap_complete::generate(
+        shell,
+        &mut crate::cli::command_line(),
+        "needlebench",
+        &mut script,
+    );
+    std::io::stdout().lock().write_all(&script)?;
+    Ok(ExitStatus::Success)
+}

@@ -1,0 +1,295 @@
+//! `needlebench run`.
+
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use needlebench_cell::{Finding, ResolvedScenario};
+use needlebench_evaluation::report::{Report, Verdict};
+use serde::Serialize;
+
+use super::{load, overrides, print_json};
+use crate::cli::RunArguments;
+use crate::exit::ExitStatus;
+use crate::output::findings::print_findings;
+use crate::output::pictures::{Backdrop, configuration_picture, sheet_caption};
+use crate::output::{junit, markdown, print_report, recording_csv, write_atomically};
+use crate::picture::{Image, tile};
+use crate::pipeline::{self, RunOptions, ScenarioRun};
+use crate::progress::Progress;
+
+#[derive(Serialize)]
+struct SeveralReports<'a> {
+    schema_version: u32,
+    results: &'a [Report],
+}
+
+/// Runs scenarios, writes their results and prints them.
+pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
+    let overrides = match overrides(&arguments.robot) {
+        Ok(overrides) => overrides,
+        Err(finding) => {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    // All inputs are read before anything long starts.
+    let mut scenarios = Vec::new();
+    for path in &arguments.scenarios {
+        scenarios.push(load(path, &overrides));
+    }
+    let Some(scenarios) = scenarios
+        .into_iter()
+        .collect::<Option<Vec<ResolvedScenario>>>()
+    else {
+        return Ok(ExitStatus::BadInput);
+    };
+    if let Some(finding) = repeated_name(&scenarios) {
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
+    let folders = match prepare_folders(arguments, &scenarios) {
+        Ok(folders) => folders,
+        Err(finding) => {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let cancel = Arc::new(AtomicBool::new(false));
+    let requested = Arc::clone(&cancel);
+    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
+        .context("cannot watch for interrupts")?;
+    let jobs = arguments.jobs.map_or_else(
+        || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        usize::from,
+    );
+    let options = RunOptions {
+        engines: arguments.engine,
+        jobs,
+    };
+
+    let mut status = ExitStatus::Success;
+    let mut reports = Vec::new();
+    for (resolved, folder) in scenarios.iter().zip(&folders) {
+        let progress = Progress::new(arguments.quiet);
+        // A robot that is not a UR arm was refused while the scenario was read.
+        let mut finished = pipeline::run(resolved, &options, &cancel, &progress)?;
+        let pictures = resolved.scenario.recording.pictures && !arguments.no_pictures;
+        let written = write_results(
+            resolved,
+            &mut finished,
+            folder,
+            pictures,
+            jobs,
+            &cancel,
+            &progress,
+        );
+        progress.finish();
+        written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
+        status = status.max(outcome(&finished));
+        if !arguments.json {
+            anstream::println!("{}", resolved.scenario.name);
+            print_report(&finished.report);
+            anstream::println!("results: {}", folder.display());
+        }
+        reports.push(finished.report);
+        if finished.interrupted {
+            anstream::eprintln!(
+                "interrupted: what was finished until then is in {}",
+                folder.display()
+            );
+            break;
+        }
+    }
+    if arguments.json {
+        match reports.as_slice() {
+            [report] if arguments.scenarios.len() == 1 => print_json(report)?,
+            results => print_json(&SeveralReports {
+                schema_version: 1,
+                results,
+            })?,
+        }
+    }
+    let all: Vec<&Report> = reports.iter().collect();
+    if let Some(path) = &arguments.junit {
+        write_atomically(path, junit(&all)?.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    append_to_step_summary(&all)?;
+    Ok(status)
+}
+
+fn outcome(finished: &ScenarioRun) -> ExitStatus {
+    if finished.interrupted {
+        ExitStatus::Interrupted
+    } else if !finished.report.engine_failures.is_empty() {
+        ExitStatus::EnvironmentFailed
+    } else if finished.report.verdict == Verdict::Fail {
+        ExitStatus::CriterionFailed
+    } else {
+        ExitStatus::Success
+    }
+}
+
+fn repeated_name(scenarios: &[ResolvedScenario]) -> Option<Finding> {
+    scenarios.iter().enumerate().find_map(|(index, each)| {
+        let name = &each.scenario.name;
+        let earlier = scenarios[..index]
+            .iter()
+            .find(|other| other.scenario.name == *name)?;
+        Some(
+            Finding::new(
+                &each.source.file,
+                format!("`{name}` is the name of {} too", earlier.source.file),
+            )
+            .key("name")
+            .hint("the name is that of the results folder: give each scenario its own"),
+        )
+    })
+}
+
+/// Makes each scenario's results folder and proves that it can be written, before a long run.
+fn prepare_folders(
+    arguments: &RunArguments,
+    scenarios: &[ResolvedScenario],
+) -> Result<Vec<PathBuf>, Finding> {
+    let mut folders = Vec::new();
+    for resolved in scenarios {
+        let folder = arguments.out.join(&resolved.scenario.name);
+        let probe = folder.join(format!(".probe-{}", std::process::id()));
+        std::fs::create_dir_all(&folder)
+            .and_then(|()| std::fs::write(&probe, []))
+            .and_then(|()| std::fs::remove_file(&probe))
+            .map_err(|error| {
+                Finding::new(
+                    folder.display().to_string(),
+                    format!("the results folder cannot be written: {error}"),
+                )
+                .key("--out")
+                .hint("choose another folder with --out DIR")
+            })?;
+        folders.push(folder);
+    }
+    Ok(folders)
+}
+
+fn write_results(
+    resolved: &ResolvedScenario,
+    finished: &mut ScenarioRun,
+    folder: &Path,
+    pictures: bool,
+    jobs: usize,
+    cancel: &AtomicBool,
+    progress: &Progress,
+) -> Result<()> {
+    let started = Instant::now();
+    let mut files: Vec<Vec<Vec<String>>> = Vec::new();
+    let period_s = resolved.scenario.recording.period_ms * 1e-3;
+    for ((goal, plan), runs) in resolved
+        .goals
+        .iter()
+        .zip(&finished.plans)
+        .zip(&finished.runs)
+    {
+        let goal_folder = folder.join(&goal.name);
+        std::fs::create_dir_all(&goal_folder)?;
+        let mut of_goal = Vec::new();
+        for (plan, runs) in plan.configurations.iter().zip(runs) {
+            let mut names = Vec::new();
+            for run in runs {
+                let name = format!("{}.{}.csv", plan.configuration, run.engine.name());
+                let trajectory = plan.trajectory.as_ref().context("a run has a trajectory")?;
+                let csv = recording_csv(run, trajectory, period_s);
+                write_atomically(&goal_folder.join(&name), csv.as_bytes())?;
+                names.push(format!("{}/{name}", goal.name));
+            }
+            of_goal.push(names);
+        }
+        files.push(of_goal);
+    }
+    if pictures && !cancel.load(Ordering::Relaxed) {
+        progress.message("drawing");
+        write_pictures(resolved, &finished.report, folder, jobs, &mut files)?;
+    }
+    for (goal, names) in finished.report.goals.iter_mut().zip(files) {
+        for (configuration, names) in goal.configurations.iter_mut().zip(names) {
+            configuration.files = names;
+        }
+    }
+    finished
+        .report
+        .timings
+        .insert("writing_s".to_owned(), started.elapsed().as_secs_f64());
+    let report = &finished.report;
+    let mut json = serde_json::to_vec_pretty(report)?;
+    json.push(b'\n');
+    write_atomically(&folder.join("report.json"), &json)?;
+    write_atomically(&folder.join("junit.xml"), junit(&[report])?.as_bytes())?;
+    write_atomically(&folder.join("summary.md"), markdown(report).as_bytes())?;
+    Ok(())
+}
+
+fn write_pictures(
+    resolved: &ResolvedScenario,
+    report: &Report,
+    folder: &Path,
+    jobs: usize,
+    files: &mut [Vec<Vec<String>>],
+) -> Result<()> {
+    let backdrop = Backdrop::new(resolved);
+    for (index, (goal, goal_report)) in resolved.goals.iter().zip(&report.goals).enumerate() {
+        let next = AtomicUsize::new(0);
+        let drawn: Mutex<Vec<(usize, Image)>> = Mutex::new(Vec::new());
+        std::thread::scope(|scope| {
+            for _ in 0..jobs.clamp(1, goal_report.configurations.len()) {
+                scope.spawn(|| {
+                    loop {
+                        let at = next.fetch_add(1, Ordering::Relaxed);
+                        let Some(configuration) = goal_report.configurations.get(at) else {
+                            break;
+                        };
+                        if let Some(image) =
+                            configuration_picture(resolved, &backdrop, goal, configuration)
+                        {
+                            drawn.lock().expect("no thread panics").push((at, image));
+                        }
+                    }
+                });
+            }
+        });
+        let mut drawn = drawn.into_inner().expect("no thread panics");
+        drawn.sort_by_key(|(at, _)| *at);
+        let mut sheet = Vec::new();
+        for (at, image) in drawn {
+            let configuration = &goal_report.configurations[at];
+            let name = format!("{}/{}.png", goal.name, configuration.label);
+            image.write_png(&folder.join(&name))?;
+            files[index][at].push(name);
+            sheet.push((image, sheet_caption(goal_report, configuration)));
+        }
+        if !sheet.is_empty() {
+            tile(&sheet, 4).write_png(&folder.join(format!("{}.png", goal.name)))?;
+        }
+    }
+    Ok(())
+}
+
+/// Adds the summaries to the page that GitHub Actions shows for a step.
+fn append_to_step_summary(reports: &[&Report]) -> Result<()> {
+    let Some(path) = std::env::var_os("GITHUB_STEP_SUMMARY") else {
+        return Ok(());
+    };
+    let mut file = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(&path)
+        .with_context(|| format!("cannot write {}", Path::new(&path).display()))?;
+    for report in reports {
+        writeln!(file, "{}", markdown(report))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,92 @@
+//! JUnit XML: a suite for each goal, a case for each configuration.
+
+use anyhow::Result;
+use needlebench_evaluation::report::{CriterionResult, Report, Status};
+use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
+
+use super::format::value_with_unit;
+
+/// Reports as one JUnit document. Contains no times: two runs give the same bytes.
+///
+/// A rejected configuration counts as skipped unless that contradicts what is expected of it.
+pub(crate) fn junit(reports: &[&Report]) -> Result<String> {
+    let mut document = quick_junit::Report::new("needlebench");
+    for report in reports {
+        for goal in &report.goals {
+            let mut suite = TestSuite::new(format!("{}.{}", report.scenario.name, goal.name));
+            for configuration in &goal.configurations {
+                let failures: Vec<String> = report
+                    .criteria
+                    .iter()
+                    .filter(|result| result.goal == goal.name && !result.pass)
+                    .filter(|result| result.label.as_deref() == Some(configuration.label))
+                    .map(described)
+                    .collect();
+                let status = if !failures.is_empty() {
+                    failure(&failures)
+                } else if configuration.status == Status::Rejected {
+                    let mut status = TestCaseStatus::skipped();
+                    if let Some(rejection) = configuration.rejections.first() {
+                        status.set_message(format!("{}: {}", rejection.rule, rejection.detail));
+                    }
+                    status
+                } else if configuration.engines.is_empty() {
+                    failure(&["no engine measured it".to_owned()])
+                } else {
+                    TestCaseStatus::success()
+                };
+                let mut case = TestCase::new(configuration.label, status);
+                case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
+                suite.add_test_case(case);
+            }
+            let failures: Vec<String> = report
+                .criteria
+                .iter()
+                .filter(|result| result.goal == goal.name && result.label.is_none() && !result.pass)
+                .map(described)
+                .collect();
+            let status = if failures.is_empty() {
+                TestCaseStatus::success()
+            } else {
+                failure(&failures)
+            };
+            let mut case = TestCase::new("goal", status);
+            case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
+            suite.add_test_case(case);
+            document.add_test_suite(suite);
+        }
+        if !report.engine_failures.is_empty() {
+            let mut suite = TestSuite::new(format!("{}.engines", report.scenario.name));
+            for broken in &report.engine_failures {
+                let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
+                status.set_message(broken.message.clone());
+                suite.add_test_case(TestCase::new(broken.engine.clone(), status));
+            }
+            document.add_test_suite(suite);
+        }
+    }
+    Ok(document.to_string()?)
+}
+
+fn failure(reasons: &[String]) -> TestCaseStatus {
+    let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+    status.set_message(reasons.join("; "));
+    status
+}
+
+fn described(result: &CriterionResult) -> String {
+    let engine = result
+        .engine
+        .as_ref()
+        .map_or(String::new(), |engine| format!(" ({engine})"));
+    match (result.value, result.limit) {
+        (Some(value), Some(limit)) => format!(
+            "{}{engine}: {}, limit {} {}",
+            result.criterion,
+            value_with_unit(value, result.unit),
+            value_with_unit(limit, result.unit),
+            result.detail
+        ),
+        _ => format!("{}{engine}: {}", result.criterion, result.detail),
+    }
+}

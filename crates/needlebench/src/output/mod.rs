@@ -1,0 +1,16 @@
+//! Output formats: terminal, JSON, JUnit, Markdown, CSV, pictures.
+
+mod atomic;
+pub(crate) mod findings;
+mod format;
+mod junit;
+mod markdown;
+pub(crate) mod pictures;
+mod recording;
+mod table;
+
+pub(crate) use atomic::write_atomically;
+pub(crate) use junit::junit;
+pub(crate) use markdown::markdown;
+pub(crate) use recording::recording_csv;
+pub(crate) use table::{plain_table, print_report};

@@ -1,0 +1,277 @@
+//! The table that a run prints.
+
+use comfy_table::{Cell, CellAlignment, Color, Table};
+use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status, Verdict};
+
+use super::format::{millimetres, small_length, value_with_unit};
+
+/// A table without frame lines between rows.
+pub(crate) fn plain_table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
+    table.set_header(header.iter().map(|text| Cell::new(text)));
+    table
+}
+
+/// Prints the whole report.
+pub(crate) fn print_report(report: &Report) {
+    for goal in &report.goals {
+        anstream::println!("{}", goal_heading(goal));
+        anstream::println!("{}", goal_table(goal));
+        print_remarks(report, goal);
+    }
+    for failure in &report.engine_failures {
+        let during = failure
+            .during
+            .as_ref()
+            .map_or(String::new(), |during| format!(" in {during}"));
+        anstream::println!(
+            "engine {} failed{during}: {}",
+            failure.engine,
+            failure.message
+        );
+    }
+    let failed = report.criteria.iter().filter(|result| !result.pass).count();
+    let verdict = match report.verdict {
+        Verdict::Pass => "PASS",
+        Verdict::Fail => "FAIL",
+    };
+    anstream::println!(
+        "{verdict}: {} of {} criteria met",
+        report.criteria.len() - failed,
+        report.criteria.len()
+    );
+}
+
+fn goal_heading(goal: &GoalReport) -> String {
+    let lesion = goal
+        .lesion
+        .as_ref()
+        .map_or(String::new(), |name| format!(", lesion {name}"));
+    let standoff = goal.standoff_m.map_or(String::new(), |standoff_m| {
+        format!(", guide {:.1} mm off the skin", standoff_m * 1e3)
+    });
+    format!(
+        "\ngoal {}{lesion}: needle {:.1} mm beyond the guide{standoff}",
+        goal.name,
+        goal.insertion_length_m * 1e3
+    )
+}
+
+/// One column: its heading, its number and text, and whether small or large is the worst.
+struct Column {
+    heading: &'static str,
+    value: fn(&ConfigurationReport) -> Option<(f64, String)>,
+    worst_is_large: bool,
+}
+
+fn engine_tip(configuration: &ConfigurationReport, engine: &str) -> Option<(f64, String)> {
+    let error_m = configuration
+        .engines
+        .get(engine)?
+        .needle
+        .tip_position_error_m;
+    Some((error_m, small_length(error_m)))
+}
+
+fn over_engines(
+    configuration: &ConfigurationReport,
+    value: impl Fn(&needlebench_evaluation::report::EngineReport) -> Option<f64>,
+) -> Option<f64> {
+    configuration
+        .engines
+        .values()
+        .filter_map(value)
+        .reduce(f64::max)
+}
+
+const COLUMNS: [Column; 11] = [
+    Column {
+        heading: "tip error\nrapier",
+        value: |each| engine_tip(each, "rapier"),
+        worst_is_large: true,
+    },
+    Column {
+        heading: "tip error\nMuJoCo",
+        value: |each| engine_tip(each, "mujoco"),
+        worst_is_large: true,
+    },
+    Column {
+        heading: "engines differ\npeak",
+        value: |each| {
+            each.engine_difference
+                .map(|d| (d.peak_tip_m, small_length(d.peak_tip_m)))
+        },
+        worst_is_large: true,
+    },
+    Column {
+        heading: "\nsettled",
+        value: |each| {
+            each.engine_difference
+                .map(|d| (d.settled_tip_m, small_length(d.settled_tip_m)))
+        },
+        worst_is_large: true,
+    },
+    Column {
+        heading: "tracking\npeak",
+        value: |each| {
+            let error_m = over_engines(each, |engine| Some(engine.motion.peak_tracking_error_m))?;
+            Some((error_m, small_length(error_m)))
+        },
+        worst_is_large: true,
+    },
+    Column {
+        heading: "torque\nof limit",
+        value: |each| {
+            let ratio = over_engines(each, |engine| Some(engine.motion.peak_torque_ratio))?;
+            Some((ratio, format!("{:.0} %", ratio * 100.0)))
+        },
+        worst_is_large: true,
+    },
+    Column {
+        heading: "arm to\nskin (mm)",
+        value: |each| class(each, "robot_phantom"),
+        worst_is_large: false,
+    },
+    Column {
+        heading: "tool to\nskin (mm)",
+        value: |each| class(each, "tool_phantom"),
+        worst_is_large: false,
+    },
+    Column {
+        heading: "behind\nguide (mm)",
+        value: |each| class(each, "needle_corridor"),
+        worst_is_large: false,
+    },
+    Column {
+        heading: "least (mm)",
+        value: |each| each.clearance.minimum_m.map(|m| (m, millimetres(m))),
+        worst_is_large: false,
+    },
+    Column {
+        heading: "motion\n(s)",
+        value: |each| {
+            let end_s = each
+                .motion
+                .iter()
+                .filter(|phase| phase.phase != "hold")
+                .map(|p| p.end_s);
+            end_s.reduce(f64::max).map(|s| (s, format!("{s:.2}")))
+        },
+        worst_is_large: true,
+    },
+];
+
+fn class(configuration: &ConfigurationReport, class: &str) -> Option<(f64, String)> {
+    let found = configuration.clearance.classes.get(class)?;
+    Some((found.minimum_m, millimetres(found.minimum_m)))
+}
+
+/// The eight rows of a goal; the worst number of each column is marked with `*` and in colour.
+fn goal_table(goal: &GoalReport) -> Table {
+    let mut header = vec!["configuration", "status"];
+    header.extend(COLUMNS.iter().map(|column| column.heading));
+    let mut table = plain_table(&header);
+    let worst: Vec<Option<f64>> = COLUMNS
+        .iter()
+        .map(|column| {
+            let values = goal
+                .configurations
+                .iter()
+                .filter(|each| each.status != Status::Rejected)
+                .filter_map(|each| (column.value)(each))
+                .map(|(value, _)| value);
+            if column.worst_is_large {
+                values.reduce(f64::max)
+            } else {
+                values.reduce(f64::min)
+            }
+        })
+        .collect();
+    let recommended = goal.recommended.as_ref().map(|found| found.label.as_str());
+    for configuration in &goal.configurations {
+        let chosen = recommended == Some(configuration.label);
+        let name = if chosen {
+            format!("{} <", configuration.label)
+        } else {
+            configuration.label.to_owned()
+        };
+        let status = match (configuration.status, configuration.rejections.first()) {
+            (Status::Rejected, Some(first)) => Cell::new(first.rule).fg(Color::Yellow),
+            (Status::Failed, _) => Cell::new("failed").fg(Color::Red),
+            (status, _) => Cell::new(status.name()),
+        };
+        let mut row = vec![
+            if chosen {
+                Cell::new(name).fg(Color::Green)
+            } else {
+                Cell::new(name)
+            },
+            status,
+        ];
+        for (column, worst) in COLUMNS.iter().zip(&worst) {
+            let cell = match (column.value)(configuration) {
+                None => Cell::new("-"),
+                Some((value, text))
+                    if Some(value) == *worst && configuration.status != Status::Rejected =>
+                {
+                    Cell::new(format!("{text}*")).fg(Color::Red)
+                }
+                Some((_, text)) => Cell::new(text),
+            };
+            row.push(cell.set_alignment(CellAlignment::Right));
+        }
+        table.add_row(row);
+    }
+    table
+}
+
+fn print_remarks(report: &Report, goal: &GoalReport) {
+    if let Some(route) = goal
+        .configurations
+        .first()
+        .and_then(|each| each.clearance.classes.get("needle_route"))
+    {
+        anstream::println!(
+            "needle route: {:.1} mm from {}",
+            route.minimum_m * 1e3,
+            route.pair[1]
+        );
+    }
+    for configuration in &goal.configurations {
+        if let Some(rejection) = configuration.rejections.first() {
+            anstream::println!(
+                "{}: {}: {} (limit {}): {}",
+                configuration.label,
+                rejection.rule,
+                value_with_unit(rejection.value, rejection.unit),
+                value_with_unit(rejection.limit, rejection.unit),
+                rejection.detail
+            );
+        }
+    }
+    for result in report
+        .criteria
+        .iter()
+        .filter(|result| result.goal == goal.name && !result.pass)
+    {
+        let about = [result.label.clone(), result.engine.clone()];
+        let about: Vec<String> = about.into_iter().flatten().collect();
+        let value = result
+            .value
+            .map_or("none".to_owned(), |v| value_with_unit(v, result.unit));
+        let limit = result.limit.map_or(String::new(), |limit| {
+            format!(": {value}, limit {}", value_with_unit(limit, result.unit))
+        });
+        anstream::println!(
+            "FAILED {} {}{limit} {}",
+            about.join(" "),
+            result.criterion,
+            result.detail
+        );
+    }
+    match &goal.recommended {
+        Some(found) => anstream::println!("recommended: {} - {}", found.label, found.reason),
+        None => anstream::println!("recommended: none, no configuration works"),
+    }
+}

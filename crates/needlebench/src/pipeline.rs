@@ -1,0 +1,640 @@
+//! The whole way of one scenario: plan, simulate, measure, judge.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use needlebench_cell::scenario::EngineName;
+use needlebench_cell::{Cell, Goal, ResolvedScenario};
+use needlebench_clearance::ClearanceModel;
+use needlebench_engine::mujoco::{HarnessProcess, ensure};
+use needlebench_engine::{
+    EngineError, EngineIdentity, Hooks, MujocoPlant, MujocoSettings, Plant, RapierPlant,
+    RapierSettings, Recording, Servo, ServoGains, simulate,
+};
+use needlebench_evaluation::report::{
+    ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
+    MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary, Status,
+};
+use needlebench_evaluation::{
+    ClearanceSeries, engine_difference, judge, measure_clearance, measure_motion, measure_needle,
+    needle_route, posture_clearance,
+};
+use needlebench_kinematics::NotUrGeometry;
+use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
+
+use crate::progress::Progress;
+use crate::provenance::provenance;
+
+/// Engines that a run uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum EngineChoice {
+    /// rapier only.
+    Rapier,
+    /// MuJoCo only.
+    Mujoco,
+    /// Both.
+    Both,
+}
+
+/// How to run a scenario.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunOptions {
+    /// Engines; the scenario's own choice if `None`.
+    pub engines: Option<EngineChoice>,
+    /// Threads; more than there are engines and goals is no use.
+    pub jobs: usize,
+}
+
+/// Recording of one engine with the clearances along it.
+#[derive(Debug, Clone)]
+pub struct EngineRun {
+    /// The engine.
+    pub engine: EngineName,
+    /// What the plant did.
+    pub recording: Recording,
+    /// Clearance over time.
+    pub clearance: ClearanceSeries,
+}
+
+/// Everything that a run of a scenario leaves.
+#[derive(Debug)]
+pub struct ScenarioRun {
+    /// The report.
+    pub report: Report,
+    /// Plans, by goal.
+    pub plans: Vec<GoalPlan>,
+    /// Recordings, by goal, configuration and engine.
+    pub runs: Vec<Vec<Vec<EngineRun>>>,
+    /// It was interrupted; what was finished until then is here.
+    pub interrupted: bool,
+}
+
+/// One motion to simulate.
+#[derive(Debug, Clone, Copy)]
+struct Job {
+    goal: usize,
+    configuration: usize,
+}
+
+/// Plans, simulates, measures and judges one scenario.
+///
+/// # Errors
+/// [`NotUrGeometry`] if the robot is not a UR arm. A failing engine is no error: the report says
+/// so and keeps what the other one measured.
+pub(crate) fn run(
+    resolved: &ResolvedScenario,
+    options: &RunOptions,
+    cancel: &AtomicBool,
+    progress: &Progress,
+) -> Result<ScenarioRun, NotUrGeometry> {
+    let started = Instant::now();
+    let mut timings = BTreeMap::new();
+    let engines = match options.engines {
+        None => {
+            let mut engines = resolved.scenario.engines.run.clone();
+            engines.sort_unstable();
+            engines.dedup();
+            engines
+        }
+        Some(EngineChoice::Rapier) => vec![EngineName::Rapier],
+        Some(EngineChoice::Mujoco) => vec![EngineName::Mujoco],
+        Some(EngineChoice::Both) => vec![EngineName::Rapier, EngineName::Mujoco],
+    };
+    let model = ClearanceModel::new(&resolved.cell);
+    let planner = Planner::new(resolved, &model)?;
+
+    // The MuJoCo process starts while the motions are planned.
+    let (plans, harness) = std::thread::scope(|scope| {
+        let wanted = engines.contains(&EngineName::Mujoco);
+        let harness = wanted.then(|| scope.spawn(|| start_harness(resolved, progress)));
+        progress.message("planning");
+        progress.expect(resolved.goals.len() as u64);
+        let plans = in_parallel(options.jobs, &resolved.goals, |goal| {
+            let plan = planner.plan(goal);
+            progress.step();
+            plan
+        });
+        (
+            plans,
+            harness.map(|thread| thread.join().expect("the start-up does not panic")),
+        )
+    });
+    timings.insert("planning_s".to_owned(), started.elapsed().as_secs_f64());
+
+    let jobs = jobs(resolved, &plans);
+    progress.message("simulating");
+    progress.expect((jobs.len() * engines.len()) as u64);
+    let simulation = Simulation {
+        resolved,
+        plans: &plans,
+        model: &model,
+        jobs: &jobs,
+        cancel,
+        progress,
+    };
+    let mut outcomes: Vec<EngineOutcome> = if options.jobs > 1 {
+        std::thread::scope(|scope| {
+            let threads: Vec<_> = engines
+                .iter()
+                .map(|engine| {
+                    let harness = harness.as_ref().filter(|_| *engine == EngineName::Mujoco);
+                    let simulation = &simulation;
+                    scope.spawn(move || simulation.run(*engine, harness))
+                })
+                .collect();
+            threads
+                .into_iter()
+                .map(|thread| thread.join().expect("plants do not panic"))
+                .collect()
+        })
+    } else {
+        engines
+            .iter()
+            .map(|engine| {
+                simulation.run(
+                    *engine,
+                    harness.as_ref().filter(|_| *engine == EngineName::Mujoco),
+                )
+            })
+            .collect()
+    };
+    timings.insert(
+        "simulation_s".to_owned(),
+        started.elapsed().as_secs_f64() - timings["planning_s"],
+    );
+
+    let mut runs: Vec<Vec<Vec<EngineRun>>> = plans
+        .iter()
+        .map(|plan| plan.configurations.iter().map(|_| Vec::new()).collect())
+        .collect();
+    for outcome in &mut outcomes {
+        timings.insert(
+            format!("{}_s", outcome.engine.name()),
+            outcome.wall.as_secs_f64(),
+        );
+        for (job, run) in outcome.runs.drain(..) {
+            runs[job.goal][job.configuration].push(run);
+        }
+    }
+    let failures = outcomes
+        .iter_mut()
+        .filter_map(|outcome| outcome.failure.take())
+        .collect();
+    let identities = outcomes
+        .iter_mut()
+        .filter_map(|outcome| outcome.identity.take())
+        .collect();
+    let interrupted = cancel.load(Ordering::Relaxed);
+    let report = assemble(
+        resolved, &planner, &plans, &runs, &engines, failures, identities, timings,
+    );
+    Ok(ScenarioRun {
+        report,
+        plans,
+        runs,
+        interrupted,
+    })
+}
+
+/// Runs a scenario without progress and without a way to interrupt it.
+///
+/// # Errors
+/// As the program's `run`.
+pub fn run_scenario(
+    resolved: &ResolvedScenario,
+    options: &RunOptions,
+) -> Result<ScenarioRun, NotUrGeometry> {
+    run(
+        resolved,
+        options,
+        &AtomicBool::new(false),
+        &Progress::new(true),
+    )
+}
+
+/// Applies `f` to all items on up to `threads` threads; results are in the items' order.
+fn in_parallel<T: Sync, R: Send>(
+    threads: usize,
+    items: &[T],
+    f: impl Fn(&T) -> R + Sync,
+) -> Vec<R> {
+    let next = AtomicUsize::new(0);
+    let results: Mutex<Vec<(usize, R)>> = Mutex::new(Vec::with_capacity(items.len()));
+    std::thread::scope(|scope| {
+        for _ in 0..threads.clamp(1, items.len().max(1)) {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(item) = items.get(index) else { break };
+                    let result = f(item);
+                    results
+                        .lock()
+                        .expect("no thread panics")
+                        .push((index, result));
+                }
+            });
+        }
+    });
+    let mut results = results.into_inner().expect("no thread panics");
+    results.sort_by_key(|(index, _)| *index);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+/// Configurations that are simulated: those that work, and on request those that only collide.
+fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
+    let everything = resolved.scenario.planning.simulate_rejected;
+    let worth = |plan: &ConfigurationPlan| {
+        plan.trajectory.is_some()
+            && (plan.rejections.is_empty()
+                || everything
+                    && plan.rejections.iter().all(|rejection| {
+                        matches!(rejection.rule, Rule::Collision | Rule::NeedleCorridor)
+                    }))
+    };
+    plans
+        .iter()
+        .enumerate()
+        .flat_map(|(goal, plan)| {
+            plan.configurations
+                .iter()
+                .enumerate()
+                .filter(|(_, plan)| worth(plan))
+                .map(move |(configuration, _)| Job {
+                    goal,
+                    configuration,
+                })
+        })
+        .collect()
+}
+
+type Harness = Result<Mutex<HarnessProcess>, String>;
+
+fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
+    let timeout = Duration::from_secs_f64(resolved.scenario.engines.harness_timeout_s);
+    let environment =
+        ensure(&mut |text| progress.message(text)).map_err(|error| error.to_string())?;
+    HarnessProcess::start(&environment, timeout)
+        .map(Mutex::new)
+        .map_err(|error| error.to_string())
+}
+
+struct Simulation<'a> {
+    resolved: &'a ResolvedScenario,
+    plans: &'a [GoalPlan],
+    model: &'a ClearanceModel,
+    jobs: &'a [Job],
+    cancel: &'a AtomicBool,
+    progress: &'a Progress,
+}
+
+struct EngineOutcome {
+    engine: EngineName,
+    identity: Option<EngineIdentity>,
+    runs: Vec<(Job, EngineRun)>,
+    failure: Option<EngineFailure>,
+    wall: Duration,
+}
+
+impl Simulation<'_> {
+    fn run(&self, engine: EngineName, harness: Option<&Harness>) -> EngineOutcome {
+        let started = Instant::now();
+        let mut outcome = EngineOutcome {
+            engine,
+            identity: None,
+            runs: Vec::new(),
+            failure: None,
+            wall: Duration::ZERO,
+        };
+        if let Err((during, message)) = self.run_jobs(engine, harness, &mut outcome) {
+            let engine = engine.name().to_owned();
+            outcome.failure = Some(EngineFailure {
+                engine,
+                during,
+                message,
+            });
+        }
+        outcome.wall = started.elapsed();
+        outcome
+    }
+
+    fn run_jobs(
+        &self,
+        engine: EngineName,
+        harness: Option<&Harness>,
+        outcome: &mut EngineOutcome,
+    ) -> Result<(), (Option<String>, String)> {
+        let cell = &self.resolved.cell;
+        let engines = &self.resolved.scenario.engines;
+        let timestep_s = engines.timestep_ms * 1e-3;
+        let start = |error: EngineError| (None, error.to_string());
+        let mut process;
+        let mut plant: Box<dyn Plant> = match engine {
+            EngineName::Rapier => {
+                let settings = rapier_settings(engines);
+                Box::new(RapierPlant::new(cell, timestep_s, &settings).map_err(start)?)
+            }
+            EngineName::Mujoco => {
+                let harness = harness.expect("a MuJoCo run has a harness or its error");
+                process = match harness {
+                    Ok(process) => process.lock().expect("one thread uses it"),
+                    Err(message) => return Err((None, message.clone())),
+                };
+                let settings = mujoco_settings(engines);
+                Box::new(
+                    MujocoPlant::new(&mut process, cell, timestep_s, &settings).map_err(start)?,
+                )
+            }
+        };
+        outcome.identity = Some(plant.identity());
+        let servo = servo(self.resolved);
+        for &job in self.jobs {
+            let goal = &self.resolved.goals[job.goal];
+            let plan = &self.plans[job.goal].configurations[job.configuration];
+            let trajectory = plan.trajectory.as_ref().expect("jobs have trajectories");
+            let hooks = Hooks {
+                cancel: Some(self.cancel),
+                progress: None,
+            };
+            let recording = match simulate(plant.as_mut(), &servo, trajectory, hooks) {
+                Ok(recording) => recording,
+                Err(EngineError::Cancelled) => return Ok(()),
+                Err(error) => {
+                    let during = format!("{} {}", goal.name, plan.configuration);
+                    return Err((Some(during), error.to_string()));
+                }
+            };
+            let period_s = self.resolved.scenario.recording.period_ms * 1e-3;
+            let clearance = measure_clearance(cell, self.model, trajectory, &recording, period_s);
+            outcome.runs.push((
+                job,
+                EngineRun {
+                    engine,
+                    recording,
+                    clearance,
+                },
+            ));
+            self.progress.step();
+        }
+        Ok(())
+    }
+}
+
+fn rapier_settings(engines: &needlebench_cell::scenario::EnginesSection) -> RapierSettings {
+    RapierSettings {
+        contact_natural_frequency_hz: engines.rapier.contact_natural_frequency_hz,
+        contact_damping_ratio: engines.rapier.contact_damping_ratio,
+        contact_sweeps: engines.rapier.contact_sweeps as usize,
+        friction: engines.friction,
+        ..RapierSettings::default()
+    }
+}
+
+fn mujoco_settings(engines: &needlebench_cell::scenario::EnginesSection) -> MujocoSettings {
+    MujocoSettings {
+        contact_stiffness_per_s2: engines.mujoco.contact_stiffness_per_s2,
+        contact_damping_per_s: engines.mujoco.contact_damping_per_s,
+        contact_impedance: engines.mujoco.contact_impedance,
+        friction: engines.friction,
+        ..MujocoSettings::default()
+    }
+}
+
+fn servo(resolved: &ResolvedScenario) -> Servo {
+    let controller = &resolved.scenario.controller;
+    Servo {
+        dynamics: resolved.cell.dynamics(),
+        gains: ServoGains {
+            kp_nm_per_rad: controller.stiffness_nm_rad,
+            kd_nms_per_rad: controller.damping_nms_rad,
+        },
+        effort_limit_nm: resolved.cell.robot.limits.efforts_nm(),
+    }
+}
+
+#[expect(
+    clippy::too_many_arguments,
+    reason = "gathers the results of all stages, once"
+)]
+fn assemble(
+    resolved: &ResolvedScenario,
+    planner: &Planner<'_>,
+    plans: &[GoalPlan],
+    runs: &[Vec<Vec<EngineRun>>],
+    engines: &[EngineName],
+    engine_failures: Vec<EngineFailure>,
+    identities: Vec<EngineIdentity>,
+    timings: BTreeMap<String, f64>,
+) -> Report {
+    let mut goals: Vec<GoalReport> = resolved
+        .goals
+        .iter()
+        .zip(plans)
+        .zip(runs)
+        .map(|((goal, plan), runs)| goal_report(resolved, planner, goal, plan, runs))
+        .collect();
+    let both = engines.len() == 2 && engine_failures.is_empty();
+    let (verdict, criteria) = judge(
+        &mut goals,
+        &resolved.goals,
+        &resolved.scenario.criteria,
+        both,
+    );
+    Report {
+        schema_version: SCHEMA_VERSION,
+        scenario: ScenarioSummary {
+            name: resolved.scenario.name.clone(),
+            description: resolved.scenario.description.clone(),
+            file: resolved.source.file.clone(),
+        },
+        verdict,
+        criteria,
+        goals,
+        engine_failures,
+        notes: resolved.notes.clone(),
+        provenance: provenance(resolved, identities),
+        timings,
+    }
+}
+
+fn goal_report(
+    resolved: &ResolvedScenario,
+    planner: &Planner<'_>,
+    goal: &Goal,
+    plan: &GoalPlan,
+    runs: &[Vec<EngineRun>],
+) -> GoalReport {
+    let route = resolved
+        .phantom
+        .as_ref()
+        .and_then(|placed| needle_route(&resolved.cell, placed, goal));
+    GoalReport {
+        name: goal.name.clone(),
+        lesion: goal.lesion.clone(),
+        entry_m: goal.entry_m.map(|point| point.coords.into()),
+        target_m: goal.target_m.coords.into(),
+        axis: goal.axis.into_inner().into(),
+        insertion_length_m: goal.insertion_length_m,
+        standoff_m: goal.standoff_m,
+        configurations: plan
+            .configurations
+            .iter()
+            .zip(runs)
+            .map(|(plan, runs)| {
+                configuration_report(resolved, planner, goal, plan, runs, route.as_ref())
+            })
+            .collect(),
+        recommended: None,
+    }
+}
+
+fn configuration_report(
+    resolved: &ResolvedScenario,
+    planner: &Planner<'_>,
+    goal: &Goal,
+    plan: &ConfigurationPlan,
+    runs: &[EngineRun],
+    route: Option<&ClassClearance>,
+) -> ConfigurationReport {
+    let cell = &resolved.cell;
+    let candidate = plan.candidate.as_ref();
+    let engines: BTreeMap<String, EngineReport> = runs
+        .iter()
+        .map(|run| {
+            let report = engine_report(resolved, goal, plan, run);
+            (run.engine.name().to_owned(), report)
+        })
+        .collect();
+    let mut clearance = overall_clearance(cell, plan, &engines);
+    if let Some(route) = route {
+        clearance.classes.insert("needle_route", route.clone());
+    }
+    let engine_difference = match runs {
+        [a, b] => Some(engine_difference(cell, goal, &a.recording, &b.recording)),
+        _ => None,
+    };
+    ConfigurationReport {
+        label: plan.configuration.label(),
+        status: Status::Rejected, // `judge` sets it
+        rejections: plan
+            .rejections
+            .iter()
+            .map(|rejection| RejectionReport {
+                rule: rejection.rule.name(),
+                value: rejection.value,
+                limit: rejection.limit,
+                unit: rejection.unit,
+                detail: rejection.detail.clone(),
+            })
+            .collect(),
+        joints_rad: candidate.map(|each| each.joints.into()),
+        roll_rad: candidate.map(|each| each.roll_rad),
+        wrap: candidate.map(|each| each.wrap),
+        ik_residual_m: candidate.map(|each| each.residual_m),
+        ik_residual_rad: candidate.map(|each| each.residual_rad),
+        free_joint: candidate
+            .filter(|each| each.wrist_3_is_free)
+            .map(|_| "wrist_3"),
+        margins: candidate.map(|each| MarginsReport {
+            joint_limit: each.margins.joint_limit,
+            wrist_sine: each.margins.wrist_sine,
+            elbow_sine: each.margins.elbow_sine,
+            shoulder_m: each.margins.shoulder_m,
+            manipulability_m3: each.margins.manipulability,
+        }),
+        motion: plan
+            .trajectory
+            .iter()
+            .flat_map(|trajectory| trajectory.phases())
+            .map(|(phase, start_s, end_s)| PhaseReport {
+                phase: phase.name(),
+                start_s,
+                end_s,
+            })
+            .collect(),
+        commanded: candidate.map(|each| {
+            let base_link_from_flange = planner.kinematics().base_link_from_flange(&each.joints);
+            let world_from_flange = cell.robot.world_from_base_link * base_link_from_flange;
+            measure_needle(cell, resolved.phantom.as_ref(), goal, &world_from_flange)
+        }),
+        engines,
+        engine_difference,
+        clearance,
+        files: Vec::new(),
+    }
+}
+
+fn engine_report(
+    resolved: &ResolvedScenario,
+    goal: &Goal,
+    plan: &ConfigurationPlan,
+    run: &EngineRun,
+) -> EngineReport {
+    let cell = &resolved.cell;
+    let trajectory = plan
+        .trajectory
+        .as_ref()
+        .expect("what was simulated has a trajectory");
+    let settled = run
+        .recording
+        .state
+        .last()
+        .expect("a recording has its initial state");
+    let band_m = resolved.scenario.criteria.settling_band_mm * 1e-3;
+    let minima = &run.clearance.minima;
+    EngineReport {
+        needle: measure_needle(
+            cell,
+            resolved.phantom.as_ref(),
+            goal,
+            &settled.world_from_flange,
+        ),
+        motion: measure_motion(cell, goal, trajectory, &run.recording, band_m),
+        clearance: clearance_report(
+            minima
+                .iter()
+                .map(|(class, found)| (class.name(), found.clone()))
+                .collect(),
+        ),
+    }
+}
+
+/// Least clearances over all engines; of the final posture where nothing was simulated.
+fn overall_clearance(
+    cell: &Cell,
+    plan: &ConfigurationPlan,
+    engines: &BTreeMap<String, EngineReport>,
+) -> ClearanceReport {
+    let mut classes: BTreeMap<&'static str, ClassClearance> = BTreeMap::new();
+    if engines.is_empty() {
+        if let Some(candidate) = &plan.candidate {
+            let minima = posture_clearance(cell, &candidate.clearance);
+            classes.extend(
+                minima
+                    .into_iter()
+                    .map(|(class, found)| (class.name(), found)),
+            );
+        }
+    }
+    for report in engines.values() {
+        for (class, found) in &report.clearance.classes {
+            let nearer = classes
+                .get(class)
+                .is_none_or(|known| found.minimum_m < known.minimum_m);
+            if nearer {
+                classes.insert(class, found.clone());
+            }
+        }
+    }
+    clearance_report(classes)
+}
+
+fn clearance_report(classes: BTreeMap<&'static str, ClassClearance>) -> ClearanceReport {
+    let minimum_m = classes
+        .iter()
+        .filter(|(class, _)| needlebench_evaluation::counts_as_clearance(class))
+        .map(|(_, found)| found.minimum_m)
+        .min_by(f64::total_cmp);
+    ClearanceReport { classes, minimum_m }
+}

@@ -1,0 +1,39 @@
+//! Where a result's numbers come from.
+
+use needlebench_cell::{ModelSource, ResolvedScenario, sha256_hex};
+use needlebench_engine::EngineIdentity;
+use needlebench_evaluation::report::{InputFile, Provenance};
+
+/// Lock file of the build.
+const CARGO_LOCK: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.lock"));
+
+/// Git revision of the build.
+pub(crate) const GIT_REVISION: &str = env!("NEEDLEBENCH_GIT_REVISION");
+
+pub(crate) fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentity>) -> Provenance {
+    let input = |role: &'static str, source: &ModelSource| InputFile {
+        role,
+        file: source.file.clone(),
+        sha256: source.sha256.clone(),
+    };
+    let mut inputs = vec![
+        input("scenario", &resolved.source),
+        input("robot", &resolved.cell.robot.source),
+        input("tool", &resolved.cell.tool.source),
+    ];
+    inputs.extend(
+        resolved
+            .phantom_source
+            .iter()
+            .map(|source| input("phantom", source)),
+    );
+    Provenance {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        git_revision: GIT_REVISION.to_owned(),
+        cargo_lock_sha256: sha256_hex(CARGO_LOCK),
+        engines,
+        inputs,
+        seed: resolved.scenario.seed,
+        truth: "nominal robot: errors are those of inverse kinematics, control and simulation",
+    }
+}

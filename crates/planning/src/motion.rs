@@ -1,0 +1,168 @@
+//! Clearance along planned motions.
+
+use needlebench_cell::{Cell, ClearanceClass, Frame};
+use needlebench_clearance::{ClassMinima, ClearanceModel, PairClearance};
+use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
+use needlebench_kinematics::{JOINT_COUNT, Joints};
+
+/// Checks motions of one cell.
+#[derive(Debug)]
+pub struct MotionChecker<'a> {
+    cell: &'a Cell,
+    model: &'a ClearanceModel,
+    /// Radius about each joint's axis within which everything beyond the joint stays, m.
+    sweep_radius_m: Joints,
+    /// Clearance below which bodies collide, m.
+    min_clearance_m: f64,
+    /// Motion of any point that may go unchecked, m.
+    spacing_m: f64,
+}
+
+/// A pair that comes too near during a motion.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Violation {
+    pub phase: Phase,
+    pub time_s: f64,
+    pub pair: PairClearance,
+    pub limit_m: f64,
+}
+
+/// Time between two postures that are looked at, s; most are skipped as provably clear.
+const GRID_S: f64 = 2e-3;
+
+impl<'a> MotionChecker<'a> {
+    /// Prepares the checker.
+    pub fn new(
+        cell: &'a Cell,
+        model: &'a ClearanceModel,
+        min_clearance_m: f64,
+        spacing_m: f64,
+    ) -> Self {
+        Self {
+            cell,
+            model,
+            sweep_radius_m: sweep_radii(cell),
+            min_clearance_m,
+            spacing_m,
+        }
+    }
+
+    /// Least clearance that a class may have, m.
+    ///
+    /// The guide tube is meant to stand near the skin, so there only touching counts.
+    pub(crate) fn limit_m(&self, class: ClearanceClass) -> f64 {
+        if class == ClearanceClass::GuideStandoff {
+            self.min_clearance_m.min(0.0)
+        } else {
+            self.min_clearance_m
+        }
+    }
+
+    /// The pair that is nearest to (or deepest in) collision at a posture, if any collides.
+    pub(crate) fn collision_at(&self, q: &Joints) -> Option<PairClearance> {
+        self.worst(&self.model.minimum_per_class(q))
+            .map(|(pair, _)| pair)
+    }
+
+    pub(crate) fn minima_at(&self, q: &Joints) -> ClassMinima {
+        self.model.minimum_per_class(q)
+    }
+
+    fn worst(&self, minima: &ClassMinima) -> Option<(PairClearance, f64)> {
+        minima
+            .iter()
+            .filter(|pair| pair.class.is_physical())
+            .map(|pair| (pair, pair.separation.distance_m - self.limit_m(pair.class)))
+            .filter(|(_, excess_m)| *excess_m < 0.0)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(pair, excess_m)| (*pair, excess_m))
+    }
+
+    /// First collision along a trajectory.
+    ///
+    /// From a posture with clearance `c` to the limit, no body can reach another before some point
+    /// of the arm has moved by `c` (by `c / 2` where both move), so all postures until then are
+    /// skipped. Contact shallower than the spacing may go unnoticed between two postures.
+    pub(crate) fn first_collision(&self, trajectory: &JointTrajectory) -> Option<Violation> {
+        let duration_s = trajectory.duration_s();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "small, positive"
+        )]
+        let steps = (duration_s / GRID_S).ceil() as u32;
+        let mut checked: Option<(Joints, f64)> = None;
+        for k in 0..=steps {
+            let time_s = (GRID_S * f64::from(k)).min(duration_s);
+            let q = trajectory.sample(time_s).position;
+            if let Some((at, free_m)) = &checked
+                && k < steps
+                && self.largest_displacement_m(at, &q) < *free_m
+            {
+                continue;
+            }
+            let minima = self.model.minimum_per_class(&q);
+            if let Some((pair, _)) = self.worst(&minima) {
+                let limit_m = self.limit_m(pair.class);
+                return Some(Violation {
+                    phase: trajectory.phase_at(time_s),
+                    time_s,
+                    pair,
+                    limit_m,
+                });
+            }
+            let free_m = minima
+                .iter()
+                .filter(|pair| pair.class.is_physical())
+                .map(|pair| {
+                    let excess_m = pair.separation.distance_m - self.limit_m(pair.class);
+                    if pair.class == ClearanceClass::SelfCollision {
+                        0.5 * excess_m
+                    } else {
+                        excess_m
+                    }
+                })
+                .fold(f64::INFINITY, f64::min);
+            checked = Some((q, free_m.max(self.spacing_m)));
+        }
+        None
+    }
+
+    /// Bound on the way of any point of arm and tool between two postures, m.
+    fn largest_displacement_m(&self, from: &Joints, to: &Joints) -> f64 {
+        self.sweep_radius_m.dot(&(to - from).abs())
+    }
+
+    /// The cell.
+    pub(crate) fn cell(&self) -> &Cell {
+        self.cell
+    }
+}
+
+/// For each joint, a radius about its origin that holds all geometry beyond it, whatever the
+/// joints beyond it do: the distances from origin to origin, and each body's own radius.
+fn sweep_radii(cell: &Cell) -> Joints {
+    let mut own_radius_m = [0.0_f64; JOINT_COUNT];
+    for body in &cell.bodies {
+        if let Frame::Link(link) = body.frame {
+            for solid in &body.solids {
+                let radius_m = solid.parent_from_shape.translation.vector.norm()
+                    + solid.shape.bounding_radius_m();
+                own_radius_m[link] = own_radius_m[link].max(radius_m);
+            }
+        }
+    }
+    Joints::from_fn(|joint, _| {
+        let mut travelled_m = 0.0;
+        let mut radius_m = own_radius_m[joint];
+        for (link, own_m) in own_radius_m.iter().enumerate().skip(joint + 1) {
+            travelled_m += cell.robot.chain.joints[link]
+                .parent_from_joint
+                .translation
+                .vector
+                .norm();
+            radius_m = radius_m.max(travelled_m + own_m);
+        }
+        radius_m
+    })
+}

@@ -1,0 +1,526 @@
+//! Candidates for each configuration of a goal.
+
+use std::f64::consts::TAU;
+
+use nalgebra::UnitVector3;
+use needlebench_cell::{ClearanceClass, Goal, ResolvedScenario, Roll};
+use needlebench_clearance::{ClassMinima, ClearanceModel};
+use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind};
+use needlebench_kinematics::trajectory::{JointTrajectory, LinePath, Phase};
+use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
+
+use crate::motion::MotionChecker;
+use crate::{Rejection, Rule};
+
+/// Where a final posture stands between its limits and singularities.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PostureMargins {
+    /// 1 in the middle of every joint's range, 0 at a limit.
+    pub joint_limit: f64,
+    /// `|sin q5|`.
+    pub wrist_sine: f64,
+    /// `|sin q3|`.
+    pub elbow_sine: f64,
+    /// `sqrt(rho^2 - d4^2)`, m.
+    pub shoulder_m: f64,
+    /// `sqrt(det J J^T)` of the flange.
+    pub manipulability: f64,
+}
+
+/// A posture that brings the guide to its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Final joint positions, rad, wrapped as the motion reaches them.
+    pub joints: Joints,
+    /// Angle of the guide about the needle, rad.
+    pub roll_rad: f64,
+    /// Whole turns that were added to the positions in `(-pi, pi]`.
+    pub wrap: [i32; JOINT_COUNT],
+    /// Distance of the flange from its planned place, m.
+    pub residual_m: f64,
+    /// Angle of the flange from its planned orientation, rad.
+    pub residual_rad: f64,
+    /// Wrist 3 is free at this pose.
+    pub wrist_3_is_free: bool,
+    /// Margins of the posture.
+    pub margins: PostureMargins,
+    /// Least clearance of the final posture, per class.
+    pub clearance: ClassMinima,
+}
+
+/// What became of one configuration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConfigurationPlan {
+    /// Which of the eight.
+    pub configuration: Configuration,
+    /// Its best posture; `None` if there is none at all.
+    pub candidate: Option<Candidate>,
+    /// Rules that it breaks, first failing one first; empty if it works.
+    pub rejections: Vec<Rejection>,
+    /// Motion from the start posture; `None` if there is no way.
+    pub trajectory: Option<JointTrajectory>,
+}
+
+/// All eight configurations of one goal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GoalPlan {
+    /// The configurations, in the order of [`Configuration::ALL`].
+    pub configurations: Vec<ConfigurationPlan>,
+}
+
+/// Plans the goals of one scenario.
+#[derive(Debug)]
+pub struct Planner<'a> {
+    resolved: &'a ResolvedScenario,
+    kinematics: Kinematics,
+    checker: MotionChecker<'a>,
+}
+
+/// Postures of one configuration for which a motion is tried, best first.
+const MOTION_TRIES: usize = 6;
+/// Combinations of whole turns that are tried for the transfer, shortest first.
+const WRAP_TRIES: usize = 8;
+
+impl<'a> Planner<'a> {
+    /// Prepares the planner.
+    ///
+    /// # Errors
+    /// [`NotUrGeometry`] if the robot is not a UR arm.
+    pub fn new(
+        resolved: &'a ResolvedScenario,
+        clearance: &'a ClearanceModel,
+    ) -> Result<Self, NotUrGeometry> {
+        let planning = &resolved.scenario.planning;
+        Ok(Self {
+            resolved,
+            kinematics: Kinematics::new(resolved.cell.robot.chain)?,
+            checker: MotionChecker::new(
+                &resolved.cell,
+                clearance,
+                planning.min_clearance_mm * 1e-3,
+                planning.sample_spacing_mm * 1e-3,
+            ),
+        })
+    }
+
+    /// The solver, for callers that need poses of their own.
+    pub fn kinematics(&self) -> &Kinematics {
+        &self.kinematics
+    }
+
+    /// Pose of the flange in `base_link` that brings the guide to a goal.
+    pub fn base_link_from_flange(&self, goal: &Goal, roll_rad: f64) -> Pose {
+        let cell = &self.resolved.cell;
+        cell.robot.world_from_base_link.inverse()
+            * goal.world_from_guide_exit_at(roll_rad)
+            * cell.tool.flange_from_guide_exit.inverse()
+    }
+
+    /// Plans all eight configurations of a goal.
+    pub fn plan(&self, goal: &Goal) -> GoalPlan {
+        let rolls: Vec<f64> = match goal.roll {
+            Roll::Fixed(roll_rad) => vec![roll_rad],
+            Roll::Free => {
+                let count = self.resolved.scenario.planning.roll_samples;
+                (0..count)
+                    .map(|k| TAU * f64::from(k) / f64::from(count))
+                    .collect()
+            }
+        };
+        let mut options: Vec<Vec<(f64, Solution)>> = vec![Vec::new(); Configuration::ALL.len()];
+        let mut absent: Vec<Option<Rejection>> = vec![None; Configuration::ALL.len()];
+        for &roll_rad in &rolls {
+            let pose = self.base_link_from_flange(goal, roll_rad);
+            let found = self.kinematics.solve(&pose, Some(&self.resolved.start));
+            for (index, configuration) in Configuration::ALL.into_iter().enumerate() {
+                if let Some(solution) = found
+                    .solutions
+                    .iter()
+                    .find(|each| each.configuration == configuration)
+                {
+                    options[index].push((roll_rad, *solution));
+                    continue;
+                }
+                let rejection = match found.unreachable.iter().find(|(c, _)| *c == configuration) {
+                    Some((_, reason)) => Rejection {
+                        rule: Rule::Unreachable,
+                        value: reason.missing_m(),
+                        limit: 0.0,
+                        unit: "m",
+                        detail: unreachable_detail(*reason),
+                        class: None,
+                    },
+                    None => merged(configuration, &found.solutions),
+                };
+                // Of many rolls, the one that comes nearest says most.
+                let nearer = absent[index]
+                    .as_ref()
+                    .is_none_or(|known: &Rejection| rejection.value < known.value);
+                if nearer {
+                    absent[index] = Some(rejection);
+                }
+            }
+        }
+        let configurations = Configuration::ALL
+            .into_iter()
+            .zip(options.into_iter().zip(absent))
+            .map(|(configuration, (options, absent))| {
+                self.plan_configuration(goal, configuration, options, absent)
+            })
+            .collect();
+        GoalPlan { configurations }
+    }
+
+    fn plan_configuration(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        options: Vec<(f64, Solution)>,
+        absent: Option<Rejection>,
+    ) -> ConfigurationPlan {
+        let mut candidates: Vec<(Candidate, Vec<Rejection>)> = options
+            .into_iter()
+            .map(|(roll_rad, solution)| self.candidate(roll_rad, &solution))
+            .collect();
+        if candidates.is_empty() {
+            return ConfigurationPlan {
+                configuration,
+                candidate: None,
+                rejections: absent.into_iter().collect(),
+                trajectory: None,
+            };
+        }
+        // Fewest broken rules first, then most clearance; equal ones stay in the order of roll.
+        candidates.sort_by(|(a, broken_a), (b, broken_b)| {
+            broken_a
+                .is_empty()
+                .cmp(&broken_b.is_empty())
+                .reverse()
+                .then(
+                    working_clearance_m(&b.clearance).total_cmp(&working_clearance_m(&a.clearance)),
+                )
+        });
+        let mut best: Option<ConfigurationPlan> = None;
+        for (candidate, rejections) in candidates.into_iter().take(MOTION_TRIES) {
+            let plan = self.plan_motion(goal, configuration, candidate, rejections);
+            if plan.rejections.is_empty() {
+                return plan;
+            }
+            let better = best
+                .as_ref()
+                .is_none_or(|known| plan.trajectory.is_some() && known.trajectory.is_none());
+            if better {
+                best = Some(plan);
+            }
+        }
+        best.expect("there is at least one candidate")
+    }
+
+    /// Margins, clearances and broken rules of one posture.
+    fn candidate(&self, roll_rad: f64, solution: &Solution) -> (Candidate, Vec<Rejection>) {
+        let planning = &self.resolved.scenario.planning;
+        let limits = &self.resolved.cell.robot.limits;
+        let mut rejections = Vec::new();
+        if solution.kind == SolutionKind::Nearest {
+            rejections.push(Rejection {
+                rule: Rule::NearestOnly,
+                value: solution.residual_m,
+                limit: 1e-9,
+                unit: "m",
+                detail: "the refined posture misses the pose".to_owned(),
+                class: None,
+            });
+        }
+        for joint in 0..JOINT_COUNT {
+            if turns_within_limits(limits.0[joint], solution.joints[joint]).is_empty() {
+                let (position, limit) = (solution.joints[joint], limits.0[joint]);
+                rejections.push(Rejection {
+                    rule: Rule::JointLimit,
+                    value: position,
+                    limit: if position > limit.upper_rad {
+                        limit.upper_rad
+                    } else {
+                        limit.lower_rad
+                    },
+                    unit: "rad",
+                    detail: format!("{} has no place in its range", JOINT_LABELS[joint]),
+                    class: None,
+                });
+            }
+        }
+        let margins = self.margins(&solution.joints);
+        for (value, limit, unit, detail) in [
+            (
+                margins.wrist_sine,
+                planning.min_singularity_sine,
+                "1",
+                "wrist: |sin q5|",
+            ),
+            (
+                margins.elbow_sine,
+                planning.min_singularity_sine,
+                "1",
+                "elbow: |sin q3|",
+            ),
+            (
+                margins.shoulder_m,
+                planning.min_shoulder_distance_mm * 1e-3,
+                "m",
+                "shoulder: sqrt(rho^2 - d4^2)",
+            ),
+        ] {
+            if value < limit {
+                rejections.push(Rejection {
+                    rule: Rule::Singular,
+                    value,
+                    limit,
+                    unit,
+                    detail: detail.to_owned(),
+                    class: None,
+                });
+            }
+        }
+        let clearance = self.checker.minima_at(&solution.joints);
+        if let Some(pair) = self.checker.collision_at(&solution.joints) {
+            rejections.push(Rejection {
+                rule: Rule::Collision,
+                value: pair.separation.distance_m,
+                limit: self.checker.limit_m(pair.class),
+                unit: "m",
+                detail: {
+                    let (a, b) = pair.solid_names(&self.resolved.cell);
+                    format!("{a} and {b} in the final posture")
+                },
+                class: Some(pair.class),
+            });
+        }
+        if let Some(corridor) = clearance.get(ClearanceClass::NeedleCorridor)
+            && planning.require_needle_corridor
+            && corridor.separation.distance_m < 0.0
+        {
+            let (a, b) = corridor.solid_names(&self.resolved.cell);
+            let blocker = if a == "needle_corridor" { b } else { a };
+            rejections.push(Rejection {
+                rule: Rule::NeedleCorridor,
+                value: corridor.separation.distance_m,
+                limit: 0.0,
+                unit: "m",
+                detail: format!("{blocker} stands behind the guide"),
+                class: Some(ClearanceClass::NeedleCorridor),
+            });
+        }
+        let candidate = Candidate {
+            joints: solution.joints,
+            roll_rad,
+            wrap: [0; JOINT_COUNT],
+            residual_m: solution.residual_m,
+            residual_rad: solution.residual_rad,
+            wrist_3_is_free: solution.wrist_3_is_free,
+            margins,
+            clearance,
+        };
+        (candidate, rejections)
+    }
+
+    fn margins(&self, q: &Joints) -> PostureMargins {
+        let geometry = &self.kinematics.geometry;
+        let jacobian = self.kinematics.chain.jacobian(q);
+        // The wrist centre's distance from the shoulder axis, in the arm's plane.
+        let shoulder_m = geometry.a2 * q[1].cos()
+            + geometry.a3 * (q[1] + q[2]).cos()
+            + geometry.d5 * (q[1] + q[2] + q[3]).sin();
+        PostureMargins {
+            joint_limit: self.resolved.cell.robot.limits.margin(q),
+            wrist_sine: q[4].sin().abs(),
+            elbow_sine: q[2].sin().abs(),
+            shoulder_m: shoulder_m.abs(),
+            manipulability: jacobian.determinant().abs(),
+        }
+    }
+
+    /// Adds the motion: transfer, straight approach, hold.
+    fn plan_motion(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        mut candidate: Candidate,
+        mut rejections: Vec<Rejection>,
+    ) -> ConfigurationPlan {
+        let limits = &self.resolved.cell.robot.limits;
+        let robot = &self.checker.cell().robot;
+        let axis = robot.world_from_base_link.rotation.inverse() * goal.axis.into_inner();
+        let line = LinePath::ending_at(
+            &robot.chain,
+            &candidate.joints,
+            &UnitVector3::new_normalize(axis),
+            goal.approach_m,
+        );
+        let line = match line {
+            Ok(line) => line,
+            Err(error) => {
+                rejections.push(Rejection {
+                    rule: Rule::Approach,
+                    value: candidate.margins.manipulability,
+                    limit: 0.0,
+                    unit: "1",
+                    detail: error.to_string(),
+                    class: None,
+                });
+                return ConfigurationPlan {
+                    configuration,
+                    candidate: Some(candidate),
+                    rejections,
+                    trajectory: None,
+                };
+            }
+        };
+        let mut first_failure = None;
+        let mut shortest = None;
+        for turns in self.wraps(&line) {
+            let shift = Joints::from_fn(|i, _| TAU * f64::from(turns[i]));
+            let line = line.shifted(&shift);
+            let trajectory = JointTrajectory::starting_at(self.resolved.start)
+                .then_straight_to(Phase::Transfer, line.start(), &self.resolved.motion)
+                .then_along(Phase::Approach, line, &self.resolved.motion)
+                .then_hold(Phase::Hold, self.resolved.scenario.motion.hold_s);
+            let collision = self.checker.first_collision(&trajectory);
+            let works = collision.is_none();
+            if works || shortest.is_none() {
+                shortest = Some((turns, trajectory));
+                first_failure = collision;
+            }
+            if works {
+                break;
+            }
+        }
+        let Some((turns, trajectory)) = shortest else {
+            rejections.push(Rejection {
+                rule: Rule::JointLimit,
+                value: limits.margin(&line.start()),
+                limit: 0.0,
+                unit: "1",
+                detail: "the approach leaves the joint ranges".to_owned(),
+                class: None,
+            });
+            return ConfigurationPlan {
+                configuration,
+                candidate: Some(candidate),
+                rejections,
+                trajectory: None,
+            };
+        };
+        candidate.wrap = turns;
+        candidate.joints = trajectory.end();
+        // A posture that collides says so already; the motion into it adds nothing.
+        let known = rejections
+            .iter()
+            .any(|rejection| rejection.rule == Rule::Collision);
+        if let Some(violation) = first_failure.filter(|_| !known) {
+            let (a, b) = violation.pair.solid_names(&self.resolved.cell);
+            rejections.push(Rejection {
+                rule: Rule::Collision,
+                value: violation.pair.separation.distance_m,
+                limit: violation.limit_m,
+                unit: "m",
+                detail: format!(
+                    "{a} and {b} in the {} at {:.2} s",
+                    violation.phase.name(),
+                    violation.time_s
+                ),
+                class: Some(violation.pair.class),
+            });
+        }
+        rejections.sort_by_key(|rejection| rejection.rule);
+        ConfigurationPlan {
+            configuration,
+            candidate: Some(candidate),
+            rejections,
+            trajectory: Some(trajectory),
+        }
+    }
+
+    /// Whole turns that keep the approach inside the joint ranges, shortest transfer first.
+    fn wraps(&self, line: &LinePath) -> Vec<[i32; JOINT_COUNT]> {
+        let limits = &self.resolved.cell.robot.limits;
+        let (from, to) = (line.start(), line.end());
+        let mut combinations = vec![[0; JOINT_COUNT]];
+        for joint in 0..JOINT_COUNT {
+            let at_both_ends: Vec<i32> = turns_within_limits(limits.0[joint], from[joint])
+                .into_iter()
+                .filter(|&k| within(limits.0[joint], to[joint] + TAU * f64::from(k)))
+                .collect();
+            combinations = combinations
+                .iter()
+                .flat_map(|known| {
+                    at_both_ends.iter().map(move |&k| {
+                        let mut turns = *known;
+                        turns[joint] = k;
+                        turns
+                    })
+                })
+                .collect();
+        }
+        let length = |turns: &[i32; JOINT_COUNT]| {
+            let way = Joints::from_fn(|i, _| {
+                from[i] + TAU * f64::from(turns[i]) - self.resolved.start[i]
+            });
+            (way.amax(), way.norm())
+        };
+        combinations.sort_by(|a, b| {
+            let (a, b) = (length(a), length(b));
+            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+        });
+        combinations.truncate(WRAP_TRIES);
+        combinations
+    }
+}
+
+fn within(limit: needlebench_kinematics::JointLimit, position: f64) -> bool {
+    (limit.lower_rad..=limit.upper_rad).contains(&position)
+}
+
+/// Whole turns that may be added to a position; at most one each way for an unlimited joint.
+fn turns_within_limits(limit: needlebench_kinematics::JointLimit, position: f64) -> Vec<i32> {
+    (-1..=1)
+        .filter(|&k| within(limit, position + TAU * f64::from(k)))
+        .collect()
+}
+
+/// Least clearance of the classes that a roll should keep free; the stand-off is given.
+fn working_clearance_m(minima: &ClassMinima) -> f64 {
+    minima
+        .iter()
+        .filter(|pair| pair.class != ClearanceClass::GuideStandoff)
+        .map(|pair| pair.separation.distance_m)
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn unreachable_detail(reason: needlebench_kinematics::ik::Unreachable) -> String {
+    use needlebench_kinematics::ik::Unreachable;
+    match reason {
+        Unreachable::WristTooNear { .. } => "the wrist is too near to the shoulder axis",
+        Unreachable::ElbowTooShort { .. } => "upper arm and forearm are too short",
+        Unreachable::ElbowTooLong { .. } => "the elbow cannot fold so far",
+    }
+    .to_owned()
+}
+
+fn merged(configuration: Configuration, solutions: &[Solution]) -> Rejection {
+    let twin = solutions
+        .iter()
+        .find(|each| each.merged || each.wrist_3_is_free);
+    Rejection {
+        rule: Rule::Merged,
+        value: 0.0,
+        limit: 0.0,
+        unit: "1",
+        detail: match twin {
+            Some(twin) => format!(
+                "{configuration} is the same posture as {}",
+                twin.configuration
+            ),
+            None => format!("{configuration} does not exist at this pose"),
+        },
+        class: None,
+    }
+}

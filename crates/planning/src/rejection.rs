@@ -1,0 +1,57 @@
+//! Why a configuration cannot work.
+
+use needlebench_cell::ClearanceClass;
+
+/// Rules, in the order in which they are applied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Rule {
+    /// No joint positions bring the guide there in this configuration.
+    Unreachable,
+    /// At this pose the configuration is the same posture as another one.
+    Merged,
+    /// Only a nearest posture exists, not an exact one.
+    NearestOnly,
+    /// A joint would have to leave its range.
+    JointLimit,
+    /// The final posture is too near to a singularity.
+    Singular,
+    /// Bodies touch or come nearer than allowed.
+    Collision,
+    /// The volume behind the guide that needle and hand need is blocked.
+    NeedleCorridor,
+    /// The guide cannot move straight along the needle to its place.
+    Approach,
+}
+
+impl Rule {
+    /// Name in reports and in `expected` of scenario files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Unreachable => "unreachable",
+            Self::Merged => "merged",
+            Self::NearestOnly => "nearest_only",
+            Self::JointLimit => "joint_limit",
+            Self::Singular => "singular",
+            Self::Collision => "collision",
+            Self::NeedleCorridor => "needle_corridor",
+            Self::Approach => "approach",
+        }
+    }
+}
+
+/// One rule that a configuration breaks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rejection {
+    /// The rule.
+    pub rule: Rule,
+    /// The value that breaks it, in `unit`.
+    pub value: f64,
+    /// The limit, in `unit`.
+    pub limit: f64,
+    /// Unit of both: `m`, `rad` or `1`.
+    pub unit: &'static str,
+    /// Which joint, pair and phase, in words.
+    pub detail: String,
+    /// Class of the pair, for collisions.
+    pub class: Option<ClearanceClass>,
+}
