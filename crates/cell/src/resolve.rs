@@ -348,6 +348,7 @@ fn tool_overrides(toml: &TomlText<'_>, scenario: &Scenario) -> Result<ToolOverri
         }
     };
     Ok(ToolOverrides {
+        mount_rotation_rad: tool.mount_rotation_deg.to_radians(),
         bore_m: tool.bore_mm.map(|mm| mm * 1e-3),
         needle_gauge: tool.needle_gauge,
         needle_outer_diameter_m,
@@ -501,6 +502,7 @@ fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
         }
     }
     let tool = &scenario.tool;
+    range("tool.mount_rotation_deg", tool.mount_rotation_deg, -360.0, 360.0, "deg");
     range(
         "tool.corridor_radius_mm",
         tool.corridor_radius_mm,

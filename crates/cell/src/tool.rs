@@ -1,6 +1,6 @@
 //! Needle guides, from URDF with the extension element `<needle_guide .../>`.
 
-use nalgebra::Vector3;
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use needlebench_kinematics::{Body, Pose};
 
 use crate::files::{Location, source_of};
@@ -17,6 +17,8 @@ const DEFAULT_COLOR: [f32; 4] = [0.6, 0.62, 0.66, 1.0];
 /// Parameters of the needle guide that a scenario may override.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct ToolOverrides {
+    /// Angle about the flange axis at which the tool is bolted on.
+    pub mount_rotation_rad: f64,
     pub bore_m: Option<f64>,
     pub needle_gauge: Option<u32>,
     pub needle_outer_diameter_m: Option<f64>,
@@ -55,13 +57,15 @@ pub(crate) fn read_tool(
         .iter()
         .find(|link| urdf.joint_above(&link.name).is_none())
         .expect("a parsed URDF has one root");
+    let flange_from_root = Pose::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), overrides.mount_rotation_rad),
+    );
     let flange_from = |link: &str| -> Pose {
         urdf.joints_between(&root.name, link)
             .into_iter()
             .flatten()
-            .fold(Pose::identity(), |pose, joint| {
-                pose * joint.parent_from_joint
-            })
+            .fold(flange_from_root, |pose, joint| pose * joint.parent_from_joint)
     };
     let frame = |link: &str| {
         urdf.link(link).map(|_| flange_from(link)).ok_or_else(|| {

@@ -93,7 +93,7 @@ impl Capsule {
             .map(|p| (p - centre).norm())
             .fold(0.0, f64::max);
         Self {
-            centre: centre,
+            centre,
             half_axis: axis * half_length_m,
             radius_m,
             ball_radius_m,

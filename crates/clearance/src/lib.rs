@@ -1,4 +1,48 @@
-//! clearance
+//! Signed clearance between convex solids, with witness points; of two shapes, and of a whole
+//! cell by class.
+//!
+//! Positive is a gap, negative a penetration depth; `point_on_b - point_on_a = distance *
+//! normal`. Metres throughout.
+//!
+//! # Method
+//!
+//! A sphere is a point and a capsule a segment with a radius around it, which is exact for both
+//! signs; cylinders, boxes and convex meshes have none. What is left of two shapes without their
+//! radii is solved in closed form (points and segments with each other, a point with a box or a
+//! cylinder) or by iteration: GJK while they are apart, an expanding polytope when they overlap.
+//! Both bound the answer from both sides and stop when the bounds meet; the one that is never
+//! optimistic is reported. What rounding leaves between the bounds is below 1e-8 m apart and,
+//! for coaxial shapes of metres in penetration, below 2e-7 m.
+//!
+//! # Accuracy
+//!
+//! Differences in um from the reference in `tests/validation/clearance`, 300 random pairs per
+//! row (a third of them near touching, a fifth aligned with each other), as
+//! `tests/against_coal.rs` prints and asserts them. The goal was 1 um. The reference itself is
+//! certified to 8e-4 um. `over` is the largest overestimate, the unsafe side.
+//!
+//! | Shapes | apart q75 | max | penetrating q75 | max | over |
+//! |---|---|---|---|---|---|
+//! | sphere, sphere | 3.3e-8 | 5.0e-8 | 3.7e-8 | 5.0e-8 | 5.0e-8 |
+//! | sphere, cylinder | 3.8e-8 | 1.3e-6 | 3.7e-8 | 4.3e-7 | 1.3e-6 |
+//! | sphere, capsule | 3.4e-8 | 5.1e-8 | 3.2e-8 | 1.8e-7 | 1.8e-7 |
+//! | sphere, cuboid | 4.1e-8 | 1.7e-6 | 3.4e-8 | 8.3e-8 | 1.7e-6 |
+//! | sphere, convex | 4.0e-8 | 4.3e-7 | 3.8e-8 | 2.0e-7 | 4.3e-7 |
+//! | cylinder, cylinder | 1.5e-5 | 2.5e-4 | 1.3e-5 | 8.3e-5 | 3.3e-5 |
+//! | cylinder, capsule | 1.8e-6 | 4.5e-5 | 2.8e-6 | 5.2e-5 | 1.8e-5 |
+//! | cylinder, cuboid | 1.2e-5 | 8.4e-5 | 9.8e-6 | 7.5e-5 | 6.2e-5 |
+//! | cylinder, convex | 1.6e-5 | 8.2e-4 | 1.3e-5 | 8.7e-5 | 1.4e-5 |
+//! | capsule, capsule | 3.2e-8 | 7.1e-7 | 3.3e-8 | 1.4e-7 | 7.1e-7 |
+//! | capsule, cuboid | 3.7e-8 | 1.5e-6 | 3.6e-8 | 2.4e-7 | 1.5e-6 |
+//! | capsule, convex | 4.1e-8 | 5.4e-7 | 3.9e-8 | 6.2e-8 | 5.4e-7 |
+//! | cuboid, cuboid | 4.2e-8 | 2.3e-6 | 3.3e-8 | 5.0e-8 | 2.3e-6 |
+//! | cuboid, convex | 4.0e-8 | 9.5e-6 | 3.4e-8 | 5.0e-8 | 9.5e-6 |
+//! | convex, convex | 4.1e-8 | 4.0e-6 | 3.6e-8 | 4.9e-8 | 3.1e-6 |
+//!
+//! The same test asks parry 0.31 (in millimetres) and Coal 3.0.3. Apart, both agree with the
+//! reference to 7e-3 um. In penetration parry misses 25 of the 4500 pairs and Coal 45, by up to
+//! 0.2 m and 0.1 m, all with a cylinder or a capsule, and parry mostly to the unsafe side. That
+//! is why the solver is our own.
 
 mod bounds;
 mod closed_form;
@@ -7,8 +51,10 @@ mod epa;
 mod gjk;
 mod hull;
 mod model;
+mod polytope;
 mod segment;
 mod separation;
+mod simplex;
 
 pub use crate::core::PreparedShape;
 pub use model::{ClassMinima, ClearanceModel, PairClearance};

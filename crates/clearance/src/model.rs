@@ -13,7 +13,7 @@ const CLASS_COUNT: usize = ClearanceClass::NeedleRoute as usize + 1;
 
 /// What a lower bound by enclosing volumes has to exceed a distance by before the pair is left
 /// out, m. More than the distances' own error, so that leaving out never changes a result.
-const PRUNING_MARGIN_M: f64 = 1e-7;
+const PRUNING_MARGIN_M: f64 = 3e-7;
 
 /// All classes, each at the index that it is cast to.
 const CLASSES: [ClearanceClass; CLASS_COUNT] = [

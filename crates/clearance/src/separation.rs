@@ -39,10 +39,11 @@ impl Separation {
 
 /// Signed distance of two placed shapes.
 ///
-/// The error against independent references stays below 0.01 um for every pair of shapes, apart
-/// or in penetration, and errs to the safe side where it can: the distance of separate shapes is
-/// a proven lower bound, the depth of penetrating ones a proven upper bound of the depth
-/// (`tests/against_coal.rs`, `tests/closed_forms.rs`).
+/// Never optimistic but for rounding: the distance of separate shapes is a proven lower bound,
+/// the depth of penetrating ones an upper bound of the depth. The error against independent
+/// references is below 0.002 um, and the overestimate below 0.0002 um, for every pair of shapes
+/// and both signs (`tests/against_coal.rs`, `tests/closed_forms.rs`); below 0.01 um for shapes
+/// from half a millimetre to two metres (`tests/properties.rs`).
 pub fn separation(
     a: &PreparedShape,
     world_from_a: &Pose,

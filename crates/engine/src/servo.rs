@@ -117,8 +117,8 @@ impl Servo {
             }
         }
         for &value in &self.effort_limit_nm {
-            // Infinite is a limit that never acts; written so that NaN fails.
-            if !(value > 0.0) {
+            // Infinite is a limit that never acts.
+            if value <= 0.0 || value.is_nan() {
                 let (key, expected) = ("effort_limit_nm", "positive");
                 return Err(EngineError::BadSetting {
                     key,

@@ -140,8 +140,7 @@ fn check(
     limit: f64,
 ) -> Result<(), EngineError> {
     for (&value, joint) in values.iter().zip(JOINT_LABELS) {
-        // Written so that NaN fails.
-        if !(value.abs() <= limit) {
+        if value.abs() > limit || value.is_nan() {
             let engine = engine.to_owned();
             return Err(EngineError::Diverged {
                 engine,

@@ -105,57 +105,61 @@ fn check_expectation(
 
 /// Clearance beyond which more of it is no better: nobody works nearer to the arm than this.
 const AMPLE_CLEARANCE_M: f64 = 0.1;
+/// Clearances in the same step of this size count as equal.
+const CLEARANCE_STEP_M: f64 = 2e-3;
 
-/// The working configuration with the most clearance; joint margin decides between equals.
+/// Least clearance over the motion, in steps.
+fn clearance_steps(configuration: &ConfigurationReport) -> f64 {
+    let clearance_m = configuration.clearance.minimum_m.unwrap_or(0.0).min(AMPLE_CLEARANCE_M);
+    (clearance_m / CLEARANCE_STEP_M).floor()
+}
+
+/// Least of joint-limit margin, `|sin q5|` and `|sin q3|`: all are 0 at worst and 1 at best.
+fn posture_margin(configuration: &ConfigurationReport) -> f64 {
+    configuration.margins.map_or(0.0, |margins| {
+        margins.joint_limit.min(margins.wrist_sine).min(margins.elbow_sine)
+    })
+}
+
+/// The working configuration to choose.
+///
+/// First by least clearance over the motion (in steps of 2 mm, up to 100 mm), then by the margin of
+/// the final posture to joint limits and singularities.
 pub fn recommend(configurations: &[ConfigurationReport]) -> Option<Recommendation> {
-    let clearance = |each: &ConfigurationReport| each.clearance.minimum_m.unwrap_or(0.0);
-    let margin = |each: &ConfigurationReport| each.margins.map_or(0.0, |m| m.joint_limit);
-    let mut working: Vec<&ConfigurationReport> = configurations
-        .iter()
-        .filter(|each| each.status == Status::Ok)
-        .collect();
+    let mut working: Vec<&ConfigurationReport> =
+        configurations.iter().filter(|each| each.status == Status::Ok).collect();
     working.sort_by(|a, b| {
-        let capped = |each| clearance(each).min(AMPLE_CLEARANCE_M);
-        capped(b)
-            .total_cmp(&capped(a))
-            .then(margin(b).total_cmp(&margin(a)))
+        clearance_steps(b)
+            .total_cmp(&clearance_steps(a))
+            .then(posture_margin(b).total_cmp(&posture_margin(a)))
     });
-    let best = working.first()?;
-    let least = best
+    let best = *working.first()?;
+    let equals =
+        working.iter().filter(|each| clearance_steps(each) == clearance_steps(best)).count();
+    let pair = best
         .clearance
         .classes
         .iter()
         .filter(|(class, _)| counts_as_clearance(class))
-        .min_by(|a, b| a.1.minimum_m.total_cmp(&b.1.minimum_m));
-    let pair = least.map_or(String::new(), |(_, found)| {
-        format!(" ({} to {}, {})", found.pair[0], found.pair[1], found.phase)
-    });
-    let reason = if clearance(best) >= AMPLE_CLEARANCE_M {
-        format!(
-            "largest joint margin ({:.0} % of the half range) of those with at least {:.0} mm of \
-             clearance",
-            100.0 * margin(best),
-            1e3 * AMPLE_CLEARANCE_M
-        )
-    } else {
-        let rest = match working.get(1) {
-            Some(next) => format!(
-                "; next is {} with {:.1} mm",
-                next.label,
-                1e3 * clearance(next)
-            ),
-            None => "; no other one works".to_owned(),
-        };
-        format!(
-            "largest least clearance of {} working: {:.1} mm{pair}{rest}",
-            working.len(),
-            1e3 * clearance(best)
-        )
+        .min_by(|a, b| a.1.minimum_m.total_cmp(&b.1.minimum_m))
+        .map_or(String::new(), |(_, found)| {
+            format!(" ({} to {} in the {})", found.pair[0], found.pair[1], found.phase)
+        });
+    let clearance_mm = 1e3 * best.clearance.minimum_m.unwrap_or(0.0);
+    let margin = posture_margin(best);
+    let reason = match (working.len(), equals) {
+        (1, _) => format!("the only one that works; least clearance {clearance_mm:.1} mm{pair}"),
+        (count, 1) => format!(
+            "most clearance of {count} that work: at least {clearance_mm:.1} mm{pair}; \
+             posture margin {margin:.2}"
+        ),
+        (count, equals) => format!(
+            "posture farthest from joint limits and singularities (margin {margin:.2}) of the \
+             {equals} with most clearance among {count} that work: at least \
+             {clearance_mm:.1} mm{pair}"
+        ),
     };
-    Some(Recommendation {
-        label: best.label.to_owned(),
-        reason,
-    })
+    Some(Recommendation { label: best.label.to_owned(), reason })
 }
 
 /// Classes that make up the least clearance of a configuration: physical bodies, but not the

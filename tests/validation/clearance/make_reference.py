@@ -403,7 +403,7 @@ def main() -> None:
             if np.isfinite(coal_value):
                 errors[value > 0.0].append(coal_value - value)
             pose = [float(x) for x in (*translation, *quat)]
-            coals = float(f"{coal_value:.10f}") if np.isfinite(coal_value) else None
+            coals = float(f"{coal_value:.13f}") if np.isfinite(coal_value) else None
             cases.append([ia, ib, *pose, float(f"{value:.13f}"), coals])
         pairs.append({"kinds": [kind_a, kind_b], "cases": cases})
         apart, inside = np.array(errors[True]), np.array(errors[False])

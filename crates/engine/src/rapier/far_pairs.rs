@@ -98,8 +98,7 @@ impl FarPairs {
         if free_m > 0.0 {
             next_look_m.store((travel_m + free_m).to_bits(), Ordering::Relaxed);
         }
-        // NaN counts as near.
-        !(free_m > 0.0)
+        free_m <= 0.0 || free_m.is_nan()
     }
 }
 

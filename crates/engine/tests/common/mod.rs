@@ -4,10 +4,6 @@
 //! (`config/ur3`); the inertia tensors are uniform-density ones of the links' meshes.
 
 #![allow(dead_code, reason = "every test file uses a part of it")]
-#![expect(
-    clippy::allow_attributes,
-    reason = "whether code is dead depends on the test file"
-)]
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -16,8 +16,6 @@ use crate::picture::{Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceI
 const SIZE_PX: [u32; 2] = [1000, 750];
 /// Height of the arm's reach over its base, for framing, m.
 const REACH_M: f64 = 0.55;
-/// Opacity of the table: legs and forearms behind it stay visible.
-const TABLE_OPACITY: f32 = 0.55;
 /// Fineness of curved surfaces in pictures, m.
 const CHORD_ERROR_M: f64 = 3e-4;
 
@@ -37,8 +35,9 @@ impl Backdrop {
         );
         for fixture in &resolved.fixtures {
             for solid in &fixture.solids {
+                // Opaque: inner faces of a gantry made of convex pieces stay hidden.
                 let mut color_rgba = fixture.color_rgba;
-                color_rgba[3] = color_rgba[3].min(TABLE_OPACITY);
+                color_rgba[3] = 1.0;
                 surfaces.push(SurfaceInstance {
                     mesh: Arc::new(solid.shape.surface(CHORD_ERROR_M)),
                     world_from_surface: solid.parent_from_shape,

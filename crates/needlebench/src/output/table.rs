@@ -85,7 +85,7 @@ fn over_engines(
         .reduce(f64::max)
 }
 
-const COLUMNS: [Column; 11] = [
+const COLUMNS: [Column; 12] = [
     Column {
         heading: "tip error\nrapier",
         value: |each| engine_tip(each, "rapier"),
@@ -144,7 +144,12 @@ const COLUMNS: [Column; 11] = [
         worst_is_large: false,
     },
     Column {
-        heading: "least (mm)",
+        heading: "self\n(mm)",
+        value: |each| class(each, "self"),
+        worst_is_large: false,
+    },
+    Column {
+        heading: "least\n(mm)",
         value: |each| each.clearance.minimum_m.map(|m| (m, millimetres(m))),
         worst_is_large: false,
     },
