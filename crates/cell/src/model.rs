@@ -383,9 +383,9 @@ fn placed(solids: &[Solid], new_from_old: &Pose) -> Vec<Solid> {
 fn pair_class(a: &CollisionBody, b: &CollisionBody) -> Option<ClearanceClass> {
     use BodyKind::{Base, Gantry, GuideTube, Link, Mount, NeedleCorridor, Phantom, Table, Tool};
     let (first, second) = if a.kind <= b.kind { (a, b) } else { (b, a) };
-    // A tool whose own wrist or bracket stands behind its guide shows that as a constant.
-    let blocks_own_corridor = second.kind == NeedleCorridor && matches!(first.kind, Link | Tool);
-    if a.frame == b.frame && !blocks_own_corridor {
+    // A tool that is bolted on so that the wrist stands behind its guide shows that as a constant.
+    let wrist_behind_guide = second.kind == NeedleCorridor && first.kind == Link;
+    if a.frame == b.frame && !wrist_behind_guide {
         return None;
     }
     Some(match (first.kind, second.kind) {

@@ -6,7 +6,7 @@ use needlebench_cell::phantom::Tissue;
 use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom};
 use needlebench_clearance::{ClassMinima, ClearanceModel, Separation, segment_clearance};
 use needlebench_engine::Recording;
-use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 
 use crate::report::ClassClearance;
 
@@ -22,6 +22,8 @@ pub struct ClearanceSeries {
 }
 
 /// Samples the clearance of a recorded motion every `period_s`, first and last state included.
+///
+/// The least clearance of the needle corridor is that while the arm holds its place.
 pub fn measure_clearance(
     cell: &Cell,
     model: &ClearanceModel,
@@ -37,6 +39,7 @@ pub fn measure_clearance(
     for index in sample_indices(recording, period_s) {
         let time_s = recording.time_s[index];
         let minima = model.minimum_per_class(&recording.state[index].position);
+        let phase = trajectory.phase_at(time_s);
         series.time_s.push(time_s);
         for pair in minima.iter() {
             series
@@ -48,12 +51,13 @@ pub fn measure_clearance(
                 .minima
                 .get(&pair.class)
                 .is_none_or(|known| pair.separation.distance_m < known.minimum_m);
-            if nearer {
-                let phase = trajectory.phase_at(time_s).name();
+            // Needle and hand come only when the guide stands in its place.
+            let counts = pair.class != ClearanceClass::NeedleCorridor || phase == Phase::Hold;
+            if nearer && counts {
                 let found = class_clearance(
                     pair.solid_names(cell),
                     &pair.separation,
-                    phase,
+                    phase.name(),
                     Some(time_s),
                     Some(&recording.engine.name),
                 );

@@ -177,22 +177,7 @@ fn goal_table(goal: &GoalReport) -> Table {
     let mut header = vec!["configuration", "status"];
     header.extend(COLUMNS.iter().map(|column| column.heading));
     let mut table = plain_table(&header);
-    let worst: Vec<Option<f64>> = COLUMNS
-        .iter()
-        .map(|column| {
-            let values = goal
-                .configurations
-                .iter()
-                .filter(|each| each.status != Status::Rejected)
-                .filter_map(|each| (column.value)(each))
-                .map(|(value, _)| value);
-            if column.worst_is_large {
-                values.reduce(f64::max)
-            } else {
-                values.reduce(f64::min)
-            }
-        })
-        .collect();
+    let worst: Vec<Option<f64>> = COLUMNS.iter().map(|column| worst_of(goal, column)).collect();
     let recommended = goal.recommended.as_ref().map(|found| found.label.as_str());
     for configuration in &goal.configurations {
         let chosen = recommended == Some(configuration.label);
@@ -229,6 +214,25 @@ fn goal_table(goal: &GoalReport) -> Table {
         table.add_row(row);
     }
     table
+}
+
+/// The worst value of a column, if the configurations that work differ in it at all.
+fn worst_of(goal: &GoalReport, column: &Column) -> Option<f64> {
+    /// Relative spread below which no value is worse than another.
+    const SPREAD: f64 = 0.01;
+    let values: Vec<(f64, String)> = goal
+        .configurations
+        .iter()
+        .filter(|each| each.status != Status::Rejected)
+        .filter_map(|each| (column.value)(each))
+        .collect();
+    let least = values.iter().map(|(value, _)| *value).reduce(f64::min)?;
+    let most = values.iter().map(|(value, _)| *value).reduce(f64::max)?;
+    let all_read_the_same = values.iter().all(|(_, text)| *text == values[0].1);
+    if all_read_the_same || most - least <= SPREAD * most.abs() {
+        return None;
+    }
+    Some(if column.worst_is_large { most } else { least })
 }
 
 fn print_remarks(report: &Report, goal: &GoalReport) {
