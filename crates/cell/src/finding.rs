@@ -55,10 +55,9 @@ impl Finding {
     pub fn at(mut self, text: &str, span: Range<usize>) -> Self {
         let end = span.start.min(text.len());
         self.line = Some(
-            1 + text.as_bytes()[..end]
-                .iter()
-                .filter(|&&byte| byte == b'\n')
-                .count(),
+            1 + text
+                .get(..end)
+                .map_or(0, |before| before.matches('\n').count()),
         );
         self.span = Some(span);
         self

@@ -1,6 +1,6 @@
 //! Meshes from STL files, and their convex hulls.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point3;
 
@@ -159,19 +159,19 @@ impl<'a> Hull<'a> {
             return Ok(());
         }
         // Edges of visible faces whose twin belongs to a hidden one.
-        let mut horizon = BTreeMap::new();
+        let mut horizon = BTreeSet::new();
         for (face, _) in self.faces.iter().zip(&visible).filter(|(_, seen)| **seen) {
             let [a, b, c] = face.vertices;
             for (from, to) in [(a, b), (b, c), (c, a)] {
-                if horizon.remove(&(to, from)).is_none() {
-                    horizon.insert((from, to), ());
+                if !horizon.remove(&(to, from)) {
+                    horizon.insert((from, to));
                 }
             }
         }
         let mut seen = visible.iter();
         self.faces
             .retain(|_| !seen.next().copied().unwrap_or(false));
-        for (from, to) in horizon.into_keys() {
+        for (from, to) in horizon {
             let face = self.face([from, to, point])?;
             self.faces.push(face);
         }

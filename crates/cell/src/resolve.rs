@@ -502,7 +502,13 @@ fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
         }
     }
     let tool = &scenario.tool;
-    range("tool.mount_rotation_deg", tool.mount_rotation_deg, -360.0, 360.0, "deg");
+    range(
+        "tool.mount_rotation_deg",
+        tool.mount_rotation_deg,
+        -360.0,
+        360.0,
+        "deg",
+    );
     range(
         "tool.corridor_radius_mm",
         tool.corridor_radius_mm,

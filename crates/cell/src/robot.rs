@@ -91,7 +91,7 @@ pub(crate) fn read_robot(
     // Every URDF link belongs to the nearest moving link above it.
     let mut owned: Vec<Vec<(&UrdfLink, Pose)>> = vec![Vec::new(); JOINT_COUNT + 1];
     for link in &urdf.links {
-        let (owner, owner_from_link) = owner_of(&urdf, &joints, &link.name)?;
+        let (owner, owner_from_link) = owner_of(&urdf, &joints, &link.name);
         owned[owner].push((link, owner_from_link));
     }
     let mut links = Vec::with_capacity(JOINT_COUNT + 1);
@@ -218,27 +218,23 @@ fn fixed_pose(urdf: &Urdf, ancestor: &str, link: &str) -> Pose {
 }
 
 /// Index of the moving link (0 for the base) that a URDF link is fixed to, and its pose there.
-fn owner_of(urdf: &Urdf, joints: &[&UrdfJoint], link: &str) -> Result<(usize, Pose), Finding> {
+fn owner_of(urdf: &Urdf, joints: &[&UrdfJoint], link: &str) -> (usize, Pose) {
     let mut owner_from_link = Pose::identity();
     let mut at = link;
     loop {
         if let Some(index) = joints.iter().position(|joint| joint.child == at) {
-            return Ok((index + 1, owner_from_link));
+            return (index + 1, owner_from_link);
         }
         if at == "base_link" {
-            return Ok((0, owner_from_link));
+            return (0, owner_from_link);
         }
-        match urdf.joint_above(at) {
-            Some(joint) => {
-                owner_from_link = joint.parent_from_joint * owner_from_link;
-                at = &joint.parent;
-            }
+        let Some(joint) = urdf.joint_above(at) else {
             // Above base_link: the robot is placed by its base_link, so that is where it belongs.
-            None => {
-                let root_from_base_link = fixed_pose(urdf, at, "base_link");
-                return Ok((0, root_from_base_link.inverse() * owner_from_link));
-            }
-        }
+            let root_from_base_link = fixed_pose(urdf, at, "base_link");
+            return (0, root_from_base_link.inverse() * owner_from_link);
+        };
+        owner_from_link = joint.parent_from_joint * owner_from_link;
+        at = &joint.parent;
     }
 }
 
@@ -375,7 +371,7 @@ fn read_link(
             link,
             owner_from_link,
             notes,
-        )?);
+        ));
     }
     rename_unique(&mut solids, label);
     if visuals.is_empty() {
@@ -402,29 +398,28 @@ pub(crate) fn read_solids(
 ) -> Result<Vec<Solid>, Finding> {
     let mut solids = Vec::new();
     for element in &link.collisions {
-        let shape = match shape_of(&element.geometry) {
-            Some(shape) => shape,
-            None => {
-                let mesh = read_mesh(urdf, location, packages, element)?;
-                let hull = convex_hull(&mesh.vertices_m).map_err(|why| {
-                    urdf.finding(
-                        &element.span,
-                        format!("collision mesh of '{}': {why}", link.name),
-                    )
-                })?;
-                notes.push(format!(
-                    "collision mesh of '{}' is used as its convex hull ({} vertices), which \
-                     contains it",
-                    link.name,
-                    hull.0.vertices_m.len()
-                ));
-                Shape::Convex(Arc::new(hull))
-            }
+        let shape = if let Some(shape) = shape_of(&element.geometry) {
+            shape
+        } else {
+            let mesh = read_mesh(urdf, location, packages, element)?;
+            let hull = convex_hull(&mesh.vertices_m).map_err(|why| {
+                urdf.finding(
+                    &element.span,
+                    format!("collision mesh of '{}': {why}", link.name),
+                )
+            })?;
+            notes.push(format!(
+                "collision mesh of '{}' is used as its convex hull ({} vertices), which \
+                 contains it",
+                link.name,
+                hull.0.vertices_m.len()
+            ));
+            Shape::Convex(Arc::new(hull))
         };
         solids.push(Solid {
             name: element.name.clone().unwrap_or_default(),
             shape,
-            parent_from_shape: owner_from_link * element.link_from_element,
+            parent_from_shape: owner_from_link * element.link_from_geometry,
         });
     }
     Ok(solids)
@@ -438,7 +433,7 @@ pub(crate) fn read_visuals(
     link: &UrdfLink,
     owner_from_link: &Pose,
     notes: &mut Vec<String>,
-) -> Result<Vec<Visual>, Finding> {
+) -> Vec<Visual> {
     let mut visuals = Vec::new();
     for element in &link.visuals {
         let mesh = match shape_of(&element.geometry) {
@@ -456,11 +451,11 @@ pub(crate) fn read_visuals(
         };
         visuals.push(Visual {
             mesh: Arc::new(mesh),
-            parent_from_visual: owner_from_link * element.link_from_element,
+            parent_from_visual: owner_from_link * element.link_from_geometry,
             color_rgba: element.color_rgba.unwrap_or(DEFAULT_COLOR),
         });
     }
-    Ok(visuals)
+    visuals
 }
 
 /// Fineness of curved surfaces in pictures.

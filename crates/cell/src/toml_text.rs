@@ -94,7 +94,7 @@ impl<'a> TomlText<'a> {
                 let Some((DeValue::Array(array), _)) = at else {
                     return None;
                 };
-                let found = array.iter().nth(index)?;
+                let found = array.get(index)?;
                 at = Some((found.get_ref(), found.span()));
             }
         }

@@ -65,7 +65,9 @@ pub(crate) fn read_tool(
         urdf.joints_between(&root.name, link)
             .into_iter()
             .flatten()
-            .fold(flange_from_root, |pose, joint| pose * joint.parent_from_joint)
+            .fold(flange_from_root, |pose, joint| {
+                pose * joint.parent_from_joint
+            })
     };
     let frame = |link: &str| {
         urdf.link(link).map(|_| flange_from(link)).ok_or_else(|| {
@@ -104,7 +106,7 @@ pub(crate) fn read_tool(
             &mut solids
         }
         .extend(read);
-        visuals.extend(read_visuals(&urdf, location, packages, link, &pose, notes)?);
+        visuals.extend(read_visuals(&urdf, location, packages, link, &pose, notes));
     }
     if body.mass_kg <= 0.0 {
         return Err(Finding::new(&urdf.file, "the tool has no mass")

@@ -3,7 +3,7 @@
 //! Read from the XML directly: a missing `<inertial>` or `<limit>` has to be told from a zero one,
 //! and every complaint names a line.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Translation3, UnitQuaternion, UnitVector3, Vector3};
@@ -24,7 +24,7 @@ pub(crate) enum Geometry {
 #[derive(Debug, Clone)]
 pub(crate) struct Element {
     pub name: Option<String>,
-    pub link_from_element: Pose,
+    pub link_from_geometry: Pose,
     pub geometry: Geometry,
     pub color_rgba: Option<[f32; 4]>,
     pub span: Range<usize>,
@@ -171,9 +171,9 @@ impl Urdf {
         if self.links.is_empty() {
             return Err(Finding::new(&self.file, "it has no <link>"));
         }
-        let mut seen = BTreeMap::new();
+        let mut seen = BTreeSet::new();
         for link in &self.links {
-            if seen.insert(link.name.as_str(), ()).is_some() {
+            if !seen.insert(link.name.as_str()) {
                 return Err(
                     self.finding(&link.span, format!("link '{}' is there twice", link.name))
                 );
@@ -182,13 +182,13 @@ impl Urdf {
         let mut parents: BTreeMap<&str, &str> = BTreeMap::new();
         for joint in &self.joints {
             for (role, name) in [("parent", &joint.parent), ("child", &joint.child)] {
-                if !seen.contains_key(name.as_str()) {
+                if !seen.contains(name.as_str()) {
                     let message = format!(
                         "joint '{}' names the {role} link '{name}', which does not exist",
                         joint.name
                     );
                     let finding = self.finding(&joint.span, message);
-                    return Err(match nearest_name(name, seen.keys().copied()) {
+                    return Err(match nearest_name(name, seen.iter().copied()) {
                         Some(near) => finding.hint(format!("did you mean '{near}'?")),
                         None => finding,
                     });
@@ -432,7 +432,7 @@ impl Reader<'_> {
         };
         Ok(Element {
             name: node.attribute("name").map(str::to_owned),
-            link_from_element: self.origin(node)?,
+            link_from_geometry: self.origin(node)?,
             geometry,
             color_rgba,
             span: opening_tag(shape),

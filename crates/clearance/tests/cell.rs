@@ -2,8 +2,6 @@
 
 mod common;
 
-use std::time::Instant;
-
 use common::{Variety, cell};
 use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::{ClearanceModel, PairClearance, PreparedShape, separation};
@@ -169,24 +167,4 @@ fn joint_positions_that_are_no_numbers_do_not_pass_for_free() {
     let minima = model.minimum_per_class(&q);
     let table = minima.get(ClearanceClass::RobotTable).expect("a table");
     assert!(table.separation.distance_m.is_nan());
-}
-
-/// Measured 0.04 to 0.06 ms on one core of a busy machine.
-#[test]
-#[cfg_attr(debug_assertions, ignore = "timings without optimisation mean nothing")]
-fn minima_take_less_than_half_a_millisecond() {
-    let model = ClearanceModel::new(&cell());
-    let postures = postures(1000);
-    let start = Instant::now();
-    let mut sum_m = 0.0;
-    for q in &postures {
-        let minima = model.minimum_per_class(q);
-        sum_m += minima.iter().map(|c| c.separation.distance_m).sum::<f64>();
-    }
-    let mean_s = start.elapsed().as_secs_f64() / postures.len() as f64;
-    println!(
-        "minimum_per_class: {:.1} us (checksum {sum_m:.3} m)",
-        mean_s * 1e6
-    );
-    assert!(mean_s < 5e-4, "{mean_s} s");
 }

@@ -110,14 +110,21 @@ const CLEARANCE_STEP_M: f64 = 2e-3;
 
 /// Least clearance over the motion, in steps.
 fn clearance_steps(configuration: &ConfigurationReport) -> f64 {
-    let clearance_m = configuration.clearance.minimum_m.unwrap_or(0.0).min(AMPLE_CLEARANCE_M);
+    let clearance_m = configuration
+        .clearance
+        .minimum_m
+        .unwrap_or(0.0)
+        .min(AMPLE_CLEARANCE_M);
     (clearance_m / CLEARANCE_STEP_M).floor()
 }
 
 /// Least of joint-limit margin, `|sin q5|` and `|sin q3|`: all are 0 at worst and 1 at best.
 fn posture_margin(configuration: &ConfigurationReport) -> f64 {
     configuration.margins.map_or(0.0, |margins| {
-        margins.joint_limit.min(margins.wrist_sine).min(margins.elbow_sine)
+        margins
+            .joint_limit
+            .min(margins.wrist_sine)
+            .min(margins.elbow_sine)
     })
 }
 
@@ -126,16 +133,20 @@ fn posture_margin(configuration: &ConfigurationReport) -> f64 {
 /// First by least clearance over the motion (in steps of 2 mm, up to 100 mm), then by the margin of
 /// the final posture to joint limits and singularities.
 pub fn recommend(configurations: &[ConfigurationReport]) -> Option<Recommendation> {
-    let mut working: Vec<&ConfigurationReport> =
-        configurations.iter().filter(|each| each.status == Status::Ok).collect();
+    let mut working: Vec<&ConfigurationReport> = configurations
+        .iter()
+        .filter(|each| each.status == Status::Ok)
+        .collect();
     working.sort_by(|a, b| {
         clearance_steps(b)
             .total_cmp(&clearance_steps(a))
             .then(posture_margin(b).total_cmp(&posture_margin(a)))
     });
     let best = *working.first()?;
-    let equals =
-        working.iter().filter(|each| clearance_steps(each) == clearance_steps(best)).count();
+    let equals = working
+        .iter()
+        .filter(|each| clearance_steps(each) == clearance_steps(best))
+        .count();
     let pair = best
         .clearance
         .classes
@@ -143,7 +154,10 @@ pub fn recommend(configurations: &[ConfigurationReport]) -> Option<Recommendatio
         .filter(|(class, _)| counts_as_clearance(class))
         .min_by(|a, b| a.1.minimum_m.total_cmp(&b.1.minimum_m))
         .map_or(String::new(), |(_, found)| {
-            format!(" ({} to {} in the {})", found.pair[0], found.pair[1], found.phase)
+            format!(
+                " ({} to {} in the {})",
+                found.pair[0], found.pair[1], found.phase
+            )
         });
     let clearance_mm = 1e3 * best.clearance.minimum_m.unwrap_or(0.0);
     let margin = posture_margin(best);
@@ -159,7 +173,10 @@ pub fn recommend(configurations: &[ConfigurationReport]) -> Option<Recommendatio
              {clearance_mm:.1} mm{pair}"
         ),
     };
-    Some(Recommendation { label: best.label.to_owned(), reason })
+    Some(Recommendation {
+        label: best.label.to_owned(),
+        reason,
+    })
 }
 
 /// Classes that make up the least clearance of a configuration: physical bodies, but not the

@@ -22,6 +22,7 @@ use needlebench_evaluation::{
     needle_route, posture_clearance,
 };
 use needlebench_kinematics::NotUrGeometry;
+use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
 
 use crate::progress::Progress;
@@ -546,7 +547,7 @@ fn configuration_report(
         motion: plan
             .trajectory
             .iter()
-            .flat_map(|trajectory| trajectory.phases())
+            .flat_map(JointTrajectory::phases)
             .map(|(phase, start_s, end_s)| PhaseReport {
                 phase: phase.name(),
                 start_s,
@@ -607,15 +608,13 @@ fn overall_clearance(
     engines: &BTreeMap<String, EngineReport>,
 ) -> ClearanceReport {
     let mut classes: BTreeMap<&'static str, ClassClearance> = BTreeMap::new();
-    if engines.is_empty() {
-        if let Some(candidate) = &plan.candidate {
-            let minima = posture_clearance(cell, &candidate.clearance);
-            classes.extend(
-                minima
-                    .into_iter()
-                    .map(|(class, found)| (class.name(), found)),
-            );
-        }
+    if let (true, Some(candidate)) = (engines.is_empty(), &plan.candidate) {
+        let minima = posture_clearance(cell, &candidate.clearance);
+        classes.extend(
+            minima
+                .into_iter()
+                .map(|(class, found)| (class.name(), found)),
+        );
     }
     for report in engines.values() {
         for (class, found) in &report.clearance.classes {

@@ -231,7 +231,7 @@ impl<'a> Planner<'a> {
                 class: None,
             });
         }
-        for joint in 0..JOINT_COUNT {
+        for (joint, label) in JOINT_LABELS.into_iter().enumerate() {
             if turns_within_limits(limits.0[joint], solution.joints[joint]).is_empty() {
                 let (position, limit) = (solution.joints[joint], limits.0[joint]);
                 rejections.push(Rejection {
@@ -243,7 +243,7 @@ impl<'a> Planner<'a> {
                         limit.lower_rad
                     },
                     unit: "rad",
-                    detail: format!("{} has no place in its range", JOINT_LABELS[joint]),
+                    detail: format!("{label} has no place in its range"),
                     class: None,
                 });
             }

@@ -9,7 +9,7 @@ use super::format::{millimetres, small_length, value_with_unit};
 pub(crate) fn plain_table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(comfy_table::presets::UTF8_FULL_CONDENSED);
-    table.set_header(header.iter().map(|text| Cell::new(text)));
+    table.set_header(header.iter().map(Cell::new));
     table
 }
 
@@ -177,7 +177,10 @@ fn goal_table(goal: &GoalReport) -> Table {
     let mut header = vec!["configuration", "status"];
     header.extend(COLUMNS.iter().map(|column| column.heading));
     let mut table = plain_table(&header);
-    let worst: Vec<Option<f64>> = COLUMNS.iter().map(|column| worst_of(goal, column)).collect();
+    let worst: Vec<Option<f64>> = COLUMNS
+        .iter()
+        .map(|column| worst_of(goal, column))
+        .collect();
     let recommended = goal.recommended.as_ref().map(|found| found.label.as_str());
     for configuration in &goal.configurations {
         let chosen = recommended == Some(configuration.label);
