@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::UnitVector3;
 use needlebench_cell::{ClearanceClass, Goal, ResolvedScenario, Roll};
 use needlebench_clearance::{ClassMinima, ClearanceModel};
-use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind};
+use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, wrap_angle};
 use needlebench_kinematics::trajectory::{JointTrajectory, LinePath, Phase};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
@@ -201,7 +201,8 @@ impl<'a> Planner<'a> {
                 )
         });
         let mut best: Option<ConfigurationPlan> = None;
-        for (candidate, rejections) in candidates.into_iter().take(MOTION_TRIES) {
+        for (candidate, rejections) in spread_over_rolls(candidates).into_iter().take(MOTION_TRIES)
+        {
             let plan = self.plan_motion(goal, configuration, candidate, rejections);
             if plan.rejections.is_empty() {
                 return plan;
@@ -484,6 +485,29 @@ fn turns_within_limits(limit: needlebench_kinematics::JointLimit, position: f64)
     (-1..=1)
         .filter(|&k| within(limit, position + TAU * f64::from(k)))
         .collect()
+}
+
+/// Angle between two rolls that count as different for a motion, rad.
+const ROLL_SPREAD_RAD: f64 = 0.5;
+
+/// The same candidates, those first that are best within their neighbourhood of rolls: where the
+/// motion to one roll collides, that to the next one mostly does too.
+fn spread_over_rolls<T>(candidates: Vec<(Candidate, T)>) -> Vec<(Candidate, T)> {
+    let mut first: Vec<(Candidate, T)> = Vec::new();
+    let mut rest = Vec::new();
+    for (candidate, extra) in candidates {
+        let apart = |other: &Candidate| wrap_angle(candidate.roll_rad - other.roll_rad).abs();
+        if first
+            .iter()
+            .all(|(other, _)| apart(other) >= ROLL_SPREAD_RAD)
+        {
+            first.push((candidate, extra));
+        } else {
+            rest.push((candidate, extra));
+        }
+    }
+    first.extend(rest);
+    first
 }
 
 /// Least clearance of the classes that a roll should keep free; the stand-off is given.

@@ -18,7 +18,7 @@ use needlebench_planning::Planner;
 use serde::Serialize;
 
 use super::{overrides, print_json};
-use crate::cli::{FkArguments, IkArguments, IkMethod, RobotArguments};
+use crate::cli::{FkArguments, IkArguments, IkMethod, RobotArguments, Six};
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
 
@@ -83,8 +83,18 @@ fn robot(arguments: &RobotArguments) -> std::result::Result<Robot, Finding> {
     load_robot(&overrides)
 }
 
+/// A coordinate beyond this is in another unit.
+const FARTHEST_M: f64 = 10.0;
+
 /// Solves the inverse kinematics of a pose or a goal.
 pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus> {
+    if let Some(Six([x, y, z, ..])) = arguments.pose
+        && [x, y, z].iter().any(|value| value.abs() > FARTHEST_M)
+    {
+        let message = format!("the position is {x}, {y}, {z} m, but no arm reaches {FARTHEST_M} m");
+        print_findings(&[Finding::new("--pose", message).hint("x, y and z are in metres")]);
+        return Ok(ExitStatus::BadInput);
+    }
     let target = match &arguments.scenario {
         Some(path) => goal_pose(arguments, path),
         None => robot(&arguments.robot)
@@ -350,7 +360,7 @@ pub(crate) fn fk(arguments: &FkArguments) -> Result<ExitStatus> {
         .links
         .iter()
         .zip(&poses)
-        .map(|(link, pose)| (link.name.clone(), PoseAnswer::new(pose)))
+        .map(|(link, pose)| (format!("{}_link", link.name), PoseAnswer::new(pose)))
         .collect();
     let answer = FkAnswer {
         schema_version: 1,
