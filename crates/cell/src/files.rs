@@ -45,7 +45,8 @@ impl PackagePaths {
                 return Err(Finding::new(
                     "--package-path",
                     format!("the folder `{folder}` of package `{name}` does not exist"),
-                ));
+                )
+                .hint("give the folder that package://NAME/ stands for"));
             }
             paths.push((name.to_owned(), PathBuf::from(folder)));
         }

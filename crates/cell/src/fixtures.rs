@@ -97,6 +97,18 @@ pub enum FixtureError {
     },
 }
 
+impl FixtureError {
+    /// The key it is about, without its section; none if it is about the robot's base.
+    pub(crate) fn key(&self) -> Option<&'static str> {
+        match self {
+            Self::NotFinite { key, .. }
+            | Self::OutOfRange { key, .. }
+            | Self::HousingTooSmall { key, .. } => Some(key),
+            Self::BaseTilted { .. } | Self::BaseTooLow { .. } => None,
+        }
+    }
+}
+
 /// The CT table: one box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]

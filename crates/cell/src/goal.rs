@@ -114,7 +114,8 @@ pub(crate) fn resolve_goal(
         from_entry_and_target(text, &key, section, surroundings, notes)?
     };
     goal.expected = expectations(text, &key, section)?;
-    check_place(text, &key, &goal, surroundings)?;
+    let by_flange_pose = section.flange_pose.is_some();
+    check_place(text, &key, &goal, by_flange_pose, surroundings)?;
     let needle_m = surroundings.tool.needle.length_m;
     let needed_m = surroundings.tool.guide_length_m() + goal.insertion_length_m;
     if needle_m < needed_m {
@@ -431,6 +432,7 @@ fn check_place(
     text: &TomlText<'_>,
     key: &dyn Fn(&str) -> String,
     goal: &Goal,
+    by_flange_pose: bool,
     surroundings: &Surroundings<'_>,
 ) -> Result<(), Finding> {
     let exit = Point3::from(goal.world_from_guide_exit.translation.vector);
@@ -448,6 +450,7 @@ fn check_place(
                 .any(|solid| solid_contains(solid, &point))
             {
                 let name = match what {
+                    _ if by_flange_pose => "flange_pose",
                     "target" => "target_mm",
                     "entry" => "entry_mm",
                     _ => "standoff_mm",

@@ -9,6 +9,7 @@ pub mod fixtures;
 mod goal;
 mod mesh;
 mod model;
+mod nominal;
 pub mod phantom;
 mod resolve;
 mod robot;

@@ -1,5 +1,6 @@
 //! Meshes from STL files, and their convex hulls.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point3;
@@ -8,6 +9,7 @@ use crate::shape::{ConvexMesh, TriangleMesh};
 
 /// Reads a binary or text STL; `scale` multiplies the coordinates (URDF's `scale`).
 pub(crate) fn read_stl(bytes: &[u8], scale: [f64; 3]) -> Result<TriangleMesh, String> {
+    let bytes = with_plain_header(bytes);
     let mesh = stl_io::read_stl(&mut std::io::Cursor::new(bytes)).map_err(|e| e.to_string())?;
     let vertices_m: Vec<Point3<f64>> = mesh
         .vertices
@@ -30,14 +32,20 @@ pub(crate) fn read_stl(bytes: &[u8], scale: [f64; 3]) -> Result<TriangleMesh, St
         return Err("it has no triangles".to_owned());
     }
     let index = |i: usize| u32::try_from(i).map_err(|_| "more than 2^32 vertices".to_owned());
+    // A mirrored surface would be inside out.
+    let order = if scale.iter().product::<f64>() < 0.0 {
+        [0, 2, 1]
+    } else {
+        [0, 1, 2]
+    };
     let triangles = mesh
         .faces
         .iter()
         .map(|face| {
             Ok([
-                index(face.vertices[0])?,
-                index(face.vertices[1])?,
-                index(face.vertices[2])?,
+                index(face.vertices[order[0]])?,
+                index(face.vertices[order[1]])?,
+                index(face.vertices[order[2]])?,
             ])
         })
         .collect::<Result<_, String>>()?;
@@ -45,6 +53,33 @@ pub(crate) fn read_stl(bytes: &[u8], scale: [f64; 3]) -> Result<TriangleMesh, St
         vertices_m,
         triangles,
     })
+}
+
+/// Header of a binary STL: free text and the number of triangles.
+const STL_HEADER_BYTES: usize = 84;
+const STL_TRIANGLE_BYTES: usize = 50;
+
+/// The file with a header from which its kind can be told: some writers start binary files with
+/// `solid`, and some give the solid of a text file no name.
+fn with_plain_header(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let count = bytes
+        .get(80..STL_HEADER_BYTES)
+        .and_then(|count| count.try_into().ok())
+        .map(u32::from_le_bytes);
+    let is_binary = count.is_some_and(|count| {
+        Some(bytes.len() - STL_HEADER_BYTES) == (count as usize).checked_mul(STL_TRIANGLE_BYTES)
+    });
+    if is_binary {
+        let mut plain = bytes.to_vec();
+        plain[..80].fill(0);
+        return plain.into();
+    }
+    match bytes.strip_prefix(b"solid") {
+        Some(rest) if rest.starts_with(b"\n") || rest.starts_with(b"\r") => {
+            [b"solid unnamed", rest].concat().into()
+        }
+        _ => bytes.into(),
+    }
 }
 
 /// Distance by which a point may lie outside the hull that is made of it, relative to its size.

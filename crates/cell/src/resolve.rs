@@ -7,10 +7,10 @@ use needlebench_kinematics::trajectory::{MotionLimits, ProfileLimits};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, Pose};
 
 use crate::files::{Location, source_of};
-use crate::fixtures::{self, Fixture};
+use crate::fixtures::{self, Fixture, FixtureError};
 use crate::goal::{PlacedPhantom, Surroundings, resolve_goal};
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
-use crate::phantom::{Phantom, PhantomParameters};
+use crate::phantom::{Phantom, PhantomError, PhantomParameters};
 use crate::robot::{MissingInertia, read_robot};
 use crate::scenario::{PhantomSection, Posture, Scenario};
 use crate::shape::Shape;
@@ -98,10 +98,14 @@ pub fn load_robot(overrides: &Overrides) -> Result<Robot, Finding> {
 pub fn load_scenario(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
     let file = path.display().to_string();
     let text = std::fs::read_to_string(path).map_err(|error| {
-        vec![Finding::new(
-            &file,
-            format!("cannot read the scenario: {error}"),
-        )]
+        let finding = Finding::new(&file, format!("cannot read the scenario: {error}"));
+        vec![
+            finding.hint(if error.kind() == std::io::ErrorKind::InvalidData {
+                "save the file as UTF-8 text"
+            } else {
+                "scenarios are TOML files, such as scenarios/table3.toml"
+            }),
+        ]
     })?;
     resolve_scenario(
         &file,
@@ -144,13 +148,12 @@ pub fn resolve_scenario(
         world_from_base_link,
     )
     .map_err(|finding| {
-        one(with_model_names(
-            &toml,
-            finding,
-            &robot_location,
-            "robot.urdf",
-            "ur3",
-        ))
+        // The command line's robot is not the one that the scenario names.
+        one(if overrides.robot_urdf.is_some() {
+            finding
+        } else {
+            with_model_names(&toml, finding, &robot_location, "robot.urdf", "ur3")
+        })
     })?;
     notes.extend(robot.notes.iter().cloned());
 
@@ -163,25 +166,29 @@ pub fn resolve_scenario(
         &mut notes,
     )
     .map_err(|finding| {
-        one(with_model_names(
-            &toml,
-            finding,
-            &tool_location,
-            "tool.urdf",
-            "needle_guide",
-        ))
+        // A bore or a gauge of the scenario may not fit the tool's other half.
+        let given = ["tool.bore_mm", "tool.needle_gauge"]
+            .into_iter()
+            .find(|key| toml.span_of(key).is_some());
+        one(match given {
+            Some(key) if finding.key.as_deref() == Some("bore_mm") => Finding {
+                hint: finding.hint,
+                ..toml.finding(key, finding.message)
+            },
+            _ => with_model_names(&toml, finding, &tool_location, "tool.urdf", "needle_guide"),
+        })
     })?;
 
     let table = scenario.table.as_ref().map(fixtures::table).transpose();
-    let table = table.map_err(|e| one(toml.finding("table", e.to_string())))?;
+    let table = table.map_err(|error| one(fixture_finding(&toml, "table", &error)))?;
     let gantry = scenario.gantry.as_ref().map(fixtures::gantry).transpose();
-    let gantry = gantry.map_err(|e| one(toml.finding("gantry", e.to_string())))?;
+    let gantry = gantry.map_err(|error| one(fixture_finding(&toml, "gantry", &error)))?;
     let mount = scenario
         .mount
         .as_ref()
         .map(|mount| fixtures::mount(mount, &world_from_base_link))
         .transpose()
-        .map_err(|e| one(toml.finding("mount", e.to_string())))?;
+        .map_err(|error| one(fixture_finding(&toml, "mount", &error)))?;
     let (phantom, phantom_source) = match &scenario.phantom {
         None => (None, None),
         Some(section) => {
@@ -328,6 +335,21 @@ fn with_model_names(
     finding
 }
 
+/// What is wrong with a fixture, at the key of its section.
+fn fixture_finding(toml: &TomlText<'_>, section: &str, error: &FixtureError) -> Finding {
+    let Some(name) = error.key() else {
+        return toml
+            .finding(section, error.to_string())
+            .hint("see `base_position_mm` and `base_rpy_deg` under [robot]");
+    };
+    toml.finding(&format!("{section}.{name}"), error.to_string())
+        .hint(if name.ends_with("_mm") {
+            "lengths are in millimetres"
+        } else {
+            "angles are in degrees"
+        })
+}
+
 fn tool_overrides(toml: &TomlText<'_>, scenario: &Scenario) -> Result<ToolOverrides, Finding> {
     let tool = &scenario.tool;
     let needle_outer_diameter_m = match tool.needle_gauge {
@@ -392,7 +414,12 @@ fn place_phantom(
     }
     let phantom = Phantom::build(&parameters).map_err(|error| {
         if resized {
-            toml.finding("phantom", error.to_string())
+            let key = match &error {
+                PhantomError::OutOfRange { key, .. } => format!("phantom.{key}"),
+                _ => "phantom".to_owned(),
+            };
+            toml.finding(&key, error.to_string())
+                .hint("lengths are in millimetres; leave a size out to take the model's own")
         } else {
             Finding::new(&file, error.to_string())
         }
@@ -472,13 +499,19 @@ fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut range = |key: &str, value: f64, least: f64, most: f64, unit: &str| {
         if !(least..=most).contains(&value) {
-            findings.push(
+            findings.push(if unit.is_empty() {
+                toml.finding(
+                    key,
+                    format!("`{key}` is {value}, outside {least} to {most}"),
+                )
+                .hint("it is a plain number, without a unit")
+            } else {
                 toml.finding(
                     key,
                     format!("`{key}` is {value} {unit}, outside {least} to {most}"),
                 )
-                .hint(format!("the value is in {unit}")),
-            );
+                .hint(format!("the value is in {unit}"))
+            });
         }
     };
     for (i, value) in scenario.robot.base_position_mm.iter().enumerate() {
@@ -727,10 +760,13 @@ fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
             .iter()
             .any(|earlier| earlier.name == goal.name)
         {
-            findings.push(toml.finding(
-                &format!("goals[{i}].name"),
-                format!("two goals are named `{}`", goal.name),
-            ));
+            findings.push(
+                toml.finding(
+                    &format!("goals[{i}].name"),
+                    format!("two goals are named `{}`", goal.name),
+                )
+                .hint("give each its own name: results go to a folder of that name"),
+            );
         }
     }
     if scenario.goals.is_empty() {

@@ -10,6 +10,7 @@ use needlebench_kinematics::{
 
 use crate::files::{Location, source_of};
 use crate::mesh::{convex_hull, read_stl};
+use crate::nominal::{body_in_frame_of, nominal_ur3, notes_on_limits};
 use crate::shape::{Shape, Solid, TriangleMesh, Visual};
 use crate::urdf::{Element, Geometry, JointKind, Urdf, UrdfJoint, UrdfLink};
 use crate::{Finding, Link, PackagePaths, Robot, nearest_name};
@@ -83,10 +84,21 @@ pub(crate) fn read_robot(
         joints: chain_joints.try_into().expect("six joints"),
         wrist_3_from_flange: fixed_pose(&urdf, parent, &tip),
     };
-    UrGeometry::of_chain(&chain).map_err(|error| {
+    let geometry = UrGeometry::of_chain(&chain).map_err(|error| {
         Finding::new(&urdf.file, error.to_string())
             .hint("needlebench works with six-joint UR arms and their factory calibrations")
     })?;
+
+    let limits = JointLimits(limits.try_into().expect("six limits"));
+    // The shipped UR3 is its own yardstick.
+    let nominal = match location {
+        Location::Builtin(_) => None,
+        Location::Disk(_) => nominal_ur3(&geometry),
+    };
+    if let Some(nominal) = &nominal {
+        notes.extend(notes_on_limits(&limits, nominal));
+    }
+    notes.extend(note_on_place(&urdf));
 
     // Every URDF link belongs to the nearest moving link above it.
     let mut owned: Vec<Vec<(&UrdfLink, Pose)>> = vec![Vec::new(); JOINT_COUNT + 1];
@@ -101,17 +113,23 @@ pub(crate) fn read_robot(
         links.push(read_link(
             &urdf, location, packages, label, members, &mut notes,
         )?);
-        if index > 0 {
-            let body = body_of(
-                &urdf,
-                members,
-                label,
-                joints[index - 1],
-                missing_inertia,
-                &mut notes,
-            )?;
-            bodies.push(body);
-        }
+        let Some(joint) = index.checked_sub(1) else {
+            continue;
+        };
+        bodies.push(match body_of(members) {
+            Ok(body) => body,
+            Err(what) => {
+                let link = &joints[joint].child;
+                let stand_in = nominal
+                    .as_ref()
+                    .filter(|_| missing_inertia == MissingInertia::NominalUr3)
+                    .ok_or_else(|| no_inertia(&urdf, link, what, missing_inertia))?;
+                notes.push(format!(
+                    "link '{link}' has {what}: the shipped UR3's {label} is used"
+                ));
+                body_in_frame_of(&chain, stand_in, joint)
+            }
+        });
     }
     let base = links.remove(0);
     Ok(Robot {
@@ -121,7 +139,7 @@ pub(crate) fn read_robot(
         base,
         links: links.try_into().expect("six links"),
         bodies: bodies.try_into().expect("six bodies"),
-        limits: JointLimits(limits.try_into().expect("six limits")),
+        limits,
         source: source_of(location.display(), urdf.text.as_bytes()),
         notes,
     })
@@ -130,9 +148,10 @@ pub(crate) fn read_robot(
 /// Reads and parses a URDF; says which shipped ones there are if it does not exist.
 pub(crate) fn read_urdf(location: &Location) -> Result<Urdf, Finding> {
     let file = location.display();
-    let bytes = location
-        .read()
-        .map_err(|error| Finding::new(&file, format!("cannot read the URDF: {error}")))?;
+    let bytes = location.read().map_err(|error| {
+        Finding::new(&file, format!("cannot read the URDF: {error}"))
+            .hint("the path is relative to the working directory")
+    })?;
     Urdf::parse(&file, &bytes)
 }
 
@@ -148,7 +167,9 @@ fn arm_joints(urdf: &Urdf) -> Result<(Vec<&UrdfJoint>, String), Finding> {
         let Some(joint) = urdf.joints.iter().find(|joint| joint.name == expected) else {
             let finding = Finding::new(&urdf.file, format!("it has no joint '{expected}'"))
                 .key(format!("joint '{expected}'"));
-            return Err(match nearest_name(expected, names.iter().copied()) {
+            let prefixed = names.iter().copied().find(|name| name.ends_with(expected));
+            let near = prefixed.or_else(|| nearest_name(expected, names.iter().copied()));
+            return Err(match near {
                 Some(near) => finding.hint(format!(
                     "joints need ROS's UR names; did you mean to rename '{near}'?"
                 )),
@@ -156,7 +177,10 @@ fn arm_joints(urdf: &Urdf) -> Result<(Vec<&UrdfJoint>, String), Finding> {
             });
         };
         if !matches!(joint.kind, JointKind::Revolute | JointKind::Continuous) {
-            return Err(urdf.finding(&joint.span, format!("joint '{expected}' is not revolute")));
+            return Err(urdf
+                .finding(&joint.span, format!("joint '{expected}' is not revolute"))
+                .key(format!("joint '{expected}'"))
+                .hint("all six joints of a UR arm turn: type=\"revolute\""));
         }
         joints.push(joint);
     }
@@ -284,65 +308,52 @@ fn joint_limit(urdf: &Urdf, joint: &UrdfJoint) -> Result<JointLimit, Finding> {
     })
 }
 
-fn body_of(
-    urdf: &Urdf,
-    members: &[(&UrdfLink, Pose)],
-    label: &str,
-    joint: &UrdfJoint,
-    missing_inertia: MissingInertia,
-    notes: &mut Vec<String>,
-) -> Result<Body, Finding> {
+/// Mass properties of a moving link and all that is fixed to it; says what it lacks.
+fn body_of(members: &[(&UrdfLink, Pose)]) -> Result<Body, &'static str> {
     let body = members
         .iter()
         .fold(Body::massless(), |sum, (link, owner_from_link)| {
-            sum.combined_with(
-                &link
-                    .inertial
-                    .unwrap_or(Body::massless())
-                    .transformed(owner_from_link),
-            )
+            let body = link.inertial.unwrap_or(Body::massless());
+            sum.combined_with(&body.transformed(owner_from_link))
         });
-    if body.mass_kg > 0.0 && body.inertia_kgm2.symmetric_eigenvalues().min() > 0.0 {
-        return Ok(body);
-    }
-    let what = if body.mass_kg > 0.0 {
-        "no moment of inertia"
+    if body.mass_kg <= 0.0 {
+        Err("no mass")
+    } else if body.inertia_kgm2.symmetric_eigenvalues().min() <= 0.0 {
+        Err("no moment of inertia")
     } else {
-        "no mass"
-    };
-    if missing_inertia == MissingInertia::Error {
-        let span = urdf
-            .link(&joint.child)
-            .map_or(joint.span.clone(), |link| link.span.clone());
-        return Err(urdf
-            .finding(&span, format!("link '{}' has {what}", joint.child))
-            .key(format!("link '{}'", joint.child))
-            .hint(
-                "give it an <inertial>, or set `missing_inertia = \"nominal-ur3\"` under [robot] \
-                 (`--missing-inertia nominal-ur3`) to take the shipped UR3's",
-            ));
+        Ok(body)
     }
-    notes.push(format!(
-        "link '{}' has {what}: the shipped UR3's {label} is used",
-        joint.child
-    ));
-    nominal_body(label, missing_inertia)
 }
 
-/// Mass properties of a link of the shipped UR3.
-fn nominal_body(label: &str, _missing: MissingInertia) -> Result<Body, Finding> {
-    let location = Location::of_model("ur3", "ur3", "urdf", std::path::Path::new(""));
-    let nominal = read_robot(
-        &location,
-        &PackagePaths::default(),
-        MissingInertia::Error,
-        Pose::identity(),
-    )?;
-    let index = LINK_LABELS
+fn no_inertia(urdf: &Urdf, link: &str, what: &str, policy: MissingInertia) -> Finding {
+    let message = format!("link '{link}' has {what}");
+    let finding = match urdf.link(link) {
+        Some(link) => urdf.finding(&link.span, message),
+        None => Finding::new(&urdf.file, message),
+    };
+    finding
+        .key(format!("link '{link}'"))
+        .hint(if policy == MissingInertia::NominalUr3 {
+            "give it an <inertial>: the arm's lengths are not a UR3's, whose masses would be wrong"
+        } else {
+            "give it an <inertial>, or set `missing_inertia = \"nominal-ur3\"` under [robot] \
+             (`--missing-inertia nominal-ur3`) to take the shipped UR3's"
+        })
+}
+
+/// Says that what stands above `base_link` in the file does not place the robot.
+fn note_on_place(urdf: &Urdf) -> Option<String> {
+    let root = urdf
+        .links
         .iter()
-        .position(|each| *each == label)
-        .unwrap_or(1);
-    Ok(nominal.bodies[index - 1])
+        .find(|link| urdf.joint_above(&link.name).is_none())?;
+    let root_from_base_link = fixed_pose(urdf, &root.name, "base_link");
+    (root_from_base_link != Pose::identity()).then(|| {
+        format!(
+            "the scenario places base_link; where '{}' has it in the URDF does not count",
+            root.name
+        )
+    })
 }
 
 fn read_link(
@@ -374,6 +385,11 @@ fn read_link(
         ));
     }
     rename_unique(&mut solids, label);
+    if solids.is_empty() {
+        notes.push(format!(
+            "{label} has no collision geometry: it is never seen to touch anything"
+        ));
+    }
     if visuals.is_empty() {
         visuals = solids
             .iter()
@@ -425,7 +441,8 @@ pub(crate) fn read_solids(
     Ok(solids)
 }
 
-/// Surfaces of one URDF link, in the frame of its owner. What cannot be read is left out and noted.
+/// Surfaces of one URDF link, in the frame of its owner. What cannot be read is left out and noted;
+/// a link of which nothing can be read is drawn as the collision geometry that it has.
 pub(crate) fn read_visuals(
     urdf: &Urdf,
     location: &Location,
@@ -434,27 +451,36 @@ pub(crate) fn read_visuals(
     owner_from_link: &Pose,
     notes: &mut Vec<String>,
 ) -> Vec<Visual> {
-    let mut visuals = Vec::new();
-    for element in &link.visuals {
+    let visual = |element: &Element| -> Result<Visual, Finding> {
         let mesh = match shape_of(&element.geometry) {
             Some(shape) => shape.surface(PICTURE_CHORD_ERROR_M),
-            None => match read_mesh(urdf, location, packages, element) {
-                Ok(mesh) => mesh,
-                Err(finding) => {
-                    notes.push(format!(
-                        "the visual mesh of '{}' is left out of pictures: {}",
-                        link.name, finding.message
-                    ));
-                    continue;
-                }
-            },
+            None => read_mesh(urdf, location, packages, element)?,
         };
-        visuals.push(Visual {
+        Ok(Visual {
             mesh: Arc::new(mesh),
             parent_from_visual: owner_from_link * element.link_from_geometry,
             color_rgba: element.color_rgba.unwrap_or(DEFAULT_COLOR),
-        });
+        })
+    };
+    let (mut visuals, mut unread) = (Vec::new(), Vec::new());
+    for element in &link.visuals {
+        match visual(element) {
+            Ok(visual) => visuals.push(visual),
+            Err(finding) => unread.push(finding.message),
+        }
     }
+    let instead = if visuals.is_empty() && !unread.is_empty() {
+        visuals.extend(link.collisions.iter().flat_map(visual));
+        ", which show its collision geometry"
+    } else {
+        ""
+    };
+    notes.extend(unread.into_iter().map(|why| {
+        format!(
+            "the visual mesh of '{}' is left out of pictures{instead}: {why}",
+            link.name
+        )
+    }));
     visuals
 }
 
@@ -518,6 +544,7 @@ fn read_mesh(
     let bytes = mesh_location.read().map_err(|error| {
         urdf.finding(span, format!("mesh `{}`: {error}", mesh_location.display()))
             .key("filename")
+            .hint("mesh files are looked for beside the URDF; package:// needs --package-path")
     })?;
     read_stl(&bytes, *scale).map_err(|why| {
         urdf.finding(span, format!("mesh `{}`: {why}", mesh_location.display()))

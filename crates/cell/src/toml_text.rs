@@ -19,11 +19,16 @@ pub(crate) struct TomlText<'a> {
 impl<'a> TomlText<'a> {
     pub(crate) fn parse(file: &'a str, text: &'a str) -> Result<Self, Finding> {
         let table = DeTable::parse(text).map_err(|error| {
-            let finding = Finding::new(file, error.message().to_owned());
-            match error.span() {
-                Some(span) => finding.at(text, span),
-                None => finding,
+            let mut message = error.message().to_owned();
+            let Some(span) = error.span() else {
+                return Finding::new(file, message);
+            };
+            if message == "duplicate key"
+                && let Some(key) = text.get(span.clone())
+            {
+                message = format!("duplicate key `{key}`");
             }
+            Finding::new(file, message).at(text, span)
         })?;
         let parsed = Self { file, text, table };
         parsed.refuse_non_finite()?;
@@ -64,10 +69,24 @@ impl<'a> TomlText<'a> {
                     Some(near) => format!("did you mean `{near}`?"),
                     None => format!("one of {}", known.join(", ")),
                 });
+            } else if message.starts_with("missing field")
+                && let [missing] = quoted.as_slice()
+            {
+                // The path ends at the table that lacks the key; `.` is the file itself.
+                key = if key == "." {
+                    (*missing).to_owned()
+                } else {
+                    format!("{key}.{missing}")
+                };
+                finding.message = format!("the key `{missing}` is missing");
             } else {
+                finding.message = in_words(&message);
                 let value = finding.span.clone().and_then(|span| self.text.get(span));
-                if let Some(value) = value.filter(|value| !value.contains('\n')) {
-                    finding.message = format!("{message}, got `{value}`");
+                let short = |value: &&str| !value.is_empty() && !value.contains('\n');
+                if let Some(value) = value.filter(short)
+                    && !message.contains(value)
+                {
+                    finding.message = format!("{}, got `{value}`", finding.message);
                 }
                 finding.hint = unit_hint(&key, &message);
             }
@@ -148,6 +167,7 @@ impl<'a> TomlText<'a> {
                 format!("`{key}` is {text}, which is not a finite number"),
             )
             .key(key)
+            .hint("give a finite number")
             .at(self.text, span)),
         }
     }
@@ -175,11 +195,26 @@ fn unknown_key_hint(unknown: &str, known: &[&str]) -> String {
     }
 }
 
+/// A message of the deserializer without the names of Rust's types.
+fn in_words(message: &str) -> String {
+    [
+        ("expected f64", "expected a number"),
+        ("expected u64", "expected a whole number, not negative"),
+        ("expected u32", "expected a whole number, not negative"),
+    ]
+    .iter()
+    .fold(message.to_owned(), |text, (from, to)| {
+        text.replace(from, to)
+    })
+}
+
 fn unit_hint(key: &str, message: &str) -> Option<String> {
     let wants_number = message.contains("expected f64") || message.contains("expected a float");
     if !wants_number {
         return None;
     }
+    // `goals[0].entry_mm[2]`: the unit is at the end of the last name.
+    let key = key.rsplit('.').next().unwrap_or(key);
     let key = key.split('[').next().unwrap_or(key);
     let unit = match key.rsplit('_').next()? {
         "mm" => "millimetres",

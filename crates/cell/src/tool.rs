@@ -148,7 +148,8 @@ pub(crate) fn read_tool(
                 bore_m * 1e3
             ),
         )
-        .key("bore_mm"));
+        .key("bore_mm")
+        .hint("a wider bore or a thinner needle (a larger gauge)"));
     }
     Ok(Tool {
         name: urdf

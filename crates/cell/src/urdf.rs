@@ -96,7 +96,7 @@ impl Urdf {
             let line = error.pos().row as usize;
             let mut finding = Finding::new(file, format!("not well-formed XML: {error}"));
             finding.line = Some(line);
-            finding
+            finding.hint("a URDF is an XML file whose root element is <robot>")
         })?;
         let reader = Reader { file, text };
         let root = document.root_element();
@@ -108,8 +108,9 @@ impl Urdf {
                 )
                 .hint("a URDF's root element is <robot>"));
         }
-        if text.contains("http://www.ros.org/wiki/xacro") || text.contains("${") {
-            return Err(Finding::new(file, "this is a xacro file, not a URDF")
+        if let Some(node) = root.descendants().find(is_xacro) {
+            return Err(reader
+                .finding(node, "this is a xacro file, not a URDF")
                 .hint("expand it first: xacro file.urdf.xacro > file.urdf"));
         }
         let materials = root
@@ -180,7 +181,14 @@ impl Urdf {
             }
         }
         let mut parents: BTreeMap<&str, &str> = BTreeMap::new();
+        let mut joint_names = BTreeSet::new();
         for joint in &self.joints {
+            if !joint_names.insert(joint.name.as_str()) {
+                let message = format!("joint '{}' is there twice", joint.name);
+                return Err(self
+                    .finding(&joint.span, message)
+                    .hint("every joint needs a name of its own"));
+            }
             for (role, name) in [("parent", &joint.parent), ("child", &joint.child)] {
                 if !seen.contains(name.as_str()) {
                     let message = format!(
@@ -214,10 +222,13 @@ impl Urdf {
                 }
             }
             if self.joint_above(at).is_some() {
-                return Err(self.finding(
-                    &link.span,
-                    format!("the links form a cycle through '{}'", link.name),
-                ));
+                return Err(self
+                    .finding(
+                        &link.span,
+                        format!("the links form a cycle through link '{}'", link.name),
+                    )
+                    .key(format!("link '{}'", link.name))
+                    .hint("a URDF is a tree: one of the joints has the wrong <parent>"));
             }
         }
         let roots: Vec<&str> = self
@@ -516,6 +527,16 @@ impl Reader<'_> {
             needle_length_mm: self.positive(node, "needle_length_mm")?,
         })
     }
+}
+
+/// An element of xacro's namespace, or one with an unexpanded attribute. A file that xacro wrote
+/// declares the namespace too, and comments may hold anything.
+fn is_xacro(node: &Node<'_, '_>) -> bool {
+    let namespace = node.tag_name().namespace().unwrap_or_default();
+    namespace.ends_with("xacro")
+        || node
+            .attributes()
+            .any(|attribute| attribute.value().contains("${"))
 }
 
 fn child<'a, 'd>(node: Node<'a, 'd>, tag: &str) -> Option<Node<'a, 'd>> {

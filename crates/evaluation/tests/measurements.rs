@@ -122,7 +122,7 @@ fn recording(
     error_rad: impl Fn(f64) -> f64,
     force_n: impl Fn(f64) -> f64,
 ) -> Recording {
-    let steps = 2000;
+    let steps = 2000_u32;
     let timestep_s = trajectory.duration_s() / f64::from(steps);
     let mut made = Recording {
         engine: EngineIdentity {
@@ -134,7 +134,7 @@ fn recording(
         time_s: Vec::new(),
         state: Vec::new(),
         reference: Vec::new(),
-        torque_nm: vec![Joints::repeat(6.0); steps as usize],
+        torque_nm: (0..steps).map(|_| Joints::repeat(6.0)).collect(),
         saturated_steps: 3,
         cost: Cost::default(),
     };

@@ -188,9 +188,15 @@ pub(crate) fn run(
         .filter_map(|outcome| outcome.identity.take())
         .collect();
     let interrupted = cancel.load(Ordering::Relaxed);
-    let report = assemble(
+    let mut report = assemble(
         resolved, &planner, &plans, &runs, &engines, failures, identities, timings,
     );
+    if interrupted {
+        report.notes.push(
+            "the run was interrupted: motions that had not been simulated by then are missing"
+                .to_owned(),
+        );
+    }
     Ok(ScenarioRun {
         report,
         plans,

@@ -6,7 +6,7 @@ use nalgebra::UnitVector3;
 use needlebench_cell::{ClearanceClass, Goal, ResolvedScenario, Roll};
 use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, wrap_angle};
-use needlebench_kinematics::trajectory::{JointTrajectory, LinePath, Phase};
+use needlebench_kinematics::trajectory::{JointTrajectory, LineError, LinePath, Phase};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
 use crate::motion::MotionChecker;
@@ -77,7 +77,7 @@ pub struct Planner<'a> {
 }
 
 /// Postures of one configuration for which a motion is tried, best first.
-const MOTION_TRIES: usize = 6;
+const MOTION_TRIES: usize = 12;
 /// Combinations of whole turns that are tried for the transfer, shortest first.
 const WRAP_TRIES: usize = 8;
 
@@ -359,14 +359,7 @@ impl<'a> Planner<'a> {
         let line = match line {
             Ok(line) => line,
             Err(error) => {
-                rejections.push(Rejection {
-                    rule: Rule::Approach,
-                    value: candidate.margins.manipulability,
-                    limit: 0.0,
-                    unit: "1",
-                    detail: error.to_string(),
-                    class: None,
-                });
+                rejections.push(blocked_approach(&error, goal.approach_m));
                 return ConfigurationPlan {
                     configuration,
                     candidate: Some(candidate),
@@ -517,6 +510,22 @@ fn working_clearance_m(minima: &ClassMinima) -> f64 {
         .filter(|pair| pair.class != ClearanceClass::GuideStandoff)
         .map(|pair| pair.separation.distance_m)
         .fold(f64::INFINITY, f64::min)
+}
+
+fn blocked_approach(error: &LineError, approach_m: f64) -> Rejection {
+    let free_m = match error {
+        LineError::Singular { travelled_m, .. } | LineError::OutOfReach { travelled_m } => {
+            *travelled_m
+        }
+    };
+    Rejection {
+        rule: Rule::Approach,
+        value: free_m,
+        limit: approach_m,
+        unit: "m",
+        detail: error.to_string(),
+        class: None,
+    }
 }
 
 fn unreachable_detail(reason: needlebench_kinematics::ik::Unreachable) -> String {

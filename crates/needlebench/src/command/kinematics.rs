@@ -91,7 +91,8 @@ pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus> {
     if let Some(Six([x, y, z, ..])) = arguments.pose
         && [x, y, z].iter().any(|value| value.abs() > FARTHEST_M)
     {
-        let message = format!("the position is {x}, {y}, {z} m, but no arm reaches {FARTHEST_M} m");
+        let message =
+            format!("the position is {x:?}, {y:?}, {z:?} m, but no arm reaches {FARTHEST_M} m");
         print_findings(&[Finding::new("--pose", message).hint("x, y and z are in metres")]);
         return Ok(ExitStatus::BadInput);
     }

@@ -9,7 +9,7 @@ mod run;
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use needlebench_cell::{
     Finding, MissingInertia, Overrides, PackagePaths, ResolvedScenario, load_scenario,
 };
@@ -48,11 +48,17 @@ fn overrides(arguments: &RobotArguments) -> Result<Overrides, Finding> {
 }
 
 /// Prints one JSON document to standard output.
+///
+/// A reader that stops reading is no error: what the command found decides its exit status.
 fn print_json(value: &impl Serialize) -> Result<()> {
     let mut out = anstream::stdout().lock();
-    serde_json::to_writer_pretty(&mut out, value).map_err(std::io::Error::from)?;
-    writeln!(out)?;
-    Ok(())
+    let written = serde_json::to_writer_pretty(&mut out, value)
+        .map_err(std::io::Error::from)
+        .and_then(|()| writeln!(out));
+    match written {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("cannot write to standard output"),
+    }
 }
 
 /// Prints the schema of a file format.

@@ -59,6 +59,12 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
             return Ok(ExitStatus::BadInput);
         }
     };
+    if let Some(path) = &arguments.junit
+        && let Err(finding) = probe_junit(path)
+    {
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
     let cancel = Arc::new(AtomicBool::new(false));
     let requested = Arc::clone(&cancel);
     ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
@@ -160,10 +166,8 @@ fn prepare_folders(
     let mut folders = Vec::new();
     for resolved in scenarios {
         let folder = arguments.out.join(&resolved.scenario.name);
-        let probe = folder.join(format!(".probe-{}", std::process::id()));
         std::fs::create_dir_all(&folder)
-            .and_then(|()| std::fs::write(&probe, []))
-            .and_then(|()| std::fs::remove_file(&probe))
+            .and_then(|()| probe_folder(&folder))
             .map_err(|error| {
                 Finding::new(
                     folder.display().to_string(),
@@ -175,6 +179,33 @@ fn prepare_folders(
         folders.push(folder);
     }
     Ok(folders)
+}
+
+/// Proves that the JUnit file can be written, before a long run.
+fn probe_junit(path: &Path) -> Result<(), Finding> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let writable = if path.is_dir() {
+        Err(std::io::ErrorKind::IsADirectory.into())
+    } else {
+        probe_folder(folder)
+    };
+    writable.map_err(|error| {
+        Finding::new(
+            path.display().to_string(),
+            format!("the JUnit file cannot be written: {error}"),
+        )
+        .key("--junit")
+        .hint("choose a file in a folder that exists and can be written")
+    })
+}
+
+fn probe_folder(folder: &Path) -> std::io::Result<()> {
+    let probe = folder.join(format!(".probe-{}", std::process::id()));
+    std::fs::write(&probe, [])?;
+    std::fs::remove_file(&probe)
 }
 
 fn write_results(

@@ -31,6 +31,9 @@ pub(crate) fn print_report(report: &Report) {
             failure.message
         );
     }
+    for note in &report.notes {
+        anstream::println!("note: {note}");
+    }
     let failed = report.criteria.iter().filter(|result| !result.pass).count();
     let verdict = match report.verdict {
         Verdict::Pass => "PASS",

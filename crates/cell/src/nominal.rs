@@ -1,0 +1,73 @@
+//! The shipped UR3 as a stand-in for what another URDF lacks, and as a yardstick for its limits.
+
+use std::path::Path;
+
+use needlebench_kinematics::{
+    Body, Chain, JOINT_COUNT, JointLimit, JointLimits, Joints, Pose, UrGeometry,
+};
+
+use crate::files::Location;
+use crate::robot::{MissingInertia, read_robot};
+use crate::{PackagePaths, Robot};
+
+/// An arm whose lengths are within this of a UR3's is one: factory calibrations move them by up to
+/// 3 mm, while the next relative, the UR3e, has a wrist that is 19 mm longer.
+const SAME_ARM_M: f64 = 5e-3;
+
+/// The shipped UR3, if `geometry` is that of a UR3.
+pub(crate) fn nominal_ur3(geometry: &UrGeometry) -> Option<Robot> {
+    let lengths = |g: &UrGeometry| Joints::new(g.d1, g.a2, g.a3, g.d4, g.d5, g.d6);
+    if (lengths(geometry) - lengths(&UrGeometry::UR3)).amax() > SAME_ARM_M {
+        return None;
+    }
+    let shipped = Location::of_model("ur3", "ur3", "urdf", Path::new(""));
+    let packages = PackagePaths::default();
+    let robot = read_robot(&shipped, &packages, MissingInertia::Error, Pose::identity());
+    Some(robot.expect("the shipped UR3 is sound"))
+}
+
+/// Mass properties of moving link `index` of `nominal`, in the frame of the same link of `chain`.
+///
+/// Two descriptions of one arm may place and turn their link frames differently. At zero angles
+/// the links are in the same place, whatever their frames.
+pub(crate) fn body_in_frame_of(chain: &Chain, nominal: &Robot, index: usize) -> Body {
+    let zero = Joints::zeros();
+    let base_from_link = chain.link_poses(&zero)[index];
+    let base_from_nominal_link = nominal.chain.link_poses(&zero)[index];
+    nominal.bodies[index].transformed(&(base_from_link.inverse() * base_from_nominal_link))
+}
+
+/// One kind of limit.
+type Limit = fn(&JointLimit) -> f64;
+
+/// Says which limits of a UR3's URDF are not the maker's: margins and criteria are measured by them.
+pub(crate) fn notes_on_limits(limits: &JointLimits, nominal: &Robot) -> Vec<String> {
+    let list = |values: [f64; JOINT_COUNT]| values.map(|value| format!("{value}")).join(", ");
+    let kinds: [(&str, &str, Limit); 2] = [
+        ("effort", "N m", |limit| limit.effort_nm),
+        ("velocity", "rad/s", |limit| limit.velocity_rad_s),
+    ];
+    kinds
+        .into_iter()
+        .filter_map(|(name, unit, limit)| {
+            let [stated, usual] =
+                [limits, &nominal.limits].map(|each| each.0.each_ref().map(limit));
+            let differ = stated
+                .iter()
+                .zip(&usual)
+                .any(|(stated, usual)| (stated - usual).abs() > 0.01 * usual);
+            differ.then(|| {
+                format!(
+                    "the URDF's {name} limits are used: {} {unit}; the shipped UR3's are {}",
+                    list(stated),
+                    list(usual.map(rounded))
+                )
+            })
+        })
+        .collect()
+}
+
+/// To four decimals, for messages.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() * 1e-4
+}

@@ -1,0 +1,49 @@
+//! The same input gives the same bytes, however many threads work.
+
+use serde_json::Value;
+
+use crate::support::{Bench, SMALL, mujoco_is_ready, with_edit};
+
+/// The text of a report without its only part that may differ.
+fn without_timings(bench: &Bench, folder: &str) -> String {
+    let text = String::from_utf8(bench.read(&format!("{folder}/small/report.json"))).unwrap();
+    let timings = text.find("  \"timings\": {").unwrap();
+    let end = timings + text[timings..].find('}').unwrap() + 1;
+    format!("{}{}", &text[..timings], &text[end..])
+}
+
+#[test]
+fn repeated_runs_write_identical_files_apart_from_the_timings() {
+    mujoco_is_ready();
+    let text = with_edit(SMALL, "pictures = false", "pictures = true");
+    let bench = Bench::with_scenario(&text);
+    for (folder, jobs) in [("a", "1"), ("b", "2"), ("c", "2")] {
+        let answer = bench.run(&["run", "s.toml", "--out", folder, "--jobs", jobs]);
+        answer.exits_with(0);
+    }
+    let files = bench.tree("a");
+    for extension in ["json", "csv", "png", "xml", "md"] {
+        let has = |file: &&std::path::PathBuf| file.extension().is_some_and(|e| e == extension);
+        assert!(files.iter().any(|file| has(&file)), "no .{extension} file");
+    }
+    for other in ["b", "c"] {
+        assert_eq!(files, bench.tree(other));
+        assert_eq!(without_timings(&bench, "a"), without_timings(&bench, other));
+        for file in &files {
+            if file.ends_with("report.json") {
+                continue;
+            }
+            let file = file.display();
+            let same = bench.read(&format!("a/{file}")) == bench.read(&format!("{other}/{file}"));
+            assert!(same, "{file} differs between a and {other}");
+        }
+    }
+}
+
+#[test]
+fn printed_report_is_the_written_one() {
+    let bench = Bench::with_scenario(SMALL);
+    let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
+    let printed: Value = answer.exits_with(0).json();
+    assert_eq!(printed, bench.read_json("out/small/report.json"));
+}

@@ -1,0 +1,165 @@
+//! A MuJoCo that cannot be had, or fails: rapier's results are kept and the exit status is 3.
+
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::process::{LongRun, is_alive, signal};
+use crate::support::{Answer, Bench, SMALL, with_edit};
+
+/// The report has rapier's results, none of MuJoCo, and says why; gives MuJoCo's failure.
+#[track_caller]
+fn rapier_is_kept(report: &Value) -> Value {
+    let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+    let measured = configurations
+        .iter()
+        .filter(|each| {
+            assert_eq!(each["engine_difference"], Value::Null);
+            assert_eq!(each["engines"]["mujoco"], Value::Null);
+            each["engines"]["rapier"]["tip_position_error_m"].is_number()
+        })
+        .count();
+    assert_eq!(measured, 6);
+    let failures = report["engine_failures"].as_array().unwrap();
+    assert_eq!(failures.len(), 1, "{failures:#?}");
+    assert_eq!(failures[0]["engine"], "mujoco");
+    failures[0].clone()
+}
+
+#[track_caller]
+fn failure_says<const N: usize>(failure: &Value, parts: [&str; N]) {
+    let message = failure["message"].as_str().unwrap();
+    for part in parts {
+        assert!(message.contains(part), "no `{part}` in\n{message}");
+    }
+}
+
+/// Runs both engines with other environment variables; gives MuJoCo's failure and the output.
+#[track_caller]
+fn failing_run(text: &str, variables: &[(&str, Option<&str>)]) -> (Value, Answer) {
+    let bench = Bench::with_scenario(text);
+    let answer = bench.run_with(variables, &["run", "s.toml", "--engine", "both"]);
+    let answer = answer.exits_with(3);
+    let report = bench.read_json("out/small/report.json");
+    (rapier_is_kept(&report), answer)
+}
+
+/// Another program in place of the harness.
+#[track_caller]
+fn stand_in(command: &str) -> Value {
+    let variables = [("NEEDLEBENCH_HARNESS_COMMAND", Some(command))];
+    failing_run(SMALL, &variables).0
+}
+
+#[test]
+fn without_python_the_run_says_what_is_missing_and_how_to_mend_it() {
+    let cache = Bench::new();
+    let folder = cache.path("cache").display().to_string();
+    let variables = [
+        ("PATH", Some("")),
+        ("NEEDLEBENCH_CACHE_DIR", Some(folder.as_str())),
+        ("NEEDLEBENCH_PYTHON", None),
+    ];
+    let (failure, answer) = failing_run(SMALL, &variables);
+    let parts = ["Python 3.11 or newer", "hint: ", "NEEDLEBENCH_PYTHON"];
+    failure_says(&failure, parts);
+    // People see it in the table's company, not only in the file.
+    for part in parts {
+        assert!(answer.stdout.contains(part), "{answer:#?}");
+    }
+}
+
+#[test]
+fn python_that_does_not_exist_is_named() {
+    let variables = [("NEEDLEBENCH_PYTHON", Some("/nonexistent/python"))];
+    let (failure, _) = failing_run(SMALL, &variables);
+    failure_says(
+        &failure,
+        ["NEEDLEBENCH_PYTHON is /nonexistent/python", "hint: "],
+    );
+}
+
+#[test]
+fn cache_folder_that_cannot_be_written_is_named() {
+    // Below a file no folder can be made, not even by the superuser.
+    let bench = Bench::with_scenario(SMALL);
+    let folder = bench.path("s.toml/cache").display().to_string();
+    let variables = [("NEEDLEBENCH_CACHE_DIR", Some(folder.as_str()))];
+    let (failure, _) = failing_run(SMALL, &variables);
+    failure_says(
+        &failure,
+        [&folder, "cannot write", "hint: set NEEDLEBENCH_CACHE_DIR"],
+    );
+}
+
+#[test]
+fn doctor_exits_with_3_and_the_same_advice() {
+    let bench = Bench::new();
+    let variables = [("NEEDLEBENCH_PYTHON", Some("/nonexistent/python"))];
+    let answer = bench.run_with(&variables, &["doctor", "--json"]);
+    let answer = answer.exits_with(3).json();
+    assert_eq!(answer["ok"], false);
+    let text = answer["checks"].to_string();
+    assert!(text.contains("hint: "), "{text}");
+}
+
+#[test]
+fn harness_that_does_not_exist_is_named() {
+    let failure = stand_in("/nonexistent/harness");
+    failure_says(&failure, ["cannot start", "/nonexistent/harness"]);
+}
+
+#[test]
+fn harness_that_hangs_is_given_up_after_the_time_limit() {
+    let text = with_edit(
+        SMALL,
+        "[recording]",
+        "[engines]\nharness_timeout_s = 1\n[recording]",
+    );
+    let started = Instant::now();
+    let variables = [("NEEDLEBENCH_HARNESS_COMMAND", Some("sleep 600"))];
+    let (failure, _) = failing_run(&text, &variables);
+    failure_says(&failure, ["no answer to", "for 1 s", "killed"]);
+    assert!(started.elapsed() < Duration::from_secs(30));
+}
+
+#[test]
+fn harness_that_answers_garbage_is_given_up() {
+    // `yes` writes without end, `cat` sends the request back, `head` is short of an answer.
+    failure_says(
+        &stand_in("yes"),
+        ["the MuJoCo harness answered", "expected"],
+    );
+    failure_says(
+        &stand_in("cat"),
+        ["the MuJoCo harness answered", "expected"],
+    );
+    failure_says(&stand_in("head -c 5"), ["the MuJoCo harness died"]);
+}
+
+#[test]
+fn harness_that_dies_at_once_is_quoted() {
+    let failure = stand_in("sh -c \"echo no luck today >&2; exit 7\"");
+    failure_says(&failure, ["died", "7", "no luck today"]);
+}
+
+#[test]
+fn harness_that_is_killed_in_mid_run_loses_its_own_results_only() {
+    let mut run = LongRun::start();
+    signal("KILL", i64::from(run.harness));
+    assert_eq!(run.end().code(), Some(3));
+    let failure = rapier_is_kept(&run.bench.read_json("out/small/report.json"));
+    failure_says(&failure, ["the MuJoCo harness died", "signal: 9"]);
+    let during = failure["during"].as_str().unwrap();
+    assert!(during.starts_with("pose "), "{during}");
+}
+
+#[test]
+fn harness_that_hangs_in_mid_run_is_killed_after_the_time_limit() {
+    let mut run = LongRun::start();
+    signal("STOP", i64::from(run.harness));
+    assert_eq!(run.end().code(), Some(3));
+    assert!(!is_alive(run.harness));
+    let failure = rapier_is_kept(&run.bench.read_json("out/small/report.json"));
+    failure_says(&failure, ["no answer to", "for 5 s", "killed"]);
+}

@@ -1,0 +1,19 @@
+//! The program from outside: what it prints, writes, refuses, and how it ends.
+
+mod arguments;
+mod bad_robot;
+mod bad_scenario;
+mod check;
+mod clearance;
+mod determinism;
+#[cfg(target_os = "linux")]
+mod environment;
+mod help;
+#[cfg(target_os = "linux")]
+mod interrupt;
+mod kinematics;
+#[cfg(target_os = "linux")]
+mod process;
+mod run;
+mod schema;
+mod support;

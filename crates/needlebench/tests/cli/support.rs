@@ -1,0 +1,260 @@
+//! A folder to work in, the program, and its answers.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A scenario whose run takes well under a second: eight configurations, two of them rejected.
+pub const SMALL: &str = include_str!("small.toml");
+
+/// The pose of the paper's Table 3, flange in the controller's base frame.
+pub const TABLE_3_POSE: &str = "0.1942,-0.3593,0.1701,-0.8567,2.7197,-1.1407";
+
+/// Top folder of the workspace.
+pub fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// Files with an extension in a folder of the workspace, sorted.
+pub fn files(folder: &str, extension: &str) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = fs::read_dir(workspace().join(folder))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|found| found == extension))
+        .collect();
+    files.sort();
+    files
+}
+
+/// How the program ended and what it said.
+#[derive(Debug)]
+pub struct Answer {
+    pub status: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Answer {
+    fn of(output: Output) -> Self {
+        Self {
+            status: output.status.code(),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    #[track_caller]
+    pub fn exits_with(self, status: i32) -> Self {
+        assert_eq!(self.status, Some(status), "{self:#?}");
+        self
+    }
+
+    /// Standard output as one JSON document.
+    #[track_caller]
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:#?}"))
+    }
+
+    /// Standard error holds all of these.
+    #[track_caller]
+    pub fn complains<const N: usize>(&self, parts: [&str; N]) {
+        for part in parts {
+            assert!(
+                self.stderr.contains(part),
+                "no `{part}` in\n{}",
+                self.stderr
+            );
+        }
+    }
+}
+
+/// A folder that is removed afterwards.
+pub struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        Self {
+            folder: tempfile::tempdir().unwrap(),
+        }
+    }
+
+    /// With a scenario `s.toml`.
+    pub fn with_scenario(text: &str) -> Self {
+        let bench = Self::new();
+        bench.write("s.toml", text);
+        bench
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        fs::write(self.path(name), bytes).unwrap();
+    }
+
+    pub fn read(&self, name: &str) -> Vec<u8> {
+        let path = self.path(name);
+        fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    }
+
+    pub fn read_json(&self, name: &str) -> Value {
+        serde_json::from_slice(&self.read(name)).unwrap()
+    }
+
+    /// Every file below a folder, relative to it, sorted.
+    pub fn tree(&self, name: &str) -> Vec<PathBuf> {
+        let root = self.path(name);
+        let mut found = Vec::new();
+        let mut folders = vec![root.clone()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else {
+                    found.push(path.strip_prefix(&root).unwrap().to_owned());
+                }
+            }
+        }
+        found.sort();
+        found
+    }
+
+    /// The program in this folder, free of the settings of whoever runs the tests.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_needlebench"));
+        command
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .env_remove("CLICOLOR_FORCE")
+            .env_remove("GITHUB_STEP_SUMMARY")
+            .env_remove("NEEDLEBENCH_HARNESS_COMMAND")
+            .stdin(Stdio::null());
+        command
+    }
+
+    pub fn run(&self, arguments: &[&str]) -> Answer {
+        Answer::of(self.command(arguments).output().unwrap())
+    }
+
+    /// With other environment variables; `None` removes one.
+    pub fn run_with(&self, variables: &[(&str, Option<&str>)], arguments: &[&str]) -> Answer {
+        let mut command = self.command(arguments);
+        for (name, value) in variables {
+            match value {
+                Some(value) => command.env(name, value),
+                None => command.env_remove(name),
+            };
+        }
+        Answer::of(command.output().unwrap())
+    }
+}
+
+/// Makes the MuJoCo environment if this machine has none yet, so that no test has to wait for it.
+#[track_caller]
+pub fn mujoco_is_ready() {
+    static READY: OnceLock<Answer> = OnceLock::new();
+    let doctor = READY.get_or_init(|| Bench::new().run(&["doctor", "--json"]));
+    assert_eq!(doctor.status, Some(0), "{doctor:#?}");
+}
+
+/// A text with one place changed, which has to be there exactly once.
+#[track_caller]
+pub fn with_edit(text: &str, from: &str, to: &str) -> String {
+    assert_eq!(text.matches(from).count(), 1, "places of `{from}`");
+    text.replace(from, to)
+}
+
+/// Asserts that a JSON object has all of these keys.
+#[track_caller]
+pub fn has_keys(value: &Value, keys: &[&str]) {
+    let object = value
+        .as_object()
+        .unwrap_or_else(|| panic!("{value} is not an object"));
+    for key in keys {
+        assert!(object.contains_key(*key), "no key `{key}` in {value:#}");
+    }
+}
+
+/// A JSON array of numbers.
+#[track_caller]
+pub fn numbers(value: &Value) -> Vec<f64> {
+    let array = value.as_array().unwrap();
+    array.iter().map(|item| item.as_f64().unwrap()).collect()
+}
+
+/// One finding of `check --json`, with the text that it is about.
+#[derive(Debug)]
+pub struct Finding {
+    json: Value,
+    text: String,
+}
+
+impl Finding {
+    /// The only finding of an answer about a file with this text.
+    #[track_caller]
+    pub fn only(answer: &Answer, text: &str) -> Self {
+        let json = answer.json();
+        assert_eq!(json["ok"], false);
+        let findings = json["findings"].as_array().unwrap();
+        assert_eq!(findings.len(), 1, "{json:#}");
+        Self {
+            json: findings[0].clone(),
+            text: text.to_owned(),
+        }
+    }
+
+    #[track_caller]
+    fn contains(&self, field: &str, part: &str) {
+        let found = self.json[field].as_str().unwrap_or_default();
+        assert!(
+            found.contains(part),
+            "`{part}` is not in the {field} of {:#}",
+            self.json
+        );
+    }
+
+    /// It names this file.
+    #[track_caller]
+    pub fn in_file(self, file: &str) -> Self {
+        assert_eq!(self.json["file"], file, "{:#}", self.json);
+        self
+    }
+
+    /// It points at the line that starts like this.
+    #[track_caller]
+    pub fn at(self, start: &str) -> Self {
+        let line = self
+            .text
+            .lines()
+            .position(|line| line.trim_start().starts_with(start))
+            .unwrap_or_else(|| panic!("no line starts with `{start}`"));
+        assert_eq!(self.json["line"], line + 1, "{:#}", self.json);
+        self
+    }
+
+    #[track_caller]
+    pub fn key(self, key: &str) -> Self {
+        assert_eq!(self.json["key"], key, "{:#}", self.json);
+        self
+    }
+
+    #[track_caller]
+    pub fn says(self, part: &str) -> Self {
+        self.contains("message", part);
+        self
+    }
+
+    #[track_caller]
+    pub fn hints(self, part: &str) -> Self {
+        self.contains("hint", part);
+        self
+    }
+}
