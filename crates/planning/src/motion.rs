@@ -1,6 +1,6 @@
 //! Clearance along planned motions.
 
-use needlebench_cell::{Cell, ClearanceClass, Frame};
+use needlebench_cell::{BodyKind, Cell, ClearanceClass, Frame};
 use needlebench_clearance::{ClassMinima, ClearanceModel, PairClearance};
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
@@ -27,7 +27,7 @@ pub(crate) struct Violation {
     pub limit_m: f64,
 }
 
-/// Time between two postures that are looked at, s; most are skipped as provably clear.
+/// Resolution of the times at which postures are looked at, s.
 const GRID_S: f64 = 2e-3;
 
 impl<'a> MotionChecker<'a> {
@@ -58,31 +58,28 @@ impl<'a> MotionChecker<'a> {
         }
     }
 
-    /// The pair that is nearest to (or deepest in) collision at a posture, if any collides.
-    pub(crate) fn collision_at(&self, q: &Joints) -> Option<PairClearance> {
-        self.worst(&self.model.minimum_per_class(q))
-            .map(|(pair, _)| pair)
+    /// Least clearances of a posture, and the pair that is deepest in collision, if any collides.
+    pub(crate) fn posture(&self, q: &Joints) -> (ClassMinima, Option<PairClearance>) {
+        let minima = self.model.minimum_per_class(q);
+        let collision = self.worst(&minima);
+        (minima, collision)
     }
 
-    pub(crate) fn minima_at(&self, q: &Joints) -> ClassMinima {
-        self.model.minimum_per_class(q)
-    }
-
-    fn worst(&self, minima: &ClassMinima) -> Option<(PairClearance, f64)> {
+    /// The pair that is farthest below its limit, if any is.
+    fn worst(&self, minima: &ClassMinima) -> Option<PairClearance> {
         minima
             .iter()
             .filter(|pair| pair.class.is_physical())
             .map(|pair| (pair, pair.separation.distance_m - self.limit_m(pair.class)))
             .filter(|(_, excess_m)| *excess_m < 0.0)
             .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(pair, excess_m)| (*pair, excess_m))
+            .map(|(pair, _)| *pair)
     }
 
     /// First collision along a trajectory.
     ///
-    /// From a posture with clearance `c` to the limit, no body can reach another before some point
-    /// of the arm has moved by `c` (by `c / 2` where both move), so all postures until then are
-    /// skipped. Contact shallower than the spacing may go unnoticed between two postures.
+    /// Postures are looked at so often that no point of the arm moves by more than the spacing
+    /// from one to the next. Contact shallower than that may go unnoticed between two of them.
     pub(crate) fn first_collision(&self, trajectory: &JointTrajectory) -> Option<Violation> {
         let duration_s = trajectory.duration_s();
         #[expect(
@@ -91,39 +88,30 @@ impl<'a> MotionChecker<'a> {
             reason = "small, positive"
         )]
         let steps = (duration_s / GRID_S).ceil() as u32;
-        let mut checked: Option<(Joints, f64)> = None;
+        let mut checked: Option<Joints> = None;
+        let mut next = trajectory.sample(0.0).position;
         for k in 0..=steps {
             let time_s = (GRID_S * f64::from(k)).min(duration_s);
-            let q = trajectory.sample(time_s).position;
-            if let Some((at, free_m)) = &checked
-                && k < steps
-                && self.largest_displacement_m(at, &q) < *free_m
-            {
+            let q = next;
+            next = trajectory.sample(time_s + GRID_S).position;
+            // Left out as long as the next posture is near enough to the last one looked at.
+            let near =
+                checked.is_some_and(|at| self.largest_displacement_m(&at, &next) < self.spacing_m);
+            if near && k < steps {
                 continue;
             }
-            let minima = self.model.minimum_per_class(&q);
-            if let Some((pair, _)) = self.worst(&minima) {
-                let limit_m = self.limit_m(pair.class);
+            if let Some(found) = self.model.first_below(&q, |class| self.limit_m(class)) {
+                let pair = self
+                    .worst(&self.model.minimum_per_class(&q))
+                    .unwrap_or(found);
                 return Some(Violation {
                     phase: trajectory.phase_at(time_s),
                     time_s,
                     pair,
-                    limit_m,
+                    limit_m: self.limit_m(pair.class),
                 });
             }
-            let free_m = minima
-                .iter()
-                .filter(|pair| pair.class.is_physical())
-                .map(|pair| {
-                    let excess_m = pair.separation.distance_m - self.limit_m(pair.class);
-                    if pair.class == ClearanceClass::SelfCollision {
-                        0.5 * excess_m
-                    } else {
-                        excess_m
-                    }
-                })
-                .fold(f64::INFINITY, f64::min);
-            checked = Some((q, free_m.max(self.spacing_m)));
+            checked = Some(q);
         }
         None
     }
@@ -144,7 +132,8 @@ impl<'a> MotionChecker<'a> {
 fn sweep_radii(cell: &Cell) -> Joints {
     let mut own_radius_m = [0.0_f64; JOINT_COUNT];
     for body in &cell.bodies {
-        if let Frame::Link(link) = body.frame {
+        // The needle corridor is no body that could hit anything.
+        if let (Frame::Link(link), true) = (body.frame, body.kind != BodyKind::NeedleCorridor) {
             for solid in &body.solids {
                 let radius_m = solid.parent_from_shape.translation.vector.norm()
                     + solid.shape.bounding_radius_m();

@@ -203,9 +203,14 @@ impl<'a> Planner<'a> {
         let mut best: Option<ConfigurationPlan> = None;
         for (candidate, rejections) in spread_over_rolls(candidates).into_iter().take(MOTION_TRIES)
         {
+            // The best posture breaks a rule, so all do: one motion shows what would happen.
+            let hopeless = !rejections.is_empty();
             let plan = self.plan_motion(goal, configuration, candidate, rejections);
             if plan.rejections.is_empty() {
                 return plan;
+            }
+            if hopeless {
+                return best.unwrap_or(plan);
             }
             let better = best
                 .as_ref()
@@ -281,8 +286,8 @@ impl<'a> Planner<'a> {
                 });
             }
         }
-        let clearance = self.checker.minima_at(&solution.joints);
-        if let Some(pair) = self.checker.collision_at(&solution.joints) {
+        let (clearance, collision) = self.checker.posture(&solution.joints);
+        if let Some(pair) = collision {
             rejections.push(Rejection {
                 rule: Rule::Collision,
                 value: pair.separation.distance_m,
@@ -368,6 +373,16 @@ impl<'a> Planner<'a> {
                 };
             }
         };
+        let approach = JointTrajectory::starting_at(line.start()).then_along(
+            Phase::Approach,
+            line.clone(),
+            &self.resolved.motion,
+        );
+        // Whole turns of a joint change the transfer, but neither the approach nor the posture.
+        let turns_help = rejections
+            .iter()
+            .all(|rejection| rejection.rule != Rule::Collision)
+            && self.checker.first_collision(&approach).is_none();
         let mut first_failure = None;
         let mut shortest = None;
         for turns in self.wraps(&line) {
@@ -383,7 +398,7 @@ impl<'a> Planner<'a> {
                 shortest = Some((turns, trajectory));
                 first_failure = collision;
             }
-            if works {
+            if works || !turns_help {
                 break;
             }
         }
