@@ -534,6 +534,15 @@ fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
             );
         }
     }
+    if let Some(table) = &scenario.table {
+        range(
+            "table.top_height_mm",
+            table.top_height_mm,
+            100.0,
+            2000.0,
+            "mm",
+        );
+    }
     let tool = &scenario.tool;
     range(
         "tool.mount_rotation_deg",

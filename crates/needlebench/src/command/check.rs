@@ -4,7 +4,7 @@ use anyhow::Result;
 use needlebench_cell::{Finding, load_scenario};
 use serde::Serialize;
 
-use super::{overrides, print_json};
+use super::{overrides, print_json, print_text};
 use crate::cli::CheckArguments;
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
@@ -28,15 +28,15 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
                 match load_scenario(path, &overrides) {
                     Ok(resolved) => {
                         if !arguments.json {
-                            anstream::println!(
+                            print_text(&format!(
                                 "{}: ok ({} goals, {} bodies, {} pairs)",
                                 path.display(),
                                 resolved.goals.len(),
                                 resolved.cell.bodies.len(),
                                 resolved.cell.pairs.len()
-                            );
+                            ))?;
                             for note in &resolved.notes {
-                                anstream::println!("  note: {note}");
+                                print_text(&format!("  note: {note}"))?;
                             }
                         }
                         notes.extend(resolved.notes);

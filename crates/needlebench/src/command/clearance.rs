@@ -8,7 +8,7 @@ use needlebench_clearance::{ClearanceModel, PairClearance};
 use needlebench_kinematics::Joints;
 use serde::Serialize;
 
-use super::{load, overrides, print_json};
+use super::{load, overrides, print_json, print_text};
 use crate::cli::ClearanceArguments;
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
@@ -106,6 +106,6 @@ pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus> {
             answer.pair[1].clone(),
         ]);
     }
-    anstream::println!("{table}");
+    print_text(&table.to_string())?;
     Ok(ExitStatus::Success)
 }

@@ -4,7 +4,7 @@ use anyhow::Result;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use serde::Serialize;
 
-use super::print_json;
+use super::{print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::provenance::GIT_REVISION;
 
@@ -87,7 +87,7 @@ pub(crate) fn doctor(json: bool) -> Result<ExitStatus> {
     } else {
         for check in &checks {
             let mark = if check.ok { "ok  " } else { "FAIL" };
-            anstream::println!("{mark} {}: {}", check.name, check.detail);
+            print_text(&format!("{mark} {}: {}", check.name, check.detail))?;
         }
     }
     Ok(if ok {

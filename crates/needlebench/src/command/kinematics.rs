@@ -17,7 +17,7 @@ use needlebench_kinematics::{
 use needlebench_planning::Planner;
 use serde::Serialize;
 
-use super::{overrides, print_json};
+use super::{overrides, print_json, print_text};
 use crate::cli::{FkArguments, IkArguments, IkMethod, RobotArguments, Six};
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
@@ -138,7 +138,7 @@ pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus> {
     if arguments.json {
         print_json(&answer)?;
     } else {
-        print_solutions(&answer);
+        print_solutions(&answer)?;
     }
     Ok(ExitStatus::Success)
 }
@@ -295,7 +295,7 @@ fn numerical(
     }
 }
 
-fn print_solutions(answer: &IkAnswer) {
+fn print_solutions(answer: &IkAnswer) -> Result<()> {
     let mut table = crate::output::plain_table(&[
         "configuration",
         "q1 (rad)",
@@ -341,7 +341,10 @@ fn print_solutions(answer: &IkAnswer) {
         ));
         table.add_row(row);
     }
-    anstream::println!("{table}\n{}: {}", answer.count, answer.certificate);
+    print_text(&format!(
+        "{table}\n{}: {}",
+        answer.count, answer.certificate
+    ))
 }
 
 /// Prints forward kinematics.
@@ -396,6 +399,6 @@ pub(crate) fn fk(arguments: &FkArguments) -> Result<ExitStatus> {
             &PoseAnswer::new(pose),
         );
     }
-    anstream::println!("{table}");
+    print_text(&table.to_string())?;
     Ok(ExitStatus::Success)
 }

@@ -48,14 +48,16 @@ fn overrides(arguments: &RobotArguments) -> Result<Overrides, Finding> {
 }
 
 /// Prints one JSON document to standard output.
+fn print_json(value: &impl Serialize) -> Result<()> {
+    print_text(&serde_json::to_string_pretty(value).map_err(std::io::Error::from)?)
+}
+
+/// Prints text and a line end to standard output.
 ///
 /// A reader that stops reading is no error: what the command found decides its exit status.
-fn print_json(value: &impl Serialize) -> Result<()> {
+fn print_text(text: &str) -> Result<()> {
     let mut out = anstream::stdout().lock();
-    let written = serde_json::to_writer_pretty(&mut out, value)
-        .map_err(std::io::Error::from)
-        .and_then(|()| writeln!(out));
-    match written {
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other.context("cannot write to standard output"),
     }
@@ -78,6 +80,6 @@ pub(crate) fn completions(shell: clap_complete::Shell) -> Result<ExitStatus> {
         "needlebench",
         &mut script,
     );
-    std::io::stdout().lock().write_all(&script)?;
+    print_text(String::from_utf8_lossy(&script).trim_end())?;
     Ok(ExitStatus::Success)
 }

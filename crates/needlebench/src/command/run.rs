@@ -12,12 +12,12 @@ use needlebench_cell::{Finding, ResolvedScenario};
 use needlebench_evaluation::report::{Report, Verdict};
 use serde::Serialize;
 
-use super::{load, overrides, print_json};
+use super::{load, overrides, print_json, print_text};
 use crate::cli::RunArguments;
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
 use crate::output::pictures::{Backdrop, configuration_picture, sheet_caption};
-use crate::output::{junit, markdown, print_report, recording_csv, write_atomically};
+use crate::output::{junit, markdown, recording_csv, report_text, write_atomically};
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
 use crate::progress::Progress;
@@ -98,9 +98,9 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
         written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
         status = status.max(outcome(&finished));
         if !arguments.json {
-            anstream::println!("{}", resolved.scenario.name);
-            print_report(&finished.report);
-            anstream::println!("results: {}", folder.display());
+            let name = &resolved.scenario.name;
+            let text = report_text(&finished.report);
+            print_text(&format!("{name}\n{text}results: {}", folder.display()))?;
         }
         reports.push(finished.report);
         if finished.interrupted {
@@ -246,6 +246,9 @@ fn write_results(
         progress.message("drawing");
         write_pictures(resolved, &finished.report, folder, jobs, &mut files)?;
     }
+    for (goal, names) in resolved.goals.iter().zip(&files) {
+        remove_stale(folder, &goal.name, &names.concat())?;
+    }
     for (goal, names) in finished.report.goals.iter_mut().zip(files) {
         for (configuration, names) in goal.configurations.iter_mut().zip(names) {
             configuration.files = names;
@@ -261,6 +264,22 @@ fn write_results(
     write_atomically(&folder.join("report.json"), &json)?;
     write_atomically(&folder.join("junit.xml"), junit(&[report])?.as_bytes())?;
     write_atomically(&folder.join("summary.md"), markdown(report).as_bytes())?;
+    Ok(())
+}
+
+/// Removes recordings and pictures that an earlier run left in a goal's folder: nobody should
+/// take them for results of this one.
+fn remove_stale(folder: &Path, goal: &str, written: &[String]) -> Result<()> {
+    for entry in std::fs::read_dir(folder.join(goal))? {
+        let path = entry?.path();
+        let ours = path
+            .extension()
+            .is_some_and(|extension| extension == "csv" || extension == "png");
+        let current = written.iter().any(|name| folder.join(name) == path);
+        if ours && !current {
+            std::fs::remove_file(&path)?;
+        }
+    }
     Ok(())
 }
 

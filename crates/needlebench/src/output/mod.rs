@@ -13,4 +13,4 @@ pub(crate) use atomic::write_atomically;
 pub(crate) use junit::junit;
 pub(crate) use markdown::markdown;
 pub(crate) use recording::recording_csv;
-pub(crate) use table::{plain_table, print_report};
+pub(crate) use table::{plain_table, report_text};

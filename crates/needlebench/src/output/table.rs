@@ -1,5 +1,7 @@
 //! The table that a run prints.
 
+use std::fmt::Write;
+
 use comfy_table::{Cell, CellAlignment, Color, Table};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status, Verdict};
 
@@ -13,37 +15,41 @@ pub(crate) fn plain_table(header: &[&str]) -> Table {
     table
 }
 
-/// Prints the whole report.
-pub(crate) fn print_report(report: &Report) {
+/// The whole report as text.
+pub(crate) fn report_text(report: &Report) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_report(&mut text, report);
+    text
+}
+
+fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
     for goal in &report.goals {
-        anstream::println!("{}", goal_heading(goal));
-        anstream::println!("{}", goal_table(goal));
-        print_remarks(report, goal);
+        writeln!(out, "{}", goal_heading(goal))?;
+        writeln!(out, "{}", goal_table(goal))?;
+        write_remarks(out, report, goal)?;
     }
     for failure in &report.engine_failures {
         let during = failure
             .during
             .as_ref()
             .map_or(String::new(), |during| format!(" in {during}"));
-        anstream::println!(
+        writeln!(
+            out,
             "engine {} failed{during}: {}",
-            failure.engine,
-            failure.message
-        );
+            failure.engine, failure.message
+        )?;
     }
     for note in &report.notes {
-        anstream::println!("note: {note}");
+        writeln!(out, "note: {note}")?;
     }
     let failed = report.criteria.iter().filter(|result| !result.pass).count();
     let verdict = match report.verdict {
         Verdict::Pass => "PASS",
         Verdict::Fail => "FAIL",
     };
-    anstream::println!(
-        "{verdict}: {} of {} criteria met",
-        report.criteria.len() - failed,
-        report.criteria.len()
-    );
+    let count = report.criteria.len();
+    writeln!(out, "{verdict}: {} of {count} criteria met", count - failed)
 }
 
 fn goal_heading(goal: &GoalReport) -> String {
@@ -241,28 +247,30 @@ fn worst_of(goal: &GoalReport, column: &Column) -> Option<f64> {
     Some(if column.worst_is_large { most } else { least })
 }
 
-fn print_remarks(report: &Report, goal: &GoalReport) {
+fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::fmt::Result {
     if let Some(route) = goal
         .configurations
         .first()
         .and_then(|each| each.clearance.classes.get("needle_route"))
     {
-        anstream::println!(
+        writeln!(
+            out,
             "needle route: {:.1} mm from {}",
             route.minimum_m * 1e3,
             route.pair[1]
-        );
+        )?;
     }
     for configuration in &goal.configurations {
         if let Some(rejection) = configuration.rejections.first() {
-            anstream::println!(
+            writeln!(
+                out,
                 "{}: {}: {} (limit {}): {}",
                 configuration.label,
                 rejection.rule,
                 value_with_unit(rejection.value, rejection.unit),
                 value_with_unit(rejection.limit, rejection.unit),
                 rejection.detail
-            );
+            )?;
         }
     }
     for result in report
@@ -278,15 +286,16 @@ fn print_remarks(report: &Report, goal: &GoalReport) {
         let limit = result.limit.map_or(String::new(), |limit| {
             format!(": {value}, limit {}", value_with_unit(limit, result.unit))
         });
-        anstream::println!(
+        writeln!(
+            out,
             "FAILED {} {}{limit} {}",
             about.join(" "),
             result.criterion,
             result.detail
-        );
+        )?;
     }
     match &goal.recommended {
-        Some(found) => anstream::println!("recommended: {} - {}", found.label, found.reason),
-        None => anstream::println!("recommended: none, no configuration works"),
+        Some(found) => writeln!(out, "recommended: {} - {}", found.label, found.reason),
+        None => writeln!(out, "recommended: none, no configuration works"),
     }
 }
