@@ -19,6 +19,7 @@ mod tessellate;
 mod toml_text;
 mod tool;
 mod urdf;
+mod values;
 
 pub use files::{PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};

@@ -2,6 +2,7 @@
 //!
 //! Data goes to standard output, logs and progress to standard error.
 
+mod assemble;
 mod cli;
 mod command;
 pub mod exit;

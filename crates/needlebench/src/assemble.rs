@@ -1,0 +1,243 @@
+//! Plans and recordings into the values of the report.
+
+use std::collections::BTreeMap;
+
+use needlebench_cell::scenario::EngineName;
+use needlebench_cell::{Cell, Goal, ResolvedScenario};
+use needlebench_engine::EngineIdentity;
+use needlebench_evaluation::report::{
+    ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
+    MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary, Status,
+};
+use needlebench_evaluation::{
+    engine_difference, judge, measure_motion, measure_needle, needle_route, posture_clearance,
+};
+use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
+
+use crate::pipeline::EngineRun;
+use crate::provenance::provenance;
+
+#[expect(
+    clippy::too_many_arguments,
+    reason = "gathers the results of all stages, once"
+)]
+pub(crate) fn assemble(
+    resolved: &ResolvedScenario,
+    planner: &Planner<'_>,
+    plans: &[GoalPlan],
+    runs: &[Vec<Vec<EngineRun>>],
+    engines: &[EngineName],
+    engine_failures: Vec<EngineFailure>,
+    identities: Vec<EngineIdentity>,
+    timings: BTreeMap<String, f64>,
+) -> Report {
+    let mut goals: Vec<GoalReport> = resolved
+        .goals
+        .iter()
+        .zip(plans)
+        .zip(runs)
+        .map(|((goal, plan), runs)| goal_report(resolved, planner, goal, plan, runs))
+        .collect();
+    let both = engines.len() == 2 && engine_failures.is_empty();
+    let (verdict, criteria) = judge(
+        &mut goals,
+        &resolved.goals,
+        &resolved.scenario.criteria,
+        both,
+    );
+    Report {
+        schema_version: SCHEMA_VERSION,
+        scenario: ScenarioSummary {
+            name: resolved.scenario.name.clone(),
+            description: resolved.scenario.description.clone(),
+            file: resolved.source.file.clone(),
+        },
+        verdict,
+        criteria,
+        goals,
+        engine_failures,
+        notes: resolved.notes.clone(),
+        provenance: provenance(resolved, identities),
+        timings,
+    }
+}
+
+fn goal_report(
+    resolved: &ResolvedScenario,
+    planner: &Planner<'_>,
+    goal: &Goal,
+    plan: &GoalPlan,
+    runs: &[Vec<EngineRun>],
+) -> GoalReport {
+    let route = resolved
+        .phantom
+        .as_ref()
+        .and_then(|placed| needle_route(&resolved.cell, placed, goal));
+    GoalReport {
+        name: goal.name.clone(),
+        lesion: goal.lesion.clone(),
+        entry_m: goal.entry_m.map(|point| point.coords.into()),
+        target_m: goal.target_m.coords.into(),
+        axis: goal.axis.into_inner().into(),
+        insertion_length_m: goal.insertion_length_m,
+        standoff_m: goal.standoff_m,
+        configurations: plan
+            .configurations
+            .iter()
+            .zip(runs)
+            .map(|(plan, runs)| {
+                configuration_report(resolved, planner, goal, plan, runs, route.as_ref())
+            })
+            .collect(),
+        recommended: None,
+    }
+}
+
+fn configuration_report(
+    resolved: &ResolvedScenario,
+    planner: &Planner<'_>,
+    goal: &Goal,
+    plan: &ConfigurationPlan,
+    runs: &[EngineRun],
+    route: Option<&ClassClearance>,
+) -> ConfigurationReport {
+    let cell = &resolved.cell;
+    let candidate = plan.candidate.as_ref();
+    let engines: BTreeMap<String, EngineReport> = runs
+        .iter()
+        .map(|run| {
+            let report = engine_report(resolved, goal, plan, run);
+            (run.engine.name().to_owned(), report)
+        })
+        .collect();
+    let mut clearance = overall_clearance(cell, plan, &engines);
+    if let Some(route) = route {
+        clearance.classes.insert("needle_route", route.clone());
+    }
+    let engine_difference = match runs {
+        [a, b] => Some(engine_difference(cell, goal, &a.recording, &b.recording)),
+        _ => None,
+    };
+    ConfigurationReport {
+        label: plan.configuration.label(),
+        status: Status::Rejected, // `judge` sets it
+        rejections: plan
+            .rejections
+            .iter()
+            .map(|rejection| RejectionReport {
+                rule: rejection.rule.name(),
+                value: rejection.value,
+                limit: rejection.limit,
+                unit: rejection.unit,
+                detail: rejection.detail.clone(),
+            })
+            .collect(),
+        joints_rad: candidate.map(|each| each.joints.into()),
+        roll_rad: candidate.map(|each| each.roll_rad),
+        wrap: candidate.map(|each| each.wrap),
+        ik_residual_m: candidate.map(|each| each.residual_m),
+        ik_residual_rad: candidate.map(|each| each.residual_rad),
+        free_joint: candidate
+            .filter(|each| each.wrist_3_is_free)
+            .map(|_| "wrist_3"),
+        margins: candidate.map(|each| MarginsReport {
+            joint_limit: each.margins.joint_limit,
+            wrist_sine: each.margins.wrist_sine,
+            elbow_sine: each.margins.elbow_sine,
+            shoulder_m: each.margins.shoulder_m,
+            manipulability_m3: each.margins.manipulability,
+        }),
+        motion: plan
+            .trajectory
+            .iter()
+            .flat_map(JointTrajectory::phases)
+            .map(|(phase, start_s, end_s)| PhaseReport {
+                phase: phase.name(),
+                start_s,
+                end_s,
+            })
+            .collect(),
+        commanded: candidate.map(|each| {
+            let base_link_from_flange = planner.kinematics().base_link_from_flange(&each.joints);
+            let world_from_flange = cell.robot.world_from_base_link * base_link_from_flange;
+            measure_needle(cell, resolved.phantom.as_ref(), goal, &world_from_flange)
+        }),
+        engines,
+        engine_difference,
+        clearance,
+        files: Vec::new(),
+    }
+}
+
+fn engine_report(
+    resolved: &ResolvedScenario,
+    goal: &Goal,
+    plan: &ConfigurationPlan,
+    run: &EngineRun,
+) -> EngineReport {
+    let cell = &resolved.cell;
+    let trajectory = plan
+        .trajectory
+        .as_ref()
+        .expect("what was simulated has a trajectory");
+    let settled = run
+        .recording
+        .state
+        .last()
+        .expect("a recording has its initial state");
+    let band_m = resolved.scenario.criteria.settling_band_mm * 1e-3;
+    let minima = &run.clearance.minima;
+    EngineReport {
+        needle: measure_needle(
+            cell,
+            resolved.phantom.as_ref(),
+            goal,
+            &settled.world_from_flange,
+        ),
+        motion: measure_motion(cell, goal, trajectory, &run.recording, band_m),
+        clearance: clearance_report(
+            minima
+                .iter()
+                .map(|(class, found)| (class.name(), found.clone()))
+                .collect(),
+        ),
+    }
+}
+
+/// Least clearances over all engines; of the final posture where nothing was simulated.
+fn overall_clearance(
+    cell: &Cell,
+    plan: &ConfigurationPlan,
+    engines: &BTreeMap<String, EngineReport>,
+) -> ClearanceReport {
+    let mut classes: BTreeMap<&'static str, ClassClearance> = BTreeMap::new();
+    if let (true, Some(candidate)) = (engines.is_empty(), &plan.candidate) {
+        let minima = posture_clearance(cell, &candidate.clearance);
+        classes.extend(
+            minima
+                .into_iter()
+                .map(|(class, found)| (class.name(), found)),
+        );
+    }
+    for report in engines.values() {
+        for (class, found) in &report.clearance.classes {
+            let nearer = classes
+                .get(class)
+                .is_none_or(|known| found.minimum_m < known.minimum_m);
+            if nearer {
+                classes.insert(class, found.clone());
+            }
+        }
+    }
+    clearance_report(classes)
+}
+
+fn clearance_report(classes: BTreeMap<&'static str, ClassClearance>) -> ClearanceReport {
+    let minimum_m = classes
+        .iter()
+        .filter(|(class, _)| needlebench_evaluation::counts_as_clearance(class))
+        .map(|(_, found)| found.minimum_m)
+        .min_by(f64::total_cmp);
+    ClearanceReport { classes, minimum_m }
+}
