@@ -121,14 +121,21 @@ pub(crate) fn resolve_goal(
     if needle_m < needed_m {
         return Err(text
             .finding(
-                &key("insertion_length_mm"),
+                &key(if section.insertion_length_mm.is_some() {
+                    "insertion_length_mm"
+                } else {
+                    "entry_mm"
+                }),
                 format!(
                     "the needle is {:.1} mm long, but guide and insertion need {:.1} mm",
                     needle_m * 1e3,
                     needed_m * 1e3
                 ),
             )
-            .hint("a longer needle (`needle_length_mm` under [tool]), or a smaller stand-off"));
+            .hint(
+                "a longer needle (`needle_length_mm` under [tool]), a smaller stand-off, or an \
+                 entry on the target's side of the body (x is to the patient's left)",
+            ));
     }
     Ok(goal)
 }
@@ -321,8 +328,15 @@ fn from_entry_and_target(
                 ),
             )
             .hint(format!(
-                "the line meets the skin at [{:.1}, {:.1}, {:.1}]",
-                skin.x, skin.y, skin.z
+                "{}the line meets the skin at [{:.1}, {:.1}, {:.1}]",
+                if entry_mm.iter().all(|value| value.abs() < 1.0) {
+                    "the point is in millimetres, not metres; "
+                } else {
+                    ""
+                },
+                skin.x,
+                skin.y,
+                skin.z
             )));
     }
     if enters_m.abs() > 1e-6 {
@@ -345,6 +359,17 @@ fn from_entry_and_target(
             length_mm * 1e-3
         }
     };
+    if insertion_length_m <= standoff_m {
+        return Err(text
+            .finding(
+                &key("insertion_length_mm"),
+                format!(
+                    "the needle would end {:.1} mm before the skin",
+                    (standoff_m - insertion_length_m) * 1e3
+                ),
+            )
+            .hint("the insertion length counts from the guide's exit, stand-off included"));
+    }
     let world = &placed.world_from_phantom;
     Ok(Goal {
         name: section.name.clone(),

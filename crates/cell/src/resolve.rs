@@ -7,8 +7,8 @@ use needlebench_kinematics::trajectory::{MotionLimits, ProfileLimits};
 use needlebench_kinematics::{JOINT_LABELS, Joints, Pose};
 
 use crate::files::{Location, source_of};
-use crate::fixtures::{self, Fixture, FixtureError};
-use crate::goal::{PlacedPhantom, Surroundings, resolve_goal};
+use crate::fixtures::{self, Fixture, FixtureError, TableParameters};
+use crate::goal::{PlacedPhantom, Surroundings, resolve_goal, solid_contains};
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
 use crate::phantom::{Phantom, PhantomError, PhantomParameters};
 use crate::robot::{MissingInertia, read_robot};
@@ -216,6 +216,7 @@ pub fn resolve_scenario(
         }
     }
 
+    check_base(&toml, &world_from_base_link, &surroundings).map_err(one)?;
     let goals = {
         let context = Surroundings {
             robot: &robot,
@@ -435,6 +436,7 @@ fn place_phantom(
                 .finding("phantom.rest_on_table", "there is no [table] to rest on")
                 .hint("add a [table], or set `rest_on_table = false` and give the full position"));
         };
+        check_over_table(toml, table, section.position_mm)?;
         let skin = phantom.skin();
         let Shape::Convex(mesh) = &skin.shape else {
             unreachable!("the phantom's skin is a convex mesh")
@@ -460,6 +462,63 @@ fn place_phantom(
         },
         source,
     ))
+}
+
+/// Refuses a base that stands inside something: the fixed link is in no pair that is checked later.
+fn check_base(
+    toml: &TomlText<'_>,
+    world_from_base_link: &Pose,
+    surroundings: &[CollisionBody],
+) -> Result<(), Finding> {
+    /// Height of a UR3's base with the shoulder on it, m.
+    const BASE_HEIGHT_M: f64 = 0.15;
+    let inside = |body: &&CollisionBody| {
+        body.kind != BodyKind::Mount
+            && (0..=5).any(|k| {
+                let height_m = BASE_HEIGHT_M * (f64::from(k) + 0.1) / 5.1;
+                let point = world_from_base_link * Point3::new(0.0, 0.0, height_m);
+                body.solids
+                    .iter()
+                    .any(|solid| solid_contains(solid, &point))
+            })
+    };
+    match surroundings.iter().find(inside) {
+        None => Ok(()),
+        Some(body) => Err(toml
+            .finding(
+                "robot.base_position_mm",
+                format!("the robot's base stands inside the {}", body.name),
+            )
+            .hint("the position is in the world: z up, floor at 0, in millimetres")),
+    }
+}
+
+/// Refuses a phantom that rests on a table it does not lie over.
+fn check_over_table(
+    toml: &TomlText<'_>,
+    table: &TableParameters,
+    position_mm: [f64; 3],
+) -> Result<(), Finding> {
+    let offset_mm = nalgebra::Rotation2::new(-table.yaw_deg.to_radians())
+        * nalgebra::Vector2::new(
+            position_mm[0] - table.center_mm[0],
+            position_mm[1] - table.center_mm[1],
+        );
+    let over =
+        offset_mm.x.abs() <= 0.5 * table.length_mm && offset_mm.y.abs() <= 0.5 * table.width_mm;
+    if over {
+        return Ok(());
+    }
+    Err(toml
+        .finding(
+            "phantom.position_mm",
+            format!(
+                "the phantom's middle lies {:.0} mm along and {:.0} mm across from the middle of \
+                 the table, which is {:.0} by {:.0} mm",
+                offset_mm.x, offset_mm.y, table.length_mm, table.width_mm
+            ),
+        )
+        .hint("move it over the table, or set `rest_on_table = false`"))
 }
 
 /// Orientation of the phantom (left, posterior, superior) in the world.

@@ -292,8 +292,12 @@ impl Default for MotionSection {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlanningSection {
-    /// Clearance below which a posture or motion is rejected, for each class, mm.
+    /// Clearance of arm and tool from their surroundings below which a posture or motion is
+    /// rejected, mm.
     pub min_clearance_mm: f64,
+    /// Clearance of arm and tool from themselves below which a posture or motion is rejected, mm.
+    /// Forearm and wrist 2 are about 10 mm apart in most postures.
+    pub min_self_clearance_mm: f64,
     /// `|sin q5|` and `|sin q3|` below which the final posture is rejected as singular.
     pub min_singularity_sine: f64,
     /// Distance of wrist 2 from the cylinder about the shoulder axis below which the final posture
@@ -315,6 +319,7 @@ impl Default for PlanningSection {
     fn default() -> Self {
         Self {
             min_clearance_mm: 0.0,
+            min_self_clearance_mm: 0.0,
             min_singularity_sine: 0.01,
             min_shoulder_distance_mm: 5.0,
             require_needle_corridor: true,

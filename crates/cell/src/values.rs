@@ -137,6 +137,13 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
         "mm",
     );
     range(
+        "planning.min_self_clearance_mm",
+        planning.min_self_clearance_mm,
+        -10.0,
+        500.0,
+        "mm",
+    );
+    range(
         "planning.min_singularity_sine",
         planning.min_singularity_sine,
         0.0,

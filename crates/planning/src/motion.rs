@@ -12,8 +12,10 @@ pub struct MotionChecker<'a> {
     model: &'a ClearanceModel,
     /// Radius about each joint's axis within which everything beyond the joint stays, m.
     sweep_radius_m: Joints,
-    /// Clearance below which bodies collide, m.
+    /// Clearance from the surroundings below which bodies collide, m.
     min_clearance_m: f64,
+    /// Clearance of the arm from itself below which bodies collide, m.
+    min_self_clearance_m: f64,
     /// Motion of any point that may go unchecked, m.
     spacing_m: f64,
 }
@@ -36,6 +38,7 @@ impl<'a> MotionChecker<'a> {
         cell: &'a Cell,
         model: &'a ClearanceModel,
         min_clearance_m: f64,
+        min_self_clearance_m: f64,
         spacing_m: f64,
     ) -> Self {
         Self {
@@ -43,6 +46,7 @@ impl<'a> MotionChecker<'a> {
             model,
             sweep_radius_m: sweep_radii(cell),
             min_clearance_m,
+            min_self_clearance_m,
             spacing_m,
         }
     }
@@ -51,10 +55,10 @@ impl<'a> MotionChecker<'a> {
     ///
     /// The guide tube is meant to stand near the skin, so there only touching counts.
     pub(crate) fn limit_m(&self, class: ClearanceClass) -> f64 {
-        if class == ClearanceClass::GuideStandoff {
-            self.min_clearance_m.min(0.0)
-        } else {
-            self.min_clearance_m
+        match class {
+            ClearanceClass::GuideStandoff => self.min_clearance_m.min(0.0),
+            ClearanceClass::SelfCollision => self.min_self_clearance_m,
+            _ => self.min_clearance_m,
         }
     }
 

@@ -98,6 +98,7 @@ impl<'a> Planner<'a> {
                 &resolved.cell,
                 clearance,
                 planning.min_clearance_mm * 1e-3,
+                planning.min_self_clearance_mm * 1e-3,
                 planning.sample_spacing_mm * 1e-3,
             ),
         })
@@ -200,6 +201,13 @@ impl<'a> Planner<'a> {
                     working_clearance_m(&b.clearance).total_cmp(&working_clearance_m(&a.clearance)),
                 )
         });
+        // Where one posture breaks no rule, those that do are out of the question.
+        if candidates
+            .first()
+            .is_some_and(|(_, broken)| broken.is_empty())
+        {
+            candidates.retain(|(_, broken)| broken.is_empty());
+        }
         let mut best: Option<ConfigurationPlan> = None;
         for (candidate, rejections) in spread_over_rolls(candidates).into_iter().take(MOTION_TRIES)
         {

@@ -1,10 +1,10 @@
 //! `needlebench check`.
 
 use anyhow::Result;
-use needlebench_cell::{Finding, load_scenario};
+use needlebench_cell::Finding;
 use serde::Serialize;
 
-use super::{overrides, print_json, print_text};
+use super::{load_checked, overrides, print_json, print_text};
 use crate::cli::CheckArguments;
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
@@ -25,7 +25,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
         Err(finding) => findings.push(finding),
         Ok(overrides) => {
             for path in &arguments.scenarios {
-                match load_scenario(path, &overrides) {
+                match load_checked(path, &overrides) {
                     Ok(resolved) => {
                         if !arguments.json {
                             print_text(&format!(

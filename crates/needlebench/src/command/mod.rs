@@ -13,6 +13,7 @@ use anyhow::{Context, Result};
 use needlebench_cell::{
     Finding, MissingInertia, Overrides, PackagePaths, ResolvedScenario, load_scenario,
 };
+use needlebench_clearance::ClearanceModel;
 use serde::Serialize;
 
 pub(crate) use check::check;
@@ -27,13 +28,34 @@ use crate::output::findings::print_findings;
 
 /// Reads a scenario; prints what is wrong with it and gives `None` if it cannot be used.
 fn load(path: &Path, overrides: &Overrides) -> Option<ResolvedScenario> {
-    match load_scenario(path, overrides) {
+    match load_checked(path, overrides) {
         Ok(resolved) => Some(resolved),
         Err(findings) => {
             print_findings(&findings);
             None
         }
     }
+}
+
+/// Reads a scenario and refuses one whose start posture collides.
+fn load_checked(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
+    let resolved = load_scenario(path, overrides)?;
+    let cell = &resolved.cell;
+    let touching = ClearanceModel::new(cell).first_below(&resolved.start, |_| 0.0);
+    let Some(pair) = touching else {
+        return Ok(resolved);
+    };
+    let (a, b) = pair.solid_names(cell);
+    let depth_mm = -pair.separation.distance_m * 1e3;
+    let finding = Finding::new(
+        path.display().to_string(),
+        format!("the start posture collides: {a} is {depth_mm:.1} mm inside {b}"),
+    );
+    Err(vec![
+        finding
+            .key("start.joints_deg")
+            .hint("choose another start posture, or move what it hits"),
+    ])
 }
 
 fn overrides(arguments: &RobotArguments) -> Result<Overrides, Finding> {

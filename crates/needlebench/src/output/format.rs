@@ -21,13 +21,16 @@ pub(crate) fn millimetres(metres: f64) -> String {
     format!("{:.1}", metres * 1e3)
 }
 
-/// A value of a rejection or criterion in the unit that people use.
-pub(crate) fn value_with_unit(value: f64, unit: &str) -> String {
-    match unit {
-        "m" if value.abs() < 1e-3 && value != 0.0 => small_length(value),
-        "m" => format!("{:.1} mm", value * 1e3),
-        "rad" => format!("{:.3} deg", value.to_degrees()),
+/// A value and its limit, both in the same unit that people use.
+pub(crate) fn value_and_limit(value: f64, limit: f64, unit: &str) -> (String, String) {
+    let text = |value: f64| match unit {
+        // Limits of accuracy are far below those of clearance.
+        "m" if limit != 0.0 && limit.abs() < 1e-3 => small_length(value),
+        "m" => format!("{:.2} mm", value * 1e3),
+        "rad" => format!("{:.4} deg", value.to_degrees()),
+        "1" if value.fract() == 0.0 && limit.fract() == 0.0 => format!("{value}"),
         "1" => format!("{value:.4}"),
         unit => format!("{value:.3} {unit}"),
-    }
+    };
+    (text(value), text(limit))
 }

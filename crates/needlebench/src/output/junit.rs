@@ -4,7 +4,7 @@ use anyhow::Result;
 use needlebench_evaluation::report::{CriterionResult, Report, Status};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 
-use super::format::value_with_unit;
+use super::format::value_and_limit;
 
 /// Reports as one JUnit document. Contains no times: two runs give the same bytes.
 ///
@@ -80,13 +80,14 @@ fn described(result: &CriterionResult) -> String {
         .as_ref()
         .map_or(String::new(), |engine| format!(" ({engine})"));
     match (result.value, result.limit) {
-        (Some(value), Some(limit)) => format!(
-            "{}{engine}: {}, limit {} {}",
-            result.criterion,
-            value_with_unit(value, result.unit),
-            value_with_unit(limit, result.unit),
-            result.detail
-        ),
+        (Some(value), Some(limit)) => {
+            let (value, limit) = value_and_limit(value, limit, result.unit);
+            let text = format!(
+                "{}{engine}: {value}, limit {limit} {}",
+                result.criterion, result.detail
+            );
+            text.trim_end().to_owned()
+        }
         _ => format!("{}{engine}: {}", result.criterion, result.detail),
     }
 }

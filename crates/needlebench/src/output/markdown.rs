@@ -70,6 +70,18 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             )?;
         }
         writeln!(out)?;
+        for each in &goal.configurations {
+            if let Some(first) = each.rejections.first() {
+                writeln!(out, "- {}: {}: {}", each.label, first.rule, first.detail)?;
+            }
+        }
+        if goal
+            .configurations
+            .iter()
+            .any(|each| !each.rejections.is_empty())
+        {
+            writeln!(out)?;
+        }
         match &goal.recommended {
             Some(found) => writeln!(out, "Recommended: **{}** - {}\n", found.label, found.reason)?,
             None => writeln!(out, "No configuration works.\n")?,

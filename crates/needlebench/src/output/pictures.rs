@@ -16,6 +16,9 @@ use crate::picture::{Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceI
 const SIZE_PX: [u32; 2] = [1000, 750];
 /// Height of the arm's reach over its base, for framing, m.
 const REACH_M: f64 = 0.55;
+/// Share of a needle's direction that leads away from the robot, beyond which pictures look the
+/// same way.
+const FROM_ROBOT_SIDE: f64 = 0.75;
 /// Fineness of curved surfaces in pictures, m.
 const CHORD_ERROR_M: f64 = 3e-4;
 
@@ -177,7 +180,14 @@ fn viewpoint(resolved: &ResolvedScenario, goal: &Goal) -> Vector3<f64> {
     let forward = Vector3::new(ahead.x, ahead.y, 0.0)
         .try_normalize(1e-6)
         .unwrap_or(Vector3::y());
-    level * -0.75 + forward * -0.45 + Vector3::new(0.0, 0.0, -0.55)
+    // Back towards the robot, unless the needle comes so much from its side that the chest would
+    // hide the guide.
+    let along = if goal.axis.dot(&forward) > FROM_ROBOT_SIDE {
+        0.45
+    } else {
+        -0.45
+    };
+    level * -0.75 + forward * along + Vector3::new(0.0, 0.0, -0.55)
 }
 
 fn caption(report: &ConfigurationReport) -> String {

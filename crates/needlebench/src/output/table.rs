@@ -5,7 +5,7 @@ use std::fmt::Write;
 use comfy_table::{Cell, CellAlignment, Color, Table};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status, Verdict};
 
-use super::format::{millimetres, small_length, value_with_unit};
+use super::format::{millimetres, small_length, value_and_limit};
 
 /// A table without frame lines between rows.
 pub(crate) fn plain_table(header: &[&str]) -> Table {
@@ -27,6 +27,7 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
     for goal in &report.goals {
         writeln!(out, "{}", goal_heading(goal))?;
         writeln!(out, "{}", goal_table(goal))?;
+        writeln!(out, "* worst of those that work, < recommended")?;
         write_remarks(out, report, goal)?;
     }
     for failure in &report.engine_failures {
@@ -262,14 +263,11 @@ fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::f
     }
     for configuration in &goal.configurations {
         if let Some(rejection) = configuration.rejections.first() {
+            let (value, limit) = value_and_limit(rejection.value, rejection.limit, rejection.unit);
             writeln!(
                 out,
-                "{}: {}: {} (limit {}): {}",
-                configuration.label,
-                rejection.rule,
-                value_with_unit(rejection.value, rejection.unit),
-                value_with_unit(rejection.limit, rejection.unit),
-                rejection.detail
+                "{}: {}: {value} (limit {limit}): {}",
+                configuration.label, rejection.rule, rejection.detail
             )?;
         }
     }
@@ -278,21 +276,23 @@ fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::f
         .iter()
         .filter(|result| result.goal == goal.name && !result.pass)
     {
-        let about = [result.label.clone(), result.engine.clone()];
-        let about: Vec<String> = about.into_iter().flatten().collect();
-        let value = result
-            .value
-            .map_or("none".to_owned(), |v| value_with_unit(v, result.unit));
-        let limit = result.limit.map_or(String::new(), |limit| {
-            format!(": {value}, limit {}", value_with_unit(limit, result.unit))
+        let measured = result.value.zip(result.limit).map(|(value, limit)| {
+            let (value, limit) = value_and_limit(value, limit, result.unit);
+            format!("{value}, limit {limit}")
         });
-        writeln!(
-            out,
-            "FAILED {} {}{limit} {}",
-            about.join(" "),
-            result.criterion,
-            result.detail
-        )?;
+        let parts = [
+            result.label.clone(),
+            result.engine.clone(),
+            Some(format!("{}:", result.criterion)),
+            measured,
+            Some(result.detail.clone()),
+        ];
+        let parts: Vec<String> = parts
+            .into_iter()
+            .flatten()
+            .filter(|p| !p.is_empty())
+            .collect();
+        writeln!(out, "FAILED {}", parts.join(" "))?;
     }
     match &goal.recommended {
         Some(found) => writeln!(out, "recommended: {} - {}", found.label, found.reason),
