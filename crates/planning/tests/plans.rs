@@ -243,3 +243,26 @@ fn a_free_roll_turns_the_guide_but_not_the_needle() {
         "{rolls:?}"
     );
 }
+
+#[test]
+fn more_rolls_never_lose_a_configuration() {
+    let working = |roll_samples: u32| -> Vec<Configuration> {
+        let text = format!(
+            "{}\n[planning]\nroll_samples = {roll_samples}\n",
+            table_text()
+        );
+        let plan = plan(&scenario(&text));
+        let works = plan
+            .configurations
+            .iter()
+            .filter(|found| found.rejections.is_empty());
+        works.map(|found| found.configuration).collect()
+    };
+    // Every multiple of 30 degrees is one of 10 degrees too.
+    let (few, many) = (working(12), working(36));
+    assert!(!few.is_empty());
+    assert!(
+        few.iter().all(|configuration| many.contains(configuration)),
+        "{few:?} {many:?}"
+    );
+}
