@@ -45,6 +45,8 @@ pub struct Robot {
     pub limits: JointLimits,
     /// The URDF.
     pub source: ModelSource,
+    /// Its collision meshes, each once.
+    pub meshes: Vec<ModelSource>,
     /// What was assumed or replaced while the URDF was read; belongs in every report.
     pub notes: Vec<String>,
 }

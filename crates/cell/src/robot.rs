@@ -13,7 +13,7 @@ use crate::mesh::{convex_hull, read_stl};
 use crate::nominal::{body_in_frame_of, nominal_ur3, notes_on_limits};
 use crate::shape::{Shape, Solid, TriangleMesh, Visual};
 use crate::urdf::{Element, Geometry, JointKind, Urdf, UrdfJoint, UrdfLink};
-use crate::{Finding, Link, PackagePaths, Robot, nearest_name};
+use crate::{Finding, Link, ModelSource, PackagePaths, Robot, nearest_name};
 
 /// Short names of the seven links, base first.
 const LINK_LABELS: [&str; JOINT_COUNT + 1] = [
@@ -141,6 +141,7 @@ pub(crate) fn read_robot(
         bodies: bodies.try_into().expect("six bodies"),
         limits,
         source: source_of(location.display(), urdf.text.as_bytes()),
+        meshes: collision_meshes(&urdf, location, packages),
         notes,
     })
 }
@@ -519,6 +520,25 @@ fn shape_of(geometry: &Geometry) -> Option<Shape> {
         },
         Geometry::Mesh { .. } => return None,
     })
+}
+
+/// Files of the collision meshes with their hashes; those that cannot be read were refused before.
+fn collision_meshes(urdf: &Urdf, location: &Location, packages: &PackagePaths) -> Vec<ModelSource> {
+    let mut sources: Vec<ModelSource> = Vec::new();
+    for element in urdf.links.iter().flat_map(|link| &link.collisions) {
+        let Geometry::Mesh { filename, .. } = &element.geometry else {
+            continue;
+        };
+        let Ok(mesh) = location.mesh(filename, packages) else {
+            continue;
+        };
+        let Ok(bytes) = mesh.read() else { continue };
+        let source = source_of(mesh.display(), &bytes);
+        if !sources.contains(&source) {
+            sources.push(source);
+        }
+    }
+    sources
 }
 
 fn read_mesh(

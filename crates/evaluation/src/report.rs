@@ -286,7 +286,7 @@ pub struct Provenance {
 /// A file that went into a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct InputFile {
-    /// `scenario`, `robot`, `tool`, `phantom`.
+    /// `scenario`, `robot`, `robot mesh`, `tool`, `phantom`.
     pub role: &'static str,
     /// As named.
     pub file: String,

@@ -21,6 +21,8 @@ pub(crate) fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentit
         input("robot", &resolved.cell.robot.source),
         input("tool", &resolved.cell.tool.source),
     ];
+    let meshes = &resolved.cell.robot.meshes;
+    inputs.extend(meshes.iter().map(|source| input("robot mesh", source)));
     inputs.extend(
         resolved
             .phantom_source
