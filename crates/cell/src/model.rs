@@ -1,7 +1,9 @@
 //! The resolved cell: robot, tool and everything that can be hit.
 
 use nalgebra::Vector3;
-use needlebench_kinematics::{Body, Chain, Dynamics, JOINT_COUNT, JointLimits, Joints, Pose};
+use needlebench_kinematics::{
+    Body, Chain, Dynamics, JOINT_COUNT, JointLimits, Joints, Pose, base_from_base_link,
+};
 use serde::Serialize;
 
 use crate::shape::{Shape, Solid, Visual};
@@ -54,11 +56,8 @@ pub struct Robot {
 impl Robot {
     /// Controller's base frame in `base_link`: turned by 180 degrees about z.
     pub fn base_link_from_base() -> Pose {
-        // Exact: (0, 0, 1, 0) as a quaternion, where a rotation by `PI` would be off by 1.2e-16.
-        Pose::from_parts(
-            nalgebra::Translation3::identity(),
-            nalgebra::Unit::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 1.0)),
-        )
+        // Half a turn is its own inverse.
+        base_from_base_link()
     }
 
     /// Controller's base frame in the world.

@@ -179,14 +179,14 @@ pub fn check_configuration(
             String::new(),
         );
     }
-    for (class, limit_mm) in clearance_limits(&criteria.min_clearance_mm) {
+    for (class, key, limit_mm) in clearance_limits(&criteria.min_clearance_mm) {
         // A class that the cell has no part for cannot be violated.
         let Some(found) = configuration.clearance.classes.get(class) else {
             continue;
         };
         check(
             limit_mm.map(|mm| Criterion {
-                key: class,
+                key,
                 limit: mm * MM,
                 unit: "m",
                 at_least: true,
@@ -199,33 +199,25 @@ pub fn check_configuration(
             ),
         );
     }
-    for result in &mut results {
-        if result.criterion.starts_with("robot_")
-            || [
-                "self",
-                "tool_phantom",
-                "guide_standoff",
-                "needle_corridor",
-                "needle_route",
-            ]
-            .contains(&result.criterion.as_str())
-        {
-            result.criterion = format!("min_clearance_mm.{}", result.criterion);
-        }
-    }
     results
 }
 
-fn clearance_limits(limits: &ClearanceCriteria) -> [(&'static str, Option<f64>); 9] {
+/// Class, key of the scenario's `[criteria]`, and limit in mm.
+fn clearance_limits(limits: &ClearanceCriteria) -> [(&'static str, &'static str, Option<f64>); 9] {
+    macro_rules! limit {
+        ($class:literal, $limit:expr) => {
+            ($class, concat!("min_clearance_mm.", $class), $limit)
+        };
+    }
     [
-        ("robot_phantom", limits.robot_phantom),
-        ("robot_table", limits.robot_table),
-        ("robot_gantry", limits.robot_gantry),
-        ("robot_mount", limits.robot_mount),
-        ("self", limits.self_collision),
-        ("tool_phantom", limits.tool_phantom),
-        ("guide_standoff", limits.guide_standoff),
-        ("needle_corridor", limits.needle_corridor),
-        ("needle_route", limits.needle_route),
+        limit!("robot_phantom", limits.robot_phantom),
+        limit!("robot_table", limits.robot_table),
+        limit!("robot_gantry", limits.robot_gantry),
+        limit!("robot_mount", limits.robot_mount),
+        limit!("self", limits.self_collision),
+        limit!("tool_phantom", limits.tool_phantom),
+        limit!("guide_standoff", limits.guide_standoff),
+        limit!("needle_corridor", limits.needle_corridor),
+        limit!("needle_route", limits.needle_route),
     ]
 }

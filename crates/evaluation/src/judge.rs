@@ -147,18 +147,12 @@ pub fn recommend(configurations: &[ConfigurationReport]) -> Option<Recommendatio
         .iter()
         .filter(|each| clearance_steps(each) == clearance_steps(best))
         .count();
-    let pair = best
-        .clearance
-        .classes
-        .iter()
-        .filter(|(class, _)| counts_as_clearance(class))
-        .min_by(|a, b| a.1.minimum_m.total_cmp(&b.1.minimum_m))
-        .map_or(String::new(), |(_, found)| {
-            format!(
-                " ({} to {} in the {})",
-                found.pair[0], found.pair[1], found.phase
-            )
-        });
+    let pair = best.clearance.least().map_or(String::new(), |found| {
+        format!(
+            " ({} to {} in the {})",
+            found.pair[0], found.pair[1], found.phase
+        )
+    });
     let clearance_mm = 1e3 * best.clearance.minimum_m.unwrap_or(0.0);
     let margin = posture_margin(best);
     let reason = match (working.len(), equals) {
@@ -177,10 +171,4 @@ pub fn recommend(configurations: &[ConfigurationReport]) -> Option<Recommendatio
         label: best.label.to_owned(),
         reason,
     })
-}
-
-/// Classes that make up the least clearance of a configuration: physical bodies, but not the
-/// intended stand-off.
-pub fn counts_as_clearance(class: &str) -> bool {
-    !matches!(class, "guide_standoff" | "needle_corridor" | "needle_route")
 }

@@ -13,6 +13,6 @@ pub use clearance::{
     ClearanceSeries, measure_clearance, needle_route, posture_clearance, sample_indices,
 };
 pub use criteria::{Criterion, check_configuration};
-pub use judge::{counts_as_clearance, judge, recommend};
+pub use judge::{judge, recommend};
 pub use motion::{EngineDifference, MotionMeasurement, engine_difference, measure_motion};
 pub use needle::{NeedleMeasurement, measure_needle};

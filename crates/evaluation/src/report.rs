@@ -264,6 +264,33 @@ pub struct ClearanceReport {
     pub minimum_m: Option<f64>,
 }
 
+impl ClearanceReport {
+    /// Clearances by class with the least of those that count.
+    pub fn new(classes: BTreeMap<&'static str, ClassClearance>) -> Self {
+        let mut made = Self {
+            classes,
+            minimum_m: None,
+        };
+        made.minimum_m = made.least().map(|found| found.minimum_m);
+        made
+    }
+
+    /// The least clearance of physical bodies from each other, the guide's intended stand-off left
+    /// out.
+    pub fn least(&self) -> Option<&ClassClearance> {
+        self.classes
+            .iter()
+            .filter(|(class, _)| {
+                !matches!(
+                    **class,
+                    "guide_standoff" | "needle_corridor" | "needle_route"
+                )
+            })
+            .map(|(_, found)| found)
+            .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
+    }
+}
+
 /// Where a report's numbers come from.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Provenance {

@@ -102,6 +102,14 @@ impl UrGeometry {
         }
     }
 
+    /// How far wrist 2's centre lies ahead of the shoulder axis in the arm's plane, m.
+    ///
+    /// Positive with a right shoulder, negative with a left one; its magnitude is
+    /// `sqrt(rho^2 - d4^2)`, which is 0 where the two meet.
+    pub fn wrist_forward_m(&self, q: &Joints) -> f64 {
+        self.a2 * q[1].cos() + self.a3 * (q[1] + q[2]).cos() + self.d5 * (q[1] + q[2] + q[3]).sin()
+    }
+
     /// Nearest UR geometry of a chain, read off its joint axes at `q = 0`.
     ///
     /// # Errors
@@ -157,8 +165,9 @@ const PROBES: [[f64; 6]; 4] = [
     [1.5, -2.4, 2.0, -0.6, 0.8, 2.9],
 ];
 
-/// `base_link` in the controller's base frame: turned by 180 degrees about z, exactly.
-pub(crate) fn base_from_base_link() -> Pose {
+/// `base_link` in the controller's base frame, and the other way round: turned by 180 degrees about
+/// z. Exact, where a rotation by `PI` would be off by 1.2e-16.
+pub fn base_from_base_link() -> Pose {
     Pose::from_parts(
         Translation3::identity(),
         nalgebra::Unit::new_unchecked(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 1.0)),

@@ -17,7 +17,7 @@ pub mod trajectory;
 
 pub use chain::{Chain, ChainJoint};
 pub use dynamics::{Body, Dynamics};
-pub use geometry::{NotUrGeometry, UrGeometry};
+pub use geometry::{NotUrGeometry, UrGeometry, base_from_base_link};
 pub use limits::{JointLimit, JointLimits};
 pub use rotation::{pose_from_rotation_vector, rotation_angle_between, rotation_vector};
 

@@ -196,7 +196,7 @@ fn engine_report(
             &settled.world_from_flange,
         ),
         motion: measure_motion(cell, goal, trajectory, &run.recording, band_m),
-        clearance: clearance_report(
+        clearance: ClearanceReport::new(
             minima
                 .iter()
                 .map(|(class, found)| (class.name(), found.clone()))
@@ -230,14 +230,5 @@ fn overall_clearance(
             }
         }
     }
-    clearance_report(classes)
-}
-
-fn clearance_report(classes: BTreeMap<&'static str, ClassClearance>) -> ClearanceReport {
-    let minimum_m = classes
-        .iter()
-        .filter(|(class, _)| needlebench_evaluation::counts_as_clearance(class))
-        .map(|(_, found)| found.minimum_m)
-        .min_by(f64::total_cmp);
-    ClearanceReport { classes, minimum_m }
+    ClearanceReport::new(classes)
 }

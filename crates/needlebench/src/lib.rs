@@ -3,6 +3,7 @@
 //! Data goes to standard output, logs and progress to standard error.
 
 mod assemble;
+mod atomic;
 mod cli;
 mod command;
 pub mod exit;

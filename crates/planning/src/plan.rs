@@ -337,17 +337,12 @@ impl<'a> Planner<'a> {
     }
 
     fn margins(&self, q: &Joints) -> PostureMargins {
-        let geometry = &self.kinematics.geometry;
         let jacobian = self.kinematics.chain.jacobian(q);
-        // The wrist centre's distance from the shoulder axis, in the arm's plane.
-        let shoulder_m = geometry.a2 * q[1].cos()
-            + geometry.a3 * (q[1] + q[2]).cos()
-            + geometry.d5 * (q[1] + q[2] + q[3]).sin();
         PostureMargins {
             joint_limit: self.resolved.cell.robot.limits.margin(q),
             wrist_sine: q[4].sin().abs(),
             elbow_sine: q[2].sin().abs(),
-            shoulder_m: shoulder_m.abs(),
+            shoulder_m: self.kinematics.geometry.wrist_forward_m(q).abs(),
             manipulability: jacobian.determinant().abs(),
         }
     }

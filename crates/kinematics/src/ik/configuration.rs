@@ -90,11 +90,7 @@ impl Configuration {
 
     /// Configuration of a posture. A zero sine counts as positive.
     pub fn of(geometry: &UrGeometry, q: &Joints) -> Self {
-        // Wrist 1's centre seen along the arm's plane: to the right shoulder's front it is the
-        // positive root of equation 9.
-        let forward = geometry.a2 * q[1].cos()
-            + geometry.a3 * (q[1] + q[2]).cos()
-            + geometry.d5 * (q[1] + q[2] + q[3]).sin();
+        let forward = geometry.wrist_forward_m(q);
         let shoulder = if forward >= 0.0 {
             Shoulder::Right
         } else {

@@ -13,11 +13,12 @@ use needlebench_evaluation::report::{Report, Verdict};
 use serde::Serialize;
 
 use super::{load, overrides, print_json, print_text};
+use crate::atomic::write_atomically;
 use crate::cli::RunArguments;
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
-use crate::output::pictures::{Backdrop, configuration_picture, sheet_caption};
-use crate::output::{junit, markdown, recording_csv, report_text, write_atomically};
+use crate::output::pictures::{Backdrop, configuration_picture, goal_camera, sheet_caption};
+use crate::output::{junit, markdown, recording_csv, report_text};
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
 use crate::progress::Progress;
@@ -292,6 +293,7 @@ fn write_pictures(
 ) -> Result<()> {
     let backdrop = Backdrop::new(resolved);
     for (index, (goal, goal_report)) in resolved.goals.iter().zip(&report.goals).enumerate() {
+        let camera = goal_camera(resolved, goal);
         let next = AtomicUsize::new(0);
         let drawn: Mutex<Vec<(usize, Image)>> = Mutex::new(Vec::new());
         std::thread::scope(|scope| {
@@ -303,7 +305,7 @@ fn write_pictures(
                             break;
                         };
                         if let Some(image) =
-                            configuration_picture(resolved, &backdrop, goal, configuration)
+                            configuration_picture(resolved, &backdrop, &camera, goal, configuration)
                         {
                             drawn.lock().expect("no thread panics").push((at, image));
                         }

@@ -43,13 +43,8 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             let difference = each.engine_difference.map_or("-".to_owned(), |difference| {
                 small_length(difference.settled_tip_m)
             });
-            let least = each
-                .clearance
-                .classes
-                .iter()
-                .filter(|(class, _)| needlebench_evaluation::counts_as_clearance(class));
-            let least = least.min_by(|a, b| a.1.minimum_m.total_cmp(&b.1.minimum_m));
-            let (clearance, pair) = least.map_or(("-".to_owned(), "-".to_owned()), |(_, found)| {
+            let least = each.clearance.least();
+            let (clearance, pair) = least.map_or(("-".to_owned(), "-".to_owned()), |found| {
                 (millimetres(found.minimum_m), found.pair.join(", "))
             });
             let corridor = each

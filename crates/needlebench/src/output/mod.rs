@@ -1,6 +1,5 @@
 //! Output formats: terminal, JSON, JUnit, Markdown, CSV, pictures.
 
-mod atomic;
 pub(crate) mod findings;
 mod format;
 mod junit;
@@ -9,7 +8,6 @@ pub(crate) mod pictures;
 mod recording;
 mod table;
 
-pub(crate) use atomic::write_atomically;
 pub(crate) use junit::junit;
 pub(crate) use markdown::markdown;
 pub(crate) use recording::recording_csv;

@@ -79,6 +79,7 @@ fn add(surfaces: &mut Vec<SurfaceInstance>, visuals: &[Visual], world_from_paren
 pub(crate) fn configuration_picture(
     resolved: &ResolvedScenario,
     backdrop: &Backdrop,
+    camera: &Camera,
     goal: &Goal,
     report: &ConfigurationReport,
 ) -> Option<Image> {
@@ -107,13 +108,6 @@ pub(crate) fn configuration_picture(
         color_rgba: [0.0, 0.55, 0.2, 1.0],
         width_px: 3.0,
     });
-    // The nearest pair, from witness point to witness point.
-    let nearest = report
-        .clearance
-        .classes
-        .iter()
-        .filter(|(class, _)| needlebench_evaluation::counts_as_clearance(class))
-        .min_by(|a, b| a.1.minimum_m.total_cmp(&b.1.minimum_m));
     scene.labels.push(Label {
         text: caption(report),
         anchor: Anchor::TopLeft,
@@ -122,7 +116,7 @@ pub(crate) fn configuration_picture(
         text: "target".to_owned(),
         anchor: Anchor::World(goal.target_m),
     });
-    if let Some((_, found)) = nearest {
+    if let Some(found) = report.clearance.least() {
         scene.labels.push(Label {
             text: format!(
                 "least clearance {} mm\n{} - {}\n({})",
@@ -144,11 +138,15 @@ pub(crate) fn configuration_picture(
         radius_m: 1.6,
         spacing_m: 0.25,
     });
-    let camera = Camera::framing(&framed(resolved, goal), viewpoint(resolved, goal), SIZE_PX);
-    Some(render(&scene, &camera))
+    Some(render(&scene, camera))
 }
 
-/// Points that every picture of a goal shows, so that its pictures can be compared.
+/// The camera of all pictures of a goal, so that they can be compared.
+pub(crate) fn goal_camera(resolved: &ResolvedScenario, goal: &Goal) -> Camera {
+    Camera::framing(&framed(resolved, goal), viewpoint(resolved, goal), SIZE_PX)
+}
+
+/// Points that every picture of a goal shows.
 fn framed(resolved: &ResolvedScenario, goal: &Goal) -> Vec<Point3<f64>> {
     let base = Point3::from(resolved.cell.robot.world_from_base_link.translation.vector);
     let mut points = vec![goal.target_m];

@@ -1,8 +1,9 @@
 //! Images and their files.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+
+use crate::atomic::write_atomically;
 
 /// What can go wrong with pictures.
 #[derive(Debug, thiserror::Error)]
@@ -130,19 +131,9 @@ impl Image {
     /// Writes a PNG file: beside its place first and then renamed, so that nobody ever sees half
     /// of it.
     pub fn write_png(&self, path: &Path) -> Result<(), PictureError> {
-        let bytes = self.to_png()?;
-        let mut partial = path.as_os_str().to_owned();
-        partial.push(format!(".{}.partial", std::process::id()));
-        let partial = PathBuf::from(partial);
-        fs::write(&partial, bytes)
-            .and_then(|()| fs::rename(&partial, path))
-            .map_err(|source| {
-                // The error to report is the first one; a partial file that stays is only untidy.
-                let _ = fs::remove_file(&partial);
-                PictureError::Write {
-                    path: path.to_owned(),
-                    source,
-                }
-            })
+        write_atomically(path, &self.to_png()?).map_err(|source| PictureError::Write {
+            path: path.to_owned(),
+            source,
+        })
     }
 }
