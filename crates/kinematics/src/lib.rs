@@ -12,6 +12,8 @@ mod dynamics;
 mod geometry;
 pub mod ik;
 mod limits;
+mod manipulability;
+pub mod pose_sets;
 mod rotation;
 pub mod trajectory;
 

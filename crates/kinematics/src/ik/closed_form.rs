@@ -59,13 +59,54 @@ impl Unreachable {
     }
 }
 
+/// What an answer of the closed form is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Certificate {
+    /// Every branch was decided in double precision, beyond the error bounds: no branch is missing
+    /// and none is too many.
+    Complete,
+    /// As [`Certificate::Complete`], but a sign needed extended precision.
+    DecidedInExtendedPrecision,
+    /// Two or more configurations are one posture within the rounding of the pose.
+    MergedBranches,
+    /// Wrist 3 is free: a row stands for a family.
+    FreeJoint,
+    /// No configuration reaches the pose.
+    NearestOnly,
+}
+
 /// All configurations of one pose.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ClosedForm {
-    /// Those that exist.
-    pub solutions: Vec<ClosedFormSolution>,
-    /// Those that do not, and why.
-    pub unreachable: Vec<(Configuration, Unreachable)>,
+    /// By the index of a configuration in [`Configuration::ALL`].
+    solutions: [Option<ClosedFormSolution>; 8],
+    unreachable: [Option<Unreachable>; 8],
+    certificate: Certificate,
+}
+
+impl ClosedForm {
+    /// What the answer is worth.
+    pub fn certificate(&self) -> Certificate {
+        self.certificate
+    }
+
+    /// Configurations that exist, in the order of [`Configuration::ALL`].
+    pub fn solutions(&self) -> impl Iterator<Item = ClosedFormSolution> {
+        self.solutions.iter().flatten().copied()
+    }
+
+    /// One configuration, if it exists and is not the same posture as an earlier one.
+    pub fn solution(&self, configuration: Configuration) -> Option<ClosedFormSolution> {
+        self.solutions[configuration.index()]
+    }
+
+    /// Configurations that do not reach the pose, and why, in the order of [`Configuration::ALL`].
+    pub fn unreachable(&self) -> impl Iterator<Item = (Configuration, Unreachable)> {
+        Configuration::ALL
+            .into_iter()
+            .zip(self.unreachable)
+            .filter_map(|(configuration, reason)| Some((configuration, reason?)))
+    }
 }
 
 /// Solves `base_from_flange(q) = pose` for a nominal arm; `pose` is in the controller's base frame.
@@ -75,7 +116,11 @@ pub struct ClosedForm {
 /// the elbow reachable. Residual on 1e5 random poses: below 1e-14 m and rad away from
 /// singularities (`every_solution_reproduces_the_pose`).
 pub fn closed_form(geometry: &UrGeometry, pose: &Pose, seed: Option<&Joints>) -> ClosedForm {
-    let mut found = ClosedForm::default();
+    let mut found = ClosedForm {
+        solutions: [None; 8],
+        unreachable: [None; 8],
+        certificate: Certificate::Complete,
+    };
     let rotation = pose.rotation.to_rotation_matrix().into_inner();
     let position = pose.translation.vector;
     // Wrist 2's centre, from which wrist 3's axis leads to the flange.
@@ -86,9 +131,8 @@ pub fn closed_form(geometry: &UrGeometry, pose: &Pose, seed: Option<&Joints>) ->
     if root_squared < -rounding {
         let missing_m = geometry.d4.abs() - rho_squared.sqrt();
         let reason = Unreachable::WristTooNear { missing_m };
-        found
-            .unreachable
-            .extend(Configuration::ALL.map(|each| (each, reason)));
+        found.unreachable = [Some(reason); 8];
+        found.certificate = Certificate::NearestOnly;
         return found;
     }
     let shoulders_merge = root_squared <= rounding;
@@ -106,6 +150,13 @@ pub fn closed_form(geometry: &UrGeometry, pose: &Pose, seed: Option<&Joints>) ->
             merged: shoulders_merge,
         };
         frame.solve(geometry, &rotation, &centre, seed, &mut found);
+    }
+    if found.solutions().any(|solution| solution.wrist_3_is_free) {
+        found.certificate = Certificate::FreeJoint;
+    } else if found.solutions().any(|solution| solution.merged) {
+        found.certificate = Certificate::MergedBranches;
+    } else if found.solutions().next().is_none() {
+        found.certificate = Certificate::NearestOnly;
     }
     found
 }
@@ -166,7 +217,7 @@ impl ShoulderFrame {
         }
         if free {
             // Both signs of zero are the same wrist: `Unfold` would repeat `Fold`.
-            for solution in &mut found.solutions {
+            for solution in found.solutions.iter_mut().flatten() {
                 if solution.wrist_3_is_free {
                     solution.merged = true;
                 }
@@ -206,7 +257,7 @@ impl ShoulderFrame {
         };
         if let Some(reason) = unreachable {
             for elbow in [Elbow::Down, Elbow::Up] {
-                found.unreachable.push((configuration(elbow), reason));
+                found.unreachable[configuration(elbow).index()] = Some(reason);
             }
             return;
         }
@@ -223,7 +274,7 @@ impl ShoulderFrame {
             let q3 = s3.atan2(c3); // eq 33
             let q2 = r2.atan2(r1) - (a3 * s3).atan2(a2 + a3 * c3); // eq 34-36
             let q4 = q234 - q2 - q3; // eq 38
-            found.solutions.push(ClosedFormSolution {
+            found.solutions[configuration(elbow).index()] = Some(ClosedFormSolution {
                 configuration: configuration(elbow),
                 joints: Joints::from_column_slice(&[self.q1, q2, q3, q4, q5, q6].map(wrap_angle)),
                 wrist_3_is_free: free,

@@ -81,6 +81,23 @@ impl Configuration {
         }
     }
 
+    /// Position in [`Configuration::ALL`].
+    pub const fn index(self) -> usize {
+        let shoulder = match self.shoulder {
+            Shoulder::Right => 0,
+            Shoulder::Left => 4,
+        };
+        let wrist = match self.wrist {
+            Wrist::Fold => 0,
+            Wrist::Unfold => 2,
+        };
+        let elbow = match self.elbow {
+            Elbow::Down => 0,
+            Elbow::Up => 1,
+        };
+        shoulder + wrist + elbow
+    }
+
     /// Configuration with a label, if it is one of Table 2's.
     pub fn from_label(label: &str) -> Option<Self> {
         Self::ALL

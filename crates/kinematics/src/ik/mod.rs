@@ -5,10 +5,12 @@
 
 mod closed_form;
 mod configuration;
+mod damped;
 mod gauss_newton;
 mod solve;
+mod wraps;
 
-pub use closed_form::{ClosedForm, ClosedFormSolution, Unreachable, closed_form};
+pub use closed_form::{Certificate, ClosedForm, ClosedFormSolution, Unreachable, closed_form};
 pub use configuration::{Configuration, Elbow, Shoulder, Wrist};
 pub use gauss_newton::{GaussNewtonOptions, GaussNewtonResult, gauss_newton};
 pub use solve::{Kinematics, Solution, SolutionKind, Solutions};

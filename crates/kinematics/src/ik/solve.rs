@@ -2,7 +2,7 @@
 
 use super::gauss_newton::pose_error;
 use super::{
-    ClosedForm, ClosedFormSolution, Configuration, GaussNewtonOptions, Unreachable, closed_form,
+    Certificate, ClosedFormSolution, Configuration, GaussNewtonOptions, Unreachable, closed_form,
     gauss_newton,
 };
 use crate::geometry::base_from_base_link;
@@ -41,8 +41,13 @@ pub struct Solution {
 pub struct Solutions {
     /// Those that exist, in the order of [`Configuration::ALL`].
     pub solutions: Vec<Solution>,
+    /// Least-squares postures for a pose that no configuration reaches, nearest first. Never
+    /// solutions.
+    pub nearest: Vec<Solution>,
     /// Configurations that do not reach the pose, with the reason.
     pub unreachable: Vec<(Configuration, Unreachable)>,
+    /// What the answer is worth.
+    pub certificate: Certificate,
 }
 
 /// A row is exact below this: m and rad.
@@ -76,22 +81,15 @@ impl Kinematics {
     /// poses: at most 1e-12 m and rad (`every_solution_reproduces_the_pose`).
     pub fn solve(&self, base_link_from_flange: &Pose, seed: Option<&Joints>) -> Solutions {
         let base_from_flange = base_from_base_link() * base_link_from_flange;
-        let ClosedForm {
-            solutions,
-            unreachable,
-        } = closed_form(&self.geometry, &base_from_flange, seed);
-        let mut solutions: Vec<Solution> = solutions
-            .iter()
-            .map(|solution| self.refined(base_link_from_flange, solution))
-            .collect();
-        solutions.sort_by_key(|solution| {
-            Configuration::ALL
-                .iter()
-                .position(|each| *each == solution.configuration)
-        });
+        let found = closed_form(&self.geometry, &base_from_flange, seed);
         Solutions {
-            solutions,
-            unreachable,
+            solutions: found
+                .solutions()
+                .map(|solution| self.refined(base_link_from_flange, &solution))
+                .collect(),
+            nearest: Vec::new(),
+            unreachable: found.unreachable().collect(),
+            certificate: found.certificate(),
         }
     }
 

@@ -1,0 +1,1 @@
+//! Damped, restarted numerical inverse kinematics.

@@ -1,0 +1,1 @@
+//! Whole turns of a posture within joint limits.

@@ -1,0 +1,1 @@
+//! Manipulability and distances to singularities.

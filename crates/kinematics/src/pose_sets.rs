@@ -1,0 +1,200 @@
+//! Sets of postures on which inverse kinematics is tested, measured and compared.
+//!
+//! Generic postures, and those on which solvers fail: the three singularities of a UR arm, their
+//! combinations, and joints at multiples of 90 degrees; each exact or a small distance away.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use crate::{Joints, Pose, UrGeometry};
+
+/// A set of postures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum PoseSet {
+    /// Every joint uniform in `(-pi, pi)`.
+    Generic,
+    /// `q5` is 0 or pi: wrist 3 is free.
+    Wrist,
+    /// `q3` is 0 or pi: elbow up and elbow down meet.
+    Elbow,
+    /// `rho = d4`: the wrist centre lies at its least distance from the shoulder axis, where right
+    /// and left shoulder meet.
+    Shoulder,
+    /// [`PoseSet::Wrist`] and [`PoseSet::Elbow`].
+    WristElbow,
+    /// [`PoseSet::Wrist`] and [`PoseSet::Shoulder`].
+    WristShoulder,
+    /// [`PoseSet::Elbow`] and [`PoseSet::Shoulder`].
+    ElbowShoulder,
+    /// All three.
+    WristElbowShoulder,
+    /// Every joint a multiple of 90 degrees.
+    QuarterTurns,
+}
+
+impl PoseSet {
+    /// All sets, the generic one first.
+    pub const ALL: [Self; 9] = [
+        Self::Generic,
+        Self::Wrist,
+        Self::Elbow,
+        Self::Shoulder,
+        Self::WristElbow,
+        Self::WristShoulder,
+        Self::ElbowShoulder,
+        Self::WristElbowShoulder,
+        Self::QuarterTurns,
+    ];
+
+    /// What reports call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Generic => "generic",
+            Self::Wrist => "wrist (q5 = 0, pi)",
+            Self::Elbow => "elbow (q3 = 0, pi)",
+            Self::Shoulder => "shoulder (rho = d4)",
+            Self::WristElbow => "wrist and elbow",
+            Self::WristShoulder => "wrist and shoulder",
+            Self::ElbowShoulder => "elbow and shoulder",
+            Self::WristElbowShoulder => "wrist, elbow and shoulder",
+            Self::QuarterTurns => "multiples of 90 degrees",
+        }
+    }
+
+    /// One posture of the set, every joint then moved by up to `away_rad` either way.
+    ///
+    /// Exactly singular for `away_rad = 0`, within the rounding of the joints.
+    pub fn sample(self, geometry: &UrGeometry, random: &mut SplitMix64, away_rad: f64) -> Joints {
+        let exact = match self {
+            Self::Generic => uniform(random),
+            Self::QuarterTurns => {
+                Joints::from_fn(|_, _| f64::from(random.below(4)) * FRAC_PI_2 - FRAC_PI_2)
+            }
+            _ => self.singular(geometry, random),
+        };
+        exact.map(|joint| joint + away_rad * random.uniform(-1.0, 1.0))
+    }
+
+    fn singular(self, geometry: &UrGeometry, random: &mut SplitMix64) -> Joints {
+        let zero_or_pi = |random: &mut SplitMix64| f64::from(random.below(2)) * PI;
+        loop {
+            let mut q = uniform(random);
+            if matches!(
+                self,
+                Self::Wrist | Self::WristElbow | Self::WristShoulder | Self::WristElbowShoulder
+            ) {
+                q[4] = zero_or_pi(random);
+            }
+            if matches!(
+                self,
+                Self::Elbow | Self::WristElbow | Self::ElbowShoulder | Self::WristElbowShoulder
+            ) {
+                q[2] = zero_or_pi(random);
+            }
+            if matches!(
+                self,
+                Self::Shoulder
+                    | Self::WristShoulder
+                    | Self::ElbowShoulder
+                    | Self::WristElbowShoulder
+            ) {
+                // Wrist 4 places the wrist centre on the plane through the shoulder axis:
+                // a2 c2 + a3 c23 + d5 s234 = 0.
+                let forward = geometry.a2 * q[1].cos() + geometry.a3 * (q[1] + q[2]).cos();
+                let s234 = -forward / geometry.d5;
+                if s234.abs() > 1.0 {
+                    continue;
+                }
+                let c234 = (1.0 - s234 * s234).sqrt();
+                let c234 = if random.below(2) == 0 { c234 } else { -c234 };
+                q[3] = s234.atan2(c234) - q[1] - q[2];
+            }
+            return q;
+        }
+    }
+}
+
+fn uniform(random: &mut SplitMix64) -> Joints {
+    Joints::from_fn(|_, _| random.uniform(-PI, PI))
+}
+
+/// The pose with position and orientation rounded to single precision, as files and message types
+/// of 32-bit floats deliver it. The quaternion is normalised again.
+pub fn rounded_to_f32(pose: &Pose) -> Pose {
+    #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
+    let round = |value: f64| f64::from(value as f32);
+    let q = pose.rotation;
+    Pose::from_parts(
+        pose.translation.vector.map(round).into(),
+        nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(
+            round(q.w),
+            round(q.i),
+            round(q.j),
+            round(q.k),
+        )),
+    )
+}
+
+/// Reproducible random numbers: Steele, Lea and Flood, *Fast splittable pseudorandom number
+/// generators*, 2014.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SplitMix64(u64);
+
+impl SplitMix64 {
+    /// Starts a sequence.
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// Next 64 bits.
+    pub fn next_u64(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in `[low, high)`.
+    pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        let unit = (self.next_u64() >> 11) as f64 * (0.5_f64).powi(53);
+        low + (high - low) * unit
+    }
+
+    /// Uniform in `0..bound`.
+    ///
+    /// # Panics
+    /// If `bound` is zero.
+    pub fn below(&mut self, bound: u32) -> u32 {
+        u32::try_from((u64::from(bound) * (self.next_u64() >> 32)) >> 32)
+            .expect("less than the bound")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rounding of the three products in the shoulder's condition.
+    const FORWARD_M: f64 = 1e-15;
+
+    #[test]
+    fn sets_are_where_they_say() {
+        let ur3 = UrGeometry::UR3;
+        let mut random = SplitMix64::new(1);
+        for _ in 0..1000 {
+            let q = PoseSet::WristElbowShoulder.sample(&ur3, &mut random, 0.0);
+            assert!(ur3.wrist_forward_m(&q).abs() < FORWARD_M);
+            assert!(q[2].sin().abs() < 1e-15 && q[4].sin().abs() < 1e-15);
+            let near = PoseSet::Wrist.sample(&ur3, &mut random, 1e-6);
+            assert!(near[4].sin().abs() <= 1e-6 && near[4].sin() != 0.0);
+        }
+    }
+
+    #[test]
+    fn the_generator_gives_the_published_sequence() {
+        // First outputs for seed 1234567 of the authors' reference implementation.
+        let mut random = SplitMix64::new(1234567);
+        assert_eq!(random.next_u64(), 6457827717110365317);
+        assert_eq!(random.next_u64(), 3203168211198807973);
+    }
+}
