@@ -110,6 +110,21 @@ impl UrGeometry {
         self.a2 * q[1].cos() + self.a3 * (q[1] + q[2]).cos() + self.d5 * (q[1] + q[2] + q[3]).sin()
     }
 
+    /// `q2` and `q3` that bring wrist 1 to `(ahead, up)` of the shoulder in the arm's plane, with
+    /// the given sign of `sin q3` (equations 31 to 36); clamped where the elbow does not close.
+    pub(crate) fn elbow(&self, ahead_m: f64, up_m: f64, sign: f64) -> (f64, f64) {
+        let (a2, a3) = (self.a2, self.a3);
+        let reach_squared = ahead_m.powi(2) + up_m.powi(2);
+        // Without cancellation at the stretched and at the folded elbow.
+        let one_minus = ((a2 + a3).powi(2) - reach_squared) / (2.0 * a2 * a3);
+        let one_plus = (reach_squared - (a2 - a3).powi(2)) / (2.0 * a2 * a3);
+        let c3 = (0.5 * (one_plus - one_minus)).clamp(-1.0, 1.0);
+        let s3 = sign * (one_minus * one_plus).max(0.0).sqrt();
+        let (bx, by) = (a2 + a3 * c3, a3 * s3);
+        let q2 = (up_m * bx - ahead_m * by).atan2(ahead_m * bx + up_m * by);
+        (q2, s3.atan2(c3))
+    }
+
     /// Nearest UR geometry of a chain, read off its joint axes at `q = 0`.
     ///
     /// # Errors

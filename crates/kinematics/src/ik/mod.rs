@@ -10,7 +10,10 @@ mod gauss_newton;
 mod solve;
 mod wraps;
 
-pub use closed_form::{Certificate, ClosedForm, ClosedFormSolution, Unreachable, closed_form};
+pub use closed_form::{
+    Certificate, ClosedForm, ClosedFormSolution, FreeWrist, Preference, Unreachable, closed_form,
+    closed_form_batch, closed_form_into,
+};
 pub use configuration::{Configuration, Elbow, Shoulder, Wrist};
 pub use gauss_newton::{GaussNewtonOptions, GaussNewtonResult, gauss_newton};
 pub use solve::{Kinematics, Solution, SolutionKind, Solutions};

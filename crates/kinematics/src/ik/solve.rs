@@ -88,7 +88,9 @@ impl Kinematics {
                 .map(|solution| self.refined(base_link_from_flange, &solution))
                 .collect(),
             nearest: Vec::new(),
-            unreachable: found.unreachable().collect(),
+            unreachable: found
+                .unreachable(&self.geometry, &base_from_flange)
+                .collect(),
             certificate: found.certificate(),
         }
     }

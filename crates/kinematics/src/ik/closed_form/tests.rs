@@ -1,0 +1,281 @@
+//! Vectors against scalars, fast against careful, families against scans.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+
+use super::super::{Elbow, wrap_angle};
+use super::*;
+use crate::pose_sets::{PoseSet, SplitMix64, rounded_to_f32};
+use crate::{JointLimit, rotation_angle_between};
+
+const UR3: UrGeometry = UrGeometry::UR3;
+
+/// Twice the worst residual seen over 1e6 generic and singular poses, m and rad: rounding of the
+/// rows and of this check's forward kinematics.
+const RESIDUAL: f64 = 1e-14;
+
+/// Vector widths differ by the order of two roundings; conditioning within the fast path's bounds
+/// raises that to this, rad. Away from singularities by 0.1 rad it is 2e-14.
+const LEVELS_AGREE_RAD: f64 = 1e-10;
+
+fn residual(pose: &Pose, q: &Joints) -> f64 {
+    let found = UR3.base_from_flange(q);
+    (found.translation.vector - pose.translation.vector)
+        .norm()
+        .max(rotation_angle_between(&found.rotation, &pose.rotation))
+}
+
+fn difference(a: &Joints, b: &Joints) -> f64 {
+    (a - b).map(|d| wrap_angle(d).abs()).max()
+}
+
+/// Every level of vector instructions that this machine has.
+fn levels() -> Vec<Level> {
+    let best = Level::new();
+    #[cfg(target_arch = "x86_64")]
+    let narrower = [
+        best.as_sse2().map(Simd::level),
+        best.as_sse4_2().map(Simd::level),
+        best.as_avx2().map(Simd::level),
+    ];
+    #[cfg(not(target_arch = "x86_64"))]
+    let narrower: [Option<Level>; 0] = [];
+    narrower
+        .into_iter()
+        .flatten()
+        .chain([best, Level::baseline()])
+        .collect()
+}
+
+fn solved(level: Level, pose: &Pose) -> ClosedForm {
+    let mut out = ClosedForm::BLANK;
+    solve_at(level, &UR3, pose, Preference::default(), &mut out);
+    out
+}
+
+#[test]
+fn all_widths_give_the_same_rows() {
+    let mut random = SplitMix64::new(21);
+    for _ in 0..2000 {
+        let q = PoseSet::Generic.sample(&UR3, &mut random, 0.0);
+        let pose = UR3.base_from_flange(&q);
+        let reference = solved(Level::baseline(), &pose);
+        for level in levels() {
+            let found = solved(level, &pose);
+            assert_eq!(found.certificate(), reference.certificate());
+            assert_eq!(found.exists, reference.exists);
+            for (a, b) in found.solutions().zip(reference.solutions()) {
+                assert!(difference(&a.joints, &b.joints) < LEVELS_AGREE_RAD);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_batch_gives_the_rows_of_single_poses() {
+    let mut random = SplitMix64::new(22);
+    // Not a multiple of any width, with singular poses in between.
+    let poses: Vec<Pose> = (0..203)
+        .map(|i| {
+            let set = PoseSet::ALL[if i % 5 == 0 {
+                i % PoseSet::ALL.len()
+            } else {
+                0
+            }];
+            UR3.base_from_flange(&set.sample(&UR3, &mut random, 0.0))
+        })
+        .collect();
+    for level in levels() {
+        let mut batch = vec![ClosedForm::BLANK; poses.len()];
+        batch_at(level, &UR3, &poses, Preference::default(), &mut batch);
+        for (pose, found) in poses.iter().zip(&batch) {
+            let single = solved(level, pose);
+            assert_eq!(found.certificate(), single.certificate());
+            assert_eq!(found.exists, single.exists);
+            for (a, b) in found.solutions().zip(single.solutions()) {
+                assert!(difference(&a.joints, &b.joints) < LEVELS_AGREE_RAD);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_row_of_every_set_solves_its_pose() {
+    let mut random = SplitMix64::new(23);
+    for set in PoseSet::ALL {
+        for away_rad in [0.0, 1e-9, 1e-7, 1e-5, 1e-3] {
+            for single_precision in [false, true] {
+                for _ in 0..100 {
+                    let q = set.sample(&UR3, &mut random, away_rad);
+                    let mut pose = UR3.base_from_flange(&q);
+                    if single_precision {
+                        pose = rounded_to_f32(&pose);
+                    }
+                    for row in closed_form(&UR3, &pose, Some(&q)).solutions() {
+                        let residual = residual(&pose, &row.joints);
+                        assert!(residual <= RESIDUAL, "{set:?} {away_rad:e}: {residual:e}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_posture_of_an_exactly_singular_pose_is_found() {
+    // Rounding of a pose moves a double root by its square root.
+    const DOUBLE_ROOT_RAD: f64 = 1e-6;
+    let mut random = SplitMix64::new(24);
+    for set in PoseSet::ALL {
+        let (mut lost, count) = (0, 1000);
+        for _ in 0..count {
+            let q = set.sample(&UR3, &mut random, 0.0);
+            let pose = UR3.base_from_flange(&q);
+            let found = closed_form(&UR3, &pose, Some(&q));
+            lost += usize::from(
+                !found
+                    .solutions()
+                    .any(|row| difference(&row.joints, &q) < DOUBLE_ROOT_RAD),
+            );
+        }
+        // Postures whose other singularity is near by chance lose more digits than the bound.
+        assert!(lost <= count / 50, "{set:?}: {lost} of {count}");
+    }
+}
+
+#[test]
+fn the_careful_path_confirms_the_fast_one() {
+    let mut random = SplitMix64::new(25);
+    for _ in 0..3000 {
+        let q = PoseSet::Generic.sample(&UR3, &mut random, 0.0);
+        let pose = UR3.base_from_flange(&q);
+        let fast = closed_form(&UR3, &pose, None);
+        let mut careful = ClosedForm::BLANK;
+        careful::solve(&UR3, &pose, Preference::default(), &mut careful);
+        assert_eq!(fast.certificate(), careful.certificate());
+        assert_eq!(fast.exists, careful.exists);
+        for (a, b) in fast.solutions().zip(careful.solutions()) {
+            assert!(difference(&a.joints, &b.joints) < LEVELS_AGREE_RAD);
+        }
+        assert_eq!(
+            fast.count() as usize + fast.unreachable(&UR3, &pose).count(),
+            8
+        );
+    }
+}
+
+/// The bounds under `CERTAIN_*` in `lanes`: what the fast path computes for poses at its edge is
+/// off from extended precision by less than the margin that makes its signs certain.
+#[test]
+fn bounds_of_the_fast_path_hold() {
+    let mut random = SplitMix64::new(26);
+    let mut edge = 0;
+    for _ in 0..20_000 {
+        let set = PoseSet::ALL[1 + random.below(7) as usize];
+        let away_rad = 10.0_f64.powf(random.uniform(-5.0, -2.0));
+        let q = set.sample(&UR3, &mut random, away_rad);
+        let pose = UR3.base_from_flange(&q);
+        let mut fast = ClosedForm::BLANK;
+        if !dispatch!(*LEVEL, simd => lanes::one_pose(simd, &UR3, &pose, &mut fast)) {
+            continue;
+        }
+        edge += 1;
+        let mut careful = ClosedForm::BLANK;
+        careful::solve(&UR3, &pose, Preference::default(), &mut careful);
+        assert_eq!(fast.exists, careful.exists, "{q}");
+        // sin q3 is off by the error of its square over twice itself.
+        for row in fast.solutions() {
+            assert!(residual(&pose, &row.joints) <= RESIDUAL);
+        }
+    }
+    assert!(edge > 2000, "{edge} poses at the edge");
+}
+
+#[test]
+fn a_pose_that_is_not_finite_has_no_rows() {
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut pose = UR3.base_from_flange(&Joints::repeat(0.4));
+        pose.translation = Translation3::new(bad, 0.1, 0.2);
+        let found = closed_form(&UR3, &pose, None);
+        assert_eq!(found.count(), 0);
+        assert!(
+            found
+                .unreachable(&UR3, &pose)
+                .all(|(_, reason)| reason == Unreachable::NotFinite)
+        );
+        pose = UR3.base_from_flange(&Joints::repeat(0.4));
+        pose.rotation = UnitQuaternion::new_unchecked(Quaternion::new(bad, 0.0, 0.0, 0.0));
+        assert_eq!(closed_form(&UR3, &pose, None).count(), 0);
+    }
+}
+
+#[test]
+fn a_family_is_where_its_members_are() {
+    let mut random = SplitMix64::new(27);
+    let mut families = 0;
+    for _ in 0..300 {
+        let q = PoseSet::Wrist.sample(&UR3, &mut random, 0.0);
+        let pose = UR3.base_from_flange(&q);
+        let found = closed_form(&UR3, &pose, Some(&q));
+        for shoulder in [Shoulder::Right, Shoulder::Left] {
+            let Some(family) = found.free_wrist(&UR3, &pose, shoulder) else {
+                continue;
+            };
+            families += 1;
+            let inside = |q6: f64| {
+                family.intervals_rad().any(|(from, to)| {
+                    let turned = from + (q6 - from).rem_euclid(2.0 * PI);
+                    turned <= to
+                })
+            };
+            for step in 0..72 {
+                let q6 = -PI + 0.01 + f64::from(step) * PI / 36.0;
+                let member = family.member(Elbow::Up, q6);
+                // Near the ends of an interval both may be right within rounding.
+                let solves = residual(&pose, &member) < 1e-9;
+                assert_eq!(solves, inside(q6), "{family:?} {q6}");
+            }
+            // The nearest is a member, and no reachable one is nearer.
+            let wanted = random.uniform(-PI, PI);
+            let nearest = family.nearest_q6(wanted).expect("the family is not empty");
+            assert!(residual(&pose, &family.member(Elbow::Down, nearest)) < RESIDUAL);
+            let distance = wrap_angle(nearest - wanted).abs();
+            let nearer = (1..100).any(|step| {
+                let ahead = distance * 0.99 * f64::from(step) / 100.0;
+                inside(wanted + ahead) || inside(wanted - ahead)
+            });
+            assert!(distance < 1e-12 || !nearer);
+        }
+    }
+    assert!(families > 100);
+}
+
+#[test]
+fn a_free_wrist_keeps_joint_limits_where_it_can() {
+    // Wrist 1 confined to a quarter turn.
+    let wide = JointLimit {
+        lower_rad: -2.0 * PI,
+        upper_rad: 2.0 * PI,
+        velocity_rad_s: 1.0,
+        effort_nm: 1.0,
+    };
+    let mut limits = JointLimits([wide; 6]);
+    limits.0[3].lower_rad = -1.0;
+    limits.0[3].upper_rad = 0.5;
+    let q = Joints::from_column_slice(&[0.3, -1.2, 1.4, -0.5, 0.0, 0.8]);
+    let pose = UR3.base_from_flange(&q);
+    let far = Joints::from_column_slice(&[0.3, -1.2, 1.4, 1.5, 0.0, 2.8]);
+    let preference = Preference {
+        seed: Some(&far),
+        limits: Some(&limits),
+    };
+    let mut out = ClosedForm::BLANK;
+    closed_form_into(&UR3, &pose, preference, &mut out);
+    let inside = |row: &ClosedFormSolution| limits.first_violation(&row.joints).is_none();
+    assert!(out.solutions().any(|row| inside(&row)));
+    assert!(
+        out.solutions()
+            .all(|row| residual(&pose, &row.joints) < RESIDUAL)
+    );
+}
