@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
+use crate::pose_sets::{PoseSet, SplitMix64};
 use crate::{Chain, ChainJoint, Joints, Pose, rotation_angle_between};
 
 /// Standard Denavit-Hartenberg lengths of a UR arm, m.
@@ -37,6 +38,10 @@ pub struct NotUrGeometry {
     /// Largest angle error over the probed postures, rad.
     pub angle_error_rad: f64,
 }
+
+/// A chain within this of its nominal geometry is a nominal one, m: URDFs print angles to ten
+/// digits.
+const NOMINAL_M: f64 = 1e-8;
 
 /// A chain within this of a nominal UR arm is a calibrated one: six real UR3s differ from nominal
 /// by at most 3.2 mm at a tip 200 mm beyond the flange.
@@ -150,6 +155,12 @@ impl UrGeometry {
             d5,
             d6,
         };
+        // A nominal chain is read off exactly; a calibrated one is fitted.
+        let geometry = if geometry.position_error_m(chain, &PROBES[1]) < NOMINAL_M {
+            geometry
+        } else {
+            geometry.fitted(chain)
+        };
         let (mut position_error_m, mut angle_error_rad): (f64, f64) = (0.0, 0.0);
         for probe in PROBES {
             let q = Joints::from_column_slice(&probe);
@@ -169,6 +180,95 @@ impl UrGeometry {
                 angle_error_rad,
             })
         }
+    }
+}
+
+impl UrGeometry {
+    fn lengths(&self) -> Joints {
+        Joints::new(self.d1, self.a2, self.a3, self.d4, self.d5, self.d6)
+    }
+
+    fn of_lengths(lengths: &Joints) -> Self {
+        Self {
+            d1: lengths[0],
+            a2: lengths[1],
+            a3: lengths[2],
+            d4: lengths[3],
+            d5: lengths[4],
+            d6: lengths[5],
+        }
+    }
+
+    fn position_error_m(&self, chain: &Chain, q: &[f64; 6]) -> f64 {
+        let q = Joints::from_column_slice(q);
+        let nominal = self.base_from_flange(&q).translation.vector;
+        let actual = base_from_base_link() * chain.base_link_from_flange(&q);
+        (nominal - actual.translation.vector).norm()
+    }
+
+    /// Lengths that place the flange best over many postures, in the sense of least squares. The
+    /// flange's position is linear in the lengths, so this takes one step.
+    fn fitted(&self, chain: &Chain) -> Self {
+        const POSTURES: u32 = 64;
+        let mut random = SplitMix64::new(1);
+        let mut normal = nalgebra::Matrix6::zeros();
+        let mut right = nalgebra::Vector6::zeros();
+        for _ in 0..POSTURES {
+            let q = PoseSet::Generic.sample(self, &mut random, 0.0);
+            let actual = base_from_base_link() * chain.base_link_from_flange(&q);
+            let columns: [Vector3<f64>; 6] = std::array::from_fn(|i| {
+                let unit = Joints::from_fn(|k, _| if k == i { 1.0 } else { 0.0 });
+                Self::of_lengths(&unit)
+                    .base_from_flange(&q)
+                    .translation
+                    .vector
+            });
+            for i in 0..6 {
+                right[i] += columns[i].dot(&actual.translation.vector);
+                for k in 0..6 {
+                    normal[(i, k)] += columns[i].dot(&columns[k]);
+                }
+            }
+        }
+        // Six lengths act in different directions over 64 postures, so that the factor exists.
+        normal
+            .cholesky()
+            .map_or(*self, |factor| Self::of_lengths(&factor.solve(&right)))
+    }
+}
+
+/// How far a chain is from its nominal geometry, at most over many postures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mismatch {
+    /// Of the flange's position, m.
+    pub position_m: f64,
+    /// Of the flange's orientation, rad.
+    pub angle_rad: f64,
+}
+
+impl Mismatch {
+    pub(crate) fn of(chain: &Chain, geometry: &UrGeometry) -> Self {
+        let mut random = SplitMix64::new(2);
+        let mut most = Self {
+            position_m: 0.0,
+            angle_rad: 0.0,
+        };
+        for _ in 0..64 {
+            let q = PoseSet::Generic.sample(geometry, &mut random, 0.0);
+            let nominal = geometry.base_from_flange(&q);
+            let actual = base_from_base_link() * chain.base_link_from_flange(&q);
+            let shift = nominal.translation.vector - actual.translation.vector;
+            most.position_m = most.position_m.max(shift.norm());
+            most.angle_rad = most
+                .angle_rad
+                .max(rotation_angle_between(&nominal.rotation, &actual.rotation));
+        }
+        most
+    }
+
+    /// The chain is a nominal arm, but for the digits that a file prints.
+    pub(crate) fn is_nominal(&self) -> bool {
+        self.position_m.max(self.angle_rad) < NOMINAL_M
     }
 }
 

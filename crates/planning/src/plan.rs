@@ -552,6 +552,10 @@ fn unreachable_detail(reason: needlebench_kinematics::ik::Unreachable) -> String
         Unreachable::WristTooNear { .. } => "the wrist is too near to the shoulder axis",
         Unreachable::ElbowTooShort { .. } => "upper arm and forearm are too short",
         Unreachable::ElbowTooLong { .. } => "the elbow cannot fold so far",
+        Unreachable::NoCounterpart { .. } => {
+            "the nominal arm reaches the pose, the calibrated one does not"
+        }
+        Unreachable::NotFinite => "the pose is not finite",
     }
     .to_owned()
 }

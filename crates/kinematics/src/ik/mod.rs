@@ -3,6 +3,7 @@
 //! Equation numbers are those of Abdelaziz, Luo, Jiang and Chen, *Multiple configurations for
 //! puncturing robot positioning*, in corrected form where the printed one is wrong.
 
+mod calibrated;
 mod closed_form;
 mod configuration;
 mod damped;
@@ -33,5 +34,7 @@ pub fn wrap_angle(angle_rad: f64) -> f64 {
     }
 }
 
+#[cfg(test)]
+mod calibrated_tests;
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@
 
 mod atan2;
 mod careful;
+mod clamped;
 mod extended;
 mod family;
 mod lanes;
@@ -14,6 +15,8 @@ use std::sync::LazyLock;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch};
 
+pub(super) use careful::unreachable;
+pub(super) use clamped::clamped;
 pub use family::FreeWrist;
 
 use super::{Configuration, Shoulder};
@@ -91,6 +94,9 @@ pub enum Certificate {
     MergedBranches,
     /// Wrist 3 is free within the rounding of the pose: a row stands for a family.
     FreeJoint,
+    /// Rows of a calibrated chain, refined numerically from the nominal arm's: each is a solution,
+    /// but that none is missing is only measured, not certain ([`super::Kinematics::solve`]).
+    Refined,
     /// No configuration reaches the pose; there is only a nearest posture.
     NearestOnly,
 }
