@@ -184,10 +184,6 @@ impl UrGeometry {
 }
 
 impl UrGeometry {
-    fn lengths(&self) -> Joints {
-        Joints::new(self.d1, self.a2, self.a3, self.d4, self.d5, self.d6)
-    }
-
     fn of_lengths(lengths: &Joints) -> Self {
         Self {
             d1: lengths[0],

@@ -195,11 +195,10 @@ impl Calibrated<'_> {
         let before = self.chain.jacobian(&(q - v * STEP_RAD));
         let kappa = u.dot(&((moved - before) * v)) / (2.0 * STEP_RAD);
         let way = -2.0 * sigma / kappa;
-        // Written so that a quotient of zeros fails too.
-        if !(way.abs() <= FARTHEST_RAD) {
-            return None;
-        }
-        self.newton(&(q + v * way))
+        // A quotient of zeros is not in range either.
+        (-FARTHEST_RAD..=FARTHEST_RAD)
+            .contains(&way)
+            .then(|| self.newton(&(q + v * way)))?
     }
 
     fn nudged(&self, pose: &Pose, size: f64, random: &mut SplitMix64) -> Pose {

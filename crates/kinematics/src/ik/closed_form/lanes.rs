@@ -180,6 +180,28 @@ fn fold_elbows<S: Simd, V: SimdFloat<S, Element = f64>>(
     elbows(simd, g, ahead, up)
 }
 
+/// `q2`, `q3` and `q4` for a positive and for a negative `sin q3`.
+#[inline(always)]
+fn elbow_angles<S: Simd, V: SimdFloat<S, Element = f64>>(
+    simd: S,
+    elbows: &Elbows<V>,
+    q234: V,
+) -> [[V; 2]; 3] {
+    let [c3, s3] = elbows.cos_sin_3;
+    let q3 = upper_half(simd, s3, c3, V::splat(simd, 1.0));
+    let [[xp, yp], [xn, yn]] = elbows.cos_sin_2;
+    let positive = atan2(simd, yp, xp, elbows.length);
+    let negative = atan2(simd, yn, xn, elbows.length);
+    [
+        [positive, negative],
+        [q3, -q3],
+        [
+            wrap(simd, q234 - positive - q3), // eq 38
+            wrap(simd, q234 - negative + q3),
+        ],
+    ]
+}
+
 /// Brings a sum of angles into `[-pi, pi]`.
 #[inline(always)]
 fn wrap<S: Simd, V: SimdFloat<S, Element = f64>>(simd: S, angle: V) -> V {
@@ -348,80 +370,57 @@ pub(super) fn many_poses<S: Simd>(
     );
     let (rho_squared, root_squared) = shoulder_root(simd, g, &target);
     let root = root_squared.max(splat(0.0)).sqrt();
-    let mut certain = is_certain_root(simd, g, root_squared);
+    // All folds and elbows before any angle: the processor then has independent work at hand.
+    let right = fold(simd, g, &target, rho_squared, root, splat(1.0));
+    let left = fold(simd, g, &target, rho_squared, -root, splat(-1.0));
+    let elbows = [
+        fold_elbows(simd, g, &target, &right, g.d5),
+        fold_elbows(simd, g, &target, &right, -g.d5),
+        fold_elbows(simd, g, &target, &left, g.d5),
+        fold_elbows(simd, g, &target, &left, -g.d5),
+    ];
+    let mut certain = is_certain_root(simd, g, root_squared)
+        & is_certain_s5(simd, right.s5_squared)
+        & is_certain_s5(simd, left.s5_squared);
     let reachable = root_squared.simd_ge(0.0);
-    // By joint and configuration.
-    let mut joints = [[splat(0.0); 8]; 6];
-    let mut closing = [0_u64; 4];
-    let folds = [
-        fold(simd, g, &target, rho_squared, root, splat(1.0)),
-        fold(simd, g, &target, rho_squared, -root, splat(-1.0)),
-    ];
-    let all_elbows = [
-        [
-            fold_elbows(simd, g, &target, &folds[0], g.d5),
-            fold_elbows(simd, g, &target, &folds[0], -g.d5),
-        ],
-        [
-            fold_elbows(simd, g, &target, &folds[1], g.d5),
-            fold_elbows(simd, g, &target, &folds[1], -g.d5),
-        ],
-    ];
-    for (shoulder, sign) in [(0, 1.0), (1, -1.0)] {
-        let fold = &folds[shoulder];
-        certain &= is_certain_s5(simd, fold.s5_squared);
-        let q1 = angle(simd, fold.cos_sin_1);
-        let q5 = angle(simd, fold.cos_sin_5);
-        let q6 = angle(simd, fold.cos_sin_6);
-        let q234 = angle(simd, fold.cos_sin_234);
-        for unfold in [0, 1] {
-            let elbows = &all_elbows[shoulder][unfold];
-            let [c3, s3] = elbows.cos_sin_3;
-            let q3 = upper_half(simd, s3, c3, splat(1.0)) * sign;
-            let positive = atan2(
-                simd,
-                elbows.cos_sin_2[0][1],
-                elbows.cos_sin_2[0][0],
-                elbows.length,
-            );
-            let negative = atan2(
-                simd,
-                elbows.cos_sin_2[1][1],
-                elbows.cos_sin_2[1][0],
-                elbows.length,
-            );
-            let (q2_down, q2_up) = if shoulder == 0 {
-                (positive, negative)
-            } else {
-                (negative, positive)
-            };
-            let (q5, q6, q234) = if unfold == 0 {
-                (q5, q6, q234)
-            } else {
-                (-q5, half_turn(simd, q6), half_turn(simd, q234))
-            };
-            let q4_down = wrap(simd, q234 - q2_down - q3);
-            let q4_up = wrap(simd, q234 - q2_up + q3);
-            let branch = 2 * shoulder + unfold;
-            certain &= is_certain_elbow(elbows.closing);
-            closing[branch] = (elbows.closing.simd_ge(0.0) & reachable).to_bitmask();
-            let (down, up) = (2 * branch, 2 * branch + 1);
-            for (joint, [at_down, at_up]) in [
-                [q1, q1],
-                [q2_down, q2_up],
-                [q3, -q3],
-                [q4_down, q4_up],
-                [q5, q5],
-                [q6, q6],
-            ]
-            .into_iter()
-            .enumerate()
-            {
-                joints[joint][down] = at_down;
-                joints[joint][up] = at_up;
-            }
-        }
+    let mut closing = [0; 4];
+    for (bits, elbows) in closing.iter_mut().zip(&elbows) {
+        certain &= is_certain_elbow(elbows.closing);
+        *bits = (elbows.closing.simd_ge(0.0) & reachable).to_bitmask();
     }
+    let (q1_right, q1_left) = (angle(simd, right.cos_sin_1), angle(simd, left.cos_sin_1));
+    let (q5_right, q5_left) = (angle(simd, right.cos_sin_5), angle(simd, left.cos_sin_5));
+    let (q6_right, q6_left) = (angle(simd, right.cos_sin_6), angle(simd, left.cos_sin_6));
+    let q234_right = angle(simd, right.cos_sin_234);
+    let q234_left = angle(simd, left.cos_sin_234);
+    // An unfolded wrist: q6 and q2 + q3 + q4 half a turn on, q5 mirrored.
+    let right_fold = elbow_angles(simd, &elbows[0], q234_right);
+    let right_unfold = elbow_angles(simd, &elbows[1], half_turn(simd, q234_right));
+    let left_fold = elbow_angles(simd, &elbows[2], q234_left);
+    let left_unfold = elbow_angles(simd, &elbows[3], half_turn(simd, q234_left));
+    // Down is a positive sin q3 on the right and a negative one on the left.
+    let by_elbow = |joint: usize| {
+        let ([rf, ru], [lf, lu]) = (
+            [&right_fold[joint], &right_unfold[joint]],
+            [&left_fold[joint], &left_unfold[joint]],
+        );
+        [rf[0], rf[1], ru[0], ru[1], lf[1], lf[0], lu[1], lu[0]]
+    };
+    let four = |right: [V<S>; 2], left: [V<S>; 2]| {
+        let ([a, b], [c, d]) = (right, left);
+        [a, a, b, b, c, c, d, d]
+    };
+    let joints = [
+        four([q1_right; 2], [q1_left; 2]),
+        by_elbow(0),
+        by_elbow(1),
+        by_elbow(2),
+        four([q5_right, -q5_right], [q5_left, -q5_left]),
+        four(
+            [q6_right, half_turn(simd, q6_right)],
+            [q6_left, half_turn(simd, q6_left)],
+        ),
+    ];
     for (joint, rows) in joints.iter().enumerate() {
         for first in (0..8).step_by(V::<S>::LEN) {
             let mut block = [splat(0.0); MOST_LANES];
