@@ -1,4 +1,4 @@
-//! Inverse kinematics and dynamics of the UR3.
+//! Inverse kinematics of the UR3.
 //!
 //! `cargo bench -p needlebench-kinematics`
 
@@ -9,9 +9,13 @@
 
 use std::hint::black_box;
 
-use criterion::{Criterion, criterion_group, criterion_main};
-use needlebench_kinematics::ik::{GaussNewtonOptions, Kinematics, closed_form, gauss_newton};
-use needlebench_kinematics::{Joints, UrGeometry};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use needlebench_kinematics::ik::{
+    ClosedForm, GaussNewtonOptions, Kinematics, Preference, closed_form, closed_form_batch,
+    closed_form_into, gauss_newton,
+};
+use needlebench_kinematics::pose_sets::{PoseSet, SplitMix64};
+use needlebench_kinematics::{Joints, Pose, UrGeometry};
 
 fn inverse(c: &mut Criterion) {
     let q =
@@ -25,9 +29,58 @@ fn inverse(c: &mut Criterion) {
     group.bench_function("closed form", |b| {
         b.iter(|| closed_form(&geometry, black_box(&base_from_flange), None));
     });
+    group.bench_function("closed form, into a place", |b| {
+        let mut out = ClosedForm::BLANK;
+        b.iter(|| {
+            let preference = Preference::default();
+            closed_form_into(
+                &geometry,
+                black_box(&base_from_flange),
+                preference,
+                &mut out,
+            );
+            black_box(out.count())
+        });
+    });
     group.bench_function("closed form, checked by forward kinematics", |b| {
         b.iter(|| kinematics.solve(black_box(&base_link_from_flange), None));
     });
+    group.finish();
+    // Per pose, over 1024 different ones: generic, then singular, where more care is taken.
+    let mut group = c.benchmark_group("1024 poses");
+    group.throughput(Throughput::Elements(1024));
+    for set in [
+        PoseSet::Generic,
+        PoseSet::Wrist,
+        PoseSet::Elbow,
+        PoseSet::Shoulder,
+        PoseSet::QuarterTurns,
+    ] {
+        let mut random = SplitMix64::new(1);
+        let poses: Vec<Pose> = (0..1024)
+            .map(|_| geometry.base_from_flange(&set.sample(&geometry, &mut random, 0.0)))
+            .collect();
+        let mut out = vec![ClosedForm::BLANK; poses.len()];
+        group.bench_function(format!("one by one, {}", set.name()), |b| {
+            b.iter(|| {
+                for (pose, out) in poses.iter().zip(&mut out) {
+                    closed_form_into(&geometry, pose, Preference::default(), out);
+                }
+                black_box(&out);
+            });
+        });
+        group.bench_function(format!("batch, {}", set.name()), |b| {
+            b.iter(|| {
+                closed_form_batch(
+                    &geometry,
+                    black_box(&poses),
+                    Preference::default(),
+                    &mut out,
+                );
+                black_box(&out);
+            });
+        });
+    }
     group.finish();
     c.bench_function("Gauss-Newton from 0.05 rad", |b| {
         b.iter(|| {
