@@ -3,6 +3,7 @@
 //! [`load_scenario`] is the way in: it reads a scenario and all that it names and gives a
 //! [`ResolvedScenario`], or [`Finding`]s that say what to mend and where.
 
+mod calibration;
 mod files;
 mod finding;
 pub mod fixtures;
@@ -20,7 +21,9 @@ mod toml_text;
 mod tool;
 mod urdf;
 mod values;
+mod yaml_text;
 
+pub use calibration::{AppliedCalibration, Calibration, OriginDeviation};
 pub use files::{PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};
 pub use goal::{Expectation, Goal, PlacedPhantom, REJECTION_RULES, Roll};

@@ -2,10 +2,12 @@
 
 use nalgebra::Vector3;
 use needlebench_kinematics::{
-    Body, Chain, Dynamics, JOINT_COUNT, JointLimits, Joints, Pose, base_from_base_link,
+    Body, Chain, Dynamics, JOINT_COUNT, JointLimits, Joints, Pose, UrGeometry, UrModel,
+    base_from_base_link,
 };
 use serde::Serialize;
 
+use crate::calibration::AppliedCalibration;
 use crate::shape::{Shape, Solid, Visual};
 
 /// Where a model came from, for the provenance of a result.
@@ -28,6 +30,10 @@ pub struct Link {
     pub visuals: Vec<Visual>,
 }
 
+/// An arm whose lengths are all within this of a known arm's is one: factory calibrations move them
+/// by up to 3 mm, while the two arms most like each other, UR3 and UR3e, differ by 19 mm.
+pub(crate) const SAME_ARM_M: f64 = 5e-3;
+
 /// The arm, placed in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robot {
@@ -47,13 +53,25 @@ pub struct Robot {
     pub limits: JointLimits,
     /// The URDF.
     pub source: ModelSource,
-    /// Its collision meshes, each once.
+    /// The factory calibration whose joint origins replaced the URDF's, if one was given.
+    pub calibration: Option<AppliedCalibration>,
+    /// The URDF's collision meshes, each once.
     pub meshes: Vec<ModelSource>,
     /// What was assumed or replaced while the URDF was read; belongs in every report.
     pub notes: Vec<String>,
 }
 
 impl Robot {
+    /// What the arm is called: the maker's name where its lengths are those of a known arm, else
+    /// the URDF's.
+    pub fn arm_name(&self) -> String {
+        let known = UrGeometry::of_chain(&self.chain)
+            .map(|geometry| UrModel::nearest(&geometry))
+            .ok()
+            .filter(|(_, deviation_m)| *deviation_m <= SAME_ARM_M);
+        known.map_or_else(|| self.name.clone(), |(model, _)| model.name().to_owned())
+    }
+
     /// Controller's base frame in `base_link`: turned by 180 degrees about z.
     pub fn base_link_from_base() -> Pose {
         // Half a turn is its own inverse.

@@ -3,21 +3,18 @@
 use std::path::Path;
 
 use needlebench_kinematics::{
-    Body, Chain, JOINT_COUNT, JointLimit, JointLimits, Joints, Pose, UrGeometry,
+    Body, Chain, JOINT_COUNT, JointLimit, JointLimits, Joints, Pose, UrGeometry, UrModel,
 };
 
 use crate::files::Location;
+use crate::model::SAME_ARM_M;
 use crate::robot::{MissingInertia, read_robot};
 use crate::{PackagePaths, Robot};
 
-/// An arm whose lengths are within this of a UR3's is one: factory calibrations move them by up to
-/// 3 mm, while the next relative, the UR3e, has a wrist that is 19 mm longer.
-const SAME_ARM_M: f64 = 5e-3;
-
 /// The shipped UR3, if `geometry` is that of a UR3.
 pub(crate) fn nominal_ur3(geometry: &UrGeometry) -> Option<Robot> {
-    let lengths = |g: &UrGeometry| Joints::new(g.d1, g.a2, g.a3, g.d4, g.d5, g.d6);
-    if (lengths(geometry) - lengths(&UrGeometry::UR3)).amax() > SAME_ARM_M {
+    let (model, deviation_m) = UrModel::nearest(geometry);
+    if model != UrModel::Ur3 || deviation_m > SAME_ARM_M {
         return None;
     }
     let shipped = Location::of_model("ur3", "ur3", "urdf", Path::new(""));

@@ -17,7 +17,7 @@ use crate::shape::Shape;
 use crate::toml_text::TomlText;
 use crate::tool::{ToolOverrides, read_tool};
 use crate::values::check_values;
-use crate::{Finding, Goal, PackagePaths, Robot, nearest_name};
+use crate::{Calibration, Finding, Goal, PackagePaths, Robot, nearest_name};
 
 /// Standard gravity, m/s^2.
 const GRAVITY_M_S2: f64 = 9.80665;
@@ -44,6 +44,9 @@ pub struct Overrides {
     pub robot_urdf: Option<PathBuf>,
     /// Search paths for `package://`.
     pub packages: PackagePaths,
+    /// Factory calibration whose joint origins replace the URDF's, relative to the working
+    /// directory.
+    pub calibration: Option<PathBuf>,
     /// What to do when a moving link has no mass.
     pub missing_inertia: Option<MissingInertia>,
 }
@@ -77,19 +80,29 @@ pub struct ResolvedScenario {
 /// `base_link` at the world's origin.
 ///
 /// # Errors
-/// What is wrong with the URDF.
+/// What is wrong with the URDF or the calibration.
 pub fn load_robot(overrides: &Overrides) -> Result<Robot, Finding> {
     let location = match &overrides.robot_urdf {
         Some(path) => Location::Disk(path.clone()),
         None => Location::of_model("ur3", "ur3", "urdf", Path::new("")),
     };
     let missing_inertia = overrides.missing_inertia.unwrap_or_default();
-    read_robot(
+    let mut robot = read_robot(
         &location,
         &overrides.packages,
         missing_inertia,
         Pose::identity(),
-    )
+    )?;
+    calibrate(&mut robot, overrides)?;
+    Ok(robot)
+}
+
+/// Gives a robot its true joint origins, if the command line names a calibration.
+fn calibrate(robot: &mut Robot, overrides: &Overrides) -> Result<(), Finding> {
+    match &overrides.calibration {
+        Some(path) => Calibration::load(path)?.apply_to(robot),
+        None => Ok(()),
+    }
 }
 
 /// Reads, resolves and validates a scenario file.
@@ -140,7 +153,7 @@ pub fn resolve_scenario(
     };
     let world_from_base_link =
         pose_of(scenario.robot.base_position_mm, scenario.robot.base_rpy_deg);
-    let robot = read_robot(
+    let mut robot = read_robot(
         &robot_location,
         &overrides.packages,
         overrides
@@ -156,6 +169,7 @@ pub fn resolve_scenario(
             with_model_names(&toml, finding, &robot_location, "robot.urdf", "ur3")
         })
     })?;
+    calibrate(&mut robot, overrides).map_err(one)?;
     notes.extend(robot.notes.iter().cloned());
 
     let tool_location = Location::of_model(&scenario.tool.urdf, "needle_guide", "urdf", base);

@@ -141,6 +141,7 @@ pub(crate) fn read_robot(
         bodies: bodies.try_into().expect("six bodies"),
         limits,
         source: source_of(location.display(), urdf.text.as_bytes()),
+        calibration: None,
         meshes: collision_meshes(&urdf, location, packages),
         notes,
     })

@@ -56,7 +56,7 @@ impl Files {
         Overrides {
             robot_urdf: Some(self.folder.path().join("arm.urdf")),
             packages: PackagePaths::from_arguments(&[argument]).unwrap(),
-            missing_inertia: None,
+            ..Overrides::default()
         }
     }
 

@@ -13,6 +13,7 @@ mod geometry;
 pub mod ik;
 mod limits;
 mod manipulability;
+mod models;
 pub mod pose_sets;
 mod rotation;
 pub mod trajectory;
@@ -20,8 +21,13 @@ pub mod trajectory;
 pub use chain::{Chain, ChainJoint};
 pub use dynamics::{Body, Dynamics};
 pub use geometry::{NotUrGeometry, UrGeometry, base_from_base_link};
-pub use limits::{JointLimit, JointLimits};
-pub use rotation::{pose_from_rotation_vector, rotation_angle_between, rotation_vector};
+pub use limits::{JointLimit, JointLimits, LIMIT_ROUNDING_RAD, LimitPolicy, MAX_TURNS};
+pub use manipulability::{Manipulability, SingularityDistances, determinant_gradient};
+pub use models::{UnknownUrModel, UrModel};
+pub use rotation::{
+    NotARotation, pose_from_matrix, pose_from_rotation_vector, rotation_angle_between,
+    rotation_vector,
+};
 
 /// Number of joints of the arm.
 pub const JOINT_COUNT: usize = 6;

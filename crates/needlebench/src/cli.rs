@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use nalgebra::Matrix3x4;
+use needlebench_kinematics::UrModel;
 
 use crate::command;
 use crate::exit::ExitStatus;
@@ -41,7 +43,7 @@ enum Command {
     #[command(
         after_help = "Example: needlebench ik --pose 0.1942,-0.3593,0.1701,-0.8567,2.7197,-1.1407"
     )]
-    Ik(IkArguments),
+    Ik(Box<IkArguments>),
     /// Pose of the flange and of every link for joint positions.
     #[command(
         after_help = "Example: needlebench fk --joints -0.735,2.370,1.883,-1.967,1.274,0.114"
@@ -52,6 +54,9 @@ enum Command {
         after_help = "Example: needlebench clearance scenarios/table3.toml --joints 0,-1.57,-1,-1.57,1.57,0"
     )]
     Clearance(ClearanceArguments),
+    /// Reproduce the paper: Table 3, every equation, both methods, and Figure 6.
+    #[command(after_help = "Example: needlebench paper --out out/paper")]
+    Paper(PaperArguments),
     /// JSON schema of scenario files, for editors.
     #[command(after_help = "Example: needlebench schema scenario > scenario.schema.json")]
     Schema {
@@ -91,9 +96,27 @@ pub(crate) struct RobotArguments {
     /// Folder of a ROS package that the URDF's meshes name; may be given several times.
     #[arg(long, value_name = "NAME=DIR")]
     pub package_path: Vec<String>,
+    /// Factory calibration of the arm, as ROS's `ur_calibration` writes it: its joint origins
+    /// replace the URDF's.
+    #[arg(long, value_name = "YAML")]
+    pub calibration: Option<PathBuf>,
     /// What to do when a moving link has no mass.
     #[arg(long, value_enum, value_name = "POLICY")]
     pub missing_inertia: Option<MissingInertiaArgument>,
+}
+
+/// Another robot than the shipped UR3, where its kinematics are enough.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct ArmArguments {
+    /// A UR arm by name, with its nominal lengths: UR3, UR3e, UR5, UR5e, UR10, UR10e or UR16e.
+    #[arg(
+        long,
+        value_name = "MODEL",
+        conflicts_with_all = ["robot", "package_path", "missing_inertia"]
+    )]
+    pub arm: Option<UrModel>,
+    #[command(flatten)]
+    pub robot: RobotArguments,
 }
 
 /// What to do when a moving link has no mass.
@@ -159,7 +182,11 @@ pub(crate) enum IkMethod {
 #[derive(Debug, Args)]
 pub(crate) struct IkArguments {
     /// Scenario, of which `--goal` is solved.
-    #[arg(value_name = "SCENARIO", conflicts_with = "pose", requires = "goal")]
+    #[arg(
+        value_name = "SCENARIO",
+        conflicts_with_all = ["pose", "matrix", "arm"],
+        requires = "goal"
+    )]
     pub scenario: Option<PathBuf>,
     /// Goal of the scenario.
     #[arg(long, requires = "scenario")]
@@ -169,23 +196,39 @@ pub(crate) struct IkArguments {
         long,
         value_name = "x,y,z,rx,ry,rz",
         allow_hyphen_values = true,
-        required_unless_present = "scenario"
+        required_unless_present_any = ["scenario", "matrix"]
     )]
     pub pose: Option<Six>,
+    /// The same as a matrix: 12 or 16 numbers, row by row, rotation and position (m).
+    #[arg(
+        long,
+        value_name = "NUMBERS",
+        allow_hyphen_values = true,
+        conflicts_with = "pose"
+    )]
+    pub matrix: Option<PoseMatrix>,
+    /// Take the rotation that is nearest to the matrix if it is not exactly one, such as after
+    /// rounding.
+    #[arg(long, requires = "matrix")]
+    pub nearest_rotation: bool,
     /// Method.
     #[arg(long, value_enum, default_value = "closed-form")]
     pub method: IkMethod,
     /// Joint positions to start from or to be near to, rad.
     #[arg(long, value_name = "q1,..,q6", allow_hyphen_values = true)]
     pub seed: Option<Six>,
-    /// List whole turns within the joint limits too.
+    /// Steps after which a numerical method gives up.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_iterations: Option<u32>,
+    /// List whole turns within the joint limits too, nearest to the seed (or to zero) first; at most
+    /// one turn more or less of a joint without limits.
     #[arg(long)]
     pub wraps: bool,
     /// Print one JSON document.
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
-    pub robot: RobotArguments,
+    pub arm: ArmArguments,
 }
 
 #[derive(Debug, Args)]
@@ -197,7 +240,7 @@ pub(crate) struct FkArguments {
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
-    pub robot: RobotArguments,
+    pub arm: ArmArguments,
 }
 
 #[derive(Debug, Args)]
@@ -215,6 +258,22 @@ pub(crate) struct ClearanceArguments {
     pub robot: RobotArguments,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct PaperArguments {
+    /// Folder for `paper.json`, `paper.html` and the pictures.
+    #[arg(long, value_name = "DIR", default_value = "out/paper")]
+    pub out: PathBuf,
+    /// Print the results as one JSON document instead of the tables.
+    #[arg(long)]
+    pub json: bool,
+    /// Draw no pictures.
+    #[arg(long)]
+    pub no_pictures: bool,
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
 /// Six comma-separated finite numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Six(pub [f64; 6]);
@@ -223,21 +282,65 @@ impl std::str::FromStr for Six {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let words: Vec<&str> = text.split(',').map(str::trim).collect();
-        let count = words.len();
-        let words: [&str; 6] = words
+        let numbers: Vec<f64> = text
+            .split(',')
+            .map(|word| finite(word.trim()))
+            .collect::<Result<_, _>>()?;
+        let count = numbers.len();
+        numbers
             .try_into()
-            .map_err(|_| format!("needs six numbers separated by commas, got {count}"))?;
-        let mut numbers = [0.0; 6];
-        for (number, word) in numbers.iter_mut().zip(words) {
-            *number = word
-                .parse()
-                .map_err(|_| format!("`{word}` is not a number"))?;
-            if !f64::is_finite(*number) {
-                return Err(format!("`{word}` is not finite"));
+            .map(Self)
+            .map_err(|_| format!("needs six numbers separated by commas, got {count}"))
+    }
+}
+
+/// The upper three rows `[R | p]` of a pose's matrix, as they were given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PoseMatrix(pub Matrix3x4<f64>);
+
+impl std::str::FromStr for PoseMatrix {
+    type Err = String;
+
+    /// Reads what programs print: numbers between commas, semicolons, brackets and white space.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let numbers: Vec<f64> = text
+            .split(|each: char| each.is_whitespace() || ",;[]()".contains(each))
+            .filter(|word| !word.is_empty())
+            .map(finite)
+            .collect::<Result<_, _>>()?;
+        let count = numbers.len();
+        let rows = match count {
+            12 => &numbers[..],
+            16 => {
+                let (rows, last) = numbers.split_at(12);
+                if last != [0.0, 0.0, 0.0, 1.0] {
+                    let columns = [3, 7, 11].iter().all(|&at| rows[at] == 0.0) && last[3] == 1.0;
+                    return Err(if columns {
+                        "the numbers are column by column; give them row by row".to_owned()
+                    } else {
+                        format!("the last row is {last:?}, but has to be 0, 0, 0, 1")
+                    });
+                }
+                rows
             }
-        }
-        Ok(Self(numbers))
+            _ => {
+                return Err(format!(
+                    "needs 12 numbers (three rows of rotation and position) or 16, got {count}"
+                ));
+            }
+        };
+        Ok(Self(Matrix3x4::from_row_slice(rows)))
+    }
+}
+
+fn finite(word: &str) -> Result<f64, String> {
+    let number: f64 = word
+        .parse()
+        .map_err(|_| format!("`{word}` is not a number"))?;
+    if number.is_finite() {
+        Ok(number)
+    } else {
+        Err(format!("`{word}` is not finite"))
     }
 }
 
@@ -255,6 +358,7 @@ pub fn main() -> ExitCode {
         Command::Ik(arguments) => command::ik(&arguments),
         Command::Fk(arguments) => command::fk(&arguments),
         Command::Clearance(arguments) => command::clearance(&arguments),
+        Command::Paper(arguments) => command::paper(&arguments),
         Command::Schema { format } => command::schema(format),
         Command::Doctor { json } => command::doctor(json),
         Command::Completions { shell } => command::completions(shell),

@@ -8,6 +8,7 @@ mod cli;
 mod command;
 pub mod exit;
 mod output;
+mod paper;
 pub mod picture;
 mod pipeline;
 mod progress;

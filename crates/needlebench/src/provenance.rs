@@ -21,6 +21,8 @@ pub(crate) fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentit
         input("robot", &resolved.cell.robot.source),
         input("tool", &resolved.cell.tool.source),
     ];
+    let calibration = resolved.cell.robot.calibration.as_ref();
+    inputs.extend(calibration.map(|applied| input("calibration", &applied.source)));
     let meshes = &resolved.cell.robot.meshes;
     inputs.extend(meshes.iter().map(|source| input("robot mesh", source)));
     inputs.extend(
@@ -36,6 +38,11 @@ pub(crate) fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentit
         engines,
         inputs,
         seed: resolved.scenario.seed,
-        truth: "nominal robot: errors are those of inverse kinematics, control and simulation",
+        truth: if calibration.is_some() {
+            "factory-calibrated robot: errors are those of inverse kinematics, control and \
+             simulation"
+        } else {
+            "nominal robot: errors are those of inverse kinematics, control and simulation"
+        },
     }
 }

@@ -273,6 +273,7 @@ fn robot() -> Robot {
             }; JOINT_COUNT],
         ),
         source: source(),
+        calibration: None,
         meshes: Vec::new(),
         notes: Vec::new(),
     }

@@ -241,6 +241,7 @@ pub fn ur3(surroundings: Vec<CollisionBody>) -> Cell {
         bodies: link_bodies(),
         limits: limits(),
         source: source(),
+        calibration: None,
         meshes: Vec::new(),
         notes: Vec::new(),
     };

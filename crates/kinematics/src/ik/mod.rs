@@ -18,6 +18,7 @@ pub use closed_form::{
 pub use configuration::{Configuration, Elbow, Shoulder, Wrist};
 pub use gauss_newton::{GaussNewtonOptions, GaussNewtonResult, gauss_newton};
 pub use solve::{Kinematics, Solution, SolutionKind, Solutions};
+pub use wraps::{InvalidWeight, Wrap, WrapOrder, WrapSearch, Wraps, nearest_within_limits};
 
 use std::f64::consts::{PI, TAU};
 
@@ -38,3 +39,5 @@ pub fn wrap_angle(angle_rad: f64) -> f64 {
 mod calibrated_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod wraps_tests;

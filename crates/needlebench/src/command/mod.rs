@@ -4,6 +4,7 @@ mod check;
 mod clearance;
 mod doctor;
 mod kinematics;
+mod paper;
 mod run;
 
 use std::io::Write;
@@ -20,6 +21,7 @@ pub(crate) use check::check;
 pub(crate) use clearance::clearance;
 pub(crate) use doctor::doctor;
 pub(crate) use kinematics::{fk, ik};
+pub(crate) use paper::paper;
 pub(crate) use run::run;
 
 use crate::cli::{MissingInertiaArgument, RobotArguments, SchemaFormat};
@@ -62,6 +64,7 @@ fn overrides(arguments: &RobotArguments) -> Result<Overrides, Finding> {
     Ok(Overrides {
         robot_urdf: arguments.robot.clone(),
         packages: PackagePaths::from_arguments(&arguments.package_path)?,
+        calibration: arguments.calibration.clone(),
         missing_inertia: arguments.missing_inertia.map(|policy| match policy {
             MissingInertiaArgument::Error => MissingInertia::Error,
             MissingInertiaArgument::NominalUr3 => MissingInertia::NominalUr3,

@@ -185,7 +185,8 @@ fn unreachable_pose_says_how_much_is_missing() {
     let answer = bench.run(&["ik", "--pose", "0.9,0,0.1,0,0,0", "--json"]);
     let answer = answer.exits_with(0).json();
     assert_eq!(answer["count"], 0);
-    assert_eq!(answer["certificate"], "unreachable");
+    assert!(solutions(&answer).is_empty());
+    assert_eq!(answer["certificate"], "nearest_only");
     let unreachable = answer["unreachable"].as_array().unwrap();
     assert_eq!(unreachable.len(), 8);
     assert!(
@@ -193,6 +194,222 @@ fn unreachable_pose_says_how_much_is_missing() {
             .iter()
             .all(|each| each["missing_m"].as_f64().unwrap() > 0.2)
     );
+    // Apart from the solutions, and named for what they are.
+    let nearest = answer["nearest"].as_array().unwrap();
+    assert!(!nearest.is_empty());
+    for row in nearest {
+        assert_eq!(row["kind"], "nearest");
+        assert!(row["residual_m"].as_f64().unwrap() > 0.2);
+    }
+}
+
+#[test]
+fn free_wrist_is_named_and_certified_as_such() {
+    let bench = Bench::new();
+    let pose = bench.run(&["fk", "--joints", "0.3,-1.2,1.4,-0.5,0,0.8", "--json"]);
+    let pose = &pose.json()["flange_in_base"];
+    let numbers = [numbers(&pose["position_m"]), numbers(&pose["rotvec_rad"])].concat();
+    let answer = bench.run(&["ik", "--pose", &comma_separated(&numbers), "--json"]);
+    let answer = answer.exits_with(0).json();
+    assert_eq!(answer["certificate"], "free_joint");
+    let free = solutions(&answer)
+        .iter()
+        .filter(|solution| solution["free_joint"] == "wrist_3");
+    assert!(free.count() > 0);
+}
+
+/// The matrix that the paper prints, four decimals.
+const PRINTED_MATRIX: &str = "[[-0.8421 -0.4673  0.2693  0.1942]
+ [-0.5196  0.5690 -0.6374 -0.3593]
+ [ 0.1446 -0.6766 -0.7220  0.1701]
+ [ 0       0       0       1     ]]";
+
+#[test]
+fn rounded_matrix_is_refused_with_a_pose_that_is_accepted() {
+    let bench = Bench::new();
+    let refused = bench.run(&["ik", "--matrix", PRINTED_MATRIX]).exits_with(2);
+    refused.complains([
+        "not a rotation",
+        "up to 8.5e-5",
+        "1.000014",
+        "--nearest-rotation",
+    ]);
+    let offered = refused.stderr.split("--pose ").nth(1).unwrap();
+    let offered = offered.split(';').next().unwrap();
+    let by_pose = bench.run(&["ik", "--pose", offered, "--json"]);
+    let by_pose = by_pose.exits_with(0).json();
+    let by_matrix = [
+        "ik",
+        "--matrix",
+        PRINTED_MATRIX,
+        "--nearest-rotation",
+        "--json",
+    ];
+    let by_matrix = bench.run(&by_matrix).exits_with(0).json();
+    assert_eq!(solutions(&by_pose).len(), 8);
+    for (pose, matrix) in solutions(&by_pose).iter().zip(solutions(&by_matrix)) {
+        assert_eq!(pose["label"], matrix["label"]);
+        let pairs = numbers(&pose["joints_rad"]).into_iter();
+        for (a, b) in pairs.zip(numbers(&matrix["joints_rad"])) {
+            assert!((a - b).abs() < ROUND_TRIP);
+        }
+    }
+    // The paper's own vector is rounded too.
+    for (matrix, (label, row)) in solutions(&by_matrix).iter().zip(TABLE_3) {
+        assert_eq!(matrix["label"], label);
+        for (joint, expected) in numbers(&matrix["joints_rad"]).iter().zip(row) {
+            assert!(
+                angle_difference(*joint, expected) < 2.0 * TABLE_3_RAD,
+                "{label}"
+            );
+        }
+    }
+}
+
+#[test]
+fn exact_matrix_is_solved_like_its_vector() {
+    let bench = Bench::new();
+    // Half a turn about x.
+    let by_matrix = [
+        "ik",
+        "--matrix",
+        "1,0,0,0.3, 0,-1,0,0.2, 0,0,-1,0.1",
+        "--json",
+    ];
+    let by_matrix = bench.run(&by_matrix).exits_with(0).json();
+    let by_pose = [
+        "ik",
+        "--pose",
+        "0.3,0.2,0.1,3.141592653589793,0,0",
+        "--json",
+    ];
+    let by_pose = bench.run(&by_pose).exits_with(0).json();
+    assert!(by_matrix["count"].as_u64().unwrap() >= 2);
+    assert_eq!(by_matrix["count"], by_pose["count"]);
+    for (a, b) in solutions(&by_matrix).iter().zip(solutions(&by_pose)) {
+        let pairs = numbers(&a["joints_rad"]).into_iter();
+        for (a, b) in pairs.zip(numbers(&b["joints_rad"])) {
+            assert!(angle_difference(a, b) < ROUND_TRIP);
+        }
+    }
+}
+
+#[test]
+fn matrices_that_are_no_pose_are_refused_with_the_reason() {
+    let bench = Bench::new();
+    for (matrix, reason) in [
+        (
+            "1 0 0 0.3 0 1 0 0.2 0 0 -1 0.1",
+            "mirrored: its determinant is -1",
+        ),
+        ("1 0 0 0.3 0 1 0 0.2 0 0 0 0.1", "do not span space"),
+        ("1 0 0 0.3 0 nan 0 0.2 0 0 1 0.1", "`nan` is not finite"),
+        ("1 0 0 0.3 0 one 0 0.2 0 0 1 0.1", "`one` is not a number"),
+        ("1 0 0 300 0 1 0 200 0 0 1 100", "x, y and z are in metres"),
+        ("1 0 0 0.3 0 1 0 0.2 0 0 1", "got 11"),
+        ("1 0 0 0 0 1 0 0 0 0 1 0 .3 .2 .1 1", "give them row by row"),
+        ("1 0 0 .3 0 1 0 .2 0 0 1 .1 0 0 0 2", "the last row"),
+    ] {
+        let answer = bench.run(&["ik", "--matrix", matrix]).exits_with(2);
+        answer.complains([reason]);
+    }
+    let mirrored = "1 0 0 0.3 0 1 0 0.2 0 0 -1 0.1";
+    let both = ["ik", "--matrix", mirrored, "--nearest-rotation"];
+    bench.run(&both).exits_with(2).complains(["mirrored"]);
+    let both = ["ik", "--matrix", mirrored, "--pose", TABLE_3_POSE];
+    bench
+        .run(&both)
+        .exits_with(2)
+        .complains(["cannot be used with"]);
+}
+
+#[test]
+fn rotation_vector_in_degrees_is_refused() {
+    let bench = Bench::new();
+    let answer = bench
+        .run(&["ik", "--pose", "0.3,0.2,0.1,0,180,0"])
+        .exits_with(2);
+    answer.complains(["180.0000 rad", "radians"]);
+}
+
+#[test]
+fn every_arm_inverts_its_own_forward_kinematics() {
+    let bench = Bench::new();
+    let posture = "0.4,-1.3,1.5,-0.9,1.1,0.2";
+    for arm in ["UR3", "UR3e", "UR5", "UR5e", "UR10", "UR10e", "UR16e"] {
+        let pose = bench.run(&["fk", "--arm", arm, "--joints", posture, "--json"]);
+        let pose = pose.exits_with(0).json();
+        assert_eq!(pose["arm"], arm);
+        assert_eq!(pose["calibration"], Value::Null);
+        let pose = &pose["flange_in_base"];
+        let pose = [numbers(&pose["position_m"]), numbers(&pose["rotvec_rad"])].concat();
+        let pose = comma_separated(&pose);
+        let arm_in_lower_case = arm.to_lowercase();
+        let answer = ["ik", "--arm", &arm_in_lower_case, "--pose", &pose, "--json"];
+        let answer = bench.run(&answer).exits_with(0).json();
+        assert_eq!(answer["arm"], arm);
+        let wanted: Vec<f64> = posture.split(',').map(|q| q.parse().unwrap()).collect();
+        let found = solutions(&answer).iter().any(|solution| {
+            let joints = numbers(&solution["joints_rad"]);
+            let mut pairs = joints.iter().zip(&wanted);
+            pairs.all(|(a, b)| angle_difference(*a, *b) < 1e-9)
+        });
+        assert!(found, "{arm}: {answer:#}");
+    }
+}
+
+#[test]
+fn arms_that_are_not_known_or_ambiguous_are_refused() {
+    let bench = Bench::with_scenario(SMALL);
+    let answer = bench.run(&["fk", "--arm", "UR4", "--joints", "0,0,0,0,0,0"]);
+    answer.exits_with(2).complains(["`UR4`", "UR3, UR3e, UR5"]);
+    for other in [
+        ["--robot", "x.urdf"],
+        ["--package-path", "a=b"],
+        ["--missing-inertia", "nominal-ur3"],
+    ] {
+        let mut arguments = vec!["fk", "--joints", "0,0,0,0,0,0", "--arm", "UR5"];
+        arguments.extend(other);
+        let answer = bench.run(&arguments).exits_with(2);
+        answer.complains(["--arm", "cannot be used with"]);
+    }
+    let answer = bench.run(&["ik", "s.toml", "--goal", "pose", "--arm", "UR5"]);
+    answer.exits_with(2).complains(["cannot be used with"]);
+}
+
+#[test]
+fn iteration_limit_is_kept_and_its_row_is_no_solution() {
+    let bench = Bench::new();
+    let run = |method: &str, limit: &str| {
+        bench.run(&[
+            "ik",
+            "--pose",
+            TABLE_3_POSE,
+            "--method",
+            method,
+            "--max-iterations",
+            limit,
+            "--json",
+        ])
+    };
+    let answer = run("gauss-newton", "1").exits_with(0).json();
+    assert_eq!(answer["count"], 0);
+    assert_eq!(answer["certificate"], "not_converged");
+    assert_eq!(answer["nearest"][0]["kind"], "nearest");
+    assert_eq!(answer["nearest"][0]["iterations"], 1);
+    run("gauss-newton", "0").exits_with(2);
+    let refused = run("closed-form", "5").exits_with(2);
+    refused.complains(["does not iterate", "--method gauss-newton"]);
+    let wraps = [
+        "ik",
+        "--pose",
+        TABLE_3_POSE,
+        "--method",
+        "gauss-newton",
+        "--wraps",
+    ];
+    let refused = bench.run(&wraps).exits_with(2);
+    refused.complains(["--wraps", "one posture only"]);
 }
 
 #[test]
@@ -202,6 +419,13 @@ fn whole_turns_stay_within_the_limits_and_keep_the_residual() {
     let answer = answer.exits_with(0).json();
     // Five joints have two full turns of range, the elbow one.
     assert_eq!(answer["count"], 8 * 32);
+    // Nearest to the seed, which is zero, comes first.
+    let from_zero = |solution: &Value| -> f64 {
+        let joints = numbers(&solution["joints_rad"]);
+        joints.iter().map(|joint| joint * joint).sum()
+    };
+    let distances: Vec<f64> = solutions(&answer).iter().map(from_zero).collect();
+    assert!(distances.is_sorted());
     for solution in solutions(&answer) {
         assert_eq!(solution["within_limits"], true);
         let joints = numbers(&solution["joints_rad"]);

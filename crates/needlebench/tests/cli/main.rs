@@ -3,6 +3,7 @@
 mod arguments;
 mod bad_robot;
 mod bad_scenario;
+mod calibration;
 mod check;
 mod clearance;
 mod determinism;
@@ -12,6 +13,7 @@ mod help;
 #[cfg(target_os = "linux")]
 mod interrupt;
 mod kinematics;
+mod paper;
 #[cfg(target_os = "linux")]
 mod process;
 mod run;

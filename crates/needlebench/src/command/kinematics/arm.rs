@@ -1,0 +1,67 @@
+//! The arm that `ik` and `fk` are asked about.
+
+use std::path::Path;
+
+use needlebench_cell::{AppliedCalibration, Calibration, Finding, Overrides, Robot, load_robot};
+use needlebench_kinematics::{Chain, JointLimits, Joints, LimitPolicy, UrModel};
+
+use super::super::overrides;
+use crate::cli::ArmArguments;
+
+/// What kinematics need of an arm.
+#[derive(Debug)]
+pub(super) struct Arm {
+    /// The maker's name where it is a known arm.
+    pub name: String,
+    /// Where it comes from, for complaints.
+    pub file: String,
+    pub chain: Chain,
+    pub limits: JointLimits,
+    /// Short names of the moving links.
+    pub links: [String; 6],
+    pub calibration: Option<AppliedCalibration>,
+}
+
+impl Arm {
+    pub(super) fn new(arguments: &ArmArguments) -> Result<Self, Finding> {
+        match arguments.arm {
+            Some(model) => Self::of_model(model, arguments.robot.calibration.as_deref()),
+            None => Ok(Self::of_robot(&load_robot(&overrides(&arguments.robot)?)?)),
+        }
+    }
+
+    pub(super) fn of_robot(robot: &Robot) -> Self {
+        Self {
+            name: robot.arm_name(),
+            file: robot.source.file.clone(),
+            chain: robot.chain,
+            limits: robot.limits,
+            links: robot.links.each_ref().map(|link| link.name.clone()),
+            calibration: robot.calibration.clone(),
+        }
+    }
+
+    fn of_model(model: UrModel, calibration: Option<&Path>) -> Result<Self, Finding> {
+        let geometry = model.geometry();
+        // The links are called the same in every UR arm.
+        let mut arm = Self::of_robot(&load_robot(&Overrides::default())?);
+        model.name().clone_into(&mut arm.name);
+        "--arm".clone_into(&mut arm.file);
+        arm.chain = geometry.chain();
+        arm.limits = LimitPolicy::of_ros(model).limits_of(model);
+        if let Some(path) = calibration {
+            let calibration = Calibration::load(path)?;
+            arm.chain = calibration.chain_of(model.name(), &geometry)?;
+            arm.calibration = Some(AppliedCalibration {
+                hash: calibration.hash,
+                source: calibration.source,
+            });
+        }
+        Ok(arm)
+    }
+
+    /// Whether a posture is inside the limits.
+    pub(super) fn allows(&self, q: &Joints) -> bool {
+        self.limits.first_violation(q).is_none()
+    }
+}

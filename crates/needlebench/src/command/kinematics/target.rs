@@ -1,0 +1,129 @@
+//! The pose that `ik` is asked for.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use nalgebra::Vector3;
+use needlebench_cell::{Finding, Robot, Roll};
+use needlebench_clearance::ClearanceModel;
+use needlebench_kinematics::{
+    NotARotation, Pose, pose_from_matrix, pose_from_rotation_vector, rotation_vector,
+};
+use needlebench_planning::Planner;
+
+use super::super::overrides;
+use super::arm::Arm;
+use crate::cli::{IkArguments, PoseMatrix, Six};
+
+/// A coordinate beyond this is in another unit.
+const FARTHEST_M: f64 = 10.0;
+
+/// The arm, and the pose of its flange in `base_link`.
+pub(super) fn target(arguments: &IkArguments) -> Result<(Arm, Pose), Vec<Finding>> {
+    if let Some(path) = &arguments.scenario {
+        return goal_pose(arguments, path);
+    }
+    let one = |finding| vec![finding];
+    let base_from_flange = match (&arguments.pose, &arguments.matrix) {
+        (Some(pose), _) => of_vector(pose),
+        (None, Some(matrix)) => of_matrix(matrix, arguments.nearest_rotation),
+        (None, None) => unreachable!("clap asks for one of them without a scenario"),
+    }
+    .map_err(one)?;
+    let arm = Arm::new(&arguments.arm).map_err(one)?;
+    Ok((arm, Robot::base_link_from_base() * base_from_flange))
+}
+
+fn of_vector(Six([x, y, z, rx, ry, rz]): &Six) -> Result<Pose, Finding> {
+    let position_m = Vector3::new(*x, *y, *z);
+    check_position("--pose", &position_m)?;
+    let rotvec_rad = Vector3::new(*rx, *ry, *rz);
+    let angle_rad = rotvec_rad.norm();
+    // The controller writes at most half a turn; a little over a whole one is still rounding.
+    if angle_rad > 1.01 * TAU {
+        let message = format!(
+            "the rotation vector is {angle_rad:.4} rad long, but a whole turn is {TAU:.4} rad"
+        );
+        return Err(Finding::new("--pose", message).hint(
+            "rx, ry and rz are an axis times an angle in radians, as the controller shows them",
+        ));
+    }
+    Ok(pose_from_rotation_vector(position_m, rotvec_rad))
+}
+
+fn of_matrix(PoseMatrix(matrix): &PoseMatrix, nearest: bool) -> Result<Pose, Finding> {
+    let position_m = matrix.column(3).into_owned();
+    check_position("--matrix", &position_m)?;
+    let error = match pose_from_matrix(&matrix.fixed_columns::<3>(0).into_owned(), position_m) {
+        Ok(pose) => return Ok(pose),
+        Err(error) => error,
+    };
+    match error.nearest {
+        Some(rotation) if nearest => Ok(Pose::from_parts(position_m.into(), rotation)),
+        _ => Err(not_a_rotation(&error, &position_m)),
+    }
+}
+
+fn not_a_rotation(error: &NotARotation, position_m: &Vector3<f64>) -> Finding {
+    if error.is_mirrored() {
+        let message = format!(
+            "the matrix is mirrored: its determinant is {:.6}, a rotation's is 1",
+            error.determinant
+        );
+        return Finding::new("--matrix", message)
+            .hint("an axis has lost its sign, or two rows or columns are swapped");
+    }
+    let finding = Finding::new("--matrix", error.to_string());
+    let Some(rotation) = error.nearest else {
+        return finding.hint("its columns do not span space, so that no rotation is near to it");
+    };
+    let [x, y, z] = (*position_m).into();
+    let [rx, ry, rz] = rotation_vector(&rotation).into();
+    finding.hint(format!(
+        "the nearest rotation is --pose {x:?},{y:?},{z:?},{rx:?},{ry:?},{rz:?}; to take it, give \
+         that or add --nearest-rotation"
+    ))
+}
+
+fn check_position(argument: &str, position_m: &Vector3<f64>) -> Result<(), Finding> {
+    if position_m.amax() <= FARTHEST_M {
+        return Ok(());
+    }
+    let [x, y, z] = (*position_m).into();
+    let message =
+        format!("the position is {x:?}, {y:?}, {z:?} m, but no arm reaches {FARTHEST_M} m");
+    Err(Finding::new(argument, message).hint("x, y and z are in metres"))
+}
+
+fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(Arm, Pose), Vec<Finding>> {
+    let overrides = overrides(&arguments.arm.robot).map_err(|finding| vec![finding])?;
+    let resolved = needlebench_cell::load_scenario(path, &overrides)?;
+    let name = arguments.goal.as_deref().unwrap_or_default();
+    let Some(goal) = resolved.goals.iter().find(|goal| goal.name == name) else {
+        let names: Vec<&str> = resolved
+            .goals
+            .iter()
+            .map(|goal| goal.name.as_str())
+            .collect();
+        return Err(vec![
+            Finding::new(
+                path.display().to_string(),
+                format!("it has no goal `{name}`"),
+            )
+            .hint(format!("goals: {}", names.join(", "))),
+        ]);
+    };
+    let model = ClearanceModel::new(&resolved.cell);
+    let planner = Planner::new(&resolved, &model).map_err(|error| {
+        vec![Finding::new(
+            &resolved.cell.robot.source.file,
+            error.to_string(),
+        )]
+    })?;
+    let roll_rad = match goal.roll {
+        Roll::Fixed(roll_rad) => roll_rad,
+        Roll::Free => 0.0,
+    };
+    let pose = planner.base_link_from_flange(goal, roll_rad);
+    Ok((Arm::of_robot(&resolved.cell.robot), pose))
+}
