@@ -48,9 +48,9 @@ impl JointLimit {
         }
         let lower = self.lower_rad - LIMIT_ROUNDING_RAD;
         let upper = self.upper_rad + LIMIT_ROUNDING_RAD;
-        // The quotient is rounded, so that the answer may be the next integer: tried, not trusted.
-        let lowest = whole(((lower - position_rad) / TAU).ceil());
-        let highest = whole(((upper - position_rad) / TAU).floor());
+        // At most one off, for the rounding of the quotient too: tried, not trusted.
+        let lowest = nearest_whole((lower - position_rad) * (1.0 / TAU));
+        let highest = nearest_whole((upper - position_rad) * (1.0 / TAU));
         let lowest = (lowest - 1..=lowest + 1).find(|&k| turned(position_rad, k) >= lower)?;
         let highest = (highest - 1..=highest + 1)
             .rev()
@@ -66,14 +66,16 @@ pub(crate) fn turned(position_rad: f64, turns: i32) -> f64 {
     position_rad + TAU * f64::from(turns)
 }
 
-/// An integral number of turns, cut off a little beyond [`MAX_TURNS`].
+/// The nearest integer, either one of two, cut off a little beyond [`MAX_TURNS`]; 0 for NaN.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "integral and within the range of i32 after the clamp"
 )]
-pub(crate) fn whole(turns: f64) -> i32 {
+pub(crate) fn nearest_whole(turns: f64) -> i32 {
+    // Adding this leaves no bits for a fraction; `f64::round` is a call without SSE 4.1.
+    const INTEGERS: f64 = 1.5 * (1_u64 << 52) as f64;
     let most = f64::from(MAX_TURNS + 1);
-    turns.clamp(-most, most) as i32
+    ((turns.clamp(-most, most) + INTEGERS) - INTEGERS) as i32
 }
 
 /// Limits of all joints.

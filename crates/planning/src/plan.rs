@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 use nalgebra::UnitVector3;
 use needlebench_cell::{ClearanceClass, Goal, ResolvedScenario, Roll};
 use needlebench_clearance::{ClassMinima, ClearanceModel};
-use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, wrap_angle};
+use needlebench_kinematics::ik::{
+    Configuration, Kinematics, Solution, SolutionKind, WrapOrder, WrapSearch, wrap_angle,
+};
 use needlebench_kinematics::trajectory::{JointTrajectory, LineError, LinePath, Phase};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
@@ -246,7 +248,7 @@ impl<'a> Planner<'a> {
             });
         }
         for (joint, label) in JOINT_LABELS.into_iter().enumerate() {
-            if turns_within_limits(limits.0[joint], solution.joints[joint]).is_empty() {
+            if limits.0[joint].turns(solution.joints[joint]).is_none() {
                 let (position, limit) = (solution.joints[joint], limits.0[joint]);
                 rejections.push(Rejection {
                     rule: Rule::JointLimit,
@@ -451,51 +453,24 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Whole turns that keep the approach inside the joint ranges, shortest transfer first.
+    /// Whole turns that keep the approach inside the joint ranges, shortest transfer first; at most
+    /// one either way.
     fn wraps(&self, line: &LinePath) -> Vec<[i32; JOINT_COUNT]> {
-        let limits = &self.resolved.cell.robot.limits;
-        let (from, to) = (line.start(), line.end());
-        let mut combinations = vec![[0; JOINT_COUNT]];
-        for joint in 0..JOINT_COUNT {
-            let at_both_ends: Vec<i32> = turns_within_limits(limits.0[joint], from[joint])
-                .into_iter()
-                .filter(|&k| within(limits.0[joint], to[joint] + TAU * f64::from(k)))
-                .collect();
-            combinations = combinations
-                .iter()
-                .flat_map(|known| {
-                    at_both_ends.iter().map(move |&k| {
-                        let mut turns = *known;
-                        turns[joint] = k;
-                        turns
-                    })
-                })
-                .collect();
+        // Where the approach may start for its end to be inside as well.
+        let mut limits = self.resolved.cell.robot.limits;
+        let way = line.end() - line.start();
+        for (limit, way) in limits.0.iter_mut().zip(&way) {
+            limit.lower_rad -= way.min(0.0);
+            limit.upper_rad -= way.max(0.0);
         }
-        let length = |turns: &[i32; JOINT_COUNT]| {
-            let way = Joints::from_fn(|i, _| {
-                from[i] + TAU * f64::from(turns[i]) - self.resolved.start[i]
-            });
-            (way.amax(), way.norm())
-        };
-        combinations.sort_by(|a, b| {
-            let (a, b) = (length(a), length(b));
-            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
-        });
-        combinations.truncate(WRAP_TRIES);
-        combinations
+        WrapSearch::new(&limits, &self.resolved.start)
+            .ordered_by(WrapOrder::LargestJoint)
+            .at_most_turns(1)
+            .wraps(&line.start())
+            .take(WRAP_TRIES)
+            .map(|wrap| wrap.turns)
+            .collect()
     }
-}
-
-fn within(limit: needlebench_kinematics::JointLimit, position: f64) -> bool {
-    (limit.lower_rad..=limit.upper_rad).contains(&position)
-}
-
-/// Whole turns that may be added to a position; at most one each way for an unlimited joint.
-fn turns_within_limits(limit: needlebench_kinematics::JointLimit, position: f64) -> Vec<i32> {
-    (-1..=1)
-        .filter(|&k| within(limit, position + TAU * f64::from(k)))
-        .collect()
 }
 
 /// Angle between two rolls that count as different for a motion, rad.

@@ -7,13 +7,14 @@
 //!
 //! Every joint has its ladder: the admitted numbers of turns, nearest to the seed first. A node is
 //! a rung on each of the six ladders, and its children are one rung further on one ladder, which
-//! must not lie before the ladder last climbed. Every node then has one parent, and none comes
-//! twice; its distance is never below its parent's, and best first is sorted.
+//! must not lie before any ladder climbed. Every node then has one parent, so that none comes
+//! twice; no node comes before its parent in the order, so that best first is sorted.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
+use std::f64::consts::TAU;
 
-use crate::limits::{turned, whole};
+use crate::limits::{nearest_whole, turned};
 use crate::{JOINT_COUNT, JointLimits, Joints};
 
 /// A posture with whole turns added.
@@ -28,6 +29,17 @@ pub struct Wrap {
     pub turns: [i32; JOINT_COUNT],
     /// Distance from the seed, `sqrt(sum_i w_i (q_i - seed_i)^2)`, rad with weights of one.
     pub distance_rad: f64,
+}
+
+impl Wrap {
+    fn of(posture: usize, rungs: [&Rung; JOINT_COUNT]) -> Self {
+        Self {
+            posture,
+            joints: Joints::from(rungs.map(|rung| rung.position_rad)),
+            turns: rungs.map(|rung| rung.turns),
+            distance_rad: rungs.map(|rung| rung.cost).iter().sum::<f64>().sqrt(),
+        }
+    }
 }
 
 /// What "near" means.
@@ -109,8 +121,8 @@ impl<'a> WrapSearch<'a> {
     ///
     /// `None` where a joint has no place in its range, and if posture or seed are not finite.
     pub fn nearest(&self, posture: &Joints) -> Option<Wrap> {
-        let ladders = Ladders::new(self, 0, *posture)?;
-        Some(ladders.wrap(self, &ladders.bottom(self)))
+        let rungs = self.bottom(posture)?;
+        Some(Wrap::of(0, rungs.each_ref()))
     }
 
     /// The wraps of a posture, nearest first; see [`WrapSearch::wraps_of_all`].
@@ -120,31 +132,91 @@ impl<'a> WrapSearch<'a> {
 
     /// The wraps of several postures, all eight of a pose say, nearest first.
     ///
-    /// Each comes once, in nondecreasing order. Equal distances come in the order of the postures,
-    /// then of the turns, first joint first; sums whose difference rounding swallows come in an
-    /// order that depends on nothing but the arguments. Wraps of two equal postures are
-    /// two. None come from a posture one joint of which has no place in its range, nor if posture
-    /// or seed are not finite. An item takes `O(log n)` after `n` of them.
+    /// Each comes once, in nondecreasing order. Of equal ones the earlier posture comes first, then
+    /// that whose first joints are nearer to the seed, then that of lower turns. Wraps of two equal
+    /// postures are two. None come from a posture one joint of which has no place in its range, nor
+    /// if posture or seed are not finite. An item takes `O(log n)` after `n` of them.
     pub fn wraps_of_all(&self, postures: impl IntoIterator<Item = Joints>) -> Wraps<'a> {
-        let ladders: Vec<Ladders> = postures
-            .into_iter()
-            .enumerate()
-            .filter_map(|(index, joints)| Ladders::new(self, index, joints))
-            .collect();
-        let nodes = ladders.iter().enumerate().map(|(at, each)| {
-            Reverse(Node {
-                ladders: at,
-                ..each.bottom(self)
-            })
-        });
-        Wraps {
+        let mut wraps = Wraps {
             search: *self,
-            open: nodes.collect(),
+            starts: Vec::new(),
+            rungs: Vec::new(),
+            open: BinaryHeap::new(),
             last: None,
-            ladders,
+        };
+        for (index, joints) in postures.into_iter().enumerate() {
+            if let Some(bottom) = self.bottom(&joints) {
+                wraps.start(index, joints, bottom);
+            }
+        }
+        wraps
+    }
+
+    /// The lowest rung of every ladder: the nearest wrap.
+    fn bottom(&self, posture: &Joints) -> Option<[Rung; JOINT_COUNT]> {
+        let mut rungs = [Rung::BLANK; JOINT_COUNT];
+        for (i, rung) in rungs.iter_mut().enumerate() {
+            *rung = self.lowest(i, posture[i])?;
+        }
+        Some(rungs)
+    }
+
+    fn lowest(&self, i: usize, position_rad: f64) -> Option<Rung> {
+        let about = nearest_whole((self.seed[i] - position_rad) * (1.0 / TAU));
+        if let Some(rung) = self.rung(i, position_rad, about)
+            && (rung.position_rad - self.seed[i]).abs() < CLEARLY_NEAREST_RAD
+        {
+            return Some(rung);
+        }
+        // The seed is beyond the range, or half a turn off, or nothing is finite.
+        if !self.seed[i].is_finite() {
+            return None;
+        }
+        let range = self.limits.0[i].turns(position_rad)?;
+        let least = (*range.start()).max(-self.max_turns);
+        let most = (*range.end()).min(self.max_turns);
+        if least > most {
+            return None;
+        }
+        let about = about.clamp(least, most);
+        (about - 1..=about + 1)
+            .filter_map(|turns| self.rung(i, position_rad, turns))
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    /// A number of turns of a joint, if it is admitted.
+    ///
+    /// The cost does not decrease with the distance of `turns` from the best ones, rounding
+    /// included, since every operation in it is monotonic.
+    fn rung(&self, i: usize, position_rad: f64, turns: i32) -> Option<Rung> {
+        if turns.abs() > self.max_turns {
+            return None;
+        }
+        let position_rad = self.limits.0[i].admit(turned(position_rad, turns))?;
+        let way_rad = position_rad - self.seed[i];
+        Some(Rung {
+            position_rad,
+            cost: self.weights[i] * (way_rad * way_rad),
+            turns,
+            passed: [turns, turns],
+            next: Next::Unknown,
+        })
+    }
+
+    /// What orders nodes: the first number, then the second. No less than that of costs of which
+    /// none is more.
+    fn key(&self, costs: [f64; JOINT_COUNT]) -> [f64; 2] {
+        let sum = costs.iter().sum();
+        match self.order {
+            WrapOrder::Distance => [sum, 0.0],
+            WrapOrder::LargestJoint => [costs.into_iter().fold(0.0, f64::max), sum],
         }
     }
 }
+
+/// A joint nearer than this to its seed, rad, is nearer than with any other number of turns: less
+/// than half a turn by more than any rounding.
+const CLEARLY_NEAREST_RAD: f64 = 3.0;
 
 /// The nearest wrap of a posture within the limits, all joints weighing the same; see
 /// [`WrapSearch::nearest`].
@@ -160,10 +232,55 @@ pub fn nearest_within_limits(
 #[derive(Debug, Clone)]
 pub struct Wraps<'a> {
     search: WrapSearch<'a>,
-    ladders: Vec<Ladders>,
+    /// The postures that have wraps, with their places among those given.
+    starts: Vec<(usize, Joints)>,
+    /// All rungs reached: the lowest ones of the first start, of the second and so on, then others
+    /// in the order of their discovery.
+    rungs: Vec<Rung>,
     open: BinaryHeap<Reverse<Node>>,
     /// The node given last. Its children wait until they are asked for.
     last: Option<Node>,
+}
+
+/// A number of turns of one joint of one posture.
+#[derive(Debug, Clone, Copy)]
+struct Rung {
+    position_rad: f64,
+    /// Weighted square of the way from the seed.
+    cost: f64,
+    turns: i32,
+    /// Least and most turns of the rungs below, this one included: a ladder leaves no gaps.
+    passed: [i32; 2],
+    next: Next,
+}
+
+impl Rung {
+    /// A place to write to.
+    const BLANK: Self = Self {
+        position_rad: 0.0,
+        cost: 0.0,
+        turns: 0,
+        passed: [0, 0],
+        next: Next::Unknown,
+    };
+}
+
+/// The next rung of a ladder.
+#[derive(Debug, Clone, Copy)]
+enum Next {
+    Unknown,
+    End,
+    At(u32),
+}
+
+/// One rung on each ladder.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    key: [f64; 2],
+    /// Index of the posture among the starts.
+    start: u32,
+    /// Indices of the rungs, which increase along a ladder.
+    rungs: [u32; JOINT_COUNT],
 }
 
 impl Iterator for Wraps<'_> {
@@ -171,153 +288,83 @@ impl Iterator for Wraps<'_> {
 
     fn next(&mut self) -> Option<Wrap> {
         if let Some(parent) = self.last.take() {
-            let ladders = &self.ladders[parent.ladders];
-            for joint in usize::from(parent.climbed)..JOINT_COUNT {
-                if let Some(child) = ladders.above(&self.search, &parent, joint) {
-                    self.open.push(Reverse(child));
-                }
-            }
+            self.open_children(&parent);
         }
         let Reverse(node) = self.open.pop()?;
         self.last = Some(node);
-        Some(self.ladders[node.ladders].wrap(&self.search, &node))
+        let (posture, _) = self.starts[node.start as usize];
+        let rungs = node.rungs.map(|at| &self.rungs[at as usize]);
+        Some(Wrap::of(posture, rungs))
     }
 }
 
 impl std::iter::FusedIterator for Wraps<'_> {}
 
-/// A posture and the least and most turns that the limits let be added to each joint.
-#[derive(Debug, Clone, Copy)]
-struct Ladders {
-    posture: usize,
-    joints: Joints,
-    range: [[i32; 2]; JOINT_COUNT],
-}
-
-/// One rung on each ladder.
-#[derive(Debug, Clone, Copy)]
-struct Node {
-    /// Orders nodes: the first number, then the second.
-    key: [f64; 2],
-    /// Index of the ladders.
-    ladders: usize,
-    turns: [i32; JOINT_COUNT],
-    /// Least and most turns of the rungs passed, this one included: a ladder leaves no gaps.
-    passed: [[i32; 2]; JOINT_COUNT],
-    /// Ladder last climbed.
-    climbed: u8,
-}
-
-impl Ladders {
-    fn new(search: &WrapSearch, posture: usize, joints: Joints) -> Option<Self> {
-        if !search.seed.iter().all(|seed| seed.is_finite()) {
-            return None;
-        }
-        let mut range = [[0; 2]; JOINT_COUNT];
-        for (i, [least, most]) in range.iter_mut().enumerate() {
-            let turns = search.limits.0[i].turns(joints[i])?;
-            *least = (*turns.start()).max(-search.max_turns);
-            *most = (*turns.end()).min(search.max_turns);
-            if least > most {
-                return None;
-            }
-        }
-        Some(Self {
-            posture,
-            joints,
-            range,
-        })
+impl Wraps<'_> {
+    fn start(&mut self, index: usize, joints: Joints, bottom: [Rung; JOINT_COUNT]) {
+        let first = id(self.rungs.len());
+        let node = Node {
+            key: self.search.key(bottom.map(|rung| rung.cost)),
+            start: id(self.starts.len()),
+            rungs: std::array::from_fn(|i| first + id(i)),
+        };
+        self.starts.push((index, joints));
+        self.rungs.extend(bottom);
+        self.open.push(Reverse(node));
     }
 
-    fn position(&self, search: &WrapSearch, i: usize, turns: i32) -> f64 {
-        let limit = &search.limits.0[i];
-        let position = turned(self.joints[i], turns);
-        limit
-            .admit(position)
-            .expect("turns outside the limits are on no ladder")
-    }
-
-    /// Weighted square of a joint's way. It does not decrease with the distance of `turns` from the
-    /// best ones, rounding included, since every operation in it is monotonic.
-    fn cost(&self, search: &WrapSearch, i: usize, turns: i32) -> f64 {
-        let way = self.position(search, i, turns) - search.seed[i];
-        search.weights[i] * (way * way)
-    }
-
-    /// Ordered by the cost of every joint; never below that of costs none of which is more.
-    fn key(&self, search: &WrapSearch, turns: &[i32; JOINT_COUNT]) -> [f64; 2] {
-        let costs: [f64; JOINT_COUNT] = std::array::from_fn(|i| self.cost(search, i, turns[i]));
-        let sum = costs.iter().sum();
-        match search.order {
-            WrapOrder::Distance => [sum, 0.0],
-            WrapOrder::LargestJoint => [costs.into_iter().fold(0.0, f64::max), sum],
-        }
-    }
-
-    /// The lowest rung of every ladder: the nearest wrap.
-    fn bottom(&self, search: &WrapSearch) -> Node {
-        let turns = std::array::from_fn(|i| {
-            let [least, most] = self.range[i];
-            let about = whole(((search.seed[i] - self.joints[i]) / std::f64::consts::TAU).round());
-            // The seed may be half a turn off or beyond the range, and the quotient is rounded.
-            let about = about.clamp(least, most);
-            let cost = |turns| self.cost(search, i, turns);
-            let mut best = about;
-            if about > least && cost(about - 1) <= cost(best) {
-                best = about - 1;
-            }
-            if about < most && cost(about + 1) < cost(best) {
-                best = about + 1;
-            }
-            best
-        });
-        Node {
-            key: self.key(search, &turns),
-            ladders: 0,
-            turns,
-            passed: turns.map(|turns| [turns, turns]),
-            climbed: 0,
+    fn open_children(&mut self, parent: &Node) {
+        let lowest_rungs = id(JOINT_COUNT * self.starts.len());
+        let climbed = parent.rungs.iter().rposition(|&at| at >= lowest_rungs);
+        let mut costs = parent.rungs.map(|at| self.rungs[at as usize].cost);
+        for joint in climbed.unwrap_or(0)..JOINT_COUNT {
+            let Some(next) = self.above(parent, joint) else {
+                continue;
+            };
+            let cost = std::mem::replace(&mut costs[joint], self.rungs[next as usize].cost);
+            let mut child = Node {
+                key: self.search.key(costs),
+                ..*parent
+            };
+            child.rungs[joint] = next;
+            costs[joint] = cost;
+            self.open.push(Reverse(child));
         }
     }
 
     /// One rung further on the ladder of a joint.
-    fn above(&self, search: &WrapSearch, node: &Node, joint: usize) -> Option<Node> {
-        let [least, most] = self.range[joint];
-        let [low, high] = node.passed[joint];
-        let mut child = Node {
-            climbed: u8::try_from(joint).expect("six joints"),
-            ..*node
-        };
-        let down = match (low > least, high < most) {
-            (false, false) => return None,
-            (true, true) => self.cost(search, joint, low - 1) <= self.cost(search, joint, high + 1),
-            (down, _) => down,
-        };
-        let passed = &mut child.passed[joint];
-        child.turns[joint] = if down {
-            passed[0] -= 1;
-            passed[0]
-        } else {
-            passed[1] += 1;
-            passed[1]
-        };
-        child.key = self.key(search, &child.turns);
-        Some(child)
-    }
-
-    fn wrap(&self, search: &WrapSearch, node: &Node) -> Wrap {
-        let [first, sum] = node.key;
-        let squared = match search.order {
-            WrapOrder::Distance => first,
-            WrapOrder::LargestJoint => sum,
-        };
-        Wrap {
-            posture: self.posture,
-            joints: Joints::from_fn(|i, _| self.position(search, i, node.turns[i])),
-            turns: node.turns,
-            distance_rad: squared.sqrt(),
+    fn above(&mut self, node: &Node, joint: usize) -> Option<u32> {
+        let at = node.rungs[joint] as usize;
+        match self.rungs[at].next {
+            Next::At(next) => return Some(next),
+            Next::End => return None,
+            Next::Unknown => {}
         }
+        let position_rad = self.starts[node.start as usize].1[joint];
+        let [low, high] = self.rungs[at].passed;
+        let down = self.search.rung(joint, position_rad, low - 1);
+        let up = self.search.rung(joint, position_rad, high + 1);
+        let found = match (down, up) {
+            (Some(down), Some(up)) if up.cost < down.cost => Some(up),
+            (Some(down), _) => Some(down),
+            (None, up) => up,
+        };
+        let Some(rung) = found else {
+            self.rungs[at].next = Next::End;
+            return None;
+        };
+        let next = id(self.rungs.len());
+        self.rungs[at].next = Next::At(next);
+        self.rungs.push(Rung {
+            passed: [low.min(rung.turns), high.max(rung.turns)],
+            ..rung
+        });
+        Some(next)
     }
+}
+
+fn id(index: usize) -> u32 {
+    u32::try_from(index).expect("memory ends before four thousand million rungs")
 }
 
 impl Ord for Node {
@@ -325,8 +372,8 @@ impl Ord for Node {
         self.key[0]
             .total_cmp(&other.key[0])
             .then_with(|| self.key[1].total_cmp(&other.key[1]))
-            .then_with(|| self.ladders.cmp(&other.ladders))
-            .then_with(|| self.turns.cmp(&other.turns))
+            .then_with(|| self.start.cmp(&other.start))
+            .then_with(|| self.rungs.cmp(&other.rungs))
     }
 }
 

@@ -21,7 +21,7 @@ fn listed(
     order: WrapOrder,
     turns: i32,
 ) -> Vec<Wrap> {
-    let mut found: Vec<([f64; 2], Wrap)> = Vec::new();
+    let mut found = Vec::new();
     for (posture, q) in postures.iter().enumerate() {
         let mut rows = vec![([0; JOINT_COUNT], *q)];
         for joint in 0..JOINT_COUNT {
@@ -47,7 +47,7 @@ fn listed(
             };
             let distance_rad = sum.sqrt();
             found.push((
-                key,
+                (key, costs),
                 Wrap {
                     posture,
                     joints,
@@ -58,10 +58,13 @@ fn listed(
         }
     }
     found.sort_by(|(a, x), (b, y)| {
-        a.partial_cmp(b)
+        let ladders = |costs: &[f64; 6], wrap: &Wrap| {
+            std::array::from_fn::<_, 6, _>(|i| (costs[i], wrap.turns[i]))
+        };
+        a.0.partial_cmp(&b.0)
             .unwrap()
             .then(x.posture.cmp(&y.posture))
-            .then(x.turns.cmp(&y.turns))
+            .then(ladders(&a.1, x).partial_cmp(&ladders(&b.1, y)).unwrap())
     });
     found.into_iter().map(|(_, wrap)| wrap).collect()
 }
@@ -178,14 +181,18 @@ fn a_joint_on_its_limit_is_on_both() {
 }
 
 #[test]
-fn equal_distances_come_in_the_order_of_the_postures_then_of_the_turns() {
+fn equal_distances_come_in_the_order_of_the_postures_then_first_joints_nearest_first() {
     let limits = limits(LimitPolicy::FULL_TURNS);
     let zero = Joints::zeros();
     let search = WrapSearch::new(&limits, &zero);
     let wraps: Vec<Wrap> = search.wraps_of_all([zero, zero]).collect();
     assert_eq!(wraps.len(), 2 * 729);
     assert!(wraps.windows(2).all(|pair| {
-        let key = |wrap: &Wrap| (wrap.distance_rad, wrap.posture, wrap.turns);
+        let key = |wrap: &Wrap| {
+            // No turn before one down before one up.
+            let rungs = wrap.turns.map(|turns| (turns.abs(), turns));
+            (wrap.distance_rad, wrap.posture, rungs)
+        };
         key(&pair[0]) < key(&pair[1])
     }));
 }

@@ -91,7 +91,7 @@ fn stated(name: &'static str, source: Source, value: f64, remark: &'static str) 
 /// Distance of the numerical method's guesses, rad: "good estimate of the initial condition".
 const GUESS_RAD: f64 = 0.05;
 
-/// Position repeatability of the UR3, m: the maker's data sheet.
+/// Position repeatability of the UR3, m: the figure usually quoted.
 pub(crate) const REPEATABILITY_M: f64 = 1e-4;
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
@@ -202,7 +202,7 @@ pub(super) fn evaluate(count: usize, watch: &Watch<'_>) -> Result<Vec<AccuracyRo
             "UR3 repeatability",
             Source::Robot,
             REPEATABILITY_M,
-            "data sheet, ±0.1 mm: the arm cannot show any of the differences above",
+            "usually quoted, ±0.1 mm: the arm cannot show any of the differences above",
         ),
     ])
 }

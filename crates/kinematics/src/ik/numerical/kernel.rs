@@ -1,0 +1,461 @@
+//! Fast forward kinematics and Jacobian of a chain of six revolute joints.
+//!
+//! Each fixed transform between two joints is brought to Hayati's form, a turn about the first
+//! axis, a shift, a twist about x, and a turn about the second axis. The turns join the joints'
+//! own, so that a joint costs two plane rotations. All is laid out in lanes of eight, of which six
+//! are joints, for the compiler to turn into vectors.
+
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use crate::{Chain, JOINT_COUNT, Joints, Pose};
+
+/// One value per joint, and two spare ones.
+pub(super) type Lanes = [f64; 8];
+pub(super) type V3 = [f64; 3];
+
+pub(super) fn lanes(q: &Joints) -> Lanes {
+    let mut lanes = [0.0; 8];
+    lanes[..JOINT_COUNT].copy_from_slice(q.as_slice());
+    lanes
+}
+
+pub(super) fn joints(lanes: &Lanes) -> Joints {
+    Joints::from_column_slice(&lanes[..JOINT_COUNT])
+}
+
+/// Sines and cosines, within one unit in the last place of one for angles up to 100 rad
+/// (`sines_and_cosines_are_right`); by the standard library beyond.
+///
+/// Reduction by Cody and Waite with pi/2 in three parts, and the polynomials of Sun's fdlibm.
+#[inline(always)]
+pub(super) fn sin_cos(angles: &Lanes) -> (Lanes, Lanes) {
+    const LARGEST_RAD: f64 = 100.0;
+    /// Adding it rounds to an integer, found in the low bits.
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    const FIRST: f64 = 1.570_796_326_734_125_6;
+    const SECOND: f64 = 6.077_100_506_303_966e-11;
+    const THIRD: f64 = 2.022_266_248_795_950_6e-21;
+    let (mut sines, mut cosines) = ([0.0; 8], [0.0; 8]);
+    // Written so that NaN counts as large.
+    if !angles.iter().all(|angle| angle.abs() <= LARGEST_RAD) {
+        for i in 0..8 {
+            (sines[i], cosines[i]) = angles[i].sin_cos();
+        }
+        return (sines, cosines);
+    }
+    for i in 0..8 {
+        let shifted = angles[i] * FRAC_2_PI + ROUND;
+        let quadrant = shifted.to_bits();
+        let quarters = shifted - ROUND;
+        let coarse = angles[i] - quarters * FIRST;
+        let fine = quarters * SECOND;
+        let high = coarse - fine;
+        let low = ((coarse - high) - fine) - quarters * THIRD;
+        let r = high + low;
+        let r_low = (high - r) + low;
+        let z = r * r;
+        let z2 = z * z;
+        let sine_tail = (8.333_333_333_322_49e-3 + z * -1.984_126_982_985_795e-4)
+            + z2 * ((2.755_731_370_707_007e-6 + z * -2.505_076_025_340_686_3e-8)
+                + z2 * 1.589_690_995_211_55e-10);
+        let cosine_tail = (4.166_666_666_666_66e-2 + z * -1.388_888_888_887_411e-3)
+            + z2 * ((2.480_158_728_947_673e-5 + z * -2.755_731_435_139_066_3e-7)
+                + z2 * (2.087_572_321_298_175e-9 + z * -1.135_964_755_778_819_5e-11));
+        let cube = z * r;
+        let sine = r
+            - ((z * (0.5 * r_low - cube * sine_tail) - r_low) + cube * 1.666_666_666_666_663_2e-1);
+        let half = 0.5 * z;
+        let near_one = 1.0 - half;
+        let cosine = near_one + (((1.0 - near_one) - half) + (z * (z * cosine_tail) - r * r_low));
+        // Odd quadrants swap sine and cosine; bit 1 is the sign.
+        let swap = 0_u64.wrapping_sub(quadrant & 1);
+        let (sine_bits, cosine_bits) = (sine.to_bits(), cosine.to_bits());
+        let sine_bits_out = (sine_bits & !swap) | (cosine_bits & swap);
+        let cosine_bits_out = (cosine_bits & !swap) | (sine_bits & swap);
+        sines[i] = f64::from_bits(sine_bits_out ^ ((quadrant & 2) << 62));
+        cosines[i] = f64::from_bits(cosine_bits_out ^ ((quadrant.wrapping_add(1) & 2) << 62));
+    }
+    (sines, cosines)
+}
+
+#[inline(always)]
+pub(super) fn cross(a: &V3, b: &V3) -> V3 {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+#[inline(always)]
+fn dot(a: &V3, b: &V3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A chain prepared for fast evaluation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Kernel {
+    /// Cosine and sine of the turn added to each joint's own.
+    turn_cos: Lanes,
+    turn_sin: Lanes,
+    /// Cosine and sine of the twist after each joint.
+    twist: [(f64, f64); JOINT_COUNT],
+    /// Shift after each joint, before the twist, m.
+    arm: [V3; JOINT_COUNT],
+    base_rotation: Matrix3<f64>,
+    base_position: Vector3<f64>,
+    tool_rotation: Matrix3<f64>,
+    /// Sum of the shifts' lengths, m.
+    pub reach_m: f64,
+}
+
+/// A pose seen from the first joint, with the tool's own rotation taken off.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Target {
+    columns: [V3; 3],
+    position: V3,
+}
+
+/// The chain at some joint positions, seen from the first joint.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct State {
+    /// Geometric Jacobian: three rows in m/rad, three in rad/rad.
+    pub rows: [Lanes; 6],
+    columns: [V3; 3],
+    position: V3,
+}
+
+/// Cosine and sine of the direction `(x, y)`, with those within rounding of a right angle made
+/// exact; `(1, 0)` where there is no direction.
+fn direction(y: f64, x: f64) -> (f64, f64) {
+    const ROUNDING: f64 = 5e-16;
+    let length = y.hypot(x);
+    if length < 1e-15 {
+        return (1.0, 0.0);
+    }
+    let snapped = |value: f64| {
+        if value.abs() < ROUNDING {
+            0.0
+        } else if (value.abs() - 1.0).abs() < ROUNDING {
+            value.signum()
+        } else {
+            value
+        }
+    };
+    (snapped(x / length), snapped(y / length))
+}
+
+fn about_z((cosine, sine): (f64, f64)) -> Matrix3<f64> {
+    Matrix3::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0)
+}
+
+fn about_x((cosine, sine): (f64, f64)) -> Matrix3<f64> {
+    Matrix3::new(1.0, 0.0, 0.0, 0.0, cosine, -sine, 0.0, sine, cosine)
+}
+
+impl Kernel {
+    pub(super) fn new(chain: &Chain) -> Self {
+        let mut rotations = [Matrix3::identity(); JOINT_COUNT];
+        let mut positions = [Vector3::zeros(); JOINT_COUNT];
+        let mut previous = Matrix3::identity();
+        for (i, joint) in chain.joints.iter().enumerate() {
+            // Frames whose z axes are the joint axes.
+            let aligned = Rotation3::rotation_between(&Vector3::z(), &joint.axis).map_or_else(
+                || Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0)),
+                Rotation3::into_inner,
+            );
+            let origin = &joint.parent_from_joint;
+            rotations[i] = previous * origin.rotation.to_rotation_matrix().into_inner() * aligned;
+            positions[i] = previous * origin.translation.vector;
+            previous = aligned.transpose();
+        }
+        let tool = &chain.wrist_3_from_flange;
+        let tool_rotation = previous * tool.rotation.to_rotation_matrix().into_inner();
+        let tool_position = previous * tool.translation.vector;
+        let mut turns = [Matrix3::identity(); JOINT_COUNT];
+        let mut twist = [(1.0, 0.0); JOINT_COUNT];
+        let mut arm = [[0.0; 3]; JOINT_COUNT];
+        for i in 1..JOINT_COUNT {
+            let r = rotations[i];
+            // The next axis is (sin a sin b, -cos a sin b, cos b).
+            let sin_b = r[(0, 2)].hypot(r[(1, 2)]);
+            let a = direction(r[(0, 2)], -r[(1, 2)]);
+            let a = if sin_b < 1e-15 { (1.0, 0.0) } else { a };
+            let b = direction(sin_b, r[(2, 2)]);
+            let rest = about_x(b).transpose() * about_z(a).transpose() * r;
+            turns[i - 1] *= about_z(a);
+            turns[i] = about_z(direction(rest[(1, 0)], rest[(0, 0)]));
+            twist[i - 1] = b;
+            arm[i - 1] = (about_z(a).transpose() * positions[i]).into();
+        }
+        arm[JOINT_COUNT - 1] = tool_position.into();
+        let (mut turn_cos, mut turn_sin) = ([0.0; 8], [0.0; 8]);
+        for i in 0..JOINT_COUNT {
+            (turn_cos[i], turn_sin[i]) = direction(turns[i][(1, 0)], turns[i][(0, 0)]);
+        }
+        Self {
+            turn_cos,
+            turn_sin,
+            twist,
+            arm,
+            base_rotation: rotations[0],
+            base_position: positions[0],
+            tool_rotation,
+            reach_m: arm.iter().map(|shift| dot(shift, shift).sqrt()).sum(),
+        }
+    }
+
+    /// Prepares a pose in the chain's base.
+    pub(super) fn target(&self, pose: &Pose) -> Target {
+        let into_base = self.base_rotation.transpose();
+        let rotation = pose.rotation.to_rotation_matrix().into_inner();
+        let r = into_base * rotation * self.tool_rotation.transpose();
+        let position = into_base * (pose.translation.vector - self.base_position);
+        Target {
+            columns: std::array::from_fn(|i| r.column(i).into_owned().into()),
+            position: position.into(),
+        }
+    }
+
+    /// Forward kinematics and Jacobian.
+    #[inline(always)]
+    pub(super) fn state(&self, q: &Lanes) -> State {
+        let (own_sin, own_cos) = sin_cos(q);
+        let (mut s, mut c) = ([0.0; 8], [0.0; 8]);
+        for i in 0..8 {
+            c[i] = own_cos[i] * self.turn_cos[i] - own_sin[i] * self.turn_sin[i];
+            s[i] = own_sin[i] * self.turn_cos[i] + own_cos[i] * self.turn_sin[i];
+        }
+        // Joint axes and origins by coordinate, and the frame that runs along the chain.
+        let (mut axes, mut origins) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
+        axes[2][0] = 1.0;
+        let mut x = [c[0], s[0], 0.0];
+        let mut y = [-s[0], c[0], 0.0];
+        let mut z = [0.0, 0.0, 1.0];
+        let mut p = [0.0; 3];
+        for i in 0..JOINT_COUNT {
+            if i > 0 {
+                for k in 0..3 {
+                    let (xk, yk) = (x[k], y[k]);
+                    x[k] = c[i] * xk + s[i] * yk;
+                    y[k] = c[i] * yk - s[i] * xk;
+                }
+            }
+            let shift = &self.arm[i];
+            for k in 0..3 {
+                p[k] += (shift[0] * x[k] + shift[1] * y[k]) + shift[2] * z[k];
+            }
+            if i + 1 < JOINT_COUNT {
+                let (cosine, sine) = self.twist[i];
+                for k in 0..3 {
+                    let (yk, zk) = (y[k], z[k]);
+                    y[k] = cosine * yk + sine * zk;
+                    z[k] = cosine * zk - sine * yk;
+                    axes[k][i + 1] = z[k];
+                    origins[k][i + 1] = p[k];
+                }
+            }
+        }
+        let mut rows = [[0.0; 8]; 6];
+        for i in 0..8 {
+            let lever = [p[0] - origins[0][i], p[1] - origins[1][i], p[2] - origins[2][i]];
+            rows[0][i] = axes[1][i] * lever[2] - axes[2][i] * lever[1];
+            rows[1][i] = axes[2][i] * lever[0] - axes[0][i] * lever[2];
+            rows[2][i] = axes[0][i] * lever[1] - axes[1][i] * lever[0];
+        }
+        [rows[3], rows[4], rows[5]] = axes;
+        State {
+            rows,
+            columns: [x, y, z],
+            position: p,
+        }
+    }
+}
+
+impl State {
+    /// Position error (m) and rotation vector from here to the target (rad), by the log map.
+    #[inline(always)]
+    pub(super) fn error(&self, target: &Target) -> [f64; 6] {
+        let Self {
+            columns, position, ..
+        } = self;
+        let crosses = [0, 1, 2].map(|i| cross(&columns[i], &target.columns[i]));
+        // Axis times sine, and cosine, of the angle between the two.
+        let axial: V3 =
+            std::array::from_fn(|k| 0.5 * (crosses[0][k] + crosses[1][k] + crosses[2][k]));
+        let trace = dot(&columns[0], &target.columns[0])
+            + dot(&columns[1], &target.columns[1])
+            + dot(&columns[2], &target.columns[2]);
+        let cosine = 0.5 * (trace - 1.0);
+        let sine_squared = dot(&axial, &axial);
+        let angular = if cosine > 0.0 && sine_squared < 0.01 {
+            let scale = angle_over_sine(sine_squared);
+            axial.map(|v| v * scale)
+        } else if cosine > -0.999 {
+            let sine = sine_squared.sqrt();
+            let scale = upper_angle(sine, cosine) / sine;
+            axial.map(|v| v * scale)
+        } else {
+            near_half_turn(target, self, &axial, cosine)
+        };
+        [
+            target.position[0] - position[0],
+            target.position[1] - position[1],
+            target.position[2] - position[2],
+            angular[0],
+            angular[1],
+            angular[2],
+        ]
+    }
+}
+
+/// `asin(s) / s` for `s^2` below 0.01, by its series; error below 1e-17.
+#[inline(always)]
+fn angle_over_sine(s2: f64) -> f64 {
+    const SERIES: [f64; 8] = [
+        1.0,
+        1.0 / 6.0,
+        3.0 / 40.0,
+        15.0 / 336.0,
+        105.0 / 3456.0,
+        945.0 / 42240.0,
+        10395.0 / 599_040.0,
+        135_135.0 / 9_676_800.0,
+    ];
+    SERIES.iter().rev().fold(0.0, |sum, term| term + s2 * sum)
+}
+
+/// Angle of `(cosine, sine)` with `sine >= 0`, rad; the length need not be one.
+#[inline(always)]
+fn upper_angle(sine: f64, cosine: f64) -> f64 {
+    /// Minimax coefficients of `2 (atan t - t) / t^3`; see the vector form in the closed form.
+    const TWICE_ATAN: [f64; 10] = [
+        -0.666666666666603,
+        0.3999999999817792,
+        -0.28571428390523384,
+        0.22222213307207014,
+        -0.18181564825677253,
+        0.15380136610897475,
+        -0.13282242457129956,
+        0.11385078293619903,
+        -0.08718191167245305,
+        0.04251969400709461,
+    ];
+    let length = (sine * sine + cosine * cosine).sqrt();
+    let (x, flat) = (cosine.abs(), cosine.abs() >= sine);
+    let t = x.min(sine) / (x.max(sine) + length);
+    let t2 = t * t;
+    let series = TWICE_ATAN.iter().rev().fold(0.0, |sum, term| term + t2 * sum);
+    let from_axis = (t + t) + t * t2 * series;
+    match (flat, cosine < 0.0) {
+        (true, false) => from_axis,
+        (true, true) => PI - from_axis,
+        (false, false) => FRAC_PI_2 - from_axis,
+        (false, true) => FRAC_PI_2 + from_axis,
+    }
+}
+
+/// The rotation vector near half a turn, where the axis is lost in the antisymmetric part: from
+/// the symmetric part, `cos I + (1 - cos) n n^T`.
+#[cold]
+#[inline(never)]
+fn near_half_turn(target: &Target, state: &State, axial: &V3, cosine: f64) -> V3 {
+    let r = |i: usize, j: usize| -> f64 {
+        (0..3)
+            .map(|k| target.columns[k][i] * state.columns[k][j])
+            .sum()
+    };
+    let diagonal = [r(0, 0), r(1, 1), r(2, 2)];
+    let most = (0..3).fold(0, |m, i| if diagonal[i] > diagonal[m] { i } else { m });
+    let mut axis: V3 = std::array::from_fn(|i| 0.5 * (r(i, most) + r(most, i)));
+    axis[most] -= cosine;
+    let length = dot(&axis, &axis).sqrt();
+    let sign = if dot(&axis, axial) < 0.0 { -1.0 } else { 1.0 };
+    let angle = dot(axial, axial).sqrt().atan2(cosine);
+    axis.map(|v| v * sign * angle / length)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix6, UnitQuaternion};
+
+    use super::*;
+    use crate::pose_sets::{PoseSet, SplitMix64};
+    use crate::{UrGeometry, rotation_vector};
+
+    /// One unit in the last place of one; the worst over 1e6 angles is 1.2e-16.
+    const SINE: f64 = 2.3e-16;
+
+    /// Ten times the rounding of a chain of six, m and rad.
+    const KINEMATICS: f64 = 1e-14;
+
+    #[test]
+    fn sines_and_cosines_are_right() {
+        let mut random = SplitMix64::new(41);
+        for count in 0..100_000 {
+            let size = if count % 2 == 0 { 4.0 } else { 100.0 };
+            let angle = random.uniform(-size, size);
+            let (s, c) = sin_cos(&[angle; 8]);
+            assert!((s[0] - angle.sin()).abs() <= SINE, "{angle}");
+            assert!((c[0] - angle.cos()).abs() <= SINE, "{angle}");
+        }
+        let (s, _) = sin_cos(&[1e6, f64::NAN, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(s[0], 1e6_f64.sin());
+        assert!(s[1].is_nan());
+    }
+
+    /// A chain with tilted axes, none of them z, and a tool.
+    fn odd_chain() -> Chain {
+        let mut chain = UrGeometry::UR3.chain();
+        let mut random = SplitMix64::new(42);
+        for joint in &mut chain.joints {
+            let mut vector = || Vector3::from_fn(|_, _| random.uniform(-1.0, 1.0));
+            joint.axis = nalgebra::Unit::new_normalize(vector());
+            joint.parent_from_joint.rotation = UnitQuaternion::from_scaled_axis(vector());
+        }
+        chain.wrist_3_from_flange = Pose::new(Vector3::new(0.01, 0.02, 0.1), Vector3::new(0.2, 1.0, -0.3));
+        chain
+    }
+
+    #[test]
+    fn state_error_and_jacobian_are_the_chains() {
+        let mut random = SplitMix64::new(43);
+        for chain in [UrGeometry::UR3.chain(), odd_chain()] {
+            let kernel = Kernel::new(&chain);
+            for count in 0..2000 {
+                let q = PoseSet::Generic.sample(&UrGeometry::UR3, &mut random, 0.0);
+                let mut wanted = chain
+                    .base_link_from_flange(&PoseSet::Generic.sample(&UrGeometry::UR3, &mut random, 0.0));
+                if count % 4 == 0 {
+                    // Half a turn away, where the log map is delicate.
+                    let axis = Vector3::from_fn(|_, _| random.uniform(-1.0, 1.0)).normalize();
+                    let angle = PI - random.uniform(0.0, 1e-3) * random.uniform(0.0, 1.0);
+                    wanted.rotation = UnitQuaternion::from_scaled_axis(axis * angle)
+                        * chain.base_link_from_flange(&q).rotation;
+                }
+                let state = kernel.state(&lanes(&q));
+                let error = state.error(&kernel.target(&wanted));
+                let actual = chain.base_link_from_flange(&q);
+                let linear = wanted.translation.vector - actual.translation.vector;
+                let angular = rotation_vector(&(wanted.rotation * actual.rotation.inverse()));
+                let turned = |v: &[f64]| kernel.base_rotation * Vector3::from_column_slice(v);
+                assert!((turned(&error[..3]) - linear).norm() < KINEMATICS);
+                let gap = turned(&error[3..]) - angular;
+                // Half a turn either way is the same rotation.
+                let turned_round = (gap.norm() - 2.0 * PI).abs() < 1e-6;
+                assert!(gap.norm() < 10.0 * KINEMATICS || turned_round, "{}", gap.norm());
+                let mut jacobian = Matrix6::zeros();
+                for column in 0..JOINT_COUNT {
+                    let part = |row: usize| {
+                        turned(&[row, row + 1, row + 2].map(|row| state.rows[row][column]))
+                    };
+                    jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&part(0));
+                    jacobian.fixed_view_mut::<3, 1>(3, column).copy_from(&part(3));
+                }
+                assert!((jacobian - chain.jacobian(&q)).amax() < KINEMATICS);
+            }
+        }
+    }
+}
