@@ -7,12 +7,12 @@
 //! for many poses about the wanted one, as far off as the calibration moves the flange, and every
 //! branch of each is a start for Newton's method.
 
-use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::closed_form::{clamped, unreachable};
-use super::gauss_newton::pose_error;
 use super::{
-    ClosedForm, Configuration, Elbow, Preference, Unreachable, closed_form_into, wrap_angle,
+    ClosedForm, Configuration, Elbow, Numerical, Preference, Unreachable, closed_form_into,
+    wrap_angle,
 };
 use crate::geometry::{Mismatch, base_from_base_link};
 use crate::pose_sets::SplitMix64;
@@ -36,7 +36,7 @@ const POSES_IN_VAIN: u32 = 24;
 const SIZES: [f64; 3] = [1.0, 3.0, 0.3];
 
 /// A metre counts as this many radians where both are minimised together.
-const RAD_PER_M: f64 = 2.0;
+pub(super) const RAD_PER_M: f64 = 2.0;
 
 /// A solution of the calibrated chain under the name of its branch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +57,7 @@ pub(super) struct Branches {
 /// A pose to be solved on a chain near a nominal geometry.
 pub(super) struct Calibrated<'a> {
     pub chain: &'a Chain,
+    pub numerical: &'a Numerical,
     pub geometry: &'a UrGeometry,
     pub mismatch: Mismatch,
     /// In `base_link`.
@@ -97,7 +98,8 @@ impl Calibrated<'_> {
                 found.iter().all(|branch| branch.configuration != name)
             })
             .filter_map(|row| {
-                let (_, missing_m, missing_rad) = self.nearest(&row.joints);
+                let nearest = self.numerical.nearest(self.target, &row.joints, RAD_PER_M);
+                let (missing_m, missing_rad) = (nearest.residual_m, nearest.residual_rad);
                 let reason = Unreachable::NoCounterpart {
                     missing_m,
                     missing_rad,
@@ -221,67 +223,11 @@ impl Calibrated<'_> {
         nominal * actual.inverse() * (base_from_base_link * self.target)
     }
 
-    fn error(&self, q: &Joints) -> Vector6<f64> {
-        pose_error(self.target, &self.chain.base_link_from_flange(q))
-    }
-
-    /// Newton's method with a damping that vanishes with the residual.
+    /// The solution that Newton's method finds from a start.
     fn newton(&self, start: &Joints) -> Option<Joints> {
-        let (q, error) = self.descend(start, 12, 1.0);
-        (error.norm() < SOLVED).then_some(q)
-    }
-
-    /// The posture nearest to the pose that descent finds, in the sense of least squares with a
-    /// metre as [`RAD_PER_M`] radians; with its errors in m and in rad.
-    pub(super) fn nearest(&self, start: &Joints) -> (Joints, f64, f64) {
-        let (q, error) = self.descend(start, 60, RAD_PER_M);
-        (
-            q.map(wrap_angle),
-            error.fixed_rows::<3>(0).norm() / RAD_PER_M,
-            error.fixed_rows::<3>(3).norm(),
-        )
-    }
-
-    /// Damped descent (Levenberg and Marquardt); positions count `weight` times.
-    fn descend(&self, start: &Joints, iterations: u32, weight: f64) -> (Joints, Vector6<f64>) {
-        let weighted = |mut error: Vector6<f64>| {
-            error.fixed_rows_mut::<3>(0).scale_mut(weight);
-            error
-        };
-        let mut q = *start;
-        let mut error = weighted(self.error(&q));
-        let mut damping = 1e-3;
-        for _ in 0..iterations {
-            let size = error.norm();
-            // Below this, steps only stir rounding errors.
-            if size < 1e-14 {
-                break;
-            }
-            let mut jacobian = self.chain.jacobian(&q);
-            jacobian.fixed_rows_mut::<3>(0).scale_mut(weight);
-            let normal = jacobian.tr_mul(&jacobian)
-                + Matrix6::identity() * (damping * size.min(1.0).powi(2) + f64::MIN_POSITIVE);
-            let Some(factor) = normal.cholesky() else {
-                damping = damping * 10.0 + 1e-6;
-                continue;
-            };
-            let step = factor.solve(&jacobian.tr_mul(&error));
-            let next = q + step;
-            let next_error = weighted(self.error(&next));
-            if next_error.norm() < size {
-                let gained = size - next_error.norm();
-                (q, error) = (next, next_error);
-                damping *= 0.3;
-                if size > SOLVED && gained < 1e-9 * size {
-                    break;
-                }
-            } else if size < SOLVED || step.amax() < 1e-12 {
-                break;
-            } else {
-                damping = damping.max(1e-6) * 8.0;
-            }
-        }
-        (q, error)
+        let q = self.numerical.refined(self.target, start)?;
+        let (m, rad) = self.numerical.residuals(self.target, &q);
+        (m.max(rad) < SOLVED).then_some(q)
     }
 }
 

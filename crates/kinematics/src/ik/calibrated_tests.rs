@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
-use super::gauss_newton::pose_error;
+use super::numerical::pose_error;
 use super::*;
 use crate::pose_sets::{PoseSet, SplitMix64};
 use crate::{Chain, Joints, Pose, UrGeometry};

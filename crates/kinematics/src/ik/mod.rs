@@ -6,8 +6,7 @@
 mod calibrated;
 mod closed_form;
 mod configuration;
-mod damped;
-mod gauss_newton;
+mod numerical;
 mod solve;
 mod wraps;
 
@@ -16,7 +15,10 @@ pub use closed_form::{
     closed_form_batch, closed_form_into,
 };
 pub use configuration::{Configuration, Elbow, Shoulder, Wrist};
-pub use gauss_newton::{GaussNewtonOptions, GaussNewtonResult, gauss_newton};
+pub use numerical::{
+    DampedOptions, GaussNewtonOptions, GaussNewtonStep, Numerical, NumericalResult, Stop,
+    gauss_newton,
+};
 pub use solve::{Kinematics, Solution, SolutionKind, Solutions};
 pub use wraps::{InvalidWeight, Wrap, WrapOrder, WrapSearch, Wraps, nearest_within_limits};
 
@@ -37,6 +39,8 @@ pub fn wrap_angle(angle_rad: f64) -> f64 {
 
 #[cfg(test)]
 mod calibrated_tests;
+#[cfg(test)]
+mod numerical_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

@@ -1,11 +1,10 @@
 //! All solutions of a flange pose on a real chain.
 
-use super::calibrated::Calibrated;
+use super::calibrated::{Calibrated, RAD_PER_M};
 use super::closed_form::clamped;
-use super::gauss_newton::pose_error;
 use super::{
-    Certificate, ClosedForm, Configuration, GaussNewtonOptions, Preference, Unreachable,
-    closed_form_into, gauss_newton, wrap_angle,
+    Certificate, ClosedForm, Configuration, Numerical, Preference, Unreachable, closed_form_into,
+    wrap_angle,
 };
 use crate::geometry::{Mismatch, base_from_base_link};
 use crate::{Chain, JointLimits, Joints, NotUrGeometry, Pose, UrGeometry};
@@ -59,6 +58,7 @@ pub struct Kinematics {
     pub chain: Chain,
     /// Its nearest nominal geometry, which the closed form solves.
     pub geometry: UrGeometry,
+    numerical: Numerical,
     mismatch: Mismatch,
     limits: Option<JointLimits>,
 }
@@ -73,6 +73,7 @@ impl Kinematics {
         Ok(Self {
             chain,
             geometry,
+            numerical: Numerical::new(&chain),
             mismatch: Mismatch::of(&chain, &geometry),
             limits: None,
         })
@@ -136,9 +137,15 @@ impl Kinematics {
         self.chain.base_link_from_flange(q)
     }
 
+    /// Numerical solvers on the same chain.
+    pub fn numerical(&self) -> &Numerical {
+        &self.numerical
+    }
+
     fn near_nominal<'a>(&'a self, target: &'a Pose) -> Calibrated<'a> {
         Calibrated {
             chain: &self.chain,
+            numerical: &self.numerical,
             geometry: &self.geometry,
             mismatch: self.mismatch,
             target,
@@ -175,7 +182,8 @@ impl Kinematics {
         for configuration in Configuration::ALL {
             let seed_6_rad = seed.map_or(0.0, |seed| seed[5]);
             let start = clamped(&self.geometry, &base_from_flange, configuration, seed_6_rad);
-            let (q, ..) = self.near_nominal(target).nearest(&start);
+            let found = self.numerical.nearest(target, &start, RAD_PER_M);
+            let q = found.joints.map(wrap_angle);
             let row = Solution {
                 kind: SolutionKind::Nearest,
                 ..self.row(target, configuration, q)
@@ -192,11 +200,7 @@ impl Kinematics {
     }
 
     fn row(&self, target: &Pose, configuration: Configuration, joints: Joints) -> Solution {
-        let error = pose_error(target, &self.chain.base_link_from_flange(&joints));
-        let (residual_m, residual_rad) = (
-            error.fixed_rows::<3>(0).norm(),
-            error.fixed_rows::<3>(3).norm(),
-        );
+        let (residual_m, residual_rad) = self.numerical.residuals(target, &joints);
         let exact = residual_m.max(residual_rad) <= EXACT;
         Solution {
             configuration,
@@ -220,14 +224,12 @@ impl Kinematics {
         if row.residual_m.max(row.residual_rad) <= CLOSED_FORM_SUFFICES {
             return row;
         }
-        let options = GaussNewtonOptions {
-            max_iterations: 10,
-            ..Default::default()
+        let Some(found) = self.numerical.refined(target, start) else {
+            return row;
         };
-        let found = gauss_newton(&self.chain, target, start, &options);
-        let refined = self.row(target, configuration, found.joints.map(wrap_angle));
+        let refined = self.row(target, configuration, found.map(wrap_angle));
         // A step that jumps to another branch would give the row a wrong name.
-        let same_branch = (found.joints - start).amax() < 0.1;
+        let same_branch = (found - start).amax() < 0.1;
         let better =
             refined.residual_m.max(refined.residual_rad) < row.residual_m.max(row.residual_rad);
         if same_branch && better { refined } else { row }
@@ -243,9 +245,9 @@ const CLOSED_FORM_SUFFICES: f64 = 1e-13;
 /// Nearest postures nearer to one another than this, rad, are one.
 const SAME_POSTURE_RAD: f64 = 1e-4;
 
-/// A metre as two radians, as in the search for the nearest posture.
+/// What the search for the nearest posture minimises, rad.
 fn cost(row: &Solution) -> f64 {
-    (2.0 * row.residual_m).hypot(row.residual_rad)
+    (RAD_PER_M * row.residual_m).hypot(row.residual_rad)
 }
 
 fn is_finite(pose: &Pose) -> bool {

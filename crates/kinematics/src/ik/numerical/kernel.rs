@@ -260,7 +260,11 @@ impl Kernel {
         }
         let mut rows = [[0.0; 8]; 6];
         for i in 0..8 {
-            let lever = [p[0] - origins[0][i], p[1] - origins[1][i], p[2] - origins[2][i]];
+            let lever = [
+                p[0] - origins[0][i],
+                p[1] - origins[1][i],
+                p[2] - origins[2][i],
+            ];
             rows[0][i] = axes[1][i] * lever[2] - axes[2][i] * lever[1];
             rows[1][i] = axes[2][i] * lever[0] - axes[0][i] * lever[2];
             rows[2][i] = axes[0][i] * lever[1] - axes[1][i] * lever[0];
@@ -347,7 +351,10 @@ fn upper_angle(sine: f64, cosine: f64) -> f64 {
     let (x, flat) = (cosine.abs(), cosine.abs() >= sine);
     let t = x.min(sine) / (x.max(sine) + length);
     let t2 = t * t;
-    let series = TWICE_ATAN.iter().rev().fold(0.0, |sum, term| term + t2 * sum);
+    let series = TWICE_ATAN
+        .iter()
+        .rev()
+        .fold(0.0, |sum, term| term + t2 * sum);
     let from_axis = (t + t) + t * t2 * series;
     match (flat, cosine < 0.0) {
         (true, false) => from_axis,
@@ -415,7 +422,8 @@ mod tests {
             joint.axis = nalgebra::Unit::new_normalize(vector());
             joint.parent_from_joint.rotation = UnitQuaternion::from_scaled_axis(vector());
         }
-        chain.wrist_3_from_flange = Pose::new(Vector3::new(0.01, 0.02, 0.1), Vector3::new(0.2, 1.0, -0.3));
+        chain.wrist_3_from_flange =
+            Pose::new(Vector3::new(0.01, 0.02, 0.1), Vector3::new(0.2, 1.0, -0.3));
         chain
     }
 
@@ -426,8 +434,11 @@ mod tests {
             let kernel = Kernel::new(&chain);
             for count in 0..2000 {
                 let q = PoseSet::Generic.sample(&UrGeometry::UR3, &mut random, 0.0);
-                let mut wanted = chain
-                    .base_link_from_flange(&PoseSet::Generic.sample(&UrGeometry::UR3, &mut random, 0.0));
+                let mut wanted = chain.base_link_from_flange(&PoseSet::Generic.sample(
+                    &UrGeometry::UR3,
+                    &mut random,
+                    0.0,
+                ));
                 if count % 4 == 0 {
                     // Half a turn away, where the log map is delicate.
                     let axis = Vector3::from_fn(|_, _| random.uniform(-1.0, 1.0)).normalize();
@@ -445,14 +456,22 @@ mod tests {
                 let gap = turned(&error[3..]) - angular;
                 // Half a turn either way is the same rotation.
                 let turned_round = (gap.norm() - 2.0 * PI).abs() < 1e-6;
-                assert!(gap.norm() < 10.0 * KINEMATICS || turned_round, "{}", gap.norm());
+                assert!(
+                    gap.norm() < 10.0 * KINEMATICS || turned_round,
+                    "{}",
+                    gap.norm()
+                );
                 let mut jacobian = Matrix6::zeros();
                 for column in 0..JOINT_COUNT {
                     let part = |row: usize| {
                         turned(&[row, row + 1, row + 2].map(|row| state.rows[row][column]))
                     };
-                    jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&part(0));
-                    jacobian.fixed_view_mut::<3, 1>(3, column).copy_from(&part(3));
+                    jacobian
+                        .fixed_view_mut::<3, 1>(0, column)
+                        .copy_from(&part(0));
+                    jacobian
+                        .fixed_view_mut::<3, 1>(3, column)
+                        .copy_from(&part(3));
                 }
                 assert!((jacobian - chain.jacobian(&q)).amax() < KINEMATICS);
             }

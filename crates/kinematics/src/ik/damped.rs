@@ -1,1 +1,0 @@
-//! Damped, restarted numerical inverse kinematics.
