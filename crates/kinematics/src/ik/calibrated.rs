@@ -10,6 +10,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::closed_form::{clamped, unreachable};
+use super::numerical::{Refined, Target};
 use super::{
     ClosedForm, Configuration, Elbow, Numerical, Preference, Unreachable, closed_form_into,
     wrap_angle,
@@ -25,12 +26,12 @@ const SOLVED: f64 = 1e-12;
 const SAME_RAD: f64 = 1e-7;
 
 /// Starts nearer to one another than this, rad, lead to the same solution.
-const SAME_START_RAD: f64 = 0.05;
+const SAME_START_RAD: f64 = 0.1;
 
 /// Poses tried about the wanted one near a singularity: at most, and after the last that led to a
 /// new solution.
-const MOST_POSES: u32 = 96;
-const POSES_IN_VAIN: u32 = 24;
+const MOST_POSES: u32 = 32;
+const POSES_IN_VAIN: u32 = 8;
 
 /// Share of the calibration's mismatch by which the poses tried are off, in turn.
 const SIZES: [f64; 3] = [1.0, 3.0, 0.3];
@@ -42,7 +43,8 @@ pub(super) const RAD_PER_M: f64 = 2.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Branch {
     pub configuration: Configuration,
-    pub joints: Joints,
+    /// With its joints wrapped.
+    pub solution: Refined,
 }
 
 /// What a calibrated chain makes of a pose.
@@ -61,25 +63,30 @@ pub(super) struct Calibrated<'a> {
     pub geometry: &'a UrGeometry,
     pub mismatch: Mismatch,
     /// In `base_link`.
-    pub target: &'a Pose,
+    pub pose: &'a Pose,
+    /// The same, prepared.
+    pub target: Target,
 }
 
 impl Calibrated<'_> {
     /// All branches, from those of the nominal arm at the same pose.
     pub(super) fn branches(&self, nominal: &ClosedForm) -> Branches {
-        let mut solutions: Vec<Joints> = Vec::with_capacity(8);
+        let mut solutions: Vec<Refined> = Vec::with_capacity(8);
+        let mut names: Vec<Configuration> = Vec::with_capacity(8);
         let mut doubtful = false;
         for row in nominal.solutions() {
             doubtful |= row.merged || row.wrist_3_is_free;
             match self.newton(&row.joints) {
-                Some(q) => {
-                    let wrist_turns_far = q[4].sin().abs() < 2.5 * self.mismatch.angle_rad;
-                    doubtful |= wrist_turns_far || !insert(&mut solutions, &q);
+                Some(found) => {
+                    let wrist_turns_far =
+                        found.joints[4].sin().abs() < 2.5 * self.mismatch.angle_rad;
+                    doubtful |= wrist_turns_far || !insert(&mut solutions, &found);
+                    names.push(row.configuration);
                 }
                 None => doubtful = true,
             }
         }
-        let base_from_flange = base_from_base_link() * self.target;
+        let base_from_flange = base_from_base_link() * self.pose;
         doubtful = doubtful
             || nominal.unreachable(self.geometry, &base_from_flange).any(
                 |(configuration, reason)| {
@@ -87,9 +94,19 @@ impl Calibrated<'_> {
                         && self.may_exist(configuration, reason.missing_m())
                 },
             );
-        if doubtful {
-            self.search(&mut solutions);
+        if !doubtful {
+            let pairs = names.into_iter().zip(solutions);
+            return Branches {
+                found: pairs
+                    .map(|(configuration, solution)| Branch {
+                        configuration,
+                        solution,
+                    })
+                    .collect(),
+                lost: Vec::new(),
+            };
         }
+        self.search(&mut solutions);
         let found = named(self.geometry, &solutions);
         let lost = nominal
             .solutions()
@@ -98,7 +115,7 @@ impl Calibrated<'_> {
                 found.iter().all(|branch| branch.configuration != name)
             })
             .filter_map(|row| {
-                let nearest = self.numerical.nearest(self.target, &row.joints, RAD_PER_M);
+                let nearest = self.numerical.nearest(self.pose, &row.joints, RAD_PER_M);
                 let (missing_m, missing_rad) = (nearest.residual_m, nearest.residual_rad);
                 let reason = Unreachable::NoCounterpart {
                     missing_m,
@@ -123,7 +140,7 @@ impl Calibrated<'_> {
         let Configuration {
             shoulder, wrist, ..
         } = configuration;
-        let mut pose = base_from_base_link() * self.target;
+        let mut pose = base_from_base_link() * self.pose;
         let mut missing_m = missing_m;
         // The calibration's error at the branch itself leaves a smaller doubt each time.
         for share in [1.0, 0.3, 0.1] {
@@ -139,7 +156,7 @@ impl Calibrated<'_> {
     }
 
     /// Adds every solution near the nominal branches of poses about the wanted one.
-    fn search(&self, solutions: &mut Vec<Joints>) {
+    fn search(&self, solutions: &mut Vec<Refined>) {
         let mut random = SplitMix64::new(1);
         let mut starts: Vec<Joints> = Vec::new();
         let mut nominal = ClosedForm::BLANK;
@@ -150,8 +167,8 @@ impl Calibrated<'_> {
                 break;
             }
             let centre = match solutions.len() {
-                0 => base_from_base_link() * self.target,
-                known => self.corrected(&solutions[count as usize % known]),
+                0 => base_from_base_link() * self.pose,
+                known => self.corrected(&solutions[count as usize % known].joints),
             };
             let size = SIZES[count as usize % SIZES.len()];
             let pose = self.nudged(&centre, size, &mut random);
@@ -172,7 +189,7 @@ impl Calibrated<'_> {
             }
             // Solutions come in pairs that meet at a singularity.
             while twins_of < solutions.len() {
-                if let Some(q) = self.twin(&solutions[twins_of])
+                if let Some(q) = self.twin(&solutions[twins_of].joints)
                     && insert(solutions, &q)
                 {
                     last_new = count;
@@ -186,7 +203,7 @@ impl Calibrated<'_> {
     ///
     /// Along the direction `v` that moves the flange least, by `sigma u` per radian, the error
     /// grows as `sigma t + kappa t^2 / 2`, which has a second zero at `-2 sigma / kappa`.
-    fn twin(&self, q: &Joints) -> Option<Joints> {
+    fn twin(&self, q: &Joints) -> Option<Refined> {
         /// Solutions farther apart are found from a start of their own.
         const FARTHEST_RAD: f64 = 1.0;
         const STEP_RAD: f64 = 1e-4;
@@ -220,14 +237,16 @@ impl Calibrated<'_> {
         let base_from_base_link = base_from_base_link();
         let actual = base_from_base_link * self.chain.base_link_from_flange(q);
         let nominal = self.geometry.base_from_flange(q);
-        nominal * actual.inverse() * (base_from_base_link * self.target)
+        nominal * actual.inverse() * (base_from_base_link * self.pose)
     }
 
     /// The solution that Newton's method finds from a start.
-    fn newton(&self, start: &Joints) -> Option<Joints> {
-        let q = self.numerical.refined(self.target, start)?;
-        let (m, rad) = self.numerical.residuals(self.target, &q);
-        (m.max(rad) < SOLVED).then_some(q)
+    fn newton(&self, start: &Joints) -> Option<Refined> {
+        let found = self.numerical.refined(&self.target, start)?;
+        (found.residual_m.max(found.residual_rad) < SOLVED).then(|| Refined {
+            joints: found.joints.map(wrap_angle),
+            ..found
+        })
     }
 }
 
@@ -237,18 +256,19 @@ fn apart(a: &Joints, b: &Joints) -> f64 {
 }
 
 /// Adds a solution unless it is known.
-fn insert(solutions: &mut Vec<Joints>, q: &Joints) -> bool {
-    let q = q.map(wrap_angle);
-    let new = solutions.iter().all(|known| apart(known, &q) >= SAME_RAD);
+fn insert(solutions: &mut Vec<Refined>, found: &Refined) -> bool {
+    let new = solutions
+        .iter()
+        .all(|known| apart(&known.joints, &found.joints) >= SAME_RAD);
     if new {
-        solutions.push(q);
+        solutions.push(*found);
     }
     new
 }
 
 /// Gives each solution the name of a branch: by the signs of the nominal arm, and where two would
 /// have the same, by the least change of a sine or of the wrist's way ahead that tells them apart.
-fn named(geometry: &UrGeometry, solutions: &[Joints]) -> Vec<Branch> {
+fn named(geometry: &UrGeometry, solutions: &[Refined]) -> Vec<Branch> {
     let cost = |q: &Joints, configuration: Configuration| {
         let Configuration {
             shoulder,
@@ -265,11 +285,13 @@ fn named(geometry: &UrGeometry, solutions: &[Joints]) -> Vec<Branch> {
     let mut pairs: Vec<(f64, usize, usize)> = solutions
         .iter()
         .enumerate()
-        .flat_map(|(solution, q)| {
+        .flat_map(|(solution, found)| {
             Configuration::ALL
                 .into_iter()
                 .enumerate()
-                .map(move |(name, configuration)| (cost(q, configuration), solution, name))
+                .map(move |(name, configuration)| {
+                    (cost(&found.joints, configuration), solution, name)
+                })
         })
         .collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
@@ -287,7 +309,7 @@ fn named(geometry: &UrGeometry, solutions: &[Joints]) -> Vec<Branch> {
         .filter_map(|(configuration, solution)| {
             Some(Branch {
                 configuration,
-                joints: solutions[solution?],
+                solution: solutions[solution?],
             })
         })
         .collect()

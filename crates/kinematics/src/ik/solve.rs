@@ -2,6 +2,7 @@
 
 use super::calibrated::{Calibrated, RAD_PER_M};
 use super::closed_form::clamped;
+use super::numerical::Target;
 use super::{
     Certificate, ClosedForm, Configuration, Numerical, Preference, Unreachable, closed_form_into,
     wrap_angle,
@@ -106,6 +107,7 @@ impl Kinematics {
         };
         let mut nominal = ClosedForm::BLANK;
         closed_form_into(&self.geometry, &base_from_flange, preference, &mut nominal);
+        let target = self.numerical.target(base_link_from_flange);
         let mut answer = if self.is_nominal() || !is_finite(base_link_from_flange) {
             Solutions {
                 solutions: nominal
@@ -113,7 +115,7 @@ impl Kinematics {
                     .map(|row| Solution {
                         wrist_3_is_free: row.wrist_3_is_free,
                         merged: row.merged,
-                        ..self.refined(base_link_from_flange, row.configuration, &row.joints)
+                        ..self.refined(&target, row.configuration, &row.joints)
                     })
                     .collect(),
                 nearest: Vec::new(),
@@ -142,13 +144,14 @@ impl Kinematics {
         &self.numerical
     }
 
-    fn near_nominal<'a>(&'a self, target: &'a Pose) -> Calibrated<'a> {
+    fn near_nominal<'a>(&'a self, pose: &'a Pose) -> Calibrated<'a> {
         Calibrated {
             chain: &self.chain,
             numerical: &self.numerical,
             geometry: &self.geometry,
             mismatch: self.mismatch,
-            target,
+            pose,
+            target: self.numerical.target(pose),
         }
     }
 
@@ -157,7 +160,11 @@ impl Kinematics {
         let solutions: Vec<Solution> = branches
             .found
             .iter()
-            .map(|branch| self.row(target, branch.configuration, branch.joints))
+            .map(|branch| {
+                let found = branch.solution;
+                let residuals = (found.residual_m, found.residual_rad);
+                row(branch.configuration, found.joints, residuals)
+            })
             .collect();
         let mut unreachable = branches.lost;
         let base_from_flange = base_from_base_link() * target;
@@ -186,7 +193,7 @@ impl Kinematics {
             let q = found.joints.map(wrap_angle);
             let row = Solution {
                 kind: SolutionKind::Nearest,
-                ..self.row(target, configuration, q)
+                ..self.row(&self.numerical.target(target), configuration, q)
             };
             let known = rows.iter().any(|other| {
                 (other.joints - q).map(|d| wrap_angle(d).abs()).max() < SAME_POSTURE_RAD
@@ -199,40 +206,55 @@ impl Kinematics {
         rows
     }
 
-    fn row(&self, target: &Pose, configuration: Configuration, joints: Joints) -> Solution {
-        let (residual_m, residual_rad) = self.numerical.residuals(target, &joints);
-        let exact = residual_m.max(residual_rad) <= EXACT;
-        Solution {
+    fn row(&self, target: &Target, configuration: Configuration, joints: Joints) -> Solution {
+        row(
             configuration,
             joints,
-            residual_m,
-            residual_rad,
-            kind: if exact {
-                SolutionKind::Exact
-            } else {
-                SolutionKind::Nearest
-            },
-            wrist_3_is_free: false,
-            merged: false,
-        }
+            self.numerical.residuals(target, &joints),
+        )
     }
 
     /// A row of the closed form, with a step or two of Newton's method where the chain's origins
     /// were printed to a few digits.
-    fn refined(&self, target: &Pose, configuration: Configuration, start: &Joints) -> Solution {
-        let row = self.row(target, configuration, *start);
-        if row.residual_m.max(row.residual_rad) <= CLOSED_FORM_SUFFICES {
-            return row;
+    fn refined(&self, target: &Target, configuration: Configuration, start: &Joints) -> Solution {
+        let closed = self.row(target, configuration, *start);
+        if closed.residual_m.max(closed.residual_rad) <= CLOSED_FORM_SUFFICES {
+            return closed;
         }
         let Some(found) = self.numerical.refined(target, start) else {
-            return row;
+            return closed;
         };
-        let refined = self.row(target, configuration, found.map(wrap_angle));
+        let residuals = (found.residual_m, found.residual_rad);
+        let refined = row(configuration, found.joints.map(wrap_angle), residuals);
         // A step that jumps to another branch would give the row a wrong name.
-        let same_branch = (found - start).amax() < 0.1;
-        let better =
-            refined.residual_m.max(refined.residual_rad) < row.residual_m.max(row.residual_rad);
-        if same_branch && better { refined } else { row }
+        let same_branch = (found.joints - start).amax() < 0.1;
+        let better = residuals.0.max(residuals.1) < closed.residual_m.max(closed.residual_rad);
+        if same_branch && better {
+            refined
+        } else {
+            closed
+        }
+    }
+}
+
+fn row(
+    configuration: Configuration,
+    joints: Joints,
+    (residual_m, residual_rad): (f64, f64),
+) -> Solution {
+    let exact = residual_m.max(residual_rad) <= EXACT;
+    Solution {
+        configuration,
+        joints,
+        residual_m,
+        residual_rad,
+        kind: if exact {
+            SolutionKind::Exact
+        } else {
+            SolutionKind::Nearest
+        },
+        wrist_3_is_free: false,
+        merged: false,
     }
 }
 

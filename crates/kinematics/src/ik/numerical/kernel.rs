@@ -113,7 +113,7 @@ pub(super) struct Kernel {
 
 /// A pose seen from the first joint, with the tool's own rotation taken off.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Target {
+pub(in super::super) struct Target {
     columns: [V3; 3],
     position: V3,
 }

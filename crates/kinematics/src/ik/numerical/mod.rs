@@ -18,7 +18,9 @@ use nalgebra::{Matrix6, Vector6};
 use crate::pose_sets::SplitMix64;
 use crate::{Chain, JOINT_COUNT, Joints, Pose, rotation_vector};
 use descent::{End, Steering, descend, least_squares};
-use kernel::{Kernel, Lanes, Target, joints, lanes};
+use kernel::{Kernel, Lanes, joints, lanes};
+
+pub(super) use kernel::Target;
 
 /// Vector instructions of this machine, at most those of four doubles: a chain is no wider.
 static LEVEL: LazyLock<Level> = LazyLock::new(|| {
@@ -146,6 +148,14 @@ pub struct Numerical {
     kernel: Kernel,
 }
 
+/// A posture at rounding level, not wrapped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Refined {
+    pub joints: Joints,
+    pub residual_m: f64,
+    pub residual_rad: f64,
+}
+
 /// How restarts are made, and how long they go on.
 #[derive(Clone, Copy)]
 struct Effort {
@@ -257,8 +267,13 @@ impl Numerical {
         result(&end, end.steps, 0, stop)
     }
 
+    /// A pose prepared for [`Numerical::refined`] and [`Numerical::residuals`].
+    pub(super) fn target(&self, base_link_from_flange: &Pose) -> Target {
+        self.kernel.target(base_link_from_flange)
+    }
+
     /// One descent to rounding level, without restarts; `None` if it does not get there.
-    pub(super) fn refined(&self, base_link_from_flange: &Pose, start: &Joints) -> Option<Joints> {
+    pub(super) fn refined(&self, target: &Target, start: &Joints) -> Option<Refined> {
         let steering = Steering {
             rad_per_m: self.rad_per_m(),
             damping: 0.3,
@@ -268,16 +283,18 @@ impl Numerical {
             steps: 20,
             tolerance: 1e-9,
         };
-        let target = self.kernel.target(base_link_from_flange);
         let start = lanes(start);
-        let end = dispatch!(*LEVEL, simd => once(simd, &self.kernel, &target, &start, &steering));
-        end.reached.then(|| joints(&end.q))
+        let end = dispatch!(*LEVEL, simd => once(simd, &self.kernel, target, &start, &steering));
+        end.reached.then(|| Refined {
+            joints: joints(&end.q),
+            residual_m: end.residual_m,
+            residual_rad: end.residual_rad,
+        })
     }
 
     /// Residuals of postures, m and rad.
-    pub(super) fn residuals(&self, base_link_from_flange: &Pose, q: &Joints) -> (f64, f64) {
-        let target = self.kernel.target(base_link_from_flange);
-        let e = self.kernel.state(&lanes(q)).error(&target);
+    pub(super) fn residuals(&self, target: &Target, q: &Joints) -> (f64, f64) {
+        let e = self.kernel.state(&lanes(q)).error(target);
         let norm = |part: &[f64]| part.iter().map(|v| v * v).sum::<f64>().sqrt();
         (norm(&e[..3]), norm(&e[3..]))
     }
