@@ -177,6 +177,8 @@ pub(crate) enum IkMethod {
     ClosedForm,
     /// One, near the seed.
     GaussNewton,
+    /// One, from any seed: damped, and started again until it converges.
+    Damped,
 }
 
 #[derive(Debug, Args)]
@@ -220,6 +222,10 @@ pub(crate) struct IkArguments {
     /// Steps after which a numerical method gives up.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub max_iterations: Option<u32>,
+    /// Time after which a numerical method gives up, ms. What it has found by then depends on the
+    /// machine.
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub time_limit_ms: Option<u32>,
     /// List whole turns within the joint limits too, nearest to the seed (or to zero) first; at most
     /// one turn more or less of a joint without limits.
     #[arg(long)]

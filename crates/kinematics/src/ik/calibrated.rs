@@ -158,7 +158,8 @@ impl Calibrated<'_> {
     /// Adds every solution near the nominal branches of poses about the wanted one.
     fn search(&self, solutions: &mut Vec<Refined>) {
         let mut random = SplitMix64::new(1);
-        let mut starts: Vec<Joints> = Vec::new();
+        let mut starts: Vec<Joints> = solutions.iter().map(|known| known.joints).collect();
+        let mut centres: Vec<Pose> = Vec::new();
         let mut nominal = ClosedForm::BLANK;
         let mut last_new = 0;
         let mut twins_of = 0;
@@ -166,9 +167,12 @@ impl Calibrated<'_> {
             if count > last_new + POSES_IN_VAIN {
                 break;
             }
-            let centre = match solutions.len() {
+            while centres.len() < solutions.len() {
+                centres.push(self.corrected(&solutions[centres.len()].joints));
+            }
+            let centre = match centres.len() {
                 0 => base_from_base_link() * self.pose,
-                known => self.corrected(&solutions[count as usize % known].joints),
+                known => centres[count as usize % known],
             };
             let size = SIZES[count as usize % SIZES.len()];
             let pose = self.nudged(&centre, size, &mut random);
@@ -207,6 +211,14 @@ impl Calibrated<'_> {
         /// Solutions farther apart are found from a start of their own.
         const FARTHEST_RAD: f64 = 1.0;
         const STEP_RAD: f64 = 1e-4;
+        /// A twin is near only where one of the singularities is: sines, and the wrist's way ahead
+        /// over the arm's length.
+        const NEAR: f64 = 0.35;
+        let reach_m = (self.geometry.a2 + self.geometry.a3).abs();
+        let ahead = self.geometry.wrist_forward_m(q).abs() / reach_m;
+        if q[2].sin().abs().min(q[4].sin().abs()).min(ahead) > NEAR {
+            return None;
+        }
         let svd = self.chain.jacobian(q).svd(true, true);
         let (u, v) = (svd.u?.column(5).into_owned(), svd.v_t?.row(5).transpose());
         let sigma = svd.singular_values[5];

@@ -4,11 +4,13 @@ mod answer;
 mod arm;
 mod target;
 
+use std::time::Duration;
+
 use anyhow::Result;
 use needlebench_cell::Finding;
 use needlebench_kinematics::ik::{
-    Certificate, Configuration, GaussNewtonOptions, Kinematics, Solution, SolutionKind, WrapSearch,
-    gauss_newton, wrap_angle,
+    Certificate, Configuration, DampedOptions, GaussNewtonOptions, Kinematics, Solution,
+    SolutionKind, WrapSearch, wrap_angle,
 };
 use needlebench_kinematics::{Joints, Pose};
 
@@ -44,11 +46,17 @@ fn solve(arguments: &IkArguments) -> Result<IkAnswer, Vec<Finding>> {
                 .hint("whole turns are those of the closed form: leave --method out"),
         ]);
     }
-    if arguments.method == IkMethod::ClosedForm && arguments.max_iterations.is_some() {
-        return Err(vec![
-            Finding::new("--max-iterations", "the closed form does not iterate")
-                .hint("choose a numerical method, such as --method gauss-newton"),
-        ]);
+    if arguments.method == IkMethod::ClosedForm {
+        let given = [
+            ("--max-iterations", arguments.max_iterations),
+            ("--time-limit-ms", arguments.time_limit_ms),
+        ];
+        if let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) {
+            return Err(vec![
+                Finding::new(*option, "the closed form does not iterate")
+                    .hint("choose a numerical method, such as --method damped"),
+            ]);
+        }
     }
     let (arm, base_link_from_flange) = target(arguments)?;
     let kinematics = Kinematics::new(arm.chain)
@@ -56,7 +64,9 @@ fn solve(arguments: &IkArguments) -> Result<IkAnswer, Vec<Finding>> {
         .within(arm.limits);
     Ok(match arguments.method {
         IkMethod::ClosedForm => closed_form(arguments, &arm, &kinematics, &base_link_from_flange),
-        IkMethod::GaussNewton => numerical(arguments, &arm, &kinematics, &base_link_from_flange),
+        IkMethod::GaussNewton | IkMethod::Damped => {
+            numerical(arguments, &arm, &kinematics, &base_link_from_flange)
+        }
     })
 }
 
@@ -138,11 +148,29 @@ fn numerical(
     // Away from every singularity, so that the first step is a sensible one.
     let guess = seed(arguments)
         .unwrap_or_else(|| Joints::from_column_slice(&[0.1, -1.2, -1.2, -1.0, 1.2, 0.1]));
-    let mut options = GaussNewtonOptions::default();
-    if let Some(limit) = arguments.max_iterations {
-        options.max_iterations = limit;
-    }
-    let found = gauss_newton(&kinematics.chain, base_link_from_flange, &guess, &options);
+    let max_time = arguments
+        .time_limit_ms
+        .map(|limit| Duration::from_millis(u64::from(limit)));
+    let solver = kinematics.numerical();
+    let (method, found) = if arguments.method == IkMethod::Damped {
+        let defaults = DampedOptions::default();
+        let options = DampedOptions {
+            max_iterations: arguments.max_iterations.unwrap_or(defaults.max_iterations),
+            max_time,
+            ..defaults
+        };
+        let found = solver.damped(base_link_from_flange, &guess, &options);
+        ("damped", found)
+    } else {
+        let defaults = GaussNewtonOptions::default();
+        let options = GaussNewtonOptions {
+            max_iterations: arguments.max_iterations.unwrap_or(defaults.max_iterations),
+            max_time,
+            ..defaults
+        };
+        let found = solver.gauss_newton(base_link_from_flange, &guess, &options);
+        ("gauss-newton", found)
+    };
     let joints = found.joints.map(wrap_angle);
     let kind = if found.converged {
         SolutionKind::Exact
@@ -167,7 +195,7 @@ fn numerical(
     IkAnswer {
         schema_version: 1,
         arm: ArmAnswer::of(arm),
-        method: "gauss-newton",
+        method,
         count: solutions.len(),
         solutions,
         nearest,

@@ -351,7 +351,12 @@ pub(super) fn least_squares(
         }
         let next = Point::new(kernel, target, q, weight);
         if next.cost < here.cost {
+            // At a minimum that is no solution, the cost settles before the joints do.
+            let settled = here.cost - next.cost < 1e-14 * here.cost;
             here = next;
+            if settled {
+                return here.end(count + 1, false);
+            }
             damping = (damping * 0.3).max(1e-9);
         } else if damping > 1e9 {
             return here.end(count, false);

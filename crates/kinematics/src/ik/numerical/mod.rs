@@ -278,7 +278,7 @@ impl Numerical {
             rad_per_m: self.rad_per_m(),
             damping: 0.3,
             longest_step_rad: 0.5,
-            second_order_below: 0.0,
+            second_order_below: f64::INFINITY,
             patience: (8, 8),
             steps: 20,
             tolerance: 1e-9,
