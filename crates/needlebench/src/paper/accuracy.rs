@@ -1,7 +1,7 @@
 //! Accuracy of both methods, beside the paper's figures and beside what limits them.
 
 use nalgebra::Matrix4;
-use needlebench_kinematics::ik::{GaussNewtonOptions, closed_form, gauss_newton};
+use needlebench_kinematics::ik::{GaussNewtonOptions, Numerical, closed_form};
 use needlebench_kinematics::pose_sets::{PoseSet, SplitMix64};
 use needlebench_kinematics::{Joints, UrGeometry, base_from_base_link};
 use serde::Serialize;
@@ -102,7 +102,7 @@ fn to_single(matrix: &Matrix4<f64>) -> Matrix4<f32> {
 /// Measures `count` random poses.
 pub(super) fn evaluate(count: usize, watch: &Watch<'_>) -> Result<Vec<AccuracyRow>, Interrupted> {
     let geometry = UrGeometry::UR3;
-    let chain = geometry.chain();
+    let numerical = Numerical::new(&geometry.chain());
     let (arm, arm_single) = (Arm::<f64>::of(&geometry), Arm::<f32>::of(&geometry));
     let mut random = SplitMix64::new(SEED + 9);
     let [
@@ -129,12 +129,8 @@ pub(super) fn evaluate(count: usize, watch: &Watch<'_>) -> Result<Vec<AccuracyRo
         }
         let guess = Joints::from_fn(|i, _| made_of[i] + GUESS_RAD * random.uniform(-1.0, 1.0));
         let in_base_link = base_from_base_link() * pose;
-        let found = gauss_newton(
-            &chain,
-            &in_base_link,
-            &guess,
-            &GaussNewtonOptions::default(),
-        );
+        let options = GaussNewtonOptions::default();
+        let found = numerical.gauss_newton(&in_base_link, &guess, &options);
         if found.converged {
             newton.add(&arm.base_from_flange(&found.joints.into()), &wanted);
         }

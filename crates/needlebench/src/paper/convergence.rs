@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use needlebench_kinematics::ik::{
-    Configuration, GaussNewtonOptions, closed_form, gauss_newton as library_gauss_newton,
+    Configuration, DampedOptions, GaussNewtonOptions, Numerical, NumericalResult, closed_form,
     wrap_angle,
 };
 use needlebench_kinematics::pose_sets::{PoseSet, SplitMix64};
-use needlebench_kinematics::{Chain, Joints, UrGeometry};
+use needlebench_kinematics::{Chain, Joints, Pose, UrGeometry};
 use serde::Serialize;
 
 use super::dh::Arm;
@@ -35,16 +35,19 @@ pub(crate) enum Method {
     Mended,
     /// The same with Levenberg-Marquardt damping.
     LevenbergMarquardt,
-    /// The library's rank-aware Gauss-Newton.
+    /// The library's Gauss-Newton, which stays near its guess.
     LibraryGaussNewton,
+    /// The library's damped solver, which starts again from anywhere.
+    LibraryDamped,
 }
 
 impl Method {
-    pub(crate) const ALL: [Self; 4] = [
+    pub(crate) const ALL: [Self; 5] = [
         Self::Equation39AsPrinted,
         Self::Mended,
         Self::LevenbergMarquardt,
         Self::LibraryGaussNewton,
+        Self::LibraryDamped,
     ];
 
     pub(crate) fn name(self) -> &'static str {
@@ -53,6 +56,7 @@ impl Method {
             Self::Mended => "39 and 45 mended, undamped",
             Self::LevenbergMarquardt => "the same, Levenberg-Marquardt",
             Self::LibraryGaussNewton => "library: Gauss-Newton",
+            Self::LibraryDamped => "library: damped, restarted",
         }
     }
 
@@ -64,18 +68,25 @@ impl Method {
             Self::Mended => gauss_newton(&bench.arm, &pose, guess, false),
             Self::LevenbergMarquardt => levenberg_marquardt(&bench.arm, &pose, guess),
             Self::LibraryGaussNewton => {
-                let found = library_gauss_newton(
-                    &bench.chain,
-                    &bench.chain.base_link_from_flange(wanted),
-                    &Joints::from(*guess),
-                    &GaussNewtonOptions::default(),
-                );
-                Ended {
-                    joints: found.joints.map(wrap_angle).into(),
-                    iterations: found.iterations,
-                    converged: found.converged,
-                }
+                let (pose, guess) = (bench.pose(wanted), Joints::from(*guess));
+                let options = GaussNewtonOptions::default();
+                Ended::of(&bench.numerical.gauss_newton(&pose, &guess, &options))
             }
+            Self::LibraryDamped => {
+                let (pose, guess) = (bench.pose(wanted), Joints::from(*guess));
+                let options = DampedOptions::default();
+                Ended::of(&bench.numerical.damped(&pose, &guess, &options))
+            }
+        }
+    }
+}
+
+impl Ended {
+    fn of(found: &NumericalResult) -> Self {
+        Self {
+            joints: found.joints.map(wrap_angle).into(),
+            iterations: found.iterations,
+            converged: found.converged,
         }
     }
 }
@@ -84,6 +95,13 @@ impl Method {
 struct Bench {
     arm: Arm<f64>,
     chain: Chain,
+    numerical: Numerical,
+}
+
+impl Bench {
+    fn pose(&self, wanted: &Joints) -> Pose {
+        self.chain.base_link_from_flange(wanted)
+    }
 }
 
 /// One method at one distance of the guess.
@@ -165,6 +183,7 @@ pub(super) fn evaluate(watch: &Watch<'_>) -> Result<ConvergenceReport, Interrupt
     let bench = Bench {
         arm: Arm::ur3(),
         chain: UrGeometry::UR3.chain(),
+        numerical: Numerical::new(&UrGeometry::UR3.chain()),
     };
     let regular = postures(true, POSES, SEED + 2);
     let all = postures(false, POSES, SEED + 3);

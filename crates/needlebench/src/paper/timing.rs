@@ -3,7 +3,10 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use needlebench_kinematics::ik::{GaussNewtonOptions, closed_form, gauss_newton};
+use needlebench_kinematics::ik::{
+    ClosedForm, DampedOptions, GaussNewtonOptions, Numerical, Preference, closed_form,
+    closed_form_batch,
+};
 use needlebench_kinematics::pose_sets::{PoseSet, SplitMix64};
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
 use serde::Serialize;
@@ -40,6 +43,17 @@ pub(crate) struct TimeRow {
     pub p90_s: Option<f64>,
     pub repetitions: Option<usize>,
     pub poses_per_repetition: Option<usize>,
+}
+
+impl TimeRow {
+    /// Makes the time of a call for many poses that of one.
+    fn share(&mut self, poses: usize) {
+        let count = poses as f64;
+        self.time_s /= count;
+        self.least_s = self.least_s.map(|time| time / count);
+        self.p90_s = self.p90_s.map(|time| time / count);
+        self.poses_per_repetition = Some(poses);
+    }
 }
 
 /// The only part of the results that differs between two runs.
@@ -90,6 +104,7 @@ struct Case {
     target: Target<f64>,
     matrix: nalgebra::Matrix4<f64>,
     guess: Joints,
+    anywhere: Joints,
 }
 
 /// Measures our own methods and puts them beside the others.
@@ -109,10 +124,12 @@ pub(super) fn measure(watch: &Watch<'_>) -> Result<Vec<TimeRow>, Interrupted> {
                 target: Target::of(&matrix),
                 matrix,
                 guess: Joints::from_fn(|i, _| q[i] + 0.1 * random.uniform(-1.0, 1.0)),
+                anywhere: PoseSet::Generic.sample(&geometry, &mut random, 0.0),
             }
         })
         .collect();
     let options = GaussNewtonOptions::default();
+    let numerical = Numerical::new(&chain);
     let mut rows = vec![
         time("paper: closed form", false),
         time("paper: numerical", true),
@@ -136,6 +153,22 @@ pub(super) fn measure(watch: &Watch<'_>) -> Result<Vec<TimeRow>, Interrupted> {
             ));
         },
     )?);
+    // Poses per call, so that the time of a call over their number is that of one.
+    let poses: Vec<Pose> = cases.iter().map(|case| case.base_from_flange).collect();
+    let mut answers = vec![ClosedForm::BLANK; poses.len()];
+    let mut batch = run(
+        watch,
+        "library: closed form, in a batch",
+        false,
+        &[()],
+        |()| {
+            let preference = Preference::default();
+            closed_form_batch(&geometry, black_box(&poses), preference, &mut answers);
+            black_box(&answers);
+        },
+    )?;
+    batch.share(poses.len());
+    rows.push(batch);
     rows.push(run(
         watch,
         "equations 9 to 38 mended, plain",
@@ -151,12 +184,18 @@ pub(super) fn measure(watch: &Watch<'_>) -> Result<Vec<TimeRow>, Interrupted> {
         true,
         &cases,
         |case| {
-            black_box(gauss_newton(
-                &chain,
-                black_box(&case.base_link_from_flange),
-                &case.guess,
-                &options,
-            ));
+            let pose = black_box(&case.base_link_from_flange);
+            black_box(numerical.gauss_newton(pose, &case.guess, &options));
+        },
+    )?);
+    rows.push(run(
+        watch,
+        "library: damped, from a random start",
+        true,
+        &cases,
+        |case| {
+            let pose = black_box(&case.base_link_from_flange);
+            black_box(numerical.damped(pose, &case.anywhere, &DampedOptions::default()));
         },
     )?);
     rows.push(run(
@@ -188,7 +227,7 @@ fn run<T>(
     name: &'static str,
     numerical: bool,
     cases: &[T],
-    solve: impl Fn(&T),
+    mut solve: impl FnMut(&T),
 ) -> Result<TimeRow, Interrupted> {
     let mut times_s = Vec::with_capacity(REPETITIONS);
     for _ in 0..REPETITIONS {

@@ -14,15 +14,13 @@ use super::kernel::{Kernel, Lanes, State, Target, cross};
 pub(super) struct Steering {
     /// Rad that a metre counts as.
     pub rad_per_m: f64,
-    /// Damping at the start, relative to the squared error.
-    pub damping: f64,
     /// Longest step, rad.
     pub longest_step_rad: f64,
-    /// Squared error below which the second-order correction pays.
-    pub second_order_below: f64,
-    /// Steps in which the squared error has to halve, or the descent is given up: far from the
-    /// pose and near it.
-    pub patience: (u32, u32),
+    /// Whether steps near the pose are corrected to second order.
+    pub second_order: bool,
+    /// Steps in which the squared error has to fall to [`MILESTONE`] of itself, or the descent is
+    /// given up, while far from the pose.
+    pub patience_far: u32,
     /// Steps at most.
     pub steps: u32,
     /// Residual at which the pose is reached, m and rad.
@@ -45,9 +43,31 @@ impl End {
     }
 }
 
-/// Squared error below which a step that does not reduce it may still be taken, as on the way
-/// round a fold.
-const UPHILL_BELOW: f64 = 1e-3;
+/// Damping relative to the squared error, and its factor after a step that is refused.
+const DAMPING: f64 = 0.04;
+const MORE_DAMPING: f64 = 6.0;
+
+/// Squared error below which the second-order correction pays, and below which a step that does
+/// not reduce the error may still be taken, as in the curved valleys next to a singularity.
+const NEAR: f64 = 0.1;
+
+/// Such a step is as good as its linearisation if the new squared error is below this share of its
+/// length to the fourth: what the curvature of the pose lets expect.
+const UPHILL: f64 = 0.2;
+
+/// Share to which the squared error has to fall within the patience.
+const MILESTONE: f64 = 0.6;
+
+/// Steps for that fall once the squared error is below [`CLOSE`].
+const PATIENCE_CLOSE: u32 = 8;
+const CLOSE: f64 = 5e-3;
+
+/// A residual that further steps only stir, m and rad, squared.
+const ROUNDING_SQUARED: f64 = 4e-30;
+
+/// Share to which a step has to reduce the squared residual for another one to be worth it, once
+/// the tolerance is met.
+const POLISHING: f64 = 0.1;
 
 /// Damping that is always there, so that a singular matrix can be factored.
 const LEAST_DAMPING: f64 = 1e-16;
@@ -203,30 +223,28 @@ impl Point {
 #[inline(always)]
 pub(super) fn descend(kernel: &Kernel, target: &Target, start: &Lanes, steering: &Steering) -> End {
     let weight = steering.rad_per_m * steering.rad_per_m;
+    let content = steering.tolerance * steering.tolerance;
     let mut here = Point::new(kernel, target, *start, weight);
-    let mut damping = steering.damping;
+    let mut damping = DAMPING;
+    // The last step, zero where it tells nothing of the next.
     let mut previous = [0.0; 8];
-    let mut previous_squared = 0.0;
     let mut matrix = normal_matrix(&here.state.rows, weight);
     let mut right = gradient(&here.state.rows, &here.error, weight);
-    let mut milestone = 0.5 * here.cost;
+    let mut milestone = MILESTONE * here.cost;
     let mut since = 0;
     for count in 0..steering.steps {
-        if here.worst <= steering.tolerance * steering.tolerance {
-            return polished(kernel, target, here, weight, count);
+        let reached = here.worst <= content;
+        if reached && here.worst <= ROUNDING_SQUARED {
+            return here.end(count, true);
         }
-        let lambda = damping * here.cost + LEAST_DAMPING;
-        let factor = Factor::new(&matrix, lambda);
+        let factor = Factor::new(&matrix, damping * here.cost + LEAST_DAMPING);
         let mut step = factor.solve(&right);
-        let (length_squared, downhill) = (product(&step, &step), product(&right, &step));
-        let mut predicted = downhill + lambda * length_squared;
-        let mut scale = 1.0;
+        let length_squared = product(&step, &step);
         let longest = steering.longest_step_rad;
         if length_squared > longest * longest {
-            scale = longest / length_squared.sqrt();
-            predicted = scale * (2.0 * downhill - scale * (downhill - lambda * length_squared));
+            let scale = longest / length_squared.sqrt();
             step = step.map(|s| s * scale);
-        } else if here.cost < steering.second_order_below {
+        } else if steering.second_order && here.cost < NEAR {
             let bend = curvature(&here.state.rows, &step).map(|h| -0.5 * h);
             let correction = factor.solve(&gradient(&here.state.rows, &bend, weight));
             // Where the correction outgrows the step, the expansion says nothing.
@@ -236,94 +254,73 @@ pub(super) fn descend(kernel: &Kernel, target: &Target, start: &Lanes, steering:
                 }
             }
         }
-        let mut step_squared = product(&step, &step);
-        let along = product(&step, &previous);
-        if scale == 1.0 && previous_squared > 0.0 && along > 0.0 {
-            let ratio_squared = step_squared / previous_squared;
-            let steady = along * along > 0.9 * step_squared * previous_squared;
-            if steady && ratio_squared > 0.08 && ratio_squared < 0.36 {
-                scale = 1.0 / (1.0 - ratio_squared.sqrt());
-                step = step.map(|s| s * scale);
-                step_squared *= scale * scale;
-            }
+        let stretch = stretch(&step, &previous);
+        if stretch > 1.0 {
+            step = step.map(|s| s * stretch);
         }
+        let step_squared = product(&step, &step);
         let mut q = here.q;
         for i in 0..6 {
             q[i] += step[i];
         }
         let next = Point::new(kernel, target, q, weight);
-        let down = next.cost < here.cost;
-        let round_a_fold = here.cost < UPHILL_BELOW
-            && step_squared < 1.0
-            && next.cost < 0.25 * step_squared * step_squared;
-        if down || round_a_fold {
-            if down {
-                let gained = here.cost - next.cost;
-                if gained > 0.75 * predicted {
-                    damping = (damping * 0.3).max(1e-12);
-                } else if gained < 0.25 * predicted {
-                    damping *= 4.0;
-                }
+        if reached {
+            let done = next.worst > POLISHING * here.worst;
+            if next.worst < here.worst {
+                here = next;
             }
-            previous = step;
-            previous_squared = if scale > 1.0 { 0.0 } else { step_squared };
+            if done {
+                return here.end(count + 1, true);
+            }
+            previous = if stretch > 1.0 { [0.0; 8] } else { step };
+            matrix = normal_matrix(&here.state.rows, weight);
+            right = gradient(&here.state.rows, &here.error, weight);
+            continue;
+        }
+        let uphill = here.cost < NEAR && next.cost < UPHILL * step_squared * step_squared;
+        if next.cost < here.cost || uphill {
+            previous = if stretch > 1.0 { [0.0; 8] } else { step };
             here = next;
             matrix = normal_matrix(&here.state.rows, weight);
             right = gradient(&here.state.rows, &here.error, weight);
         } else {
-            damping *= 8.0;
-            previous_squared = 0.0;
+            damping *= MORE_DAMPING;
+            previous = [0.0; 8];
             if next.cost.is_nan() {
                 return here.end(count + 1, false);
             }
         }
         since += 1;
         if here.cost < milestone {
-            milestone = 0.5 * here.cost;
+            milestone = MILESTONE * here.cost;
             since = 0;
         }
-        let (far, near) = steering.patience;
-        if since >= if here.cost > 1e-3 { far } else { near } {
+        let patience = if here.cost > CLOSE {
+            steering.patience_far
+        } else {
+            PATIENCE_CLOSE
+        };
+        if since >= patience && here.worst > content {
             return here.end(count + 1, false);
         }
     }
-    let reached = here.worst <= steering.tolerance * steering.tolerance;
-    if reached {
-        return polished(kernel, target, here, weight, steering.steps);
-    }
-    here.end(steering.steps, false)
+    here.end(steering.steps, here.worst <= content)
 }
 
-/// A few undamped steps, kept as long as they come nearer: to the rounding of the kinematics.
+/// Factor that takes a step to the limit of the geometric series it belongs to; 1 if to none.
+///
+/// Towards a double root, plain steps shrink by 1/2 and those of second order by 3/8.
 #[inline(always)]
-fn polished(kernel: &Kernel, target: &Target, here: Point, weight: f64, steps: u32) -> End {
-    /// A residual that further steps only stir, m and rad, squared.
-    const ROUNDING_SQUARED: f64 = 1e-28;
-    let (mut here, mut steps) = (here, steps);
-    for _ in 0..3 {
-        if here.worst <= ROUNDING_SQUARED {
-            break;
-        }
-        let matrix = normal_matrix(&here.state.rows, weight);
-        let right = gradient(&here.state.rows, &here.error, weight);
-        // The damping keeps a nearly singular step from running off along the free direction.
-        let step = Factor::new(&matrix, LEAST_DAMPING + 1e-3 * here.cost).solve(&right);
-        let mut q = here.q;
-        for i in 0..6 {
-            q[i] += step[i];
-        }
-        let next = Point::new(kernel, target, q, weight);
-        steps += 1;
-        // Less than two digits a step: towards a double root, where digits are not to be had.
-        let quick = next.worst < 1e-4 * here.worst;
-        if next.worst < here.worst {
-            here = next;
-        }
-        if !quick {
-            break;
-        }
+fn stretch(step: &Lanes, previous: &Lanes) -> f64 {
+    let (new, old) = (product(step, step), product(previous, previous));
+    let along = product(step, previous);
+    // Products rather than quotients: without a previous step nothing is inside.
+    let steady = new > 0.08 * old && new < 0.36 * old;
+    if steady && along > 0.0 && along * along > 0.9 * new * old {
+        1.0 / (1.0 - (new / old).sqrt())
+    } else {
+        1.0
     }
-    here.end(steps, true)
 }
 
 /// Descends to where the cost has no slope: the nearest posture in the sense of least squares.

@@ -197,17 +197,18 @@ impl Numerical {
         let effort = Effort {
             steering: Steering {
                 rad_per_m: self.rad_per_m(),
-                damping: 0.3,
                 longest_step_rad: 0.5,
-                second_order_below: f64::INFINITY,
-                patience: (8, 8),
+                second_order: true,
+                patience_far: 8,
                 steps: 50,
                 tolerance: options.tolerance,
             },
             spread_rad: 0.2,
             about_start: true,
             max_iterations: options.max_iterations,
-            deadline: options.max_time.map(|time| Instant::now() + time),
+            deadline: options
+                .max_time
+                .and_then(|time| Instant::now().checked_add(time)),
             seed: 1,
         };
         self.solve(base_link_from_flange, guess, &effort)
@@ -228,17 +229,18 @@ impl Numerical {
         let effort = Effort {
             steering: Steering {
                 rad_per_m: self.rad_per_m(),
-                damping: 1e-2,
-                longest_step_rad: 2.0,
-                second_order_below: 1e-2,
-                patience: (5, 8),
+                longest_step_rad: PI,
+                second_order: true,
+                patience_far: 3,
                 steps: 50,
                 tolerance: options.tolerance,
             },
             spread_rad: PI,
             about_start: false,
             max_iterations: options.max_iterations,
-            deadline: options.max_time.map(|time| Instant::now() + time),
+            deadline: options
+                .max_time
+                .and_then(|time| Instant::now().checked_add(time)),
             seed: options.seed,
         };
         self.solve(base_link_from_flange, start, &effort)
@@ -276,10 +278,9 @@ impl Numerical {
     pub(super) fn refined(&self, target: &Target, start: &Joints) -> Option<Refined> {
         let steering = Steering {
             rad_per_m: self.rad_per_m(),
-            damping: 0.3,
             longest_step_rad: 0.5,
-            second_order_below: f64::INFINITY,
-            patience: (8, 8),
+            second_order: true,
+            patience_far: 8,
             steps: 20,
             tolerance: 1e-9,
         };
@@ -299,10 +300,10 @@ impl Numerical {
         (norm(&e[..3]), norm(&e[3..]))
     }
 
-    /// Metres and radians made comparable: about twice the angle that a length subtends at the
-    /// arm's reach.
+    /// Metres and radians made comparable: 9.2 rad/m on the UR3, which took the fewest steps; half
+    /// or twice as much costs 5 %.
     fn rad_per_m(&self) -> f64 {
-        2.2 / self.kernel.reach_m.max(1e-3)
+        6.0 / self.kernel.reach_m.max(1e-3)
     }
 
     fn solve(&self, pose: &Pose, start: &Joints, effort: &Effort) -> NumericalResult {
@@ -405,7 +406,9 @@ fn undamped(
     let mut q = *guess;
     let mut error = evaluate(&q);
     let mut best = (q, error, 0);
-    let deadline = options.max_time.map(|time| Instant::now() + time);
+    let deadline = options
+        .max_time
+        .and_then(|time| Instant::now().checked_add(time));
     let mut stop = Stop::IterationLimit;
     for iteration in 1..=options.max_iterations {
         // Below this, steps only stir rounding errors.
