@@ -95,7 +95,8 @@ impl<'a> Planner<'a> {
         let planning = &resolved.scenario.planning;
         Ok(Self {
             resolved,
-            kinematics: Kinematics::new(resolved.cell.robot.chain)?,
+            kinematics: Kinematics::new(resolved.cell.robot.chain)?
+                .within(resolved.cell.robot.limits),
             checker: MotionChecker::new(
                 &resolved.cell,
                 clearance,

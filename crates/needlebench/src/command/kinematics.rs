@@ -54,7 +54,7 @@ fn solve(arguments: &IkArguments) -> Result<IkAnswer, Vec<Finding>> {
         if let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) {
             return Err(vec![
                 Finding::new(*option, "the closed form does not iterate")
-                    .hint("choose a numerical method, such as --method damped"),
+                    .hint("choose a numerical method, such as --method gauss-newton"),
             ]);
         }
     }

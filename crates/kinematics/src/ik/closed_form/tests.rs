@@ -16,8 +16,11 @@ const UR3: UrGeometry = UrGeometry::UR3;
 const RESIDUAL: f64 = 1e-14;
 
 /// Vector widths differ by the order of two roundings; conditioning within the fast path's bounds
-/// raises that to this, rad. Away from singularities by 0.1 rad it is 2e-14.
+/// raises that to this, rad.
 const LEVELS_AGREE_RAD: f64 = 1e-10;
+
+/// The same away from singularities: sines of elbow and wrist 2 above 0.1, the wrist 50 mm ahead.
+const REGULAR_LEVELS_AGREE_RAD: f64 = 2e-14;
 
 fn residual(pose: &Pose, q: &Joints) -> f64 {
     let found = UR3.base_from_flange(q);
@@ -66,7 +69,14 @@ fn all_widths_give_the_same_rows() {
             assert_eq!(found.certificate(), reference.certificate());
             assert_eq!(found.exists, reference.exists);
             for (a, b) in found.solutions().zip(reference.solutions()) {
-                assert!(difference(&a.joints, &b.joints) < LEVELS_AGREE_RAD);
+                let difference = difference(&a.joints, &b.joints);
+                assert!(difference < LEVELS_AGREE_RAD);
+                let singular = a.joints[2].sin().abs().min(a.joints[4].sin().abs()) < 0.1
+                    || UR3.wrist_forward_m(&a.joints).abs() < 0.05;
+                assert!(
+                    singular || difference < REGULAR_LEVELS_AGREE_RAD,
+                    "{difference:e}"
+                );
             }
         }
     }
