@@ -2,8 +2,6 @@
 //!
 //! `.ci/instructions` runs it under valgrind with two counts and divides the difference.
 
-#![expect(missing_docs, reason = "a program")]
-
 use std::f64::consts::PI;
 use std::hint::black_box;
 
