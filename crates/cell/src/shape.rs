@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use needlebench_kinematics::Pose;
 
-/// A convex solid, centred on its own frame.
+/// A solid in its own frame; primitives are centred on it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// Ball about the origin.
@@ -34,6 +34,8 @@ pub enum Shape {
     },
     /// Convex polyhedron.
     Convex(Arc<ConvexMesh>),
+    /// Solid inside a closed surface that need not be convex.
+    Mesh(Arc<SolidMesh>),
 }
 
 impl Shape {
@@ -50,12 +52,8 @@ impl Shape {
                 half_length_m,
             } => radius_m + half_length_m,
             Self::Cuboid { half_extents_m } => half_extents_m.norm(),
-            Self::Convex(mesh) => mesh
-                .0
-                .vertices_m
-                .iter()
-                .map(|vertex| vertex.coords.norm())
-                .fold(0.0, f64::max),
+            Self::Convex(mesh) => mesh.0.bounding_radius_m(),
+            Self::Mesh(mesh) => mesh.surface.bounding_radius_m(),
         }
     }
 }
@@ -67,6 +65,45 @@ pub struct TriangleMesh {
     pub vertices_m: Vec<Point3<f64>>,
     /// Vertex indices, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriangleMesh {
+    /// Radius of a ball about the origin that holds all vertices, m.
+    pub fn bounding_radius_m(&self) -> f64 {
+        self.vertices_m
+            .iter()
+            .map(|vertex| vertex.coords.norm())
+            .fold(0.0, f64::max)
+    }
+
+    /// How often the surface winds about a point: 1 inside a closed surface and 0 outside.
+    ///
+    /// The sum of the solid angles of all triangles over `4 pi` (Van Oosterom and Strackee, 1983);
+    /// on the surface itself it is anything in between.
+    pub fn winding_number(&self, point: &Point3<f64>) -> f64 {
+        let half_angles: f64 = self
+            .triangles
+            .iter()
+            .map(|triangle| {
+                let [a, b, c] = triangle.map(|i| self.vertices_m[i as usize] - point);
+                let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
+                let volume = a.dot(&b.cross(&c));
+                let scale = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+                volume.atan2(scale)
+            })
+            .sum();
+        half_angles / std::f64::consts::TAU
+    }
+}
+
+/// A solid that need not be convex: its exact surface, and convex pieces for the engines, which
+/// collide with nothing else.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SolidMesh {
+    /// Closed surface, the true one: clearances are measured to it.
+    pub surface: TriangleMesh,
+    /// Convex pieces that together stand for the solid in the engines.
+    pub pieces: Vec<ConvexMesh>,
 }
 
 /// A convex polyhedron: a closed triangle mesh of which every vertex is an extreme point.

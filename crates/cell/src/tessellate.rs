@@ -26,7 +26,7 @@ impl Shape {
     /// Every vertex lies on the true surface, so the mesh is inscribed; no point of it is further
     /// than `chord_error_m` inside, as long as the bounds of 8 to 128 segments per full circle
     /// allow. A chord error that is zero, negative or NaN asks for the finest mesh. A convex
-    /// polyhedron is its own surface.
+    /// polyhedron and a mesh are their own surface.
     pub fn surface(&self, chord_error_m: f64) -> TriangleMesh {
         match self {
             Self::Sphere { radius_m } => capsule(*radius_m, 0.0, chord_error_m),
@@ -53,6 +53,7 @@ impl Shape {
                 cuboid(half_extents_m.x, half_extents_m.y, half_extents_m.z)
             }
             Self::Convex(mesh) => mesh.0.clone(),
+            Self::Mesh(mesh) => mesh.surface.clone(),
         }
     }
 }
@@ -188,7 +189,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::shape::ConvexMesh;
+    use crate::shape::{ConvexMesh, SolidMesh};
 
     const RADIUS_M: f64 = 0.06;
     const HALF_LENGTH_M: f64 = 0.2;
@@ -201,12 +202,16 @@ mod tests {
         Vector3::new(0.1, 0.2, 0.3)
     }
 
-    fn shapes() -> [Shape; 5] {
+    fn shapes() -> [Shape; 6] {
         let (radius_m, half_length_m) = (RADIUS_M, HALF_LENGTH_M);
         let cuboid = Shape::Cuboid {
             half_extents_m: half_extents_m(),
         };
         let convex = Shape::Convex(Arc::new(ConvexMesh(cuboid.surface(CHORD_ERROR_M))));
+        let mesh = Shape::Mesh(Arc::new(SolidMesh {
+            surface: cuboid.surface(CHORD_ERROR_M),
+            pieces: vec![ConvexMesh(cuboid.surface(CHORD_ERROR_M))],
+        }));
         [
             Shape::Sphere { radius_m },
             Shape::Cylinder {
@@ -219,6 +224,7 @@ mod tests {
             },
             cuboid,
             convex,
+            mesh,
         ]
     }
 
@@ -231,7 +237,9 @@ mod tests {
             Shape::Sphere { .. } => (ball, sphere),
             Shape::Cylinder { .. } => (rod, tube),
             Shape::Capsule { .. } => (ball + rod, sphere + tube),
-            Shape::Cuboid { .. } | Shape::Convex(_) => (8.0 * half_extents_m().product(), 0.0),
+            Shape::Cuboid { .. } | Shape::Convex(_) | Shape::Mesh(_) => {
+                (8.0 * half_extents_m().product(), 0.0)
+            }
         }
     }
 
@@ -251,7 +259,7 @@ mod tests {
                 radius_m,
                 half_length_m,
             } => (across_m.hypot((p.z.abs() - half_length_m).max(0.0)) - radius_m).abs(),
-            Shape::Cuboid { .. } | Shape::Convex(_) => {
+            Shape::Cuboid { .. } | Shape::Convex(_) | Shape::Mesh(_) => {
                 (p.coords.abs() - half_extents_m()).max().abs()
             }
         }

@@ -141,6 +141,16 @@ impl PreparedShape {
                     bound,
                 }
             }
+            Shape::Mesh(mesh) => {
+                // Without adjacency that a walk could use: the hull of all vertices.
+                let hull = Hull::new(&mesh.surface.vertices_m, &[]);
+                let bound = Capsule::around_points(hull.vertices_m());
+                Self {
+                    core: Core::Hull(hull),
+                    radius_m: 0.0,
+                    bound,
+                }
+            }
         }
     }
 

@@ -122,6 +122,12 @@ fn reach_m(solid: &Solid, direction: &UnitVector3<f64>) -> f64 {
             .iter()
             .map(|vertex| local.dot(&vertex.coords))
             .fold(f64::NEG_INFINITY, f64::max),
+        Shape::Mesh(mesh) => mesh
+            .surface
+            .vertices_m
+            .iter()
+            .map(|vertex| local.dot(&vertex.coords))
+            .fold(f64::NEG_INFINITY, f64::max),
     };
     reach + direction.dot(&solid.parent_from_shape.translation.vector)
 }

@@ -52,7 +52,7 @@ fn surface(solid: &Solid) -> Vec<Point3<f64>> {
             .flat_map(|[x, y]| (-12..=12).map(move |z| [x, y, f64::from(z) / 12.0]))
             .map(|corner| Point3::from(Vector3::from(corner).component_mul(half_extents_m)))
             .collect(),
-        Shape::Sphere { .. } | Shape::Convex(_) => panic!("not a bone's shape"),
+        Shape::Sphere { .. } | Shape::Convex(_) | Shape::Mesh(_) => panic!("not a bone's shape"),
     };
     local
         .into_iter()

@@ -153,17 +153,20 @@ impl Writer<'_> {
         self.open("asset");
         for (body, k) in self.solids() {
             let solid = &self.cell.bodies[body].solids[k];
-            let Shape::Convex(mesh) = &solid.shape else {
-                continue;
+            // MuJoCo collides a mesh as its convex hull.
+            let mesh = match &solid.shape {
+                Shape::Convex(mesh) => &mesh.0,
+                Shape::Mesh(mesh) => &mesh.surface,
+                _ => continue,
             };
-            if mesh.0.vertices_m.len() < 4 {
+            if mesh.vertices_m.len() < 4 {
                 return Err(EngineError::BadSolid {
                     solid: solid.name.clone(),
                     reason: "its points have no hull with a volume",
                 });
             }
             let mut vertices = String::new();
-            for vertex in &mesh.0.vertices_m {
+            for vertex in &mesh.vertices_m {
                 vertices += &vector(&vertex.coords);
                 vertices.push(' ');
             }
@@ -219,7 +222,7 @@ fn shape(solid: &Solid, mesh_name: &str) -> String {
         Shape::Cuboid { half_extents_m } => {
             format!("type=\"box\" size=\"{}\"", vector(half_extents_m))
         }
-        Shape::Convex(_) => format!("type=\"mesh\" mesh=\"{mesh_name}\""),
+        Shape::Convex(_) | Shape::Mesh(_) => format!("type=\"mesh\" mesh=\"{mesh_name}\""),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Our geometry and mass properties as rapier's, and back: units and conventions.
 
 use nalgebra::{Rotation3, UnitQuaternion, UnitVector3, Vector3};
-use needlebench_cell::shape::{Shape, Solid};
+use needlebench_cell::shape::{Shape, Solid, TriangleMesh};
 use needlebench_kinematics::{Body, Pose};
 use rapier3d_f64::geometry::SharedShape;
 use rapier3d_f64::math::{self, Rotation, Vector};
@@ -67,22 +67,23 @@ pub(super) fn collider_shape(solid: &Solid) -> Result<(SharedShape, Pose), Engin
                 Pose::identity(),
             )
         }
-        Shape::Convex(mesh) => {
-            let points: Vec<Vector> = mesh
-                .0
-                .vertices_m
-                .iter()
-                .map(|point| vector(&point.coords))
-                .collect();
-            // The hull of the points, which is also what MuJoCo makes of them.
-            let hull = SharedShape::convex_hull(&points).ok_or_else(|| EngineError::BadSolid {
-                solid: solid.name.clone(),
-                reason: "its points have no hull with a volume",
-            })?;
-            (hull, Pose::identity())
-        }
+        Shape::Convex(mesh) => (hull_of(solid, &mesh.0)?, Pose::identity()),
+        Shape::Mesh(mesh) => (hull_of(solid, &mesh.surface)?, Pose::identity()),
     };
     Ok((shape, solid.parent_from_shape * shape_from_rapier))
+}
+
+/// The hull of a mesh's points, which is also what MuJoCo makes of them.
+fn hull_of(solid: &Solid, mesh: &TriangleMesh) -> Result<SharedShape, EngineError> {
+    let points: Vec<Vector> = mesh
+        .vertices_m
+        .iter()
+        .map(|point| vector(&point.coords))
+        .collect();
+    SharedShape::convex_hull(&points).ok_or_else(|| EngineError::BadSolid {
+        solid: solid.name.clone(),
+        reason: "its points have no hull with a volume",
+    })
 }
 
 /// Mass properties in rapier's form and units: principal moments and their frame.
