@@ -133,6 +133,7 @@ fn parry_distance_m(case: &Case) -> Option<f64> {
                 .collect();
             SharedShape::convex_hull(&vertices).expect("vertices of a hull")
         }
+        Shape::Mesh(_) => unreachable!("the reference has convex shapes only"),
     };
     let pose = |pose: Pose, shape: &Shape| {
         // parry's cylinders are about y.
