@@ -1,6 +1,9 @@
 //! The resolved cell: robot, tool and everything that can be hit.
 
-use nalgebra::Vector3;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
 use needlebench_kinematics::{
     Body, Chain, Dynamics, JOINT_COUNT, JointLimits, Joints, Pose, UrGeometry, UrModel,
     base_from_base_link,
@@ -8,7 +11,7 @@ use needlebench_kinematics::{
 use serde::Serialize;
 
 use crate::calibration::AppliedCalibration;
-use crate::shape::{Shape, Solid, Visual};
+use crate::shape::{ConvexMesh, Shape, Solid, TriangleMesh, Visual};
 
 /// Where a model came from, for the provenance of a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -264,13 +267,66 @@ pub struct Cell {
     pub pairs: Vec<BodyPair>,
 }
 
-/// Volume behind the guide entry that has to stay free: a cylinder about the guide axis.
+/// Volume behind the guide entry that has to stay free: a cylinder about the guide axis, and a cone
+/// about it that widens from the guide entry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NeedleCorridor {
     /// Radius, m.
     pub radius_m: f64,
     /// Length behind the guide entry, m.
     pub length_m: f64,
+    /// Half-angle of the cone that the hand needs, rad; 0 for no cone. Its apex is the guide entry
+    /// and it is as long as the cylinder.
+    pub hand_cone_half_angle_rad: f64,
+}
+
+/// Sides of the pyramid that stands for the hand cone. It is circumscribed, so wider than the cone
+/// by `1 / cos(pi / 32)` at its corners, which is 0.5 %: a clearance from it is never optimistic.
+const HAND_CONE_SIDES: u32 = 32;
+
+impl NeedleCorridor {
+    /// The solids in the frame of the guide entry, whose z points along the insertion.
+    fn solids(&self) -> Vec<Solid> {
+        let mut solids = vec![Solid {
+            name: "needle_corridor".into(),
+            shape: Shape::Cylinder {
+                radius_m: self.radius_m,
+                half_length_m: 0.5 * self.length_m,
+            },
+            parent_from_shape: Pose::translation(0.0, 0.0, -0.5 * self.length_m),
+        }];
+        if self.hand_cone_half_angle_rad > 0.0 {
+            solids.push(Solid {
+                name: "hand_cone".into(),
+                shape: Shape::Convex(Arc::new(self.hand_cone())),
+                parent_from_shape: Pose::identity(),
+            });
+        }
+        solids
+    }
+
+    fn hand_cone(&self) -> ConvexMesh {
+        let corner_radius_m = self.length_m * self.hand_cone_half_angle_rad.tan()
+            / (PI / f64::from(HAND_CONE_SIDES)).cos();
+        let mut vertices_m = vec![Point3::origin()];
+        vertices_m.extend((0..HAND_CONE_SIDES).map(|side| {
+            let (sine, cosine) = (TAU * f64::from(side) / f64::from(HAND_CONE_SIDES)).sin_cos();
+            Point3::new(
+                corner_radius_m * cosine,
+                corner_radius_m * sine,
+                -self.length_m,
+            )
+        }));
+        // Vertex 0 is the apex; the base is a fan about vertex 1.
+        let mut triangles: Vec<[u32; 3]> = (0..HAND_CONE_SIDES)
+            .map(|side| [0, 1 + side, 1 + (side + 1) % HAND_CONE_SIDES])
+            .collect();
+        triangles.extend((2..HAND_CONE_SIDES).map(|side| [1, 1 + side, side]));
+        ConvexMesh(TriangleMesh {
+            vertices_m,
+            triangles,
+        })
+    }
 }
 
 impl Cell {
@@ -315,16 +371,7 @@ impl Cell {
             name: "needle_corridor".into(),
             kind: BodyKind::NeedleCorridor,
             frame: wrist_3,
-            solids: vec![Solid {
-                name: "needle_corridor".into(),
-                shape: Shape::Cylinder {
-                    radius_m: corridor.radius_m,
-                    half_length_m: 0.5 * corridor.length_m,
-                },
-                parent_from_shape: flange
-                    * tool.flange_from_guide_entry
-                    * Pose::translation(0.0, 0.0, -0.5 * corridor.length_m),
-            }],
+            solids: placed(&corridor.solids(), &(flange * tool.flange_from_guide_entry)),
         });
         bodies.extend(surroundings);
         bodies.retain(|body| !body.solids.is_empty());
@@ -430,4 +477,47 @@ fn pair_class(a: &CollisionBody, b: &CollisionBody) -> Option<ClearanceClass> {
         (Link | Tool | GuideTube, Mount) => ClearanceClass::RobotMount,
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hand_cone_is_closed_convex_and_contains_the_cone() {
+        let corridor = NeedleCorridor {
+            radius_m: 0.02,
+            length_m: 0.15,
+            hand_cone_half_angle_rad: 0.3,
+        };
+        let ConvexMesh(mesh) = corridor.hand_cone();
+        let radius_m = 0.15 * 0.3_f64.tan();
+        // The circumscribed polygon's area over the circle's.
+        let turn = PI / f64::from(HAND_CONE_SIDES);
+        let volume_m3 = PI * radius_m.powi(2) * 0.15 / 3.0 * turn.tan() / turn;
+        let measured_m3: f64 = mesh
+            .triangles
+            .iter()
+            .map(|triangle| {
+                let [a, b, c] = triangle.map(|i| mesh.vertices_m[i as usize].coords);
+                a.dot(&b.cross(&c)) / 6.0
+            })
+            .sum();
+        assert!((measured_m3 - volume_m3).abs() < 1e-12);
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|i| mesh.vertices_m[i as usize]);
+            let outwards = (b - a).cross(&(c - a));
+            for vertex in &mesh.vertices_m {
+                assert!(outwards.dot(&(vertex - a)) < 1e-12);
+            }
+        }
+        for k in 0..1000 {
+            let angle = TAU * f64::from(k) / 1000.0;
+            let rim = Point3::new(radius_m * angle.cos(), radius_m * angle.sin(), -0.15);
+            for triangle in &mesh.triangles {
+                let [a, b, c] = triangle.map(|i| mesh.vertices_m[i as usize]);
+                assert!((b - a).cross(&(c - a)).dot(&(rim - a)) < 1e-12);
+            }
+        }
+    }
 }

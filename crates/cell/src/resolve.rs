@@ -276,6 +276,7 @@ pub fn resolve_scenario(
             .tool
             .corridor_length_mm
             .map_or(tool.needle.length_m, |mm| mm * 1e-3),
+        hand_cone_half_angle_rad: scenario.tool.hand_cone_half_angle_deg.to_radians(),
     };
     let cell = Cell::assemble(
         robot,

@@ -110,6 +110,9 @@ pub struct ToolSection {
     pub corridor_radius_mm: f64,
     /// Length of that volume behind the guide's entry, mm; the needle's length if left out.
     pub corridor_length_mm: Option<f64>,
+    /// Half-angle of the cone that the hand needs on its way to the hub, deg, from the guide's entry
+    /// to the end of that volume; it counts as part of it. 0 leaves the cone out. Default assumed.
+    pub hand_cone_half_angle_deg: f64,
 }
 
 impl Default for ToolSection {
@@ -122,6 +125,7 @@ impl Default for ToolSection {
             needle_length_mm: None,
             corridor_radius_mm: 25.0,
             corridor_length_mm: None,
+            hand_cone_half_angle_deg: 12.0,
         }
     }
 }

@@ -70,6 +70,13 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
         200.0,
         "mm",
     );
+    range(
+        "tool.hand_cone_half_angle_deg",
+        tool.hand_cone_half_angle_deg,
+        0.0,
+        80.0,
+        "deg",
+    );
     for (key, value, least, most) in [
         (
             "tool.corridor_length_mm",

@@ -316,7 +316,10 @@ impl<'a> Planner<'a> {
             && corridor.separation.distance_m < 0.0
         {
             let (a, b) = corridor.solid_names(&self.resolved.cell);
-            let blocker = if a == "needle_corridor" { b } else { a };
+            let blocker = match a {
+                "needle_corridor" | "hand_cone" => b,
+                _ => a,
+            };
             rejections.push(Rejection {
                 rule: Rule::NeedleCorridor,
                 value: corridor.separation.distance_m,

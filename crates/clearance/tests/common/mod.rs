@@ -361,6 +361,7 @@ pub fn cell() -> Cell {
         NeedleCorridor {
             radius_m: 0.04,
             length_m: 0.2,
+            hand_cone_half_angle_rad: 0.0,
         },
         vec![
             fixed("phantom", BodyKind::Phantom, phantom),

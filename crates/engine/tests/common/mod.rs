@@ -251,6 +251,7 @@ pub fn ur3(surroundings: Vec<CollisionBody>) -> Cell {
         NeedleCorridor {
             radius_m: 0.02,
             length_m: 0.2,
+            hand_cone_half_angle_rad: 0.0,
         },
         surroundings,
         Joints::new(0.1, 0.1, 0.1, 0.05, 0.05, 0.05),
