@@ -170,6 +170,25 @@ pub fn resolve_scenario(
         })
     })?;
     calibrate(&mut robot, overrides).map_err(one)?;
+    // The scenario's calibration is that of the scenario's robot.
+    if let (Some(reference), None, None) = (
+        &scenario.robot.calibration,
+        &overrides.calibration,
+        &overrides.robot_urdf,
+    ) {
+        let path = base.join(reference);
+        if !path.is_file() {
+            return Err(one(toml
+                .finding(
+                    "robot.calibration",
+                    format!("there is no file {}", path.display()),
+                )
+                .hint("the path is relative to the scenario's folder")));
+        }
+        Calibration::load(&path)
+            .and_then(|calibration| calibration.apply_to(&mut robot))
+            .map_err(one)?;
+    }
     notes.extend(robot.notes.iter().cloned());
 
     let tool_location = Location::of_model(&scenario.tool.urdf, "needle_guide", "urdf", base);

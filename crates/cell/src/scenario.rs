@@ -77,6 +77,10 @@ pub struct RobotSection {
     pub base_rpy_deg: [f64; 3],
     /// What to do when a moving link has no mass: `error` or `nominal-ur3`.
     pub missing_inertia: MissingInertia,
+    /// Factory calibration of the arm, as ROS's `ur_calibration` writes it: path relative to this
+    /// file. Its joint origins replace the URDF's. The nominal arm if left out; a robot or a
+    /// calibration of the command line replaces it.
+    pub calibration: Option<String>,
 }
 
 impl Default for RobotSection {
@@ -86,6 +90,7 @@ impl Default for RobotSection {
             base_position_mm: [0.0, 0.0, 800.0],
             base_rpy_deg: [0.0; 3],
             missing_inertia: MissingInertia::default(),
+            calibration: None,
         }
     }
 }

@@ -277,3 +277,22 @@ fn goal_of_a_scenario_is_solved_for_the_calibrated_robot() {
     let apart_rad = distance(a, b);
     assert!(apart_rad > 1e-4 && apart_rad < 0.1, "{apart_rad}");
 }
+
+#[test]
+fn a_scenario_may_name_the_calibration_of_its_robot() {
+    let bench = bench();
+    let naming = |file: &str| {
+        let section = format!("[robot]\ncalibration = \"{file}\"\n");
+        with_edit(SMALL, "[robot]\n", &section)
+    };
+    bench.write("c.toml", naming("ur3.yaml"));
+    let solve = |arguments: &[&str]| bench.run(arguments).exits_with(0).json();
+    let by_key = solve(&["ik", "c.toml", "--goal", "pose", "--json"]);
+    let by_option = ["ik", "s.toml", "--goal", "pose", "--json", "--calibration"];
+    let by_option = solve(&[&by_option[..], &["ur3.yaml"]].concat());
+    assert_eq!(by_key["solutions"], by_option["solutions"]);
+
+    bench.write("d.toml", naming("ur4.yaml"));
+    let answer = bench.run(&["check", "d.toml"]).exits_with(2);
+    answer.complains(["d.toml", "robot.calibration", "ur4.yaml"]);
+}
