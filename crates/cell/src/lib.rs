@@ -12,6 +12,7 @@ mod mesh;
 mod model;
 mod nominal;
 pub mod phantom;
+pub mod ranking;
 mod resolve;
 mod robot;
 pub mod scenario;

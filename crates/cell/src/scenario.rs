@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
+use crate::ranking::RankingSection;
 use crate::robot::MissingInertia;
 
 /// One scenario: a cell, goals, and what is asked of every configuration.
@@ -60,6 +61,9 @@ pub struct Scenario {
     /// What every working configuration has to reach.
     #[serde(default)]
     pub criteria: CriteriaSection,
+    /// How the configurations that work are ranked.
+    #[serde(default)]
+    pub ranking: RankingSection,
     /// What is written of each simulated motion.
     #[serde(default)]
     pub recording: RecordingSection,

@@ -3,6 +3,7 @@
 use needlebench_kinematics::JOINT_COUNT;
 
 use crate::Finding;
+use crate::ranking::check_ranking;
 use crate::scenario::Scenario;
 use crate::toml_text::TomlText;
 
@@ -304,6 +305,7 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
             );
         }
     }
+    findings.extend(check_ranking(toml, &scenario.ranking));
     if scenario.goals.is_empty() {
         findings.push(
             toml.finding("goals", "the scenario has no goal")

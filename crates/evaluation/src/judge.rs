@@ -1,16 +1,14 @@
-//! Verdict and recommendation.
+//! Verdict.
 
 use needlebench_cell::scenario::CriteriaSection;
 use needlebench_cell::{Expectation, Goal};
 use needlebench_kinematics::ik::Configuration;
 
 use crate::check_configuration;
-use crate::report::{
-    ConfigurationReport, CriterionResult, GoalReport, Recommendation, Status, Verdict,
-};
+use crate::report::{ConfigurationReport, CriterionResult, GoalReport, Status, Verdict};
 
-/// Judges all configurations of all goals: sets each status and recommendation, and returns the
-/// verdict with every criterion that was checked.
+/// Judges all configurations of all goals: sets each status, and returns the verdict with every
+/// criterion that was checked.
 ///
 /// A configuration that works is `failed` if it misses a criterion. The verdict is `fail` if any
 /// configuration is, unless that was expected; if a goal has fewer working configurations than
@@ -70,7 +68,6 @@ pub fn judge(
             pass: enough,
             detail: String::new(),
         });
-        report.recommended = recommend(&report.configurations);
     }
     (if failed { Verdict::Fail } else { Verdict::Pass }, results)
 }
@@ -101,74 +98,4 @@ fn check_expectation(
         pass: actual == wanted,
         detail: format!("expected {wanted}, got {actual}"),
     }
-}
-
-/// Clearance beyond which more of it is no better: nobody works nearer to the arm than this.
-const AMPLE_CLEARANCE_M: f64 = 0.1;
-/// Clearances in the same step of this size count as equal.
-const CLEARANCE_STEP_M: f64 = 2e-3;
-
-/// Least clearance over the motion, in steps.
-fn clearance_steps(configuration: &ConfigurationReport) -> f64 {
-    let clearance_m = configuration
-        .clearance
-        .minimum_m
-        .unwrap_or(0.0)
-        .min(AMPLE_CLEARANCE_M);
-    (clearance_m / CLEARANCE_STEP_M).floor()
-}
-
-/// Least of joint-limit margin, `|sin q5|` and `|sin q3|`: all are 0 at worst and 1 at best.
-fn posture_margin(configuration: &ConfigurationReport) -> f64 {
-    configuration.margins.map_or(0.0, |margins| {
-        margins
-            .joint_limit
-            .min(margins.wrist_sine)
-            .min(margins.elbow_sine)
-    })
-}
-
-/// The working configuration to choose.
-///
-/// First by least clearance over the motion (in steps of 2 mm, up to 100 mm), then by the margin of
-/// the final posture to joint limits and singularities.
-pub fn recommend(configurations: &[ConfigurationReport]) -> Option<Recommendation> {
-    let mut working: Vec<&ConfigurationReport> = configurations
-        .iter()
-        .filter(|each| each.status == Status::Ok)
-        .collect();
-    working.sort_by(|a, b| {
-        clearance_steps(b)
-            .total_cmp(&clearance_steps(a))
-            .then(posture_margin(b).total_cmp(&posture_margin(a)))
-    });
-    let best = *working.first()?;
-    let equals = working
-        .iter()
-        .filter(|each| clearance_steps(each) == clearance_steps(best))
-        .count();
-    let pair = best.clearance.least().map_or(String::new(), |found| {
-        format!(
-            " ({} to {} in the {})",
-            found.pair[0], found.pair[1], found.phase
-        )
-    });
-    let clearance_mm = 1e3 * best.clearance.minimum_m.unwrap_or(0.0);
-    let margin = posture_margin(best);
-    let reason = match (working.len(), equals) {
-        (1, _) => format!("the only one that works; least clearance {clearance_mm:.1} mm{pair}"),
-        (count, 1) => format!(
-            "most clearance of {count} that work: at least {clearance_mm:.1} mm{pair}; \
-             posture margin {margin:.2}"
-        ),
-        (count, equals) => format!(
-            "posture farthest from joint limits and singularities (margin {margin:.2}) of the \
-             {equals} with most clearance among {count} that work: at least \
-             {clearance_mm:.1} mm{pair}"
-        ),
-    };
-    Some(Recommendation {
-        label: best.label.to_owned(),
-        reason,
-    })
 }

@@ -5,14 +5,23 @@
 mod clearance;
 mod criteria;
 mod judge;
+pub mod metric;
 mod motion;
 mod needle;
+pub mod pareto;
+pub mod ranking;
+mod reason;
 pub mod report;
+pub mod room;
+mod sensitivity;
 
 pub use clearance::{
     ClearanceSeries, measure_clearance, needle_route, posture_clearance, sample_indices,
 };
 pub use criteria::{Criterion, check_configuration};
-pub use judge::{judge, recommend};
-pub use motion::{EngineDifference, MotionMeasurement, engine_difference, measure_motion};
+pub use judge::judge;
+pub use motion::{
+    ContactMeasurement, EngineDifference, MotionMeasurement, engine_difference, measure_motion,
+};
 pub use needle::{NeedleMeasurement, measure_needle};
+pub use sensitivity::tip_sensitivity;

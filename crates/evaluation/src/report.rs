@@ -7,6 +7,8 @@ use serde::Serialize;
 
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
+use crate::ranking::{Dominance, GoalRanking, RankingReport};
+use crate::room::RoomReport;
 
 /// Version of the report's keys.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -110,6 +112,8 @@ pub struct GoalReport {
     pub configurations: Vec<ConfigurationReport>,
     /// The one to choose; none if none works.
     pub recommended: Option<Recommendation>,
+    /// How those that work compare; none until they are ranked.
+    pub ranking: Option<GoalRanking>,
 }
 
 /// Which configuration to choose.
@@ -218,6 +222,19 @@ pub struct ConfigurationReport {
     pub engine_difference: Option<EngineDifference>,
     /// Clearances over the motion, of the final posture where nothing was simulated.
     pub clearance: ClearanceReport,
+    /// Room that it leaves to the people around it.
+    pub room: Option<RoomReport>,
+    /// How far the needle's tip moves, root mean square, when every joint has an independent error.
+    pub tip_sensitivity_m_per_rad: Option<f64>,
+    /// Share of the doctor's stated preferences that it meets; none where none is stated.
+    pub preference_match: Option<f64>,
+    /// Whether it works and no other one that works is as good in everything and better in
+    /// something.
+    pub pareto: bool,
+    /// The one that is, if any.
+    pub dominated_by: Option<Dominance>,
+    /// Its score; none unless it works.
+    pub ranking: Option<RankingReport>,
     /// Files written for it, relative to the results folder.
     pub files: Vec<String>,
 }

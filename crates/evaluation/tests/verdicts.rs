@@ -1,15 +1,15 @@
-//! Verdicts and recommendations on made-up measurements.
+//! Verdicts on made-up measurements.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use needlebench_cell::scenario::CriteriaSection;
 use needlebench_cell::{Expectation, Goal, Overrides, load_scenario};
+use needlebench_evaluation::judge;
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, GoalReport, MarginsReport,
     RejectionReport, Status, Verdict,
 };
-use needlebench_evaluation::{judge, recommend};
 use needlebench_kinematics::ik::Configuration;
 
 /// Configuration `index` with a least clearance to the skin and a joint margin, not yet judged.
@@ -48,6 +48,12 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
             classes: BTreeMap::from([("robot_phantom", found)]),
             minimum_m: Some(clearance_m),
         },
+        room: None,
+        tip_sensitivity_m_per_rad: None,
+        preference_match: None,
+        pareto: false,
+        dominated_by: None,
+        ranking: None,
         files: Vec::new(),
     }
 }
@@ -85,36 +91,8 @@ fn report(configurations: Vec<ConfigurationReport>) -> Vec<GoalReport> {
         standoff_m: None,
         configurations,
         recommended: None,
+        ranking: None,
     }]
-}
-
-#[test]
-fn more_clearance_is_recommended() {
-    let all = [
-        configuration(0, 0.02, 0.9),
-        configuration(1, 0.03, 0.1),
-        rejected(2),
-    ];
-    assert_eq!(recommend(&all).unwrap().label, "Right-Up-Fold");
-}
-
-#[test]
-fn equal_clearance_leaves_the_choice_to_the_posture() {
-    let all = [configuration(0, 0.0201, 0.2), configuration(1, 0.0209, 0.1)];
-    let found = recommend(&all).unwrap();
-    assert_eq!(found.label, "Right-Down-Fold");
-    assert!(found.reason.contains("margin 0.20"), "{}", found.reason);
-}
-
-#[test]
-fn ample_clearance_is_ample() {
-    let all = [configuration(0, 0.3, 0.1), configuration(1, 0.12, 0.4)];
-    assert_eq!(recommend(&all).unwrap().label, "Right-Up-Fold");
-}
-
-#[test]
-fn nothing_is_recommended_where_nothing_works() {
-    assert_eq!(recommend(&[rejected(0), rejected(1)]), None);
 }
 
 #[test]
@@ -123,7 +101,6 @@ fn a_configuration_that_no_engine_measured_has_failed() {
     let (verdict, _) = judge(&mut goals, &[goal()], &CriteriaSection::default(), false);
     assert_eq!(verdict, Verdict::Fail);
     assert_eq!(goals[0].configurations[0].status, Status::Failed);
-    assert_eq!(goals[0].recommended, None);
 }
 
 #[test]

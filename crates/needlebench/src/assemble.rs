@@ -5,12 +5,14 @@ use std::collections::BTreeMap;
 use needlebench_cell::scenario::EngineName;
 use needlebench_cell::{Cell, Goal, ResolvedScenario};
 use needlebench_engine::EngineIdentity;
+use needlebench_evaluation::ranking::{Preferences, rank_goal};
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
     MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary, Status,
 };
 use needlebench_evaluation::{
     engine_difference, judge, measure_motion, measure_needle, needle_route, posture_clearance,
+    tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
@@ -46,6 +48,9 @@ pub(crate) fn assemble(
         &resolved.scenario.criteria,
         both,
     );
+    for goal in &mut goals {
+        rank_goal(goal, &resolved.scenario.ranking, &Preferences::default());
+    }
     Report {
         schema_version: SCHEMA_VERSION,
         scenario: ScenarioSummary {
@@ -91,6 +96,7 @@ fn goal_report(
             })
             .collect(),
         recommended: None,
+        ranking: None,
     }
 }
 
@@ -166,6 +172,12 @@ fn configuration_report(
         engines,
         engine_difference,
         clearance,
+        room: None,
+        tip_sensitivity_m_per_rad: candidate.map(|each| tip_sensitivity(cell, goal, &each.joints)),
+        preference_match: None,
+        pareto: false,
+        dominated_by: None,
+        ranking: None,
         files: Vec::new(),
     }
 }

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use needlebench_evaluation::report::{Report, Status, Verdict};
 
 use super::format::{millimetres, small_length};
+use super::ranking::comparison_markdown;
 
 /// The report as Markdown.
 pub(crate) fn markdown(report: &Report) -> String {
@@ -65,6 +66,10 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             )?;
         }
         writeln!(out)?;
+        let comparison = comparison_markdown(goal);
+        if !comparison.is_empty() {
+            writeln!(out, "{comparison}")?;
+        }
         for each in &goal.configurations {
             if let Some(first) = each.rejections.first() {
                 writeln!(out, "- {}: {}: {}", each.label, first.rule, first.detail)?;

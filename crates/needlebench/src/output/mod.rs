@@ -5,6 +5,7 @@ mod format;
 mod junit;
 mod markdown;
 pub(crate) mod pictures;
+mod ranking;
 mod recording;
 mod table;
 

@@ -6,6 +6,7 @@ use comfy_table::{Cell, CellAlignment, Color, Table};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status, Verdict};
 
 use super::format::{millimetres, small_length, value_and_limit};
+use super::ranking::comparison_text;
 
 /// A table without frame lines between rows.
 pub(crate) fn plain_table(header: &[&str]) -> Table {
@@ -28,6 +29,9 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
         writeln!(out, "{}", goal_heading(goal))?;
         writeln!(out, "{}", goal_table(goal))?;
         writeln!(out, "* worst of those that work, < recommended")?;
+        if let Some(comparison) = comparison_text(goal) {
+            writeln!(out, "{comparison}")?;
+        }
         write_remarks(out, report, goal)?;
     }
     for failure in &report.engine_failures {

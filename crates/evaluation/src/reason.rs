@@ -1,0 +1,133 @@
+//! Why a configuration is recommended, in words.
+
+use crate::metric::Metric;
+use crate::ranking::{GoalRanking, RankingReport, Term};
+use crate::report::ConfigurationReport;
+
+/// Terms that are named for the first choice and, of the runner-up's leads, against it.
+const NAMED: (usize, usize) = (3, 2);
+/// Share of all differences of contributions below which one is not worth a word.
+const WORTH_A_WORD: f64 = 0.1;
+
+/// Why `first` is chosen of all that work.
+pub(crate) fn reason(
+    first: &ConfigurationReport,
+    second: Option<&ConfigurationReport>,
+    ranking: &GoalRanking,
+) -> String {
+    let nearest = first.clearance.least().map_or(String::new(), |found| {
+        format!(
+            "; least clearance {:.1} mm ({} to {} in the {})",
+            found.minimum_m * 1e3,
+            found.pair[0],
+            found.pair[1],
+            found.phase
+        )
+    });
+    let count = ranking.order.len();
+    let Some(second) = second else {
+        return format!("the only one that works{nearest}");
+    };
+    let (Some(mine), Some(theirs)) = (&first.ranking, &second.ranking) else {
+        return format!(
+            "first in the table of {count} that work: nothing that has a weight was measured for \
+             all of them{nearest}"
+        );
+    };
+    let mut text = format!(
+        "score {:.3}, best of {count} that work; {} has {:.3}",
+        mine.score, second.label, theirs.score
+    );
+    let (ahead, behind) = differences(mine, theirs);
+    if mine.score == theirs.score && ahead.is_empty() && behind.is_empty() {
+        text += " too and comes later in the table";
+    }
+    for (words, terms, named) in [
+        ("ahead in", &ahead, NAMED.0),
+        ("behind in", &behind, NAMED.1),
+    ] {
+        if !terms.is_empty() {
+            let terms: Vec<String> = terms.iter().take(named).map(|d| d.text()).collect();
+            text += &format!("; {words} {}", terms.join(", "));
+        }
+    }
+    text += &robustness(ranking);
+    if let Some(dominance) = &first.dominated_by {
+        let better: Vec<&str> = dominance.better_in.iter().map(|name| words(name)).collect();
+        text += &format!(
+            "; not in the Pareto set: leaving effort and preferences aside {} is better in {} and \
+             as good in everything else",
+            dominance.label,
+            better.join(", ")
+        );
+    }
+    text + &nearest
+}
+
+fn words(metric: &'static str) -> &'static str {
+    Metric::named(metric).map_or(metric, |metric| metric.words)
+}
+
+/// Contributions that differ, of one metric.
+struct Difference<'a> {
+    mine: &'a Term,
+    theirs: &'a Term,
+    lead: f64,
+}
+
+impl Difference<'_> {
+    fn text(&self) -> String {
+        let text = |value: f64| {
+            Metric::named(self.mine.metric)
+                .map_or(value.to_string(), |metric| metric.quantity.text(value))
+        };
+        format!(
+            "{} ({} against {}: {:+.3})",
+            words(self.mine.metric),
+            text(self.mine.counted_as),
+            text(self.theirs.counted_as),
+            self.lead
+        )
+    }
+}
+
+/// Where the first is ahead of the second and where it is behind, largest difference first.
+fn differences<'a>(
+    mine: &'a RankingReport,
+    theirs: &'a RankingReport,
+) -> (Vec<Difference<'a>>, Vec<Difference<'a>>) {
+    let mut all: Vec<Difference<'_>> = mine
+        .terms
+        .iter()
+        .zip(&theirs.terms)
+        .map(|(mine, theirs)| Difference {
+            mine,
+            theirs,
+            lead: mine.contribution - theirs.contribution,
+        })
+        .filter(|difference| difference.lead != 0.0)
+        .collect();
+    let total: f64 = all.iter().map(|difference| difference.lead.abs()).sum();
+    all.retain(|difference| difference.lead.abs() >= WORTH_A_WORD * total);
+    all.sort_by(|a, b| b.lead.abs().total_cmp(&a.lead.abs()));
+    all.into_iter()
+        .partition(|difference| difference.lead > 0.0)
+}
+
+fn robustness(ranking: &GoalRanking) -> String {
+    let Some(change) = &ranking.smallest_weight_change else {
+        return "; no change of a single weight would change the choice".to_owned();
+    };
+    let (words, winner) = (words(change.metric), &change.then_first);
+    let (from, to) = (
+        format!("{:.2}", change.weight),
+        format!("{:.2}", change.even_at),
+    );
+    let more = change.even_at >= change.weight;
+    if from == to {
+        let direction = if more { "more" } else { "less" };
+        return format!("; the slightest {direction} weight of {words} would put {winner} first");
+    }
+    let direction = if more { "above" } else { "below" };
+    format!("; a weight of {words} {direction} {to} instead of {from} would put {winner} first")
+}
