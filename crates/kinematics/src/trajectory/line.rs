@@ -129,7 +129,7 @@ impl LinePath {
 
     /// Point at distance `s_m` from the start: quintic Hermite interpolation.
     pub fn sample(&self, s_m: f64) -> PathPoint {
-        let intervals = self.knots.len() - 1;
+        let intervals = self.intervals();
         let h = self.length_m / intervals as f64;
         #[expect(
             clippy::cast_possible_truncation,
@@ -138,20 +138,37 @@ impl LinePath {
         )]
         let index = ((s_m / h).floor().max(0.0) as usize).min(intervals - 1);
         let u = (s_m / h - index as f64).clamp(0.0, 1.0);
+        let [c0, c1, c2, c3, c4, c5] = self.coefficients(index);
+        PathPoint {
+            position: c0 + (c1 + (c2 + (c3 + (c4 + c5 * u) * u) * u) * u) * u,
+            first: (c1 + (c2 * 2.0 + (c3 * 3.0 + (c4 * 4.0 + c5 * (5.0 * u)) * u) * u) * u) / h,
+            second: (c2 * 2.0 + (c3 * 6.0 + (c4 * 12.0 + c5 * (20.0 * u)) * u) * u) / (h * h),
+            third: (c3 * 6.0 + (c4 * 24.0 + c5 * (60.0 * u)) * u) / (h * h * h),
+        }
+    }
+
+    /// Number of intervals between knots.
+    pub(super) fn intervals(&self) -> usize {
+        self.knots.len() - 1
+    }
+
+    /// Coefficients of the quintic between knots `index` and `index + 1`, by rising powers of
+    /// `u`, which runs from 0 to 1 between them.
+    pub(super) fn coefficients(&self, index: usize) -> [Joints; 6] {
+        let h = self.length_m / self.intervals() as f64;
         let (a, b) = (&self.knots[index], &self.knots[index + 1]);
-        // Quintic in u with the knots' values, first and second derivatives (by u).
+        // The knots' values, first and second derivatives (by u).
         let (v0, v1) = (a.first * h, b.first * h);
         let (w0, w1) = (a.second * (h * h), b.second * (h * h));
         let d = b.position - a.position;
-        let c3 = d * 10.0 - v0 * 6.0 - v1 * 4.0 - w0 * 1.5 + w1 * 0.5;
-        let c4 = d * -15.0 + v0 * 8.0 + v1 * 7.0 + w0 * 1.5 - w1;
-        let c5 = d * 6.0 - v0 * 3.0 - v1 * 3.0 - w0 * 0.5 + w1 * 0.5;
-        PathPoint {
-            position: a.position + (v0 + (w0 * 0.5 + (c3 + (c4 + c5 * u) * u) * u) * u) * u,
-            first: (v0 + (w0 + (c3 * 3.0 + (c4 * 4.0 + c5 * (5.0 * u)) * u) * u) * u) / h,
-            second: (w0 + (c3 * 6.0 + (c4 * 12.0 + c5 * (20.0 * u)) * u) * u) / (h * h),
-            third: (c3 * 6.0 + (c4 * 24.0 + c5 * (60.0 * u)) * u) / (h * h * h),
-        }
+        [
+            a.position,
+            v0,
+            w0 * 0.5,
+            d * 10.0 - v0 * 6.0 - v1 * 4.0 - w0 * 1.5 + w1 * 0.5,
+            d * -15.0 + v0 * 8.0 + v1 * 7.0 + w0 * 1.5 - w1,
+            d * 6.0 - v0 * 3.0 - v1 * 3.0 - w0 * 0.5 + w1 * 0.5,
+        ]
     }
 }
 

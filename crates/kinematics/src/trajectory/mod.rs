@@ -5,6 +5,7 @@
 
 mod line;
 mod profile;
+mod travel;
 
 pub use line::{LineError, LinePath};
 pub use profile::{DoubleS, ProfileLimits};
