@@ -126,31 +126,46 @@ pub(crate) fn check_closed(mesh: &TriangleMesh) -> Result<MeshFacts, MeshDefect>
     }
     let volume_m3 = volume_m3(mesh);
     let parts = components(mesh);
-    let size = size_m(mesh).norm();
-    let winding = Winding::new(mesh);
-    let outside = |&triangle: &usize| {
-        let corners = corners(mesh, mesh.triangles[triangle]);
-        let middle = Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
-        let normal = area_vector(corners).normalize();
-        winding.at(mesh, &(middle + normal * (BESIDE * size))) >= 0
-    };
-    let inverted: Vec<usize> = parts.into_iter().collect();
-    let count = inverted.len();
-    let inverted: Vec<usize> = inverted.into_iter().filter(|part| !outside(part)).collect();
-    if let Some(&triangle) = inverted.first() {
-        return Err(MeshDefect::Inverted {
-            triangle,
-            at_m: corners(mesh, mesh.triangles[triangle])[0],
-            count: inverted.len(),
-        });
+    let components = parts.len();
+    if let Some(defect) = first_inverted(mesh, parts) {
+        return Err(defect);
     }
     if volume_m3 <= 0.0 {
         return Err(MeshDefect::NoVolume);
     }
     Ok(MeshFacts {
-        components: count,
+        components,
         shared_edges: edges.shared(),
         volume_m3,
+    })
+}
+
+/// Edges that lack an opposite.
+pub(super) fn open_edges(mesh: &TriangleMesh) -> usize {
+    EdgeCounts::of(mesh).unmatched().len()
+}
+
+/// The first part of a closed surface that is inside out, if one is.
+pub(super) fn inverted(mesh: &TriangleMesh) -> Option<MeshDefect> {
+    first_inverted(mesh, components(mesh))
+}
+
+/// Of the parts that these triangles belong to.
+fn first_inverted(mesh: &TriangleMesh, parts: Vec<usize>) -> Option<MeshDefect> {
+    let beside_m = BESIDE * size_m(mesh).norm();
+    let winding = Winding::new(mesh);
+    let faces_inward = |&triangle: &usize| {
+        let [a, b, c] = corners(mesh, mesh.triangles[triangle]);
+        let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+        let normal = area_vector([a, b, c]).normalize();
+        winding.at(mesh, &(middle + normal * beside_m)) < 0
+    };
+    let inverted: Vec<usize> = parts.into_iter().filter(faces_inward).collect();
+    let &triangle = inverted.first()?;
+    Some(MeshDefect::Inverted {
+        triangle,
+        at_m: corners(mesh, mesh.triangles[triangle])[0],
+        count: inverted.len(),
     })
 }
 

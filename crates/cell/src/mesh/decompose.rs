@@ -316,11 +316,11 @@ mod tests {
     #[test]
     fn pieces_leave_nothing_uncovered_and_keep_close() {
         // The hull of the L is 37 mm from it in its corner, that of the bowl 40 mm.
-        for (mesh, overhang_m) in [(ell(), 7e-3), (bowl(), 7e-3), (torus(48, 24), 7e-3)] {
+        for (mesh, overhang_m) in [(ell(), 1e-6), (bowl(), 10e-3), (torus(48, 24), 7e-3)] {
             let found = fidelity(mesh);
             assert!(found.uncovered_m < ROUNDING_M, "{found:?}");
             assert!(found.overhang_m < overhang_m, "{found:?}");
-            assert!(found.mean_overhang_m < 0.5 * overhang_m, "{found:?}");
+            assert!(found.mean_overhang_m < 0.1 * overhang_m, "{found:?}");
         }
     }
 
@@ -328,27 +328,5 @@ mod tests {
     fn pieces_are_the_same_every_time() {
         let solid = SurfaceIndex::new(bowl());
         assert_eq!(decompose(&solid), decompose(&solid));
-    }
-}
-
-#[cfg(test)]
-mod maker {
-    #[test]
-    #[ignore]
-    fn try_maker() {
-        for name in ["base","shoulder","upperarm","forearm","wrist1","wrist2","wrist3"] {
-            let bytes = std::fs::read(format!("/tmp/erd/u/cmeel.prefix/share/example-robot-data/robots/ur_description/meshes/ur3/collision/{name}.stl")).unwrap();
-            let t0 = std::time::Instant::now();
-            let mesh = super::super::read_stl(&bytes, [1.0; 3]).unwrap();
-            let t1 = t0.elapsed();
-            let m = super::super::mend(mesh);
-            let t2 = t0.elapsed();
-            let solid = super::super::SurfaceIndex::new(m.mesh.clone());
-            let t3 = t0.elapsed();
-            let pieces = super::decompose(&solid);
-            let t4 = t0.elapsed();
-            let f = super::super::Fidelity::measure(&solid, &pieces);
-            println!("{name}: read {t1:?} mend {t2:?} index {t3:?} dec {t4:?} fid {:?} dropped {} loops {} share {:.5} longest {:.4} tri {}\n  {f:?} verts {:?}", t0.elapsed(), m.dropped, m.loops, m.filled_share, m.longest_m, m.mesh.triangles.len(), pieces.iter().map(|p| p.0.vertices_m.len()).collect::<Vec<_>>());
-        }
     }
 }

@@ -65,6 +65,22 @@ impl Fidelity {
     }
 }
 
+impl Fidelity {
+    /// For notes.
+    pub(crate) fn in_words(&self) -> String {
+        format!(
+            "the engines collide with {} convex pieces of it, which reach up to {:.2} mm beyond \
+             its surface (mean {:.2} mm) and leave up to {:.4} mm of it uncovered (samples every \
+             {:.1} mm)",
+            self.pieces,
+            self.overhang_m * 1e3,
+            self.mean_overhang_m * 1e3,
+            self.uncovered_m * 1e3,
+            self.spacing_m * 1e3
+        )
+    }
+}
+
 /// Face planes of a convex piece.
 struct Planes(Vec<(nalgebra::Vector3<f64>, f64)>);
 

@@ -6,17 +6,19 @@ mod fidelity;
 mod hull;
 mod mend;
 mod near;
+mod solid;
 mod stl;
 #[cfg(test)]
 pub(crate) mod test_meshes;
 mod winding;
 
 pub(crate) use check::{MeshDefect, MeshFacts, check_closed};
-pub(crate) use decompose::{decompose, is_convex};
+use decompose::{decompose, is_convex};
 pub(crate) use fidelity::{Fidelity, points_on};
 pub use hull::convex_hull;
-pub(crate) use mend::{Mended, mend};
+use mend::mend;
 pub(crate) use near::SurfaceIndex;
+pub(crate) use solid::{Use, shape_of_link, shape_of_surface};
 pub(crate) use stl::read_stl;
 
 use nalgebra::{Point3, Vector3};

@@ -50,6 +50,11 @@ impl SurfaceIndex {
         &self.mesh
     }
 
+    /// The surface, given back.
+    pub(crate) fn into_mesh(self) -> TriangleMesh {
+        self.mesh
+    }
+
     /// Whether a point is inside.
     pub(crate) fn contains(&self, point: &Point3<f64>) -> bool {
         self.winding.at(&self.mesh, point) > 0
