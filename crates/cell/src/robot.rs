@@ -9,7 +9,7 @@ use needlebench_kinematics::{
 };
 
 use crate::files::{Location, source_of};
-use crate::mesh::{convex_hull, read_stl};
+use crate::mesh::{read_stl, shape_of_link};
 use crate::nominal::{body_in_frame_of, nominal_ur3, notes_on_limits};
 use crate::shape::{Shape, Solid, TriangleMesh, Visual};
 use crate::urdf::{Element, Geometry, JointKind, Urdf, UrdfJoint, UrdfLink};
@@ -420,19 +420,14 @@ pub(crate) fn read_solids(
             shape
         } else {
             let mesh = read_mesh(urdf, location, packages, element)?;
-            let hull = convex_hull(&mesh.vertices_m).map_err(|why| {
+            let (shape, said) = shape_of_link(mesh, &link.name).map_err(|why| {
                 urdf.finding(
                     &element.span,
                     format!("collision mesh of '{}': {why}", link.name),
                 )
             })?;
-            notes.push(format!(
-                "collision mesh of '{}' is used as its convex hull ({} vertices), which \
-                 contains it",
-                link.name,
-                hull.0.vertices_m.len()
-            ));
-            Shape::Convex(Arc::new(hull))
+            notes.extend(said);
+            shape
         };
         solids.push(Solid {
             name: element.name.clone().unwrap_or_default(),

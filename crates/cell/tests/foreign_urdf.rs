@@ -261,7 +261,7 @@ fn a_package_may_have_a_hyphen_in_its_name() {
     assert_is_the_box(&upper_arm_hull(&robot));
     assert_noted(
         &robot,
-        "'upper_arm_link' is used as its convex hull (8 vertices)",
+        "'upper_arm_link' is convex: it is used as its convex hull (8 vertices)",
     );
 }
 

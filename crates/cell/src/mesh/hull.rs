@@ -1,116 +1,58 @@
-//! Meshes from STL files, and their convex hulls.
+//! Convex hulls.
 
-use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use crate::shape::{ConvexMesh, TriangleMesh};
-
-/// Reads a binary or text STL; `scale` multiplies the coordinates (URDF's `scale`).
-pub(crate) fn read_stl(bytes: &[u8], scale: [f64; 3]) -> Result<TriangleMesh, String> {
-    let bytes = with_plain_header(bytes);
-    let mesh = stl_io::read_stl(&mut std::io::Cursor::new(bytes)).map_err(|e| e.to_string())?;
-    let vertices_m: Vec<Point3<f64>> = mesh
-        .vertices
-        .iter()
-        .map(|v| {
-            Point3::new(
-                f64::from(v[0]) * scale[0],
-                f64::from(v[1]) * scale[1],
-                f64::from(v[2]) * scale[2],
-            )
-        })
-        .collect();
-    if let Some(bad) = vertices_m
-        .iter()
-        .position(|v| !v.coords.iter().all(|c| c.is_finite()))
-    {
-        return Err(format!("vertex {bad} is not finite"));
-    }
-    if mesh.faces.is_empty() {
-        return Err("it has no triangles".to_owned());
-    }
-    let index = |i: usize| u32::try_from(i).map_err(|_| "more than 2^32 vertices".to_owned());
-    // A mirrored surface would be inside out.
-    let order = if scale.iter().product::<f64>() < 0.0 {
-        [0, 2, 1]
-    } else {
-        [0, 1, 2]
-    };
-    let triangles = mesh
-        .faces
-        .iter()
-        .map(|face| {
-            Ok([
-                index(face.vertices[order[0]])?,
-                index(face.vertices[order[1]])?,
-                index(face.vertices[order[2]])?,
-            ])
-        })
-        .collect::<Result<_, String>>()?;
-    Ok(TriangleMesh {
-        vertices_m,
-        triangles,
-    })
-}
-
-/// Header of a binary STL: free text and the number of triangles.
-const STL_HEADER_BYTES: usize = 84;
-const STL_TRIANGLE_BYTES: usize = 50;
-
-/// The file with a header from which its kind can be told: some writers start binary files with
-/// `solid`, and some give the solid of a text file no name.
-fn with_plain_header(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let count = bytes
-        .get(80..STL_HEADER_BYTES)
-        .and_then(|count| count.try_into().ok())
-        .map(u32::from_le_bytes);
-    let is_binary = count.is_some_and(|count| {
-        Some(bytes.len() - STL_HEADER_BYTES) == (count as usize).checked_mul(STL_TRIANGLE_BYTES)
-    });
-    if is_binary {
-        let mut plain = bytes.to_vec();
-        plain[..80].fill(0);
-        return plain.into();
-    }
-    match bytes.strip_prefix(b"solid") {
-        Some(rest) if rest.starts_with(b"\n") || rest.starts_with(b"\r") => {
-            [b"solid unnamed", rest].concat().into()
-        }
-        _ => bytes.into(),
-    }
-}
 
 /// Distance by which a point may lie outside the hull that is made of it, relative to its size.
 const HULL_TOLERANCE: f64 = 1e-9;
 
-/// Convex hull of points: incremental, checked to contain every point within 1e-9 of its size.
+/// Convex hull of points: quickhull, checked to contain every point within 1e-9 of its size.
 ///
 /// # Errors
 /// Says why, if the points are flat, or if rounding broke the hull (it is checked, not trusted).
 pub fn convex_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> {
     let mut hull = Hull::around(points)?;
-    // Far points first: most of the others are then inside and cost one look.
-    let centre = points
-        .iter()
-        .fold(nalgebra::Vector3::zeros(), |sum, p| sum + p.coords)
-        / points.len() as f64;
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    order.sort_by(|&a, &b| {
-        let distance = |i: usize| (points[i].coords - centre).norm_squared();
-        distance(b).total_cmp(&distance(a)).then(a.cmp(&b))
-    });
-    for i in order {
-        hull.add(i)?;
-    }
+    hull.grow((0..points.len()).collect())?;
     hull.finish()
+}
+
+/// A convex hull of points that rounding would break otherwise: of points that are moved by up to
+/// 1e-8 of its size (1e-6 if need be), the same way every time.
+///
+/// Many points in a plane or on a line, which cuts through a surface leave, make faces without an
+/// area of their own; moved points make none.
+pub(super) fn robust_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> {
+    let mut hull = convex_hull(points);
+    let Some(first) = points.first() else {
+        return hull;
+    };
+    let size = points.iter().map(|p| (p - first).norm()).fold(0.0, f64::max);
+    for share in [1e-8, 1e-7, 1e-6] {
+        if hull.is_ok() {
+            break;
+        }
+        let moved: Vec<Point3<f64>> = (1_u32..)
+            .zip(points)
+            .map(|(i, point)| {
+                let step = |each: f64| (f64::from(i) * each).fract() - 0.5;
+                let way = [0.819_172_513_396_2, 0.671_043_606_703_8, 0.549_700_477_901_9];
+                point + Vector3::from(way.map(step)) * (share * size)
+            })
+            .collect();
+        hull = convex_hull(&moved);
+    }
+    hull
 }
 
 struct Face {
     vertices: [usize; 3],
     normal: nalgebra::Vector3<f64>,
     offset: f64,
+    /// Points in front of the face, for which it was the first found.
+    outside: Vec<usize>,
 }
 
 struct Hull<'a> {
@@ -177,6 +119,7 @@ impl<'a> Hull<'a> {
             vertices,
             normal,
             offset: normal.dot(&a.coords),
+            outside: Vec::new(),
         })
     }
 
@@ -184,18 +127,49 @@ impl<'a> Hull<'a> {
         face.normal.dot(&self.points[point].coords) - face.offset
     }
 
-    fn add(&mut self, point: usize) -> Result<(), String> {
-        let visible: Vec<bool> = self
-            .faces
-            .iter()
-            .map(|face| self.height(face, point) > self.tolerance_m)
-            .collect();
-        if !visible.contains(&true) {
-            return Ok(());
+    /// Adds points until none of these is outside.
+    fn grow(&mut self, mut waiting: Vec<usize>) -> Result<(), String> {
+        let all = 0..self.faces.len();
+        self.assign(waiting.drain(..), all);
+        // The last faces are the newest; whose points are gone is looked at once.
+        let mut at = 0;
+        while at < self.faces.len() {
+            let face = &self.faces[at];
+            let farthest = face.outside.iter().copied().max_by(|&i, &j| {
+                let order = self.height(face, i).total_cmp(&self.height(face, j));
+                order.then(j.cmp(&i))
+            });
+            match farthest {
+                Some(point) => {
+                    self.add(point)?;
+                    at = 0;
+                }
+                None => at += 1,
+            }
         }
+        Ok(())
+    }
+
+    /// Gives each point to the first of some faces that it is in front of.
+    fn assign(&mut self, points: impl Iterator<Item = usize>, faces: std::ops::Range<usize>) {
+        for point in points {
+            let in_front = faces
+                .clone()
+                .find(|&face| self.height(&self.faces[face], point) > self.tolerance_m);
+            if let Some(face) = in_front {
+                self.faces[face].outside.push(point);
+            }
+        }
+    }
+
+    fn add(&mut self, point: usize) -> Result<(), String> {
+        let (hidden, visible): (Vec<Face>, Vec<Face>) = std::mem::take(&mut self.faces)
+            .into_iter()
+            .partition(|face| self.height(face, point) <= self.tolerance_m);
+        self.faces = hidden;
         // Edges of visible faces whose twin belongs to a hidden one.
         let mut horizon = BTreeSet::new();
-        for (face, _) in self.faces.iter().zip(&visible).filter(|(_, seen)| **seen) {
+        for face in &visible {
             let [a, b, c] = face.vertices;
             for (from, to) in [(a, b), (b, c), (c, a)] {
                 if !horizon.remove(&(to, from)) {
@@ -203,13 +177,14 @@ impl<'a> Hull<'a> {
                 }
             }
         }
-        let mut seen = visible.iter();
-        self.faces
-            .retain(|_| !seen.next().copied().unwrap_or(false));
+        let first_new = self.faces.len();
         for (from, to) in horizon {
             let face = self.face([from, to, point])?;
             self.faces.push(face);
         }
+        // What was in front of a face that is gone is inside now or in front of a new one.
+        let orphans = visible.into_iter().flat_map(|face| face.outside);
+        self.assign(orphans.filter(|&orphan| orphan != point), first_new..self.faces.len());
         Ok(())
     }
 
