@@ -52,16 +52,17 @@ impl Capsule {
     }
 
     /// Along the direction in which the points spread most, as short as its radius allows.
-    pub fn around_points(points: &[Vector3<f64>]) -> Self {
-        let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-        let covariance = points.iter().fold(Matrix3::zeros(), |sum, point| {
+    pub fn around_points<'p>(points: impl Iterator<Item = &'p Vector3<f64>> + Clone) -> Self {
+        let count = points.clone().count() as f64;
+        let mean = points.clone().sum::<Vector3<f64>>() / count;
+        let covariance = points.clone().fold(Matrix3::zeros(), |sum, point| {
             sum + (point - mean) * (point - mean).transpose()
         });
         let eigen = covariance.symmetric_eigen();
         let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
         let extents = |direction: &Vector3<f64>| {
             points
-                .iter()
+                .clone()
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), point| {
                     let t = direction.dot(point);
                     (lo.min(t), hi.max(t))
@@ -79,19 +80,16 @@ impl Capsule {
             let along = axis.dot(&offset);
             (along, (offset - axis * along).norm())
         };
-        let radius_m = points.iter().map(|p| split(p).1).fold(0.0, f64::max);
+        let radius_m = points.clone().map(|p| split(p).1).fold(0.0, f64::max);
         let half_length_m = points
-            .iter()
+            .clone()
             .map(|p| {
                 let (along, across) = split(p);
                 // The rounded end reaches this much further at that distance from the axis.
                 along.abs() - (radius_m * radius_m - across * across).max(0.0).sqrt()
             })
             .fold(0.0, f64::max);
-        let ball_radius_m = points
-            .iter()
-            .map(|p| (p - centre).norm())
-            .fold(0.0, f64::max);
+        let ball_radius_m = points.map(|p| (p - centre).norm()).fold(0.0, f64::max);
         Self {
             centre,
             half_axis: axis * half_length_m,

@@ -1,11 +1,14 @@
 //! Shapes as the solver sees them: a convex core, its support function, and a radius around it.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_cell::shape::Shape;
 use needlebench_kinematics::Pose;
 
 use crate::bounds::Capsule;
 use crate::hull::Hull;
+use crate::mesh::MeshTree;
 
 /// A rotation as a matrix and a translation: half the cost of a quaternion per point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +63,10 @@ pub(crate) enum Core {
     Cuboid { half_extents_m: Vector3<f64> },
     /// A convex polyhedron.
     Hull(Hull),
+    /// A triangle.
+    Triangle([Vector3<f64>; 3]),
+    /// A surface, which is its convex hull to everything here but the `mesh` module.
+    Mesh(Arc<MeshTree>),
 }
 
 impl Core {
@@ -88,6 +95,29 @@ impl Core {
             }
             Self::Cuboid { half_extents_m } => half_extents_m.zip_map(direction, f64::copysign),
             Self::Hull(hull) => hull.support(direction, hint),
+            Self::Triangle([a, b, c]) => {
+                let [to_a, to_b, to_c] = [a, b, c].map(|corner| direction.dot(corner));
+                if to_a >= to_b && to_a >= to_c {
+                    *a
+                } else if to_b >= to_c {
+                    *b
+                } else {
+                    *c
+                }
+            }
+            Self::Mesh(tree) => tree.support(direction, hint),
+        }
+    }
+
+    /// Any point of the core.
+    pub fn some_point(&self) -> Vector3<f64> {
+        match self {
+            Self::Point | Self::Segment { .. } | Self::Cylinder { .. } | Self::Cuboid { .. } => {
+                Vector3::zeros()
+            }
+            Self::Hull(hull) => hull.vertices_m()[0],
+            Self::Triangle(corners) => corners[0],
+            Self::Mesh(tree) => tree.anchors[0],
         }
     }
 }
@@ -134,7 +164,7 @@ impl PreparedShape {
             },
             Shape::Convex(mesh) => {
                 let hull = Hull::new(&mesh.0.vertices_m, &mesh.0.triangles);
-                let bound = Capsule::around_points(hull.vertices_m());
+                let bound = Capsule::around_points(hull.vertices_m().iter());
                 Self {
                     core: Core::Hull(hull),
                     radius_m: 0.0,
@@ -142,11 +172,10 @@ impl PreparedShape {
                 }
             }
             Shape::Mesh(mesh) => {
-                // Without adjacency that a walk could use: the hull of all vertices.
-                let hull = Hull::new(&mesh.surface.vertices_m, &[]);
-                let bound = Capsule::around_points(hull.vertices_m());
+                let tree = MeshTree::new(&mesh.surface);
+                let bound = Capsule::around_points(tree.vertices_m());
                 Self {
-                    core: Core::Hull(hull),
+                    core: Core::Mesh(Arc::new(tree)),
                     radius_m: 0.0,
                     bound,
                 }
@@ -161,6 +190,10 @@ impl PreparedShape {
             radius_m,
             bound: Capsule::on_z(half_length_m, radius_m),
         }
+    }
+
+    pub(crate) fn is_mesh(&self) -> bool {
+        matches!(self.core, Core::Mesh(_))
     }
 
     /// Centre and radius of a ball around the shape, in the shape's frame, m.
@@ -186,6 +219,8 @@ pub(crate) struct Difference<'s> {
     a: &'s Core,
     b: &'s Core,
     b_from_a: Placement,
+    /// A is stretched along this vector.
+    sweep: Vector3<f64>,
     hint_a: usize,
     hint_b: usize,
 }
@@ -196,18 +231,37 @@ impl<'s> Difference<'s> {
             a,
             b,
             b_from_a,
+            sweep: Vector3::zeros(),
             hint_a: usize::MAX,
             hint_b: usize::MAX,
         }
+    }
+
+    /// With A replaced by all that it covers on a straight way.
+    pub fn swept(self, sweep: Vector3<f64>) -> Self {
+        Self { sweep, ..self }
+    }
+
+    /// With a guess of A's first farthest vertex; it only saves time.
+    pub fn from_hint(self, hint_a: usize) -> Self {
+        Self { hint_a, ..self }
+    }
+
+    /// A's farthest vertex found last.
+    pub fn hint(&self) -> usize {
+        self.hint_a
     }
 
     /// Farthest difference along `direction`.
     #[inline]
     pub fn support(&mut self, direction: &Vector3<f64>) -> Vertex {
         let in_a = self.b_from_a.rotation.tr_mul(direction);
-        let a = self
+        let mut a = self
             .b_from_a
             .point(&self.a.support(&in_a, &mut self.hint_a));
+        if direction.dot(&self.sweep) > 0.0 {
+            a += self.sweep;
+        }
         let b = self.b.support(&-direction, &mut self.hint_b);
         Vertex { x: a - b, a }
     }

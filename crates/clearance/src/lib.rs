@@ -50,6 +50,7 @@ mod core;
 mod epa;
 mod gjk;
 mod hull;
+mod mesh;
 mod model;
 mod polytope;
 mod segment;

@@ -7,6 +7,7 @@ use crate::closed_form;
 use crate::core::{Core, Difference, Placement, PreparedShape};
 use crate::epa;
 use crate::gjk::{self, CoreSeparation, Gap};
+use crate::mesh;
 
 /// Signed distance of two placed convex shapes with its witnesses, in the world.
 ///
@@ -72,6 +73,9 @@ pub(crate) fn closer_than(
     b_from_a: &Placement,
     cutoff_m: f64,
 ) -> Option<Separation> {
+    if a.is_mesh() || b.is_mesh() {
+        return mesh::closer_than(a, b, b_from_a, cutoff_m);
+    }
     let radius_m = a.radius_m + b.radius_m;
     let core = core_separation(a, b, b_from_a, cutoff_m + radius_m)?;
     Some(Separation {

@@ -1,0 +1,322 @@
+//! A flat tree of boxes around the triangles of a closed surface, each turned to fit its patch.
+//!
+//! A patch of a smooth surface is a thin slab. Boxes along the axes cannot be thin there, turned
+//! ones are: their slack falls with the square of the patch's size, and a search for the nearest
+//! triangle visits a number of boxes that grows with the logarithm of the triangles.
+
+use nalgebra::{Matrix3, Vector3};
+use needlebench_cell::shape::TriangleMesh;
+
+/// Triangles in a leaf: their own plane tests cost about as much as a further box.
+const LEAF_TRIANGLES: usize = 4;
+
+/// A box along axes of its own around some triangles.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Node {
+    pub centre: Vector3<f64>,
+    /// From the centre to the middles of three faces, at right angles.
+    half: [Vector3<f64>; 3],
+    /// `1 / |half|^2`, or zero.
+    inverse_squared: [f64; 3],
+    /// Leaf: its first triangle. Else: the second child; the first one follows its parent.
+    next: u32,
+    /// Triangles of a leaf; zero for all others.
+    count: u32,
+}
+
+impl Node {
+    /// Largest `direction . x` over the box.
+    #[inline]
+    pub fn high(&self, direction: &Vector3<f64>) -> f64 {
+        direction.dot(&self.centre) + self.reach(direction)
+    }
+
+    /// Least `direction . x` over the box.
+    #[inline]
+    pub fn low(&self, direction: &Vector3<f64>) -> f64 {
+        direction.dot(&self.centre) - self.reach(direction)
+    }
+
+    #[inline]
+    fn reach(&self, direction: &Vector3<f64>) -> f64 {
+        direction.dot(&self.half[0]).abs()
+            + direction.dot(&self.half[1]).abs()
+            + direction.dot(&self.half[2]).abs()
+    }
+
+    /// Point of the box nearest to `point`.
+    #[inline]
+    pub fn nearest(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        let offset = point - self.centre;
+        (0..3).fold(self.centre, |nearest, i| {
+            let along = offset.dot(&self.half[i]) * self.inverse_squared[i];
+            nearest + self.half[i] * along.clamp(-1.0, 1.0)
+        })
+    }
+
+    /// Whether a ray from `origin` may meet the box.
+    #[inline]
+    pub fn is_met(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> bool {
+        let offset = origin - self.centre;
+        let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+        for half in &self.half {
+            let squared = half.norm_squared() * (1.0 + RAY_SLACK) + RAY_SLACK * RAY_SLACK;
+            let (at, rate) = (offset.dot(half), direction.dot(half));
+            if rate == 0.0 {
+                if at.abs() > squared {
+                    return false;
+                }
+                continue;
+            }
+            let (one, other) = ((-squared - at) / rate, (squared - at) / rate);
+            enter = enter.max(one.min(other));
+            leave = leave.min(one.max(other));
+        }
+        enter <= leave * (1.0 + RAY_SLACK) + RAY_SLACK
+    }
+
+    /// Half of the diagonal, m.
+    pub fn radius_m(&self) -> f64 {
+        self.half
+            .iter()
+            .map(Vector3::norm_squared)
+            .sum::<f64>()
+            .sqrt()
+    }
+}
+
+/// By how much a ray may miss a box by rounding and still count, relative and in m.
+const RAY_SLACK: f64 = 1e-9;
+
+/// The parts of a box.
+pub(crate) enum Parts<'t> {
+    Boxes([u32; 2]),
+    Triangles(&'t [[Vector3<f64>; 3]]),
+}
+
+/// A closed surface, ready for distance queries.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct MeshTree {
+    /// Depth first; the root comes first.
+    nodes: Vec<Node>,
+    /// In the order of the leaves.
+    triangles: Vec<[Vector3<f64>; 3]>,
+    /// One vertex of each connected part of the surface.
+    pub anchors: Vec<Vector3<f64>>,
+}
+
+impl MeshTree {
+    /// Triangles that name a vertex which is not there are left out: an error of the loader's.
+    /// Without any triangle the surface is the origin, which keeps every query defined.
+    pub fn new(mesh: &TriangleMesh) -> Self {
+        let corner = |&i: &u32| mesh.vertices_m.get(i as usize).map(|vertex| vertex.coords);
+        let mut triangles: Vec<[Vector3<f64>; 3]> = mesh
+            .triangles
+            .iter()
+            .filter_map(|[a, b, c]| Some([corner(a)?, corner(b)?, corner(c)?]))
+            .collect();
+        let anchors = if triangles.is_empty() {
+            triangles.push([Vector3::zeros(); 3]);
+            vec![Vector3::zeros()]
+        } else {
+            anchors(mesh)
+        };
+        let mut nodes = Vec::with_capacity(triangles.len());
+        split(&mut nodes, &mut triangles, 0);
+        Self {
+            nodes,
+            triangles,
+            anchors,
+        }
+    }
+
+    pub fn root(&self) -> &Node {
+        &self.nodes[0]
+    }
+
+    #[inline]
+    pub fn node(&self, index: u32) -> &Node {
+        &self.nodes[index as usize]
+    }
+
+    pub fn is_leaf(&self, index: u32) -> bool {
+        self.node(index).count > 0
+    }
+
+    #[inline]
+    pub fn parts(&self, index: u32) -> Parts<'_> {
+        let node = self.node(index);
+        if node.count == 0 {
+            Parts::Boxes([index + 1, node.next])
+        } else {
+            let first = node.next as usize;
+            Parts::Triangles(&self.triangles[first..first + node.count as usize])
+        }
+    }
+
+    pub fn vertices_m(&self) -> impl Iterator<Item = &Vector3<f64>> + Clone {
+        self.triangles.iter().flatten()
+    }
+
+    /// Vertex farthest along `direction`; `hint` is the one found last, and only saves time.
+    pub fn support(&self, direction: &Vector3<f64>, hint: &mut usize) -> Vector3<f64> {
+        let at = |corner: usize| &self.triangles[corner / 3][corner % 3];
+        if *hint >= 3 * self.triangles.len() {
+            *hint = 0;
+        }
+        let mut best = direction.dot(at(*hint));
+        let mut stack = vec![(self.root().high(direction), 0)];
+        while let Some((high, index)) = stack.pop() {
+            if high <= best {
+                continue;
+            }
+            match self.parts(index) {
+                Parts::Boxes(boxes) => {
+                    let [one, other] = boxes.map(|i| (self.node(i).high(direction), i));
+                    // The farther one is on top.
+                    let (under, top) = if one.0 >= other.0 {
+                        (other, one)
+                    } else {
+                        (one, other)
+                    };
+                    stack.extend([under, top].into_iter().filter(|entry| entry.0 > best));
+                }
+                Parts::Triangles(triangles) => {
+                    let first = 3 * self.node(index).next as usize;
+                    for (i, vertex) in triangles.iter().flatten().enumerate() {
+                        let value = direction.dot(vertex);
+                        if value > best {
+                            best = value;
+                            *hint = first + i;
+                        }
+                    }
+                }
+            }
+        }
+        *at(*hint)
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a mesh numbers its vertices in u32, so its triangles and boxes fit too"
+)]
+fn split(nodes: &mut Vec<Node>, triangles: &mut [[Vector3<f64>; 3]], first: usize) {
+    let (mut node, longest) = fitted(triangles);
+    if triangles.len() <= LEAF_TRIANGLES {
+        node.next = first as u32;
+        node.count = triangles.len() as u32;
+        nodes.push(node);
+        return;
+    }
+    let axis = node.half[longest];
+    let key = |triangle: &[Vector3<f64>; 3]| axis.dot(&(triangle[0] + triangle[1] + triangle[2]));
+    let middle = triangles.len() / 2;
+    triangles.select_nth_unstable_by(middle, |one, other| key(one).total_cmp(&key(other)));
+    let index = nodes.len();
+    nodes.push(node);
+    let (left, right) = triangles.split_at_mut(middle);
+    split(nodes, left, first);
+    nodes[index].next = nodes.len() as u32;
+    split(nodes, right, first + middle);
+}
+
+/// The box along the principal axes of the triangles' corners, and its longest axis.
+fn fitted(triangles: &[[Vector3<f64>; 3]]) -> (Node, usize) {
+    let count = 3.0 * triangles.len() as f64;
+    let vertices = || triangles.iter().flatten();
+    let mean = vertices().sum::<Vector3<f64>>() / count;
+    let covariance = vertices().fold(Matrix3::zeros(), |sum, vertex| {
+        let offset = vertex - mean;
+        sum + offset * offset.transpose()
+    });
+    let eigen = covariance.symmetric_eigen();
+    let turned: [Vector3<f64>; 3] = [0, 1, 2].map(|i| eigen.eigenvectors.column(i).into());
+    let upright = [Vector3::x(), Vector3::y(), Vector3::z()];
+    // Corners that spread alike have principal axes by chance; then those of the mesh may fit
+    // better, as for a box.
+    let [one, other] = [turned, upright].map(|axes| {
+        let mut centre = Vector3::zeros();
+        let mut half = [Vector3::zeros(); 3];
+        for (axis, half) in axes.iter().zip(&mut half) {
+            let (low, high) = vertices().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| {
+                let t = axis.dot(v);
+                (lo.min(t), hi.max(t))
+            });
+            centre += axis * (0.5 * (low + high));
+            *half = axis * (0.5 * (high - low));
+        }
+        (centre, half)
+    });
+    let area = |half: &[Vector3<f64>; 3]| {
+        let [a, b, c] = half.each_ref().map(Vector3::norm);
+        a * b + b * c + c * a
+    };
+    let (centre, half) = if area(&other.1) < area(&one.1) {
+        other
+    } else {
+        one
+    };
+    let squared = half.map(|half| half.norm_squared());
+    let longest = (0..3).fold(
+        0,
+        |best, i| if squared[i] > squared[best] { i } else { best },
+    );
+    let node = Node {
+        centre,
+        half,
+        inverse_squared: squared.map(|x| if x > 0.0 { x.recip() } else { 0.0 }),
+        next: 0,
+        count: 0,
+    };
+    (node, longest)
+}
+
+/// One vertex of each connected part; vertices at the same place are one.
+fn anchors(mesh: &TriangleMesh) -> Vec<Vector3<f64>> {
+    let count = mesh.vertices_m.len();
+    let mut parent: Vec<usize> = (0..count).collect();
+    fn top(parent: &mut [usize], mut i: usize) -> usize {
+        while parent[i] != i {
+            parent[i] = parent[parent[i]];
+            i = parent[i];
+        }
+        i
+    }
+    let join = |parent: &mut Vec<usize>, a: usize, b: usize| {
+        let (a, b) = (top(parent, a), top(parent, b));
+        parent[a.max(b)] = a.min(b);
+    };
+    let mut order: Vec<usize> = (0..count).collect();
+    let key = |i: usize| mesh.vertices_m[i].coords;
+    let compare = |&i: &usize, &j: &usize| {
+        let (a, b) = (key(i), key(j));
+        a.x.total_cmp(&b.x)
+            .then(a.y.total_cmp(&b.y))
+            .then(a.z.total_cmp(&b.z))
+    };
+    order.sort_unstable_by(|i, j| compare(i, j).then(i.cmp(j)));
+    for pair in order.windows(2) {
+        if key(pair[0]) == key(pair[1]) {
+            join(&mut parent, pair[0], pair[1]);
+        }
+    }
+    let mut used = vec![false; count];
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|i| i as usize);
+        if a.max(b).max(c) < count {
+            join(&mut parent, a, b);
+            join(&mut parent, b, c);
+            used[a] = true;
+        }
+    }
+    let mut tops: Vec<usize> = (0..count)
+        .filter(|&i| used[i])
+        .map(|i| top(&mut parent, i))
+        .collect();
+    tops.sort_unstable();
+    tops.dedup();
+    tops.into_iter()
+        .map(|i| mesh.vertices_m[i].coords)
+        .collect()
+}
