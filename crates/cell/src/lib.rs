@@ -12,6 +12,7 @@ mod mesh;
 mod model;
 mod nominal;
 pub mod phantom;
+mod phantom_place;
 mod resolve;
 mod robot;
 pub mod scenario;
@@ -20,6 +21,7 @@ mod tessellate;
 mod toml_text;
 mod tool;
 mod urdf;
+mod user_parts;
 mod values;
 mod yaml_text;
 

@@ -12,7 +12,7 @@ mod stl;
 pub(crate) mod test_meshes;
 mod winding;
 
-pub(crate) use check::{MeshDefect, MeshFacts, check_closed};
+pub(crate) use check::{MeshDefect, check_closed};
 use decompose::{decompose, is_convex};
 pub(crate) use fidelity::{Fidelity, points_on};
 pub use hull::convex_hull;
