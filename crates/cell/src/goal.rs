@@ -6,7 +6,7 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::{Pose, pose_from_rotation_vector};
 
-use crate::phantom::Phantom;
+use crate::phantom::{Phantom, Tissue};
 use crate::scenario::GoalSection;
 use crate::shape::{Shape, Solid};
 use crate::toml_text::TomlText;
@@ -116,6 +116,7 @@ pub(crate) fn resolve_goal(
     goal.expected = expectations(text, &key, section)?;
     let by_flange_pose = section.flange_pose.is_some();
     check_place(text, &key, &goal, by_flange_pose, surroundings)?;
+    check_target(text, &key, &goal, by_flange_pose, surroundings)?;
     let needle_m = surroundings.tool.needle.length_m;
     let needed_m = surroundings.tool.guide_length_m() + goal.insertion_length_m;
     if needle_m < needed_m {
@@ -309,8 +310,8 @@ fn from_entry_and_target(
                 "points are in the phantom frame: left, posterior, superior, from mid-chest, in mm",
             ));
     }
-    // The target is inside, so the line through it crosses the convex skin.
-    let Some((enters_m, _)) = phantom.skin_intersection(&entry, &axis) else {
+    // The target is inside, so the line through it crosses the skin.
+    let Some((enters_m, leaves_m)) = phantom.skin_intersection(&entry, &axis) else {
         return Err(text.finding(
             &key("entry_mm"),
             "the line from entry to target misses the skin",
@@ -338,6 +339,19 @@ fn from_entry_and_target(
                 skin.y,
                 skin.z
             )));
+    }
+    let to_target_m = (target - entry).norm();
+    if leaves_m < to_target_m {
+        return Err(text
+            .finding(
+                &key("entry_mm"),
+                format!(
+                    "the needle would leave the skin {:.1} mm after its entry and pierce it again \
+                     before the target",
+                    (leaves_m - enters_m) * 1e3
+                ),
+            )
+            .hint("choose an entry on the target's side of the fold"));
     }
     if enters_m.abs() > 1e-6 {
         notes.push(format!(
@@ -421,7 +435,7 @@ fn organ_at(phantom: &Phantom, point: &Point3<f64>) -> Option<String> {
             phantom
                 .parts
                 .iter()
-                .filter(|part| part.tissue == crate::phantom::Tissue::Organ)
+                .filter(|part| part.tissue == Tissue::Organ)
                 .find(|part| solid_contains(&part.solid, point))
                 .and_then(|part| part.organ.clone())
         })
@@ -491,6 +505,38 @@ fn check_place(
         }
     }
     Ok(())
+}
+
+/// Refuses a target inside a bone, unless it is a lesion that is there.
+fn check_target(
+    text: &TomlText<'_>,
+    key: &dyn Fn(&str) -> String,
+    goal: &Goal,
+    by_flange_pose: bool,
+    surroundings: &Surroundings<'_>,
+) -> Result<(), Finding> {
+    let (Some(placed), None) = (surroundings.phantom, &goal.lesion) else {
+        return Ok(());
+    };
+    let target = placed.world_from_phantom.inverse() * goal.target_m;
+    let bone = placed
+        .phantom
+        .parts
+        .iter()
+        .filter(|part| part.tissue == Tissue::Bone)
+        .find(|part| solid_contains(&part.solid, &target));
+    let Some(bone) = bone else { return Ok(()) };
+    let name = if by_flange_pose {
+        "flange_pose"
+    } else {
+        "target_mm"
+    };
+    Err(text
+        .finding(
+            &key(name),
+            format!("the target lies inside the bone `{}`", bone.name),
+        )
+        .hint("move the target, or make it a lesion if the bone is to be pierced"))
 }
 
 fn check_length(

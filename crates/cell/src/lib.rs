@@ -13,6 +13,7 @@ mod model;
 mod nominal;
 pub mod phantom;
 pub mod ranking;
+mod phantom_place;
 mod resolve;
 mod robot;
 pub mod scenario;
@@ -21,6 +22,7 @@ mod tessellate;
 mod toml_text;
 mod tool;
 mod urdf;
+mod user_parts;
 mod values;
 mod yaml_text;
 

@@ -7,13 +7,12 @@ use needlebench_kinematics::trajectory::{MotionLimits, ProfileLimits};
 use needlebench_kinematics::{JOINT_LABELS, Joints, Pose};
 
 use crate::files::{Location, source_of};
-use crate::fixtures::{self, Fixture, FixtureError, TableParameters};
+use crate::fixtures::{self, Fixture, FixtureError};
 use crate::goal::{PlacedPhantom, Surroundings, resolve_goal, solid_contains};
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
-use crate::phantom::{Phantom, PhantomError, PhantomParameters};
+use crate::phantom_place::place_phantom;
 use crate::robot::{MissingInertia, read_robot};
-use crate::scenario::{PhantomSection, Posture, Scenario};
-use crate::shape::Shape;
+use crate::scenario::Scenario;
 use crate::toml_text::TomlText;
 use crate::tool::{ToolOverrides, read_tool};
 use crate::values::check_values;
@@ -72,6 +71,8 @@ pub struct ResolvedScenario {
     pub motion: MotionLimits,
     /// Parameter file of the phantom.
     pub phantom_source: Option<ModelSource>,
+    /// Files of the parts that the user gave the phantom.
+    pub phantom_parts: Vec<ModelSource>,
     /// What was assumed or adjusted; belongs in every report.
     pub notes: Vec<String>,
 }
@@ -223,13 +224,16 @@ pub fn resolve_scenario(
         .map(|mount| fixtures::mount(mount, &world_from_base_link))
         .transpose()
         .map_err(|error| one(fixture_finding(&toml, "mount", &error)))?;
-    let (phantom, phantom_source) = match &scenario.phantom {
-        None => (None, None),
+    let found = match &scenario.phantom {
+        None => None,
         Some(section) => {
-            let (placed, source) = place_phantom(&toml, section, &scenario, base).map_err(one)?;
-            (Some(placed), Some(source))
+            Some(place_phantom(&toml, section, &scenario, base, &mut notes).map_err(one)?)
         }
     };
+    let (phantom, phantom_source, phantom_parts) = found
+        .map_or((None, None, Vec::new()), |found| {
+            (Some(found.placed), found.model, found.parts)
+        });
 
     let mut fixtures = Vec::new();
     let mut surroundings = Vec::new();
@@ -314,6 +318,7 @@ pub fn resolve_scenario(
         start,
         motion,
         phantom_source,
+        phantom_parts,
         notes,
         scenario,
     })
@@ -414,90 +419,6 @@ fn tool_overrides(toml: &TomlText<'_>, scenario: &Scenario) -> Result<ToolOverri
     })
 }
 
-fn place_phantom(
-    toml: &TomlText<'_>,
-    section: &PhantomSection,
-    scenario: &Scenario,
-    base: &Path,
-) -> Result<(PlacedPhantom, ModelSource), Finding> {
-    let location = Location::of_model(&section.model, "chest_phantom", "toml", base);
-    let bytes = location.read().map_err(|error| {
-        let names = Location::builtin_names("chest_phantom", "toml");
-        toml.finding("phantom.model", format!("{}: {error}", location.display()))
-            .hint(
-                match nearest_name(&section.model, names.iter().map(String::as_str)) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("a path, or one of {}", names.join(", ")),
-                },
-            )
-    })?;
-    let file = location.display();
-    let text = String::from_utf8(bytes)
-        .map_err(|error| Finding::new(&file, format!("not UTF-8 text: {error}")))?;
-    let parameter_text = TomlText::parse(&file, &text)?;
-    let mut parameters: PhantomParameters = parameter_text.deserialize()?;
-    let sizes = [
-        (&mut parameters.breadth_mm, section.breadth_mm),
-        (&mut parameters.depth_mm, section.depth_mm),
-        (&mut parameters.length_mm, section.length_mm),
-    ];
-    let mut resized = false;
-    for (size, wanted) in sizes {
-        if let Some(wanted) = wanted {
-            *size = wanted;
-            resized = true;
-        }
-    }
-    let phantom = Phantom::build(&parameters).map_err(|error| {
-        if resized {
-            let key = match &error {
-                PhantomError::OutOfRange { key, .. } => format!("phantom.{key}"),
-                _ => "phantom".to_owned(),
-            };
-            toml.finding(&key, error.to_string())
-                .hint("lengths are in millimetres; leave a size out to take the model's own")
-        } else {
-            Finding::new(&file, error.to_string())
-        }
-    })?;
-    let mut world_from_phantom = Pose::from_parts(
-        Translation3::from(Vector3::from(section.position_mm) * 1e-3),
-        orientation(section),
-    );
-    if section.rest_on_table {
-        let Some(table) = &scenario.table else {
-            return Err(toml
-                .finding("phantom.rest_on_table", "there is no [table] to rest on")
-                .hint("add a [table], or set `rest_on_table = false` and give the full position"));
-        };
-        check_over_table(toml, table, section.position_mm)?;
-        let skin = phantom.skin();
-        let Shape::Convex(mesh) = &skin.shape else {
-            unreachable!("the phantom's skin is a convex mesh")
-        };
-        let lowest_m = mesh
-            .0
-            .vertices_m
-            .iter()
-            .map(|vertex| {
-                (world_from_phantom.rotation
-                    * (skin.parent_from_shape * Point3::from(vertex.coords)).coords)
-                    .z
-            })
-            .fold(f64::INFINITY, f64::min);
-        world_from_phantom.translation.vector.z =
-            (table.top_height_mm + section.position_mm[2]) * 1e-3 - lowest_m;
-    }
-    let source = source_of(file, text.as_bytes());
-    Ok((
-        PlacedPhantom {
-            phantom,
-            world_from_phantom,
-        },
-        source,
-    ))
-}
-
 /// Refuses a base that stands inside something: the fixed link is in no pair that is checked later.
 fn check_base(
     toml: &TomlText<'_>,
@@ -525,52 +446,6 @@ fn check_base(
             )
             .hint("the position is in the world: z up, floor at 0, in millimetres")),
     }
-}
-
-/// Refuses a phantom that rests on a table it does not lie over.
-fn check_over_table(
-    toml: &TomlText<'_>,
-    table: &TableParameters,
-    position_mm: [f64; 3],
-) -> Result<(), Finding> {
-    let offset_mm = nalgebra::Rotation2::new(-table.yaw_deg.to_radians())
-        * nalgebra::Vector2::new(
-            position_mm[0] - table.center_mm[0],
-            position_mm[1] - table.center_mm[1],
-        );
-    let over =
-        offset_mm.x.abs() <= 0.5 * table.length_mm && offset_mm.y.abs() <= 0.5 * table.width_mm;
-    if over {
-        return Ok(());
-    }
-    Err(toml
-        .finding(
-            "phantom.position_mm",
-            format!(
-                "the phantom's middle lies {:.0} mm along and {:.0} mm across from the middle of \
-                 the table, which is {:.0} by {:.0} mm",
-                offset_mm.x, offset_mm.y, table.length_mm, table.width_mm
-            ),
-        )
-        .hint("move it over the table, or set `rest_on_table = false`"))
-}
-
-/// Orientation of the phantom (left, posterior, superior) in the world.
-fn orientation(section: &PhantomSection) -> UnitQuaternion<f64> {
-    // With the head towards world x; columns are where left, posterior and superior point.
-    let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
-    let columns = match section.posture {
-        Posture::Supine => [-y, -z, x],
-        Posture::Prone => [y, z, x],
-        Posture::LeftLateral => [-z, y, x],
-        Posture::RightLateral => [z, -y, x],
-    };
-    let posture = UnitQuaternion::from_rotation_matrix(
-        &nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&columns)),
-    );
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), section.head_yaw_deg.to_radians())
-        * posture
-        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), section.body_roll_deg.to_radians())
 }
 
 fn motion_limits(scenario: &Scenario, urdf_velocity: &Joints) -> MotionLimits {

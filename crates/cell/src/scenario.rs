@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
 use crate::ranking::RankingSection;
 use crate::robot::MissingInertia;
+use crate::user_parts::PartSection;
 
 /// One scenario: a cell, goals, and what is asked of every configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -157,8 +158,8 @@ pub enum Posture {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PhantomSection {
-    /// `male-p5`, `male-p50`, `male-p95`, `female-p5`, `female-p50`, `female-p95`, or the path of
-    /// a parameter file relative to this file.
+    /// `male-p5`, `male-p50`, `male-p95`, `female-p5`, `female-p50`, `female-p95`, the path of a
+    /// parameter file relative to this file, or `none` for a phantom of `parts` alone.
     pub model: String,
     /// Breadth of the chest, mm; the model's own if left out.
     pub breadth_mm: Option<f64>,
@@ -177,6 +178,8 @@ pub struct PhantomSection {
     pub position_mm: [f64; 3],
     /// Lays the lowest point of the skin on the table.
     pub rest_on_table: bool,
+    /// Parts from STL files, besides the model's or in their place.
+    pub parts: Vec<PartSection>,
 }
 
 impl Default for PhantomSection {
@@ -191,6 +194,7 @@ impl Default for PhantomSection {
             body_roll_deg: 0.0,
             position_mm: [0.0; 3],
             rest_on_table: true,
+            parts: Vec::new(),
         }
     }
 }

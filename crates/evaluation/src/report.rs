@@ -330,7 +330,7 @@ pub struct Provenance {
 /// A file that went into a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct InputFile {
-    /// `scenario`, `robot`, `robot mesh`, `tool`, `phantom`.
+    /// `scenario`, `robot`, `robot mesh`, `tool`, `calibration`, `phantom`, `phantom part`.
     pub role: &'static str,
     /// As named.
     pub file: String,

@@ -31,6 +31,8 @@ pub(crate) fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentit
             .iter()
             .map(|source| input("phantom", source)),
     );
+    let parts = &resolved.phantom_parts;
+    inputs.extend(parts.iter().map(|source| input("phantom part", source)));
     Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         git_revision: GIT_REVISION.to_owned(),

@@ -242,7 +242,11 @@ impl EdgeCounts {
             .0
             .iter()
             .flat_map(|(&(low, high), &[forth, back])| {
-                let edge = if forth > back { (low, high) } else { (high, low) };
+                let edge = if forth > back {
+                    (low, high)
+                } else {
+                    (high, low)
+                };
                 std::iter::repeat_n(edge, forth.abs_diff(back) as usize)
             })
             .collect();
@@ -297,7 +301,10 @@ fn components(mesh: &TriangleMesh) -> Vec<usize> {
             *best = (area, i);
         }
     }
-    let mut triangles: Vec<usize> = largest.into_values().map(|(_, triangle)| triangle).collect();
+    let mut triangles: Vec<usize> = largest
+        .into_values()
+        .map(|(_, triangle)| triangle)
+        .collect();
     triangles.sort_unstable();
     triangles
 }
@@ -323,7 +330,11 @@ mod tests {
     fn two_parts_are_sound_and_so_is_a_cavity() {
         let apart = both(&cuboid(BOX), &cuboid(BOX), [0.1, 0.0, 0.0]);
         assert_eq!(check_closed(&apart).unwrap().components, 2);
-        let hollow = both(&cuboid(BOX), &inverted(cuboid([0.01, 0.01, 0.005])), [0.0; 3]);
+        let hollow = both(
+            &cuboid(BOX),
+            &inverted(cuboid([0.01, 0.01, 0.005])),
+            [0.0; 3],
+        );
         let facts = check_closed(&hollow).unwrap();
         assert_eq!(facts.components, 2);
         assert!((facts.volume_m3 - 8.0 * (6e-6 - 0.5e-6)).abs() < 1e-15);
@@ -334,13 +345,19 @@ mod tests {
         let mut mesh = bowl();
         mesh.triangles.remove(40);
         let defect = check_closed(&mesh).unwrap_err();
-        assert!(matches!(defect, MeshDefect::Open { edges: 3, .. }), "{defect}");
+        assert!(
+            matches!(defect, MeshDefect::Open { edges: 3, .. }),
+            "{defect}"
+        );
     }
 
     #[test]
     fn inside_out_is_told_from_a_cavity() {
         let defect = check_closed(&inverted(ell())).unwrap_err();
-        assert!(matches!(defect, MeshDefect::Inverted { count: 1, .. }), "{defect}");
+        assert!(
+            matches!(defect, MeshDefect::Inverted { count: 1, .. }),
+            "{defect}"
+        );
         let beside = both(&cuboid(BOX), &inverted(cuboid(BOX)), [0.1, 0.0, 0.0]);
         let Err(MeshDefect::Inverted { at_m, .. }) = check_closed(&beside) else {
             panic!("the second box is inside out");
@@ -353,7 +370,10 @@ mod tests {
         let mut mesh = ell();
         mesh.triangles[3].swap(0, 1);
         let defect = check_closed(&mesh).unwrap_err();
-        assert!(matches!(defect, MeshDefect::Open { edges: 6, .. }), "{defect}");
+        assert!(
+            matches!(defect, MeshDefect::Open { edges: 6, .. }),
+            "{defect}"
+        );
     }
 
     #[test]
@@ -361,10 +381,18 @@ mod tests {
         let mut mesh = ell();
         mesh.triangles.insert(5, [0, 1, 1]);
         let defect = check_closed(&mesh).unwrap_err();
-        assert!(matches!(defect, MeshDefect::NoArea { triangle: 5, count: 1, .. }));
+        assert!(matches!(
+            defect,
+            MeshDefect::NoArea {
+                triangle: 5,
+                count: 1,
+                ..
+            }
+        ));
         // A point in the middle of an edge.
         let mut mesh = ell();
-        mesh.vertices_m.push(nalgebra::center(&mesh.vertices_m[0], &mesh.vertices_m[1]));
+        mesh.vertices_m
+            .push(nalgebra::center(&mesh.vertices_m[0], &mesh.vertices_m[1]));
         let middle = u32::try_from(mesh.vertices_m.len() - 1).unwrap();
         mesh.triangles.push([0, middle, 1]);
         let defect = check_closed(&mesh).unwrap_err();
@@ -383,7 +411,11 @@ mod tests {
     #[test]
     fn triangle_given_twice_is_named_with_its_twin() {
         let mut mesh = ell();
-        mesh.triangles.push([mesh.triangles[2][1], mesh.triangles[2][2], mesh.triangles[2][0]]);
+        mesh.triangles.push([
+            mesh.triangles[2][1],
+            mesh.triangles[2][2],
+            mesh.triangles[2][0],
+        ]);
         let last = mesh.triangles.len() - 1;
         let defect = check_closed(&mesh).unwrap_err();
         let named = matches!(defect, MeshDefect::Twice { first: 2, second, .. } if second == last);

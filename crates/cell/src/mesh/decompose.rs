@@ -52,7 +52,11 @@ pub(crate) fn decompose(solid: &SurfaceIndex) -> Vec<ConvexMesh> {
             .iter()
             .enumerate()
             .filter(|(_, part)| part.overhang_m > GOOD_ENOUGH_M)
-            .max_by(|a, b| a.1.overhang_m.total_cmp(&b.1.overhang_m).then(b.0.cmp(&a.0)));
+            .max_by(|a, b| {
+                a.1.overhang_m
+                    .total_cmp(&b.1.overhang_m)
+                    .then(b.0.cmp(&a.0))
+            });
         let Some((index, part)) = worst else { break };
         match part.halves(solid) {
             Some([a, b]) => {
@@ -109,7 +113,9 @@ fn cut_normals() -> impl Iterator<Item = Vector3<f64>> {
         [0.0, 1.0, 1.0],
         [0.0, 1.0, -1.0],
     ];
-    ALONG.into_iter().map(|along| Vector3::from(along).normalize())
+    ALONG
+        .into_iter()
+        .map(|along| Vector3::from(along).normalize())
 }
 
 /// What of the surface lies between some planes.

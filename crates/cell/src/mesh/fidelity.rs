@@ -122,7 +122,11 @@ pub(crate) fn points_on(mesh: &TriangleMesh, spacing_m: f64) -> impl Iterator<It
                 (number * 0.754_877_666_246_692_7).fract(),
                 (number * 0.569_840_290_998_053_3).fract(),
             );
-            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            let (u, v) = if u + v > 1.0 {
+                (1.0 - u, 1.0 - v)
+            } else {
+                (u, v)
+            };
             points.push(a + (b - a) * u + (c - a) * v);
         }
         points

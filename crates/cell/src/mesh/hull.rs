@@ -29,7 +29,10 @@ pub(super) fn robust_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> 
     let Some(first) = points.first() else {
         return hull;
     };
-    let size = points.iter().map(|p| (p - first).norm()).fold(0.0, f64::max);
+    let size = points
+        .iter()
+        .map(|p| (p - first).norm())
+        .fold(0.0, f64::max);
     for share in [1e-8, 1e-7, 1e-6] {
         if hull.is_ok() {
             break;
@@ -38,7 +41,11 @@ pub(super) fn robust_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> 
             .zip(points)
             .map(|(i, point)| {
                 let step = |each: f64| (f64::from(i) * each).fract() - 0.5;
-                let way = [0.819_172_513_396_2, 0.671_043_606_703_8, 0.549_700_477_901_9];
+                let way = [
+                    0.819_172_513_396_2,
+                    0.671_043_606_703_8,
+                    0.549_700_477_901_9,
+                ];
                 point + Vector3::from(way.map(step)) * (share * size)
             })
             .collect();
@@ -184,7 +191,10 @@ impl<'a> Hull<'a> {
         }
         // What was in front of a face that is gone is inside now or in front of a new one.
         let orphans = visible.into_iter().flat_map(|face| face.outside);
-        self.assign(orphans.filter(|&orphan| orphan != point), first_new..self.faces.len());
+        self.assign(
+            orphans.filter(|&orphan| orphan != point),
+            first_new..self.faces.len(),
+        );
         Ok(())
     }
 

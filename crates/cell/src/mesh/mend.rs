@@ -101,7 +101,13 @@ fn fill(mesh: &TriangleMesh, corner_loop: &[u32]) -> Vec<([u32; 3], f64)> {
     let at = |vertex: u32| mesh.vertices_m[vertex as usize];
     while rest.len() >= 3 {
         let count = rest.len();
-        let ear = |i: usize| [rest[(i + count - 1) % count], rest[i], rest[(i + 1) % count]];
+        let ear = |i: usize| {
+            [
+                rest[(i + count - 1) % count],
+                rest[i],
+                rest[(i + 1) % count],
+            ]
+        };
         let cut = |i: usize| {
             let [a, _, c] = ear(i);
             (at(c) - at(a)).norm()
@@ -151,10 +157,7 @@ mod tests {
         // A corner on the long edge of its neighbour, as exporters of CAD leave them.
         let mut mesh = bowl();
         let [a, b, c] = mesh.triangles[30];
-        let middle = nalgebra::center(
-            &mesh.vertices_m[a as usize],
-            &mesh.vertices_m[b as usize],
-        );
+        let middle = nalgebra::center(&mesh.vertices_m[a as usize], &mesh.vertices_m[b as usize]);
         mesh.vertices_m.push(middle);
         let m = u32::try_from(mesh.vertices_m.len() - 1).unwrap();
         mesh.triangles[30] = [a, m, c];

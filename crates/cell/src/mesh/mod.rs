@@ -12,7 +12,7 @@ mod stl;
 pub(crate) mod test_meshes;
 mod winding;
 
-pub(crate) use check::{MeshDefect, MeshFacts, check_closed};
+pub(crate) use check::{MeshDefect, check_closed};
 use decompose::{decompose, is_convex};
 pub(crate) use fidelity::{Fidelity, points_on};
 pub use hull::convex_hull;
@@ -82,9 +82,9 @@ pub(crate) fn extent_m(mesh: &TriangleMesh) -> [Point3<f64>; 2] {
         Point3::from(Vector3::repeat(f64::INFINITY)),
         Point3::from(Vector3::repeat(f64::NEG_INFINITY)),
     ];
-    mesh.vertices_m
-        .iter()
-        .fold(start, |[low, high], vertex| [low.inf(vertex), high.sup(vertex)])
+    mesh.vertices_m.iter().fold(start, |[low, high], vertex| {
+        [low.inf(vertex), high.sup(vertex)]
+    })
 }
 
 /// Edges of the box around a mesh, m.

@@ -58,7 +58,10 @@ pub(crate) fn shape_of_surface(
 /// Meshes of robots come from CAD with seams: corners on the edges of neighbours, slivers that lost
 /// their area. They are mended, and said to be, as long as that adds hardly any surface. A mesh
 /// that is open beyond that, or inside out, stands as its convex hull, which contains it.
-pub(crate) fn shape_of_link(mesh: TriangleMesh, link: &str) -> Result<(Shape, Vec<String>), String> {
+pub(crate) fn shape_of_link(
+    mesh: TriangleMesh,
+    link: &str,
+) -> Result<(Shape, Vec<String>), String> {
     let largest_m = size_m(&mesh).max();
     if largest_m > LARGEST_LINK_M {
         return Err(format!(
@@ -138,7 +141,9 @@ mod tests {
     #[test]
     fn hollow_mesh_is_its_surface_and_has_pieces() {
         let (shape, notes) = link(ell());
-        let Shape::Mesh(mesh) = shape else { panic!("{shape:?}") };
+        let Shape::Mesh(mesh) = shape else {
+            panic!("{shape:?}")
+        };
         assert_eq!(mesh.surface, ell());
         assert_eq!(mesh.pieces.len(), 2);
         assert!(notes[0].contains("2 convex pieces"), "{notes:?}");
@@ -149,9 +154,14 @@ mod tests {
         let mut mesh = super::super::test_meshes::torus(48, 24);
         mesh.triangles.remove(100);
         let (shape, notes) = link(mesh.clone());
-        let Shape::Mesh(solid) = shape else { panic!("{shape:?}") };
+        let Shape::Mesh(solid) = shape else {
+            panic!("{shape:?}")
+        };
         assert_eq!(solid.surface.triangles.len(), mesh.triangles.len() + 1);
-        assert!(notes[0].contains("1 seams (3 open edges) were closed"), "{notes:?}");
+        assert!(
+            notes[0].contains("1 seams (3 open edges) were closed"),
+            "{notes:?}"
+        );
     }
 
     #[test]
@@ -173,13 +183,18 @@ mod tests {
             *vertex *= 1e3;
         }
         let why = shape_of_link(mesh, "forearm_link").unwrap_err();
-        assert!(why.contains("100.0 m") && why.contains("scale=\"0.001"), "{why}");
+        assert!(
+            why.contains("100.0 m") && why.contains("scale=\"0.001"),
+            "{why}"
+        );
     }
 
     #[test]
     fn surface_for_distances_alone_has_no_pieces() {
         let (shape, fidelity) = shape_of_surface(ell(), Use::Distance).unwrap();
-        let Shape::Mesh(mesh) = shape else { panic!("{shape:?}") };
+        let Shape::Mesh(mesh) = shape else {
+            panic!("{shape:?}")
+        };
         assert!(mesh.pieces.is_empty() && fidelity.is_none());
     }
 }

@@ -14,6 +14,7 @@ mod markers;
 mod organs;
 mod parameters;
 mod skeleton;
+mod skin;
 mod solids;
 
 #[cfg(test)]
@@ -32,10 +33,11 @@ pub(crate) use loft::assert_convex_and_closed;
 
 use crate::shape::{Shape, Solid};
 use envelope::Envelope;
-use half_spaces::HalfSpaces;
+pub(crate) use half_spaces::HalfSpaces;
+pub(crate) use skin::SkinSurface;
 
-const SKIN_RGBA: [f32; 4] = [0.90, 0.72, 0.60, 0.35];
-const LESION_RGBA: [f32; 4] = [0.95, 0.80, 0.10, 1.0];
+pub(crate) const SKIN_RGBA: [f32; 4] = [0.90, 0.72, 0.60, 0.35];
+pub(crate) const LESION_RGBA: [f32; 4] = [0.95, 0.80, 0.10, 1.0];
 
 /// Names of the shipped sizes.
 pub const SIZE_PRESETS: [&str; 6] = {
@@ -122,15 +124,15 @@ pub struct Marker {
 /// The chest phantom.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Phantom {
-    /// What it was built from.
-    pub parameters: PhantomParameters,
+    /// What the shipped part of it was built from; `None` if all parts are the user's.
+    pub parameters: Option<PhantomParameters>,
     /// All pieces. The skin is the first; it encloses all others but the markers.
     pub parts: Vec<PhantomPart>,
     /// Targets, in the order of the parameters.
     pub lesions: Vec<Lesion>,
     /// Skin markers, in the order of the parameters.
     pub markers: Vec<Marker>,
-    skin_faces: HalfSpaces,
+    skin_surface: SkinSurface,
 }
 
 impl Phantom {
@@ -184,15 +186,32 @@ impl Phantom {
             parts.extend(marker_parts);
         }
         Ok(Self {
-            parameters: parameters.clone(),
+            parameters: Some(parameters.clone()),
             parts,
             lesions,
             markers,
-            skin_faces,
+            skin_surface: SkinSurface::Convex(skin_faces),
         })
     }
 
-    /// The outer surface: one closed convex mesh, phantom frame.
+    /// Of these parts, the first of which is the skin with this surface.
+    pub(crate) fn of_parts(
+        parameters: Option<PhantomParameters>,
+        parts: Vec<PhantomPart>,
+        lesions: Vec<Lesion>,
+        markers: Vec<Marker>,
+        skin_surface: SkinSurface,
+    ) -> Self {
+        Self {
+            parameters,
+            parts,
+            lesions,
+            markers,
+            skin_surface,
+        }
+    }
+
+    /// The outer surface: one closed mesh, phantom frame. The shipped ones are convex.
     pub fn skin(&self) -> &Solid {
         &self.parts[0].solid
     }
@@ -201,13 +220,15 @@ impl Phantom {
     /// frame) at which it enters and leaves.
     ///
     /// Exact for the polyhedral skin. Negative distances lie behind the origin: an origin inside
-    /// has `enter_m < 0 < leave_m`. `None` when the line misses the skin or only grazes it.
+    /// has `enter_m < 0 < leave_m`. `None` when the line misses the skin or only grazes it. Of a
+    /// skin that is not convex and that the line pierces more than once, it is the first stretch
+    /// inside that ends ahead of the origin, or the last where none does.
     pub fn skin_intersection(
         &self,
         origin: &Point3<f64>,
         direction: &UnitVector3<f64>,
     ) -> Option<(f64, f64)> {
-        self.skin_faces.clip_line(origin, direction)
+        self.skin_surface.clip_line(origin, direction)
     }
 
     /// Whether a point (phantom frame) is inside the skin or on it.
@@ -217,10 +238,10 @@ impl Phantom {
 
     /// Depth of a point (phantom frame) under the skin, m: positive inside, negative outside.
     ///
-    /// Exact inside. Outside, the magnitude is a lower bound of the distance, exact opposite a
-    /// face: the distance to the furthest face plane that the point is in front of.
+    /// Exact inside. Outside a convex skin, the magnitude is a lower bound of the distance, exact
+    /// opposite a face: the distance to the furthest face plane that the point is in front of.
     pub fn skin_signed_depth(&self, point: &Point3<f64>) -> f64 {
-        self.skin_faces.depth_m(point)
+        self.skin_surface.depth_m(point)
     }
 }
 

@@ -66,7 +66,7 @@ fn skin_is_as_broad_deep_and_long_as_stated() {
         let Shape::Convex(mesh) = &phantom.skin().shape else {
             panic!("the skin is a mesh");
         };
-        let size = &phantom.parameters;
+        let size = phantom.parameters.as_ref().unwrap();
         for (axis, size_mm) in [size.breadth_mm, size.depth_mm, size.length_mm]
             .into_iter()
             .enumerate()
@@ -112,7 +112,9 @@ fn bones_lie_under_soft_tissue() {
     const COVER_M: f64 = 0.006;
     for phantom in every_size() {
         for part in phantom.parts.iter().filter(|p| p.tissue == Tissue::Bone) {
-            let depth_m = phantom.skin_faces.depth_of_solid_m(&part.solid);
+            let depth_m = HalfSpaces::of(phantom.skin())
+                .unwrap()
+                .depth_of_solid_m(&part.solid);
             assert!(depth_m > COVER_M, "{}: {depth_m} m", part.name);
         }
     }
@@ -155,7 +157,7 @@ fn lungs_fill_the_rib_cage_without_reaching_the_ribs() {
     /// scaled with the walls, pass it by up to 2 mm in the smallest size.
     const BEYOND_M: f64 = 2.5e-3;
     for phantom in every_size() {
-        let envelope = Envelope::new(&phantom.parameters).unwrap();
+        let envelope = Envelope::new(phantom.parameters.as_ref().unwrap()).unwrap();
         let mut breadth_m = 0.0;
         for name in ["lung_left", "lung_right"] {
             let solid = part(&phantom, name);
@@ -185,7 +187,7 @@ fn chest_wall_is_as_thick_as_stated_where_it_is_measured() {
     /// it nearer than the parameter says.
     const EXCESS_MM: f64 = 7.0;
     for phantom in every_size() {
-        let size = &phantom.parameters;
+        let size = phantom.parameters.as_ref().unwrap();
         for (name, sign) in [("lung_left", 1.0), ("lung_right", -1.0)] {
             let z_m = 0.42 * 0.5e-3 * size.length_mm;
             let in_front = Point3::new(sign * 0.25e-3 * size.breadth_mm, -1.0, z_m);
@@ -242,7 +244,7 @@ fn same_parameters_give_the_same_phantom() {
 #[test]
 fn markers_lie_on_the_skin_and_never_in_it() {
     for phantom in every_size() {
-        let thickness_m = 1e-3 * phantom.parameters.marker_thickness_mm;
+        let thickness_m = 1e-3 * phantom.parameters.as_ref().unwrap().marker_thickness_mm;
         assert!(phantom.markers.len() >= 6);
         for marker in &phantom.markers {
             let on_skin = marker.center_m - thickness_m * marker.normal.into_inner();
@@ -250,7 +252,7 @@ fn markers_lie_on_the_skin_and_never_in_it() {
             assert!((phantom.skin_signed_depth(&marker.center_m) + thickness_m).abs() < ROUNDING_M);
         }
         for part in phantom.parts.iter().filter(|p| p.tissue == Tissue::Marker) {
-            assert!(phantom.skin_faces.gap_m(&part.solid) > -ROUNDING_M);
+            assert!(HalfSpaces::of(phantom.skin()).unwrap().gap_m(&part.solid) > -ROUNDING_M);
         }
     }
 }

@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use needlebench_cell::shape::{Shape, Solid};
+use needlebench_cell::shape::{Shape, Solid, TriangleMesh};
 use needlebench_cell::{Cell, Frame};
 use needlebench_kinematics::{JOINT_COUNT, Pose};
 
 use super::plant::MujocoSettings;
 use crate::EngineError;
 use crate::contact_groups::{ContactBits, contact_bits};
-use crate::error::check_bodies;
+use crate::error::{check_bodies, convex_pieces};
 
 /// Name of the site at the flange.
 pub(super) const FLANGE_SITE: &str = "flange";
@@ -26,8 +26,27 @@ pub(super) fn joint_name(joint: usize) -> String {
 }
 
 /// Name of a solid's geom: indices keep it unique, the solid's name makes it readable.
-pub(super) fn geom_name(cell: &Cell, body: usize, solid: usize) -> String {
+fn geom_name(cell: &Cell, body: usize, solid: usize) -> String {
     format!("{body}/{solid}/{}", cell.bodies[body].solids[solid].name)
+}
+
+/// Names of a solid's geoms, each with the mesh that it is made of, if it is: one geom, but for a mesh
+/// one for each of its convex pieces. MuJoCo collides a mesh as its convex hull.
+pub(super) fn geoms_of(
+    cell: &Cell,
+    body: usize,
+    solid: usize,
+) -> Result<Vec<(String, Option<&TriangleMesh>)>, EngineError> {
+    let name = geom_name(cell, body, solid);
+    let geometry = &cell.bodies[body].solids[solid];
+    Ok(match &geometry.shape {
+        Shape::Convex(mesh) => vec![(name, Some(&mesh.0))],
+        Shape::Mesh(mesh) => (1..)
+            .zip(convex_pieces(geometry, mesh)?)
+            .map(|(number, piece)| (format!("{name}/{number}"), Some(&piece.0)))
+            .collect(),
+        _ => vec![(name, None)],
+    })
 }
 
 /// Model of the cell, every number with 17 significant digits.
@@ -71,7 +90,7 @@ pub(super) fn mjcf(
     writer.close("default");
     writer.assets()?;
     writer.open("worldbody");
-    writer.geoms(Frame::World);
+    writer.geoms(Frame::World)?;
     let dynamics = cell.dynamics();
     for i in 0..JOINT_COUNT {
         let joint = &dynamics.chain.joints[i];
@@ -100,7 +119,7 @@ pub(super) fn mjcf(
             vector(&joint.axis),
             number(dynamics.armature_kgm2[i]),
         ));
-        writer.geoms(Frame::Link(i));
+        writer.geoms(Frame::Link(i))?;
     }
     writer.leaf(&format!(
         "site name=\"{FLANGE_SITE}\" {}",
@@ -153,46 +172,46 @@ impl Writer<'_> {
         self.open("asset");
         for (body, k) in self.solids() {
             let solid = &self.cell.bodies[body].solids[k];
-            // MuJoCo collides a mesh as its convex hull.
-            let mesh = match &solid.shape {
-                Shape::Convex(mesh) => &mesh.0,
-                Shape::Mesh(mesh) => &mesh.surface,
-                _ => continue,
-            };
-            if mesh.vertices_m.len() < 4 {
-                return Err(EngineError::BadSolid {
-                    solid: solid.name.clone(),
-                    reason: "its points have no hull with a volume",
-                });
+            for (name, mesh) in geoms_of(self.cell, body, k)? {
+                let Some(mesh) = mesh else { continue };
+                if mesh.vertices_m.len() < 4 {
+                    return Err(EngineError::BadSolid {
+                        solid: solid.name.clone(),
+                        reason: "its points have no hull with a volume",
+                    });
+                }
+                let mut vertices = String::new();
+                for vertex in &mesh.vertices_m {
+                    vertices += &vector(&vertex.coords);
+                    vertices.push(' ');
+                }
+                self.leaf(&format!(
+                    "mesh name=\"{}\" inertia=\"convex\" vertex=\"{}\"",
+                    escaped(&name),
+                    vertices.trim_end()
+                ));
             }
-            let mut vertices = String::new();
-            for vertex in &mesh.vertices_m {
-                vertices += &vector(&vertex.coords);
-                vertices.push(' ');
-            }
-            let name = escaped(&geom_name(self.cell, body, k));
-            self.leaf(&format!(
-                "mesh name=\"{name}\" inertia=\"convex\" vertex=\"{}\"",
-                vertices.trim_end()
-            ));
         }
         self.close("asset");
         Ok(())
     }
 
-    fn geoms(&mut self, frame: Frame) {
+    fn geoms(&mut self, frame: Frame) -> Result<(), EngineError> {
         for (body, k) in self.solids() {
             if self.cell.bodies[body].frame == frame {
                 let ContactBits { member, mask } = self.bits[body];
-                let name = escaped(&geom_name(self.cell, body, k));
                 let solid = &self.cell.bodies[body].solids[k];
-                self.leaf(&format!(
-                    "geom name=\"{name}\" {} {} contype=\"{member}\" conaffinity=\"{mask}\"",
-                    shape(solid, &name),
-                    placed(&solid.parent_from_shape),
-                ));
+                for (name, _) in geoms_of(self.cell, body, k)? {
+                    let name = escaped(&name);
+                    self.leaf(&format!(
+                        "geom name=\"{name}\" {} {} contype=\"{member}\" conaffinity=\"{mask}\"",
+                        shape(solid, &name),
+                        placed(&solid.parent_from_shape),
+                    ));
+                }
             }
         }
+        Ok(())
     }
 }
 

@@ -6,7 +6,7 @@ use needlebench_cell::Cell;
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
 use serde::{Deserialize, Serialize};
 
-use super::mjcf::{FLANGE_SITE, geom_name, joint_name, link_name, mjcf};
+use super::mjcf::{FLANGE_SITE, geoms_of, joint_name, link_name, mjcf};
 use super::{HarnessError, HarnessProcess, HarnessState, InverseDynamics, PlantHandle};
 use crate::plant::checked_timestep_s;
 use crate::{Contact, EngineError, EngineIdentity, Plant, PlantState};
@@ -141,10 +141,13 @@ impl<'h> MujocoPlant<'h> {
         if !joints.eq(handle.joint_names.iter().cloned()) {
             return Err(EngineError::ModelMismatch { missing: "joints" });
         }
-        let body_names = (0..cell.bodies.len()).flat_map(|body| {
-            (0..cell.bodies[body].solids.len()).map(move |k| (geom_name(cell, body, k), body))
-        });
-        let bodies: BTreeMap<String, usize> = body_names.collect();
+        let mut bodies = BTreeMap::new();
+        for (body, each) in cell.bodies.iter().enumerate() {
+            for solid in 0..each.solids.len() {
+                let names = geoms_of(cell, body, solid)?.into_iter();
+                bodies.extend(names.map(|(name, _)| (name, body)));
+            }
+        }
         let body_of_geom = handle
             .geom_names
             .iter()

@@ -8,6 +8,7 @@ use rapier3d_f64::math::{self, Rotation, Vector};
 use rapier3d_f64::parry::mass_properties::MassProperties;
 
 use crate::EngineError;
+use crate::error::convex_pieces;
 
 /// rapier's world is in units of `1/1024` m: nearly a millimetre, and scaling is free of rounding.
 ///
@@ -34,8 +35,26 @@ pub(super) fn pose_m(pose: &math::Pose) -> Pose {
     scaled
 }
 
-/// A solid's shape in rapier's units, with its pose in the parent frame in metres.
-pub(super) fn collider_shape(solid: &Solid) -> Result<(SharedShape, Pose), EngineError> {
+/// A solid's shapes in rapier's units, with their pose in the parent frame in metres: one, but for a
+/// mesh its convex pieces.
+pub(super) fn collider_shapes(solid: &Solid) -> Result<Vec<(SharedShape, Pose)>, EngineError> {
+    let pieces = match &solid.shape {
+        Shape::Mesh(mesh) => convex_pieces(solid, mesh)?,
+        _ => return Ok(vec![collider_shape(solid)?]),
+    };
+    pieces
+        .iter()
+        .map(|piece| {
+            // Its faces are known to be right; parry's hulls of points from a cut are not always.
+            let points = points_of(&piece.0);
+            let shape = SharedShape::convex_mesh(points, &piece.0.triangles)
+                .ok_or_else(|| no_volume(solid))?;
+            Ok((shape, solid.parent_from_shape))
+        })
+        .collect()
+}
+
+fn collider_shape(solid: &Solid) -> Result<(SharedShape, Pose), EngineError> {
     // rapier's cylinders stand on y, ours on z.
     let y_to_z = || {
         Pose::from_parts(
@@ -68,22 +87,26 @@ pub(super) fn collider_shape(solid: &Solid) -> Result<(SharedShape, Pose), Engin
             )
         }
         Shape::Convex(mesh) => (hull_of(solid, &mesh.0)?, Pose::identity()),
-        Shape::Mesh(mesh) => (hull_of(solid, &mesh.surface)?, Pose::identity()),
+        Shape::Mesh(_) => unreachable!("a mesh collides as its pieces"),
     };
     Ok((shape, solid.parent_from_shape * shape_from_rapier))
 }
 
 /// The hull of a mesh's points, which is also what MuJoCo makes of them.
 fn hull_of(solid: &Solid, mesh: &TriangleMesh) -> Result<SharedShape, EngineError> {
-    let points: Vec<Vector> = mesh
-        .vertices_m
-        .iter()
-        .map(|point| vector(&point.coords))
-        .collect();
-    SharedShape::convex_hull(&points).ok_or_else(|| EngineError::BadSolid {
+    SharedShape::convex_hull(&points_of(mesh)).ok_or_else(|| no_volume(solid))
+}
+
+fn points_of(mesh: &TriangleMesh) -> Vec<Vector> {
+    let points = mesh.vertices_m.iter();
+    points.map(|point| vector(&point.coords)).collect()
+}
+
+fn no_volume(solid: &Solid) -> EngineError {
+    EngineError::BadSolid {
         solid: solid.name.clone(),
         reason: "its points have no hull with a volume",
-    })
+    }
 }
 
 /// Mass properties in rapier's form and units: principal moments and their frame.

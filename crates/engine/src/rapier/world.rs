@@ -16,7 +16,7 @@ use rapier3d_f64::pipeline::{ActiveHooks, PhysicsWorld};
 
 use super::RapierSettings;
 use super::convert::{
-    UNITS_PER_M, collider_shape, mass_properties, pose, pose_m, rotation_from_x, vector,
+    UNITS_PER_M, collider_shapes, mass_properties, pose, pose_m, rotation_from_x, vector,
 };
 use super::far_pairs::FarPairs;
 use super::hooks::Hooks;
@@ -72,26 +72,27 @@ impl Blueprint {
                 InteractionTestMode::And,
             );
             for solid in &body.solids {
-                let (shape, parent_from_collider) = collider_shape(solid)?;
-                let collider = ColliderBuilder::new(shape)
-                    .position(pose(&parent_from_collider))
-                    .density(0.0)
-                    .friction(settings.friction)
-                    .restitution(0.0)
-                    .collision_groups(groups)
-                    .active_hooks(
-                        ActiveHooks::FILTER_CONTACT_PAIRS | ActiveHooks::MODIFY_SOLVER_CONTACTS,
-                    )
-                    .user_data(index as u128)
-                    .build();
-                if let Some(link) = link {
-                    let bound = collider
-                        .shape()
-                        .compute_bounding_sphere(collider.position());
-                    let radius_m = (bound.center.length() + bound.radius) / UNITS_PER_M;
-                    link_radii_m[link] = link_radii_m[link].max(radius_m);
+                for (shape, parent_from_collider) in collider_shapes(solid)? {
+                    let collider = ColliderBuilder::new(shape)
+                        .position(pose(&parent_from_collider))
+                        .density(0.0)
+                        .friction(settings.friction)
+                        .restitution(0.0)
+                        .collision_groups(groups)
+                        .active_hooks(
+                            ActiveHooks::FILTER_CONTACT_PAIRS | ActiveHooks::MODIFY_SOLVER_CONTACTS,
+                        )
+                        .user_data(index as u128)
+                        .build();
+                    if let Some(link) = link {
+                        let bound = collider
+                            .shape()
+                            .compute_bounding_sphere(collider.position());
+                        let radius_m = (bound.center.length() + bound.radius) / UNITS_PER_M;
+                        link_radii_m[link] = link_radii_m[link].max(radius_m);
+                    }
+                    colliders.push((link, collider));
                 }
-                colliders.push((link, collider));
             }
         }
         let dynamics = cell.dynamics();
