@@ -19,6 +19,7 @@ mod robot;
 pub mod scenario;
 pub mod shape;
 mod tessellate;
+mod thresholds;
 mod toml_text;
 mod tool;
 mod urdf;
@@ -37,3 +38,4 @@ pub use model::{
 };
 pub use resolve::{Overrides, ResolvedScenario, load_robot, load_scenario, resolve_scenario};
 pub use robot::MissingInertia;
+pub use thresholds::ThresholdsFile;

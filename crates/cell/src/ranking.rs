@@ -282,14 +282,15 @@ mod tests {
         assert_eq!(aim(Some(5.0)), Aim::bent(3.0, 0.0, 5.0, 50.0));
     }
 
+    #[derive(Deserialize)]
+    struct File {
+        ranking: RankingSection,
+    }
+
     #[test]
     fn wrong_weights_and_anchors_are_found_where_they_stand() {
         let check = |text: &str| {
             let toml = TomlText::parse("s.toml", text).unwrap();
-            #[derive(Deserialize)]
-            struct File {
-                ranking: RankingSection,
-            }
             let file: File = toml.deserialize().unwrap();
             let findings = check_ranking(&toml, &file.ranking);
             findings
@@ -306,10 +307,13 @@ mod tests {
             check("[ranking]\n\n[ranking.motion_time_s]\nworst = 1\nbest = 5"),
             [(Some(3), "ranking.motion_time_s".to_owned())]
         );
-        let mut nothing = "[ranking]\n".to_owned();
+        let mut nothing = vec!["[ranking]".to_owned()];
         for (key, _) in RankingSection::default().aims() {
-            nothing += &format!("{key}.weight = 0\n");
+            nothing.push(format!("{key}.weight = 0"));
         }
-        assert_eq!(check(&nothing), [(Some(1), "ranking".to_owned())]);
+        assert_eq!(
+            check(&nothing.join("\n")),
+            [(Some(1), "ranking".to_owned())]
+        );
     }
 }

@@ -3,6 +3,7 @@
 //! Definitions are those of the field: see each field's documentation. SI units and radians.
 
 mod clearance;
+pub mod compare;
 mod criteria;
 mod judge;
 pub mod metric;
@@ -14,6 +15,8 @@ mod reason;
 pub mod report;
 pub mod room;
 mod sensitivity;
+mod stored;
+mod threshold;
 
 pub use clearance::{
     ClearanceSeries, measure_clearance, needle_route, posture_clearance, sample_indices,
@@ -25,3 +28,5 @@ pub use motion::{
 };
 pub use needle::{NeedleMeasurement, measure_needle};
 pub use sensitivity::tip_sensitivity;
+pub use stored::StoredReport;
+pub use threshold::{Limit, Threshold, ThresholdError};

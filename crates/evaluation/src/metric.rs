@@ -94,7 +94,7 @@ pub struct Metric {
     pub in_pareto_set: bool,
     /// Key of the scenario's `[ranking]` and its unit in SI; none if it is not ranked by.
     pub ranking_key: Option<(&'static str, f64)>,
-    read: fn(&ConfigurationFacts<'_>) -> Option<f64>,
+    read: fn(ConfigurationFacts<'_>) -> Option<f64>,
 }
 
 impl Metric {
@@ -104,7 +104,7 @@ impl Metric {
     }
 
     /// Value of a configuration in SI units; none if it was not measured.
-    pub fn read(&self, configuration: &ConfigurationFacts<'_>) -> Option<f64> {
+    pub fn read(&self, configuration: ConfigurationFacts<'_>) -> Option<f64> {
         (self.read)(configuration).filter(|value| value.is_finite())
     }
 
@@ -145,32 +145,32 @@ impl<'a> ConfigurationFacts<'a> {
     }
 
     /// The number at a JSON pointer.
-    fn number(&self, pointer: &str) -> Option<f64> {
+    fn number(self, pointer: &str) -> Option<f64> {
         self.0.pointer(pointer)?.as_f64()
     }
 
-    fn text(&self, pointer: &str) -> Option<&'a str> {
+    fn text(self, pointer: &str) -> Option<&'a str> {
         self.0.pointer(pointer)?.as_str()
     }
 
     /// Its label.
-    pub fn label(&self) -> Option<&'a str> {
+    pub fn label(self) -> Option<&'a str> {
         self.text("/label")
     }
 
     /// Its status: `ok`, `rejected` or `failed`.
-    pub fn status(&self) -> Option<&'a str> {
+    pub fn status(self) -> Option<&'a str> {
         self.text("/status")
     }
 
     /// First rule that rejects it, with what it says.
-    pub fn rejection(&self) -> Option<(&'a str, &'a str)> {
+    pub fn rejection(self) -> Option<(&'a str, &'a str)> {
         let rule = self.text("/rejections/0/rule")?;
         Some((rule, self.text("/rejections/0/detail").unwrap_or_default()))
     }
 
     /// Largest value over the engines; none if one of them has none.
-    fn worst_engine(&self, key: &str) -> Option<f64> {
+    fn worst_engine(self, key: &str) -> Option<f64> {
         let engines = self.0.get("engines")?.as_object()?;
         let mut worst = None;
         for engine in engines.values() {
@@ -181,19 +181,19 @@ impl<'a> ConfigurationFacts<'a> {
     }
 
     /// Least clearance of a class: its certified bound where there is one.
-    fn class(&self, class: &str) -> Option<f64> {
+    fn class(self, class: &str) -> Option<f64> {
         let found = self.0.get("clearance")?.get(class)?;
         let number = |key: &str| found.get(key).and_then(Value::as_f64);
         number("certified_lower_bound_m").or_else(|| number("minimum_m"))
     }
 
-    fn least_of(&self, classes: &[&str]) -> Option<f64> {
+    fn least_of(self, classes: &[&str]) -> Option<f64> {
         let found = classes.iter().filter_map(|class| self.class(class));
         found.reduce(f64::min)
     }
 
     /// When the arm stands in its final place.
-    fn arrival_s(&self) -> Option<f64> {
+    fn arrival_s(self) -> Option<f64> {
         let phases = self.0.get("motion")?.as_array()?;
         let times = phases
             .iter()
@@ -222,7 +222,7 @@ const fn compared(
     quantity: Quantity,
     better: Better,
     resolution: f64,
-    read: fn(&ConfigurationFacts<'_>) -> Option<f64>,
+    read: fn(ConfigurationFacts<'_>) -> Option<f64>,
 ) -> Metric {
     Metric {
         name,

@@ -256,7 +256,7 @@ fn columns(
         let aim = aim.expect("every metric's key exists").1.scaled(scale);
         let measured: Vec<Option<f64>> = json
             .iter()
-            .map(|each| metric.read(&ConfigurationFacts::new(each)))
+            .map(|each| metric.read(ConfigurationFacts::new(each)))
             .collect();
         let missing = measured.iter().zip(working).filter(|(v, _)| v.is_none());
         described.push(RankedMetric {

@@ -15,53 +15,64 @@ pub(crate) fn reason(
     second: Option<&ConfigurationReport>,
     ranking: &GoalRanking,
 ) -> String {
-    let nearest = first.clearance.least().map_or(String::new(), |found| {
+    let nearest = first.clearance.least().map(|found| {
         format!(
-            "; least clearance {:.1} mm ({} to {} in the {})",
+            "least clearance {:.1} mm ({} to {} in the {})",
             found.minimum_m * 1e3,
             found.pair[0],
             found.pair[1],
             found.phase
         )
     });
+    let mut clauses = match second {
+        None => vec!["the only one that works".to_owned()],
+        Some(second) => against(first, second, ranking),
+    };
+    clauses.extend(nearest);
+    clauses.join("; ")
+}
+
+/// What speaks for the first choice and against it beside the second.
+fn against(
+    first: &ConfigurationReport,
+    second: &ConfigurationReport,
+    ranking: &GoalRanking,
+) -> Vec<String> {
     let count = ranking.order.len();
-    let Some(second) = second else {
-        return format!("the only one that works{nearest}");
-    };
     let (Some(mine), Some(theirs)) = (&first.ranking, &second.ranking) else {
-        return format!(
+        return vec![format!(
             "first in the table of {count} that work: nothing that has a weight was measured for \
-             all of them{nearest}"
-        );
+             all of them"
+        )];
     };
-    let mut text = format!(
-        "score {:.3}, best of {count} that work; {} has {:.3}",
-        mine.score, second.label, theirs.score
-    );
+    let mut clauses = vec![
+        format!("score {:.3}, best of {count} that work", mine.score),
+        format!("{} has {:.3}", second.label, theirs.score),
+    ];
     let (ahead, behind) = differences(mine, theirs);
-    if mine.score == theirs.score && ahead.is_empty() && behind.is_empty() {
-        text += " too and comes later in the table";
+    if ahead.is_empty() && behind.is_empty() {
+        clauses.push("the two are even and it comes first in the table".to_owned());
     }
     for (words, terms, named) in [
         ("ahead in", &ahead, NAMED.0),
         ("behind in", &behind, NAMED.1),
     ] {
+        let terms: Vec<String> = terms.iter().take(named).map(Difference::text).collect();
         if !terms.is_empty() {
-            let terms: Vec<String> = terms.iter().take(named).map(|d| d.text()).collect();
-            text += &format!("; {words} {}", terms.join(", "));
+            clauses.push(format!("{words} {}", terms.join(", ")));
         }
     }
-    text += &robustness(ranking);
+    clauses.push(robustness(ranking));
     if let Some(dominance) = &first.dominated_by {
         let better: Vec<&str> = dominance.better_in.iter().map(|name| words(name)).collect();
-        text += &format!(
-            "; not in the Pareto set: leaving effort and preferences aside {} is better in {} and \
+        clauses.push(format!(
+            "not in the Pareto set: leaving effort and preferences aside {} is better in {} and \
              as good in everything else",
             dominance.label,
             better.join(", ")
-        );
+        ));
     }
-    text + &nearest
+    clauses
 }
 
 fn words(metric: &'static str) -> &'static str {
@@ -116,7 +127,7 @@ fn differences<'a>(
 
 fn robustness(ranking: &GoalRanking) -> String {
     let Some(change) = &ranking.smallest_weight_change else {
-        return "; no change of a single weight would change the choice".to_owned();
+        return "no change of a single weight would change the choice".to_owned();
     };
     let (words, winner) = (words(change.metric), &change.then_first);
     let (from, to) = (
@@ -126,8 +137,8 @@ fn robustness(ranking: &GoalRanking) -> String {
     let more = change.even_at >= change.weight;
     if from == to {
         let direction = if more { "more" } else { "less" };
-        return format!("; the slightest {direction} weight of {words} would put {winner} first");
+        return format!("the slightest {direction} weight of {words} would put {winner} first");
     }
     let direction = if more { "above" } else { "below" };
-    format!("; a weight of {words} {direction} {to} instead of {from} would put {winner} first")
+    format!("a weight of {words} {direction} {to} instead of {from} would put {winner} first")
 }

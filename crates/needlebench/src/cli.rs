@@ -54,6 +54,12 @@ enum Command {
         after_help = "Example: needlebench clearance scenarios/table3.toml --joints 0,-1.57,-1,-1.57,1.57,0"
     )]
     Clearance(ClearanceArguments),
+    /// Two results side by side: what changed, and whether more was lost than is allowed.
+    #[command(
+        after_help = "Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm",
+        after_long_help = COMPARE_HELP
+    )]
+    Compare(Box<CompareArguments>),
     /// Reproduce the paper: Table 3, every equation, both methods, and Figure 6.
     #[command(after_help = "Example: needlebench paper --out out/paper")]
     Paper(PaperArguments),
@@ -264,6 +270,79 @@ pub(crate) struct ClearanceArguments {
     pub robot: RobotArguments,
 }
 
+const COMPARE_HELP: &str = "\
+Exits with 1 if a configuration that worked is missing, fails or is rejected (unless \
+--allow-status-change), or if a metric got worse than its --max-loss allows.
+
+Metrics: clearance, self_clearance, needle_corridor, tip_error, tip_sensitivity, joint_margin, \
+singularity_margin, shoulder_margin, motion_time, peak_torque, free_fraction, sight_fraction, \
+hand_cone, preference, needle_angle_error, lateral_error, guide_position_error, settling_time, \
+tracking_error, contact_force, engine_difference_peak, engine_difference_settled, arm_to_skin, \
+tool_to_skin, guide_to_skin, to_table, to_gantry, to_mount, needle_route
+
+Examples:
+  needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm
+  needlebench compare scenarios/table3.toml other_table.toml --max-loss motion_time=10%";
+
+#[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub(crate) struct CompareArguments {
+    /// First result: a report.json, a results folder, or a scenario, which is then run.
+    #[arg(value_name = "A")]
+    pub a: PathBuf,
+    /// Second result, likewise.
+    #[arg(value_name = "B")]
+    pub b: PathBuf,
+    /// Engine for scenarios that have to be run first.
+    #[arg(long, value_enum, default_value = "rapier")]
+    pub engine: EngineChoice,
+    /// A goal of A that is called otherwise in B; may be given several times.
+    #[arg(long, value_name = "A=B")]
+    pub goal: Vec<Pair>,
+    /// Largest loss of a metric that is allowed, with its unit: clearance=0.5mm, tip_error=5%; may be
+    /// given several times. `--help` lists the metrics. 0 allows no loss at all, not even rounding.
+    #[arg(long, value_name = "METRIC=VALUE")]
+    pub max_loss: Vec<Pair>,
+    /// TOML file with such losses under [max_loss]; those of the command line go before it.
+    #[arg(long, value_name = "TOML")]
+    pub thresholds: Option<PathBuf>,
+    /// Do not fail where a configuration no longer works.
+    #[arg(long)]
+    pub allow_status_change: bool,
+    /// List values that did not change too.
+    #[arg(long)]
+    pub all: bool,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    /// Write JUnit XML to this file.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+    /// Write a Markdown summary to this file.
+    #[arg(long, value_name = "FILE")]
+    pub markdown: Option<PathBuf>,
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Two texts with `=` between.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Pair(pub (String, String));
+
+impl std::str::FromStr for Pair {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.split_once('=') {
+            Some((a, b)) if !a.trim().is_empty() && !b.trim().is_empty() => {
+                Ok(Self((a.trim().to_owned(), b.trim().to_owned())))
+            }
+            _ => Err("needs a name, `=` and what it stands for".to_owned()),
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct PaperArguments {
     /// Folder for `paper.json`, `paper.html` and the pictures.
@@ -364,6 +443,7 @@ pub fn main() -> ExitCode {
         Command::Ik(arguments) => command::ik(&arguments),
         Command::Fk(arguments) => command::fk(&arguments),
         Command::Clearance(arguments) => command::clearance(&arguments),
+        Command::Compare(arguments) => command::compare(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),
         Command::Schema { format } => command::schema(format),
         Command::Doctor { json } => command::doctor(json),

@@ -2,6 +2,7 @@
 
 mod check;
 mod clearance;
+mod compare;
 mod doctor;
 mod kinematics;
 mod paper;
@@ -19,6 +20,7 @@ use serde::Serialize;
 
 pub(crate) use check::check;
 pub(crate) use clearance::clearance;
+pub(crate) use compare::compare;
 pub(crate) use doctor::doctor;
 pub(crate) use kinematics::{fk, ik};
 pub(crate) use paper::paper;

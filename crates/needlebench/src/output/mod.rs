@@ -1,5 +1,6 @@
 //! Output formats: terminal, JSON, JUnit, Markdown, CSV, pictures.
 
+pub(crate) mod comparison;
 pub(crate) mod findings;
 mod format;
 mod junit;

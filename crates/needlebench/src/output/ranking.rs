@@ -119,23 +119,23 @@ pub(super) fn comparison_text(goal: &GoalReport) -> Option<String> {
     let rows = rows(goal);
     let ranking = goal.ranking.as_ref().filter(|_| rows.len() > 1)?;
     let (metrics, others) = split(ranking, &rows);
-    let table = table(&rows, &metrics);
-    let mut text = format!(
-        "{table}\nscore of 100, in brackets what each metric contributes to it by its weight"
-    );
+    let mut lines = vec![
+        table(&rows, &metrics).to_string(),
+        "score of 100, in brackets what each metric contributes to it by its weight".to_owned(),
+    ];
     if !others.is_empty() {
         let words: Vec<String> = others
             .iter()
             .map(|metric| format!("{} x {}", words(metric.name), metric.weight))
             .collect();
-        text += &format!("\ndecide less or nothing: {}", words.join(", "));
+        lines.push(format!("decide less or nothing: {}", words.join(", ")));
     }
-    Some(text)
+    Some(lines.join("\n"))
 }
 
 fn table(rows: &[Row<'_>], metrics: &[&RankedMetric]) -> Table {
     let mut header = vec![
-        "".to_owned(),
+        String::new(),
         "configuration".to_owned(),
         "score".to_owned(),
     ];
@@ -172,25 +172,32 @@ pub(super) fn comparison_markdown(goal: &GoalReport) -> String {
         return String::new();
     };
     let metrics = counted(ranking);
-    let mut text = "| Rank | Configuration | Score | Pareto set |".to_owned();
-    for metric in &metrics {
-        let words = words(metric.name);
-        text += &format!(" {words}, weight {} |", metric.weight);
-    }
-    text += "\n|--:|---|--:|---|";
-    text += &"--:|".repeat(metrics.len());
+    let mut header = vec!["Rank | Configuration | Score | Pareto set".to_owned()];
+    header.extend(
+        metrics
+            .iter()
+            .map(|metric| format!("{}, weight {}", words(metric.name), metric.weight)),
+    );
+    let mut lines = vec![
+        header.join(" | "),
+        format!("--:|---|--:|---{}", "|--:".repeat(metrics.len())),
+    ];
     for row in &rows {
-        text += &format!(
-            "\n| {} | {} | {:.1} | {} |",
-            row.ranking.rank,
-            row.configuration.label,
-            row.ranking.score * 100.0,
-            pareto_text(row.configuration)
-        );
-        for metric in &metrics {
+        let mut cells = vec![
+            row.ranking.rank.to_string(),
+            row.configuration.label.to_owned(),
+            format!("{:.1}", row.ranking.score * 100.0),
+            pareto_text(row.configuration),
+        ];
+        cells.extend(metrics.iter().map(|metric| {
             let (value, contribution) = value_and_contribution(row, metric.name);
-            text += &format!(" {value} ({contribution}) |");
-        }
+            format!("{value} ({contribution})")
+        }));
+        lines.push(cells.join(" | "));
     }
-    text + "\n\nScores of 100; in brackets what each metric contributes.\n"
+    let rows: Vec<String> = lines.iter().map(|line| format!("| {line} |")).collect();
+    format!(
+        "{}\n\nScores of 100; in brackets what each metric contributes.\n",
+        rows.join("\n")
+    )
 }

@@ -1,0 +1,615 @@
+//! Two results side by side.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::metric::{ConfigurationFacts, METRICS, Metric};
+use crate::report::SCHEMA_VERSION;
+use crate::stored::StoredReport;
+use crate::threshold::Threshold;
+
+/// What to compare and what to allow.
+#[derive(Debug, Clone, Default)]
+pub struct CompareOptions {
+    /// Goals that have another name in the second result.
+    pub renamed_goals: Vec<(String, String)>,
+    /// Losses that are allowed.
+    pub thresholds: Vec<Threshold>,
+    /// A configuration that no longer works does not fail the comparison.
+    pub allow_status_change: bool,
+}
+
+/// Two results side by side.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Version of the keys.
+    pub schema_version: u32,
+    /// Whether nothing was lost beyond what is allowed.
+    pub pass: bool,
+    /// What was, if anything.
+    pub failures: Vec<ComparisonFailure>,
+    /// The first result.
+    pub a: Side,
+    /// The second result.
+    pub b: Side,
+    /// What else differs between the two: versions, inputs, settings.
+    pub provenance_differences: Vec<ProvenanceDifference>,
+    /// Goals of either.
+    pub goals: Vec<GoalComparison>,
+}
+
+/// One of the two results.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Side {
+    /// Where it comes from.
+    pub source: String,
+    /// Name of its scenario.
+    pub scenario: Option<String>,
+    /// `pass` or `fail`.
+    pub verdict: Option<String>,
+    /// Version of needlebench.
+    pub version: Option<String>,
+    /// Git revision of the program.
+    pub git_revision: Option<String>,
+}
+
+/// What a failed comparison lost.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ComparisonFailure {
+    /// Goal, by its name in the first result that has it.
+    pub goal: Option<String>,
+    /// Configuration.
+    pub label: Option<String>,
+    /// Metric; none where a status changed.
+    pub metric: Option<&'static str>,
+    /// In words.
+    pub detail: String,
+}
+
+/// A difference between the two that is no result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ProvenanceDifference {
+    /// What it is of.
+    pub what: String,
+    /// In the first result.
+    pub a: Option<String>,
+    /// In the second.
+    pub b: Option<String>,
+}
+
+/// One goal of either result.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GoalComparison {
+    /// Name in the first result; none if it has no such goal.
+    pub a: Option<String>,
+    /// Name in the second.
+    pub b: Option<String>,
+    /// What the first recommends.
+    pub recommended_a: Option<String>,
+    /// What the second recommends.
+    pub recommended_b: Option<String>,
+    /// Configurations of either.
+    pub configurations: Vec<ConfigurationComparison>,
+}
+
+impl GoalComparison {
+    /// Its name, in the first result that has it.
+    pub fn name(&self) -> &str {
+        let name = self.a.as_deref().or(self.b.as_deref());
+        name.unwrap_or_default()
+    }
+}
+
+/// Better, worse or the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Change {
+    /// The second is better.
+    Better,
+    /// The second is worse.
+    Worse,
+    /// No difference beyond the resolution.
+    Same,
+    /// Only the first has it.
+    Lost,
+    /// Only the second has it.
+    New,
+}
+
+/// One configuration of a goal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ConfigurationComparison {
+    /// Its label.
+    pub label: String,
+    /// Status in the first result; none if it is not there.
+    pub status_a: Option<String>,
+    /// Status in the second.
+    pub status_b: Option<String>,
+    /// Why it was rejected in the first, if so.
+    pub rejection_a: Option<String>,
+    /// Why it was rejected in the second, if so.
+    pub rejection_b: Option<String>,
+    /// Change of the status.
+    pub status: Change,
+    /// Metrics that either measured.
+    pub metrics: Vec<MetricComparison>,
+}
+
+impl ConfigurationComparison {
+    /// Whether it was not rejected in either.
+    pub fn works_in_either(&self) -> bool {
+        [&self.status_a, &self.status_b]
+            .into_iter()
+            .flatten()
+            .any(|status| status != "rejected")
+    }
+}
+
+/// One metric of a configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MetricComparison {
+    /// Its name.
+    pub metric: &'static str,
+    /// Unit of the values.
+    pub unit: &'static str,
+    /// First value; none if it was not measured.
+    pub a: Option<f64>,
+    /// Second value.
+    pub b: Option<f64>,
+    /// Second minus first.
+    pub change: Option<f64>,
+    /// Change over the magnitude of the first value; none where that is 0.
+    pub relative: Option<f64>,
+    /// Differences up to this are none.
+    pub resolution: f64,
+    /// Which way it went.
+    pub outcome: Change,
+}
+
+/// Why two results cannot be compared.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CompareError {
+    /// A goal that is said to be renamed is not there.
+    #[error("{report} has no goal `{goal}`, but {known}")]
+    UnknownGoal {
+        /// The report.
+        report: String,
+        /// The goal.
+        goal: String,
+        /// Goals that it has.
+        known: String,
+    },
+    /// A goal is renamed twice.
+    #[error("goal `{goal}` is renamed twice")]
+    RenamedTwice {
+        /// The goal.
+        goal: String,
+    },
+    /// Not one goal is in both.
+    #[error("the two have no goal in common: {a} against {b}")]
+    NothingInCommon {
+        /// Goals of the first.
+        a: String,
+        /// Goals of the second.
+        b: String,
+    },
+}
+
+/// Compares two results, goal by goal and configuration by configuration.
+///
+/// Lost is what a metric got worse by. The comparison fails where a loss is more than a threshold
+/// allows for a configuration that worked and is not rejected now, where a metric with a threshold
+/// is no longer measured or never was, and, unless that is allowed, where a goal or configuration
+/// that worked is missing or does not.
+///
+/// # Errors
+/// If the goals cannot be matched.
+pub fn compare(
+    a: &StoredReport,
+    b: &StoredReport,
+    options: &CompareOptions,
+) -> Result<Comparison, CompareError> {
+    let mut goals = Vec::new();
+    for (in_a, in_b) in matched_goals(a, b, &options.renamed_goals)? {
+        goals.push(compare_goal(in_a, in_b));
+    }
+    let mut failures = Vec::new();
+    if !options.allow_status_change {
+        failures.extend(status_failures(&goals));
+    }
+    for threshold in &options.thresholds {
+        failures.extend(threshold_failures(&goals, threshold));
+    }
+    Ok(Comparison {
+        schema_version: SCHEMA_VERSION,
+        pass: failures.is_empty(),
+        failures,
+        a: side(a),
+        b: side(b),
+        provenance_differences: provenance_differences(a, b),
+        goals,
+    })
+}
+
+fn side(report: &StoredReport) -> Side {
+    let text = |pointer: &str| report.text(pointer).map(str::to_owned);
+    Side {
+        source: report.source().to_owned(),
+        scenario: text("/scenario/name"),
+        verdict: text("/verdict"),
+        version: text("/provenance/version"),
+        git_revision: text("/provenance/git_revision"),
+    }
+}
+
+type NamedGoal<'a> = (&'a str, &'a Value);
+/// A goal of the first result, of the second, or the same goal of both.
+type MatchedGoals<'a> = (Option<NamedGoal<'a>>, Option<NamedGoal<'a>>);
+
+/// Goals of the first result with their partners, then those that only the second has.
+fn matched_goals<'a>(
+    a: &'a StoredReport,
+    b: &'a StoredReport,
+    renamed: &[(String, String)],
+) -> Result<Vec<MatchedGoals<'a>>, CompareError> {
+    let names = |report: &StoredReport| {
+        let names: Vec<&str> = report.goals().map(|(name, _)| name).collect();
+        names.join(", ")
+    };
+    let has = |report: &StoredReport, goal: &str| report.goals().any(|(name, _)| name == goal);
+    for (index, (from, to)) in renamed.iter().enumerate() {
+        for (report, goal) in [(a, from), (b, to)] {
+            if !has(report, goal) {
+                return Err(CompareError::UnknownGoal {
+                    report: report.source().to_owned(),
+                    goal: goal.clone(),
+                    known: names(report),
+                });
+            }
+        }
+        let earlier = &renamed[..index];
+        if earlier.iter().any(|(a, b)| a == from || b == to) {
+            return Err(CompareError::RenamedTwice { goal: from.clone() });
+        }
+    }
+    let taken = |name: &str| renamed.iter().any(|(_, to)| to == name);
+    let are_partners = |in_a: &str, in_b: &str| match renamed.iter().find(|(from, _)| from == in_a)
+    {
+        Some((_, to)) => to == in_b,
+        None => !taken(in_b) && in_a == in_b,
+    };
+    let mut matched: Vec<MatchedGoals<'_>> = a
+        .goals()
+        .map(|goal| {
+            let partner = b.goals().find(|(name, _)| are_partners(goal.0, name));
+            (Some(goal), partner)
+        })
+        .collect();
+    let left = b.goals().filter(|(name, _)| {
+        !matched
+            .iter()
+            .any(|(_, found)| found.is_some_and(|(known, _)| known == *name))
+    });
+    let left: Vec<_> = left.map(|goal| (None, Some(goal))).collect();
+    matched.extend(left);
+    if !matched.iter().any(|(a, b)| a.is_some() && b.is_some()) {
+        return Err(CompareError::NothingInCommon {
+            a: names(a),
+            b: names(b),
+        });
+    }
+    Ok(matched)
+}
+
+fn compare_goal(a: Option<NamedGoal<'_>>, b: Option<NamedGoal<'_>>) -> GoalComparison {
+    let recommended = |goal: Option<NamedGoal<'_>>| {
+        let label = goal?.1.pointer("/recommended/label")?.as_str()?;
+        Some(label.to_owned())
+    };
+    let configurations = |goal: Option<NamedGoal<'_>>| -> Vec<Value> {
+        let list = goal.and_then(|(_, goal)| goal.get("configurations")?.as_array());
+        list.cloned().unwrap_or_default()
+    };
+    let (of_a, of_b) = (configurations(a), configurations(b));
+    let label = |each: &Value| ConfigurationFacts::new(each).label().map(str::to_owned);
+    let mut pairs: Vec<(Option<&Value>, Option<&Value>)> = of_a
+        .iter()
+        .map(|each| {
+            let same = of_b.iter().find(|other| label(other) == label(each));
+            (Some(each), same)
+        })
+        .collect();
+    let only_b = of_b
+        .iter()
+        .filter(|each| !of_a.iter().any(|other| label(other) == label(each)));
+    pairs.extend(only_b.map(|each| (None, Some(each))));
+    GoalComparison {
+        a: a.map(|(name, _)| name.to_owned()),
+        b: b.map(|(name, _)| name.to_owned()),
+        recommended_a: recommended(a),
+        recommended_b: recommended(b),
+        configurations: pairs
+            .into_iter()
+            .map(|(a, b)| compare_configuration(a, b))
+            .collect(),
+    }
+}
+
+/// How good a status is; what this version does not know is no better than rejected.
+fn standing(status: &str) -> u8 {
+    match status {
+        "ok" => 2,
+        "failed" => 1,
+        _ => 0,
+    }
+}
+
+fn compare_configuration(a: Option<&Value>, b: Option<&Value>) -> ConfigurationComparison {
+    let [a, b] = [a, b].map(|value| value.map(ConfigurationFacts::new));
+    let status = |facts: Option<ConfigurationFacts<'_>>| facts?.status().map(str::to_owned);
+    let rejection = |facts: Option<ConfigurationFacts<'_>>| {
+        let (rule, detail) = facts?.rejection()?;
+        let text = format!("{rule}: {detail}");
+        Some(text.trim_end_matches(": ").to_owned())
+    };
+    let (status_a, status_b) = (status(a), status(b));
+    let change = match (&status_a, &status_b) {
+        (Some(a), Some(b)) => match standing(b).cmp(&standing(a)) {
+            Ordering::Less => Change::Worse,
+            Ordering::Equal => Change::Same,
+            Ordering::Greater => Change::Better,
+        },
+        (Some(_), None) => Change::Lost,
+        _ => Change::New,
+    };
+    let label = a.or(b).and_then(ConfigurationFacts::label);
+    ConfigurationComparison {
+        label: label.unwrap_or_default().to_owned(),
+        status_a,
+        status_b,
+        rejection_a: rejection(a),
+        rejection_b: rejection(b),
+        status: change,
+        metrics: METRICS
+            .iter()
+            .filter_map(|metric| {
+                let read = |facts: Option<ConfigurationFacts<'_>>| metric.read(facts?);
+                compare_metric(metric, read(a), read(b))
+            })
+            .collect(),
+    }
+}
+
+fn compare_metric(
+    metric: &'static Metric,
+    a: Option<f64>,
+    b: Option<f64>,
+) -> Option<MetricComparison> {
+    let outcome = match (a, b) {
+        (None, None) => return None,
+        (Some(_), None) => Change::Lost,
+        (None, Some(_)) => Change::New,
+        (Some(a), Some(b)) => match metric.compare(a, b) {
+            Ordering::Less => Change::Worse,
+            Ordering::Equal => Change::Same,
+            Ordering::Greater => Change::Better,
+        },
+    };
+    let change = a.zip(b).map(|(a, b)| b - a);
+    Some(MetricComparison {
+        metric: metric.name,
+        unit: metric.quantity.unit(),
+        a,
+        b,
+        change,
+        relative: change
+            .zip(a)
+            .filter(|(_, a)| *a != 0.0)
+            .map(|(change, a)| change / a.abs()),
+        resolution: metric.resolution,
+        outcome,
+    })
+}
+
+fn status_failures(goals: &[GoalComparison]) -> Vec<ComparisonFailure> {
+    let mut failures = Vec::new();
+    for goal in goals {
+        let mut fail = |label: Option<&str>, detail: String| {
+            failures.push(ComparisonFailure {
+                goal: Some(goal.name().to_owned()),
+                label: label.map(str::to_owned),
+                metric: None,
+                detail,
+            });
+        };
+        if goal.b.is_none() {
+            fail(None, "the goal is missing in the second result".to_owned());
+            continue;
+        }
+        for each in &goal.configurations {
+            let before = each.status_a.as_deref().unwrap_or("missing");
+            match each.status {
+                Change::Worse => {
+                    let now = each.status_b.as_deref().unwrap_or("missing");
+                    let why = each.rejection_b.as_ref();
+                    let why = why.map_or(String::new(), |why| format!(" ({why})"));
+                    fail(Some(&each.label), format!("was {before}, is {now}{why}"));
+                }
+                // A rejected one that is no longer listed is no loss.
+                Change::Lost if standing(before) > 0 => {
+                    fail(Some(&each.label), format!("was {before}, is missing"));
+                }
+                _ => {}
+            }
+        }
+    }
+    failures
+}
+
+fn threshold_failures(goals: &[GoalComparison], threshold: &Threshold) -> Vec<ComparisonFailure> {
+    let metric = threshold.metric;
+    let mut failures = Vec::new();
+    let mut measured = false;
+    for goal in goals
+        .iter()
+        .filter(|goal| goal.a.is_some() && goal.b.is_some())
+    {
+        let compared = goal.configurations.iter().filter(|each| {
+            let status = |status: &Option<String>| status.as_deref().map_or(0, standing);
+            status(&each.status_a) == 2 && status(&each.status_b) > 0
+        });
+        for each in compared {
+            let found = each
+                .metrics
+                .iter()
+                .find(|found| found.metric == metric.name);
+            let Some((first, second)) = found.and_then(|found| Some((found.a?, found.b))) else {
+                continue;
+            };
+            measured = true;
+            let text = |value: f64| metric.quantity.text(value);
+            let detail = match second {
+                None => format!(
+                    "{}: was {}, is no longer measured",
+                    metric.words,
+                    text(first)
+                ),
+                Some(second) => {
+                    let loss = -metric.gain(first, second);
+                    if !threshold.is_exceeded_by(loss, first) {
+                        continue;
+                    }
+                    format!(
+                        "{}: {} to {}, worse by {}, allowed {}",
+                        metric.words,
+                        text(first),
+                        text(second),
+                        text(loss),
+                        threshold.text
+                    )
+                }
+            };
+            failures.push(ComparisonFailure {
+                goal: Some(goal.name().to_owned()),
+                label: Some(each.label.clone()),
+                metric: Some(metric.name),
+                detail,
+            });
+        }
+    }
+    if !measured {
+        // A threshold that nothing is held against would pass for ever.
+        failures.push(ComparisonFailure {
+            goal: None,
+            label: None,
+            metric: Some(metric.name),
+            detail: format!(
+                "{}: the first result has it for no configuration that works in both, so its \
+                 threshold checks nothing",
+                metric.words
+            ),
+        });
+    }
+    failures
+}
+
+fn provenance_differences(a: &StoredReport, b: &StoredReport) -> Vec<ProvenanceDifference> {
+    let (of_a, of_b) = (provenance(a), provenance(b));
+    let mut keys: Vec<&String> = of_a.keys().chain(of_b.keys()).collect();
+    keys.sort();
+    keys.dedup();
+    keys.into_iter()
+        .filter(|key| of_a.get(*key).map(|v| &v.identity) != of_b.get(*key).map(|v| &v.identity))
+        .map(|key| ProvenanceDifference {
+            what: key.clone(),
+            a: of_a.get(key).map(|value| value.text.clone()),
+            b: of_b.get(key).map(|value| value.text.clone()),
+        })
+        .collect()
+}
+
+/// What decides whether two are the same, and what people read.
+struct Origin {
+    identity: String,
+    text: String,
+}
+
+/// Everything in a report's provenance, by name.
+fn provenance(report: &StoredReport) -> BTreeMap<String, Origin> {
+    let mut found = BTreeMap::new();
+    let plain = |text: &str| Origin {
+        identity: text.to_owned(),
+        text: text.to_owned(),
+    };
+    for key in [
+        "version",
+        "git_revision",
+        "cargo_lock_sha256",
+        "seed",
+        "truth",
+    ] {
+        let value = report.value(&format!("/provenance/{key}"));
+        let text = match value {
+            None | Some(Value::Null) => continue,
+            Some(Value::String(text)) => text.clone(),
+            Some(other) => other.to_string(),
+        };
+        let origin = Origin {
+            text: if key.ends_with("sha256") {
+                short(&text).to_owned()
+            } else {
+                text.clone()
+            },
+            identity: text,
+        };
+        found.insert(key.replace('_', " "), origin);
+    }
+    let list = |key: &str| {
+        let list = report.value(&format!("/provenance/{key}"));
+        list.and_then(Value::as_array).cloned().unwrap_or_default()
+    };
+    let text = |value: &Value, key: &str| {
+        let text = value.get(key).and_then(Value::as_str);
+        text.unwrap_or_default().to_owned()
+    };
+    for engine in list("engines") {
+        let name = text(&engine, "name");
+        found.insert(name.clone(), plain(&text(&engine, "version")));
+        let settings = engine.get("settings").and_then(Value::as_array);
+        for setting in settings.into_iter().flatten() {
+            let part = |index: usize| setting.get(index).and_then(Value::as_str);
+            if let (Some(key), Some(value)) = (part(0), part(1)) {
+                found.insert(format!("{name} {key}"), plain(value));
+            }
+        }
+    }
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for input in list("inputs") {
+        let role = text(&input, "role");
+        let count = counts.entry(role.clone()).or_default();
+        *count += 1;
+        let name = if *count == 1 {
+            role
+        } else {
+            format!("{role} {count}")
+        };
+        let hash = text(&input, "sha256");
+        let shown = format!("{} ({})", text(&input, "file"), short(&hash));
+        found.insert(
+            name,
+            Origin {
+                identity: hash,
+                text: shown,
+            },
+        );
+    }
+    found
+}
+
+/// The start of a hash, as people tell them apart.
+fn short(hash: &str) -> &str {
+    hash.get(..12).unwrap_or(hash)
+}
