@@ -11,11 +11,13 @@ mod goal;
 mod mesh;
 mod model;
 mod nominal;
+mod pairs;
 pub mod phantom;
 mod resolve;
 mod robot;
 pub mod scenario;
 pub mod shape;
+mod srdf;
 mod tessellate;
 mod toml_text;
 mod tool;
@@ -29,8 +31,10 @@ pub use finding::{Finding, nearest_name};
 pub use goal::{Expectation, Goal, PlacedPhantom, REJECTION_RULES, Roll};
 pub use mesh::convex_hull;
 pub use model::{
-    BodyKind, BodyPair, Cell, ClearanceClass, CollisionBody, Frame, Link, ModelSource, Needle,
-    NeedleCorridor, Robot, Tool,
+    BodyKind, BodyPair, Cell, ClearanceClass, CollisionBody, Frame, Link, LinkMember, ModelSource,
+    Needle, NeedleCorridor, Robot, Tool,
 };
+pub use pairs::{LeftOut, PairRule, pair_rule, place_in_chain};
 pub use resolve::{Overrides, ResolvedScenario, load_robot, load_scenario, resolve_scenario};
 pub use robot::MissingInertia;
+pub use srdf::{DisabledPair, Srdf};

@@ -51,6 +51,7 @@ mod epa;
 mod gjk;
 mod hull;
 mod model;
+mod pairs;
 mod polytope;
 mod segment;
 mod separation;
@@ -58,5 +59,9 @@ mod simplex;
 
 pub use crate::core::PreparedShape;
 pub use model::{ClassMinima, ClearanceModel, PairClearance};
+pub use pairs::{
+    PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
+    check_srdf, examine_pairs,
+};
 pub use segment::segment_clearance;
 pub use separation::{Separation, separation};

@@ -54,6 +54,9 @@ enum Command {
         after_help = "Example: needlebench clearance scenarios/table3.toml --joints 0,-1.57,-1,-1.57,1.57,0"
     )]
     Clearance(ClearanceArguments),
+    /// Every pair of bodies: measured or left out, why, and the evidence; and checks an SRDF.
+    #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
+    Pairs(PairsArguments),
     /// Reproduce the paper: Table 3, every equation, both methods, and Figure 6.
     #[command(after_help = "Example: needlebench paper --out out/paper")]
     Paper(PaperArguments),
@@ -265,6 +268,31 @@ pub(crate) struct ClearanceArguments {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct PairsArguments {
+    /// Scenario whose cell is looked at.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// SRDF whose disabled pairs are checked against the model. needlebench measures every pair
+    /// that can move, whatever an SRDF says.
+    #[arg(long, value_name = "FILE")]
+    pub srdf: Option<PathBuf>,
+    /// Write the arm's pairs that cannot collide as an SRDF.
+    #[arg(long, value_name = "FILE")]
+    pub write_srdf: Option<PathBuf>,
+    /// Random postures that the collision rates are taken from.
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub samples: u32,
+    /// Seed of the postures.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    pub seed: u64,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct PaperArguments {
     /// Folder for `paper.json`, `paper.html` and the pictures.
     #[arg(long, value_name = "DIR", default_value = "out/paper")]
@@ -364,6 +392,7 @@ pub fn main() -> ExitCode {
         Command::Ik(arguments) => command::ik(&arguments),
         Command::Fk(arguments) => command::fk(&arguments),
         Command::Clearance(arguments) => command::clearance(&arguments),
+        Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),
         Command::Schema { format } => command::schema(format),
         Command::Doctor { json } => command::doctor(json),

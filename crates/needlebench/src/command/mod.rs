@@ -4,6 +4,7 @@ mod check;
 mod clearance;
 mod doctor;
 mod kinematics;
+mod pairs;
 mod paper;
 mod run;
 
@@ -21,6 +22,7 @@ pub(crate) use check::check;
 pub(crate) use clearance::clearance;
 pub(crate) use doctor::doctor;
 pub(crate) use kinematics::{fk, ik};
+pub(crate) use pairs::pairs;
 pub(crate) use paper::paper;
 pub(crate) use run::run;
 
