@@ -11,13 +11,15 @@ mod goal;
 mod mesh;
 mod model;
 mod nominal;
+mod pairs;
 pub mod phantom;
-pub mod ranking;
 mod phantom_place;
+pub mod ranking;
 mod resolve;
 mod robot;
 pub mod scenario;
 pub mod shape;
+mod srdf;
 mod tessellate;
 mod thresholds;
 mod toml_text;
@@ -33,9 +35,11 @@ pub use finding::{Finding, nearest_name};
 pub use goal::{Expectation, Goal, PlacedPhantom, REJECTION_RULES, Roll};
 pub use mesh::convex_hull;
 pub use model::{
-    BodyKind, BodyPair, Cell, ClearanceClass, CollisionBody, Frame, Link, ModelSource, Needle,
-    NeedleCorridor, Robot, Tool,
+    BodyKind, BodyPair, Cell, ClearanceClass, CollisionBody, Frame, Link, LinkMember, ModelSource,
+    Needle, NeedleCorridor, Robot, Tool,
 };
+pub use pairs::{LeftOut, PairRule, pair_rule, place_in_chain};
 pub use resolve::{Overrides, ResolvedScenario, load_robot, load_scenario, resolve_scenario};
 pub use robot::MissingInertia;
+pub use srdf::{DisabledPair, Srdf};
 pub use thresholds::ThresholdsFile;

@@ -11,6 +11,7 @@ use needlebench_kinematics::{
 use serde::Serialize;
 
 use crate::calibration::AppliedCalibration;
+use crate::pairs::{PairRule, pair_rule};
 use crate::shape::{ConvexMesh, Shape, Solid, TriangleMesh, Visual};
 
 /// Where a model came from, for the provenance of a result.
@@ -33,6 +34,17 @@ pub struct Link {
     pub visuals: Vec<Visual>,
 }
 
+/// A link of the URDF that a body of the arm was made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LinkMember {
+    /// Name in the URDF, e.g. `forearm_link`.
+    pub name: String,
+    /// The body: 0 for the base, 1 to 6 for the moving links.
+    pub owner: usize,
+    /// Whether it has collision geometry.
+    pub has_geometry: bool,
+}
+
 /// An arm whose lengths are all within this of a known arm's is one: factory calibrations move them
 /// by up to 3 mm, while the two arms most like each other, UR3 and UR3e, differ by 19 mm.
 pub(crate) const SAME_ARM_M: f64 = 5e-3;
@@ -50,6 +62,8 @@ pub struct Robot {
     pub base: Link,
     /// The six moving links.
     pub links: [Link; JOINT_COUNT],
+    /// Links of the URDF and what they became part of, in the file's order.
+    pub members: Vec<LinkMember>,
     /// Mass properties of the moving links, without the tool.
     pub bodies: [Body; JOINT_COUNT],
     /// Limits of the joints.
@@ -379,7 +393,7 @@ impl Cell {
         let mut pairs = Vec::new();
         for a in 0..bodies.len() {
             for b in a + 1..bodies.len() {
-                if let Some(class) = pair_class(&bodies[a], &bodies[b]) {
+                if let PairRule::Measured(class) = pair_rule(&bodies[a], &bodies[b]) {
                     // The moving body first; both move for `self` pairs and the corridor's.
                     let (a, b) = if bodies[a].frame == Frame::World {
                         (b, a)
@@ -442,41 +456,6 @@ fn placed(solids: &[Solid], new_from_old: &Pose) -> Vec<Solid> {
             ..solid.clone()
         })
         .collect()
-}
-
-/// Class of a pair, or `None` where the distance means nothing: two fixed bodies, neighbours
-/// in the chain, parts that are bolted together.
-fn pair_class(a: &CollisionBody, b: &CollisionBody) -> Option<ClearanceClass> {
-    use BodyKind::{Base, Gantry, GuideTube, Link, Mount, NeedleCorridor, Phantom, Table, Tool};
-    let (first, second) = if a.kind <= b.kind { (a, b) } else { (b, a) };
-    // A tool that is bolted on so that the wrist stands behind its guide shows that as a constant.
-    let wrist_behind_guide = second.kind == NeedleCorridor && first.kind == Link;
-    if a.frame == b.frame && !wrist_behind_guide {
-        return None;
-    }
-    Some(match (first.kind, second.kind) {
-        (Base | Link, Link) => {
-            let index = |body: &CollisionBody| match body.frame {
-                Frame::World => 0,
-                Frame::Link(i) => i + 1,
-            };
-            if index(first).abs_diff(index(second)) == 1 {
-                return None;
-            }
-            ClearanceClass::SelfCollision
-        }
-        (Base | Link, Tool | GuideTube) => ClearanceClass::SelfCollision,
-        (_, NeedleCorridor) | (NeedleCorridor, Phantom | Table | Gantry | Mount) => {
-            ClearanceClass::NeedleCorridor
-        }
-        (Link, Phantom) => ClearanceClass::RobotPhantom,
-        (Tool, Phantom) => ClearanceClass::ToolPhantom,
-        (GuideTube, Phantom) => ClearanceClass::GuideStandoff,
-        (Link | Tool | GuideTube, Table) => ClearanceClass::RobotTable,
-        (Link | Tool | GuideTube, Gantry) => ClearanceClass::RobotGantry,
-        (Link | Tool | GuideTube, Mount) => ClearanceClass::RobotMount,
-        _ => return None,
-    })
 }
 
 #[cfg(test)]

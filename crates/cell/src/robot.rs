@@ -10,6 +10,7 @@ use needlebench_kinematics::{
 
 use crate::files::{Location, source_of};
 use crate::mesh::{read_stl, shape_of_link};
+use crate::model::LinkMember;
 use crate::nominal::{body_in_frame_of, nominal_ur3, notes_on_limits};
 use crate::shape::{Shape, Solid, TriangleMesh, Visual};
 use crate::urdf::{Element, Geometry, JointKind, Urdf, UrdfJoint, UrdfLink};
@@ -106,6 +107,15 @@ pub(crate) fn read_robot(
         let (owner, owner_from_link) = owner_of(&urdf, &joints, &link.name);
         owned[owner].push((link, owner_from_link));
     }
+    let members = urdf
+        .links
+        .iter()
+        .map(|link| LinkMember {
+            name: link.name.clone(),
+            owner: owner_of(&urdf, &joints, &link.name).0,
+            has_geometry: !link.collisions.is_empty(),
+        })
+        .collect();
     let mut links = Vec::with_capacity(JOINT_COUNT + 1);
     let mut bodies = Vec::with_capacity(JOINT_COUNT);
     for (index, members) in owned.iter().enumerate() {
@@ -138,6 +148,7 @@ pub(crate) fn read_robot(
         chain,
         base,
         links: links.try_into().expect("six links"),
+        members,
         bodies: bodies.try_into().expect("six bodies"),
         limits,
         source: source_of(location.display(), urdf.text.as_bytes()),

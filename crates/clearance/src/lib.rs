@@ -52,6 +52,7 @@ mod gjk;
 mod hull;
 mod mesh;
 mod model;
+mod pairs;
 mod polytope;
 mod segment;
 mod separation;
@@ -59,5 +60,9 @@ mod simplex;
 
 pub use crate::core::PreparedShape;
 pub use model::{ClassMinima, ClearanceModel, PairClearance};
+pub use pairs::{
+    PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
+    check_srdf, examine_pairs,
+};
 pub use segment::segment_clearance;
 pub use separation::{Separation, separation};

@@ -60,6 +60,9 @@ enum Command {
         after_long_help = COMPARE_HELP
     )]
     Compare(Box<CompareArguments>),
+    /// Every pair of bodies: measured or left out, why, and the evidence; and checks an SRDF.
+    #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
+    Pairs(PairsArguments),
     /// Reproduce the paper: Table 3, every equation, both methods, and Figure 6.
     #[command(after_help = "Example: needlebench paper --out out/paper")]
     Paper(PaperArguments),
@@ -344,6 +347,31 @@ impl std::str::FromStr for Pair {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct PairsArguments {
+    /// Scenario whose cell is looked at.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// SRDF whose disabled pairs are checked against the model. needlebench measures every pair
+    /// that can move, whatever an SRDF says.
+    #[arg(long, value_name = "FILE")]
+    pub srdf: Option<PathBuf>,
+    /// Write the arm's pairs that cannot collide as an SRDF.
+    #[arg(long, value_name = "FILE")]
+    pub write_srdf: Option<PathBuf>,
+    /// Random postures that the collision rates are taken from.
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub samples: u32,
+    /// Seed of the postures.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    pub seed: u64,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct PaperArguments {
     /// Folder for `paper.json`, `paper.html` and the pictures.
     #[arg(long, value_name = "DIR", default_value = "out/paper")]
@@ -444,6 +472,7 @@ pub fn main() -> ExitCode {
         Command::Fk(arguments) => command::fk(&arguments),
         Command::Clearance(arguments) => command::clearance(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
+        Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),
         Command::Schema { format } => command::schema(format),
         Command::Doctor { json } => command::doctor(json),

@@ -263,6 +263,7 @@ fn robot() -> Robot {
             ],
         ),
         links,
+        members: Vec::new(),
         bodies: [Body::massless(); JOINT_COUNT],
         limits: JointLimits(
             [JointLimit {

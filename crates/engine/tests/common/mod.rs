@@ -238,6 +238,7 @@ pub fn ur3(surroundings: Vec<CollisionBody>) -> Cell {
         chain: chain(),
         base: link("base", vec![base_solid]),
         links: JOINT_LABELS.map(|name| link(name, solids.next().expect("six links"))),
+        members: Vec::new(),
         bodies: link_bodies(),
         limits: limits(),
         source: source(),

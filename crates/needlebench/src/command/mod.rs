@@ -5,6 +5,7 @@ mod clearance;
 mod compare;
 mod doctor;
 mod kinematics;
+mod pairs;
 mod paper;
 mod run;
 
@@ -23,6 +24,7 @@ pub(crate) use clearance::clearance;
 pub(crate) use compare::compare;
 pub(crate) use doctor::doctor;
 pub(crate) use kinematics::{fk, ik};
+pub(crate) use pairs::pairs;
 pub(crate) use paper::paper;
 pub(crate) use run::run;
 

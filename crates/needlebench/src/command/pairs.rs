@@ -1,0 +1,329 @@
+//! `needlebench pairs`.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use needlebench_cell::{Cell, Finding, Srdf, load_scenario};
+use needlebench_clearance::{
+    PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
+    check_srdf, examine_pairs,
+};
+use serde::Serialize;
+
+use super::{overrides, print_json, print_text};
+use crate::atomic::write_atomically;
+use crate::cli::PairsArguments;
+use crate::exit::ExitStatus;
+use crate::output::findings::print_findings;
+use crate::output::plain_table;
+
+#[derive(Serialize)]
+struct PairsAnswer {
+    schema_version: u32,
+    samples: usize,
+    seed: u64,
+    pairs: Vec<PairAnswer>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    srdf: Option<SrdfReport>,
+}
+
+#[derive(Serialize)]
+struct PairAnswer {
+    pair: [String; 2],
+    class: Option<&'static str>,
+    state: PairState,
+    measured: bool,
+    joints_between: usize,
+    least_m: f64,
+    least_joints_rad: [f64; 6],
+    collision_rate: f64,
+    nearest_m: Option<BoundAnswer>,
+    farthest_m: Option<BoundAnswer>,
+    concern: Option<PairConcern>,
+}
+
+#[derive(Serialize)]
+struct BoundAnswer {
+    lower: f64,
+    upper: f64,
+    boxes: usize,
+}
+
+#[derive(Serialize)]
+struct SrdfReport {
+    file: String,
+    robot: String,
+    disabled: Vec<SrdfPairAnswer>,
+}
+
+#[derive(Serialize)]
+struct SrdfPairAnswer {
+    links: [String; 2],
+    reason: String,
+    verdict: SrdfVerdict,
+    state: Option<PairState>,
+    collision_rate: Option<f64>,
+    least_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    finding: Option<Finding>,
+}
+
+/// Prints every pair of bodies with what becomes of it and why, and checks an SRDF.
+pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus> {
+    let read = || -> Result<_, Vec<Finding>> {
+        let overrides = overrides(&arguments.robot).map_err(|finding| vec![finding])?;
+        // Unlike for a run, the start posture may collide: a wrong model is what is looked for.
+        let resolved = load_scenario(&arguments.scenario, &overrides)?;
+        let srdf = arguments.srdf.as_deref().map(Srdf::load).transpose();
+        Ok((resolved, srdf.map_err(|finding| vec![finding])?))
+    };
+    let (resolved, srdf) = match read() {
+        Ok(read) => read,
+        Err(findings) => {
+            print_findings(&findings);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let cell = &resolved.cell;
+    let settings = PairSettings {
+        samples: arguments.samples as usize,
+        seed: arguments.seed,
+        ..PairSettings::default()
+    };
+    let examined = examine_pairs(cell, &settings);
+    let answers = srdf
+        .as_ref()
+        .map(|srdf| check_srdf(srdf, cell, &examined))
+        .unwrap_or_default();
+    if let Some(path) = &arguments.write_srdf {
+        write_srdf(path, cell, &examined, &settings)?;
+    }
+    if arguments.json {
+        print_json(&PairsAnswer {
+            schema_version: 1,
+            samples: settings.samples,
+            seed: settings.seed,
+            pairs: examined.iter().map(|each| answer(cell, each)).collect(),
+            srdf: srdf
+                .as_ref()
+                .map(|srdf| srdf_report(srdf, &answers, &examined)),
+        })?;
+    } else {
+        print_text(&table(cell, &examined, &settings))?;
+        if let Some(srdf) = &srdf {
+            print_text(&srdf_text(srdf, &answers))?;
+        }
+    }
+    let findings: Vec<Finding> = answers
+        .iter()
+        .filter_map(|answer| answer.finding.clone())
+        .collect();
+    print_findings(&findings);
+    Ok(if findings.is_empty() {
+        ExitStatus::Success
+    } else {
+        ExitStatus::BadInput
+    })
+}
+
+fn names(cell: &Cell, pair: &PairExamination) -> [String; 2] {
+    [pair.a, pair.b].map(|body| cell.bodies[body].name.clone())
+}
+
+fn answer(cell: &Cell, pair: &PairExamination) -> PairAnswer {
+    let bound = |bound: RangeBound| BoundAnswer {
+        lower: bound.lower_m,
+        upper: bound.upper_m,
+        boxes: bound.boxes,
+    };
+    PairAnswer {
+        pair: names(cell, pair),
+        class: pair.class.map(|class| class.name()),
+        state: pair.state,
+        measured: pair.state.is_measured(),
+        joints_between: pair.joints.len(),
+        least_m: pair.least_m,
+        least_joints_rad: pair.least_at.into(),
+        collision_rate: pair.collision_rate,
+        nearest_m: pair.nearest.map(bound),
+        farthest_m: pair.farthest.map(bound),
+        concern: pair.concern(),
+    }
+}
+
+fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> String {
+    let mut table = plain_table(&[
+        "body",
+        "and",
+        "class",
+        "state",
+        "joints",
+        "in collision",
+        "least seen (mm)",
+        "proven least (mm)",
+    ]);
+    for pair in examined {
+        // What stands still in the world is no statement about the arm.
+        if pair.state == PairState::Fixed {
+            continue;
+        }
+        let [a, b] = names(cell, pair);
+        table.add_row([
+            a,
+            b,
+            pair.class.map_or("-", |class| class.name()).to_owned(),
+            pair.state.name().to_owned(),
+            pair.joints.len().to_string(),
+            format!("{:.2} %", pair.collision_rate * 100.0),
+            format!("{:.1}", pair.least_m * 1e3),
+            pair.nearest.map_or_else(String::new, |bound| {
+                format!("{:.1} to {:.1}", bound.lower_m * 1e3, bound.upper_m * 1e3)
+            }),
+        ]);
+    }
+    let count = |state| examined.iter().filter(|pair| pair.state == state).count();
+    let mut text = table.to_string();
+    let _ = write!(
+        text,
+        "\n{} pairs measured, of which {} proven never to touch and {} always in collision; {} left \
+         out as adjacent, {} as fixed to each other ({} random postures, seed {})",
+        examined
+            .iter()
+            .filter(|pair| pair.state.is_measured())
+            .count(),
+        count(PairState::Never),
+        count(PairState::Always),
+        count(PairState::Adjacent),
+        count(PairState::Fixed),
+        settings.samples,
+        settings.seed,
+    );
+    for pair in examined {
+        let Some(concern) = pair.concern() else {
+            continue;
+        };
+        let [a, b] = names(cell, pair);
+        let _ = match concern {
+            PairConcern::AlwaysInCollision => write!(
+                text,
+                "\nwarning: {a} and {b} overlap at every posture: no posture of this model is free"
+            ),
+            PairConcern::LeftOutButDependsOnPosture => write!(
+                text,
+                "\nwarning: {a} and {b} share a joint and are left out, but touch at {:.1} % of its \
+                 angles only: collisions of theirs go unseen",
+                pair.collision_rate * 100.0
+            ),
+        };
+    }
+    text
+}
+
+fn srdf_report(srdf: &Srdf, answers: &[SrdfAnswer], examined: &[PairExamination]) -> SrdfReport {
+    SrdfReport {
+        file: srdf.file.clone(),
+        robot: srdf.robot.clone(),
+        disabled: answers
+            .iter()
+            .map(|answer| {
+                let pair = &srdf.disabled[answer.pair];
+                let found = answer.examination.map(|index| &examined[index]);
+                SrdfPairAnswer {
+                    links: pair.links.clone(),
+                    reason: pair.reason.clone(),
+                    verdict: answer.verdict,
+                    state: found.map(|found| found.state),
+                    collision_rate: found.map(|found| found.collision_rate),
+                    least_m: found.map(|found| found.least_m),
+                    finding: answer.finding.clone(),
+                }
+            })
+            .collect(),
+    }
+}
+
+fn srdf_text(srdf: &Srdf, answers: &[SrdfAnswer]) -> String {
+    let count = |verdict| {
+        answers
+            .iter()
+            .filter(|answer| answer.verdict == verdict)
+            .count()
+    };
+    let mut text = format!(
+        "{} ('{}') disables {} pairs: {} justified, {} unproven, {} refuted, {} with unknown links",
+        srdf.file,
+        srdf.robot,
+        answers.len(),
+        count(SrdfVerdict::Justified),
+        count(SrdfVerdict::Unproven),
+        count(SrdfVerdict::Refuted),
+        count(SrdfVerdict::UnknownLink),
+    );
+    for answer in answers {
+        if answer.verdict == SrdfVerdict::Unproven {
+            let [a, b] = &srdf.disabled[answer.pair].links;
+            let _ = write!(
+                text,
+                "\nunproven: {a} and {b} touch at no posture seen, which proves nothing"
+            );
+        }
+    }
+    text
+}
+
+/// Writes the arm's pairs that need no check: those that share a joint and those that are proven
+/// never to touch. What always collides stays enabled, because disabling it hides a wrong model.
+fn write_srdf(
+    path: &Path,
+    cell: &Cell,
+    examined: &[PairExamination],
+    settings: &PairSettings,
+) -> Result<()> {
+    let robot = &cell.robot;
+    let links_of = |body: usize| -> Vec<&str> {
+        let name = &cell.bodies[body].name;
+        let labels = std::iter::once(&robot.base).chain(&robot.links);
+        let owner = labels.map(|link| &link.name).position(|each| each == name);
+        robot
+            .members
+            .iter()
+            .filter(|member| Some(member.owner) == owner && member.has_geometry)
+            .map(|member| member.name.as_str())
+            .collect()
+    };
+    let mut text = format!(
+        "<?xml version=\"1.0\"?>\n<!-- Pairs that cannot collide, derived by needlebench from {}.\n     \
+         Adjacent: they share a joint. Never: proven over the whole joint ranges, to {} mm. -->\n\
+         <robot name=\"{}\">\n",
+        escaped(&robot.source.file.replace("--", "-")),
+        settings.tolerance_m * 1e3,
+        escaped(&robot.name),
+    );
+    for pair in examined {
+        let reason = match pair.state {
+            PairState::Adjacent => "Adjacent",
+            PairState::Never => "Never",
+            _ => continue,
+        };
+        for first in links_of(pair.b) {
+            for second in links_of(pair.a) {
+                let _ = writeln!(
+                    text,
+                    "  <disable_collisions link1=\"{}\" link2=\"{}\" reason=\"{reason}\"/>",
+                    escaped(first),
+                    escaped(second),
+                );
+            }
+        }
+    }
+    text.push_str("</robot>\n");
+    write_atomically(path, text.as_bytes())
+        .with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('"', "&quot;")
+}
