@@ -305,6 +305,60 @@ impl Default for MotionSection {
     }
 }
 
+/// What the guide's angle about the needle is chosen for, where it is free.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum RollAim {
+    /// Clearance of the final posture: a soft least over all classes, `-s ln sum exp(-d / s)` with
+    /// `s` = 20 mm, so that a class that no roll changes does not decide.
+    #[default]
+    Clearance,
+    /// Margin to the joint limits.
+    JointMargin,
+    /// Distance from singularities: the least of `|sin q5|`, `|sin q3|` and the distance from the
+    /// shoulder's singularity over 100 mm.
+    Singularity,
+    /// Least motion of the needle's tip under errors of the joints.
+    TipAccuracy,
+    /// The weighted mean of the `[ranking]` utilities of all these.
+    Balanced,
+}
+
+impl RollAim {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Clearance,
+        Self::JointMargin,
+        Self::Singularity,
+        Self::TipAccuracy,
+        Self::Balanced,
+    ];
+
+    /// Name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clearance => "clearance",
+            Self::JointMargin => "joint_margin",
+            Self::Singularity => "singularity",
+            Self::TipAccuracy => "tip_accuracy",
+            Self::Balanced => "balanced",
+        }
+    }
+}
+
 /// What makes a configuration unfit before anything is simulated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -326,8 +380,11 @@ pub struct PlanningSection {
     /// Simulates configurations too that are rejected for collisions or a blocked corridor, to
     /// see what would happen. They stay rejected.
     pub simulate_rejected: bool,
-    /// Directions about the needle that are tried where roll is free.
+    /// Directions about the needle that are tried where roll is free; between them the edges of the
+    /// ranges that work and the best roll are searched for.
     pub roll_samples: u32,
+    /// What the direction about the needle is chosen for.
+    pub roll_aim: RollAim,
     /// Largest step of any point of the arm between two collision checks of a motion, mm.
     pub sample_spacing_mm: f64,
 }
@@ -342,6 +399,7 @@ impl Default for PlanningSection {
             require_needle_corridor: true,
             simulate_rejected: false,
             roll_samples: 36,
+            roll_aim: RollAim::default(),
             sample_spacing_mm: 5.0,
         }
     }

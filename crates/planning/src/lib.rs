@@ -3,10 +3,12 @@
 //! For each goal all eight configurations get a [`ConfigurationPlan`], never fewer: one that
 //! cannot work carries the rules that reject it, the first failing one first.
 
+mod family;
 mod motion;
 mod plan;
 mod rejection;
 
+pub use family::{Aim, Best, Edge, Family, Member, RollRange};
 pub use motion::MotionChecker;
 pub use plan::{Candidate, ConfigurationPlan, GoalPlan, Planner, PostureMargins};
 pub use rejection::{Rejection, Rule};

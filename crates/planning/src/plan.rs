@@ -3,14 +3,16 @@
 use std::f64::consts::TAU;
 
 use nalgebra::UnitVector3;
-use needlebench_cell::{ClearanceClass, Goal, ResolvedScenario, Roll};
+use needlebench_cell::scenario::PlanningSection;
+use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, Roll};
 use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_kinematics::ik::{
-    Configuration, Kinematics, Solution, SolutionKind, WrapOrder, WrapSearch, wrap_angle,
+    Configuration, Kinematics, Solution, SolutionKind, Solutions, WrapOrder, WrapSearch, wrap_angle,
 };
 use needlebench_kinematics::trajectory::{JointTrajectory, LineError, LinePath, Phase};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
+use crate::family::Member;
 use crate::motion::MotionChecker;
 use crate::{Rejection, Rule};
 
@@ -76,6 +78,8 @@ pub struct Planner<'a> {
     resolved: &'a ResolvedScenario,
     kinematics: Kinematics,
     checker: MotionChecker<'a>,
+    /// Keys of the scenario's `[ranking]` with weights and utilities.
+    ranking_aims: Vec<(&'static str, needlebench_cell::ranking::Aim)>,
 }
 
 /// Postures of one configuration for which a motion is tried, best first.
@@ -104,7 +108,29 @@ impl<'a> Planner<'a> {
                 planning.min_self_clearance_mm * 1e-3,
                 planning.sample_spacing_mm * 1e-3,
             ),
+            ranking_aims: resolved.scenario.ranking.aims().to_vec(),
         })
+    }
+
+    pub(crate) fn cell(&self) -> &Cell {
+        &self.resolved.cell
+    }
+
+    pub(crate) fn start(&self) -> &Joints {
+        &self.resolved.start
+    }
+
+    pub(crate) fn planning(&self) -> &PlanningSection {
+        &self.resolved.scenario.planning
+    }
+
+    pub(crate) fn ranking_aims(&self) -> &[(&'static str, needlebench_cell::ranking::Aim)] {
+        &self.ranking_aims
+    }
+
+    /// Least clearance that a class of physical bodies may have, m.
+    pub(crate) fn limit_m(&self, class: ClearanceClass) -> f64 {
+        self.checker.limit_m(class)
     }
 
     /// The solver, for callers that need poses of their own.
@@ -120,97 +146,91 @@ impl<'a> Planner<'a> {
             * cell.tool.flange_from_guide_exit.inverse()
     }
 
+    /// Rolls that are looked at: all round where it is free, else the one.
+    pub fn rolls(&self, goal: &Goal, count: u32) -> Vec<f64> {
+        match goal.roll {
+            Roll::Fixed(roll_rad) => vec![roll_rad],
+            Roll::Free => (0..count)
+                .map(|k| TAU * f64::from(k) / f64::from(count))
+                .collect(),
+        }
+    }
+
     /// Plans all eight configurations of a goal.
     pub fn plan(&self, goal: &Goal) -> GoalPlan {
-        let rolls: Vec<f64> = match goal.roll {
-            Roll::Fixed(roll_rad) => vec![roll_rad],
-            Roll::Free => {
-                let count = self.resolved.scenario.planning.roll_samples;
-                (0..count)
-                    .map(|k| TAU * f64::from(k) / f64::from(count))
-                    .collect()
-            }
-        };
-        let mut options: Vec<Vec<(f64, Solution)>> = vec![Vec::new(); Configuration::ALL.len()];
-        let mut absent: Vec<Option<Rejection>> = vec![None; Configuration::ALL.len()];
+        let rolls = self.rolls(goal, self.planning().roll_samples);
+        let mut grids: [Vec<Member>; 8] = std::array::from_fn(|_| Vec::with_capacity(rolls.len()));
         for &roll_rad in &rolls {
-            let pose = self.base_link_from_flange(goal, roll_rad);
-            let found = self.kinematics.solve(&pose, Some(&self.resolved.start));
-            for (index, configuration) in Configuration::ALL.into_iter().enumerate() {
-                if let Some(solution) = found
-                    .solutions
-                    .iter()
-                    .find(|each| each.configuration == configuration)
-                {
-                    options[index].push((roll_rad, *solution));
-                    continue;
-                }
-                let rejection = match found.unreachable.iter().find(|(c, _)| *c == configuration) {
-                    Some((_, reason)) => Rejection {
-                        rule: Rule::Unreachable,
-                        value: reason.missing_m(),
-                        limit: 0.0,
-                        unit: "m",
-                        detail: unreachable_detail(*reason),
-                        class: None,
-                    },
-                    None => merged(configuration, &found.solutions),
-                };
-                // Of many rolls, the one that comes nearest says most.
-                let nearer = absent[index]
-                    .as_ref()
-                    .is_none_or(|known: &Rejection| rejection.value < known.value);
-                if nearer {
-                    absent[index] = Some(rejection);
-                }
+            for (grid, member) in grids.iter_mut().zip(self.members_at(goal, roll_rad)) {
+                grid.push(member);
             }
         }
         let configurations = Configuration::ALL
             .into_iter()
-            .zip(options.into_iter().zip(absent))
-            .map(|(configuration, (options, absent))| {
-                self.plan_configuration(goal, configuration, options, absent)
-            })
+            .zip(grids)
+            .map(|(configuration, grid)| self.plan_configuration(goal, configuration, grid))
             .collect();
         GoalPlan { configurations }
+    }
+
+    /// Why a configuration is not among the solutions of a pose.
+    pub(crate) fn absent(&self, configuration: Configuration, found: &Solutions) -> Rejection {
+        match found.unreachable.iter().find(|(c, _)| *c == configuration) {
+            Some((_, reason)) => Rejection {
+                rule: Rule::Unreachable,
+                value: reason.missing_m(),
+                limit: 0.0,
+                unit: "m",
+                detail: unreachable_detail(*reason),
+                class: None,
+            },
+            None => merged(configuration, &found.solutions),
+        }
     }
 
     fn plan_configuration(
         &self,
         goal: &Goal,
         configuration: Configuration,
-        options: Vec<(f64, Solution)>,
-        absent: Option<Rejection>,
+        grid: Vec<Member>,
     ) -> ConfigurationPlan {
-        let mut candidates: Vec<(Candidate, Vec<Rejection>)> = options
+        let aim = self.planning().roll_aim;
+        // The best of each range that works, then the rest of what works.
+        let mut members: Vec<Member> = self
+            .family(goal, configuration, &grid)
+            .ranges
             .into_iter()
-            .map(|(roll_rad, solution)| self.candidate(roll_rad, &solution))
+            .map(|range| range.best_for(aim).member.clone())
+            .collect();
+        let some_work = !members.is_empty();
+        let of_grid = grid
+            .iter()
+            .filter(|member| member.candidate.is_some() && (member.works() || !some_work));
+        members.extend(of_grid.cloned());
+        let mut candidates: Vec<(Candidate, Vec<Rejection>)> = members
+            .into_iter()
+            .filter_map(|member| Some((member.candidate?, member.rejections)))
             .collect();
         if candidates.is_empty() {
+            // Of many rolls, the one that comes nearest says most.
+            let rejections = grid
+                .into_iter()
+                .flat_map(|member| member.rejections)
+                .min_by(|a, b| a.value.total_cmp(&b.value))
+                .into_iter()
+                .collect();
             return ConfigurationPlan {
                 configuration,
                 candidate: None,
-                rejections: absent.into_iter().collect(),
+                rejections,
                 trajectory: None,
             };
         }
-        // Fewest broken rules first, then most clearance; equal ones stay in the order of roll.
-        candidates.sort_by(|(a, broken_a), (b, broken_b)| {
-            broken_a
-                .is_empty()
-                .cmp(&broken_b.is_empty())
-                .reverse()
-                .then(
-                    working_clearance_m(&b.clearance).total_cmp(&working_clearance_m(&a.clearance)),
-                )
+        // Best first; equal ones stay in the order of roll.
+        candidates.sort_by(|(a, _), (b, _)| {
+            self.value(goal, aim, b)
+                .total_cmp(&self.value(goal, aim, a))
         });
-        // Where one posture breaks no rule, those that do are out of the question.
-        if candidates
-            .first()
-            .is_some_and(|(_, broken)| broken.is_empty())
-        {
-            candidates.retain(|(_, broken)| broken.is_empty());
-        }
         let mut best: Option<ConfigurationPlan> = None;
         for (candidate, rejections) in spread_over_rolls(candidates).into_iter().take(MOTION_TRIES)
         {
@@ -234,7 +254,11 @@ impl<'a> Planner<'a> {
     }
 
     /// Margins, clearances and broken rules of one posture.
-    fn candidate(&self, roll_rad: f64, solution: &Solution) -> (Candidate, Vec<Rejection>) {
+    pub(crate) fn candidate(
+        &self,
+        roll_rad: f64,
+        solution: &Solution,
+    ) -> (Candidate, Vec<Rejection>) {
         let planning = &self.resolved.scenario.planning;
         let limits = &self.resolved.cell.robot.limits;
         let mut rejections = Vec::new();
@@ -498,15 +522,6 @@ fn spread_over_rolls<T>(candidates: Vec<(Candidate, T)>) -> Vec<(Candidate, T)> 
     }
     first.extend(rest);
     first
-}
-
-/// Least clearance of the classes that a roll should keep free; the stand-off is given.
-fn working_clearance_m(minima: &ClassMinima) -> f64 {
-    minima
-        .iter()
-        .filter(|pair| pair.class != ClearanceClass::GuideStandoff)
-        .map(|pair| pair.separation.distance_m)
-        .fold(f64::INFINITY, f64::min)
 }
 
 fn blocked_approach(error: &LineError, approach_m: f64) -> Rejection {

@@ -100,6 +100,17 @@ impl Kinematics {
     /// calibrations on random poses it finds at least 99.9 % (`a_calibrated_arm_keeps_its_branches`).
     /// Residual of every row at most 1e-12 m and rad (`every_solution_reproduces_the_pose`).
     pub fn solve(&self, base_link_from_flange: &Pose, seed: Option<&Joints>) -> Solutions {
+        let mut answer = self.branches(base_link_from_flange, seed);
+        if answer.solutions.is_empty() && is_finite(base_link_from_flange) {
+            answer.certificate = Certificate::NearestOnly;
+            answer.nearest = self.nearest(base_link_from_flange, seed);
+        }
+        answer
+    }
+
+    /// [`Kinematics::solve`] without the search for nearest postures where no configuration reaches
+    /// the pose, which takes a thousand times as long as all the rest.
+    pub fn branches(&self, base_link_from_flange: &Pose, seed: Option<&Joints>) -> Solutions {
         let base_from_flange = base_from_base_link() * base_link_from_flange;
         let preference = Preference {
             seed,
@@ -108,7 +119,7 @@ impl Kinematics {
         let mut nominal = ClosedForm::BLANK;
         closed_form_into(&self.geometry, &base_from_flange, preference, &mut nominal);
         let target = self.numerical.target(base_link_from_flange);
-        let mut answer = if self.is_nominal() || !is_finite(base_link_from_flange) {
+        if self.is_nominal() || !is_finite(base_link_from_flange) {
             Solutions {
                 solutions: nominal
                     .solutions()
@@ -126,12 +137,7 @@ impl Kinematics {
             }
         } else {
             self.calibrated(base_link_from_flange, &nominal)
-        };
-        if answer.solutions.is_empty() && is_finite(base_link_from_flange) {
-            answer.certificate = Certificate::NearestOnly;
-            answer.nearest = self.nearest(base_link_from_flange, seed);
         }
-        answer
     }
 
     /// Pose of the flange in `base_link`.
