@@ -54,6 +54,11 @@ enum Command {
         after_help = "Example: needlebench clearance scenarios/table3.toml --joints 0,-1.57,-1,-1.57,1.57,0"
     )]
     Clearance(ClearanceArguments),
+    /// Every configuration at every angle of the guide about the needle: what works, and why not.
+    #[command(
+        after_help = "Example: needlebench atlas scenarios/supine_suite.toml --goal right_upper_anterior"
+    )]
+    Atlas(AtlasArguments),
     /// Two results side by side: what changed, and whether more was lost than is allowed.
     #[command(
         after_help = "Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm",
@@ -165,6 +170,53 @@ pub(crate) struct RunArguments {
     pub quiet: bool,
     #[command(flatten)]
     pub robot: RobotArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct AtlasArguments {
+    /// Scenario whose goals are looked at.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// One goal; all of them if left out.
+    #[arg(long, value_name = "NAME")]
+    pub goal: Option<String>,
+    /// Rolls all round.
+    #[arg(long, value_name = "N", default_value_t = 360, value_parser = clap::value_parser!(u32).range(3..=36_000))]
+    pub rolls: u32,
+    /// What the marked roll of each range is best at; the scenario's `planning.roll_aim` if left out.
+    /// The report has all aims.
+    #[arg(long, value_enum)]
+    pub aim: Option<AimArgument>,
+    /// Folder for results; the scenario gets a folder of its name in it.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Print the atlas as one JSON document instead of the table.
+    #[arg(long)]
+    pub json: bool,
+    /// Draw no pictures.
+    #[arg(long)]
+    pub no_pictures: bool,
+    /// Threads; the number of cores if left out. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: Option<u16>,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+/// What a roll is best at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub(crate) enum AimArgument {
+    /// Soft least clearance over all classes.
+    Clearance,
+    /// Margin to the joint limits.
+    JointMargin,
+    /// Distance from singularities.
+    Singularity,
+    /// Least motion of the needle's tip under errors of the joints.
+    TipAccuracy,
+    /// Weighted mean of the utilities of all these.
+    Balanced,
 }
 
 #[derive(Debug, Args)]
@@ -471,6 +523,7 @@ pub fn main() -> ExitCode {
         Command::Ik(arguments) => command::ik(&arguments),
         Command::Fk(arguments) => command::fk(&arguments),
         Command::Clearance(arguments) => command::clearance(&arguments),
+        Command::Atlas(arguments) => command::atlas(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),

@@ -3,6 +3,7 @@
 //! Data goes to standard output, logs and progress to standard error.
 
 mod assemble;
+mod atlas;
 mod atomic;
 mod cli;
 mod command;
@@ -14,5 +15,6 @@ mod pipeline;
 mod progress;
 mod provenance;
 
+pub use atlas::{GoalAtlas, goal_atlas};
 pub use cli::{command_line, main};
 pub use pipeline::{EngineChoice, RunOptions, ScenarioRun, run_scenario};

@@ -215,7 +215,7 @@ pub fn run_scenario(
 }
 
 /// Applies `f` to all items on up to `threads` threads; results are in the items' order.
-fn in_parallel<T: Sync, R: Send>(
+pub(crate) fn in_parallel<T: Sync, R: Send>(
     threads: usize,
     items: &[T],
     f: impl Fn(&T) -> R + Sync,

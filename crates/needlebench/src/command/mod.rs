@@ -1,5 +1,6 @@
 //! What each command does.
 
+mod atlas;
 mod check;
 mod clearance;
 mod compare;
@@ -19,6 +20,7 @@ use needlebench_cell::{
 use needlebench_clearance::ClearanceModel;
 use serde::Serialize;
 
+pub(crate) use atlas::atlas;
 pub(crate) use check::check;
 pub(crate) use clearance::clearance;
 pub(crate) use compare::compare;

@@ -8,6 +8,7 @@
 
 mod camera;
 mod color;
+pub(crate) mod flat;
 mod floor;
 mod geometry;
 mod image;

@@ -12,6 +12,11 @@ const INK: [u8; 3] = [25, 30, 38];
 pub(super) struct TextSize(RasterHeight);
 
 impl TextSize {
+    /// For axes and legends.
+    pub const SMALL: Self = Self(RasterHeight::Size16);
+    /// For titles.
+    pub const LARGE: Self = Self(RasterHeight::Size24);
+
     /// The size for a picture of the given height: about 45 lines, as far as the font allows.
     pub fn for_picture(height_px: usize) -> Self {
         Self(match height_px {
