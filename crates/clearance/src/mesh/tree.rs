@@ -139,10 +139,6 @@ impl MeshTree {
         &self.nodes[index as usize]
     }
 
-    pub fn is_leaf(&self, index: u32) -> bool {
-        self.node(index).count > 0
-    }
-
     #[inline]
     pub fn parts(&self, index: u32) -> Parts<'_> {
         let node = self.node(index);
