@@ -383,10 +383,10 @@ fn apart_every_shape_is_as_far_as_brute_force_over_all_triangles_says() {
     let meshes = [torus(0.2, 0.06, 18, 10), bowl(), angle_iron()];
     for kind in [0, 2, 3, 4, 5] {
         let mut row = Row::default();
-        for round in 0..40 {
+        for round in 0..24 {
             let mesh = &meshes[round % 3];
             let shape = match kind {
-                5 => solid_mesh(torus(0.1, 0.02, 9, 5)),
+                5 => solid_mesh(torus(0.1, 0.02, 7, 4)),
                 kind => variety.shapes()[kind].clone(),
             };
             let (a, b) = (variety.pose(0.35), variety.pose(0.1));
@@ -509,7 +509,7 @@ fn depth_by_brute_force_m(shape: &Shape, a: &Pose, mesh: &Shape, b: &Pose) -> f6
         let moved = Pose::from(way) * a;
         separation(&shape, &moved, &mesh, b).distance_m >= 0.0
     };
-    let (count, step_m) = (200, 0.002);
+    let (count, step_m) = (60, 0.004);
     let golden = PI * (3.0 - 5.0_f64.sqrt());
     let mut least_m = f64::INFINITY;
     for i in 0..count {
@@ -533,7 +533,7 @@ fn a_reported_way_out_parts_the_shapes_and_is_short() {
     let mut variety = Variety(36);
     let meshes = [torus(0.2, 0.06, 14, 8), bowl(), angle_iron()];
     let mut ratios = Vec::new();
-    for round in 0..60 {
+    for round in 0..36 {
         let mesh = solid_mesh(meshes[round % 3].clone());
         let shape = match round % 6 {
             5 => solid_mesh(angle_iron()),
@@ -550,14 +550,14 @@ fn a_reported_way_out_parts_the_shapes_and_is_short() {
         let out = Pose::from(found.normal.into_inner() * found.distance_m) * a;
         let left_m = gap(&shape, &out, &mesh, &b).distance_m;
         assert!(left_m.abs() <= LEFT_M, "{round} {left_m:e}");
-        if ratios.len() < 12 {
+        if ratios.len() < 6 {
             let brute_m = depth_by_brute_force_m(&shape, &a, &mesh, &b);
             ratios.push(-found.distance_m / brute_m);
         }
     }
     ratios.sort_by(f64::total_cmp);
     println!("depth over brute force: {ratios:.3?}");
-    // The brute force is coarse: 2 mm and some 8 degrees.
+    // The brute force is coarse: 4 mm and some 15 degrees.
     assert!(ratios[ratios.len() / 2] <= 1.02);
     assert!(ratios[ratios.len() - 1] <= 1.25);
 }

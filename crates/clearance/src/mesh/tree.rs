@@ -103,15 +103,7 @@ pub(crate) struct MeshTree {
     nodes: Vec<Node>,
     /// In the order of the leaves.
     triangles: Vec<[Vector3<f64>; 3]>,
-    /// An order in which equal points are neighbours.
-pub(crate) fn by_coordinates(one: &Vector3<f64>, other: &Vector3<f64>) -> Ordering {
-    one.x
-        .total_cmp(&other.x)
-        .then(one.y.total_cmp(&other.y))
-        .then(one.z.total_cmp(&other.z))
-}
-
-/// One vertex of each connected part of the surface.
+    /// One vertex of each connected part of the surface.
     pub anchors: Vec<Vector3<f64>>,
 }
 
