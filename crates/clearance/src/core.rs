@@ -109,14 +109,17 @@ impl Core {
         }
     }
 
-    /// Any point of the core.
+    /// A point of the core, not on its boundary unless it has no inside.
     pub fn some_point(&self) -> Vector3<f64> {
         match self {
             Self::Point | Self::Segment { .. } | Self::Cylinder { .. } | Self::Cuboid { .. } => {
                 Vector3::zeros()
             }
-            Self::Hull(hull) => hull.vertices_m()[0],
-            Self::Triangle(corners) => corners[0],
+            Self::Hull(hull) => {
+                let vertices = hull.vertices_m();
+                vertices.iter().sum::<Vector3<f64>>() / vertices.len() as f64
+            }
+            Self::Triangle([a, b, c]) => (a + b + c) / 3.0,
             Self::Mesh(tree) => tree.anchors[0],
         }
     }

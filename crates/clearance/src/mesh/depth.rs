@@ -12,6 +12,7 @@ use nalgebra::{Point3, Vector3};
 use super::inside::is_inside;
 use super::nearest::{Nearest, nearest};
 use super::sides::{Boxes, Hint, Mover, ROOTS, Sides, Step};
+use super::tree::by_coordinates;
 use super::way_out::{WayOut, is_touched, touches, way_out};
 use crate::bounds::Capsule;
 use crate::core::{Core, Difference, Placement};
@@ -58,7 +59,9 @@ pub(crate) fn depth(sides: &Sides<'_>, radius_m: f64, cutoff_m: f64) -> Option<W
             return None;
         }
         let way = sides.swept(&(direction * best.length_m));
-        around.extend(touched(&way, radius_m, &direction));
+        around.extend(touched(&way, radius_m, &direction).into_iter().flatten());
+        around.sort_unstable_by(by_coordinates);
+        around.dedup();
         let Some(next) = out_of_patch(sides, &around, &best.direction, best.length_m) else {
             break;
         };
@@ -178,20 +181,20 @@ fn touched(sides: &Sides<'_>, radius_m: f64, along: &Vector3<f64>) -> Vec<[Vecto
 /// Direction of the shortest way out of the hull of a patch, made deep against `out`.
 fn out_of_patch(
     sides: &Sides<'_>,
-    patch: &[[Vector3<f64>; 3]],
+    patch: &[Vector3<f64>],
     out: &Vector3<f64>,
     length_m: f64,
 ) -> Option<Vector3<f64>> {
-    let corners = || patch.iter().flatten();
-    let first = corners().next()?;
-    let extent_m = corners()
+    let first = patch.first()?;
+    let extent_m = patch
+        .iter()
         .map(|corner| (corner - first).norm())
         .fold(length_m, f64::max);
-    let down = out * (-PATCH_DEPTH * extent_m);
-    let points: Vec<_> = corners()
-        .flat_map(|corner| [Point3::from(*corner), Point3::from(corner + down)])
-        .collect();
+    let points: Vec<_> = patch.iter().map(|corner| Point3::from(*corner)).collect();
     let patch = Core::Hull(Hull::new(&points, &[]));
-    let found = signed(&mut Difference::new(sides.hulls[0], &patch, sides.b_from_a));
+    // A patch that is continued downwards is met by A where A continued upwards meets the patch.
+    let mut difference = Difference::new(sides.hulls[0], &patch, sides.b_from_a)
+        .swept(out * (PATCH_DEPTH * extent_m));
+    let found = signed(&mut difference);
     Some(-found.normal)
 }

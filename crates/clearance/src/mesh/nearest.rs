@@ -116,7 +116,7 @@ impl Search<'_> {
     /// Lower bound of the boxes' distance, never below their parents'.
     fn bounded(&mut self, boxes: Boxes, parent: &Entry) -> Entry {
         let mut entry = Entry { boxes, ..*parent };
-        let mut improve = |entry: &mut Entry, direction: &Vector3<f64>, hint: &mut Hint| {
+        let improve = |entry: &mut Entry, direction: &Vector3<f64>, hint: &mut Hint| {
             let gap_m = self.sides.gap_m(boxes, direction, hint);
             if gap_m > entry.lower_m {
                 entry.lower_m = gap_m;

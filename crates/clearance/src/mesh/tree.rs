@@ -4,6 +4,8 @@
 //! ones are: their slack falls with the square of the patch's size, and a search for the nearest
 //! triangle visits a number of boxes that grows with the logarithm of the triangles.
 
+use std::cmp::Ordering;
+
 use nalgebra::{Matrix3, Vector3};
 use needlebench_cell::shape::TriangleMesh;
 
@@ -139,10 +141,6 @@ impl MeshTree {
         &self.nodes[index as usize]
     }
 
-    pub fn is_leaf(&self, index: u32) -> bool {
-        self.node(index).count > 0
-    }
-
     #[inline]
     pub fn parts(&self, index: u32) -> Parts<'_> {
         let node = self.node(index);
@@ -272,30 +270,25 @@ fn fitted(triangles: &[[Vector3<f64>; 3]]) -> (Node, usize) {
     (node, longest)
 }
 
+/// An order in which equal points are neighbours.
+pub(crate) fn by_coordinates(one: &Vector3<f64>, other: &Vector3<f64>) -> Ordering {
+    one.x
+        .total_cmp(&other.x)
+        .then(one.y.total_cmp(&other.y))
+        .then(one.z.total_cmp(&other.z))
+}
+
 /// One vertex of each connected part; vertices at the same place are one.
 fn anchors(mesh: &TriangleMesh) -> Vec<Vector3<f64>> {
     let count = mesh.vertices_m.len();
     let mut parent: Vec<usize> = (0..count).collect();
-    fn top(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
     let join = |parent: &mut Vec<usize>, a: usize, b: usize| {
         let (a, b) = (top(parent, a), top(parent, b));
         parent[a.max(b)] = a.min(b);
     };
     let mut order: Vec<usize> = (0..count).collect();
     let key = |i: usize| mesh.vertices_m[i].coords;
-    let compare = |&i: &usize, &j: &usize| {
-        let (a, b) = (key(i), key(j));
-        a.x.total_cmp(&b.x)
-            .then(a.y.total_cmp(&b.y))
-            .then(a.z.total_cmp(&b.z))
-    };
-    order.sort_unstable_by(|i, j| compare(i, j).then(i.cmp(j)));
+    order.sort_unstable_by(|&i, &j| by_coordinates(&key(i), &key(j)).then(i.cmp(&j)));
     for pair in order.windows(2) {
         if key(pair[0]) == key(pair[1]) {
             join(&mut parent, pair[0], pair[1]);
@@ -319,4 +312,12 @@ fn anchors(mesh: &TriangleMesh) -> Vec<Vector3<f64>> {
     tops.into_iter()
         .map(|i| mesh.vertices_m[i].coords)
         .collect()
+}
+
+fn top(parent: &mut [usize], mut i: usize) -> usize {
+    while parent[i] != i {
+        parent[i] = parent[parent[i]];
+        i = parent[i];
+    }
+    i
 }

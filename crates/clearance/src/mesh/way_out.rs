@@ -19,6 +19,9 @@ use crate::gjk::{self, Gap};
 /// Exits are found to this, m.
 const EXIT_GAP_M: f64 = 1e-11;
 
+/// How far beyond its end a way is asked for what is inside of what, m.
+const BEYOND_M: f64 = 1e-9;
+
 /// Steps from a plane above a triangle down to its exit. They converge faster than any power;
 /// where rounding ends them early, the exit is too late, which is the safe side.
 const EXIT_STEPS: usize = 40;
@@ -84,7 +87,8 @@ pub(crate) fn way_out(
                 return None;
             }
         }
-        let there = sides.moved(&(direction * length_m));
+        // A little further, because a point on the surface is neither inside nor outside.
+        let there = sides.moved(&(direction * (length_m + BEYOND_M)));
         if !is_within(&there) {
             let on_a = last.map_or_else(|| sides.centre_a(), |exit| exit.on_a);
             return Some(WayOut {
@@ -97,7 +101,7 @@ pub(crate) fn way_out(
         let Nearest::Apart(found) = nearest(&there, f64::INFINITY) else {
             return None;
         };
-        length_m += found.distance_m.max(EXIT_GAP_M);
+        length_m += BEYOND_M + found.distance_m;
         last = None;
         if length_m >= limit_m {
             return None;
