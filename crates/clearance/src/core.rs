@@ -163,6 +163,17 @@ impl PreparedShape {
         }
     }
 
+    /// Whether the solid is convex, so that planes separate it from other such solids.
+    pub(crate) fn is_convex(&self) -> bool {
+        match self.core {
+            Core::Point
+            | Core::Segment { .. }
+            | Core::Cylinder { .. }
+            | Core::Cuboid { .. }
+            | Core::Hull(_) => true,
+        }
+    }
+
     /// Centre and radius of a ball around the shape, in the shape's frame, m.
     pub fn bounding_sphere_m(&self) -> (Point3<f64>, f64) {
         (Point3::from(self.bound.centre), self.bound.ball_radius_m)
