@@ -91,7 +91,6 @@ impl Gaps {
         0.5 - rise_m / curvature_m
     }
 
-
     /// Least over the interval of the larger of two parabolas, m.
     pub fn least_of_larger_m(&self, other: &Self, curvature_m: f64) -> f64 {
         for (one, two) in [(self, other), (other, self)] {

@@ -47,10 +47,12 @@ impl<'m> Couple<'m> {
     }
 
     /// Lower bound of the distance in a posture by the solids' capsules, m.
+    ///
+    /// Without their balls, which [`capsule_gap_m`] does not know: bounds over shorter and shorter
+    /// intervals tend to this one.
     fn capsules_m(&self, inner_from_outer: &Placement) -> f64 {
         let outer = self.outer.bound.placed(inner_from_outer);
-        let inner = &self.inner.bound;
-        outer.gap_m(inner).max(outer.ball_gap_m(inner))
+        outer.gap_m(&self.inner.bound)
     }
 
     /// Signed distance in the frame of the inner body, the normal from the outer solid.
