@@ -199,6 +199,11 @@ impl PreparedShape {
         matches!(self.core, Core::Mesh(_))
     }
 
+    /// Whether the solid is convex, so that planes separate it from other such solids.
+    pub(crate) fn is_convex(&self) -> bool {
+        !self.is_mesh()
+    }
+
     /// Centre and radius of a ball around the shape, in the shape's frame, m.
     pub fn bounding_sphere_m(&self) -> (Point3<f64>, f64) {
         (Point3::from(self.bound.centre), self.bound.ball_radius_m)

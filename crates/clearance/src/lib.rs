@@ -45,6 +45,7 @@
 //! is why the solver is our own.
 
 mod bounds;
+mod certificate;
 mod closed_form;
 mod core;
 mod epa;
@@ -59,6 +60,10 @@ mod separation;
 mod simplex;
 
 pub use crate::core::PreparedShape;
+pub use certificate::{
+    CertificateOptions, ClassCertificate, Effort, LEAST_INTERVAL_S, MOST_INTERVALS, Motion,
+    MotionBound, MotionCertificate, ROUNDING_M, RecordedMotion, Span, certify,
+};
 pub use model::{ClassMinima, ClearanceModel, PairClearance};
 pub use pairs::{
     PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,

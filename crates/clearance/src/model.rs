@@ -9,7 +9,7 @@ use crate::core::{Placement, PreparedShape};
 use crate::separation::{Separation, closer_than};
 
 /// Number of classes; `NeedleRoute` is the last.
-const CLASS_COUNT: usize = ClearanceClass::NeedleRoute as usize + 1;
+pub(crate) const CLASS_COUNT: usize = ClearanceClass::NeedleRoute as usize + 1;
 
 /// What a lower bound by enclosing volumes has to exceed a distance by before the pair is left
 /// out, m. More than the distances' own error, so that leaving out never changes a result.
@@ -71,29 +71,29 @@ impl ClassMinima {
 }
 
 /// Poses of the moving links, as the bodies need them.
-type LinkPlacements = [Placement; JOINT_COUNT];
+pub(crate) type LinkPlacements = [Placement; JOINT_COUNT];
 
 #[derive(Debug, Clone)]
-struct PlacedShape {
-    shape: PreparedShape,
-    body_from_shape: Placement,
+pub(crate) struct PlacedShape {
+    pub shape: PreparedShape,
+    pub body_from_shape: Placement,
     /// Encloses the shape, in the body's frame.
-    bound: Capsule,
+    pub bound: Capsule,
 }
 
 #[derive(Debug, Clone)]
-struct PlacedBody {
-    frame: Frame,
-    solids: Vec<PlacedShape>,
+pub(crate) struct PlacedBody {
+    pub frame: Frame,
+    pub solids: Vec<PlacedShape>,
     /// Ball around all solids, in the body's frame.
     bound: Capsule,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct PlacedPair {
-    a: usize,
-    b: usize,
-    class: ClearanceClass,
+pub(crate) struct PlacedPair {
+    pub a: usize,
+    pub b: usize,
+    pub class: ClearanceClass,
 }
 
 /// Two solids of a pair; indices into their bodies' solids.
@@ -110,10 +110,10 @@ struct SolidPair {
 /// penetrating shapes needs.
 #[derive(Debug, Clone)]
 pub struct ClearanceModel {
-    chain: Chain,
+    pub(crate) chain: Chain,
     world_from_base_link: Pose,
-    bodies: Vec<PlacedBody>,
-    pairs: Vec<PlacedPair>,
+    pub(crate) bodies: Vec<PlacedBody>,
+    pub(crate) pairs: Vec<PlacedPair>,
 }
 
 impl ClearanceModel {
@@ -226,7 +226,7 @@ impl ClearanceModel {
         })
     }
 
-    fn world_from_links(&self, q: &Joints) -> [Pose; JOINT_COUNT] {
+    pub(crate) fn world_from_links(&self, q: &Joints) -> [Pose; JOINT_COUNT] {
         self.chain
             .link_poses(q)
             .map(|pose| self.world_from_base_link * pose)
@@ -252,7 +252,7 @@ impl ClearanceModel {
     }
 }
 
-const IDENTITY: Placement = Placement {
+pub(crate) const IDENTITY: Placement = Placement {
     rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
     translation: Vector3::new(0.0, 0.0, 0.0),
 };

@@ -1,0 +1,532 @@
+//! Adaptive halving of a motion until every class is known to the tolerance.
+
+use nalgebra::Vector3;
+use needlebench_cell::{ClearanceClass, Frame};
+use needlebench_kinematics::trajectory::Phase;
+
+use super::motion::{Motion, Span};
+use super::planes::{Gaps, Plane, capsule_gap_m};
+use super::sweep::{ChainBounds, MovingSolid, PointBounds, Posture, Sweep, inner_from_outer};
+use super::{
+    CertificateOptions, ClassCertificate, Effort, LEAST_INTERVAL_S, MOST_INTERVALS, MotionBound,
+    MotionCertificate, ROUNDING_M,
+};
+use crate::core::Placement;
+use crate::model::{CLASS_COUNT, ClearanceModel, PairClearance, PlacedShape};
+use crate::separation::{Separation, closer_than};
+
+/// Two solids of a pair, by who moves relative to whom.
+#[derive(Debug)]
+struct Couple<'m> {
+    pair: usize,
+    class: ClearanceClass,
+    outer: &'m PlacedShape,
+    inner: &'m PlacedShape,
+    outer_solid: usize,
+    inner_solid: usize,
+    outer_link: usize,
+    /// `None`: fixed in the world.
+    inner_link: Option<usize>,
+    moving: MovingSolid,
+    /// The pair's body `a` is the inner one.
+    swapped: bool,
+}
+
+impl<'m> Couple<'m> {
+    /// First joint that moves the outer solid relative to the inner one.
+    fn first_joint(&self) -> usize {
+        self.inner_link.map_or(0, |link| link + 1)
+    }
+
+    fn inner_from_outer(&self, posture: &Posture) -> Placement {
+        inner_from_outer(&posture.links, self.inner_link, self.outer_link)
+    }
+
+    fn are_convex(&self) -> bool {
+        self.outer.shape.is_convex() && self.inner.shape.is_convex()
+    }
+
+    /// Lower bound of the distance in a posture by the solids' capsules, m.
+    ///
+    /// Without their balls, which [`capsule_gap_m`] does not know: bounds over shorter and shorter
+    /// intervals tend to this one.
+    fn capsules_m(&self, inner_from_outer: &Placement) -> f64 {
+        let outer = self.outer.bound.placed(inner_from_outer);
+        outer.gap_m(&self.inner.bound)
+    }
+
+    /// Signed distance in the frame of the inner body, the normal from the outer solid.
+    fn separation(&self, inner_from_outer: &Placement) -> Separation {
+        let outer = inner_from_outer.after(&self.outer.body_from_shape);
+        let inner_solid_from_outer_solid = self.inner.body_from_shape.inverse_after(&outer);
+        closer_than(
+            &self.outer.shape,
+            &self.inner.shape,
+            &inner_solid_from_outer_solid,
+            f64::INFINITY,
+        )
+        .expect("no distance is beyond an infinite cutoff")
+        .placed(&self.inner.body_from_shape)
+    }
+
+    /// That separation as the model reports it.
+    fn clearance(&self, separation: &Separation, posture: &Posture) -> PairClearance {
+        let mut separation = match self.inner_link {
+            None => *separation,
+            Some(link) => separation.placed(&posture.links[link]),
+        };
+        let (mut solid_a, mut solid_b) = (self.outer_solid, self.inner_solid);
+        if self.swapped {
+            (solid_a, solid_b) = (solid_b, solid_a);
+            separation.normal = -separation.normal;
+            std::mem::swap(&mut separation.point_on_a, &mut separation.point_on_b);
+        }
+        PairClearance {
+            pair: self.pair,
+            class: self.class,
+            solid_a,
+            solid_b,
+            separation,
+        }
+    }
+}
+
+fn couples(model: &ClearanceModel) -> Vec<Couple<'_>> {
+    let link = |body: usize| match model.bodies[body].frame {
+        Frame::World => None,
+        Frame::Link(link) => Some(link),
+    };
+    let mut couples = Vec::new();
+    for (pair, placed) in model.pairs.iter().enumerate() {
+        // `None` is less than any link.
+        let swapped = link(placed.a) < link(placed.b);
+        let (outer, inner) = if swapped {
+            (placed.b, placed.a)
+        } else {
+            (placed.a, placed.b)
+        };
+        // One body of every pair moves.
+        let Some(outer_link) = link(outer) else {
+            continue;
+        };
+        for (outer_solid, moving) in model.bodies[outer].solids.iter().enumerate() {
+            for (inner_solid, still) in model.bodies[inner].solids.iter().enumerate() {
+                couples.push(Couple {
+                    pair,
+                    class: placed.class,
+                    outer: moving,
+                    inner: still,
+                    outer_solid,
+                    inner_solid,
+                    outer_link,
+                    inner_link: link(inner),
+                    moving: MovingSolid::new(&model.chain, outer_link, moving),
+                    swapped,
+                });
+            }
+        }
+    }
+    couples
+}
+
+/// What is known of a couple in an interval.
+#[derive(Debug, Clone, Copy)]
+enum Known {
+    /// Nothing but its capsules.
+    Capsules,
+    /// Gaps along one or two directions.
+    Planes([(Plane, Gaps); 2]),
+    /// Lower bounds of the distance at both ends.
+    Ends(Gaps),
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    couple: usize,
+    known: Known,
+}
+
+#[derive(Debug)]
+struct Interval {
+    left: usize,
+    right: usize,
+    phase: Phase,
+    open: Vec<Open>,
+}
+
+struct Search<'m, M> {
+    model: &'m ClearanceModel,
+    motion: &'m M,
+    options: CertificateOptions,
+    length_scale: f64,
+    chain: ChainBounds,
+    couples: Vec<Couple<'m>>,
+    postures: Vec<Posture>,
+    classes: [Option<ClassCertificate>; CLASS_COUNT],
+    effort: Effort,
+}
+
+/// `length_scale` is 1 for a proof; tests take less, to see that they notice.
+pub(super) fn certify<M: Motion>(
+    model: &ClearanceModel,
+    motion: &M,
+    options: &CertificateOptions,
+    length_scale: f64,
+) -> MotionCertificate {
+    let mut search = Search {
+        model,
+        motion,
+        options: *options,
+        length_scale,
+        chain: ChainBounds::new(&model.chain),
+        couples: couples(model),
+        postures: Vec::new(),
+        classes: [None; CLASS_COUNT],
+        effort: Effort::default(),
+    };
+    let spans = motion.spans();
+    let mut level: Vec<Interval> = spans.iter().map(|span| search.whole(span)).collect();
+    while !level.is_empty() {
+        level = level
+            .into_iter()
+            .filter_map(|interval| search.work_on(&interval))
+            .flatten()
+            .collect();
+    }
+    MotionCertificate {
+        classes: search.classes,
+        effort: search.effort,
+    }
+}
+
+impl<M: Motion> Search<'_, M> {
+    /// A span as one interval; its ends start the list of attained clearances.
+    fn whole(&mut self, span: &Span) -> Interval {
+        let left = self.start(span, span.start_s);
+        let right = self.start(span, span.end_s);
+        let open = (0..self.couples.len())
+            .filter(|&couple| counts(self.couples[couple].class, span.phase))
+            .map(|couple| Open {
+                couple,
+                known: if self.uses_planes(&self.couples[couple]) {
+                    Known::Capsules
+                } else {
+                    let gap_m = |posture: usize| {
+                        let couple = &self.couples[couple];
+                        couple.capsules_m(&couple.inner_from_outer(&self.postures[posture]))
+                    };
+                    Known::Ends(Gaps {
+                        left_m: gap_m(left),
+                        right_m: gap_m(right),
+                    })
+                },
+            })
+            .collect();
+        Interval {
+            left,
+            right,
+            phase: span.phase,
+            open,
+        }
+    }
+
+    fn uses_planes(&self, couple: &Couple<'_>) -> bool {
+        self.options.bound == MotionBound::Planes && couple.are_convex()
+    }
+
+    fn posture(&mut self, time_s: f64) -> usize {
+        self.effort.postures += 1;
+        let position = self.motion.position(time_s);
+        let links = self.model.world_from_links(&position);
+        let links = links.each_ref().map(Placement::new);
+        self.postures
+            .push(Posture::new(&self.model.chain, time_s, position, links));
+        self.postures.len() - 1
+    }
+
+    /// The posture at an end of a span, with the least clearances there.
+    fn start(&mut self, span: &Span, time_s: f64) -> usize {
+        let index = self.posture(time_s);
+        let minima = self.model.minimum_per_class(&self.postures[index].position);
+        for found in minima.iter() {
+            if counts(found.class, span.phase) {
+                self.attain(found, time_s, span.phase);
+            }
+        }
+        index
+    }
+
+    fn attain(&mut self, found: &PairClearance, time_s: f64, phase: Phase) {
+        let class = &mut self.classes[found.class as usize];
+        let lower_bound_m = class.map_or(f64::INFINITY, |known| known.lower_bound_m);
+        let nearer = class
+            .is_none_or(|known| found.separation.distance_m < known.attained.separation.distance_m);
+        if nearer {
+            *class = Some(ClassCertificate {
+                lower_bound_m,
+                attained: *found,
+                time_s,
+                phase,
+            });
+        }
+    }
+
+    fn attained_m(&self, class: ClearanceClass) -> f64 {
+        self.classes[class as usize]
+            .as_ref()
+            .map_or(f64::INFINITY, |known| known.attained.separation.distance_m)
+    }
+
+    /// Counts a bound that holds over an interval.
+    fn count(&mut self, class: ClearanceClass, bound_m: f64) {
+        if let Some(known) = &mut self.classes[class as usize] {
+            // A bound that is no number proves nothing.
+            let bound_m = if bound_m.is_nan() {
+                f64::NEG_INFINITY
+            } else {
+                bound_m
+            };
+            known.lower_bound_m = known.lower_bound_m.min(bound_m);
+        }
+    }
+
+    /// Closes what can be closed in an interval, and halves it for the rest.
+    fn work_on(&mut self, interval: &Interval) -> Option<[Interval; 2]> {
+        self.effort.intervals += 1;
+        let (left_s, right_s) = (
+            self.postures[interval.left].time_s,
+            self.postures[interval.right].time_s,
+        );
+        let is_finite = [interval.left, interval.right].iter().all(|&posture| {
+            self.postures[posture]
+                .position
+                .iter()
+                .all(|q| q.is_finite())
+        });
+        let may_halve = is_finite
+            && right_s - left_s > LEAST_INTERVAL_S
+            && self.effort.intervals < MOST_INTERVALS;
+        let deviation_rad = self.motion.chord_deviation(left_s, right_s);
+        let mut open = Vec::new();
+        for each in &interval.open {
+            let class = self.couples[each.couple].class;
+            let enough_m = self.attained_m(class) - self.options.tolerance_m;
+            let (bound_m, way_m) = {
+                let sweep = Sweep::new(
+                    &self.postures[interval.left],
+                    &self.postures[interval.right],
+                    deviation_rad,
+                    &self.chain,
+                    self.length_scale,
+                );
+                self.bound(&sweep, interval, each)
+            };
+            let is_closed = bound_m >= enough_m
+                // Two surfaces that cross: their depth need not follow the motion smoothly.
+                || (way_m <= self.options.tolerance_m
+                    && !self.couples[each.couple].are_convex()
+                    && bound_m < 0.0);
+            if is_closed || !may_halve {
+                self.count(class, bound_m);
+            } else {
+                open.push(Open {
+                    couple: each.couple,
+                    known: each.known,
+                });
+            }
+        }
+        if open.is_empty() {
+            return None;
+        }
+        Some(self.halved(interval, &open))
+    }
+
+    /// Lower bound of a couple's clearance over an interval, and its way in it, m.
+    fn bound(&self, sweep: &Sweep<'_>, interval: &Interval, open: &Open) -> (f64, f64) {
+        let couple = &self.couples[open.couple];
+        let first = couple.first_joint();
+        let points = sweep.point_bounds(&couple.moving, couple.outer, first);
+        let lost_m = points.deviation_m + ROUNDING_M;
+        match &open.known {
+            Known::Capsules => (
+                self.by_capsules_m(couple, interval, &points) - lost_m,
+                f64::INFINITY,
+            ),
+            Known::Planes([(_, one), (_, two)]) => (
+                one.least_of_larger_m(two, points.curvature_m) - lost_m,
+                f64::INFINITY,
+            ),
+            Known::Ends(ends) => {
+                let way_m = sweep.way_m(&couple.moving, couple.outer, first, &points);
+                let bound_m = 0.5 * (ends.left_m + ends.right_m - way_m) - lost_m;
+                if bound_m > 0.0 || couple.are_convex() {
+                    return (bound_m, way_m);
+                }
+                let around_m = self.by_capsules_m(couple, interval, &points) - lost_m;
+                (around_m, way_m + points.deviation_m)
+            }
+        }
+    }
+
+    /// The same by the capsules around both solids, in the directions in which they see each
+    /// other at the ends.
+    fn by_capsules_m(&self, couple: &Couple<'_>, interval: &Interval, points: &PointBounds) -> f64 {
+        let inner = &couple.inner.bound;
+        let outer = [interval.left, interval.right].map(|posture| {
+            let placement = couple.inner_from_outer(&self.postures[posture]);
+            couple.outer.bound.placed(&placement)
+        });
+        let [one, two] = outer.map(|seen| {
+            let normal = inner
+                .towards(&seen)
+                .try_normalize(0.0)
+                .unwrap_or_else(Vector3::z);
+            Gaps {
+                left_m: capsule_gap_m(&normal, &outer[0], inner),
+                right_m: capsule_gap_m(&normal, &outer[1], inner),
+            }
+        });
+        one.least_of_larger_m(&two, points.curvature_m)
+    }
+
+    /// Looks at the posture in the middle and hands the open couples to both halves.
+    fn halved(&mut self, interval: &Interval, open: &[Open]) -> [Interval; 2] {
+        let time_s =
+            0.5 * (self.postures[interval.left].time_s + self.postures[interval.right].time_s);
+        let middle = self.posture(time_s);
+        let mut halves =
+            [(interval.left, middle), (middle, interval.right)].map(|(left, right)| Interval {
+                left,
+                right,
+                phase: interval.phase,
+                open: Vec::with_capacity(open.len()),
+            });
+        for each in open {
+            let known = self.look(interval, middle, each);
+            for (half, known) in halves.iter_mut().zip(known) {
+                half.open.push(Open {
+                    couple: each.couple,
+                    known,
+                });
+            }
+        }
+        halves
+    }
+
+    /// What is known of a couple in both halves once its middle has been looked at.
+    fn look(&mut self, interval: &Interval, middle: usize, open: &Open) -> [Known; 2] {
+        let couple = &self.couples[open.couple];
+        let placement = couple.inner_from_outer(&self.postures[middle]);
+        let attained_m = self.attained_m(couple.class);
+        match open.known {
+            Known::Capsules => {
+                // Farther than the nearest: shorter intervals do, without a distance.
+                if couple.capsules_m(&placement) >= attained_m {
+                    return [Known::Capsules; 2];
+                }
+                let separation = self.distance(open.couple, middle, &placement, interval.phase);
+                match self.plane(open.couple, interval, &placement, &separation) {
+                    None => [Known::Capsules; 2],
+                    Some((plane, middle_m, ends)) => [
+                        Known::Planes([(plane, ends.left_half(middle_m)); 2]),
+                        Known::Planes([(plane, ends.right_half(middle_m)); 2]),
+                    ],
+                }
+            }
+            Known::Planes(mut planes) => {
+                self.effort.planes += 2;
+                let middles_m = planes
+                    .each_mut()
+                    .map(|(plane, _)| plane.gap_m(couple.outer, &placement));
+                let halves = [0, 1].map(|i| {
+                    let (plane, gaps) = planes[i];
+                    [
+                        (plane, gaps.left_half(middles_m[i])),
+                        (plane, gaps.right_half(middles_m[i])),
+                    ]
+                });
+                // These directions do where the couple is not the nearest of its class.
+                let kept = [
+                    Known::Planes([halves[0][0], halves[1][0]]),
+                    Known::Planes([halves[0][1], halves[1][1]]),
+                ];
+                if middles_m[0].max(middles_m[1]) >= attained_m {
+                    return kept;
+                }
+                let separation = self.distance(open.couple, middle, &placement, interval.phase);
+                let Some((plane, middle_m, ends)) =
+                    self.plane(open.couple, interval, &placement, &separation)
+                else {
+                    return kept;
+                };
+                let better = |measure: &dyn Fn(&Gaps) -> f64| {
+                    usize::from(measure(&planes[1].1) > measure(&planes[0].1))
+                };
+                let (at_left, at_right) =
+                    (better(&|gaps| gaps.left_m), better(&|gaps| gaps.right_m));
+                [
+                    Known::Planes([halves[at_left][0], (plane, ends.left_half(middle_m))]),
+                    Known::Planes([(plane, ends.right_half(middle_m)), halves[at_right][1]]),
+                ]
+            }
+            Known::Ends(ends) => {
+                let mut middle_m = couple.capsules_m(&placement);
+                let reach_m = ends.left_m.max(ends.right_m) - middle_m;
+                if middle_m < attained_m + reach_m.max(0.0) || middle_m < 2.0 * attained_m {
+                    let separation = self.distance(open.couple, middle, &placement, interval.phase);
+                    middle_m = separation.distance_m;
+                }
+                [
+                    Known::Ends(ends.left_half(middle_m)),
+                    Known::Ends(ends.right_half(middle_m)),
+                ]
+            }
+        }
+    }
+
+    fn distance(
+        &mut self,
+        couple: usize,
+        posture: usize,
+        inner_from_outer: &Placement,
+        phase: Phase,
+    ) -> Separation {
+        self.effort.distances += 1;
+        let couple = &self.couples[couple];
+        let separation = couple.separation(inner_from_outer);
+        let posture = &self.postures[posture];
+        let time_s = posture.time_s;
+        if separation.distance_m < self.attained_m(couple.class) {
+            let found = couple.clearance(&separation, posture);
+            self.attain(&found, time_s, phase);
+        }
+        separation
+    }
+
+    /// The plane of a separation with its gaps in the middle and at both ends; none if the
+    /// separation has no direction.
+    fn plane(
+        &mut self,
+        couple: usize,
+        interval: &Interval,
+        inner_from_outer: &Placement,
+        separation: &Separation,
+    ) -> Option<(Plane, f64, Gaps)> {
+        self.effort.planes += 3;
+        let couple = &self.couples[couple];
+        let normal = (-separation.normal.into_inner()).try_normalize(0.5)?;
+        let mut plane = Plane::across(normal, couple.inner);
+        let middle_m = plane.gap_m(couple.outer, inner_from_outer);
+        let [left_m, right_m] = [interval.left, interval.right].map(|posture| {
+            let placement = couple.inner_from_outer(&self.postures[posture]);
+            plane.gap_m(couple.outer, &placement)
+        });
+        Some((plane, middle_m, Gaps { left_m, right_m }))
+    }
+}
+
+/// Whether a class counts in a phase: needle and hand come only when the guide stands in its
+/// place.
+fn counts(class: ClearanceClass, phase: Phase) -> bool {
+    class != ClearanceClass::NeedleCorridor || phase == Phase::Hold
+}
