@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Cell, Goal, ResolvedScenario};
+use needlebench_cell::{Cell, Goal, ResolvedScenario, enclosures};
 use needlebench_engine::EngineIdentity;
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
@@ -57,6 +57,7 @@ pub(crate) fn assemble(
         criteria,
         goals,
         engine_failures,
+        enclosure: enclosures(&resolved.cell.robot),
         notes: resolved.notes.clone(),
         provenance: provenance(resolved, identities),
         timings,

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{
-    Fidelity, SurfaceIndex, check, convex_hull, decompose, is_convex, mend, size_m, volume_m3,
-};
+use super::cache::pieces_of;
+use super::{Fidelity, SurfaceIndex, check, convex_hull, is_convex, mend, size_m, volume_m3};
 use crate::shape::{Shape, SolidMesh, TriangleMesh};
 
 /// Share of a surface that mending may add.
@@ -43,11 +42,10 @@ pub(crate) fn shape_of_surface(
         return Ok((Shape::Mesh(Arc::new(SolidMesh { surface, pieces })), None));
     }
     let index = SurfaceIndex::new(surface);
-    let pieces = decompose(&index);
+    let (pieces, fidelity) = pieces_of(&index);
     if pieces.is_empty() {
         return Err("it has no convex hull with a volume".to_owned());
     }
-    let fidelity = Fidelity::measure(&index, &pieces);
     let surface = index.into_mesh();
     let shape = Shape::Mesh(Arc::new(SolidMesh { surface, pieces }));
     Ok((shape, Some(fidelity)))
