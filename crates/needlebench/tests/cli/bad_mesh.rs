@@ -163,7 +163,7 @@ fn phantom_of_files_alone_is_sound_before_it_is_spoilt() {
 #[test]
 fn files_are_part_of_the_provenance_and_the_needle_keeps_from_the_bone() {
     let bench = bench(&scenario());
-    bench.run(&["run", "s.toml", "--engine", "rapier", "-q"]);
+    bench.run(&["run", "s.toml", "--engine", "rapier"]);
     let report = bench.read_json("out/small/report.json");
     let inputs = report["provenance"]["inputs"].as_array().unwrap();
     let parts: Vec<&str> = inputs
