@@ -13,6 +13,10 @@ use crate::shape::{Shape, Solid};
 /// Samples on the surface of a link, about.
 const SAMPLES: f64 = 20_000.0;
 
+/// How much denser the samples are by which a protrusion is found: it is the unsafe side, and a
+/// distance from primitives costs little.
+const FINER: f64 = 5.0;
+
 /// How far the tessellated primitives may be inside the true ones, m.
 const CHORD_ERROR_M: f64 = 1e-5;
 
@@ -31,7 +35,7 @@ pub struct LinkEnclosure {
     /// How far the link's surface reaches out of the primitives at most; negative: it is inside
     /// everywhere, by that much at least.
     pub worst_protrusion_m: f64,
-    /// Distance between neighbouring samples.
+    /// Distance between neighbouring samples; a fifth of it for the protrusion.
     pub sample_spacing_m: f64,
 }
 
@@ -110,7 +114,7 @@ fn compare(link: &str, solids: &[Solid], primitives: &[Solid]) -> LinkEnclosure 
     }
     let worst_protrusion_m = surfaces
         .iter()
-        .flat_map(|surface| points_on(surface.mesh(), spacing_m))
+        .flat_map(|surface| points_on(surface.mesh(), spacing_m / FINER))
         .map(|point| {
             primitives
                 .iter()

@@ -14,6 +14,10 @@ const MOST_PIECES: usize = 16;
 /// A piece is cut no further once no sample of its hull is further than this from the solid, m.
 const GOOD_ENOUGH_M: f64 = 1e-3;
 
+/// How far a point may be outside the hull of its piece, m: finely drawn surfaces have thousands of
+/// points that make no difference to an engine but time.
+const LEFT_OUT_M: f64 = 2e-5;
+
 /// Samples of a piece's hull by which it is judged.
 const HULL_SAMPLES: f64 = 1500.0;
 
@@ -36,7 +40,7 @@ const CONVEX: f64 = 1e-7;
 /// Convex pieces that together contain the solid within a closed surface.
 ///
 /// The surface is cut by planes, and each piece is the hull of what lies between them, so that the
-/// pieces leave nothing of the solid uncovered. Always the piece that reaches furthest beyond the
+/// pieces leave nothing of the solid uncovered but the 0.02 mm by which hulls are simplified. Always the piece that reaches furthest beyond the
 /// solid is cut next, where the hulls of its two halves have the least volume together; planes are
 /// along the axes of the solid's box. Nothing is random.
 pub(crate) fn decompose(solid: &SurfaceIndex) -> Vec<ConvexMesh> {
@@ -71,7 +75,7 @@ pub(crate) fn decompose(solid: &SurfaceIndex) -> Vec<ConvexMesh> {
 
 /// Whether a closed surface is that of its own convex hull, within the rounding of an STL file.
 pub(crate) fn is_convex(mesh: &TriangleMesh) -> bool {
-    let Ok(hull) = robust_hull(&mesh.vertices_m) else {
+    let Ok(hull) = robust_hull(&mesh.vertices_m, 0.0) else {
         return false;
     };
     let gap_m = (volume_m3(&hull.0) - volume_m3(mesh)) / area_m2(&hull.0);
@@ -131,7 +135,7 @@ struct Part {
 impl Part {
     /// None for a part without a volume.
     fn new(triangles: Vec<Triangle>, solid: &SurfaceIndex) -> Option<Self> {
-        let hull = robust_hull(&distinct(&triangles)).ok()?;
+        let hull = robust_hull(&distinct(&triangles), LEFT_OUT_M).ok()?;
         let (overhang_m, below) = overhang(&hull, solid, HULL_SAMPLES);
         Some(Self {
             triangles,
@@ -271,7 +275,7 @@ fn rough_hull(points: &[Point3<f64>]) -> Option<ConvexMesh> {
     extreme.sort_unstable();
     extreme.dedup();
     let points: Vec<Point3<f64>> = extreme.into_iter().map(|i| points[i]).collect();
-    robust_hull(&points).ok()
+    robust_hull(&points, LEFT_OUT_M).ok()
 }
 
 /// Directions spread evenly over the sphere (a Fibonacci lattice).
@@ -291,6 +295,9 @@ mod tests {
     use super::super::Fidelity;
     use super::super::test_meshes::{bowl, cuboid, ell, torus};
     use super::*;
+
+    /// What hulls leave out: within that of a face, then of the faces that came after it.
+    const LEFT_OUT_AT_MOST_M: f64 = 1.5 * LEFT_OUT_M;
 
     /// Rounding of coordinates of a decimetre, through planes.
     const ROUNDING_M: f64 = 1e-12;
@@ -321,10 +328,10 @@ mod tests {
 
     #[test]
     fn pieces_leave_nothing_uncovered_and_keep_close() {
-        // The hull of the L is 37 mm from it in its corner, that of the bowl 40 mm.
+        // The L falls into two boxes. The hull of the L is 37 mm from it in its corner, that of the bowl 40 mm.
         for (mesh, overhang_m) in [(ell(), 1e-6), (bowl(), 10e-3), (torus(48, 24), 7e-3)] {
             let found = fidelity(mesh);
-            assert!(found.uncovered_m < ROUNDING_M, "{found:?}");
+            assert!(found.uncovered_m < LEFT_OUT_AT_MOST_M, "{found:?}");
             assert!(found.overhang_m < overhang_m, "{found:?}");
             assert!(found.mean_overhang_m < 0.1 * overhang_m, "{found:?}");
         }

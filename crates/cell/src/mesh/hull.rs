@@ -14,18 +14,16 @@ const HULL_TOLERANCE: f64 = 1e-9;
 /// # Errors
 /// Says why, if the points are flat, or if rounding broke the hull (it is checked, not trusted).
 pub fn convex_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> {
-    let mut hull = Hull::around(points)?;
-    hull.grow((0..points.len()).collect())?;
-    hull.finish()
+    hull_within(points, 0.0)
 }
 
-/// A convex hull of points that rounding would break otherwise: of points that are moved by up to
-/// 1e-8 of its size (1e-6 if need be), the same way every time.
+/// A convex hull that leaves out what is no more than `tolerance_m` outside.
 ///
 /// Many points in a plane or on a line, which cuts through a surface leave, make faces without an
-/// area of their own; moved points make none.
-pub(super) fn robust_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> {
-    let mut hull = convex_hull(points);
+/// area of their own where the tolerance is next to none; if that breaks the hull, the points are
+/// moved by up to 1e-8 of its size (1e-6 if need be), the same way every time.
+pub(super) fn robust_hull(points: &[Point3<f64>], tolerance_m: f64) -> Result<ConvexMesh, String> {
+    let mut hull = hull_within(points, tolerance_m);
     let Some(first) = points.first() else {
         return hull;
     };
@@ -49,9 +47,16 @@ pub(super) fn robust_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> 
                 point + Vector3::from(way.map(step)) * (share * size)
             })
             .collect();
-        hull = convex_hull(&moved);
+        hull = hull_within(&moved, tolerance_m);
     }
     hull
+}
+
+fn hull_within(points: &[Point3<f64>], tolerance_m: f64) -> Result<ConvexMesh, String> {
+    let mut hull = Hull::around(points)?;
+    hull.tolerance_m = hull.tolerance_m.max(tolerance_m);
+    hull.grow((0..points.len()).collect())?;
+    hull.finish()
 }
 
 struct Face {
@@ -204,6 +209,7 @@ impl<'a> Hull<'a> {
             .iter()
             .flat_map(|face| (0..self.points.len()).map(|i| self.height(face, i)))
             .fold(f64::NEG_INFINITY, f64::max);
+        // What is dropped is within the tolerance of a face, but for rounding.
         if worst > 10.0 * self.tolerance_m {
             return Err(format!("its convex hull misses a point by {worst:.1e} m"));
         }
