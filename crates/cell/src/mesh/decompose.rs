@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use nalgebra::{Point3, Vector3};
 
-use super::hull::robust_hull;
+use super::hull::{robust_hull, simplified_hull};
 use super::{SurfaceIndex, area_m2, corners, points_on, volume_m3};
 use crate::shape::{ConvexMesh, TriangleMesh};
 
@@ -135,7 +135,7 @@ struct Part {
 impl Part {
     /// None for a part without a volume.
     fn new(triangles: Vec<Triangle>, solid: &SurfaceIndex) -> Option<Self> {
-        let hull = robust_hull(&distinct(&triangles), LEFT_OUT_M).ok()?;
+        let hull = simplified_hull(&distinct(&triangles), LEFT_OUT_M).ok()?;
         let (overhang_m, below) = overhang(&hull, solid, HULL_SAMPLES);
         Some(Self {
             triangles,
@@ -145,24 +145,26 @@ impl Part {
         })
     }
 
-    /// The two halves on either side of the best plane.
+    /// The two halves on either side of the best plane that leaves two with a volume.
     fn halves(&self, solid: &SurfaceIndex) -> Option<[Self; 2]> {
-        let plane = self.best_cut(solid)?;
-        let [low, high] = [plane.turned(), plane].map(|side| {
-            let triangles = self
-                .triangles
-                .iter()
-                .flat_map(|triangle| {
-                    let kept = clipped(triangle, side);
-                    (2..kept.len()).map(move |k| [kept[0], kept[k - 1], kept[k]])
-                })
-                .collect();
-            Self::new(triangles, solid)
-        });
-        Some([low?, high?])
+        self.cuts_by_merit(solid).into_iter().find_map(|plane| {
+            let half = |side: Plane| {
+                let triangles = self
+                    .triangles
+                    .iter()
+                    .flat_map(|triangle| {
+                        let kept = clipped(triangle, side);
+                        (2..kept.len()).map(move |k| [kept[0], kept[k - 1], kept[k]])
+                    })
+                    .collect();
+                Self::new(triangles, solid)
+            };
+            Some([half(plane.turned())?, half(plane)?])
+        })
     }
 
-    fn best_cut(&self, solid: &SurfaceIndex) -> Option<Plane> {
+    /// Planes to cut along, the best first.
+    fn cuts_by_merit(&self, solid: &SurfaceIndex) -> Vec<Plane> {
         let stride = self.triangles.len().div_ceil(CUT_TRIANGLES);
         let sample: Vec<&Triangle> = self.triangles.iter().step_by(stride).collect();
         let area = area_m2(&self.hull.0);
@@ -181,7 +183,7 @@ impl Part {
             normal,
             offset_m: normal.dot(&self.below.coords),
         });
-        ranked
+        let mut judged: Vec<(f64, Plane)> = ranked
             .into_iter()
             .map(|(_, plane)| plane)
             .chain(through_the_worst)
@@ -192,8 +194,9 @@ impl Part {
                 let cost_m = a.max(b) + 0.5 * a.min(b) + 2.0 * volume / area;
                 Some((cost_m, plane))
             })
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, plane)| plane)
+            .collect();
+        judged.sort_by(|a, b| a.0.total_cmp(&b.0));
+        judged.into_iter().map(|(_, plane)| plane).collect()
     }
 
     /// Planes across the part, evenly spaced.
@@ -296,8 +299,8 @@ mod tests {
     use super::super::test_meshes::{bowl, cuboid, ell, torus};
     use super::*;
 
-    /// What hulls leave out: within that of a face, then of the faces that came after it.
-    const LEFT_OUT_AT_MOST_M: f64 = 1.5 * LEFT_OUT_M;
+    /// What hulls leave out is checked to be no more; rounding.
+    const LEFT_OUT_AT_MOST_M: f64 = LEFT_OUT_M * 1.001;
 
     /// Rounding of coordinates of a decimetre, through planes.
     const ROUNDING_M: f64 = 1e-12;
@@ -329,7 +332,7 @@ mod tests {
     #[test]
     fn pieces_leave_nothing_uncovered_and_keep_close() {
         // The L falls into two boxes. The hull of the L is 37 mm from it in its corner, that of the bowl 40 mm.
-        for (mesh, overhang_m) in [(ell(), 1e-6), (bowl(), 10e-3), (torus(48, 24), 7e-3)] {
+        for (mesh, overhang_m) in [(ell(), 1e-6), (bowl(), 15e-3), (torus(48, 24), 7e-3)] {
             let found = fidelity(mesh);
             assert!(found.uncovered_m < LEFT_OUT_AT_MOST_M, "{found:?}");
             assert!(found.overhang_m < overhang_m, "{found:?}");
