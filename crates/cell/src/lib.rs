@@ -4,6 +4,7 @@
 //! [`ResolvedScenario`], or [`Finding`]s that say what to mend and where.
 
 mod calibration;
+mod enclosure;
 mod files;
 mod finding;
 pub mod fixtures;
@@ -30,6 +31,7 @@ mod values;
 mod yaml_text;
 
 pub use calibration::{AppliedCalibration, Calibration, OriginDeviation};
+pub use enclosure::{LinkEnclosure, enclosures};
 pub use files::{PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};
 pub use goal::{Expectation, Goal, PlacedPhantom, REJECTION_RULES, Roll};

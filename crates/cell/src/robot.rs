@@ -431,7 +431,7 @@ pub(crate) fn read_solids(
             shape
         } else {
             let mesh = read_mesh(urdf, location, packages, element)?;
-            let (shape, said) = shape_of_link(mesh, &link.name).map_err(|why| {
+            let (shape, said) = shape_of_link(&mesh, &link.name).map_err(|why| {
                 urdf.finding(
                     &element.span,
                     format!("collision mesh of '{}': {why}", link.name),

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use needlebench_cell::LinkEnclosure;
 use needlebench_engine::EngineIdentity;
 use serde::Serialize;
 
@@ -28,6 +29,9 @@ pub struct Report {
     pub goals: Vec<GoalReport>,
     /// Engines that failed, and how; their results are missing.
     pub engine_failures: Vec<EngineFailure>,
+    /// What the shipped arm's enclosing primitives would cost beside the meshes of the robot in
+    /// use; empty unless that robot is a UR3 with meshes of its own.
+    pub enclosure: Vec<LinkEnclosure>,
     /// What was assumed or adjusted.
     pub notes: Vec<String>,
     /// Where the numbers come from.

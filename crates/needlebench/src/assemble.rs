@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Cell, Goal, ResolvedScenario};
+use needlebench_cell::{Cell, Goal, ResolvedScenario, enclosures};
 use needlebench_engine::EngineIdentity;
 use needlebench_evaluation::ranking::{Preferences, rank_goal};
 use needlebench_evaluation::report::{
@@ -62,6 +62,7 @@ pub(crate) fn assemble(
         criteria,
         goals,
         engine_failures,
+        enclosure: enclosures(&resolved.cell.robot),
         notes: resolved.notes.clone(),
         provenance: provenance(resolved, identities),
         timings,

@@ -275,16 +275,18 @@ impl EdgeCounts {
     }
 }
 
+/// The vertex that stands for the part that a vertex belongs to.
+fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
+    while parents[vertex as usize] != vertex {
+        parents[vertex as usize] = parents[parents[vertex as usize] as usize];
+        vertex = parents[vertex as usize];
+    }
+    vertex
+}
+
 /// The largest triangle of every part that shares no vertex with another, in order.
 fn components(mesh: &TriangleMesh) -> Vec<usize> {
     let mut parents: Vec<u32> = (0..).take(mesh.vertices_m.len()).collect();
-    fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
-        while parents[vertex as usize] != vertex {
-            parents[vertex as usize] = parents[parents[vertex as usize] as usize];
-            vertex = parents[vertex as usize];
-        }
-        vertex
-    }
     for &[a, b, c] in &mesh.triangles {
         for other in [b, c] {
             let (from, to) = (root(&mut parents, a), root(&mut parents, other));

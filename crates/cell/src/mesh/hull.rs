@@ -14,18 +14,26 @@ const HULL_TOLERANCE: f64 = 1e-9;
 /// # Errors
 /// Says why, if the points are flat, or if rounding broke the hull (it is checked, not trusted).
 pub fn convex_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> {
-    let mut hull = Hull::around(points)?;
-    hull.grow((0..points.len()).collect())?;
-    hull.finish()
+    hull_within(points, 0.0)
 }
 
-/// A convex hull of points that rounding would break otherwise: of points that are moved by up to
-/// 1e-8 of its size (1e-6 if need be), the same way every time.
+/// A convex hull that leaves out what is no more than `tolerance_m` outside.
+pub(super) fn simplified_hull(
+    points: &[Point3<f64>],
+    tolerance_m: f64,
+) -> Result<ConvexMesh, String> {
+    let kept = robust_hull(points, tolerance_m)?;
+    // Bent inwards by up to the tolerance where a face was not seen to be visible.
+    robust_hull(&kept.0.vertices_m, 0.0)
+}
+
+/// A hull that rounding does not break, within a tolerance.
 ///
 /// Many points in a plane or on a line, which cuts through a surface leave, make faces without an
-/// area of their own; moved points make none.
-pub(super) fn robust_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> {
-    let mut hull = convex_hull(points);
+/// area of their own where the tolerance is next to none. If that breaks the hull, the points are
+/// moved by up to 1e-8 of its size (1e-6 if need be), the same way every time.
+pub(super) fn robust_hull(points: &[Point3<f64>], tolerance_m: f64) -> Result<ConvexMesh, String> {
+    let mut hull = hull_within(points, tolerance_m);
     let Some(first) = points.first() else {
         return hull;
     };
@@ -49,9 +57,23 @@ pub(super) fn robust_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> 
                 point + Vector3::from(way.map(step)) * (share * size)
             })
             .collect();
-        hull = convex_hull(&moved);
+        hull = hull_within(&moved, tolerance_m);
     }
     hull
+}
+
+fn hull_within(points: &[Point3<f64>], tolerance_m: f64) -> Result<ConvexMesh, String> {
+    /// Points that were inside for the faces at hand may be in front of others; hardly ever twice.
+    const ROUNDS: usize = 4;
+    let mut hull = Hull::around(points)?;
+    hull.tolerance_m = hull.tolerance_m.max(tolerance_m);
+    for _ in 0..ROUNDS {
+        hull.grow()?;
+        if hull.is_complete() {
+            break;
+        }
+    }
+    hull.finish()
 }
 
 struct Face {
@@ -134,11 +156,10 @@ impl<'a> Hull<'a> {
         face.normal.dot(&self.points[point].coords) - face.offset
     }
 
-    /// Adds points until none of these is outside.
-    fn grow(&mut self, mut waiting: Vec<usize>) -> Result<(), String> {
+    /// Adds points until none is outside that was seen to be.
+    fn grow(&mut self) -> Result<(), String> {
         let all = 0..self.faces.len();
-        self.assign(waiting.drain(..), all);
-        // The last faces are the newest; whose points are gone is looked at once.
+        self.assign(0..self.points.len(), all);
         let mut at = 0;
         while at < self.faces.len() {
             let face = &self.faces[at];
@@ -198,12 +219,21 @@ impl<'a> Hull<'a> {
         Ok(())
     }
 
+    fn is_complete(&self) -> bool {
+        let mut points = 0..self.points.len();
+        points.all(|point| {
+            let mut faces = self.faces.iter();
+            faces.all(|face| self.height(face, point) <= self.tolerance_m)
+        })
+    }
+
     fn finish(self) -> Result<ConvexMesh, String> {
         let worst = self
             .faces
             .iter()
             .flat_map(|face| (0..self.points.len()).map(|i| self.height(face, i)))
             .fold(f64::NEG_INFINITY, f64::max);
+        // What is dropped is within the tolerance of a face, but for rounding.
         if worst > 10.0 * self.tolerance_m {
             return Err(format!("its convex hull misses a point by {worst:.1e} m"));
         }

@@ -81,12 +81,8 @@ fn open_loops(mesh: &TriangleMesh) -> Vec<Vec<u32>> {
             .and_then(|vertex| onward.get_mut(vertex))
             .and_then(Vec::pop)
         {
-            match path.iter().position(|&vertex| vertex == next) {
-                Some(at) => loops.push(path.split_off(at)),
-                None => {
-                    path.push(next);
-                    continue;
-                }
+            if let Some(at) = path.iter().position(|&vertex| vertex == next) {
+                loops.push(path.split_off(at));
             }
             path.push(next);
         }

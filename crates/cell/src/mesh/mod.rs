@@ -1,5 +1,6 @@
 //! Triangle meshes: reading, checking and mending them, and the convex pieces that engines need.
 
+mod cache;
 mod check;
 mod decompose;
 mod fidelity;

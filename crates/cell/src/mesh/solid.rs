@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{
-    Fidelity, SurfaceIndex, check, convex_hull, decompose, is_convex, mend, size_m, volume_m3,
-};
+use super::cache::pieces_of;
+use super::{Fidelity, SurfaceIndex, check, convex_hull, is_convex, mend, size_m, volume_m3};
 use crate::shape::{Shape, SolidMesh, TriangleMesh};
 
 /// Share of a surface that mending may add.
@@ -43,11 +42,10 @@ pub(crate) fn shape_of_surface(
         return Ok((Shape::Mesh(Arc::new(SolidMesh { surface, pieces })), None));
     }
     let index = SurfaceIndex::new(surface);
-    let pieces = decompose(&index);
+    let (pieces, fidelity) = pieces_of(&index);
     if pieces.is_empty() {
         return Err("it has no convex hull with a volume".to_owned());
     }
-    let fidelity = Fidelity::measure(&index, &pieces);
     let surface = index.into_mesh();
     let shape = Shape::Mesh(Arc::new(SolidMesh { surface, pieces }));
     Ok((shape, Some(fidelity)))
@@ -59,10 +57,10 @@ pub(crate) fn shape_of_surface(
 /// their area. They are mended, and said to be, as long as that adds hardly any surface. A mesh
 /// that is open beyond that, or inside out, stands as its convex hull, which contains it.
 pub(crate) fn shape_of_link(
-    mesh: TriangleMesh,
+    mesh: &TriangleMesh,
     link: &str,
 ) -> Result<(Shape, Vec<String>), String> {
-    let largest_m = size_m(&mesh).max();
+    let largest_m = size_m(mesh).max();
     if largest_m > LARGEST_LINK_M {
         return Err(format!(
             "it is {largest_m:.1} m large: is it in millimetres? Then set \
@@ -78,11 +76,11 @@ pub(crate) fn shape_of_link(
         );
         Ok((Shape::Convex(Arc::new(hull)), vec![note]))
     };
-    let open = check::open_edges(&mesh);
+    let open = check::open_edges(mesh);
     let mended = mend(mesh.clone());
     if mended.filled_share > MENDABLE {
         return hull_of(
-            &mesh,
+            mesh,
             format!(
                 ": its surface is open ({open} edges, {:.0} % of the surface is missing)",
                 mended.filled_share * 1e2
@@ -90,10 +88,10 @@ pub(crate) fn shape_of_link(
         );
     }
     if let Some(inverted) = check::inverted(&mended.mesh) {
-        return hull_of(&mesh, format!(": {inverted}"));
+        return hull_of(mesh, format!(": {inverted}"));
     }
     if volume_m3(&mended.mesh) <= 0.0 {
-        return hull_of(&mesh, ": its surface encloses no volume".to_owned());
+        return hull_of(mesh, ": its surface encloses no volume".to_owned());
     }
     let triangles = mended.mesh.triangles.len();
     let (shape, fidelity) = shape_of_surface(mended.mesh, Use::Collision)?;
@@ -127,20 +125,20 @@ mod tests {
     use super::super::test_meshes::{bowl, cuboid, ell, inverted};
     use super::*;
 
-    fn link(mesh: TriangleMesh) -> (Shape, Vec<String>) {
+    fn link(mesh: &TriangleMesh) -> (Shape, Vec<String>) {
         shape_of_link(mesh, "forearm_link").unwrap()
     }
 
     #[test]
     fn convex_mesh_is_its_hull() {
-        let (shape, notes) = link(cuboid([0.03, 0.02, 0.01]));
+        let (shape, notes) = link(&cuboid([0.03, 0.02, 0.01]));
         assert!(matches!(shape, Shape::Convex(_)), "{shape:?}");
         assert!(notes[0].contains("convex hull (8 vertices)"), "{notes:?}");
     }
 
     #[test]
     fn hollow_mesh_is_its_surface_and_has_pieces() {
-        let (shape, notes) = link(ell());
+        let (shape, notes) = link(&ell());
         let Shape::Mesh(mesh) = shape else {
             panic!("{shape:?}")
         };
@@ -153,7 +151,7 @@ mod tests {
     fn seam_is_closed_and_told() {
         let mut mesh = super::super::test_meshes::torus(48, 24);
         mesh.triangles.remove(100);
-        let (shape, notes) = link(mesh.clone());
+        let (shape, notes) = link(&mesh);
         let Shape::Mesh(solid) = shape else {
             panic!("{shape:?}")
         };
@@ -168,10 +166,10 @@ mod tests {
     fn open_mesh_and_one_inside_out_stand_as_their_hulls_and_it_is_told() {
         let mut open = ell();
         open.triangles.truncate(18);
-        let (shape, notes) = link(open);
+        let (shape, notes) = link(&open);
         assert!(matches!(shape, Shape::Convex(_)));
         assert!(notes[0].contains("its surface is open"), "{notes:?}");
-        let (shape, notes) = link(inverted(bowl()));
+        let (shape, notes) = link(&inverted(bowl()));
         assert!(matches!(shape, Shape::Convex(_)));
         assert!(notes[0].contains("inside out"), "{notes:?}");
     }
@@ -182,7 +180,7 @@ mod tests {
         for vertex in &mut mesh.vertices_m {
             *vertex *= 1e3;
         }
-        let why = shape_of_link(mesh, "forearm_link").unwrap_err();
+        let why = shape_of_link(&mesh, "forearm_link").unwrap_err();
         assert!(
             why.contains("100.0 m") && why.contains("scale=\"0.001"),
             "{why}"

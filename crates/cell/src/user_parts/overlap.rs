@@ -40,13 +40,12 @@ pub(super) fn check_inside_skin(
         if index.is_none() && user_skin.is_none() {
             continue;
         }
-        let worst = match index {
-            Some(index) => outermost(meshes[index].surface.vertices_m.iter().copied(), skin),
-            None => {
-                let surface = part.solid.shape.surface(CHORD_ERROR_M);
-                let pose = part.solid.parent_from_shape;
-                outermost(surface.vertices_m.iter().map(|v| pose * v), skin)
-            }
+        let worst = if let Some(index) = index {
+            outermost(meshes[index].surface.vertices_m.iter().copied(), skin)
+        } else {
+            let surface = part.solid.shape.surface(CHORD_ERROR_M);
+            let pose = part.solid.parent_from_shape;
+            outermost(surface.vertices_m.iter().map(|v| pose * v), skin)
         };
         let Some((out_m, at_m)) = worst.filter(|(out_m, _)| *out_m > OUT_OF_SKIN_M) else {
             continue;

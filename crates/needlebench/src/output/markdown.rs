@@ -116,6 +116,23 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             failure.engine, failure.message
         )?;
     }
+    if !report.enclosure.is_empty() {
+        writeln!(
+            out,
+            "\n| Link | Enclosing primitives off the mesh, mean (mm) | Worst (mm) | Mesh out of the primitives (mm) |\n|---|--:|--:|--:|"
+        )?;
+        for each in &report.enclosure {
+            writeln!(
+                out,
+                "| {} | {:.2} | {:.2} | {:.2} |",
+                each.link,
+                each.mean_overhang_m * 1e3,
+                each.worst_overhang_m * 1e3,
+                each.worst_protrusion_m * 1e3
+            )?;
+        }
+        writeln!(out)?;
+    }
     for note in &report.notes {
         writeln!(out, "- note: {note}")?;
     }

@@ -45,6 +45,17 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             failure.engine, failure.message
         )?;
     }
+    for each in &report.enclosure {
+        writeln!(
+            out,
+            "enclosing primitives of {}: {:.2} mm off its mesh on average, {:.2} mm at most; the \
+             mesh reaches {:.2} mm out of them",
+            each.link,
+            each.mean_overhang_m * 1e3,
+            each.worst_overhang_m * 1e3,
+            each.worst_protrusion_m * 1e3
+        )?;
+    }
     for note in &report.notes {
         writeln!(out, "note: {note}")?;
     }
