@@ -18,7 +18,7 @@ use crate::cli::RunArguments;
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
 use crate::output::pictures::{Backdrop, configuration_picture, goal_camera, sheet_caption};
-use crate::output::{junit, markdown, recording_csv, report_text};
+use crate::output::{junit, markdown, ranking_picture, recording_csv, report_text};
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
 use crate::progress::Progress;
@@ -325,6 +325,9 @@ fn write_pictures(
         }
         if !sheet.is_empty() {
             tile(&sheet, 4).write_png(&folder.join(format!("{}.png", goal.name)))?;
+        }
+        if let Some(image) = ranking_picture(goal_report) {
+            image.write_png(&folder.join(format!("{}.ranking.png", goal.name)))?;
         }
     }
     Ok(())

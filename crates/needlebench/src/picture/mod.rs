@@ -20,6 +20,7 @@ mod sheet;
 #[cfg(test)]
 mod tests;
 mod text;
+mod weighted_bars;
 
 use std::sync::Arc;
 
@@ -31,6 +32,7 @@ pub use camera::{Camera, Projection};
 pub use image::{Image, PictureError};
 pub use render::render;
 pub use sheet::tile;
+pub use weighted_bars::{WeightedBars, WeightedRow, weighted_bars};
 
 /// What a picture shows. Everything is in the world frame, z up.
 #[derive(Debug, Clone, Default)]
