@@ -61,6 +61,8 @@ fn length_text(metres: f64) -> String {
         format!("{:.1} um", metres * 1e6)
     } else if magnitude >= 1e-10 {
         format!("{:.1} nm", metres * 1e9)
+    } else if magnitude > 0.0 {
+        "< 0.1 nm".to_owned()
     } else {
         "0 mm".to_owned()
     }
@@ -155,7 +157,7 @@ const fn compared(
     }
 }
 
-/// Clearances are compared to what a phantom's skin is known to.
+/// Assumed: less than anybody would move a robot for.
 const CLEARANCE_RESOLUTION_M: f64 = 0.5e-3;
 /// Far below what any needle robot reaches, far above the rounding of two engines.
 const NEEDLE_RESOLUTION_M: f64 = 1e-6;
