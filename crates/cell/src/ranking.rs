@@ -52,8 +52,8 @@ pub struct RankingSection {
     pub sight_fraction: MetricRanking,
     /// Half-angle of the free cone behind the guide, deg. Default weight 1, worst 0, best 45.
     pub hand_cone_deg: MetricRanking,
-    /// Share of the doctor's stated preferences that the configuration meets. Default weight 1,
-    /// worst 0, best 1.
+    /// How well the doctor's stated preferences are met: mean of the elbow as preferred, 0 or 1, and
+    /// the free share of the preferred side. Default weight 1, worst 0, best 1.
     pub preference: MetricRanking,
 }
 

@@ -57,9 +57,15 @@ impl<'a> ConfigurationFacts<'a> {
         worst
     }
 
-    /// Least clearance of a class: its certified bound where there is one.
+    /// Least clearance of a class over the motion: its certified bound where there is one.
+    ///
+    /// What was not simulated has the clearances of its final posture alone. That is another
+    /// quantity, never less, and counts as not measured.
     pub(crate) fn class(self, class: &str) -> Option<f64> {
         let found = self.0.get("clearance")?.get(class)?;
+        if found.get("phase").and_then(Value::as_str) == Some("final_posture") {
+            return None;
+        }
         let number = |key: &str| found.get(key).and_then(Value::as_f64);
         number("certified_lower_bound_m").or_else(|| number("minimum_m"))
     }
@@ -67,6 +73,15 @@ impl<'a> ConfigurationFacts<'a> {
     pub(crate) fn least_of(self, classes: &[&str]) -> Option<f64> {
         let found = classes.iter().filter_map(|class| self.class(class));
         found.reduce(f64::min)
+    }
+
+    /// How well the doctor's preferences are met; none where none is stated.
+    pub(crate) fn preference(self) -> Option<f64> {
+        let elbow = self.0.pointer("/room/elbow_as_preferred");
+        let elbow = elbow.and_then(Value::as_bool).map(f64::from);
+        let side = self.number("/room/preferred_side_free_fraction");
+        let stated: Vec<f64> = [elbow, side].into_iter().flatten().collect();
+        (!stated.is_empty()).then(|| stated.iter().sum::<f64>() / stated.len() as f64)
     }
 
     /// When the arm stands in its final place.

@@ -311,7 +311,7 @@ pub const METRICS: &[Metric] = &[
         resolution: SHARE_RESOLUTION,
         in_pareto_set: false,
         ranking_key: Some(("preference", 1.0)),
-        read: |each| each.number("/preference_match"),
+        read: |each| each.preference(),
     },
     compared(
         "needle_angle_error",

@@ -326,8 +326,12 @@ fn write_pictures(
         if !sheet.is_empty() {
             tile(&sheet, 4).write_png(&folder.join(format!("{}.png", goal.name)))?;
         }
-        if let Some(image) = ranking_picture(goal_report) {
-            image.write_png(&folder.join(format!("{}.ranking.png", goal.name)))?;
+        let ranking = folder.join(format!("{}.ranking.png", goal.name));
+        match ranking_picture(goal_report) {
+            Some(image) => image.write_png(&ranking)?,
+            // Nobody should take an earlier run's for this one's.
+            None if ranking.exists() => std::fs::remove_file(&ranking)?,
+            None => {}
         }
     }
     Ok(())

@@ -334,7 +334,7 @@ fn ranking_of_a_scenario_is_stated_with_every_term() {
                 "pareto",
                 "dominated_by",
                 "room",
-                "preference_match",
+                "tip_sensitivity_m_per_rad",
             ],
         );
         if each["status"] != "ok" {
