@@ -24,8 +24,8 @@ pub struct RankingSection {
     /// worst 0, half 10, best 50: a hand is in there.
     pub needle_corridor_mm: MetricRanking,
     /// Settled distance of the needle's tip from the target in the worst engine, mm. Default
-    /// weight 2, worst 2.7, best 0: 2.7 is the largest error that interventional radiologists
-    /// allow, on the mean.
+    /// weight 2, worst 2.7, best 0: 2.7 is the mean of the largest errors that 153
+    /// interventional radiologists allow.
     pub tip_error_mm: MetricRanking,
     /// How far the needle's tip moves when every joint is off by independent errors, mm/mrad.
     /// Default weight 1, worst 1.5, best 0.5: an arm of 0.5 m stretched and folded.
@@ -52,8 +52,8 @@ pub struct RankingSection {
     pub sight_fraction: MetricRanking,
     /// Half-angle of the free cone behind the guide, deg. Default weight 1, worst 0, best 45.
     pub hand_cone_deg: MetricRanking,
-    /// Share of the doctor's stated preferences that the configuration meets. Default weight 1,
-    /// worst 0, best 1.
+    /// How well the doctor's stated preferences are met: mean of the elbow as preferred, 0 or 1, and
+    /// the free share of the preferred side. Default weight 1, worst 0, best 1.
     pub preference: MetricRanking,
 }
 

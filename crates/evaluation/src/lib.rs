@@ -5,11 +5,13 @@
 mod clearance;
 pub mod compare;
 mod criteria;
+mod facts;
 mod judge;
 pub mod metric;
 mod motion;
 mod needle;
 pub mod pareto;
+mod provenance;
 pub mod ranking;
 mod reason;
 pub mod report;

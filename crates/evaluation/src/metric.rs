@@ -5,9 +5,7 @@
 //! `report.json`, so that a result that was just made and one that was stored by an older version
 //! are read by the same code. What is missing, `null` or not finite was *not measured*.
 
-use serde_json::Value;
-
-use crate::report::ConfigurationReport;
+pub use crate::facts::ConfigurationFacts;
 
 /// What a metric measures, with its SI unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,6 +61,8 @@ fn length_text(metres: f64) -> String {
         format!("{:.1} um", metres * 1e6)
     } else if magnitude >= 1e-10 {
         format!("{:.1} nm", metres * 1e9)
+    } else if magnitude > 0.0 {
+        "< 0.1 nm".to_owned()
     } else {
         "0 mm".to_owned()
     }
@@ -127,85 +127,6 @@ impl Metric {
     }
 }
 
-/// A configuration as it stands in `report.json`.
-#[derive(Debug, Clone, Copy)]
-pub struct ConfigurationFacts<'a>(&'a Value);
-
-impl<'a> ConfigurationFacts<'a> {
-    /// Reads a member of `goals[].configurations`.
-    pub fn new(configuration: &'a Value) -> Self {
-        Self(configuration)
-    }
-
-    /// The JSON of a configuration, to be read by [`ConfigurationFacts::new`].
-    ///
-    /// A number that is not finite becomes `null` there: not measured.
-    pub fn json(configuration: &ConfigurationReport) -> Value {
-        serde_json::to_value(configuration).expect("reports have string keys")
-    }
-
-    /// The number at a JSON pointer.
-    fn number(self, pointer: &str) -> Option<f64> {
-        self.0.pointer(pointer)?.as_f64()
-    }
-
-    fn text(self, pointer: &str) -> Option<&'a str> {
-        self.0.pointer(pointer)?.as_str()
-    }
-
-    /// Its label.
-    pub fn label(self) -> Option<&'a str> {
-        self.text("/label")
-    }
-
-    /// Its status: `ok`, `rejected` or `failed`.
-    pub fn status(self) -> Option<&'a str> {
-        self.text("/status")
-    }
-
-    /// First rule that rejects it, with what it says.
-    pub fn rejection(self) -> Option<(&'a str, &'a str)> {
-        let rule = self.text("/rejections/0/rule")?;
-        Some((rule, self.text("/rejections/0/detail").unwrap_or_default()))
-    }
-
-    /// Largest value over the engines; none if one of them has none.
-    fn worst_engine(self, key: &str) -> Option<f64> {
-        let engines = self.0.get("engines")?.as_object()?;
-        let mut worst = None;
-        for engine in engines.values() {
-            let value = engine.pointer(key)?.as_f64()?;
-            worst = Some(worst.map_or(value, |known: f64| known.max(value)));
-        }
-        worst
-    }
-
-    /// Least clearance of a class: its certified bound where there is one.
-    fn class(self, class: &str) -> Option<f64> {
-        let found = self.0.get("clearance")?.get(class)?;
-        let number = |key: &str| found.get(key).and_then(Value::as_f64);
-        number("certified_lower_bound_m").or_else(|| number("minimum_m"))
-    }
-
-    fn least_of(self, classes: &[&str]) -> Option<f64> {
-        let found = classes.iter().filter_map(|class| self.class(class));
-        found.reduce(f64::min)
-    }
-
-    /// When the arm stands in its final place.
-    fn arrival_s(self) -> Option<f64> {
-        let phases = self.0.get("motion")?.as_array()?;
-        let times = phases
-            .iter()
-            .filter(|phase| {
-                let name = phase.get("phase").and_then(Value::as_str);
-                matches!(name, Some("transfer" | "approach"))
-            })
-            .map(|phase| phase.get("end_s").and_then(Value::as_f64));
-        times.reduce(|a, b| Some(a?.max(b?))).flatten()
-    }
-}
-
 /// Classes of arm and tool against what stands around them.
 const SURROUNDINGS: [&str; 5] = [
     "robot_phantom",
@@ -236,7 +157,7 @@ const fn compared(
     }
 }
 
-/// Clearances are compared to what a phantom's skin is known to.
+/// Assumed: less than anybody would move a robot for.
 const CLEARANCE_RESOLUTION_M: f64 = 0.5e-3;
 /// Far below what any needle robot reaches, far above the rounding of two engines.
 const NEEDLE_RESOLUTION_M: f64 = 1e-6;
@@ -390,7 +311,7 @@ pub const METRICS: &[Metric] = &[
         resolution: SHARE_RESOLUTION,
         in_pareto_set: false,
         ranking_key: Some(("preference", 1.0)),
-        read: |each| each.number("/preference_match"),
+        read: |each| each.preference(),
     },
     compared(
         "needle_angle_error",

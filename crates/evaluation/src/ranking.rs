@@ -8,37 +8,12 @@
 //! same metrics.
 
 use needlebench_cell::ranking::{Aim, RankingSection};
-use needlebench_kinematics::ik::{Configuration, Elbow, Shoulder};
 use serde::Serialize;
 
 use crate::metric::{Better, ConfigurationFacts, METRICS, Metric};
 use crate::pareto::{dominates, levels, pareto_set};
 use crate::reason::reason;
 use crate::report::{ConfigurationReport, GoalReport, Recommendation, Status};
-
-/// What the doctor would rather have, all else being equal.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Preferences {
-    /// Side of the arm's shoulder.
-    pub shoulder: Option<Shoulder>,
-    /// Elbow up or down.
-    pub elbow: Option<Elbow>,
-}
-
-impl Preferences {
-    /// Share of the stated preferences that a configuration meets; none where none is stated.
-    pub fn match_of(&self, configuration: Configuration) -> Option<f64> {
-        let met: Vec<bool> = [
-            self.shoulder.map(|side| side == configuration.shoulder),
-            self.elbow.map(|elbow| elbow == configuration.elbow),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
-        let count = met.iter().filter(|met| **met).count();
-        (!met.is_empty()).then(|| count as f64 / met.len() as f64)
-    }
-}
 
 /// Score of a configuration that works.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -147,10 +122,8 @@ struct Column {
 /// Marks the Pareto set of a goal, ranks its configurations and recommends the first.
 ///
 /// Takes the statuses as they are: only what is `ok` is compared.
-pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection, preferences: &Preferences) {
+pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
     for each in &mut goal.configurations {
-        each.preference_match = Configuration::from_label(each.label)
-            .and_then(|configuration| preferences.match_of(configuration));
         each.pareto = false;
         each.dominated_by = None;
         each.ranking = None;

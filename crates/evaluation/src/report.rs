@@ -230,8 +230,6 @@ pub struct ConfigurationReport {
     pub room: Option<RoomReport>,
     /// How far the needle's tip moves, root mean square, when every joint has an independent error.
     pub tip_sensitivity_m_per_rad: Option<f64>,
-    /// Share of the doctor's stated preferences that it meets; none where none is stated.
-    pub preference_match: Option<f64>,
     /// Whether it works and no other one that works is as good in everything and better in
     /// something.
     pub pareto: bool,

@@ -11,4 +11,8 @@ pub struct RoomReport {
     pub sight_fraction: f64,
     /// Half-angle of the free cone behind the guide.
     pub hand_cone_half_angle_rad: f64,
+    /// Free share of the region on the side that the scenario prefers.
+    pub preferred_side_free_fraction: Option<f64>,
+    /// Whether the elbow is where the scenario prefers it.
+    pub elbow_as_preferred: Option<bool>,
 }

@@ -258,3 +258,35 @@ fn the_difference_of_engines_is_that_of_their_tips() {
     assert!((found.peak_tip_m - chord_m(2e-3)).abs() < 1e-12);
     assert!((found.settled_tip_m - chord_m(1e-3)).abs() < 1e-12);
 }
+
+/// Central differences with steps of 1e-6 rad: truncation 1e-12, rounding 1e-16 / 1e-6.
+const DIFFERENCE_M_PER_RAD: f64 = 1e-8;
+
+#[test]
+fn sensitivity_of_the_tip_is_the_norm_of_its_displacements_under_each_joint() {
+    let resolved = table3();
+    let (cell, goal) = (&resolved.cell, &resolved.goals[0]);
+    let tip = |q: &Joints| {
+        cell.robot.world_from_flange(q)
+            * cell.tool.flange_from_guide_exit
+            * nalgebra::Point3::new(0.0, 0.0, goal.insertion_length_m)
+    };
+    let step_rad = 1e-6;
+    for q in [
+        Joints::new(-0.735, 2.370, 1.883, -1.967, 1.274, 0.114),
+        Joints::new(0.3, -1.2, 0.9, 0.4, -1.1, 2.0),
+    ] {
+        let squares: f64 = (0..6)
+            .map(|joint| {
+                let mut step = Joints::zeros();
+                step[joint] = step_rad;
+                ((tip(&(q + step)) - tip(&(q - step))) / (2.0 * step_rad)).norm_squared()
+            })
+            .sum();
+        let found = needlebench_evaluation::tip_sensitivity(cell, goal, &q);
+        assert!(
+            (found - squares.sqrt()).abs() < DIFFERENCE_M_PER_RAD,
+            "{found}"
+        );
+    }
+}

@@ -5,16 +5,15 @@ use std::collections::BTreeMap;
 use needlebench_cell::ranking::{MetricRanking, RankingSection};
 use needlebench_evaluation::metric::{Better, ConfigurationFacts, METRICS, Metric};
 use needlebench_evaluation::pareto::{dominates, levels, pareto_set};
-use needlebench_evaluation::ranking::{Preferences, rank_goal};
+use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineReport, GoalReport, MarginsReport,
     PhaseReport, Status,
 };
-use needlebench_evaluation::room::RoomReport;
 use needlebench_evaluation::{
     ContactMeasurement, EngineDifference, MotionMeasurement, NeedleMeasurement,
 };
-use needlebench_kinematics::ik::{Configuration, Elbow, Shoulder};
+use needlebench_kinematics::ik::Configuration;
 use proptest::prelude::*;
 
 /// Sums of a dozen numbers from 0 to 1.
@@ -108,13 +107,8 @@ fn configuration(index: usize) -> ConfigurationReport {
             settled_tip_m: 1e-9,
         }),
         clearance: ClearanceReport::new(BTreeMap::from(classes)),
-        room: Some(RoomReport {
-            free_fraction: 0.6,
-            sight_fraction: 0.7,
-            hand_cone_half_angle_rad: 0.3,
-        }),
+        room: None,
         tip_sensitivity_m_per_rad: Some(0.8),
-        preference_match: Some(0.5),
         pareto: false,
         dominated_by: None,
         ranking: None,
@@ -155,11 +149,7 @@ fn goal(configurations: Vec<ConfigurationReport>) -> GoalReport {
 
 fn ranked(configurations: Vec<ConfigurationReport>) -> GoalReport {
     let mut goal = goal(configurations);
-    rank_goal(
-        &mut goal,
-        &RankingSection::default(),
-        &Preferences::default(),
-    );
+    rank_goal(&mut goal, &RankingSection::default());
     goal
 }
 
@@ -176,8 +166,15 @@ fn read(configuration: &ConfigurationReport, name: &str) -> Option<f64> {
 
 #[test]
 fn every_metric_is_read_from_a_report_that_has_everything() {
+    let mut json = ConfigurationFacts::json(&configuration(0));
+    json["room"] = serde_json::json!({
+        "free_fraction": 0.6,
+        "sight_fraction": 0.7,
+        "hand_cone_half_angle_rad": 0.3,
+        "elbow_as_preferred": true,
+    });
     for metric in METRICS {
-        let value = read(&configuration(0), metric.name);
+        let value = metric.read(ConfigurationFacts::new(&json));
         assert!(value.is_some(), "{}", metric.name);
         assert!(metric.resolution > 0.0, "{}", metric.name);
     }
@@ -211,9 +208,25 @@ fn metrics_are_the_worst_of_the_engines_and_the_least_of_the_surroundings() {
 }
 
 #[test]
+fn clearance_of_the_final_posture_alone_is_not_that_of_the_motion() {
+    let mut made = configuration(0);
+    for found in made.clearance.classes.values_mut() {
+        found.phase = "final_posture";
+    }
+    for name in [
+        "clearance",
+        "self_clearance",
+        "needle_corridor",
+        "arm_to_skin",
+    ] {
+        assert_eq!(read(&made, name), None, "{name}");
+    }
+}
+
+#[test]
 fn what_is_missing_or_not_finite_was_not_measured() {
     let mut made = configuration(0);
-    made.room = None;
+    made.tip_sensitivity_m_per_rad = None;
     made.margins.as_mut().unwrap().joint_limit = f64::NAN;
     made.engines
         .get_mut("rapier")
@@ -226,7 +239,7 @@ fn what_is_missing_or_not_finite_was_not_measured() {
         .needle
         .tip_position_error_m = f64::INFINITY;
     for name in [
-        "free_fraction",
+        "tip_sensitivity",
         "joint_margin",
         "settling_time",
         "tip_error",
@@ -240,14 +253,14 @@ fn what_is_missing_or_not_finite_was_not_measured() {
 #[test]
 fn metric_that_one_configuration_lacks_counts_for_none() {
     let mut blind = with_margin(0, 0.4);
-    blind.room = None;
+    blind.tip_sensitivity_m_per_rad = None;
     let goal = ranked(vec![blind, with_margin(1, 0.4)]);
     let metrics = &goal.ranking.as_ref().unwrap().metrics;
-    let sight = metrics.iter().find(|each| each.name == "sight_fraction");
-    assert_eq!(sight.unwrap().not_measured_for, ["Right-Down-Fold"]);
+    let missing = metrics.iter().find(|each| each.name == "tip_sensitivity");
+    assert_eq!(missing.unwrap().not_measured_for, ["Right-Down-Fold"]);
     for each in &goal.configurations {
         let terms = &each.ranking.as_ref().unwrap().terms;
-        assert!(terms.iter().all(|term| term.metric != "sight_fraction"));
+        assert!(terms.iter().all(|term| term.metric != "tip_sensitivity"));
         assert!(each.pareto);
     }
     let scores: Vec<f64> = goal
@@ -349,7 +362,7 @@ fn smallest_change_of_a_weight_is_where_the_scores_are_even() {
             ..MetricRanking::default()
         };
         let mut goal = goal.clone();
-        rank_goal(&mut goal, &section, &Preferences::default());
+        rank_goal(&mut goal, &section);
         chosen(&goal).to_owned()
     };
     let step = 1e-6 * (change.even_at - change.weight);
@@ -358,20 +371,47 @@ fn smallest_change_of_a_weight_is_where_the_scores_are_even() {
 }
 
 #[test]
-fn preferences_decide_between_equals_and_can_beat_the_pareto_set() {
-    let prefer = Preferences {
-        elbow: Some(Elbow::Up),
-        shoulder: Some(Shoulder::Right),
-    };
-    // Down has a slightly better margin.
-    let mut goal = goal(vec![with_margin(0, 0.42), with_margin(1, 0.4)]);
-    rank_goal(&mut goal, &RankingSection::default(), &prefer);
-    let matches = [0, 1].map(|at| goal.configurations[at].preference_match);
-    assert_eq!(matches, [Some(0.5), Some(1.0)]);
+fn effort_can_put_first_what_is_not_in_the_pareto_set_and_the_reason_says_so() {
+    // Slightly less margin, much less torque.
+    let mut easy = with_margin(1, 0.4);
+    for engine in easy.engines.values_mut() {
+        engine.motion.peak_torque_ratio = 0.3;
+    }
+    let goal = ranked(vec![with_margin(0, 0.42), easy]);
     assert_eq!(chosen(&goal), "Right-Up-Fold");
     assert!(!goal.configurations[1].pareto);
     let reason = &goal.recommended.as_ref().unwrap().reason;
     assert!(reason.contains("not in the Pareto set"), "{reason}");
+}
+
+#[test]
+fn preference_is_the_mean_of_what_is_stated() {
+    let preference = |room: serde_json::Value| {
+        let configuration = serde_json::json!({"room": room});
+        Metric::named("preference")
+            .unwrap()
+            .read(ConfigurationFacts::new(&configuration))
+    };
+    let side = "preferred_side_free_fraction";
+    let elbow = "elbow_as_preferred";
+    let none = serde_json::Value::Null;
+    assert_eq!(preference(none.clone()), None);
+    assert_eq!(
+        preference(serde_json::json!({side: none, elbow: none})),
+        None
+    );
+    assert_eq!(
+        preference(serde_json::json!({side: none, elbow: false})),
+        Some(0.0)
+    );
+    assert_eq!(
+        preference(serde_json::json!({side: 0.5, elbow: none})),
+        Some(0.5)
+    );
+    assert_eq!(
+        preference(serde_json::json!({side: 0.5, elbow: true})),
+        Some(0.75)
+    );
 }
 
 #[test]
@@ -399,7 +439,6 @@ fn nothing_measured_is_said_and_not_scored() {
     bare.motion.clear();
     bare.engines.clear();
     bare.clearance = ClearanceReport::default();
-    bare.room = None;
     bare.tip_sensitivity_m_per_rad = None;
     let mut other = bare.clone();
     other.label = Configuration::ALL[1].label();

@@ -50,7 +50,6 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
         },
         room: None,
         tip_sensitivity_m_per_rad: None,
-        preference_match: None,
         pareto: false,
         dominated_by: None,
         ranking: None,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use needlebench_cell::scenario::EngineName;
 use needlebench_cell::{Cell, Goal, ResolvedScenario, enclosures};
 use needlebench_engine::EngineIdentity;
-use needlebench_evaluation::ranking::{Preferences, rank_goal};
+use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
     MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary, Status,
@@ -49,7 +49,7 @@ pub(crate) fn assemble(
         both,
     );
     for goal in &mut goals {
-        rank_goal(goal, &resolved.scenario.ranking, &Preferences::default());
+        rank_goal(goal, &resolved.scenario.ranking);
     }
     Report {
         schema_version: SCHEMA_VERSION,
@@ -175,7 +175,6 @@ fn configuration_report(
         clearance,
         room: None,
         tip_sensitivity_m_per_rad: candidate.map(|each| tip_sensitivity(cell, goal, &each.joints)),
-        preference_match: None,
         pareto: false,
         dominated_by: None,
         ranking: None,

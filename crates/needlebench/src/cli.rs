@@ -335,9 +335,8 @@ hand_cone, preference, needle_angle_error, lateral_error, guide_position_error, 
 tracking_error, contact_force, engine_difference_peak, engine_difference_settled, arm_to_skin, \
 tool_to_skin, guide_to_skin, to_table, to_gantry, to_mount, needle_route
 
-Examples:
-  needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm
-  needlebench compare scenarios/table3.toml other_table.toml --max-loss motion_time=10%";
+Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm
+Example: needlebench compare scenarios/table3.toml other_table.toml --max-loss motion_time=10%";
 
 #[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]

@@ -7,6 +7,7 @@ use needlebench_cell::{Finding, Overrides, ThresholdsFile};
 use needlebench_evaluation::compare::{CompareOptions, compare as compare_reports};
 use needlebench_evaluation::{StoredReport, Threshold};
 
+use super::run::probe_file;
 use super::{load_checked, print_json, print_text};
 use crate::atomic::write_atomically;
 use crate::cli::{CompareArguments, Pair};
@@ -81,6 +82,14 @@ fn compared(
     arguments: &CompareArguments,
 ) -> Result<(CompareOptions, StoredReport, StoredReport), Refused> {
     let options = options(arguments)?;
+    for (path, argument) in [
+        (&arguments.junit, "--junit"),
+        (&arguments.markdown, "--markdown"),
+    ] {
+        if let Some(path) = path {
+            probe_file(path, argument)?;
+        }
+    }
     let (a, b) = (input(&arguments.a)?, input(&arguments.b)?);
     Ok((options, a.report(arguments)?, b.report(arguments)?))
 }

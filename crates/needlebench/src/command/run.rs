@@ -18,7 +18,7 @@ use crate::cli::RunArguments;
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
 use crate::output::pictures::{Backdrop, configuration_picture, goal_camera, sheet_caption};
-use crate::output::{junit, markdown, recording_csv, report_text};
+use crate::output::{junit, markdown, ranking_picture, recording_csv, report_text};
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
 use crate::progress::Progress;
@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
         }
     };
     if let Some(path) = &arguments.junit
-        && let Err(finding) = probe_junit(path)
+        && let Err(finding) = probe_file(path, "--junit")
     {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
@@ -182,8 +182,8 @@ fn prepare_folders(
     Ok(folders)
 }
 
-/// Proves that the JUnit file can be written, before a long run.
-fn probe_junit(path: &Path) -> Result<(), Finding> {
+/// Proves that a file that an argument names can be written, before a long run.
+pub(super) fn probe_file(path: &Path, argument: &str) -> Result<(), Finding> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -196,9 +196,9 @@ fn probe_junit(path: &Path) -> Result<(), Finding> {
     writable.map_err(|error| {
         Finding::new(
             path.display().to_string(),
-            format!("the JUnit file cannot be written: {error}"),
+            format!("the file cannot be written: {error}"),
         )
-        .key("--junit")
+        .key(argument)
         .hint("choose a file in a folder that exists and can be written")
     })
 }
@@ -325,6 +325,13 @@ fn write_pictures(
         }
         if !sheet.is_empty() {
             tile(&sheet, 4).write_png(&folder.join(format!("{}.png", goal.name)))?;
+        }
+        let ranking = folder.join(format!("{}.ranking.png", goal.name));
+        match ranking_picture(goal_report) {
+            Some(image) => image.write_png(&ranking)?,
+            // Nobody should take an earlier run's for this one's.
+            None if ranking.exists() => std::fs::remove_file(&ranking)?,
+            None => {}
         }
     }
     Ok(())

@@ -91,7 +91,11 @@ fn metric_texts(found: &MetricComparison) -> [String; 5] {
     let change = match (found.change, found.relative) {
         (None, _) => "-".to_owned(),
         (Some(change), relative) => {
-            let sign = if change > 0.0 { "+" } else { "" };
+            let sign = if change > 0.0 && found.outcome != Change::Same {
+                "+"
+            } else {
+                ""
+            };
             // From nearly nothing to something is no percentage.
             let share = relative
                 .filter(|share| found.outcome != Change::Same && share.abs() < 10.0)

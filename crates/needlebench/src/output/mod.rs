@@ -12,5 +12,6 @@ mod table;
 
 pub(crate) use junit::junit;
 pub(crate) use markdown::markdown;
+pub(crate) use ranking::ranking_picture;
 pub(crate) use recording::recording_csv;
 pub(crate) use table::{plain_table, report_text};

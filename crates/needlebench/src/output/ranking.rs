@@ -6,6 +6,7 @@ use needlebench_evaluation::ranking::{GoalRanking, RankedMetric, RankingReport};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 
 use super::table::plain_table;
+use crate::picture::{Image, WeightedBars, WeightedRow, weighted_bars};
 
 /// A row of the table: configurations that were ranked, first choice first.
 struct Row<'a> {
@@ -200,4 +201,47 @@ pub(super) fn comparison_markdown(goal: &GoalReport) -> String {
         "{}\n\nScores of 100; in brackets what each metric contributes.\n",
         rows.join("\n")
     )
+}
+
+/// The ranking as a picture; none if fewer than two configurations were ranked.
+pub(crate) fn ranking_picture(goal: &GoalReport) -> Option<Image> {
+    let rows = rows(goal);
+    let ranking = goal.ranking.as_ref().filter(|_| rows.len() > 1)?;
+    let metrics = counted(ranking);
+    let bars = WeightedBars {
+        title: format!(
+            "{}: a column is as wide as its metric's weight and filled to the utility of the value, \
+             so the filled part of a row is its score",
+            goal.name
+        ),
+        columns: metrics
+            .iter()
+            .map(|metric| (words(metric.name).to_owned(), metric.weight))
+            .collect(),
+        rows: rows
+            .iter()
+            .map(|row| WeightedRow {
+                label: format!("{} {}", row.ranking.rank, row.configuration.label),
+                note: format!(
+                    "{:.1}{}",
+                    row.ranking.score * 100.0,
+                    if row.configuration.pareto {
+                        " Pareto"
+                    } else {
+                        ""
+                    }
+                ),
+                cells: metrics
+                    .iter()
+                    .map(|metric| {
+                        let mut terms = row.ranking.terms.iter();
+                        let utility = terms.find(|term| term.metric == metric.name);
+                        let (value, _) = value_and_contribution(row, metric.name);
+                        (utility.map_or(0.0, |term| term.utility), value)
+                    })
+                    .collect(),
+            })
+            .collect(),
+    };
+    Some(weighted_bars(&bars))
 }

@@ -92,6 +92,22 @@ impl Image {
         }
     }
 
+    /// Fills a rectangle, clipped to this picture.
+    pub(super) fn fill(
+        &mut self,
+        [left, top]: [usize; 2],
+        [width, height]: [usize; 2],
+        color: [u8; 3],
+    ) {
+        let right = (left + width).min(self.width_px);
+        for y in top..(top + height).min(self.height_px) {
+            let row = y * self.width_px;
+            if left < right {
+                self.pixels[row + left..row + right].fill(color);
+            }
+        }
+    }
+
     /// Copies `other` with its top left corner at the given pixel, clipped to this picture.
     pub(super) fn paste(&mut self, other: &Self, left: usize, top: usize) {
         let width = other.width_px.min(self.width_px.saturating_sub(left));

@@ -21,6 +21,7 @@ mod sheet;
 #[cfg(test)]
 mod tests;
 mod text;
+mod weighted_bars;
 
 use std::sync::Arc;
 
@@ -32,6 +33,7 @@ pub use camera::{Camera, Projection};
 pub use image::{Image, PictureError};
 pub use render::render;
 pub use sheet::tile;
+pub use weighted_bars::{WeightedBars, WeightedRow, weighted_bars};
 
 /// What a picture shows. Everything is in the world frame, z up.
 #[derive(Debug, Clone, Default)]

@@ -7,6 +7,7 @@ mod bad_scenario;
 mod calibration;
 mod check;
 mod clearance;
+mod compare;
 mod determinism;
 #[cfg(target_os = "linux")]
 mod environment;

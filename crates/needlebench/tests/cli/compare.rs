@@ -1,0 +1,406 @@
+//! `compare`: results, folders and scenarios side by side.
+
+use std::sync::OnceLock;
+
+use serde_json::{Value, json};
+
+use crate::support::{Answer, Bench, SMALL, has_keys, with_edit};
+
+/// The report of `SMALL` in rapier, as text.
+fn report() -> &'static str {
+    static REPORT: OnceLock<String> = OnceLock::new();
+    REPORT.get_or_init(|| {
+        let bench = Bench::with_scenario(SMALL);
+        let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
+        answer.exits_with(0).stdout
+    })
+}
+
+/// A folder with `a.json`, and `b.json` that was changed.
+fn bench(change: impl FnOnce(&mut Value)) -> Bench {
+    let bench = Bench::new();
+    bench.write("a.json", report());
+    let mut changed: Value = serde_json::from_str(report()).unwrap();
+    change(&mut changed);
+    bench.write("b.json", changed.to_string());
+    bench
+}
+
+fn compare(bench: &Bench, more: &[&str]) -> Answer {
+    let mut arguments = vec!["compare", "a.json", "b.json"];
+    arguments.extend(more);
+    bench.run(&arguments)
+}
+
+/// Makes the arm of configuration 0 come this near to the skin.
+fn nearer(report: &mut Value, clearance_m: f64) {
+    let configuration = &mut report["goals"][0]["configurations"][0];
+    configuration["clearance"]["robot_phantom"]["minimum_m"] = json!(clearance_m);
+}
+
+#[test]
+fn result_against_itself_passes_and_lists_nothing() {
+    let bench = bench(|_| ());
+    let text = compare(&bench, &["--max-loss", "clearance=0mm"]).exits_with(0);
+    assert!(text.stdout.contains("PASS"), "{text:#?}");
+    assert!(!text.stdout.contains('│'), "{text:#?}");
+    assert_eq!(text.stderr, "");
+    let all = compare(&bench, &["--all"]).exits_with(0).stdout;
+    assert!(all.contains("tip error") && all.contains("same"), "{all}");
+}
+
+#[test]
+fn document_has_its_keys_and_si_units() {
+    let bench = bench(|report| nearer(report, 0.001));
+    let answer = compare(&bench, &["--json"]).exits_with(0).json();
+    has_keys(
+        &answer,
+        &[
+            "schema_version",
+            "pass",
+            "failures",
+            "a",
+            "b",
+            "provenance_differences",
+            "goals",
+        ],
+    );
+    let configurations = answer["goals"][0]["configurations"].as_array().unwrap();
+    assert_eq!(configurations.len(), 8);
+    let found = configurations[0]["metrics"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|found| found["metric"] == "arm_to_skin")
+        .unwrap();
+    has_keys(
+        found,
+        &[
+            "metric",
+            "unit",
+            "a",
+            "b",
+            "change",
+            "relative",
+            "resolution",
+            "outcome",
+        ],
+    );
+    assert_eq!((&found["unit"], &found["b"]), (&json!("m"), &json!(0.001)));
+    assert_eq!(found["outcome"], "worse");
+}
+
+#[test]
+fn loss_beyond_its_threshold_exits_with_1_and_is_written_for_ci() {
+    let bench = bench(|report| nearer(report, 0.001));
+    compare(&bench, &["--max-loss", "arm_to_skin=1m"]).exits_with(0);
+    let answer = compare(
+        &bench,
+        &[
+            "--max-loss",
+            "arm_to_skin=1mm",
+            "--junit",
+            "j.xml",
+            "--markdown",
+            "m.md",
+        ],
+    );
+    let answer = answer.exits_with(1);
+    assert!(
+        answer
+            .stdout
+            .contains("FAILED pose Right-Down-Fold: arm to skin: "),
+        "{answer:#?}"
+    );
+    let junit = String::from_utf8(bench.read("j.xml")).unwrap();
+    assert_eq!(junit.matches("<failure").count(), 1, "{junit}");
+    assert!(junit.contains("tests=\"10\""), "{junit}");
+    let markdown = String::from_utf8(bench.read("m.md")).unwrap();
+    assert!(
+        markdown.contains("**fail**") && markdown.contains("| worse |"),
+        "{markdown}"
+    );
+}
+
+#[test]
+fn status_that_got_worse_exits_with_1_unless_that_is_allowed() {
+    let bench = bench(|report| {
+        let configuration = &mut report["goals"][0]["configurations"][1];
+        configuration["status"] = json!("rejected");
+        configuration["rejections"] = json!([{"rule": "collision", "detail": "forearm and skin"}]);
+    });
+    let answer = compare(&bench, &[]).exits_with(1);
+    let line = "Right-Up-Fold: worse: ok -> rejected (collision: forearm and skin)";
+    assert!(answer.stdout.contains(line), "{answer:#?}");
+    compare(&bench, &["--allow-status-change"]).exits_with(0);
+}
+
+#[test]
+fn goal_with_another_name_is_matched_when_told() {
+    let bench = bench(|report| report["goals"][0]["name"] = json!("entry"));
+    let answer = compare(&bench, &[]).exits_with(2);
+    answer.complains(["no goal in common", "pose", "entry", "--goal A=B"]);
+    let answer = compare(&bench, &["--goal", "pose=entry"]).exits_with(0);
+    assert!(
+        answer.stdout.contains("goal pose, in B entry"),
+        "{answer:#?}"
+    );
+    compare(&bench, &["--goal", "pose=entri"])
+        .exits_with(2)
+        .complains(["`entri`"]);
+}
+
+#[test]
+fn thresholds_come_from_a_file_too_and_the_command_line_goes_before_it() {
+    let bench = bench(|report| nearer(report, 0.001));
+    bench.write("limits.toml", "[max_loss]\narm_to_skin = \"1mm\"\n");
+    compare(&bench, &["--thresholds", "limits.toml"]).exits_with(1);
+    let more = [
+        "--thresholds",
+        "limits.toml",
+        "--max-loss",
+        "arm_to_skin=1m",
+    ];
+    compare(&bench, &more).exits_with(0);
+    bench.write("limits.toml", "[max_loss]\n\narm_to_skim = \"1mm\"\n");
+    compare(&bench, &["--thresholds", "limits.toml"])
+        .exits_with(2)
+        .complains([
+            "limits.toml:3",
+            "arm_to_skim",
+            "did you mean `arm_to_skin`?",
+        ]);
+    compare(&bench, &["--thresholds", "none.toml"])
+        .exits_with(2)
+        .complains(["none.toml", "cannot be read"]);
+}
+
+#[test]
+fn wrong_thresholds_are_refused_with_a_hint() {
+    let bench = bench(|_| ());
+    for (limit, parts) in [
+        (
+            "clearence=1mm",
+            ["`clearence`", "did you mean `clearance`?"],
+        ),
+        ("clearance=1s", ["`s` is not a unit", "give one of mm"]),
+        ("clearance=1", ["is not a unit", "give one of mm"]),
+        ("clearance=-1mm", ["not negative", "such as 0.5mm"]),
+        ("clearance", ["clearance", "needs a name"]),
+    ] {
+        compare(&bench, &["--max-loss", limit])
+            .exits_with(2)
+            .complains(parts);
+    }
+}
+
+#[test]
+fn reports_that_cannot_be_used_are_refused_with_file_and_line() {
+    let bench = bench(|_| ());
+    let half: String = report().lines().take(40).collect::<Vec<_>>().join("\n");
+    bench.write("half.json", half);
+    bench
+        .run(&["compare", "a.json", "half.json"])
+        .exits_with(2)
+        .complains(["half.json:40", "ends too early", "line 40 column"]);
+    bench.write("foreign.json", "{\"name\": \"something else\"}");
+    bench
+        .run(&["compare", "foreign.json", "a.json"])
+        .exits_with(2)
+        .complains(["foreign.json", "schema_version", "hint"]);
+    bench.write("newer.json", "{\"schema_version\": 99, \"goals\": []}");
+    bench
+        .run(&["compare", "a.json", "newer.json"])
+        .exits_with(2)
+        .complains(["newer.json", "schema version 99"]);
+    bench
+        .run(&["compare", "a.json", "none"])
+        .exits_with(2)
+        .complains(["none", "cannot be read", "hint"]);
+    bench
+        .run(&["compare", "a.json", "none.toml"])
+        .exits_with(2)
+        .complains(["none.toml"]);
+    compare(&bench, &["--junit", "none/j.xml"])
+        .exits_with(2)
+        .complains(["--junit", "cannot be written"]);
+}
+
+#[test]
+fn folder_of_several_results_is_answered_with_one_to_try() {
+    let bench = bench(|_| ());
+    for name in ["one", "two"] {
+        std::fs::create_dir_all(bench.path("out").join(name)).unwrap();
+        bench.write(&format!("out/{name}/report.json"), report());
+    }
+    bench.run(&["compare", "a.json", "out/one"]).exits_with(0);
+    let answer = bench.run(&["compare", "a.json", "out"]).exits_with(2);
+    answer.complains(["several scenarios", "out/one"]);
+}
+
+#[test]
+fn scenarios_are_run_and_two_layouts_differ_by_their_input() {
+    let bench = bench(|_| ());
+    bench.write("s.toml", SMALL);
+    // What is run now is what was stored.
+    let answer = bench
+        .run(&["compare", "a.json", "s.toml", "--json"])
+        .exits_with(0)
+        .json();
+    assert_eq!(answer["provenance_differences"], json!([]));
+    for each in answer["goals"][0]["configurations"].as_array().unwrap() {
+        for found in each["metrics"].as_array().unwrap() {
+            assert_eq!(found["outcome"], "same", "{found:#}");
+        }
+    }
+    bench.write(
+        "lower.toml",
+        with_edit(
+            SMALL,
+            "position_mm = [146.0, -597.5, 0]",
+            "position_mm = [146.0, -597.5, -8]",
+        ),
+    );
+    let answer = bench.run(&["compare", "s.toml", "lower.toml", "--json"]);
+    let answer = answer.exits_with(0).json();
+    assert_eq!(answer["provenance_differences"][0]["what"], "scenario");
+    let changed = answer["goals"][0]["configurations"][0]["metrics"]
+        .as_array()
+        .unwrap();
+    let skin = changed
+        .iter()
+        .find(|found| found["metric"] == "tool_to_skin")
+        .unwrap();
+    assert_eq!(skin["outcome"], "better", "{skin:#}");
+    assert!(!bench.path("out").exists(), "nothing is written");
+}
+
+#[test]
+fn report_of_a_version_before_rankings_is_read() {
+    let bench = bench(|report| {
+        for each in report["goals"][0]["configurations"].as_array_mut().unwrap() {
+            let keys = each.as_object_mut().unwrap();
+            for key in [
+                "ranking",
+                "pareto",
+                "room",
+                "tip_sensitivity_m_per_rad",
+                "motion",
+            ] {
+                keys.remove(key);
+            }
+        }
+    });
+    let answer = bench.run(&["compare", "b.json", "a.json"]).exits_with(0);
+    assert!(answer.stdout.contains("new"), "{answer:#?}");
+    compare(&bench, &["--max-loss", "motion_time=1s"]).exits_with(1);
+}
+
+#[test]
+fn help_lists_every_metric() {
+    let help = Bench::new()
+        .run(&["compare", "--help"])
+        .exits_with(0)
+        .stdout;
+    for metric in needlebench_evaluation::metric::METRICS {
+        let listed = help
+            .split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
+            .any(|word| word == metric.name);
+        assert!(listed, "{} is not in\n{help}", metric.name);
+    }
+}
+
+#[test]
+fn ranking_of_a_scenario_is_stated_with_every_term() {
+    let report: Value = serde_json::from_str(report()).unwrap();
+    let goal = &report["goals"][0];
+    let ranking = &goal["ranking"];
+    has_keys(
+        ranking,
+        &[
+            "order",
+            "pareto_set",
+            "metrics",
+            "runner_up",
+            "smallest_weight_change",
+        ],
+    );
+    assert_eq!(ranking["order"][0], goal["recommended"]["label"]);
+    for each in goal["configurations"].as_array().unwrap() {
+        has_keys(
+            each,
+            &[
+                "ranking",
+                "pareto",
+                "dominated_by",
+                "room",
+                "tip_sensitivity_m_per_rad",
+            ],
+        );
+        if each["status"] != "ok" {
+            assert_eq!(each["ranking"], Value::Null);
+            continue;
+        }
+        has_keys(&each["ranking"], &["rank", "score", "terms"]);
+        for term in each["ranking"]["terms"].as_array().unwrap() {
+            has_keys(
+                term,
+                &[
+                    "metric",
+                    "value",
+                    "counted_as",
+                    "unit",
+                    "utility",
+                    "weight",
+                    "contribution",
+                ],
+            );
+        }
+    }
+}
+
+#[test]
+fn weights_of_the_scenario_change_the_choice_and_wrong_ones_are_refused() {
+    let ranked = |section: &str| {
+        let text = with_edit(SMALL, "[recording]", &format!("{section}\n[recording]"));
+        Bench::with_scenario(&text).run(&["run", "s.toml", "--engine", "rapier", "--json"])
+    };
+    // Of the time alone the fastest is the best.
+    let report: Value = serde_json::from_str(report()).unwrap();
+    let mut others = vec![
+        "[ranking]".to_owned(),
+        "motion_time_s.best = 0.01".to_owned(),
+    ];
+    for metric in report["goals"][0]["ranking"]["metrics"].as_array().unwrap() {
+        let name = metric["name"].as_str().unwrap();
+        let key = needlebench_evaluation::metric::Metric::named(name).unwrap();
+        let (key, _) = key.ranking_key.unwrap();
+        if key != "motion_time_s" {
+            others.push(format!("{key}.weight = 0"));
+        }
+    }
+    let answer = ranked(&others.join("\n")).exits_with(0).json();
+    let goal = &answer["goals"][0];
+    let time_s = |each: &Value| {
+        let terms = each["ranking"]["terms"].as_array()?;
+        let term = terms.iter().find(|term| term["metric"] == "motion_time")?;
+        term["counted_as"].as_f64()
+    };
+    let configurations = goal["configurations"].as_array().unwrap();
+    let least = configurations
+        .iter()
+        .filter_map(time_s)
+        .fold(f64::INFINITY, f64::min);
+    let chosen = configurations
+        .iter()
+        .find(|each| each["label"] == goal["recommended"]["label"])
+        .unwrap();
+    assert_eq!(time_s(chosen), Some(least));
+
+    let answer = ranked("[ranking.motion_time_s]\nweight = -1").exits_with(2);
+    answer.complains(["ranking.motion_time_s.weight", "-1"]);
+    let answer = ranked("[ranking.motion_tyme_s]\nweight = 1").exits_with(2);
+    answer.complains(["motion_tyme_s", "did you mean `motion_time_s`?"]);
+    let answer = ranked("[ranking.clearance_mm]\nbest = 10\nhalf = 20").exits_with(2);
+    answer.complains(["not in order", "worst < half < best"]);
+}
