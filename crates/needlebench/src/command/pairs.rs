@@ -112,7 +112,7 @@ pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus> {
     } else {
         print_text(&table(cell, &examined, &settings))?;
         if let Some(srdf) = &srdf {
-            print_text(&srdf_text(srdf, &answers))?;
+            print_text(&srdf_text(srdf, cell, &answers))?;
         }
     }
     let findings: Vec<Finding> = answers
@@ -243,7 +243,7 @@ fn srdf_report(srdf: &Srdf, answers: &[SrdfAnswer], examined: &[PairExamination]
     }
 }
 
-fn srdf_text(srdf: &Srdf, answers: &[SrdfAnswer]) -> String {
+fn srdf_text(srdf: &Srdf, cell: &Cell, answers: &[SrdfAnswer]) -> String {
     let count = |verdict| {
         answers
             .iter()
@@ -260,6 +260,13 @@ fn srdf_text(srdf: &Srdf, answers: &[SrdfAnswer]) -> String {
         count(SrdfVerdict::Refuted),
         count(SrdfVerdict::UnknownLink),
     );
+    if srdf.robot != cell.robot.name {
+        let _ = write!(
+            text,
+            "\nwarning: the SRDF is for '{}', the robot is '{}'",
+            srdf.robot, cell.robot.name
+        );
+    }
     for answer in answers {
         if answer.verdict == SrdfVerdict::Unproven {
             let [a, b] = &srdf.disabled[answer.pair].links;

@@ -2,12 +2,13 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 9] = [
+const COMMANDS: [&str; 10] = [
     "run",
     "check",
     "ik",
     "fk",
     "clearance",
+    "pairs",
     "paper",
     "schema",
     "doctor",

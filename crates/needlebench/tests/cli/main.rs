@@ -13,6 +13,7 @@ mod help;
 #[cfg(target_os = "linux")]
 mod interrupt;
 mod kinematics;
+mod pairs;
 mod paper;
 #[cfg(target_os = "linux")]
 mod process;
