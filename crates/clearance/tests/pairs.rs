@@ -233,6 +233,7 @@ fn collision_rates_are_those_known_of_the_arm() {
 
 #[test]
 fn an_srdf_is_believed_only_where_the_model_agrees() {
+    use SrdfVerdict::{Justified, Refuted, UnknownLink, Unproven};
     let cell = table3();
     // As shipped with a widespread UR3 description.
     let text = r#"<robot name="ur5">
@@ -247,7 +248,6 @@ fn an_srdf_is_believed_only_where_the_model_agrees() {
     let examined = examine_pairs(&cell, &QUICK);
     let answers = check_srdf(&srdf, &cell, &examined);
     let verdicts: Vec<_> = answers.iter().map(|answer| answer.verdict).collect();
-    use SrdfVerdict::{Justified, Refuted, UnknownLink, Unproven};
     assert_eq!(
         verdicts,
         [
