@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use needlebench_cell::{Cell, Finding, Srdf, load_scenario};
+use needlebench_cell::{Cell, ClearanceClass, Finding, Srdf, load_scenario};
 use needlebench_clearance::{
     PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
     check_srdf, examine_pairs,
@@ -89,6 +89,7 @@ pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus> {
     let settings = PairSettings {
         samples: arguments.samples as usize,
         seed: arguments.seed,
+        boxes: arguments.proof_boxes as usize,
         ..PairSettings::default()
     };
     let examined = examine_pairs(cell, &settings);
@@ -139,7 +140,7 @@ fn answer(cell: &Cell, pair: &PairExamination) -> PairAnswer {
     };
     PairAnswer {
         pair: names(cell, pair),
-        class: pair.class.map(|class| class.name()),
+        class: pair.class.map(ClearanceClass::name),
         state: pair.state,
         measured: pair.state.is_measured(),
         joints_between: pair.joints.len(),
@@ -172,7 +173,7 @@ fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> 
         table.add_row([
             a,
             b,
-            pair.class.map_or("-", |class| class.name()).to_owned(),
+            pair.class.map_or("-", ClearanceClass::name).to_owned(),
             pair.state.name().to_owned(),
             pair.joints.len().to_string(),
             format!("{:.2} %", pair.collision_rate * 100.0),

@@ -2,10 +2,15 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, SMALL, has_keys};
+use crate::support::{Answer, Bench, SMALL, has_keys};
 
-/// Postures enough to see a pair that collides at one in ten.
-const SAMPLES: &str = "200";
+/// Postures enough to see a pair that collides at one in ten, and boxes enough to prove pairs
+/// with two joints between them.
+const QUICK: [&str; 4] = ["--samples", "200", "--proof-boxes", "5000"];
+
+fn run(bench: &Bench, more: &[&str]) -> Answer {
+    bench.run(&[&["pairs", "s.toml"], &QUICK[..], more].concat())
+}
 
 const SRDF: &str = r#"<?xml version="1.0"?>
 <robot name="ur3">
@@ -30,7 +35,7 @@ fn state_of<'v>(answer: &'v Value, first: &str, second: &str) -> &'v Value {
 #[test]
 fn every_pair_of_bodies_has_a_state_and_its_evidence() {
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["pairs", "s.toml", "--samples", SAMPLES, "--json"]);
+    let answer = run(&bench, &["--json"]);
     let answer = answer.exits_with(0).json();
     has_keys(&answer, &["schema_version", "samples", "seed", "pairs"]);
     let pairs = answer["pairs"].as_array().unwrap();
@@ -68,15 +73,7 @@ fn every_pair_of_bodies_has_a_state_and_its_evidence() {
 fn an_srdf_that_disables_what_collides_is_bad_input() {
     let bench = Bench::with_scenario(SMALL);
     bench.write("arm.srdf", SRDF);
-    let arguments = [
-        "pairs",
-        "s.toml",
-        "--samples",
-        SAMPLES,
-        "--srdf",
-        "arm.srdf",
-    ];
-    let answer = bench.run(&arguments).exits_with(2);
+    let answer = run(&bench, &["--srdf", "arm.srdf"]).exits_with(2);
     assert!(
         answer
             .stdout
@@ -96,25 +93,10 @@ fn an_srdf_that_disables_what_collides_is_bad_input() {
 #[test]
 fn what_it_writes_it_agrees_with() {
     let bench = Bench::with_scenario(SMALL);
-    let write = [
-        "pairs",
-        "s.toml",
-        "--samples",
-        SAMPLES,
-        "--write-srdf",
-        "own.srdf",
-    ];
-    bench.run(&write).exits_with(0);
-    let check = [
-        "pairs",
-        "s.toml",
-        "--samples",
-        SAMPLES,
-        "--srdf",
-        "own.srdf",
-        "--json",
-    ];
-    let answer = bench.run(&check).exits_with(0).json();
+    run(&bench, &["--write-srdf", "own.srdf"]).exits_with(0);
+    let answer = run(&bench, &["--srdf", "own.srdf", "--json"])
+        .exits_with(0)
+        .json();
     let disabled = answer["srdf"]["disabled"].as_array().unwrap();
     assert!(disabled.len() >= 7, "{disabled:#?}");
     for pair in disabled {
@@ -132,10 +114,8 @@ fn what_it_writes_it_agrees_with() {
 fn a_file_that_is_no_srdf_is_refused() {
     let bench = Bench::with_scenario(SMALL);
     bench.write("arm.srdf", "<robot name=\"x\"><link name=\"a\"/></robot>");
-    let arguments = ["pairs", "s.toml", "--srdf", "arm.srdf"];
-    let answer = bench.run(&arguments).exits_with(2);
+    let answer = run(&bench, &["--srdf", "arm.srdf"]).exits_with(2);
     answer.complains(["a URDF, not an SRDF"]);
-    let missing = ["pairs", "s.toml", "--srdf", "none.srdf"];
-    let answer = bench.run(&missing).exits_with(2);
+    let answer = run(&bench, &["--srdf", "none.srdf"]).exits_with(2);
     answer.complains(["cannot read the SRDF"]);
 }
