@@ -206,20 +206,24 @@ def our_certificates(cell: Cell, answers: Answers) -> Array:
     return result
 
 
-def searched(cell: Cell, answers: Answers, posture: int, pair: int, solids: Array) -> float:
-    """Second opinion on two solids: the widest gap over a dense search of directions."""
-    row = np.array([posture])
+def searched(
+    cell: Cell, answers: Answers, at: tuple[int, int], solids: Array, enough: float
+) -> float:
+    """Second opinion on two solids at a posture and pair: the widest gap over a dense search of
+    directions, or one that is enough."""
+    row = np.array([at[0]])
     poses = []
     for solid in solids:
         rotation, position = solid_poses(cell, answers, int(solid), row)
         poses.append((rotation[0], position[0]))
-    hints = np.vstack([answers.our_normal[posture, pair], answers.coal_normal[posture, pair]])
+    hints = np.vstack([answers.our_normal[at], answers.coal_normal[at]])
     return widest_gap(
         a=cell.solids[solids[0]].shape,
         b=cell.solids[solids[1]].shape,
         pose_a=poses[0],
         pose_b=poses[1],
         hints=np.vstack([hints, -hints]),
+        enough=enough,
     )
 
 
@@ -235,7 +239,7 @@ def settle(cell: Cell, answers: Answers, tally: Tally, at: tuple[int, int]) -> s
         return message if apart else None
     if np.isnan(theirs) or ours > theirs:
         # Ours is the larger: every solid that Coal sees nearer has to be shown further.
-        proved = searched(cell, answers, *at, answers.coal_solids[at])
+        proved = searched(cell, answers, at, answers.coal_solids[at], ours - AGREEMENT_M)
         right = proved >= ours - AGREEMENT_M
     elif apart:
         # Ours is the smaller: two points as close as we say show it.
@@ -243,7 +247,7 @@ def settle(cell: Cell, answers: Answers, tally: Tally, at: tuple[int, int]) -> s
         right = np.linalg.norm(b - a) <= ours + AGREEMENT_M
     else:
         # Ours is the deeper: no direction may show a shallower way out.
-        proved = searched(cell, answers, *at, answers.our_solids[at])
+        proved = searched(cell, answers, at, answers.our_solids[at], ours + 2.0 * AGREEMENT_M)
         right = proved <= ours + AGREEMENT_M
     if not right:
         return message
@@ -298,8 +302,8 @@ def judge(cell: Cell, answers: Answers) -> Tally:
     # Our own normal proves our distance, apart and in penetration; or else a better direction.
     unproved = np.nan_to_num(answers.ours - our_certificates(cell, answers))
     for at in zip(*np.nonzero(unproved > OVERESTIMATE_M), strict=True):
-        posture, pair = (int(each) for each in at)
-        proved = searched(cell, answers, posture, pair, answers.our_solids[at])
+        enough = answers.ours[at] - OVERESTIMATE_M
+        proved = searched(cell, answers, at, answers.our_solids[at], enough)
         unproved[at] = min(unproved[at], answers.ours[at] - proved)
         tally.proved_by_search += 1
     tally.largest_unproved.take(unproved.ravel(), name)
