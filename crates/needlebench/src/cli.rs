@@ -412,6 +412,9 @@ pub(crate) struct PairsArguments {
     /// Random postures that the collision rates are taken from.
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub samples: u32,
+    /// Boxes of joint positions after which the proof that a pair never touches gives up.
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
+    pub proof_boxes: u32,
     /// Seed of the postures.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub seed: u64,

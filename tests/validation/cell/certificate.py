@@ -46,9 +46,11 @@ def gap(*, a: Shape, b: Shape, pose_a: tuple, pose_b: tuple, n: Array) -> Array:
     return along - reach_a - reach_b
 
 
-def widest_gap(*, a: Shape, b: Shape, pose_a: tuple, pose_b: tuple, hints: Array) -> float:
+def widest_gap(
+    *, a: Shape, b: Shape, pose_a: tuple, pose_b: tuple, hints: Array, enough: float
+) -> float:
     """Largest gap over all directions that a dense search with refinement finds, a lower bound of
-    the signed distance; `hints` are tried besides."""
+    the signed distance; `hints` are tried besides. Stops when the gap is `enough`."""
 
     def of(n: Array) -> Array:
         return gap(a=a, b=b, pose_a=pose_a, pose_b=pose_b, n=n)
@@ -64,7 +66,7 @@ def widest_gap(*, a: Shape, b: Shape, pose_a: tuple, pose_b: tuple, hints: Array
     random = np.random.default_rng(1)
     step = np.full(len(order), 3.0 / np.sqrt(DIRECTIONS))
     # A pattern search: no gradient, because the gap has kinks just where it is largest.
-    while step.max() > 1e-10:
+    while step.max() > 1e-10 and best.max() < enough:
         trial = directions[:, None, :] + step[:, None, None] * random.normal(
             size=(len(order), 16, 3)
         )

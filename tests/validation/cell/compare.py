@@ -89,7 +89,7 @@ class Tally:
 def quantiles(values: Array) -> dict:
     """Quantiles and the largest."""
     if not values.size:
-        return {}
+        return dict.fromkeys(("q50", "q75", "q99", "max"), 0.0)
     q50, q75, q99 = np.quantile(values, [0.5, 0.75, 0.99])
     return {"q50": float(q50), "q75": float(q75), "q99": float(q99), "max": float(values.max())}
 
@@ -126,26 +126,28 @@ def ask_both(cell: Cell, file: Path) -> Answers:
         request.enable_signed_distance = True
         request.gjk_tolerance = request.epa_tolerance = TOLERANCE
         request.gjk_max_iterations = request.epa_max_iterations = ITERATIONS
+    # Every body pair's solid pairs in a row; what a row has less than the longest is infinite.
     starts = np.flatnonzero(np.diff(cell.pair_of, prepend=-1))
-    ends = np.append(starts[1:], len(cell.pair_of))
+    lengths = np.diff(np.append(starts, len(cell.pair_of)))
+    columns = np.arange(lengths.max())[None]
+    members = np.where(columns < lengths[:, None], starts[:, None] + columns, len(cell.pair_of))
     found = np.empty((count, pairs))
     points, normals = np.empty((count, pairs, 2, 3)), np.empty((count, pairs, 3))
     solids = np.empty((count, pairs, 2), dtype=int)
     rotations, positions = np.empty((count, 7, 3, 3)), np.empty((count, 7, 3))
-    every = [(pair.first, pair.second) for pair in cell.geometry.collisionPairs]
+    every = np.array([(pair.first, pair.second) for pair in cell.geometry.collisionPairs])
     for k in range(count):
         pin.computeDistances(cell.model, data, cell.geometry, geometry_data, q[k])
         results = geometry_data.distanceResults
-        values = np.array([result.min_distance for result in results])
-        values[values < -BEYOND_M] = np.nan
-        for pair in range(pairs):
-            part = values[starts[pair] : ends[pair]]
-            best = int(starts[pair]) + (0 if np.isnan(part).all() else int(np.nanargmin(part)))
-            found[k, pair] = values[best]
+        values = np.array([result.min_distance for result in results] + [np.inf])
+        values[values < -BEYOND_M] = np.inf
+        nearest = members[np.arange(pairs), values[members].argmin(axis=1)]
+        found[k] = np.where(np.isinf(values[nearest]), np.nan, values[nearest])
+        solids[k] = every[nearest]
+        for pair, best in enumerate(nearest.tolist()):
             result = results[best]
             points[k, pair] = result.getNearestPoint1(), result.getNearestPoint2()
             normals[k, pair] = result.normal
-            solids[k, pair] = every[best]
         for link in range(7):
             rotations[k, link] = data.oMi[link].rotation
             positions[k, link] = data.oMi[link].translation
@@ -204,20 +206,24 @@ def our_certificates(cell: Cell, answers: Answers) -> Array:
     return result
 
 
-def searched(cell: Cell, answers: Answers, posture: int, pair: int, solids: Array) -> float:
-    """Second opinion on two solids: the widest gap over a dense search of directions."""
-    row = np.array([posture])
+def searched(
+    cell: Cell, answers: Answers, at: tuple[int, int], solids: Array, enough: float
+) -> float:
+    """Second opinion on two solids at a posture and pair: the widest gap over a dense search of
+    directions, or one that is enough."""
+    row = np.array([at[0]])
     poses = []
     for solid in solids:
         rotation, position = solid_poses(cell, answers, int(solid), row)
         poses.append((rotation[0], position[0]))
-    hints = np.vstack([answers.our_normal[posture, pair], answers.coal_normal[posture, pair]])
+    hints = np.vstack([answers.our_normal[at], answers.coal_normal[at]])
     return widest_gap(
         a=cell.solids[solids[0]].shape,
         b=cell.solids[solids[1]].shape,
         pose_a=poses[0],
         pose_b=poses[1],
         hints=np.vstack([hints, -hints]),
+        enough=enough,
     )
 
 
@@ -233,7 +239,7 @@ def settle(cell: Cell, answers: Answers, tally: Tally, at: tuple[int, int]) -> s
         return message if apart else None
     if np.isnan(theirs) or ours > theirs:
         # Ours is the larger: every solid that Coal sees nearer has to be shown further.
-        proved = searched(cell, answers, *at, answers.coal_solids[at])
+        proved = searched(cell, answers, at, answers.coal_solids[at], ours - AGREEMENT_M)
         right = proved >= ours - AGREEMENT_M
     elif apart:
         # Ours is the smaller: two points as close as we say show it.
@@ -241,7 +247,7 @@ def settle(cell: Cell, answers: Answers, tally: Tally, at: tuple[int, int]) -> s
         right = np.linalg.norm(b - a) <= ours + AGREEMENT_M
     else:
         # Ours is the deeper: no direction may show a shallower way out.
-        proved = searched(cell, answers, *at, answers.our_solids[at])
+        proved = searched(cell, answers, at, answers.our_solids[at], ours + 2.0 * AGREEMENT_M)
         right = proved <= ours + AGREEMENT_M
     if not right:
         return message
@@ -296,8 +302,8 @@ def judge(cell: Cell, answers: Answers) -> Tally:
     # Our own normal proves our distance, apart and in penetration; or else a better direction.
     unproved = np.nan_to_num(answers.ours - our_certificates(cell, answers))
     for at in zip(*np.nonzero(unproved > OVERESTIMATE_M), strict=True):
-        posture, pair = (int(each) for each in at)
-        proved = searched(cell, answers, posture, pair, answers.our_solids[at])
+        enough = answers.ours[at] - OVERESTIMATE_M
+        proved = searched(cell, answers, at, answers.our_solids[at], enough)
         unproved[at] = min(unproved[at], answers.ours[at] - proved)
         tally.proved_by_search += 1
     tally.largest_unproved.take(unproved.ravel(), name)
@@ -408,7 +414,7 @@ def plain(value):
 def text_of(tallies: list[Tally], meshes: list[dict]) -> str:
     """The report as a table."""
     lines = ["clearances of whole cells against Coal and Pinocchio (differences in um)", ""]
-    form = "{:<14} {:>8} {:>6} {:>8} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>10} {:>9}"
+    form = "{:<20} {:>8} {:>6} {:>8} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>10} {:>9}"
     lines.append(
         form.format(
             "scenario", "postures", "pairs", "solids", "distances", "apart q99", "max",
@@ -454,7 +460,7 @@ def text_of(tallies: list[Tally], meshes: list[dict]) -> str:
                 f"least {row['least_m'] * 1e3:9.3f} mm"
             )
     lines += ["", "time of a posture with forward kinematics (us, one thread, same postures)"]
-    form = "{:<14} {:>16} {:>12} {:>20} {:>8} {:>8}"
+    form = "{:<20} {:>16} {:>12} {:>20} {:>8} {:>8}"
     heads = ["scenario", "Coal+Pinocchio", "all pairs", "minimum per class", "times", "times"]
     lines.append(form.format(*heads))
     for each in tallies:
@@ -502,11 +508,13 @@ def main() -> int:
     out = arguments.out.resolve()
     command = [str(arguments.exporter.resolve()), "--out", str(out)]
     command += ["--postures", str(arguments.postures), "--seed", str(arguments.seed)]
+    command += ["--surfaces"]
     subprocess.run([*command, *scenarios], check=True, cwd=ROOT)
 
     tallies = []
-    for path in scenarios:
-        header_file = out / f"{Path(path).stem}.json"
+    names = [Path(path).stem for path in scenarios]
+    for name in [*names, *(f"{name}_surface" for name in names)]:
+        header_file = out / f"{name}.json"
         cell = build_cell(header_file)
         answers = ask_both(cell, header_file.with_suffix(".f64"))
         tally = judge(cell, answers)

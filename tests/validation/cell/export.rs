@@ -2,6 +2,9 @@
 //!
 //! `cargo run --release -p needlebench-tests --example cell_export -- --out DIR SCENARIO...`
 //!
+//! With `--surfaces` every scenario a second time with a tenth of the postures, the phantom's skin
+//! given as a triangle mesh instead of a convex piece, as `NAME_surface`.
+//!
 //! For every scenario `NAME.json` (bodies, shapes, pairs, timings) and `NAME.f64`: little-endian
 //! doubles, per posture six joint positions (rad) and then per pair of the cell
 //! [`NUMBERS_PER_PAIR`] numbers. Lengths in metres. The same arguments give the same bytes, but for
@@ -13,10 +16,11 @@ use std::error::Error;
 use std::f64::consts::PI;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
-use needlebench_cell::shape::{Shape, TriangleMesh};
-use needlebench_cell::{Cell, Frame, Overrides, ResolvedScenario, load_scenario};
+use needlebench_cell::shape::{ConvexMesh, Shape, SolidMesh, TriangleMesh};
+use needlebench_cell::{BodyKind, Cell, Frame, Overrides, ResolvedScenario, load_scenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::pose_sets::SplitMix64;
 use needlebench_kinematics::{Joints, Pose};
@@ -38,6 +42,7 @@ struct Arguments {
     postures: usize,
     timed: usize,
     seed: u64,
+    surfaces: bool,
     scenarios: Vec<PathBuf>,
 }
 
@@ -47,6 +52,7 @@ fn arguments() -> Result<Arguments, Box<dyn Error>> {
         postures: 2000,
         timed: 500,
         seed: 1,
+        surfaces: false,
         scenarios: Vec::new(),
     };
     let mut words = std::env::args().skip(1);
@@ -56,6 +62,7 @@ fn arguments() -> Result<Arguments, Box<dyn Error>> {
             "--out" => parsed.out = PathBuf::from(value()?),
             "--postures" => parsed.postures = value()?.parse()?,
             "--timed" => parsed.timed = value()?.parse()?,
+            "--surfaces" => parsed.surfaces = true,
             "--seed" => parsed.seed = value()?.parse()?,
             _ if word.starts_with('-') => return Err(format!("unknown option {word}").into()),
             _ => parsed.scenarios.push(PathBuf::from(word)),
@@ -68,11 +75,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments = arguments()?;
     std::fs::create_dir_all(&arguments.out)?;
     for path in &arguments.scenarios {
-        let resolved = load_scenario(path, &Overrides::default()).map_err(|findings| {
+        let mut resolved = load_scenario(path, &Overrides::default()).map_err(|findings| {
             let lines: Vec<String> = findings.iter().map(ToString::to_string).collect();
             lines.join("\n")
         })?;
-        export(path, &resolved, &arguments)?;
+        export(path, &resolved, &arguments, arguments.postures)?;
+        if arguments.surfaces {
+            resolved.scenario.name += "_surface";
+            skin_as_surface(&mut resolved.cell);
+            export(path, &resolved, &arguments, arguments.postures / 10)?;
+        }
     }
     let mesh = mesh_bench::export(arguments.seed);
     std::fs::write(arguments.out.join("mesh.json"), mesh.to_string())?;
@@ -83,10 +95,11 @@ fn export(
     path: &Path,
     resolved: &ResolvedScenario,
     arguments: &Arguments,
+    count: usize,
 ) -> Result<(), Box<dyn Error>> {
     let cell = &resolved.cell;
     let model = ClearanceModel::new(cell);
-    let postures = postures(resolved, &model, arguments)?;
+    let postures = postures(resolved, &model, arguments.seed, count)?;
     let mut bytes = Vec::new();
     let mut push = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
     for q in &postures {
@@ -134,12 +147,29 @@ fn export(
     Ok(())
 }
 
+/// Gives the phantom's skin as the same surface without its being known to be convex.
+fn skin_as_surface(cell: &mut Cell) {
+    let phantoms = cell
+        .bodies
+        .iter_mut()
+        .filter(|body| body.kind == BodyKind::Phantom);
+    for solid in phantoms.flat_map(|body| &mut body.solids) {
+        if let Shape::Convex(mesh) = &solid.shape {
+            solid.shape = Shape::Mesh(Arc::new(SolidMesh {
+                surface: mesh.0.clone(),
+                pieces: vec![ConvexMesh::clone(mesh)],
+            }));
+        }
+    }
+}
+
 /// Every other posture uniform over the joint limits (one turn where there are more), every other
 /// near one that the scenario has to do with.
 fn postures(
     resolved: &ResolvedScenario,
     model: &ClearanceModel,
-    arguments: &Arguments,
+    seed: u64,
+    count: usize,
 ) -> Result<Vec<Joints>, Box<dyn Error>> {
     let planner = Planner::new(resolved, model)?;
     let mut places = vec![resolved.start];
@@ -149,8 +179,8 @@ fn postures(
         }
     }
     let limits = &resolved.cell.robot.limits.0;
-    let mut random = SplitMix64::new(arguments.seed);
-    Ok((0..arguments.postures)
+    let mut random = SplitMix64::new(seed);
+    Ok((0..count)
         .map(|i| {
             if i % 2 == 0 {
                 Joints::from_fn(|joint, _| {

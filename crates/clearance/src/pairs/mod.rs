@@ -43,7 +43,7 @@ impl Default for PairSettings {
             samples: 2000,
             seed: 1,
             tolerance_m: 1e-3,
-            boxes: 20_000,
+            boxes: 100_000,
             joints: 3,
         }
     }
@@ -222,11 +222,7 @@ fn examine(
     let mut nearest = None;
     let mut farthest = None;
     if joints.is_empty() {
-        let constant = RangeBound {
-            lower_m: sampled.least_m,
-            upper_m: sampled.least_m,
-            boxes: 1,
-        };
+        let constant = RangeBound::of_constant(sampled.least_m);
         nearest = Some(constant);
         farthest = Some(constant);
     } else if joints.len() <= settings.joints {

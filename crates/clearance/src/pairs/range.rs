@@ -42,6 +42,17 @@ pub struct RangeBound {
     pub boxes: usize,
 }
 
+impl RangeBound {
+    /// Of a distance that no joint changes.
+    pub(super) fn of_constant(distance_m: f64) -> Self {
+        Self {
+            lower_m: distance_m - ROUNDING_M,
+            upper_m: distance_m + ROUNDING_M,
+            boxes: 1,
+        }
+    }
+}
+
 /// Which extreme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Extreme {

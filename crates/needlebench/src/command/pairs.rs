@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use needlebench_cell::{Cell, Finding, Srdf, load_scenario};
+use needlebench_cell::{Cell, ClearanceClass, Finding, Srdf, load_scenario};
 use needlebench_clearance::{
     PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
     check_srdf, examine_pairs,
@@ -89,6 +89,7 @@ pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus> {
     let settings = PairSettings {
         samples: arguments.samples as usize,
         seed: arguments.seed,
+        boxes: arguments.proof_boxes as usize,
         ..PairSettings::default()
     };
     let examined = examine_pairs(cell, &settings);
@@ -112,7 +113,7 @@ pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus> {
     } else {
         print_text(&table(cell, &examined, &settings))?;
         if let Some(srdf) = &srdf {
-            print_text(&srdf_text(srdf, &answers))?;
+            print_text(&srdf_text(srdf, cell, &answers))?;
         }
     }
     let findings: Vec<Finding> = answers
@@ -139,7 +140,7 @@ fn answer(cell: &Cell, pair: &PairExamination) -> PairAnswer {
     };
     PairAnswer {
         pair: names(cell, pair),
-        class: pair.class.map(|class| class.name()),
+        class: pair.class.map(ClearanceClass::name),
         state: pair.state,
         measured: pair.state.is_measured(),
         joints_between: pair.joints.len(),
@@ -172,7 +173,7 @@ fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> 
         table.add_row([
             a,
             b,
-            pair.class.map_or("-", |class| class.name()).to_owned(),
+            pair.class.map_or("-", ClearanceClass::name).to_owned(),
             pair.state.name().to_owned(),
             pair.joints.len().to_string(),
             format!("{:.2} %", pair.collision_rate * 100.0),
@@ -243,7 +244,7 @@ fn srdf_report(srdf: &Srdf, answers: &[SrdfAnswer], examined: &[PairExamination]
     }
 }
 
-fn srdf_text(srdf: &Srdf, answers: &[SrdfAnswer]) -> String {
+fn srdf_text(srdf: &Srdf, cell: &Cell, answers: &[SrdfAnswer]) -> String {
     let count = |verdict| {
         answers
             .iter()
@@ -260,6 +261,13 @@ fn srdf_text(srdf: &Srdf, answers: &[SrdfAnswer]) -> String {
         count(SrdfVerdict::Refuted),
         count(SrdfVerdict::UnknownLink),
     );
+    if srdf.robot != cell.robot.name {
+        let _ = write!(
+            text,
+            "\nwarning: the SRDF is for '{}', the robot is '{}'",
+            srdf.robot, cell.robot.name
+        );
+    }
     for answer in answers {
         if answer.verdict == SrdfVerdict::Unproven {
             let [a, b] = &srdf.disabled[answer.pair].links;

@@ -2,13 +2,15 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 10] = [
+const COMMANDS: [&str; 12] = [
     "run",
     "check",
     "ik",
     "fk",
     "clearance",
+    "atlas",
     "compare",
+    "pairs",
     "paper",
     "schema",
     "doctor",

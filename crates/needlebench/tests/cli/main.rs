@@ -15,6 +15,7 @@ mod help;
 #[cfg(target_os = "linux")]
 mod interrupt;
 mod kinematics;
+mod pairs;
 mod paper;
 #[cfg(target_os = "linux")]
 mod process;
