@@ -11,6 +11,7 @@ mod goal;
 mod mesh;
 mod model;
 mod nominal;
+pub mod people;
 pub mod phantom;
 mod resolve;
 mod robot;

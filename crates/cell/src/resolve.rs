@@ -10,6 +10,7 @@ use crate::files::{Location, source_of};
 use crate::fixtures::{self, Fixture, FixtureError, TableParameters};
 use crate::goal::{PlacedPhantom, Surroundings, resolve_goal, solid_contains};
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
+use crate::people::{People, Room, resolve_people};
 use crate::phantom::{Phantom, PhantomError, PhantomParameters};
 use crate::robot::{MissingInertia, read_robot};
 use crate::scenario::{PhantomSection, Posture, Scenario};
@@ -74,6 +75,8 @@ pub struct ResolvedScenario {
     pub phantom_source: Option<ModelSource>,
     /// What was assumed or adjusted; belongs in every report.
     pub notes: Vec<String>,
+    /// The people in the room, by goal.
+    pub people: People,
 }
 
 /// Reads a robot without a scenario: the one of the overrides, or the shipped UR3, with its
@@ -255,6 +258,25 @@ pub fn resolve_scenario(
         goals
     };
 
+    let people = {
+        let base = robot.base.solids.iter().map(|solid| crate::shape::Solid {
+            parent_from_shape: world_from_base_link * solid.parent_from_shape,
+            ..solid.clone()
+        });
+        let base: Vec<_> = base.collect();
+        let standing = surroundings
+            .iter()
+            .flat_map(|body| body.solids.iter().map(|solid| (body.name.as_str(), solid)));
+        let solids: Vec<_> = standing
+            .chain(base.iter().map(|solid| ("robot's base", solid)))
+            .collect();
+        let room = Room {
+            phantom: phantom.as_ref(),
+            solids: &solids,
+            robot_base_m: Point3::from(world_from_base_link.translation.vector),
+        };
+        resolve_people(&toml, &scenario.people, &goals, &room).map_err(one)?
+    };
     let start = Joints::from_column_slice(&scenario.start.joints_deg.map(f64::to_radians));
     if let Some(joint) = robot.limits.first_violation(&start) {
         let limit = robot.limits.0[joint];
@@ -295,6 +317,7 @@ pub fn resolve_scenario(
         motion,
         phantom_source,
         notes,
+        people,
         scenario,
     })
 }

@@ -8,6 +8,7 @@ mod judge;
 mod motion;
 mod needle;
 pub mod report;
+pub mod room;
 
 pub use clearance::{
     ClearanceSeries, measure_clearance, needle_route, posture_clearance, sample_indices,

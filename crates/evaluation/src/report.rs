@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
+use crate::room::RoomReport;
 
 /// Version of the report's keys.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -218,6 +219,8 @@ pub struct ConfigurationReport {
     pub engine_difference: Option<EngineDifference>,
     /// Clearances over the motion, of the final posture where nothing was simulated.
     pub clearance: ClearanceReport,
+    /// What it leaves to the people in the room; none without a posture.
+    pub room: Option<RoomReport>,
     /// Files written for it, relative to the results folder.
     pub files: Vec<String>,
 }

@@ -48,6 +48,7 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
             classes: BTreeMap::from([("robot_phantom", found)]),
             minimum_m: Some(clearance_m),
         },
+        room: None,
         files: Vec::new(),
     }
 }
