@@ -65,8 +65,8 @@ pub struct RoomReport {
     pub elbow_up: bool,
     /// Height of the elbow's axis over the entry point.
     pub elbow_over_entry_m: f64,
-    /// Height over the entry point of the lowest point of arm and tool, but for the guide tube, over
-    /// the patient; none without a patient or where nothing is over it.
+    /// Height over the entry point of the arm's lowest point over the patient, the tool left out;
+    /// none without a patient or where no link is over it.
     pub lowest_over_patient_m: Option<f64>,
     /// Free share of the region on the side that the scenario prefers.
     pub preferred_side_free_fraction: Option<f64>,
@@ -104,7 +104,7 @@ pub struct RoomModel<'a> {
     obstacles: Obstacles<'a>,
     sides: Option<PatientSides>,
     sectors: Vec<Sector>,
-    /// Points all over arm and tool: body and place in it, m.
+    /// Points all over the arm: body and place in it, m.
     surface: Vec<(usize, Vec<Point3<f64>>)>,
 }
 
@@ -141,7 +141,7 @@ impl<'a> RoomModel<'a> {
             .bodies
             .iter()
             .enumerate()
-            .filter(|(_, body)| matches!(body.kind, BodyKind::Link | BodyKind::Tool));
+            .filter(|(_, body)| body.kind == BodyKind::Link);
         let surface = moving
             .map(|(index, body)| {
                 let points = body.solids.iter().flat_map(|solid| {

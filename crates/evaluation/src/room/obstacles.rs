@@ -165,13 +165,9 @@ impl PlacedObstacles<'_> {
         (nearest, kept)
     }
 
-    /// First solid on the way from one point to another, with the parameter of the place, 0 at
-    /// `from` and 1 at `to`.
-    pub(super) fn first_on_the_way(
-        &self,
-        from: &Point3<f64>,
-        to: &Point3<f64>,
-    ) -> Option<(f64, usize)> {
+    /// First solid on the way from one point to another: parameter of the place, 0 at `from` and 1
+    /// at `to`, and the solid's index.
+    pub fn first_on_the_way(&self, from: &Point3<f64>, to: &Point3<f64>) -> Option<(f64, usize)> {
         let along = to - from;
         let length_squared = along.norm_squared().max(f64::MIN_POSITIVE);
         let mut first: Option<(f64, usize)> = None;

@@ -6,6 +6,7 @@ mod junit;
 mod markdown;
 pub(crate) mod pictures;
 mod recording;
+pub(crate) mod room_pictures;
 mod table;
 
 pub(crate) use junit::junit;

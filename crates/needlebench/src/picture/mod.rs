@@ -20,6 +20,7 @@ mod sheet;
 #[cfg(test)]
 mod tests;
 mod text;
+mod voxels;
 
 use std::sync::Arc;
 
@@ -31,6 +32,7 @@ pub use camera::{Camera, Projection};
 pub use image::{Image, PictureError};
 pub use render::render;
 pub use sheet::tile;
+pub use voxels::voxel_surface;
 
 /// What a picture shows. Everything is in the world frame, z up.
 #[derive(Debug, Clone, Default)]
