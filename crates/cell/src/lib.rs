@@ -13,6 +13,7 @@ mod mesh;
 mod model;
 mod nominal;
 mod pairs;
+pub mod people;
 pub mod phantom;
 mod phantom_place;
 pub mod ranking;

@@ -10,6 +10,7 @@ use crate::files::{Location, source_of};
 use crate::fixtures::{self, Fixture, FixtureError};
 use crate::goal::{PlacedPhantom, Surroundings, resolve_goal, solid_contains};
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
+use crate::people::{People, Room, resolve_people};
 use crate::phantom_place::place_phantom;
 use crate::robot::{MissingInertia, read_robot};
 use crate::scenario::Scenario;
@@ -75,6 +76,8 @@ pub struct ResolvedScenario {
     pub phantom_parts: Vec<ModelSource>,
     /// What was assumed or adjusted; belongs in every report.
     pub notes: Vec<String>,
+    /// The people in the room, by goal.
+    pub people: People,
 }
 
 /// Reads a robot without a scenario: the one of the overrides, or the shipped UR3, with its
@@ -278,6 +281,25 @@ pub fn resolve_scenario(
         goals
     };
 
+    let people = {
+        let base = robot.base.solids.iter().map(|solid| crate::shape::Solid {
+            parent_from_shape: world_from_base_link * solid.parent_from_shape,
+            ..solid.clone()
+        });
+        let base: Vec<_> = base.collect();
+        let standing = surroundings
+            .iter()
+            .flat_map(|body| body.solids.iter().map(|solid| (body.name.as_str(), solid)));
+        let solids: Vec<_> = standing
+            .chain(base.iter().map(|solid| ("robot's base", solid)))
+            .collect();
+        let room = Room {
+            phantom: phantom.as_ref(),
+            solids: &solids,
+            robot_base_m: Point3::from(world_from_base_link.translation.vector),
+        };
+        resolve_people(&toml, &scenario.people, &goals, &room).map_err(one)?
+    };
     let start = Joints::from_column_slice(&scenario.start.joints_deg.map(f64::to_radians));
     if let Some(joint) = robot.limits.first_violation(&start) {
         let limit = robot.limits.0[joint];
@@ -320,6 +342,7 @@ pub fn resolve_scenario(
         phantom_source,
         phantom_parts,
         notes,
+        people,
         scenario,
     })
 }

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
+pub use crate::people::{PeopleSection, PersonSection};
 use crate::ranking::RankingSection;
 use crate::robot::MissingInertia;
 use crate::user_parts::PartSection;
@@ -68,6 +69,9 @@ pub struct Scenario {
     /// What is written of each simulated motion.
     #[serde(default)]
     pub recording: RecordingSection,
+    /// The people in the room, and what they prefer.
+    #[serde(default)]
+    pub people: PeopleSection,
 }
 
 /// The arm.
@@ -576,6 +580,12 @@ pub struct CriteriaSection {
     pub min_working_configurations: u32,
     /// Half-width of the tip's settling band, mm.
     pub settling_band_mm: f64,
+    /// Least share of the room about the entry point that is free of arm and tool, 0 to 1.
+    pub min_free_fraction: Option<f64>,
+    /// Least share of unobstructed lines of sight, 0 to 1.
+    pub min_sight_fraction: Option<f64>,
+    /// Least half-angle of the free cone behind the guide, deg.
+    pub min_hand_cone_deg: Option<f64>,
 }
 
 impl Default for CriteriaSection {
@@ -592,6 +602,9 @@ impl Default for CriteriaSection {
             min_clearance_mm: ClearanceCriteria::default(),
             min_working_configurations: 1,
             settling_band_mm: 0.01,
+            min_free_fraction: None,
+            min_sight_fraction: None,
+            min_hand_cone_deg: None,
         }
     }
 }

@@ -3,6 +3,7 @@
 use needlebench_kinematics::JOINT_COUNT;
 
 use crate::Finding;
+use crate::people::check_people;
 use crate::ranking::check_ranking;
 use crate::scenario::Scenario;
 use crate::toml_text::TomlText;
@@ -272,6 +273,32 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
         100.0,
         "mm",
     );
+    let criteria = &scenario.criteria;
+    for (key, value, most, unit) in [
+        (
+            "criteria.min_free_fraction",
+            criteria.min_free_fraction,
+            1.0,
+            "",
+        ),
+        (
+            "criteria.min_sight_fraction",
+            criteria.min_sight_fraction,
+            1.0,
+            "",
+        ),
+        (
+            "criteria.min_hand_cone_deg",
+            criteria.min_hand_cone_deg,
+            90.0,
+            "deg",
+        ),
+    ] {
+        if let Some(value) = value {
+            range(key, value, 0.0, most, unit);
+        }
+    }
+    findings.extend(check_people(toml, scenario));
 
     let is_name = |name: &str| {
         !name.is_empty()

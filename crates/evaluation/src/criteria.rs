@@ -179,6 +179,38 @@ pub fn check_configuration(
             String::new(),
         );
     }
+    let room = configuration.room.as_ref();
+    let mut at_least = |key, limit: Option<f64>, unit, value: Option<f64>, detail: String| {
+        let criterion = limit.map(|limit| Criterion {
+            key,
+            limit,
+            unit,
+            at_least: true,
+        });
+        check(criterion, None, value, detail);
+    };
+    at_least(
+        "min_free_fraction",
+        criteria.min_free_fraction,
+        "1",
+        room.map(|room| room.free_fraction),
+        String::new(),
+    );
+    at_least(
+        "min_sight_fraction",
+        criteria.min_sight_fraction,
+        "1",
+        room.map(|room| room.sight_fraction),
+        String::new(),
+    );
+    at_least(
+        "min_hand_cone_deg",
+        criteria.min_hand_cone_deg.map(f64::to_radians),
+        "rad",
+        room.map(|room| room.hand_cone_half_angle_rad),
+        room.and_then(|room| room.hand_cone_blocker.as_ref())
+            .map_or(String::new(), |blocker| format!("blocked by {blocker}")),
+    );
     for (class, key, limit_mm) in clearance_limits(&criteria.min_clearance_mm) {
         // A class that the cell has no part for cannot be violated.
         let Some(found) = configuration.clearance.classes.get(class) else {

@@ -10,6 +10,7 @@ use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
     MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary, Status,
 };
+use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
     engine_difference, judge, measure_motion, measure_needle, needle_route, posture_clearance,
     tip_sensitivity,
@@ -34,12 +35,12 @@ pub(crate) fn assemble(
     identities: Vec<EngineIdentity>,
     timings: BTreeMap<String, f64>,
 ) -> Report {
-    let mut goals: Vec<GoalReport> = resolved
-        .goals
+    let room = RoomModel::new(resolved);
+    let mut goals: Vec<GoalReport> = plans
         .iter()
-        .zip(plans)
         .zip(runs)
-        .map(|((goal, plan), runs)| goal_report(resolved, planner, goal, plan, runs))
+        .enumerate()
+        .map(|(index, (plan, runs))| goal_report(resolved, planner, &room, index, plan, runs))
         .collect();
     let both = engines.len() == 2 && engine_failures.is_empty();
     let (verdict, criteria) = judge(
@@ -72,10 +73,12 @@ pub(crate) fn assemble(
 fn goal_report(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
-    goal: &Goal,
+    room: &RoomModel<'_>,
+    goal_index: usize,
     plan: &GoalPlan,
     runs: &[Vec<EngineRun>],
 ) -> GoalReport {
+    let goal = &resolved.goals[goal_index];
     let route = resolved
         .phantom
         .as_ref()
@@ -93,7 +96,15 @@ fn goal_report(
             .iter()
             .zip(runs)
             .map(|(plan, runs)| {
-                configuration_report(resolved, planner, goal, plan, runs, route.as_ref())
+                configuration_report(
+                    resolved,
+                    planner,
+                    room,
+                    goal_index,
+                    plan,
+                    runs,
+                    route.as_ref(),
+                )
             })
             .collect(),
         recommended: None,
@@ -104,12 +115,14 @@ fn goal_report(
 fn configuration_report(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
-    goal: &Goal,
+    room: &RoomModel<'_>,
+    goal_index: usize,
     plan: &ConfigurationPlan,
     runs: &[EngineRun],
     route: Option<&ClassClearance>,
 ) -> ConfigurationReport {
     let cell = &resolved.cell;
+    let goal = &resolved.goals[goal_index];
     let candidate = plan.candidate.as_ref();
     let engines: BTreeMap<String, EngineReport> = runs
         .iter()
@@ -173,11 +186,11 @@ fn configuration_report(
         engines,
         engine_difference,
         clearance,
-        room: None,
         tip_sensitivity_m_per_rad: candidate.map(|each| tip_sensitivity(cell, goal, &each.joints)),
         pareto: false,
         dominated_by: None,
         ranking: None,
+        room: candidate.map(|each| room.measure(goal_index, &each.joints)),
         files: Vec::new(),
     }
 }

@@ -10,6 +10,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use needlebench_cell::{Finding, ResolvedScenario};
 use needlebench_evaluation::report::{Report, Verdict};
+use needlebench_evaluation::room::RoomModel;
 use serde::Serialize;
 
 use super::{load, overrides, print_json, print_text};
@@ -18,6 +19,7 @@ use crate::cli::RunArguments;
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
 use crate::output::pictures::{Backdrop, configuration_picture, goal_camera, sheet_caption};
+use crate::output::room_pictures::{RoomPictures, room_caption};
 use crate::output::{junit, markdown, ranking_picture, recording_csv, report_text};
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
@@ -284,6 +286,9 @@ fn remove_stale(folder: &Path, goal: &str, written: &[String]) -> Result<()> {
     Ok(())
 }
 
+/// What is added to the names of pictures: those of the posture, those of the room.
+const PICTURE_KINDS: [&str; 2] = ["", ".room"];
+
 fn write_pictures(
     resolved: &ResolvedScenario,
     report: &Report,
@@ -292,10 +297,12 @@ fn write_pictures(
     files: &mut [Vec<Vec<String>>],
 ) -> Result<()> {
     let backdrop = Backdrop::new(resolved);
+    let room = RoomModel::new(resolved);
     for (index, (goal, goal_report)) in resolved.goals.iter().zip(&report.goals).enumerate() {
         let camera = goal_camera(resolved, goal);
+        let room_pictures = RoomPictures::new(resolved, &backdrop, &room, index);
         let next = AtomicUsize::new(0);
-        let drawn: Mutex<Vec<(usize, Image)>> = Mutex::new(Vec::new());
+        let drawn: Mutex<Vec<(usize, [Option<Image>; 2])>> = Mutex::new(Vec::new());
         std::thread::scope(|scope| {
             for _ in 0..jobs.clamp(1, goal_report.configurations.len()) {
                 scope.spawn(|| {
@@ -304,27 +311,44 @@ fn write_pictures(
                         let Some(configuration) = goal_report.configurations.get(at) else {
                             break;
                         };
-                        if let Some(image) =
-                            configuration_picture(resolved, &backdrop, &camera, goal, configuration)
-                        {
-                            drawn.lock().expect("no thread panics").push((at, image));
-                        }
+                        let pictures = [
+                            configuration_picture(
+                                resolved,
+                                &backdrop,
+                                &camera,
+                                goal,
+                                configuration,
+                            ),
+                            room_pictures.draw(configuration),
+                        ];
+                        drawn.lock().expect("no thread panics").push((at, pictures));
                     }
                 });
             }
         });
         let mut drawn = drawn.into_inner().expect("no thread panics");
         drawn.sort_by_key(|(at, _)| *at);
-        let mut sheet = Vec::new();
-        for (at, image) in drawn {
+        let mut sheets = [Vec::new(), Vec::new()];
+        for (at, pictures) in drawn {
             let configuration = &goal_report.configurations[at];
-            let name = format!("{}/{}.png", goal.name, configuration.label);
-            image.write_png(&folder.join(&name))?;
-            files[index][at].push(name);
-            sheet.push((image, sheet_caption(goal_report, configuration)));
+            let captions = [
+                sheet_caption(goal_report, configuration),
+                room_caption(goal_report, configuration),
+            ];
+            let kinds = PICTURE_KINDS.iter().zip(&mut sheets).zip(captions);
+            for (picture, ((kind, sheet), caption)) in pictures.into_iter().zip(kinds) {
+                let Some(image) = picture else { continue };
+                let name = format!("{}/{}{kind}.png", goal.name, configuration.label);
+                image.write_png(&folder.join(&name))?;
+                files[index][at].push(name);
+                sheet.push((image, caption));
+            }
         }
-        if !sheet.is_empty() {
-            tile(&sheet, 4).write_png(&folder.join(format!("{}.png", goal.name)))?;
+        for (kind, sheet) in PICTURE_KINDS.iter().zip(&sheets) {
+            if !sheet.is_empty() {
+                let name = format!("{}{kind}.png", goal.name);
+                tile(sheet, 4).write_png(&folder.join(name))?;
+            }
         }
         let ranking = folder.join(format!("{}.ranking.png", goal.name));
         match ranking_picture(goal_report) {

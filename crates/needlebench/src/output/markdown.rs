@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use needlebench_evaluation::report::{Report, Status, Verdict};
+use needlebench_evaluation::room::RoomReport;
 
 use super::format::{millimetres, small_length};
 use super::ranking::comparison_markdown;
@@ -28,9 +29,9 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
         writeln!(out, "## {}\n", goal.name)?;
         writeln!(
             out,
-            "| Configuration | Status | Tip error rapier | Tip error MuJoCo | Engines differ, settled | Least clearance (mm) | Between | Behind the guide (mm) |"
+            "| Configuration | Status | Tip error rapier | Tip error MuJoCo | Engines differ, settled | Least clearance (mm) | Between | Behind the guide (mm) | Free room | Sight | Hand cone (deg) |"
         )?;
-        writeln!(out, "|---|---|--:|--:|--:|--:|---|--:|")?;
+        writeln!(out, "|---|---|--:|--:|--:|--:|---|--:|--:|--:|--:|")?;
         for each in &goal.configurations {
             let status = match (each.status, each.rejections.first()) {
                 (Status::Rejected, Some(first)) => format!("rejected: {}", first.rule),
@@ -53,13 +54,18 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
                 .classes
                 .get("needle_corridor")
                 .map_or("-".to_owned(), |found| millimetres(found.minimum_m));
+            let of_room =
+                |value: fn(&RoomReport) -> String| each.room.as_ref().map_or("-".to_owned(), value);
+            let free = of_room(|room| format!("{:.0} %", 100.0 * room.free_fraction));
+            let sight = of_room(|room| format!("{:.0} %", 100.0 * room.sight_fraction));
+            let cone = of_room(|room| format!("{:.1}", room.hand_cone_half_angle_rad.to_degrees()));
             let mark = match &goal.recommended {
                 Some(found) if found.label == each.label => "**",
                 _ => "",
             };
             writeln!(
                 out,
-                "| {mark}{}{mark} | {status} | {} | {} | {difference} | {clearance} | {pair} | {corridor} |",
+                "| {mark}{}{mark} | {status} | {} | {} | {difference} | {clearance} | {pair} | {corridor} | {free} | {sight} | {cone} |",
                 each.label,
                 tip("rapier"),
                 tip("mujoco"),

@@ -84,19 +84,7 @@ pub(crate) fn configuration_picture(
     report: &ConfigurationReport,
 ) -> Option<Image> {
     let q = Joints::from_column_slice(&report.joints_rad?);
-    let robot = &resolved.cell.robot;
-    let mut scene = Scene {
-        surfaces: backdrop.surfaces.clone(),
-        ..Scene::default()
-    };
-    for (link, pose) in robot.links.iter().zip(robot.world_from_links(&q)) {
-        add(&mut scene.surfaces, &link.visuals, &pose);
-    }
-    add(
-        &mut scene.surfaces,
-        &resolved.cell.tool.visuals,
-        &robot.world_from_flange(&q),
-    );
+    let mut scene = posture_scene(resolved, backdrop, &q);
 
     let exit = Point3::from(goal.world_from_guide_exit.translation.vector);
     let behind = exit
@@ -128,8 +116,32 @@ pub(crate) fn configuration_picture(
             anchor: Anchor::BottomLeft,
         });
     }
-    let base = robot.world_from_base_link.translation.vector;
-    scene.floor = Some(Floor {
+    scene.floor = Some(floor(resolved, goal));
+    Some(render(&scene, camera))
+}
+
+/// The cell with the arm in a posture.
+pub(super) fn posture_scene(resolved: &ResolvedScenario, backdrop: &Backdrop, q: &Joints) -> Scene {
+    let robot = &resolved.cell.robot;
+    let mut scene = Scene {
+        surfaces: backdrop.surfaces.clone(),
+        ..Scene::default()
+    };
+    for (link, pose) in robot.links.iter().zip(robot.world_from_links(q)) {
+        add(&mut scene.surfaces, &link.visuals, &pose);
+    }
+    add(
+        &mut scene.surfaces,
+        &resolved.cell.tool.visuals,
+        &robot.world_from_flange(q),
+    );
+    scene
+}
+
+/// The floor under robot and patient.
+pub(super) fn floor(resolved: &ResolvedScenario, goal: &Goal) -> Floor {
+    let base = resolved.cell.robot.world_from_base_link.translation.vector;
+    Floor {
         center_m: Point2::new(
             0.5 * (base.x + goal.target_m.x),
             0.5 * (base.y + goal.target_m.y),
@@ -137,8 +149,7 @@ pub(crate) fn configuration_picture(
         z_m: 0.0,
         radius_m: 1.6,
         spacing_m: 0.25,
-    });
-    Some(render(&scene, camera))
+    }
 }
 
 /// The camera of all pictures of a goal, so that they can be compared.
@@ -170,7 +181,7 @@ fn framed(resolved: &ResolvedScenario, goal: &Goal) -> Vec<Point3<f64>> {
 }
 
 /// Direction of view: from the side of the robot that looks across towards the goal, from above.
-fn viewpoint(resolved: &ResolvedScenario, goal: &Goal) -> Vector3<f64> {
+pub(super) fn viewpoint(resolved: &ResolvedScenario, goal: &Goal) -> Vector3<f64> {
     let base = resolved.cell.robot.world_from_base_link.translation.vector;
     let ahead = goal.target_m.coords - base;
     let across = Vector3::new(ahead.y, -ahead.x, 0.0);

@@ -1,5 +1,6 @@
 //! The table that a run prints.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use comfy_table::{Cell, CellAlignment, Color, Table};
@@ -31,6 +32,10 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
         writeln!(out, "* worst of those that work, < recommended")?;
         if let Some(comparison) = comparison_text(goal) {
             writeln!(out, "{comparison}")?;
+        }
+        if goal.configurations.iter().any(|each| each.room.is_some()) {
+            writeln!(out, "room for people, in the final posture")?;
+            writeln!(out, "{}", room_table(goal))?;
         }
         write_remarks(out, report, goal)?;
     }
@@ -242,6 +247,81 @@ fn goal_table(goal: &GoalReport) -> Table {
         table.add_row(row);
     }
     table
+}
+
+/// What each configuration leaves to people; `-` without a posture.
+fn room_table(goal: &GoalReport) -> Table {
+    let rooms = || {
+        goal.configurations
+            .iter()
+            .filter_map(|each| each.room.as_ref())
+    };
+    let regions: BTreeSet<&'static str> = rooms()
+        .flat_map(|room| room.regions.keys().copied())
+        .collect();
+    // The same people for all: those of the first that has any.
+    let people: Vec<(String, f64)> = rooms().next().map_or(Vec::new(), |room| {
+        let named = room
+            .sight
+            .iter()
+            .map(|each| (each.person.clone(), each.stature_m));
+        named.collect()
+    });
+    let mut header = vec!["configuration".to_owned(), "free\n(%)".to_owned()];
+    header.extend(regions.iter().map(|region| format!("\n{region}")));
+    header.push("sight\n(%)".to_owned());
+    header.extend(
+        people
+            .iter()
+            .map(|(name, stature_m)| format!("{name}\n{stature_m:.2} m")),
+    );
+    header.extend(
+        [
+            "hand cone\n(deg)",
+            "blocked\nby",
+            "elbow",
+            "over entry\n(mm)",
+        ]
+        .map(str::to_owned),
+    );
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let mut table = plain_table(&header);
+    for configuration in &goal.configurations {
+        let mut row = vec![configuration.label.to_owned()];
+        if let Some(room) = &configuration.room {
+            row.push(percent(room.free_fraction));
+            for region in &regions {
+                row.push(
+                    room.regions
+                        .get(region)
+                        .map_or("-".to_owned(), |free| percent(*free)),
+                );
+            }
+            row.push(percent(room.sight_fraction));
+            row.extend(room.sight.iter().map(|seen| percent(seen.fraction)));
+            row.push(format!("{:.1}", room.hand_cone_half_angle_rad.to_degrees()));
+            row.push(room.hand_cone_blocker.clone().unwrap_or("-".to_owned()));
+            row.push(if room.elbow_up { "up" } else { "down" }.to_owned());
+            row.push(format!("{:.0}", 1e3 * room.elbow_over_entry_m));
+        } else {
+            row.resize(header.len(), "-".to_owned());
+        }
+        let cells = row.into_iter().enumerate().map(|(at, text)| {
+            let is_text = at == 0 || header[at].starts_with("blocked") || header[at] == "elbow";
+            let cell = Cell::new(text);
+            if is_text {
+                cell
+            } else {
+                cell.set_alignment(CellAlignment::Right)
+            }
+        });
+        table.add_row(cells);
+    }
+    table
+}
+
+fn percent(fraction: f64) -> String {
+    format!("{:.0}", 100.0 * fraction)
 }
 
 /// The worst value of a column, if the configurations that work differ in it at all.

@@ -4,11 +4,14 @@ use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
 use needlebench_cell::ResolvedScenario;
-use needlebench_cell::shape::{TriangleMesh, Visual};
+use needlebench_cell::shape::Visual;
+use needlebench_evaluation::room::VoxelGrid;
 use needlebench_kinematics::{Joints, Pose};
 
-use super::free_space::{BASE_HEIGHT_M, CELL_M, ConfigurationSpace, Grid, Space};
-use crate::picture::{Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceInstance, render};
+use super::free_space::{BASE_HEIGHT_M, ConfigurationSpace, Space};
+use crate::picture::{
+    Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceInstance, render, voxel_surface,
+};
 
 const SIZE_PX: [u32; 2] = [800, 660];
 /// Fineness of curved surfaces, m.
@@ -87,7 +90,7 @@ fn add(scene: &mut Scene, visuals: &[Visual], world_from_parent: &Pose) {
 fn picture(
     resolved: &ResolvedScenario,
     configuration: &ConfigurationSpace,
-    grid: &Grid,
+    grid: &VoxelGrid,
     gained: &[bool],
     camera: &Camera,
 ) -> Image {
@@ -107,7 +110,7 @@ fn picture(
         });
     }
     scene.surfaces.push(SurfaceInstance {
-        mesh: Arc::new(outside_of(grid, gained)),
+        mesh: Arc::new(voxel_surface(grid, gained)),
         world_from_surface: Pose::identity(),
         color_rgba: GAINED,
     });
@@ -138,55 +141,4 @@ fn picture(
         spacing_m: 0.25,
     });
     render(&scene, camera)
-}
-
-/// The faces between cells that are in the set and cells that are not.
-fn outside_of(grid: &Grid, cells: &[bool]) -> TriangleMesh {
-    /// Corners of a face in the two other axes, counter-clockwise seen from its positive side.
-    const CORNERS: [[usize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
-    let [across, deep, high] = grid.cells;
-    let is_in = |place: [Option<usize>; 3]| match place {
-        [Some(x), Some(y), Some(z)] if x < across && y < deep && z < high => {
-            cells[(z * deep + y) * across + x]
-        }
-        _ => false,
-    };
-    let mut mesh = TriangleMesh {
-        vertices_m: Vec::new(),
-        triangles: Vec::new(),
-    };
-    for index in (0..cells.len()).filter(|index| cells[*index]) {
-        let place = grid.place(index);
-        for axis in 0..3 {
-            for outwards in [false, true] {
-                let mut beside = place.map(Some);
-                beside[axis] = if outwards {
-                    Some(place[axis] + 1)
-                } else {
-                    place[axis].checked_sub(1)
-                };
-                if is_in(beside) {
-                    continue;
-                }
-                let first = u32::try_from(mesh.vertices_m.len()).unwrap_or(u32::MAX);
-                for corner in CORNERS {
-                    let mut at = place;
-                    at[axis] += usize::from(outwards);
-                    at[(axis + 1) % 3] += corner[0];
-                    at[(axis + 2) % 3] += corner[1];
-                    let offset = Vector3::from(at.map(|each| each as f64 * CELL_M));
-                    mesh.vertices_m.push(grid.corner_m + offset);
-                }
-                mesh.triangles.extend(
-                    if outwards {
-                        [[0, 1, 2], [0, 2, 3]]
-                    } else {
-                        [[0, 2, 1], [0, 3, 2]]
-                    }
-                    .map(|triangle| triangle.map(|corner| first + corner)),
-                );
-            }
-        }
-    }
-    mesh
 }

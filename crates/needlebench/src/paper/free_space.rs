@@ -3,12 +3,9 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::shape::Shape;
-use needlebench_cell::{
-    BodyKind, Cell, Finding, Frame, Overrides, ResolvedScenario, resolve_scenario,
-};
-use needlebench_clearance::{PreparedShape, separation};
-use needlebench_kinematics::{Joints, Pose};
+use needlebench_cell::{BodyKind, Cell, Finding, Overrides, ResolvedScenario, resolve_scenario};
+use needlebench_evaluation::room::{Obstacles, VoxelGrid};
+use needlebench_kinematics::Joints;
 use serde::Serialize;
 
 use super::dh::{Arm, origin};
@@ -148,60 +145,34 @@ pub(crate) struct FreeSpaceReport {
 
 const BOX_HALF_WIDTH_M: f64 = 0.6;
 const BOX_HEIGHT_M: f64 = 0.8;
-pub(crate) const CELL_M: f64 = 0.025;
+const CELL_M: f64 = 0.025;
 /// Room for a hand or a forearm.
 const MARGIN_M: f64 = 0.1;
 
-/// The box cut into cubes, and which of them an arm takes.
-pub(crate) struct Grid {
-    /// Lower corner in the world, m.
-    pub corner_m: Point3<f64>,
-    pub cells: [usize; 3],
-}
-
-impl Grid {
-    fn about(guide_exit_m: &Point3<f64>) -> Self {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a few dozen"
-        )]
-        let along = |length_m: f64| (length_m / CELL_M).round() as usize;
-        let across = along(2.0 * BOX_HALF_WIDTH_M);
-        Self {
-            corner_m: Point3::new(
-                guide_exit_m.x - BOX_HALF_WIDTH_M,
-                guide_exit_m.y - BOX_HALF_WIDTH_M,
-                BASE_HEIGHT_M,
-            ),
-            cells: [across, across, along(BOX_HEIGHT_M)],
-        }
-    }
-
-    fn len(&self) -> usize {
-        self.cells.iter().product()
-    }
-
-    /// Column, row and layer of a cell.
-    pub(crate) fn place(&self, index: usize) -> [usize; 3] {
-        let [across, deep, _] = self.cells;
-        [
-            index % across,
-            index / across % deep,
-            index / (across * deep),
-        ]
-    }
-
-    fn center_m(&self, index: usize) -> Point3<f64> {
-        let place = self.place(index).map(|each| (each as f64 + 0.5) * CELL_M);
-        self.corner_m + Vector3::from(place)
+/// The box cut into cubes.
+fn grid_about(guide_exit_m: &Point3<f64>) -> VoxelGrid {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a few dozen"
+    )]
+    let along = |length_m: f64| (length_m / CELL_M).round() as usize;
+    let across = along(2.0 * BOX_HALF_WIDTH_M);
+    VoxelGrid {
+        corner_m: Point3::new(
+            guide_exit_m.x - BOX_HALF_WIDTH_M,
+            guide_exit_m.y - BOX_HALF_WIDTH_M,
+            BASE_HEIGHT_M,
+        ),
+        cells: [across, across, along(BOX_HEIGHT_M)],
+        voxel_m: CELL_M,
     }
 }
 
 /// What pictures need besides the numbers.
 pub(crate) struct Space {
     pub report: FreeSpaceReport,
-    pub grid: Grid,
+    pub grid: VoxelGrid,
     /// By configuration: cells that are free here but taken in at least half of the others.
     pub gained: Vec<Vec<bool>>,
 }
@@ -221,12 +192,13 @@ pub(super) fn measure(
     let exit_m = Point3::from(exit.translation.vector);
     let entry = cell.robot.world_from_flange(&first) * cell.tool.flange_from_guide_entry;
     let entry_height_m = entry.translation.vector.z - exit_m.z;
-    let grid = Grid::about(&exit_m);
+    let grid = grid_about(&exit_m);
     let obstacles = Obstacles::new(cell);
     let mut taken = Vec::new();
     for row in &table.rows {
         watch.check()?;
-        taken.push(obstacles.taken(cell, &Joints::from(row.joints_rad), &grid));
+        let robot = obstacles.robot(&Joints::from(row.joints_rad));
+        taken.push(robot.taken(&grid, MARGIN_M));
     }
     let gained: Vec<Vec<bool>> = (0..taken.len())
         .map(|own| {
@@ -398,54 +370,4 @@ fn surface_heights_m(cell: &Cell, q: &Joints) -> (f64, f64) {
                 })
             },
         )
-}
-
-/// Collision shapes of arm and tool, ready for distances from points.
-struct Obstacles {
-    /// Body, shape, pose of the shape in its body, radius of a ball about its origin.
-    shapes: Vec<(usize, PreparedShape, Pose, f64)>,
-}
-
-impl Obstacles {
-    fn new(cell: &Cell) -> Self {
-        let bodies = cell.bodies.iter().enumerate().filter(|(_, body)| {
-            matches!(body.frame, Frame::Link(_)) && body.kind != BodyKind::NeedleCorridor
-                || body.kind == BodyKind::Base
-        });
-        let shapes = bodies
-            .flat_map(|(index, body)| {
-                body.solids.iter().map(move |solid| {
-                    (
-                        index,
-                        PreparedShape::new(&solid.shape),
-                        solid.parent_from_shape,
-                        solid.shape.bounding_radius_m(),
-                    )
-                })
-            })
-            .collect();
-        Self { shapes }
-    }
-
-    /// Cells whose centre is within the margin of arm or tool.
-    fn taken(&self, cell: &Cell, q: &Joints, grid: &Grid) -> Vec<bool> {
-        let bodies = cell.world_from_bodies(q);
-        let placed: Vec<(&PreparedShape, Pose, f64)> = self
-            .shapes
-            .iter()
-            .map(|(body, shape, pose, radius_m)| (shape, bodies[*body] * pose, *radius_m))
-            .collect();
-        let point = PreparedShape::new(&Shape::Sphere { radius_m: 0.0 });
-        (0..grid.len())
-            .map(|index| {
-                let center = grid.center_m(index);
-                let at = Pose::translation(center.x, center.y, center.z);
-                placed.iter().any(|(shape, pose, radius_m)| {
-                    let apart_m = (pose.translation.vector - center.coords).norm();
-                    apart_m < radius_m + MARGIN_M
-                        && separation(&point, &at, shape, pose).distance_m < MARGIN_M
-                })
-            })
-            .collect()
-    }
 }

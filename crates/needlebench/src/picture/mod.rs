@@ -21,6 +21,7 @@ mod sheet;
 #[cfg(test)]
 mod tests;
 mod text;
+mod voxels;
 mod weighted_bars;
 
 use std::sync::Arc;
@@ -33,6 +34,7 @@ pub use camera::{Camera, Projection};
 pub use image::{Image, PictureError};
 pub use render::render;
 pub use sheet::tile;
+pub use voxels::voxel_surface;
 pub use weighted_bars::{WeightedBars, WeightedRow, weighted_bars};
 
 /// What a picture shows. Everything is in the world frame, z up.

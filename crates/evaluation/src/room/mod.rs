@@ -1,0 +1,385 @@
+//! The people in the room: the paper's Figure 6 in numbers.
+//!
+//! For each configuration in its final posture: which part of the space about the entry point arm
+//! and tool leave free, what of the entry point and of the needle people see past them, how wide a
+//! cone behind the guide is free for the hand, and where the elbow is.
+
+mod grid;
+mod hand_cone;
+mod obstacles;
+mod ray;
+mod sector;
+mod sight;
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, Vector3};
+use needlebench_cell::people::{ElbowPreference, Handedness, PatientSides, Person, Side};
+use needlebench_cell::shape::Shape;
+use needlebench_cell::{BodyKind, Goal, ResolvedScenario};
+use needlebench_clearance::{PreparedShape, separation};
+use needlebench_kinematics::{Joints, Pose};
+use serde::Serialize;
+
+pub use grid::VoxelGrid;
+pub use hand_cone::{CONE_START_M, CONE_TOLERANCE_RAD, HandCone, hand_cone};
+pub use obstacles::{Obstacles, PlacedObstacles};
+pub use sector::Sector;
+pub use sight::{
+    ENTRY_DISC_HEIGHT_M, ENTRY_DISC_RADIUS_M, SIGHT_SEGMENTS, Sight, SightTargets, measure_sight,
+    sight_segments,
+};
+
+/// Radius of the half ball about the entry point that is asked for free space, m: as far as a
+/// forearm with a hand reaches.
+pub const SECTOR_RADIUS_M: f64 = 0.35;
+/// Points nearer to arm or tool than this are not free, m: half of a hand's breadth.
+pub const FREE_MARGIN_M: f64 = 0.05;
+/// Edge of the cubes by which free space is counted, m.
+pub const VOXEL_M: f64 = 0.02;
+
+/// What one configuration leaves to the people in the room, in its final posture.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RoomReport {
+    /// Share of the half ball of 0.35 m on the outer side of the skin at the entry point that is
+    /// farther than 0.05 m from arm and tool; what phantom, table, gantry and mount fill does not
+    /// count. By cubes of 20 mm.
+    pub free_fraction: f64,
+    /// The same by region, which share out the half ball: `above` and the patient's level sides.
+    /// Empty without a patient.
+    pub regions: BTreeMap<&'static str, f64>,
+    /// Sight of each person in each stature.
+    pub sight: Vec<SightReport>,
+    /// Mean of `sight` over the people on the preferred side, over all if nobody stands there.
+    pub sight_fraction: f64,
+    /// Half-angle of the largest cone behind the guide, about the needle, that is free of arm, tool
+    /// and surroundings; a proven lower bound, at most a right angle.
+    pub hand_cone_half_angle_rad: f64,
+    /// How much larger the true angle may be.
+    pub hand_cone_accuracy_rad: f64,
+    /// Length of the cone from the guide's entry.
+    pub hand_cone_length_m: f64,
+    /// The solid that blocks a larger cone.
+    pub hand_cone_blocker: Option<String>,
+    /// Whether the elbow is above the line from shoulder to wrist, in the world.
+    pub elbow_up: bool,
+    /// Height of the elbow's axis over the entry point.
+    pub elbow_over_entry_m: f64,
+    /// Height over the entry point of the arm's lowest point over the patient, the tool left out;
+    /// none without a patient or where no link is over it.
+    pub lowest_over_patient_m: Option<f64>,
+    /// Free share of the region on the side that the scenario prefers.
+    pub preferred_side_free_fraction: Option<f64>,
+    /// Whether the elbow is where the scenario prefers it.
+    pub elbow_as_preferred: Option<bool>,
+}
+
+/// What one person of one stature sees.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SightReport {
+    /// Who.
+    pub person: String,
+    /// Stature.
+    pub stature_m: f64,
+    /// Side of the patient.
+    pub side: Option<Side>,
+    /// Middle of where the eyes may be, in the world.
+    pub eyes_m: [f64; 3],
+    /// Mean of the two below.
+    pub fraction: f64,
+    /// Share of free lines to the skin within 30 mm of the entry point.
+    pub entry_fraction: f64,
+    /// Share of free lines to the needle between guide and hub.
+    pub needle_fraction: f64,
+    /// The solid that is in the way of most of the blocked lines.
+    pub blocker: Option<String>,
+    /// Free share of the half of the sector on the side of the person's better hand.
+    pub hand_side_free_fraction: Option<f64>,
+}
+
+/// Room measurements of one scenario, prepared once.
+#[derive(Debug)]
+pub struct RoomModel<'a> {
+    resolved: &'a ResolvedScenario,
+    obstacles: Obstacles<'a>,
+    sides: Option<PatientSides>,
+    sectors: Vec<Sector>,
+    /// Points all over the arm: body and place in it, m.
+    surface: Vec<(usize, Vec<Point3<f64>>)>,
+}
+
+/// Distance of two points of the arm's surface that are asked whether they are over the patient, m.
+const SURFACE_SPACING_M: f64 = 0.01;
+/// Fineness of curved surfaces, m.
+const CHORD_ERROR_M: f64 = 1e-3;
+
+impl<'a> RoomModel<'a> {
+    /// Prepares obstacles and, for every goal, its sector.
+    pub fn new(resolved: &'a ResolvedScenario) -> Self {
+        let cell = &resolved.cell;
+        let obstacles = Obstacles::new(cell);
+        let sides = resolved
+            .phantom
+            .as_ref()
+            .and_then(|placed| PatientSides::new(&placed.world_from_phantom.rotation));
+        let surroundings = obstacles.surroundings();
+        let sectors = resolved
+            .goals
+            .iter()
+            .map(|goal| {
+                Sector::new(
+                    entry_of(goal),
+                    skin_normal(resolved, goal),
+                    SECTOR_RADIUS_M,
+                    VOXEL_M,
+                    &surroundings,
+                    sides.as_ref(),
+                )
+            })
+            .collect();
+        let moving = cell
+            .bodies
+            .iter()
+            .enumerate()
+            .filter(|(_, body)| body.kind == BodyKind::Link);
+        let surface = moving
+            .map(|(index, body)| {
+                let points = body.solids.iter().flat_map(|solid| {
+                    let mesh = solid.shape.surface(CHORD_ERROR_M);
+                    edge_points(&mesh, &solid.parent_from_shape)
+                });
+                (index, points.collect())
+            })
+            .collect();
+        Self {
+            resolved,
+            obstacles,
+            sides,
+            sectors,
+            surface,
+        }
+    }
+
+    /// The half ball about the entry point of a goal.
+    pub fn sector(&self, goal: usize) -> &Sector {
+        &self.sectors[goal]
+    }
+
+    /// The solids of the cell.
+    pub fn obstacles(&self) -> &Obstacles<'a> {
+        &self.obstacles
+    }
+
+    /// By voxel of the goal's sector: whether arm or tool are nearer than the margin.
+    pub fn taken(&self, goal: usize, q: &Joints) -> Vec<bool> {
+        self.obstacles
+            .robot(q)
+            .taken(&self.sectors[goal].grid, FREE_MARGIN_M)
+    }
+
+    /// Entry of the guide as the arm holds it; z points along the insertion.
+    pub fn guide_entry(&self, q: &Joints) -> Pose {
+        let cell = &self.resolved.cell;
+        cell.robot.world_from_flange(q) * cell.tool.flange_from_guide_entry
+    }
+
+    /// What people look at.
+    pub fn targets(&self, goal: usize, q: &Joints) -> SightTargets {
+        let sector = &self.sectors[goal];
+        let tool = &self.resolved.cell.tool;
+        let standoff_m = self.resolved.goals[goal].standoff_m.unwrap_or(0.0);
+        // With the tip on the skin; a needle too short for that ends at the guide.
+        let hub_m = (tool.needle.length_m - tool.guide_length_m() - standoff_m).max(CONE_START_M);
+        let entry = self.guide_entry(q);
+        SightTargets {
+            entry_m: sector.center_m,
+            outwards: sector.outwards,
+            needle_m: [CONE_START_M, hub_m]
+                .map(|behind_m| entry * Point3::new(0.0, 0.0, -behind_m)),
+        }
+    }
+
+    /// Length of the hand's cone, m: as the needle corridor.
+    pub fn hand_reach_m(&self) -> f64 {
+        self.resolved
+            .scenario
+            .tool
+            .corridor_length_mm
+            .map_or(self.resolved.cell.tool.needle.length_m, |mm| mm * 1e-3)
+    }
+
+    /// Measures a posture for a goal, given by its index.
+    pub fn measure(&self, goal: usize, q: &Joints) -> RoomReport {
+        let sector = &self.sectors[goal];
+        let taken = self.taken(goal, q);
+        let regions = sector.free_by_region(&taken);
+        let all = self.obstacles.all(q);
+        let targets = self.targets(goal, q);
+        let people = &self.resolved.people;
+        let mut sight = Vec::new();
+        for person in &people.by_goal[goal] {
+            let hand_side = sector.free_towards(&taken, &hand_side(person, &sector.center_m));
+            for &stature_m in &person.statures_m {
+                let eyes_m = person.eyes_m(stature_m);
+                let seen = measure_sight(&all, &eyes_m, person.head_movement_m, &targets);
+                sight.push(SightReport {
+                    person: person.name.clone(),
+                    stature_m,
+                    side: person.side,
+                    eyes_m: eyes_m.coords.into(),
+                    fraction: 0.5 * (seen.entry_fraction + seen.needle_fraction),
+                    entry_fraction: seen.entry_fraction,
+                    needle_fraction: seen.needle_fraction,
+                    blocker: seen.blocker,
+                    hand_side_free_fraction: hand_side,
+                });
+            }
+        }
+        let entry = self.guide_entry(q);
+        let reach_m = self.hand_reach_m();
+        let behind = -(entry.rotation * Vector3::z());
+        let cone = hand_cone(&all, &entry.translation.vector.into(), &behind, reach_m);
+        let links = self.resolved.cell.robot.world_from_links(q);
+        let elbow_up = elbow_is_up(&links);
+        RoomReport {
+            free_fraction: sector.free_fraction(&taken),
+            sight_fraction: mean_sight(&sight, people.prefer_side),
+            hand_cone_half_angle_rad: cone.half_angle_rad,
+            hand_cone_accuracy_rad: cone.accuracy_rad,
+            hand_cone_length_m: reach_m,
+            hand_cone_blocker: cone.blocker,
+            elbow_up,
+            elbow_over_entry_m: links[2].translation.vector.z - sector.center_m.z,
+            lowest_over_patient_m: self.lowest_over_patient_m(goal, q),
+            preferred_side_free_fraction: people
+                .prefer_side
+                .and_then(|side| regions.get(side.name()).copied()),
+            elbow_as_preferred: people
+                .prefer_elbow
+                .map(|wanted| elbow_up == (wanted == ElbowPreference::Up)),
+            regions,
+            sight,
+        }
+    }
+
+    /// See [`RoomReport::lowest_over_patient_m`].
+    fn lowest_over_patient_m(&self, goal: usize, q: &Joints) -> Option<f64> {
+        let placed = self.resolved.phantom.as_ref()?;
+        let sides = self.sides.as_ref()?;
+        let axes = [
+            sides.direction(Side::Head)?,
+            Vector3::z().cross(&sides.direction(Side::Head)?),
+        ];
+        let skin = placed.phantom.skin();
+        let pose = placed.world_from_phantom * skin.parent_from_shape;
+        let mut ranges = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for vertex in skin.shape.surface(CHORD_ERROR_M).vertices_m {
+            let vertex = pose * vertex;
+            for (range, axis) in ranges.iter_mut().zip(&axes) {
+                let along = vertex.coords.dot(axis);
+                *range = [range[0].min(along), range[1].max(along)];
+            }
+        }
+        let bodies = self.resolved.cell.world_from_bodies(q);
+        let lowest =
+            self.surface
+                .iter()
+                .flat_map(|(body, points)| points.iter().map(|point| bodies[*body] * point))
+                .filter(|point| {
+                    ranges.iter().zip(&axes).all(|(range, axis)| {
+                        (range[0]..=range[1]).contains(&point.coords.dot(axis))
+                    })
+                })
+                .map(|point| point.z)
+                .reduce(f64::min)?;
+        Some(lowest - self.sectors[goal].center_m.z)
+    }
+}
+
+/// The entry point, or the guide's exit without a phantom.
+fn entry_of(goal: &Goal) -> Point3<f64> {
+    goal.entry_m
+        .unwrap_or_else(|| goal.world_from_guide_exit.translation.vector.into())
+}
+
+/// Outer normal of the skin at the entry point; against the needle without a phantom.
+fn skin_normal(resolved: &ResolvedScenario, goal: &Goal) -> Vector3<f64> {
+    /// Distance from the skin at which its nearest point is asked for: the normal is that of a
+    /// point within this distance of the entry, and well above the distances' error.
+    const STEP_M: f64 = 1e-3;
+    let against = -goal.axis.into_inner();
+    let (Some(entry), Some(placed)) = (goal.entry_m, &resolved.phantom) else {
+        return against;
+    };
+    let skin = placed.phantom.skin();
+    let probe = entry + against * STEP_M;
+    let found = separation(
+        &PreparedShape::new(&Shape::Sphere { radius_m: 0.0 }),
+        &Pose::translation(probe.x, probe.y, probe.z),
+        &PreparedShape::new(&skin.shape),
+        &(placed.world_from_phantom * skin.parent_from_shape),
+    );
+    if found.distance_m > 0.0 {
+        -found.normal.into_inner()
+    } else {
+        against
+    }
+}
+
+/// Level direction to the side of a person's better hand, who looks at the entry point.
+fn hand_side(person: &Person, entry: &Point3<f64>) -> Vector3<f64> {
+    let ahead = entry - person.position_m;
+    let to_the_right = Vector3::new(ahead.y, -ahead.x, 0.0);
+    match person.handedness {
+        Handedness::Right => to_the_right,
+        Handedness::Left => -to_the_right,
+    }
+}
+
+fn mean_sight(sight: &[SightReport], prefer_side: Option<Side>) -> f64 {
+    let preferred: Vec<f64> = sight
+        .iter()
+        .filter(|each| prefer_side.is_some() && each.side == prefer_side)
+        .map(|each| each.fraction)
+        .collect();
+    let counted = if preferred.is_empty() {
+        sight.iter().map(|each| each.fraction).collect()
+    } else {
+        preferred
+    };
+    counted.iter().sum::<f64>() / counted.len() as f64
+}
+
+/// Whether the elbow's axis is above the line from the shoulder's to the wrist's.
+fn elbow_is_up(links: &[Pose; 6]) -> bool {
+    let [shoulder, elbow, wrist] = [1, 2, 3].map(|link: usize| links[link].translation.vector);
+    let line = wrist - shoulder;
+    let along = (elbow - shoulder).dot(&line) / line.norm_squared().max(f64::MIN_POSITIVE);
+    elbow.z > (shoulder + line * along).z
+}
+
+/// Points on all edges of a surface, no farther apart than [`SURFACE_SPACING_M`].
+fn edge_points(
+    mesh: &needlebench_cell::shape::TriangleMesh,
+    body_from_shape: &Pose,
+) -> Vec<Point3<f64>> {
+    let mut points = Vec::new();
+    for triangle in &mesh.triangles {
+        for edge in 0..3 {
+            let (a, b) = (triangle[edge], triangle[(edge + 1) % 3]);
+            // Every edge has two triangles: one of them is enough.
+            if a > b {
+                continue;
+            }
+            let [a, b] = [a, b].map(|i| body_from_shape * mesh.vertices_m[i as usize]);
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a few dozen"
+            )]
+            let steps = ((b - a).norm() / SURFACE_SPACING_M).ceil().max(1.0) as u32;
+            points.extend((0..=steps).map(|k| a + (b - a) * (f64::from(k) / f64::from(steps))));
+        }
+    }
+    points
+}

@@ -1,0 +1,269 @@
+//! What stands between people and the entry point, placed for one posture.
+
+use nalgebra::Point3;
+use needlebench_cell::shape::Shape;
+use needlebench_cell::{BodyKind, Cell, Frame};
+use needlebench_clearance::{PreparedShape, separation};
+use needlebench_kinematics::{Joints, Pose};
+
+use super::grid::VoxelGrid;
+use super::ray::first_hit;
+
+/// Solids of a cell, ready for distances from points and for lines of sight.
+#[derive(Debug)]
+pub struct Obstacles<'c> {
+    cell: &'c Cell,
+    solids: Vec<Obstacle<'c>>,
+    point: PreparedShape,
+}
+
+#[derive(Debug)]
+struct Obstacle<'c> {
+    name: &'c str,
+    body: usize,
+    is_robot: bool,
+    shape: &'c Shape,
+    prepared: PreparedShape,
+    body_from_shape: Pose,
+    /// Ball around the shape, in its frame.
+    ball_center_m: Point3<f64>,
+    ball_radius_m: f64,
+}
+
+/// A solid at its place.
+#[derive(Debug, Clone)]
+struct Placed<'o> {
+    solid: &'o Obstacle<'o>,
+    world_from_shape: Pose,
+    shape_from_world: Pose,
+    ball_center_m: Point3<f64>,
+}
+
+impl<'c> Obstacles<'c> {
+    /// All solids of the cell but the needle corridor, which is none.
+    pub fn new(cell: &'c Cell) -> Self {
+        let mut solids = Vec::new();
+        for (index, body) in cell.bodies.iter().enumerate() {
+            if body.kind == BodyKind::NeedleCorridor {
+                continue;
+            }
+            let is_robot = body.kind == BodyKind::Base || matches!(body.frame, Frame::Link(_));
+            for solid in &body.solids {
+                let prepared = PreparedShape::new(&solid.shape);
+                let (ball_center_m, ball_radius_m) = prepared.bounding_sphere_m();
+                solids.push(Obstacle {
+                    name: &solid.name,
+                    body: index,
+                    is_robot,
+                    shape: &solid.shape,
+                    prepared,
+                    body_from_shape: solid.parent_from_shape,
+                    ball_center_m,
+                    ball_radius_m,
+                });
+            }
+        }
+        Self {
+            cell,
+            solids,
+            point: PreparedShape::new(&Shape::Sphere { radius_m: 0.0 }),
+        }
+    }
+
+    /// Arm and tool alone, at joint positions `q`.
+    pub fn robot(&self, q: &Joints) -> PlacedObstacles<'_> {
+        self.placed(q, |solid| solid.is_robot)
+    }
+
+    /// What does not move: phantom, table, gantry and mount.
+    pub fn surroundings(&self) -> PlacedObstacles<'_> {
+        self.placed(&Joints::zeros(), |solid| !solid.is_robot)
+    }
+
+    /// Everything, with the arm at joint positions `q`.
+    pub fn all(&self, q: &Joints) -> PlacedObstacles<'_> {
+        self.placed(q, |_| true)
+    }
+
+    fn placed(&self, q: &Joints, wanted: impl Fn(&Obstacle<'_>) -> bool) -> PlacedObstacles<'_> {
+        let bodies = self.cell.world_from_bodies(q);
+        let solids = self.solids.iter().filter(|solid| wanted(solid));
+        PlacedObstacles {
+            point: &self.point,
+            solids: solids
+                .map(|solid| {
+                    let world_from_shape = bodies[solid.body] * solid.body_from_shape;
+                    Placed {
+                        solid,
+                        world_from_shape,
+                        shape_from_world: world_from_shape.inverse(),
+                        ball_center_m: world_from_shape * solid.ball_center_m,
+                    }
+                })
+                .collect(),
+        }
+    }
+}
+
+/// Solids at their places.
+#[derive(Debug, Clone)]
+pub struct PlacedObstacles<'o> {
+    point: &'o PreparedShape,
+    solids: Vec<Placed<'o>>,
+}
+
+/// Indices of solids that may matter for a piece of space.
+pub(super) type Near = Vec<usize>;
+
+impl PlacedObstacles<'_> {
+    /// Name of a solid.
+    pub(super) fn name(&self, index: usize) -> &str {
+        self.solids[index].solid.name
+    }
+
+    /// All solids.
+    pub(super) fn everything(&self) -> Near {
+        (0..self.solids.len()).collect()
+    }
+
+    /// Signed distance of a point from a solid, or infinity if it is certainly more than `beyond_m`.
+    fn distance_m(&self, index: usize, point: &Point3<f64>, beyond_m: f64) -> f64 {
+        let placed = &self.solids[index];
+        let ball_gap_m = (placed.ball_center_m - point).norm() - placed.solid.ball_radius_m;
+        if ball_gap_m > beyond_m {
+            return f64::INFINITY;
+        }
+        let at = Pose::translation(point.x, point.y, point.z);
+        separation(
+            self.point,
+            &at,
+            &placed.solid.prepared,
+            &placed.world_from_shape,
+        )
+        .distance_m
+    }
+
+    /// Nearest of the solids within `reach_m` of a point: its signed distance and index, and all
+    /// that are within reach.
+    pub(super) fn within(
+        &self,
+        near: &[usize],
+        point: &Point3<f64>,
+        reach_m: f64,
+    ) -> (Option<(f64, usize)>, Near) {
+        let mut nearest: Option<(f64, usize)> = None;
+        let mut kept = Near::new();
+        for &index in near {
+            let distance_m = self.distance_m(index, point, reach_m);
+            if distance_m <= reach_m {
+                kept.push(index);
+                if nearest.is_none_or(|(known_m, _)| distance_m < known_m) {
+                    nearest = Some((distance_m, index));
+                }
+            }
+        }
+        (nearest, kept)
+    }
+
+    /// First solid on the way from one point to another: parameter of the place, 0 at `from` and 1
+    /// at `to`, and the solid's index.
+    pub fn first_on_the_way(&self, from: &Point3<f64>, to: &Point3<f64>) -> Option<(f64, usize)> {
+        let along = to - from;
+        let length_squared = along.norm_squared().max(f64::MIN_POSITIVE);
+        let mut first: Option<(f64, usize)> = None;
+        for (index, placed) in self.solids.iter().enumerate() {
+            let to_center = placed.ball_center_m - from;
+            let nearest = (to_center.dot(&along) / length_squared).clamp(0.0, 1.0);
+            let radius_m = placed.solid.ball_radius_m;
+            if (to_center - along * nearest).norm_squared() > radius_m * radius_m {
+                continue;
+            }
+            let from = placed.shape_from_world * from;
+            let to = placed.shape_from_world * to;
+            if let Some(t) = first_hit(placed.solid.shape, &from, &to)
+                && first.is_none_or(|(known, _)| t < known)
+            {
+                first = Some((t, index));
+            }
+        }
+        first
+    }
+
+    /// Voxels whose centre is nearer to a solid than the margin, in the grid's order.
+    ///
+    /// The same as asking for every centre by itself. Blocks are decided at once where the distance
+    /// of their middle says so: it changes by no more than one walks.
+    pub fn taken(&self, grid: &VoxelGrid, margin_m: f64) -> Vec<bool> {
+        let mut taken = vec![false; grid.len()];
+        let whole = Block {
+            low: [0; 3],
+            size: grid.cells,
+        };
+        self.take(grid, margin_m, whole, &self.everything(), &mut taken);
+        taken
+    }
+
+    fn take(
+        &self,
+        grid: &VoxelGrid,
+        margin_m: f64,
+        block: Block,
+        near: &[usize],
+        taken: &mut [bool],
+    ) {
+        if block.size.contains(&0) {
+            return;
+        }
+        let (middle, half_m) = block.ball(grid);
+        let (nearest, kept) = self.within(near, &middle, margin_m + half_m);
+        let Some((distance_m, _)) = nearest else {
+            return;
+        };
+        let is_voxel = block.size == [1; 3];
+        if distance_m + half_m < margin_m {
+            block.for_each(grid, |index| taken[index] = true);
+        } else if !is_voxel {
+            for part in block.halves() {
+                self.take(grid, margin_m, part, &kept, taken);
+            }
+        }
+    }
+}
+
+/// A box of voxels.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    low: [usize; 3],
+    size: [usize; 3],
+}
+
+impl Block {
+    /// Ball about the centres of all voxels.
+    fn ball(&self, grid: &VoxelGrid) -> (Point3<f64>, f64) {
+        let low = grid.center_at_m(self.low);
+        let high = grid.center_at_m(std::array::from_fn(|axis| {
+            self.low[axis] + self.size[axis] - 1
+        }));
+        (nalgebra::center(&low, &high), 0.5 * (high - low).norm())
+    }
+
+    /// Two halves across the longest side.
+    fn halves(&self) -> [Self; 2] {
+        let axis = (0..3).max_by_key(|axis| self.size[*axis]).unwrap_or(0);
+        let (mut first, mut second) = (*self, *self);
+        first.size[axis] /= 2;
+        second.size[axis] -= first.size[axis];
+        second.low[axis] += first.size[axis];
+        [first, second]
+    }
+
+    fn for_each(&self, grid: &VoxelGrid, mut visit: impl FnMut(usize)) {
+        for z in 0..self.size[2] {
+            for y in 0..self.size[1] {
+                for x in 0..self.size[0] {
+                    visit(grid.index([self.low[0] + x, self.low[1] + y, self.low[2] + z]));
+                }
+            }
+        }
+    }
+}
