@@ -9,7 +9,7 @@ use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_kinematics::ik::{
     Configuration, Kinematics, Solution, SolutionKind, Solutions, WrapOrder, WrapSearch, wrap_angle,
 };
-use needlebench_kinematics::trajectory::{JointTrajectory, LineError, LinePath, Phase};
+use needlebench_kinematics::trajectory::{JointPath, JointTrajectory, LineError, Phase};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
 use crate::family::Member;
@@ -388,7 +388,7 @@ impl<'a> Planner<'a> {
         let limits = &self.resolved.cell.robot.limits;
         let robot = &self.checker.cell().robot;
         let axis = robot.world_from_base_link.rotation.inverse() * goal.axis.into_inner();
-        let line = LinePath::ending_at(
+        let line = JointPath::line_ending_at(
             &robot.chain,
             &candidate.joints,
             &UnitVector3::new_normalize(axis),
@@ -483,7 +483,7 @@ impl<'a> Planner<'a> {
 
     /// Whole turns that keep the approach inside the joint ranges, shortest transfer first; at most
     /// one either way.
-    fn wraps(&self, line: &LinePath) -> Vec<[i32; JOINT_COUNT]> {
+    fn wraps(&self, line: &JointPath) -> Vec<[i32; JOINT_COUNT]> {
         // Where the approach may start for its end to be inside as well.
         let mut limits = self.resolved.cell.robot.limits;
         let way = line.end() - line.start();

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::UnitVector3;
 use needlebench_cell::{Overrides, ResolvedScenario, Roll, load_scenario};
 use needlebench_kinematics::ik::Kinematics;
-use needlebench_kinematics::trajectory::{JointTrajectory, LinePath, Phase};
+use needlebench_kinematics::trajectory::{JointPath, JointTrajectory, Phase};
 
 /// A shipped scenario.
 pub fn shipped(name: &str) -> ResolvedScenario {
@@ -32,7 +32,7 @@ pub fn motions(resolved: &ResolvedScenario, rolls_rad: &[f64]) -> Vec<JointTraje
                 * cell.tool.flange_from_guide_exit.inverse();
             let axis = cell.robot.world_from_base_link.rotation.inverse() * goal.axis.into_inner();
             for solution in kinematics.solve(&pose, Some(&resolved.start)).solutions {
-                let line = LinePath::ending_at(
+                let line = JointPath::line_ending_at(
                     &cell.robot.chain,
                     &solution.joints,
                     &UnitVector3::new_normalize(axis),

@@ -4,10 +4,13 @@
 //! position, velocity and acceleration are continuous and the jerk is bounded.
 
 mod line;
+mod path;
 mod profile;
+mod through;
 mod travel;
 
-pub use line::{LineError, LinePath};
+pub use line::LineError;
+pub use path::{JointPath, PathPoint};
 pub use profile::{DoubleS, ProfileLimits};
 
 use crate::{JOINT_COUNT, Joints};
@@ -56,6 +59,10 @@ pub enum Phase {
     Approach,
     /// Standing still at the final place.
     Hold,
+    /// Straight back along the needle axis.
+    Retract,
+    /// From there back to the start posture.
+    Return,
 }
 
 impl Phase {
@@ -65,6 +72,8 @@ impl Phase {
             Self::Transfer => "transfer",
             Self::Approach => "approach",
             Self::Hold => "hold",
+            Self::Retract => "retract",
+            Self::Return => "return",
         }
     }
 }
@@ -77,9 +86,9 @@ enum Course {
         delta: Joints,
         profile: DoubleS,
     },
-    /// Along a line of the tool; the profile runs in metres, slowed down by `time_scale >= 1`.
-    Line {
-        path: LinePath,
+    /// Along a path; the profile runs in its parameter, slowed down by `time_scale >= 1`.
+    Path {
+        path: JointPath,
         profile: DoubleS,
         time_scale: f64,
     },
@@ -153,28 +162,69 @@ impl JointTrajectory {
     /// The profile keeps the line's limits; where a joint would exceed its own, the whole line is
     /// slowed down uniformly until none does.
     #[must_use]
-    pub fn then_along(mut self, phase: Phase, path: LinePath, limits: &MotionLimits) -> Self {
+    pub fn then_along(mut self, phase: Phase, path: JointPath, limits: &MotionLimits) -> Self {
         debug_assert!(
             (path.start() - self.end).amax() < 1e-9,
             "line starts elsewhere"
         );
-        if path.length_m() <= 0.0 {
+        if path.length() <= 0.0 {
             return self;
         }
-        let profile = DoubleS::new(path.length_m(), &limits.line);
-        let time_scale = line_time_scale(&path, &profile, limits);
+        let profile = DoubleS::new(path.length(), &limits.line);
+        self.push_path(phase, path, profile, limits);
+        self
+    }
+
+    /// Appends a path through waypoints ([`JointPath::through`]), which has to start where this
+    /// trajectory ends: without a stop, all joints within their limits.
+    ///
+    /// Limits are compared at 64 places of each of its pieces.
+    #[must_use]
+    pub fn then_through(mut self, phase: Phase, path: JointPath, limits: &MotionLimits) -> Self {
+        debug_assert!(
+            (path.start() - self.end).amax() < 1e-9,
+            "path starts elsewhere"
+        );
+        // What straight pieces allow; corners then slow the whole path down.
+        let (mut acceleration, mut jerk) = (f64::INFINITY, f64::INFINITY);
+        for index in 0..path.intervals() {
+            let direction = path.sample(path.interval(index).0).first;
+            for i in (0..JOINT_COUNT).filter(|&i| direction[i] != 0.0) {
+                acceleration = acceleration.min(limits.acceleration[i] / direction[i].abs());
+                jerk = jerk.min(limits.jerk[i] / direction[i].abs());
+            }
+        }
+        let profile = DoubleS::new(
+            path.length(),
+            &ProfileLimits {
+                velocity: 1.0,
+                acceleration,
+                jerk,
+            },
+        );
+        self.push_path(phase, path, profile, limits);
+        self
+    }
+
+    fn push_path(
+        &mut self,
+        phase: Phase,
+        path: JointPath,
+        profile: DoubleS,
+        limits: &MotionLimits,
+    ) {
+        let time_scale = path_time_scale(&path, &profile, limits);
         self.end = path.end();
         let duration_s = profile.duration_s() * time_scale;
         self.push(
             phase,
             duration_s,
-            Course::Line {
+            Course::Path {
                 path,
                 profile,
                 time_scale,
             },
         );
-        self
     }
 
     /// Appends a rest.
@@ -246,7 +296,7 @@ impl JointTrajectory {
                     acceleration: delta * fraction.acceleration,
                 }
             }
-            Course::Line {
+            Course::Path {
                 path,
                 profile,
                 time_scale,
@@ -275,13 +325,16 @@ impl JointTrajectory {
     }
 }
 
-/// Samples at which a line's joint speeds are compared with the limits.
-const LINE_SAMPLES: u32 = 512;
+/// Samples per path, at least, at which joint speeds are compared with the limits.
+const PATH_SAMPLES: usize = 512;
+/// Samples per piece of a path through waypoints.
+const PIECE_SAMPLES: usize = 64;
 
-fn line_time_scale(path: &LinePath, profile: &DoubleS, limits: &MotionLimits) -> f64 {
+fn path_time_scale(path: &JointPath, profile: &DoubleS, limits: &MotionLimits) -> f64 {
+    let samples = PATH_SAMPLES.max(PIECE_SAMPLES * path.intervals());
     let mut scale: f64 = 1.0;
-    for k in 0..=LINE_SAMPLES {
-        let t = profile.duration_s() * f64::from(k) / f64::from(LINE_SAMPLES);
+    for k in 0..=samples {
+        let t = profile.duration_s() * k as f64 / samples as f64;
         let along = profile.sample(t);
         let point = path.sample(along.position);
         let (v, a, j) = (along.velocity, along.acceleration, along.jerk);

@@ -24,7 +24,7 @@ fn posture() -> Joints {
 fn motion() -> JointTrajectory {
     let chain = UrGeometry::UR3.chain();
     let down = UnitVector3::new_normalize(Vector3::new(0.2, 0.5, -0.8));
-    let line = LinePath::ending_at(&chain, &posture(), &down, 0.08).unwrap();
+    let line = JointPath::line_ending_at(&chain, &posture(), &down, 0.08).unwrap();
     JointTrajectory::starting_at(Joints::from_column_slice(&[
         0.0, -1.5, -1.0, -1.5, 1.5, 0.0,
     ]))
@@ -81,7 +81,7 @@ fn the_flange_stays_on_the_line() {
     const DEVIATION_M: f64 = 1e-9;
     let chain = UrGeometry::UR3.chain();
     let direction = UnitVector3::new_normalize(Vector3::new(0.2, 0.5, -0.8));
-    let path = LinePath::ending_at(&chain, &posture(), &direction, 0.2).unwrap();
+    let path = JointPath::line_ending_at(&chain, &posture(), &direction, 0.2).unwrap();
     let end = chain.base_link_from_flange(&posture());
     for k in 0..=1000 {
         let s = 0.2 * f64::from(k) / 1000.0;
@@ -121,7 +121,7 @@ fn a_line_out_of_the_workspace_is_refused() {
     let geometry = UrGeometry::UR3;
     let out =
         UnitVector3::new_normalize(-chain.base_link_from_flange(&posture()).translation.vector);
-    let error = LinePath::ending_at(&chain, &posture(), &out, 0.6).unwrap_err();
+    let error = JointPath::line_ending_at(&chain, &posture(), &out, 0.6).unwrap_err();
     assert!(matches!(
         error,
         LineError::OutOfReach { .. } | LineError::Singular { .. }

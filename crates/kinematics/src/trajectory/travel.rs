@@ -12,7 +12,7 @@
 //! Both are exact in the limit of short parts: for a joint that does not turn back the first is
 //! the difference of the ends.
 
-use super::{Course, JointTrajectory, LinePath, Segment};
+use super::{Course, JointPath, JointTrajectory, Segment};
 use crate::Joints;
 
 /// Added to a bound that is not zero, rad: a hundred times the rounding of positions of ten turns,
@@ -74,7 +74,7 @@ impl Segment {
                 let fraction = profile.sample(to_s).position - profile.sample(from_s).position;
                 padded(&(delta.abs() * fraction.max(0.0)))
             }
-            Course::Line {
+            Course::Path {
                 path,
                 profile,
                 time_scale,
@@ -91,7 +91,7 @@ impl Segment {
         match &self.course {
             // `from + fraction * delta` with a monotone fraction is the chord itself.
             Course::Straight { .. } | Course::Hold { .. } => Joints::zeros(),
-            Course::Line {
+            Course::Path {
                 path,
                 profile,
                 time_scale,
@@ -108,7 +108,7 @@ fn padded(bound: &Joints) -> Joints {
     bound.map(|each| if each > 0.0 { each + ROUNDING_RAD } else { 0.0 })
 }
 
-impl LinePath {
+impl JointPath {
     /// Upper bound of each joint's path length between two distances, rad.
     fn travel(&self, from_m: f64, to_m: f64) -> Joints {
         self.parts(from_m, to_m)
@@ -144,9 +144,9 @@ impl LinePath {
 
     /// The path between two distances, cut at the knots.
     fn parts(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = Part> + '_ {
-        let h = self.length_m() / self.intervals() as f64;
         (0..self.intervals()).filter_map(move |index| {
-            let start_m = h * index as f64;
+            let (start_m, end_m) = self.interval(index);
+            let h = end_m - start_m;
             // The ends of the line belong to the outer quintics, whatever rounding says.
             let u0 = ((from_m - start_m) / h).clamp(0.0, 1.0);
             let u1 = ((to_m - start_m) / h).clamp(0.0, 1.0);
@@ -234,7 +234,7 @@ mod tests {
                     + Joints::from_fn(|_, _| random.uniform(-0.2, 0.2));
                 let direction = Vector3::from_fn(|_, _| random.uniform(-1.0, 1.0));
                 let direction = UnitVector3::new_normalize(direction);
-                let line = LinePath::ending_at(&chain, &posture, &direction, 0.12)
+                let line = JointPath::line_ending_at(&chain, &posture, &direction, 0.12)
                     .expect("the line is in the workspace");
                 let start = Joints::from_fn(|_, _| random.uniform(-2.0, 2.0));
                 JointTrajectory::starting_at(start)
