@@ -89,7 +89,7 @@ pub(crate) struct Surroundings<'a> {
 }
 
 /// Rules that reject configurations: the words that `expected` may use.
-pub const REJECTION_RULES: [&str; 8] = [
+pub const REJECTION_RULES: [&str; 9] = [
     "unreachable",
     "merged",
     "joint_limit",
@@ -98,6 +98,7 @@ pub const REJECTION_RULES: [&str; 8] = [
     "needle_corridor",
     "approach",
     "nearest_only",
+    "no_motion",
 ];
 
 pub(crate) fn resolve_goal(

@@ -391,6 +391,10 @@ pub struct PlanningSection {
     pub roll_aim: RollAim,
     /// Largest step of any point of the arm between two collision checks of a motion, mm.
     pub sample_spacing_mm: f64,
+    /// Postures that the search for a motion may look at per configuration, where the straight joint
+    /// motion is blocked; 0 for straight motions only. A count, not a time: results are the same on
+    /// every machine. A posture takes about 10 us.
+    pub motion_checks: u32,
 }
 
 impl Default for PlanningSection {
@@ -405,6 +409,7 @@ impl Default for PlanningSection {
             roll_samples: 36,
             roll_aim: RollAim::default(),
             sample_spacing_mm: 5.0,
+            motion_checks: 60_000,
         }
     }
 }

@@ -250,7 +250,10 @@ fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
             && (plan.rejections.is_empty()
                 || everything
                     && plan.rejections.iter().all(|rejection| {
-                        matches!(rejection.rule, Rule::Collision | Rule::NeedleCorridor)
+                        matches!(
+                            rejection.rule,
+                            Rule::Collision | Rule::NeedleCorridor | Rule::NoMotion
+                        )
                     }))
     };
     plans

@@ -4,11 +4,13 @@
 //! cannot work carries the rules that reject it, the first failing one first.
 
 mod family;
+mod getting_there;
 mod motion;
 mod plan;
 mod rejection;
+mod transfer;
 
 pub use family::{Aim, Best, Edge, Family, Member, RollRange};
 pub use motion::MotionChecker;
-pub use plan::{Candidate, ConfigurationPlan, GoalPlan, Planner, PostureMargins};
+pub use plan::{Candidate, ConfigurationPlan, GoalPlan, Planner, PostureMargins, SearchEffort};
 pub use rejection::{Rejection, Rule};

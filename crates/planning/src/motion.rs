@@ -8,7 +8,6 @@ use needlebench_kinematics::{JOINT_COUNT, Joints};
 /// Checks motions of one cell.
 #[derive(Debug)]
 pub struct MotionChecker<'a> {
-    cell: &'a Cell,
     model: &'a ClearanceModel,
     /// Radius about each joint's axis within which everything beyond the joint stays, m.
     sweep_radius_m: Joints,
@@ -42,7 +41,6 @@ impl<'a> MotionChecker<'a> {
         spacing_m: f64,
     ) -> Self {
         Self {
-            cell,
             model,
             sweep_radius_m: sweep_radii(cell),
             min_clearance_m,
@@ -120,14 +118,41 @@ impl<'a> MotionChecker<'a> {
         None
     }
 
-    /// Bound on the way of any point of arm and tool between two postures, m.
-    fn largest_displacement_m(&self, from: &Joints, to: &Joints) -> f64 {
-        self.sweep_radius_m.dot(&(to - from).abs())
+    /// Whether the straight joint motion between two postures is free of collisions, its first end
+    /// not looked at; and the number of postures that it took. No point of the arm moves by more
+    /// than the spacing from one of them to the next.
+    pub(crate) fn is_straight_free(&self, from: &Joints, to: &Joints) -> (bool, u64) {
+        let way_m = self.largest_displacement_m(from, to);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "small, positive"
+        )]
+        let steps = ((way_m / self.spacing_m).ceil() as u64).max(1);
+        let mut checks = 0;
+        // The end, the middle, the quarters ...: a blocked way shows early.
+        let bits = u64::BITS - steps.leading_zeros();
+        for k in 0..1_u64 << bits {
+            let step = steps - (k.reverse_bits() >> (u64::BITS - bits)).min(steps);
+            if step == 0 || (k.reverse_bits() >> (u64::BITS - bits)) >= steps {
+                continue;
+            }
+            let q = from + (to - from) * (step as f64 / steps as f64);
+            checks += 1;
+            if self
+                .model
+                .first_below(&q, |class| self.limit_m(class))
+                .is_some()
+            {
+                return (false, checks);
+            }
+        }
+        (true, checks)
     }
 
-    /// The cell.
-    pub(crate) fn cell(&self) -> &Cell {
-        self.cell
+    /// Bound on the way of any point of arm and tool between two postures, m.
+    pub(crate) fn largest_displacement_m(&self, from: &Joints, to: &Joints) -> f64 {
+        self.sweep_radius_m.dot(&(to - from).abs())
     }
 }
 

@@ -2,14 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::UnitVector3;
 use needlebench_cell::scenario::PlanningSection;
 use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, Roll};
 use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_kinematics::ik::{
-    Configuration, Kinematics, Solution, SolutionKind, Solutions, WrapOrder, WrapSearch, wrap_angle,
+    Configuration, Kinematics, Solution, SolutionKind, Solutions, wrap_angle,
 };
-use needlebench_kinematics::trajectory::{JointPath, JointTrajectory, LineError, Phase};
+use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
 use crate::family::Member;
@@ -63,6 +62,24 @@ pub struct ConfigurationPlan {
     pub rejections: Vec<Rejection>,
     /// Motion from the start posture; `None` if there is no way.
     pub trajectory: Option<JointTrajectory>,
+    /// The same way back: straight out along the needle axis first. `None` unless the configuration
+    /// works.
+    pub retreat: Option<JointTrajectory>,
+    /// What the search for a way around cost; `None` where the straight motion was tried alone.
+    pub search: Option<SearchEffort>,
+}
+
+/// A search for a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SearchEffort {
+    /// Corners of the way that was found, ends included; 0 if none was.
+    pub waypoints: usize,
+    /// Postures that were looked at.
+    pub checks: u64,
+    /// Random postures that were drawn.
+    pub samples: u64,
+    /// Seed of the random postures.
+    pub seed: u64,
 }
 
 /// All eight configurations of one goal.
@@ -75,17 +92,18 @@ pub struct GoalPlan {
 /// Plans the goals of one scenario.
 #[derive(Debug)]
 pub struct Planner<'a> {
-    resolved: &'a ResolvedScenario,
+    pub(crate) resolved: &'a ResolvedScenario,
     kinematics: Kinematics,
-    checker: MotionChecker<'a>,
+    pub(crate) checker: MotionChecker<'a>,
     /// Keys of the scenario's `[ranking]` with weights and utilities.
     ranking_aims: Vec<(&'static str, needlebench_cell::ranking::Aim)>,
 }
 
 /// Postures of one configuration for which a motion is tried, best first.
 const MOTION_TRIES: usize = 12;
-/// Combinations of whole turns that are tried for the transfer, shortest first.
-const WRAP_TRIES: usize = 8;
+/// Postures of one configuration for which a way around is searched where the straight motion is
+/// blocked.
+const SEARCH_TRIES: usize = 3;
 
 impl<'a> Planner<'a> {
     /// Prepares the planner.
@@ -224,6 +242,8 @@ impl<'a> Planner<'a> {
                 candidate: None,
                 rejections,
                 trajectory: None,
+                retreat: None,
+                search: None,
             };
         }
         // Best first; equal ones stay in the order of roll.
@@ -232,20 +252,46 @@ impl<'a> Planner<'a> {
                 .total_cmp(&self.value(goal, aim, a))
         });
         let mut best: Option<ConfigurationPlan> = None;
+        let mut blocked = Vec::new();
         for (candidate, rejections) in spread_over_rolls(candidates).into_iter().take(MOTION_TRIES)
         {
             // The best posture breaks a rule, so all do: one motion shows what would happen.
             let hopeless = !rejections.is_empty();
-            let plan = self.plan_motion(goal, configuration, candidate, rejections);
+            let plan = self.plan_motion(goal, configuration, candidate.clone(), rejections, None);
             if plan.rejections.is_empty() {
                 return plan;
             }
             if hopeless {
                 return best.unwrap_or(plan);
             }
+            blocked.push(candidate);
             let better = best
                 .as_ref()
                 .is_none_or(|known| plan.trajectory.is_some() && known.trajectory.is_none());
+            if better {
+                best = Some(plan);
+            }
+        }
+        // No straight motion to any of them: a way around is searched for the best ones.
+        let mut checks_left = u64::from(self.planning().motion_checks);
+        for candidate in blocked.into_iter().take(SEARCH_TRIES) {
+            if checks_left == 0 {
+                break;
+            }
+            let plan = self.plan_motion(
+                goal,
+                configuration,
+                candidate,
+                Vec::new(),
+                Some(&mut checks_left),
+            );
+            if plan.rejections.is_empty() {
+                return plan;
+            }
+            let searched = plan.rejections[0].rule == Rule::NoMotion;
+            let better = best
+                .as_ref()
+                .is_none_or(|known| searched && known.rejections[0].rule != Rule::NoMotion);
             if better {
                 best = Some(plan);
             }
@@ -376,129 +422,6 @@ impl<'a> Planner<'a> {
             manipulability: jacobian.determinant().abs(),
         }
     }
-
-    /// Adds the motion: transfer, straight approach, hold.
-    fn plan_motion(
-        &self,
-        goal: &Goal,
-        configuration: Configuration,
-        mut candidate: Candidate,
-        mut rejections: Vec<Rejection>,
-    ) -> ConfigurationPlan {
-        let limits = &self.resolved.cell.robot.limits;
-        let robot = &self.checker.cell().robot;
-        let axis = robot.world_from_base_link.rotation.inverse() * goal.axis.into_inner();
-        let line = JointPath::line_ending_at(
-            &robot.chain,
-            &candidate.joints,
-            &UnitVector3::new_normalize(axis),
-            goal.approach_m,
-        );
-        let line = match line {
-            Ok(line) => line,
-            Err(error) => {
-                rejections.push(blocked_approach(&error, goal.approach_m));
-                return ConfigurationPlan {
-                    configuration,
-                    candidate: Some(candidate),
-                    rejections,
-                    trajectory: None,
-                };
-            }
-        };
-        let approach = JointTrajectory::starting_at(line.start()).then_along(
-            Phase::Approach,
-            line.clone(),
-            &self.resolved.motion,
-        );
-        // Whole turns of a joint change the transfer, but neither the approach nor the posture.
-        let turns_help = rejections
-            .iter()
-            .all(|rejection| rejection.rule != Rule::Collision)
-            && self.checker.first_collision(&approach).is_none();
-        let mut first_failure = None;
-        let mut shortest = None;
-        for turns in self.wraps(&line) {
-            let shift = Joints::from_fn(|i, _| TAU * f64::from(turns[i]));
-            let line = line.shifted(&shift);
-            let trajectory = JointTrajectory::starting_at(self.resolved.start)
-                .then_straight_to(Phase::Transfer, line.start(), &self.resolved.motion)
-                .then_along(Phase::Approach, line, &self.resolved.motion)
-                .then_hold(Phase::Hold, self.resolved.scenario.motion.hold_s);
-            let collision = self.checker.first_collision(&trajectory);
-            let works = collision.is_none();
-            if works || shortest.is_none() {
-                shortest = Some((turns, trajectory));
-                first_failure = collision;
-            }
-            if works || !turns_help {
-                break;
-            }
-        }
-        let Some((turns, trajectory)) = shortest else {
-            rejections.push(Rejection {
-                rule: Rule::JointLimit,
-                value: limits.margin(&line.start()),
-                limit: 0.0,
-                unit: "1",
-                detail: "the approach leaves the joint ranges".to_owned(),
-                class: None,
-            });
-            return ConfigurationPlan {
-                configuration,
-                candidate: Some(candidate),
-                rejections,
-                trajectory: None,
-            };
-        };
-        candidate.wrap = turns;
-        candidate.joints = trajectory.end();
-        // A posture that collides says so already; the motion into it adds nothing.
-        let known = rejections
-            .iter()
-            .any(|rejection| rejection.rule == Rule::Collision);
-        if let Some(violation) = first_failure.filter(|_| !known) {
-            let (a, b) = violation.pair.solid_names(&self.resolved.cell);
-            rejections.push(Rejection {
-                rule: Rule::Collision,
-                value: violation.pair.separation.distance_m,
-                limit: violation.limit_m,
-                unit: "m",
-                detail: format!(
-                    "{a} and {b} in the {} at {:.2} s",
-                    violation.phase.name(),
-                    violation.time_s
-                ),
-                class: Some(violation.pair.class),
-            });
-        }
-        rejections.sort_by_key(|rejection| rejection.rule);
-        ConfigurationPlan {
-            configuration,
-            candidate: Some(candidate),
-            rejections,
-            trajectory: Some(trajectory),
-        }
-    }
-
-    /// Whole turns that keep the approach inside the joint ranges, shortest transfer first; at most
-    /// one either way.
-    fn wraps(&self, line: &JointPath) -> Vec<[i32; JOINT_COUNT]> {
-        // Where the approach may start for its end to be inside as well.
-        let mut limits = self.resolved.cell.robot.limits;
-        let way = line.end() - line.start();
-        for (limit, way) in limits.0.iter_mut().zip(&way) {
-            limit.lower_rad -= way.min(0.0);
-            limit.upper_rad -= way.max(0.0);
-        }
-        WrapSearch::new(&limits, &self.resolved.start)
-            .ordered_by(WrapOrder::LargestJoint)
-            .at_most_turns(1)
-            .wraps(&line.start())
-            .take(WRAP_TRIES)
-            .map(|wrap| wrap.turns)
-            .collect()
-    }
 }
 
 /// Angle between two rolls that count as different for a motion, rad.
@@ -522,22 +445,6 @@ fn spread_over_rolls<T>(candidates: Vec<(Candidate, T)>) -> Vec<(Candidate, T)> 
     }
     first.extend(rest);
     first
-}
-
-fn blocked_approach(error: &LineError, approach_m: f64) -> Rejection {
-    let free_m = match error {
-        LineError::Singular { travelled_m, .. } | LineError::OutOfReach { travelled_m } => {
-            *travelled_m
-        }
-    };
-    Rejection {
-        rule: Rule::Approach,
-        value: free_m,
-        limit: approach_m,
-        unit: "m",
-        detail: error.to_string(),
-        class: None,
-    }
 }
 
 fn unreachable_detail(reason: needlebench_kinematics::ik::Unreachable) -> String {

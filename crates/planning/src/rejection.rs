@@ -21,6 +21,8 @@ pub enum Rule {
     NeedleCorridor,
     /// The guide cannot move straight along the needle to its place.
     Approach,
+    /// The posture is free and so is the approach, but no motion from the start was found.
+    NoMotion,
 }
 
 impl Rule {
@@ -35,6 +37,7 @@ impl Rule {
             Self::Collision => "collision",
             Self::NeedleCorridor => "needle_corridor",
             Self::Approach => "approach",
+            Self::NoMotion => "no_motion",
         }
     }
 }

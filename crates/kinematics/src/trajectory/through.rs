@@ -49,7 +49,9 @@ impl JointPath {
         let mut left = pieces[0].1;
         for (corner, pair) in corners[1..].iter().zip(pieces.windows(2)) {
             let [(before, length_before), (after, length_after)] = [pair[0], pair[1]];
-            let reach = LARGEST_SHARE * rounding.clamp(LEAST_ROUNDING, 1.0) * length_before.min(length_after);
+            let reach = LARGEST_SHARE
+                * rounding.clamp(LEAST_ROUNDING, 1.0)
+                * length_before.min(length_after);
             let s = knots[knots.len() - 1].s + left - reach;
             knots.push(straight(s, corner - before * reach, before));
             knots.push(straight(s + 2.0 * reach, corner + after * reach, after));
