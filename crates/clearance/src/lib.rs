@@ -53,6 +53,7 @@ mod hull;
 mod mesh;
 mod model;
 mod polytope;
+mod posture;
 mod segment;
 mod separation;
 mod simplex;
