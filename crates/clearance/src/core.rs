@@ -173,7 +173,7 @@ impl PreparedShape {
             Shape::Convex(mesh) => {
                 let hull = Hull::new(&mesh.0.vertices_m, &mesh.0.triangles);
                 let bound = Capsule::around_points(hull.vertices_m().iter());
-                let (block, _) = Node::around(hull.vertices_m().iter());
+                let (block, _) = Node::around(&hull.vertices_m().iter());
                 Self {
                     core: Core::Hull(hull),
                     radius_m: 0.0,
@@ -255,7 +255,7 @@ impl<'s> Difference<'s> {
     }
 
     /// With a guess of A's first farthest vertex; it only saves time.
-    pub fn from_hint(self, hint_a: usize) -> Self {
+    pub fn with_hint(self, hint_a: usize) -> Self {
         Self { hint_a, ..self }
     }
 

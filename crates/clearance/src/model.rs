@@ -112,9 +112,7 @@ struct SolidPair {
 
 /// Clearance queries of one cell, prepared once.
 ///
-/// Distances are as accurate as [`separation`](crate::separation). Nothing is allocated per
-/// query but the list that [`ClearanceModel::all_pairs`] returns, and what the depth of
-/// penetrating shapes needs.
+/// Distances are as accurate as [`separation`](crate::separation).
 #[derive(Debug, Clone)]
 pub struct ClearanceModel {
     chain: Chain,
@@ -214,7 +212,7 @@ impl ClearanceModel {
         }
         for here in pairs.into_iter().rev() {
             let class = self.pairs[here.pair].class as usize;
-            if here.bound_m < beyond_m(&best[class]) || here.bound_m.is_nan() {
+            if here.bound_m < beyond_m(best[class].as_ref()) || here.bound_m.is_nan() {
                 let is_done = promising[class].is_some_and(|one| one.pair == here.pair);
                 let query = self.query(here.pair, &links, &posture);
                 query.improve_from(&mut best[class], here.solids, is_done);
@@ -293,7 +291,7 @@ struct Promising {
 }
 
 /// What a lower bound has to reach for a pair to be left out.
-fn beyond_m(best: &Option<PairClearance>) -> f64 {
+fn beyond_m(best: Option<&PairClearance>) -> f64 {
     best.map_or(f64::INFINITY, |best| best.separation.distance_m) + PRUNING_MARGIN_M
 }
 
@@ -357,7 +355,7 @@ impl PairQuery<'_> {
 
     /// Replaces `best` by the closest solids of this pair if they are closer.
     fn improve(&self, best: &mut Option<PairClearance>) {
-        let first = self.most_promising(beyond_m(best));
+        let first = self.most_promising(beyond_m(best.as_ref()));
         self.improve_from(best, first.map(|(_, solids)| solids), false);
     }
 
@@ -374,11 +372,11 @@ impl PairQuery<'_> {
         {
             self.try_solids(first, best);
         }
-        self.for_each_near(beyond_m(best), |solids, _| {
+        self.for_each_near(beyond_m(best.as_ref()), |solids, _| {
             if Some(solids) != first {
                 self.try_solids(solids, best);
             }
-            Some(beyond_m(best))
+            Some(beyond_m(best.as_ref()))
         });
     }
 

@@ -93,7 +93,7 @@ fn split(nodes: &mut Vec<Node>, solids: &[&Node], order: &mut [usize]) {
         return;
     }
     let corners: Vec<Vector3<f64>> = order.iter().flat_map(|&i| solids[i].corners()).collect();
-    let (node, axis) = Node::around(corners.iter());
+    let (node, axis) = Node::around(&corners.iter());
     let middle = order.len() / 2;
     let key = |i: usize| axis.dot(&solids[i].centre);
     order.sort_unstable_by(|&i, &j| key(i).total_cmp(&key(j)).then(i.cmp(&j)));

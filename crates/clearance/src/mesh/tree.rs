@@ -87,7 +87,7 @@ impl Node {
 
     /// Around points, with its longest half axis.
     pub fn around<'p>(
-        points: impl Iterator<Item = &'p Vector3<f64>> + Clone,
+        points: &(impl Iterator<Item = &'p Vector3<f64>> + Clone),
     ) -> (Self, Vector3<f64>) {
         let (node, longest) = fitted(points);
         let axis = node.half[longest];
@@ -273,7 +273,7 @@ impl MeshTree {
     reason = "a mesh numbers its vertices in u32, so its triangles and boxes fit too"
 )]
 fn split(nodes: &mut Vec<Node>, triangles: &mut [[Vector3<f64>; 3]], first: usize) {
-    let (node, longest) = fitted(triangles.iter().flatten());
+    let (node, longest) = fitted(&triangles.iter().flatten());
     if triangles.len() <= LEAF_TRIANGLES {
         nodes.push(node.leaf(first as u32, triangles.len() as u32));
         return;
@@ -292,7 +292,7 @@ fn split(nodes: &mut Vec<Node>, triangles: &mut [[Vector3<f64>; 3]], first: usiz
 }
 
 /// The box along the principal axes of some points, and its longest axis.
-fn fitted<'p>(points: impl Iterator<Item = &'p Vector3<f64>> + Clone) -> (Node, usize) {
+fn fitted<'p>(points: &(impl Iterator<Item = &'p Vector3<f64>> + Clone)) -> (Node, usize) {
     let vertices = || points.clone();
     let count = vertices().count() as f64;
     let mean = vertices().sum::<Vector3<f64>>() / count;
