@@ -196,39 +196,46 @@ fn plot(rows: &[(f64, [f64; 2])]) -> String {
             points.join(" ")
         )
     };
-    let mut svg = String::from(
+    let mut svg = vec![String::from(
         "<svg xmlns='http://www.w3.org/2000/svg' width='560' height='400' \
          font-family='sans-serif' font-size='12'>\n<rect width='560' height='400' fill='white'/>\n",
-    );
+    )];
     for (exponent, name) in [(3, "1e3"), (4, "1e4"), (5, "1e5"), (6, "1e6")] {
         let at = x(10.0_f64.powi(exponent));
-        svg += &format!("<path d='M{at:.1} 30V330' stroke='#ddd'/>");
-        svg += &format!("<text x='{at:.1}' y='348' text-anchor='middle'>{name}</text>\n");
+        svg.push(format!("<path d='M{at:.1} 30V330' stroke='#ddd'/>"));
+        svg.push(format!(
+            "<text x='{at:.1}' y='348' text-anchor='middle'>{name}</text>\n"
+        ));
     }
     for us in [1.0, 10.0, 100.0, 1000.0] {
         let at = y(us);
-        svg += &format!("<path d='M70 {at:.1}H510' stroke='#ddd'/>");
-        svg += &format!(
+        svg.push(format!("<path d='M70 {at:.1}H510' stroke='#ddd'/>"));
+        svg.push(format!(
             "<text x='62' y='{:.1}' text-anchor='end'>{us}</text>\n",
             at + 4.0
-        );
+        ));
     }
-    svg += "<text x='290' y='375' text-anchor='middle'>triangles of the surface</text>\n";
-    svg += "<text x='20' y='20'>us per query, 200 nearby poses</text>\n";
+    svg.push("<text x='290' y='375' text-anchor='middle'>triangles of the surface</text>\n".into());
+    svg.push("<text x='20' y='20'>us per query, 200 nearby poses</text>\n".into());
     for (i, (name, color)) in [("convex piece", "#06c"), ("segment", "#c40")]
         .iter()
         .enumerate()
     {
         let points = rows.iter().map(|&(count, us)| (count, us[i])).collect();
-        svg += &line(points, &format!("stroke='{color}' stroke-width='2'"));
+        svg.push(line(points, &format!("stroke='{color}' stroke-width='2'")));
         let at = 50 + 18 * i;
-        svg += &format!("<text x='90' y='{at}' fill='{color}'>{name}</text>\n");
+        svg.push(format!(
+            "<text x='90' y='{at}' fill='{color}'>{name}</text>\n"
+        ));
     }
     let (first, us) = rows[0];
     let linear = [1.0, 100.0].map(|times| (first * times, us[0] * times));
-    svg += &line(linear.to_vec(), "stroke='#888' stroke-dasharray='4 4'");
-    svg += "<text x='90' y='86' fill='#888'>in proportion</text>\n</svg>\n";
-    svg
+    svg.push(line(
+        linear.to_vec(),
+        "stroke='#888' stroke-dasharray='4 4'",
+    ));
+    svg.push("<text x='90' y='86' fill='#888'>in proportion</text>\n</svg>\n".into());
+    svg.concat()
 }
 
 fn main() {
