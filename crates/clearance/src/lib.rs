@@ -90,5 +90,5 @@ mod simplex;
 
 pub use crate::core::PreparedShape;
 pub use model::{ClassMinima, ClearanceModel, PairClearance};
-pub use segment::segment_clearance;
+pub use segment::{PreparedSolids, segment_clearance};
 pub use separation::{Separation, separation};

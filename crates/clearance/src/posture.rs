@@ -156,6 +156,7 @@ impl Posture {
         if ball_a.balls_part(ball_b, limit_m) {
             return;
         }
+        let mut stack = Vec::new();
         for i in 0..a.solids.len() {
             let seen = self.seen(a, i);
             if seen.bound.balls_part(ball_b, limit_m) {
@@ -194,7 +195,7 @@ impl Posture {
                         .after(&solid.inverse_after(&IDENTITY))
                 }
             };
-            let mut stack = Vec::with_capacity(16);
+            stack.clear();
             let gap_m = |node: u32| {
                 let node = &nodes[node as usize];
                 match b.frame {

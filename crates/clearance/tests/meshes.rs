@@ -511,7 +511,7 @@ fn depth_by_brute_force_m(shape: &Shape, a: &Pose, mesh: &Shape, b: &Pose) -> f6
         let moved = Pose::from(way) * a;
         separation(&shape, &moved, &mesh, b).distance_m >= 0.0
     };
-    let (count, step_m) = (100, 0.003);
+    let (count, step_m) = (60, 0.003);
     let golden = PI * (3.0 - 5.0_f64.sqrt());
     let mut least_m = f64::INFINITY;
     for i in 0..count {
@@ -552,14 +552,14 @@ fn a_reported_way_out_parts_the_shapes_and_is_short() {
         let out = Pose::from(found.normal.into_inner() * found.distance_m) * a;
         let left_m = gap(&shape, &out, &mesh, &b).distance_m;
         assert!(left_m.abs() <= LEFT_M, "{round} {left_m:e}");
-        if ratios.len() < 12 {
+        if ratios.len() < 8 {
             let brute_m = depth_by_brute_force_m(&shape, &a, &mesh, &b);
             ratios.push(-found.distance_m / brute_m);
         }
     }
     ratios.sort_by(f64::total_cmp);
     println!("depth over brute force: {ratios:.3?}");
-    // The brute force is coarse: 3 mm and some 12 degrees.
+    // The brute force is coarse: 3 mm and some 15 degrees.
     assert!(ratios[ratios.len() / 2] <= 1.02);
     assert!(ratios[ratios.len() - 1] <= 1.25);
 }
