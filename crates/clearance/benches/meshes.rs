@@ -141,6 +141,104 @@ fn beside_parry() {
     println!("penetrating piece, {} poses: {us:.1} us", crossing.len());
 }
 
+/// Cuts of an icosahedron's edges: 980 to a million triangles.
+const CUTS: [u32; 7] = [7, 13, 22, 40, 71, 126, 224];
+
+/// Cost against the number of triangles, as a table and a plot in the target directory.
+fn scaling() {
+    println!(
+        "\n{:>10} {:>12} {:>12} {:>12}",
+        "triangles", "piece, us", "segment, us", "build, ms"
+    );
+    let segment = Shape::Capsule {
+        radius_m: 0.0,
+        half_length_m: 0.05,
+    };
+    let shapes = [piece(), segment].map(|shape| PreparedShape::new(&shape));
+    let mut rows = Vec::new();
+    for cuts in CUTS {
+        let surface = chest(cuts);
+        let count = surface.triangles.len();
+        let poses = nearby(&surface, POSES, 0.06);
+        let shape = solid(surface);
+        let start = Instant::now();
+        let mesh = PreparedShape::new(&shape);
+        let build_ms = start.elapsed().as_secs_f64() * 1e3;
+        let [piece_us, segment_us] = shapes.each_ref().map(|shape| {
+            let run = |pose: &Pose| separation(shape, pose, &mesh, &Pose::identity()).distance_m;
+            time_us(&poses, run).0
+        });
+        println!("{count:10} {piece_us:12.2} {segment_us:12.2} {build_ms:12.1}");
+        rows.push((count as f64, [piece_us, segment_us]));
+    }
+    let target = std::env::current_exe()
+        .ok()
+        .and_then(|exe| Some(exe.ancestors().nth(3)?.to_path_buf()))
+        .unwrap_or_default();
+    let path = target.join("mesh_scaling.svg");
+    match std::fs::write(&path, plot(&rows)) {
+        Ok(()) => println!("plotted in {}", path.display()),
+        Err(error) => eprintln!("{}: {error}", path.display()),
+    }
+}
+
+/// Both axes logarithmic, with a dashed line for a cost in proportion to the triangles.
+fn plot(rows: &[(f64, [f64; 2])]) -> String {
+    let x = |count: f64| 70.0 + 140.0 * (count.log10() - 2.9);
+    let y = |us: f64| 330.0 - 100.0 * us.log10();
+    let line = |points: Vec<(f64, f64)>, style: &str| {
+        let points: Vec<String> = points
+            .into_iter()
+            .map(|(count, us)| format!("{:.1},{:.1}", x(count), y(us)))
+            .collect();
+        format!(
+            "<polyline fill='none' {style} points='{}'/>\n",
+            points.join(" ")
+        )
+    };
+    let mut svg = vec![String::from(
+        "<svg xmlns='http://www.w3.org/2000/svg' width='560' height='400' \
+         font-family='sans-serif' font-size='12'>\n<rect width='560' height='400' fill='white'/>\n",
+    )];
+    for (exponent, name) in [(3, "1e3"), (4, "1e4"), (5, "1e5"), (6, "1e6")] {
+        let at = x(10.0_f64.powi(exponent));
+        svg.push(format!("<path d='M{at:.1} 30V330' stroke='#ddd'/>"));
+        svg.push(format!(
+            "<text x='{at:.1}' y='348' text-anchor='middle'>{name}</text>\n"
+        ));
+    }
+    for us in [1.0, 10.0, 100.0, 1000.0] {
+        let at = y(us);
+        svg.push(format!("<path d='M70 {at:.1}H510' stroke='#ddd'/>"));
+        svg.push(format!(
+            "<text x='62' y='{:.1}' text-anchor='end'>{us}</text>\n",
+            at + 4.0
+        ));
+    }
+    svg.push("<text x='290' y='375' text-anchor='middle'>triangles of the surface</text>\n".into());
+    svg.push("<text x='20' y='20'>us per query, 200 nearby poses</text>\n".into());
+    for (i, (name, color)) in [("convex piece", "#06c"), ("segment", "#c40")]
+        .iter()
+        .enumerate()
+    {
+        let points = rows.iter().map(|&(count, us)| (count, us[i])).collect();
+        svg.push(line(points, &format!("stroke='{color}' stroke-width='2'")));
+        let at = 50 + 18 * i;
+        svg.push(format!(
+            "<text x='90' y='{at}' fill='{color}'>{name}</text>\n"
+        ));
+    }
+    let (first, us) = rows[0];
+    let linear = [1.0, 100.0].map(|times| (first * times, us[0] * times));
+    svg.push(line(
+        linear.to_vec(),
+        "stroke='#888' stroke-dasharray='4 4'",
+    ));
+    svg.push("<text x='90' y='86' fill='#888'>in proportion</text>\n</svg>\n".into());
+    svg.concat()
+}
+
 fn main() {
     beside_parry();
+    scaling();
 }

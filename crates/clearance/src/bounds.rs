@@ -126,10 +126,11 @@ impl Capsule {
         }
     }
 
-    /// Lower bound of the signed distance of the enclosed shapes by their balls alone.
+    /// Whether the balls alone show the enclosed shapes to be `limit_m` apart or more.
     #[inline]
-    pub fn ball_gap_m(&self, other: &Self) -> f64 {
-        (self.centre - other.centre).norm() - self.ball_radius_m - other.ball_radius_m
+    pub fn balls_part(&self, other: &Self, limit_m: f64) -> bool {
+        let reach_m = limit_m + self.ball_radius_m + other.ball_radius_m;
+        reach_m < 0.0 || (self.centre - other.centre).norm_squared() >= reach_m * reach_m
     }
 
     /// Lower bound of the signed distance of the enclosed shapes by the capsules.

@@ -8,7 +8,7 @@ use needlebench_kinematics::Pose;
 
 use crate::bounds::Capsule;
 use crate::hull::Hull;
-use crate::mesh::MeshTree;
+use crate::mesh::{MeshTree, Node};
 
 /// A rotation as a matrix and a translation: half the cost of a quaternion per point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -132,6 +132,8 @@ pub struct PreparedShape {
     pub(crate) radius_m: f64,
     /// Encloses the whole shape.
     pub(crate) bound: Capsule,
+    /// A box around the whole shape.
+    pub(crate) block: Node,
 }
 
 impl PreparedShape {
@@ -142,6 +144,7 @@ impl PreparedShape {
                 core: Core::Point,
                 radius_m: *radius_m,
                 bound: Capsule::on_z(0.0, *radius_m),
+                block: Node::upright(&Vector3::repeat(*radius_m)),
             },
             Shape::Capsule {
                 radius_m,
@@ -157,6 +160,7 @@ impl PreparedShape {
                 },
                 radius_m: 0.0,
                 bound: Capsule::around_cylinder(*radius_m, *half_length_m),
+                block: Node::upright(&Vector3::new(*radius_m, *radius_m, *half_length_m)),
             },
             Shape::Cuboid { half_extents_m } => Self {
                 core: Core::Cuboid {
@@ -164,20 +168,24 @@ impl PreparedShape {
                 },
                 radius_m: 0.0,
                 bound: Capsule::around_cuboid(half_extents_m),
+                block: Node::upright(half_extents_m),
             },
             Shape::Convex(mesh) => {
                 let hull = Hull::new(&mesh.0.vertices_m, &mesh.0.triangles);
                 let bound = Capsule::around_points(hull.vertices_m().iter());
+                let (block, _) = Node::around(&hull.vertices_m().iter());
                 Self {
                     core: Core::Hull(hull),
                     radius_m: 0.0,
                     bound,
+                    block,
                 }
             }
             Shape::Mesh(mesh) => {
                 let tree = MeshTree::new(&mesh.surface);
                 let bound = Capsule::around_points(tree.vertices_m());
                 Self {
+                    block: tree.root().clone(),
                     core: Core::Mesh(Arc::new(tree)),
                     radius_m: 0.0,
                     bound,
@@ -192,6 +200,7 @@ impl PreparedShape {
             core: Core::Segment { half_length_m },
             radius_m,
             bound: Capsule::on_z(half_length_m, radius_m),
+            block: Node::upright(&Vector3::new(radius_m, radius_m, half_length_m + radius_m)),
         }
     }
 
@@ -251,7 +260,7 @@ impl<'s> Difference<'s> {
     }
 
     /// With a guess of A's first farthest vertex; it only saves time.
-    pub fn from_hint(self, hint_a: usize) -> Self {
+    pub fn with_hint(self, hint_a: usize) -> Self {
         Self { hint_a, ..self }
     }
 

@@ -1,5 +1,5 @@
-//! Signed clearance between convex solids, with witness points; of two shapes, and of a whole
-//! cell by class.
+//! Signed clearance between solids, convex or meshes, with witness points; of two shapes, and of
+//! a whole cell by class.
 //!
 //! Positive is a gap, negative a penetration depth; `point_on_b - point_on_a = distance *
 //! normal`. Metres throughout.
@@ -13,6 +13,22 @@
 //! Both bound the answer from both sides and stop when the bounds meet; the one that is never
 //! optimistic is reported. What rounding leaves between the bounds is below 1e-8 m apart and,
 //! for coaxial shapes of metres in penetration, below 2e-7 m.
+//!
+//! # Meshes
+//!
+//! The distance from a triangle mesh is the least over its triangles, each as certain as above;
+//! a tree of turned boxes finds it. What is within the closed surface is told by a winding
+//! number, so cavities are free and parts that overlap are one solid.
+//!
+//! The depth in a mesh is the length of the shortest of some straight ways out: out of the convex
+//! hull, to the nearest point of the surface, across the pieces of surface that are touched, and
+//! what a local search makes of the best. Each is proven to part the two: no triangle that is
+//! touched on the way is left later than at its end, and the end is outside. So the depth is an
+//! upper bound, the signed distance never optimistic, and `distance * normal` does part the two.
+//! It is exact for a mesh that is convex, and for a ball or a point that meets nothing else on the
+//! way to the nearest point of the surface. Where a solid is not convex a shorter way may exist;
+//! `tests/meshes.rs` looks for one by brute force, and the worst reported depth was 1.14 times
+//! what it found.
 //!
 //! # Accuracy
 //!
@@ -39,7 +55,21 @@
 //! | cuboid, convex | 4.0e-8 | 9.5e-6 | 3.4e-8 | 5.0e-8 | 9.5e-6 |
 //! | convex, convex | 4.1e-8 | 4.0e-6 | 3.6e-8 | 4.9e-8 | 3.1e-6 |
 //!
-//! The same test asks parry 0.31 (in millimetres) and Coal 3.0.3. Apart, both agree with the
+//! Meshes, as `tests/meshes.rs` prints and asserts them, in um: against the convex solver where
+//! the mesh is convex (both signs), and while apart against brute force over all triangles, with a
+//! distance of triangles of its own, for a torus, a bowl and an angle iron.
+//!
+//! | Shapes | convex mesh over | under | brute force over | under |
+//! |---|---|---|---|---|
+//! | sphere, mesh | 1.1e-10 | 3.5e-10 | 1.0e-7 | 0 |
+//! | cylinder, mesh | 9.3e-5 | 6.1e-5 | 8.0e-5 | 3.7e-5 |
+//! | capsule, mesh | 3.1e-10 | 3.4e-9 | 5.9e-8 | 2.2e-10 |
+//! | cuboid, mesh | 1.5e-10 | 1.0e-8 | 2.5e-10 | 2.4e-10 |
+//! | convex, mesh | 2.6e-10 | 1.3e-10 | 1.7e-10 | 2.2e-10 |
+//! | mesh, mesh | 3.1e-10 | 2.3e-10 | 2.2e-10 | 2.9e-10 |
+//! | notch, cavity, closed form | 1.4e-10 | 1.5e-9 | | |
+//!
+//! The test of the primitives asks parry 0.31 (in millimetres) and Coal 3.0.3. Apart, both agree with the
 //! reference to 7e-3 um. In penetration parry misses 25 of the 4500 pairs and Coal 45, by up to
 //! 0.2 m and 0.1 m, all with a cylinder or a capsule, and parry mostly to the unsafe side. That
 //! is why the solver is our own.
@@ -55,6 +85,7 @@ mod mesh;
 mod model;
 mod pairs;
 mod polytope;
+mod posture;
 mod segment;
 mod separation;
 mod simplex;
@@ -69,5 +100,5 @@ pub use pairs::{
     PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
     check_srdf, examine_pairs,
 };
-pub use segment::segment_clearance;
+pub use segment::{PreparedSolids, segment_clearance};
 pub use separation::{Separation, separation};

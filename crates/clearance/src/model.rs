@@ -6,6 +6,7 @@ use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 
 use crate::bounds::Capsule;
 use crate::core::{Placement, PreparedShape};
+use crate::posture::{Posture, Seen, SolidTree};
 use crate::separation::{Separation, closer_than};
 
 /// Number of classes; `NeedleRoute` is the last.
@@ -79,6 +80,8 @@ pub(crate) struct PlacedShape {
     pub body_from_shape: Placement,
     /// Encloses the shape, in the body's frame.
     pub bound: Capsule,
+    /// Place and what encloses the shape, in the body's frame.
+    pub seen: Seen,
 }
 
 #[derive(Debug, Clone)]
@@ -86,7 +89,11 @@ pub(crate) struct PlacedBody {
     pub frame: Frame,
     pub solids: Vec<PlacedShape>,
     /// Ball around all solids, in the body's frame.
-    bound: Capsule,
+    pub bound: Capsule,
+    /// In the body's frame.
+    pub tree: Option<SolidTree>,
+    /// Solids of the moving bodies before this one.
+    pub first_moving: usize,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -105,9 +112,7 @@ struct SolidPair {
 
 /// Clearance queries of one cell, prepared once.
 ///
-/// Distances are as accurate as [`separation`](crate::separation). Nothing is allocated per
-/// query but the list that [`ClearanceModel::all_pairs`] returns, and what the depth of
-/// penetrating shapes needs.
+/// Distances are as accurate as [`separation`](crate::separation).
 #[derive(Debug, Clone)]
 pub struct ClearanceModel {
     pub(crate) chain: Chain,
@@ -119,10 +124,18 @@ pub struct ClearanceModel {
 impl ClearanceModel {
     /// Prepares the geometry of a cell.
     pub fn new(cell: &Cell) -> Self {
+        let mut moving = 0;
+        let bodies = cell.bodies.iter().map(|body| {
+            let placed = placed_body(body, moving);
+            if placed.frame != Frame::World {
+                moving += placed.solids.len();
+            }
+            placed
+        });
         Self {
             chain: cell.robot.chain,
             world_from_base_link: cell.robot.world_from_base_link,
-            bodies: cell.bodies.iter().map(placed_body).collect(),
+            bodies: bodies.collect(),
             pairs: cell
                 .pairs
                 .iter()
@@ -144,11 +157,12 @@ impl ClearanceModel {
     /// an engine has recorded.
     pub fn all_pairs_at(&self, world_from_links: &[Pose; JOINT_COUNT]) -> Vec<PairClearance> {
         let links = world_from_links.each_ref().map(Placement::new);
+        let posture = Posture::new(&self.bodies, &links);
         (0..self.pairs.len())
             .filter_map(|pair| {
-                let query = self.query(pair, &links);
+                let query = self.query(pair, &links, &posture);
                 let mut best = None;
-                query.improve(&mut best, None);
+                query.improve(&mut best);
                 best
             })
             .collect()
@@ -165,28 +179,44 @@ impl ClearanceModel {
     /// [`ClearanceModel::minimum_per_class`] with the poses of the moving links given.
     pub fn minimum_per_class_at(&self, world_from_links: &[Pose; JOINT_COUNT]) -> ClassMinima {
         let links = world_from_links.each_ref().map(Placement::new);
+        let posture = Posture::new(&self.bodies, &links);
         // The most promising solids of each class first: their distance prunes most of the rest.
-        let mut promising: [Option<(f64, usize, SolidPair)>; CLASS_COUNT] = [None; CLASS_COUNT];
-        for (pair, placed) in self.pairs.iter().enumerate() {
+        let mut promising: [Option<Promising>; CLASS_COUNT] = [None; CLASS_COUNT];
+        let mut pairs: Vec<Promising> = Vec::with_capacity(self.pairs.len());
+        // Backwards: what moves most, the tool, tends to be closest and comes late in the list.
+        for (pair, placed) in self.pairs.iter().enumerate().rev() {
             let slot = &mut promising[placed.class as usize];
-            let least_m = slot.map_or(f64::INFINITY, |(bound_m, ..)| bound_m);
-            if let Some((bound_m, solids)) = self.query(pair, &links).most_promising(least_m) {
-                *slot = Some((bound_m, pair, solids));
+            let least_m = slot.map_or(f64::INFINITY, |promising| promising.bound_m);
+            let query = self.query(pair, &links, &posture);
+            let found = query.most_promising(least_m);
+            let here = Promising {
+                bound_m: found.map_or(least_m, |(bound_m, _)| bound_m),
+                pair,
+                solids: found.map(|(_, solids)| solids),
+            };
+            if found.is_some() {
+                *slot = Some(here);
             }
+            pairs.push(here);
         }
         let mut best = [None; CLASS_COUNT];
         for (slot, promising) in best.iter_mut().zip(promising) {
-            if let Some((_, pair, solids)) = promising {
-                self.query(pair, &links).try_solids(solids, slot);
+            if let Some(Promising {
+                pair,
+                solids: Some(solids),
+                ..
+            }) = promising
+            {
+                self.query(pair, &links, &posture).try_solids(solids, slot);
             }
         }
-        // Backwards: what moves most, the tool, tends to be closest and comes late in the list.
-        for (pair, placed) in self.pairs.iter().enumerate().rev() {
-            let class = placed.class as usize;
-            let done = promising[class]
-                .filter(|&(_, promising_pair, _)| promising_pair == pair)
-                .map(|(_, _, solids)| solids);
-            self.query(pair, &links).improve(&mut best[class], done);
+        for here in pairs.into_iter().rev() {
+            let class = self.pairs[here.pair].class as usize;
+            if here.bound_m < beyond_m(best[class].as_ref()) || here.bound_m.is_nan() {
+                let is_done = promising[class].is_some_and(|one| one.pair == here.pair);
+                let query = self.query(here.pair, &links, &posture);
+                query.improve_from(&mut best[class], here.solids, is_done);
+            }
         }
         ClassMinima(best)
     }
@@ -210,6 +240,7 @@ impl ClearanceModel {
         limit_m: impl Fn(ClearanceClass) -> f64,
     ) -> Option<PairClearance> {
         let links = world_from_links.each_ref().map(Placement::new);
+        let posture = Posture::new(&self.bodies, &links);
         let limits_m = CLASSES.map(|class| {
             if class.is_physical() {
                 limit_m(class)
@@ -222,7 +253,7 @@ impl ClearanceModel {
             if limit_m == f64::NEG_INFINITY {
                 return None;
             }
-            self.query(pair, &links).first_below(limit_m)
+            self.query(pair, &links, &posture).first_below(limit_m)
         })
     }
 
@@ -232,24 +263,36 @@ impl ClearanceModel {
             .map(|pose| self.world_from_base_link * pose)
     }
 
-    fn query<'m>(&'m self, pair: usize, links: &'m LinkPlacements) -> PairQuery<'m> {
+    fn query<'m>(
+        &'m self,
+        pair: usize,
+        links: &'m LinkPlacements,
+        posture: &'m Posture,
+    ) -> PairQuery<'m> {
         let PlacedPair { a, b, class } = self.pairs[pair];
-        let (a, b) = (&self.bodies[a], &self.bodies[b]);
-        let b_from_a = match (a.frame, b.frame) {
-            (Frame::World, Frame::World) => IDENTITY,
-            (Frame::Link(i), Frame::World) => links[i],
-            (Frame::World, Frame::Link(j)) => links[j].inverse_after(&IDENTITY),
-            (Frame::Link(i), Frame::Link(j)) => links[j].inverse_after(&links[i]),
-        };
         PairQuery {
             pair,
             class,
-            a,
-            b,
-            b_from_a,
+            a: (a, &self.bodies[a]),
+            b: (b, &self.bodies[b]),
             links,
+            posture,
         }
     }
+}
+
+/// Solids of a pair with a lower bound of the distance of the pair's bodies.
+#[derive(Debug, Clone, Copy)]
+struct Promising {
+    bound_m: f64,
+    pair: usize,
+    /// Those with that bound, unless others of the class have a lower one.
+    solids: Option<SolidPair>,
+}
+
+/// What a lower bound has to reach for a pair to be left out.
+fn beyond_m(best: Option<&PairClearance>) -> f64 {
+    best.map_or(f64::INFINITY, |best| best.separation.distance_m) + PRUNING_MARGIN_M
 }
 
 pub(crate) const IDENTITY: Placement = Placement {
@@ -257,7 +300,7 @@ pub(crate) const IDENTITY: Placement = Placement {
     translation: Vector3::new(0.0, 0.0, 0.0),
 };
 
-fn placed_body(body: &CollisionBody) -> PlacedBody {
+fn placed_body(body: &CollisionBody, first_moving: usize) -> PlacedBody {
     let solids: Vec<_> = body
         .solids
         .iter()
@@ -266,6 +309,7 @@ fn placed_body(body: &CollisionBody) -> PlacedBody {
             let body_from_shape = Placement::new(&solid.parent_from_shape);
             PlacedShape {
                 bound: shape.bound.placed(&body_from_shape),
+                seen: Seen::new(&shape, body_from_shape),
                 body_from_shape,
                 shape,
             }
@@ -274,6 +318,8 @@ fn placed_body(body: &CollisionBody) -> PlacedBody {
     PlacedBody {
         frame: body.frame,
         bound: Capsule::around_balls(solids.iter().map(|solid| &solid.bound)),
+        tree: SolidTree::new(&solids.iter().map(|s| &s.seen.block).collect::<Vec<_>>()),
+        first_moving,
         solids,
     }
 }
@@ -284,14 +330,15 @@ fn is_closer(separation: &Separation, limit_m: f64) -> bool {
     separation.distance_m < limit_m || separation.distance_m.is_nan()
 }
 
-/// One pair of bodies at one state of the arm. Works in the frame of body B.
+/// One pair of bodies at one state of the arm.
 struct PairQuery<'m> {
     pair: usize,
     class: ClearanceClass,
-    a: &'m PlacedBody,
-    b: &'m PlacedBody,
-    b_from_a: Placement,
+    /// The bodies, after their indices.
+    a: (usize, &'m PlacedBody),
+    b: (usize, &'m PlacedBody),
     links: &'m LinkPlacements,
+    posture: &'m Posture,
 }
 
 impl PairQuery<'_> {
@@ -306,24 +353,30 @@ impl PairQuery<'_> {
         found
     }
 
-    /// Replaces `best` by the closest solids of this pair if they are closer. `done` have been
-    /// tried before.
-    fn improve(&self, best: &mut Option<PairClearance>, done: Option<SolidPair>) {
-        let beyond_m = |best: &Option<PairClearance>| {
-            best.map_or(f64::INFINITY, |best| best.separation.distance_m) + PRUNING_MARGIN_M
-        };
-        // Nothing within reach, or a good start: it halves the number of full distances.
-        let Some((_, first)) = self.most_promising(beyond_m(best)) else {
-            return;
-        };
-        if done != Some(first) {
+    /// Replaces `best` by the closest solids of this pair if they are closer.
+    fn improve(&self, best: &mut Option<PairClearance>) {
+        let first = self.most_promising(beyond_m(best.as_ref()));
+        self.improve_from(best, first.map(|(_, solids)| solids), false);
+    }
+
+    /// [`PairQuery::improve`] with the most promising solids given, which may have been tried.
+    fn improve_from(
+        &self,
+        best: &mut Option<PairClearance>,
+        first: Option<SolidPair>,
+        is_done: bool,
+    ) {
+        // A good start halves the number of full distances.
+        if let Some(first) = first
+            && !is_done
+        {
             self.try_solids(first, best);
         }
-        self.for_each_near(beyond_m(best), |solids, _| {
-            if solids != first && done != Some(solids) {
+        self.for_each_near(beyond_m(best.as_ref()), |solids, _| {
+            if Some(solids) != first {
                 self.try_solids(solids, best);
             }
-            Some(beyond_m(best))
+            Some(beyond_m(best.as_ref()))
         });
     }
 
@@ -355,59 +408,30 @@ impl PairQuery<'_> {
 
     /// Calls `visit` with all solids whose lower bound, which is passed on, is below a limit.
     /// `visit` returns the limit from there on, or `None` to end.
-    fn for_each_near(
-        &self,
-        mut limit_m: f64,
-        mut visit: impl FnMut(SolidPair, f64) -> Option<f64>,
-    ) {
-        if self
-            .a
-            .bound
-            .placed(&self.b_from_a)
-            .ball_gap_m(&self.b.bound)
-            >= limit_m
-        {
-            return;
-        }
-        for (i, a) in self.a.solids.iter().enumerate() {
-            let bound_a = a.bound.placed(&self.b_from_a);
-            if bound_a.ball_gap_m(&self.b.bound) >= limit_m {
-                continue;
-            }
-            for (j, b) in self.b.solids.iter().enumerate() {
-                let ball_gap_m = bound_a.ball_gap_m(&b.bound);
-                if ball_gap_m >= limit_m {
-                    continue;
-                }
-                let gap_m = bound_a.gap_m(&b.bound).max(ball_gap_m);
-                if gap_m >= limit_m {
-                    continue;
-                }
-                match visit(SolidPair { a: i, b: j }, gap_m) {
-                    Some(next_m) => limit_m = next_m,
-                    None => return,
-                }
-            }
-        }
+    fn for_each_near(&self, limit_m: f64, mut visit: impl FnMut(SolidPair, f64) -> Option<f64>) {
+        let visit = |a, b, gap_m| visit(SolidPair { a, b }, gap_m);
+        self.posture.for_each_near(self.a, self.b, limit_m, visit);
     }
 
     /// Signed distance in the frame of solid B, or `None` if it is beyond the cutoff.
     fn separation(&self, solids: SolidPair, cutoff_m: f64) -> Option<Separation> {
-        let (a, b) = (&self.a.solids[solids.a], &self.b.solids[solids.b]);
-        let solid_b_from_solid_a = b
-            .body_from_shape
-            .inverse_after(&self.b_from_a.after(&a.body_from_shape));
+        let ((_, body_a), (_, body_b)) = (self.a, self.b);
+        let (a, b) = (&body_a.solids[solids.a], &body_b.solids[solids.b]);
+        let [world_from_a, world_from_b] =
+            [(body_a, solids.a), (body_b, solids.b)].map(|(body, i)| self.posture.place(body, i));
+        let solid_b_from_solid_a = world_from_b.inverse_after(world_from_a);
         closer_than(&a.shape, &b.shape, &solid_b_from_solid_a, cutoff_m)
     }
 
     fn clearance(&self, solids: SolidPair, in_solid_b: &Separation) -> PairClearance {
-        let in_body_b = in_solid_b.placed(&self.b.solids[solids.b].body_from_shape);
+        let (_, body_b) = self.b;
+        let in_body_b = in_solid_b.placed(&body_b.solids[solids.b].body_from_shape);
         PairClearance {
             pair: self.pair,
             class: self.class,
             solid_a: solids.a,
             solid_b: solids.b,
-            separation: match self.b.frame {
+            separation: match body_b.frame {
                 Frame::World => in_body_b,
                 Frame::Link(i) => in_body_b.placed(&self.links[i]),
             },

@@ -82,6 +82,10 @@ pub fn sphere(cuts: u32) -> TriangleMesh {
         }
     }
     // Corners that are equal but for rounding are one vertex.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a coordinate within the unit sphere, in units of 1e-9"
+    )]
     let mut order: Vec<(usize, [i64; 3])> = soup
         .iter()
         .flatten()

@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, Unit, Vector3};
 
 use self::nearest::Nearest;
 use self::sides::{Mover, Sides};
-pub(crate) use self::tree::MeshTree;
+pub(crate) use self::tree::{MeshTree, Node};
 use self::way_out::WayOut;
 use crate::core::{Core, Placement, PreparedShape};
 use crate::separation::Separation;

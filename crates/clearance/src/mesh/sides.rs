@@ -182,6 +182,6 @@ impl<'s> Sides<'s> {
     pub fn difference<'c>(&self, a: &'c Core, b: &'c Core, hint: Hint) -> Difference<'c> {
         Difference::new(a, b, self.b_from_a)
             .swept(self.sweep)
-            .from_hint(hint.0)
+            .with_hint(hint.0)
     }
 }

@@ -9,6 +9,8 @@ use std::cmp::Ordering;
 use nalgebra::{Matrix3, Vector3};
 use needlebench_cell::shape::TriangleMesh;
 
+use crate::core::Placement;
+
 /// Triangles in a leaf: their own plane tests cost about as much as a further box.
 const LEAF_TRIANGLES: usize = 4;
 
@@ -75,6 +77,77 @@ impl Node {
             leave = leave.min(one.max(other));
         }
         enter <= leave * (1.0 + RAY_SLACK) + RAY_SLACK
+    }
+
+    /// About the origin along the axes.
+    pub fn upright(half_extents_m: &Vector3<f64>) -> Self {
+        let half = [0, 1, 2].map(|i| Vector3::ith(i, half_extents_m[i]));
+        Self::from_half(Vector3::zeros(), half)
+    }
+
+    /// Around points, with its longest half axis.
+    pub fn around<'p>(
+        points: &(impl Iterator<Item = &'p Vector3<f64>> + Clone),
+    ) -> (Self, Vector3<f64>) {
+        let (node, longest) = fitted(points);
+        let axis = node.half[longest];
+        (node, axis)
+    }
+
+    fn from_half(centre: Vector3<f64>, half: [Vector3<f64>; 3]) -> Self {
+        let inverse_squared = half.map(|half| {
+            let squared = half.norm_squared();
+            if squared > 0.0 { squared.recip() } else { 0.0 }
+        });
+        Self {
+            centre,
+            half,
+            inverse_squared,
+            next: 0,
+            count: 0,
+        }
+    }
+
+    pub fn placed(&self, placement: &Placement) -> Self {
+        Self {
+            centre: placement.point(&self.centre),
+            half: self.half.map(|half| placement.rotation * half),
+            ..*self
+        }
+    }
+
+    pub fn corners(&self) -> [Vector3<f64>; 8] {
+        std::array::from_fn(|i| {
+            (0..3).fold(self.centre, |corner, axis| {
+                let sign = if i >> axis & 1 == 0 { -1.0 } else { 1.0 };
+                corner + self.half[axis] * sign
+            })
+        })
+    }
+
+    /// A leaf of `count` things from `first` on.
+    pub fn leaf(self, first: u32, count: u32) -> Self {
+        Self {
+            next: first,
+            count,
+            ..self
+        }
+    }
+
+    /// Two children, of which the second one is at `second`.
+    pub fn open_at(&mut self, second: u32) {
+        self.next = second;
+        self.count = 0;
+    }
+
+    /// The children of the box at `index`, or the first thing in a leaf.
+    #[inline]
+    pub fn children(&self, index: u32) -> Result<[u32; 2], u32> {
+        if self.count == 0 {
+            Ok([index + 1, self.next])
+        } else {
+            Err(self.next)
+        }
     }
 
     /// Half of the diagonal, m.
@@ -200,11 +273,9 @@ impl MeshTree {
     reason = "a mesh numbers its vertices in u32, so its triangles and boxes fit too"
 )]
 fn split(nodes: &mut Vec<Node>, triangles: &mut [[Vector3<f64>; 3]], first: usize) {
-    let (mut node, longest) = fitted(triangles);
+    let (node, longest) = fitted(&triangles.iter().flatten());
     if triangles.len() <= LEAF_TRIANGLES {
-        node.next = first as u32;
-        node.count = triangles.len() as u32;
-        nodes.push(node);
+        nodes.push(node.leaf(first as u32, triangles.len() as u32));
         return;
     }
     let axis = node.half[longest];
@@ -215,14 +286,15 @@ fn split(nodes: &mut Vec<Node>, triangles: &mut [[Vector3<f64>; 3]], first: usiz
     nodes.push(node);
     let (left, right) = triangles.split_at_mut(middle);
     split(nodes, left, first);
-    nodes[index].next = nodes.len() as u32;
+    let second = nodes.len() as u32;
+    nodes[index].open_at(second);
     split(nodes, right, first + middle);
 }
 
-/// The box along the principal axes of the triangles' corners, and its longest axis.
-fn fitted(triangles: &[[Vector3<f64>; 3]]) -> (Node, usize) {
-    let count = 3.0 * triangles.len() as f64;
-    let vertices = || triangles.iter().flatten();
+/// The box along the principal axes of some points, and its longest axis.
+fn fitted<'p>(points: &(impl Iterator<Item = &'p Vector3<f64>> + Clone)) -> (Node, usize) {
+    let vertices = || points.clone();
+    let count = vertices().count() as f64;
     let mean = vertices().sum::<Vector3<f64>>() / count;
     let covariance = vertices().fold(Matrix3::zeros(), |sum, vertex| {
         let offset = vertex - mean;
@@ -260,13 +332,7 @@ fn fitted(triangles: &[[Vector3<f64>; 3]]) -> (Node, usize) {
         0,
         |best, i| if squared[i] > squared[best] { i } else { best },
     );
-    let node = Node {
-        centre,
-        half,
-        inverse_squared: squared.map(|x| if x > 0.0 { x.recip() } else { 0.0 }),
-        next: 0,
-        count: 0,
-    };
+    let node = Node::from_half(centre, half);
     (node, longest)
 }
 

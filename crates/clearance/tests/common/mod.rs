@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod solids;
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
