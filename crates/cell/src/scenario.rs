@@ -313,6 +313,9 @@ pub struct PlanningSection {
     pub roll_samples: u32,
     /// Largest step of any point of the arm between two collision checks of a motion, mm.
     pub sample_spacing_mm: f64,
+    /// Distance between the least clearance found along a motion and its proven lower bound that
+    /// is aimed at, mm.
+    pub certificate_tolerance_mm: f64,
 }
 
 impl Default for PlanningSection {
@@ -326,6 +329,7 @@ impl Default for PlanningSection {
             simulate_rejected: false,
             roll_samples: 36,
             sample_spacing_mm: 5.0,
+            certificate_tolerance_mm: 0.1,
         }
     }
 }

@@ -216,7 +216,8 @@ pub struct ConfigurationReport {
     pub engines: BTreeMap<String, EngineReport>,
     /// Difference of the engines; none unless both ran.
     pub engine_difference: Option<EngineDifference>,
-    /// Clearances over the motion, of the final posture where nothing was simulated.
+    /// Clearances over the motions of all engines; over the planned motion where nothing was
+    /// simulated, and of the final posture where there is no motion.
     pub clearance: ClearanceReport,
     /// Files written for it, relative to the results folder.
     pub files: Vec<String>,
@@ -240,7 +241,7 @@ pub struct EngineReport {
 pub struct ClassClearance {
     /// Signed distance: positive apart, negative the penetration depth.
     pub minimum_m: f64,
-    /// Proven lower bound over the whole motion; none: the minimum is over samples.
+    /// Proven lower bound over the whole motion; none where there is no motion.
     pub certified_lower_bound_m: Option<f64>,
     /// The two solids.
     pub pair: [String; 2],
@@ -262,6 +263,8 @@ pub struct ClearanceReport {
     pub classes: BTreeMap<&'static str, ClassClearance>,
     /// Least over the classes of physical bodies, the guide's intended stand-off left out.
     pub minimum_m: Option<f64>,
+    /// Least proven lower bound over the same classes; none unless all of them have one.
+    pub minimum_certified_m: Option<f64>,
 }
 
 impl ClearanceReport {
@@ -270,14 +273,25 @@ impl ClearanceReport {
         let mut made = Self {
             classes,
             minimum_m: None,
+            minimum_certified_m: None,
         };
         made.minimum_m = made.least().map(|found| found.minimum_m);
+        made.minimum_certified_m = made
+            .physical()
+            .map(|found| found.certified_lower_bound_m)
+            .reduce(|least, next| Some(least?.min(next?)))
+            .flatten();
         made
     }
 
     /// The least clearance of physical bodies from each other, the guide's intended stand-off left
     /// out.
     pub fn least(&self) -> Option<&ClassClearance> {
+        self.physical()
+            .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
+    }
+
+    fn physical(&self) -> impl Iterator<Item = &ClassClearance> {
         self.classes
             .iter()
             .filter(|(class, _)| {
@@ -287,7 +301,6 @@ impl ClearanceReport {
                 )
             })
             .map(|(_, found)| found)
-            .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
     }
 }
 

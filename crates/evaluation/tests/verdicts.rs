@@ -47,6 +47,7 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
         clearance: ClearanceReport {
             classes: BTreeMap::from([("robot_phantom", found)]),
             minimum_m: Some(clearance_m),
+            minimum_certified_m: None,
         },
         files: Vec::new(),
     }

@@ -3,14 +3,16 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Cell, Goal, ResolvedScenario};
+use needlebench_cell::{Goal, ResolvedScenario};
+use needlebench_clearance::ClearanceModel;
 use needlebench_engine::EngineIdentity;
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
     MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary, Status,
 };
 use needlebench_evaluation::{
-    engine_difference, judge, measure_motion, measure_needle, needle_route, posture_clearance,
+    engine_difference, judge, measure_motion, measure_needle, needle_route, planned_clearance,
+    posture_clearance,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
@@ -25,6 +27,7 @@ use crate::provenance::provenance;
 pub(crate) fn assemble(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
+    model: &ClearanceModel,
     plans: &[GoalPlan],
     runs: &[Vec<Vec<EngineRun>>],
     engines: &[EngineName],
@@ -37,7 +40,7 @@ pub(crate) fn assemble(
         .iter()
         .zip(plans)
         .zip(runs)
-        .map(|((goal, plan), runs)| goal_report(resolved, planner, goal, plan, runs))
+        .map(|((goal, plan), runs)| goal_report(resolved, planner, model, goal, plan, runs))
         .collect();
     let both = engines.len() == 2 && engine_failures.is_empty();
     let (verdict, criteria) = judge(
@@ -66,6 +69,7 @@ pub(crate) fn assemble(
 fn goal_report(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
+    model: &ClearanceModel,
     goal: &Goal,
     plan: &GoalPlan,
     runs: &[Vec<EngineRun>],
@@ -87,7 +91,7 @@ fn goal_report(
             .iter()
             .zip(runs)
             .map(|(plan, runs)| {
-                configuration_report(resolved, planner, goal, plan, runs, route.as_ref())
+                configuration_report(resolved, planner, model, goal, plan, runs, route.as_ref())
             })
             .collect(),
         recommended: None,
@@ -97,6 +101,7 @@ fn goal_report(
 fn configuration_report(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
+    model: &ClearanceModel,
     goal: &Goal,
     plan: &ConfigurationPlan,
     runs: &[EngineRun],
@@ -111,7 +116,7 @@ fn configuration_report(
             (run.engine.name().to_owned(), report)
         })
         .collect();
-    let mut clearance = overall_clearance(cell, plan, &engines);
+    let mut clearance = overall_clearance(resolved, model, plan, &engines);
     if let Some(route) = route {
         clearance.classes.insert("needle_route", route.clone());
     }
@@ -205,15 +210,23 @@ fn engine_report(
     }
 }
 
-/// Least clearances over all engines; of the final posture where nothing was simulated.
+/// Least clearances over all engines; over the planned motion where nothing was simulated, and of
+/// the final posture where there is no motion.
 fn overall_clearance(
-    cell: &Cell,
+    resolved: &ResolvedScenario,
+    model: &ClearanceModel,
     plan: &ConfigurationPlan,
     engines: &BTreeMap<String, EngineReport>,
 ) -> ClearanceReport {
+    let cell = &resolved.cell;
     let mut classes: BTreeMap<&'static str, ClassClearance> = BTreeMap::new();
-    if let (true, Some(candidate)) = (engines.is_empty(), &plan.candidate) {
-        let minima = posture_clearance(cell, &candidate.clearance);
+    if engines.is_empty() {
+        let tolerance_m = resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
+        let minima = match (&plan.trajectory, &plan.candidate) {
+            (Some(trajectory), _) => planned_clearance(cell, model, trajectory, tolerance_m),
+            (None, Some(candidate)) => posture_clearance(cell, &candidate.clearance),
+            (None, None) => BTreeMap::new(),
+        };
         classes.extend(
             minima
                 .into_iter()
@@ -222,12 +235,19 @@ fn overall_clearance(
     }
     for report in engines.values() {
         for (class, found) in &report.clearance.classes {
-            let nearer = classes
-                .get(class)
-                .is_none_or(|known| found.minimum_m < known.minimum_m);
-            if nearer {
+            let Some(known) = classes.get_mut(class) else {
                 classes.insert(class, found.clone());
+                continue;
+            };
+            // The bound over all engines, whichever comes nearest.
+            let bound_m = known
+                .certified_lower_bound_m
+                .zip(found.certified_lower_bound_m)
+                .map(|(one, other)| one.min(other));
+            if found.minimum_m < known.minimum_m {
+                *known = found.clone();
             }
+            known.certified_lower_bound_m = bound_m;
         }
     }
     ClearanceReport::new(classes)
