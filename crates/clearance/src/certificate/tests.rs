@@ -215,7 +215,7 @@ fn lengths_that_are_too_short_are_refuted() {
         tolerance_m: 0.02,
         ..CertificateOptions::default()
     };
-    let swings = swings(&resolved, 150);
+    let swings = swings(&resolved, 40);
     let worst_m = |length_scale: f64| {
         swings
             .iter()
