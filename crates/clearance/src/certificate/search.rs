@@ -32,7 +32,7 @@ struct Couple<'m> {
     swapped: bool,
 }
 
-impl<'m> Couple<'m> {
+impl Couple<'_> {
     /// First joint that moves the outer solid relative to the inner one.
     fn first_joint(&self) -> usize {
         self.inner_link.map_or(0, |link| link + 1)
@@ -247,7 +247,7 @@ impl<M: Motion> Search<'_, M> {
         let links = self.model.world_from_links(&position);
         let links = links.each_ref().map(Placement::new);
         self.postures
-            .push(Posture::new(&self.model.chain, time_s, position, links));
+            .push(Posture::new(&self.model.chain, time_s, position, &links));
         self.postures.len() - 1
     }
 

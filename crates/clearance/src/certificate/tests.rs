@@ -162,11 +162,8 @@ fn executed_motions_are_certified_with_their_tracking_errors() {
     let options = CertificateOptions::default();
     let mut random = SplitMix64::new(8);
     for trajectory in &motions(&resolved, &[])[..4] {
-        let steps = (trajectory.duration_s() / 1e-3).ceil();
-        let time_s: Vec<f64> = (0..)
-            .map(f64::from)
-            .take_while(|&k: &f64| k <= steps)
-            .map(|k| k * 1e-3)
+        let time_s: Vec<f64> = std::iter::successors(Some(0.0), |time_s| Some(time_s + 1e-3))
+            .take_while(|time_s| *time_s < trajectory.duration_s() + 1e-3)
             .collect();
         // An oscillation of 5 mrad and a jitter of 0.02 mrad, far beyond what the engines show.
         let position = time_s
