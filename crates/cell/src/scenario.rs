@@ -395,6 +395,9 @@ pub struct PlanningSection {
     /// motion is blocked; 0 for straight motions only. A count, not a time: results are the same on
     /// every machine. A posture takes about 10 us.
     pub motion_checks: u32,
+    /// Distance between the least clearance found along a motion and its proven lower bound that
+    /// is aimed at, mm.
+    pub certificate_tolerance_mm: f64,
 }
 
 impl Default for PlanningSection {
@@ -410,6 +413,7 @@ impl Default for PlanningSection {
             roll_aim: RollAim::default(),
             sample_spacing_mm: 5.0,
             motion_checks: 60_000,
+            certificate_tolerance_mm: 0.1,
         }
     }
 }

@@ -174,6 +174,13 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
         "mm",
     );
     range(
+        "planning.certificate_tolerance_mm",
+        planning.certificate_tolerance_mm,
+        0.001,
+        100.0,
+        "mm",
+    );
+    range(
         "planning.roll_samples",
         f64::from(planning.roll_samples),
         1.0,

@@ -54,7 +54,7 @@ fn main() {
     println!("table3: every class to 0.1 mm, fastest of {RUNS} runs");
     println!(
         "{:10} {:>2} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11}",
-        "phase", "", "bound", "ms", "postures", "intervals", "distances", "planes", "least width"
+        "phase", "", "bound", "ms", "postures", "intervals", "distances", "planes", "widest"
     );
     for phase in [Phase::Approach, Phase::Transfer] {
         for (k, motion) in motions.iter().enumerate() {

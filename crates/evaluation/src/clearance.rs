@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use needlebench_cell::phantom::Tissue;
 use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom};
-use needlebench_clearance::{ClassMinima, ClearanceModel, Separation, segment_clearance};
+use needlebench_clearance::{
+    CertificateOptions, ClassMinima, ClearanceModel, Motion, ROUNDING_M, RecordedMotion,
+    Separation, certify, segment_clearance,
+};
 use needlebench_engine::Recording;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 
@@ -66,6 +69,80 @@ pub fn measure_clearance(
         }
     }
     series
+}
+
+/// Adds to a recording's least clearances their proven lower bounds, and replaces those that are
+/// undercut between the samples.
+///
+/// What is certified is the recorded course itself, every step of it, linear in between: tracking
+/// errors are part of it, and need no allowance of their own.
+pub fn certify_recording(
+    series: &mut ClearanceSeries,
+    cell: &Cell,
+    model: &ClearanceModel,
+    trajectory: &JointTrajectory,
+    recording: &Recording,
+    tolerance_m: f64,
+) {
+    let position = recording.state.iter().map(|state| state.position);
+    let motion = RecordedMotion::new(recording.time_s.clone(), position.collect(), trajectory);
+    let engine = Some(recording.engine.name.as_str());
+    certify_minima(
+        &mut series.minima,
+        cell,
+        model,
+        &motion,
+        tolerance_m,
+        engine,
+    );
+}
+
+/// Least clearances of a planned motion with their proven lower bounds.
+pub fn planned_clearance(
+    cell: &Cell,
+    model: &ClearanceModel,
+    trajectory: &JointTrajectory,
+    tolerance_m: f64,
+) -> BTreeMap<ClearanceClass, ClassClearance> {
+    let mut minima = BTreeMap::new();
+    certify_minima(&mut minima, cell, model, trajectory, tolerance_m, None);
+    minima
+}
+
+fn certify_minima(
+    minima: &mut BTreeMap<ClearanceClass, ClassClearance>,
+    cell: &Cell,
+    model: &ClearanceModel,
+    motion: &impl Motion,
+    tolerance_m: f64,
+    engine: Option<&str>,
+) {
+    let options = CertificateOptions {
+        tolerance_m,
+        ..CertificateOptions::default()
+    };
+    for (class, found) in certify(model, motion, &options).iter() {
+        let attained = &found.attained;
+        let nearer = minima
+            .get(&class)
+            .is_none_or(|known| attained.separation.distance_m < known.minimum_m);
+        if nearer {
+            let least = class_clearance(
+                attained.solid_names(cell),
+                &attained.separation,
+                found.phase.name(),
+                Some(found.time_s),
+                engine,
+            );
+            minima.insert(class, least);
+        }
+        if let Some(least) = minima.get_mut(&class)
+            && found.lower_bound_m.is_finite()
+        {
+            // The bound holds for samples too; only rounding could say otherwise.
+            least.certified_lower_bound_m = Some(found.lower_bound_m.min(least.minimum_m));
+        }
+    }
 }
 
 /// Indices of the states that are written and checked: every `period_s`, and the last one.
@@ -147,12 +224,11 @@ pub fn needle_route(cell: &Cell, placed: &PlacedPhantom, goal: &Goal) -> Option<
     .zip(&parts)
     .min_by(|(a, _), (b, _)| a.distance_m.total_cmp(&b.distance_m))
     .map(|(separation, solid)| {
-        class_clearance(
-            ("needle", &solid.name),
-            &separation,
-            "insertion",
-            None,
-            None,
-        )
+        let pair = ("needle", solid.name.as_str());
+        ClassClearance {
+            // One exact distance that is never optimistic, but for rounding.
+            certified_lower_bound_m: Some(separation.distance_m - ROUNDING_M),
+            ..class_clearance(pair, &separation, "insertion", None, None)
+        }
     })
 }

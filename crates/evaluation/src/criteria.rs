@@ -48,7 +48,8 @@ const MM: f64 = 1e-3;
 
 /// Checks a configuration that works against all criteria.
 ///
-/// Values of the engines are checked for each engine that ran, clearances over all of them.
+/// Values of the engines are checked for each engine that ran, clearances over all of them and by
+/// their proven lower bounds.
 pub fn check_configuration(
     goal: &str,
     configuration: &ConfigurationReport,
@@ -224,7 +225,8 @@ pub fn check_configuration(
                 at_least: true,
             }),
             None,
-            Some(found.minimum_m),
+            // What was merely sampled is no proof.
+            Some(found.certified_lower_bound_m.unwrap_or(found.minimum_m)),
             format!(
                 "{} and {} in the {}",
                 found.pair[0], found.pair[1], found.phase

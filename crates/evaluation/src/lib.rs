@@ -21,7 +21,8 @@ mod stored;
 mod threshold;
 
 pub use clearance::{
-    ClearanceSeries, measure_clearance, needle_route, posture_clearance, sample_indices,
+    ClearanceSeries, certify_recording, measure_clearance, needle_route, planned_clearance,
+    posture_clearance, sample_indices,
 };
 pub use criteria::{Criterion, check_configuration};
 pub use judge::judge;

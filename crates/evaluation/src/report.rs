@@ -185,12 +185,25 @@ pub struct MarginsReport {
 /// One phase of the planned motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PhaseReport {
-    /// `transfer`, `approach` or `hold`.
+    /// `transfer`, `approach` or `hold`; `retract` or `return` on the way back.
     pub phase: &'static str,
     /// Its start.
     pub start_s: f64,
     /// Its end.
     pub end_s: f64,
+}
+
+/// Search for a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct SearchReport {
+    /// Corners of the way that was found, ends included; 0 if none was.
+    pub waypoints: usize,
+    /// Postures that were looked at.
+    pub postures_checked: u64,
+    /// Random postures that were drawn.
+    pub postures_drawn: u64,
+    /// Seed of the random postures.
+    pub seed: u64,
 }
 
 /// One configuration of a goal.
@@ -218,13 +231,19 @@ pub struct ConfigurationReport {
     pub margins: Option<MarginsReport>,
     /// Planned motion.
     pub motion: Vec<PhaseReport>,
+    /// The way back out: straight back along the needle axis, then to the start posture. Empty
+    /// unless the configuration works. Planned and free, not simulated.
+    pub retreat: Vec<PhaseReport>,
+    /// Search for a way around what blocks the straight transfer; none where it was not needed.
+    pub search: Option<SearchReport>,
     /// Needle metrics of the commanded posture, by our forward kinematics.
     pub commanded: Option<NeedleMeasurement>,
     /// Measurements per engine: `rapier`, `mujoco`.
     pub engines: BTreeMap<String, EngineReport>,
     /// Difference of the engines; none unless both ran.
     pub engine_difference: Option<EngineDifference>,
-    /// Clearances over the motion, of the final posture where nothing was simulated.
+    /// Clearances over the motions of all engines; over the planned motion where nothing was
+    /// simulated, and of the final posture where there is no motion.
     pub clearance: ClearanceReport,
     /// Room that it leaves to the people around it.
     pub room: Option<RoomReport>,
@@ -259,7 +278,7 @@ pub struct EngineReport {
 pub struct ClassClearance {
     /// Signed distance: positive apart, negative the penetration depth.
     pub minimum_m: f64,
-    /// Proven lower bound over the whole motion; none: the minimum is over samples.
+    /// Proven lower bound over the whole motion; none where there is no motion.
     pub certified_lower_bound_m: Option<f64>,
     /// The two solids.
     pub pair: [String; 2],
@@ -281,6 +300,8 @@ pub struct ClearanceReport {
     pub classes: BTreeMap<&'static str, ClassClearance>,
     /// Least over the classes of physical bodies, the guide's intended stand-off left out.
     pub minimum_m: Option<f64>,
+    /// Least proven lower bound over the same classes; none unless all of them have one.
+    pub minimum_certified_m: Option<f64>,
 }
 
 impl ClearanceReport {
@@ -289,14 +310,25 @@ impl ClearanceReport {
         let mut made = Self {
             classes,
             minimum_m: None,
+            minimum_certified_m: None,
         };
         made.minimum_m = made.least().map(|found| found.minimum_m);
+        made.minimum_certified_m = made
+            .physical()
+            .map(|found| found.certified_lower_bound_m)
+            .reduce(|least, next| Some(least?.min(next?)))
+            .flatten();
         made
     }
 
     /// The least clearance of physical bodies from each other, the guide's intended stand-off left
     /// out.
     pub fn least(&self) -> Option<&ClassClearance> {
+        self.physical()
+            .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
+    }
+
+    fn physical(&self) -> impl Iterator<Item = &ClassClearance> {
         self.classes
             .iter()
             .filter(|(class, _)| {
@@ -306,7 +338,6 @@ impl ClearanceReport {
                 )
             })
             .map(|(_, found)| found)
-            .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
     }
 }
 

@@ -3,23 +3,33 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Cell, Goal, ResolvedScenario, enclosures};
+use needlebench_cell::{Goal, ResolvedScenario, enclosures};
+use needlebench_clearance::ClearanceModel;
 use needlebench_engine::EngineIdentity;
 use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
-    MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary, Status,
+    MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary,
+    SearchReport, Status,
 };
 use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
-    engine_difference, judge, measure_motion, measure_needle, needle_route, posture_clearance,
-    tip_sensitivity,
+    engine_difference, judge, measure_motion, measure_needle, needle_route, planned_clearance,
+    posture_clearance, tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 
 use crate::pipeline::EngineRun;
 use crate::provenance::provenance;
+
+/// What all parts of a report are made with.
+struct Context<'a> {
+    resolved: &'a ResolvedScenario,
+    planner: &'a Planner<'a>,
+    model: &'a ClearanceModel,
+    room: RoomModel<'a>,
+}
 
 #[expect(
     clippy::too_many_arguments,
@@ -28,6 +38,7 @@ use crate::provenance::provenance;
 pub(crate) fn assemble(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
+    model: &ClearanceModel,
     plans: &[GoalPlan],
     runs: &[Vec<Vec<EngineRun>>],
     engines: &[EngineName],
@@ -35,12 +46,17 @@ pub(crate) fn assemble(
     identities: Vec<EngineIdentity>,
     timings: BTreeMap<String, f64>,
 ) -> Report {
-    let room = RoomModel::new(resolved);
+    let context = Context {
+        resolved,
+        planner,
+        model,
+        room: RoomModel::new(resolved),
+    };
     let mut goals: Vec<GoalReport> = plans
         .iter()
         .zip(runs)
         .enumerate()
-        .map(|(index, (plan, runs))| goal_report(resolved, planner, &room, index, plan, runs))
+        .map(|(index, (plan, runs))| goal_report(&context, index, plan, runs))
         .collect();
     let both = engines.len() == 2 && engine_failures.is_empty();
     let (verdict, criteria) = judge(
@@ -71,13 +87,12 @@ pub(crate) fn assemble(
 }
 
 fn goal_report(
-    resolved: &ResolvedScenario,
-    planner: &Planner<'_>,
-    room: &RoomModel<'_>,
+    context: &Context<'_>,
     goal_index: usize,
     plan: &GoalPlan,
     runs: &[Vec<EngineRun>],
 ) -> GoalReport {
+    let resolved = context.resolved;
     let goal = &resolved.goals[goal_index];
     let route = resolved
         .phantom
@@ -96,15 +111,7 @@ fn goal_report(
             .iter()
             .zip(runs)
             .map(|(plan, runs)| {
-                configuration_report(
-                    resolved,
-                    planner,
-                    room,
-                    goal_index,
-                    plan,
-                    runs,
-                    route.as_ref(),
-                )
+                configuration_report(context, goal_index, plan, runs, route.as_ref())
             })
             .collect(),
         recommended: None,
@@ -113,14 +120,18 @@ fn goal_report(
 }
 
 fn configuration_report(
-    resolved: &ResolvedScenario,
-    planner: &Planner<'_>,
-    room: &RoomModel<'_>,
+    context: &Context<'_>,
     goal_index: usize,
     plan: &ConfigurationPlan,
     runs: &[EngineRun],
     route: Option<&ClassClearance>,
 ) -> ConfigurationReport {
+    let Context {
+        resolved,
+        planner,
+        model,
+        room,
+    } = context;
     let cell = &resolved.cell;
     let goal = &resolved.goals[goal_index];
     let candidate = plan.candidate.as_ref();
@@ -131,7 +142,7 @@ fn configuration_report(
             (run.engine.name().to_owned(), report)
         })
         .collect();
-    let mut clearance = overall_clearance(cell, plan, &engines);
+    let mut clearance = overall_clearance(resolved, model, plan, &engines);
     if let Some(route) = route {
         clearance.classes.insert("needle_route", route.clone());
     }
@@ -168,16 +179,14 @@ fn configuration_report(
             shoulder_m: each.margins.shoulder_m,
             manipulability_m3: each.margins.manipulability,
         }),
-        motion: plan
-            .trajectory
-            .iter()
-            .flat_map(JointTrajectory::phases)
-            .map(|(phase, start_s, end_s)| PhaseReport {
-                phase: phase.name(),
-                start_s,
-                end_s,
-            })
-            .collect(),
+        motion: phases(plan.trajectory.as_ref()),
+        retreat: phases(plan.retreat.as_ref()),
+        search: plan.search.map(|effort| SearchReport {
+            waypoints: effort.waypoints,
+            postures_checked: effort.checks,
+            postures_drawn: effort.samples,
+            seed: effort.seed,
+        }),
         commanded: candidate.map(|each| {
             let base_link_from_flange = planner.kinematics().base_link_from_flange(&each.joints);
             let world_from_flange = cell.robot.world_from_base_link * base_link_from_flange;
@@ -193,6 +202,18 @@ fn configuration_report(
         room: candidate.map(|each| room.measure(goal_index, &each.joints)),
         files: Vec::new(),
     }
+}
+
+fn phases(trajectory: Option<&JointTrajectory>) -> Vec<PhaseReport> {
+    trajectory
+        .into_iter()
+        .flat_map(JointTrajectory::phases)
+        .map(|(phase, start_s, end_s)| PhaseReport {
+            phase: phase.name(),
+            start_s,
+            end_s,
+        })
+        .collect()
 }
 
 fn engine_report(
@@ -230,15 +251,23 @@ fn engine_report(
     }
 }
 
-/// Least clearances over all engines; of the final posture where nothing was simulated.
+/// Least clearances over all engines; over the planned motion where nothing was simulated, and of
+/// the final posture where there is no motion.
 fn overall_clearance(
-    cell: &Cell,
+    resolved: &ResolvedScenario,
+    model: &ClearanceModel,
     plan: &ConfigurationPlan,
     engines: &BTreeMap<String, EngineReport>,
 ) -> ClearanceReport {
+    let cell = &resolved.cell;
     let mut classes: BTreeMap<&'static str, ClassClearance> = BTreeMap::new();
-    if let (true, Some(candidate)) = (engines.is_empty(), &plan.candidate) {
-        let minima = posture_clearance(cell, &candidate.clearance);
+    if engines.is_empty() {
+        let tolerance_m = resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
+        let minima = match (&plan.trajectory, &plan.candidate) {
+            (Some(trajectory), _) => planned_clearance(cell, model, trajectory, tolerance_m),
+            (None, Some(candidate)) => posture_clearance(cell, &candidate.clearance),
+            (None, None) => BTreeMap::new(),
+        };
         classes.extend(
             minima
                 .into_iter()
@@ -247,12 +276,19 @@ fn overall_clearance(
     }
     for report in engines.values() {
         for (class, found) in &report.clearance.classes {
-            let nearer = classes
-                .get(class)
-                .is_none_or(|known| found.minimum_m < known.minimum_m);
-            if nearer {
+            let Some(known) = classes.get_mut(class) else {
                 classes.insert(class, found.clone());
+                continue;
+            };
+            // The bound over all engines, whichever comes nearest.
+            let bound_m = known
+                .certified_lower_bound_m
+                .zip(found.certified_lower_bound_m)
+                .map(|(one, other)| one.min(other));
+            if found.minimum_m < known.minimum_m {
+                *known = found.clone();
             }
+            known.certified_lower_bound_m = bound_m;
         }
     }
     ClearanceReport::new(classes)

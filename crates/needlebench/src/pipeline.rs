@@ -14,7 +14,7 @@ use needlebench_engine::{
     RapierSettings, Recording, Servo, ServoGains, simulate,
 };
 use needlebench_evaluation::report::{EngineFailure, Report};
-use needlebench_evaluation::{ClearanceSeries, measure_clearance};
+use needlebench_evaluation::{ClearanceSeries, certify_recording, measure_clearance};
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
 
@@ -182,7 +182,7 @@ pub(crate) fn run(
         .collect();
     let interrupted = cancel.load(Ordering::Relaxed);
     let mut report = assemble(
-        resolved, &planner, &plans, &runs, &engines, failures, identities, timings,
+        resolved, &planner, &model, &plans, &runs, &engines, failures, identities, timings,
     );
     if interrupted {
         report.notes.push(
@@ -369,7 +369,17 @@ impl Simulation<'_> {
                 }
             };
             let period_s = self.resolved.scenario.recording.period_ms * 1e-3;
-            let clearance = measure_clearance(cell, self.model, trajectory, &recording, period_s);
+            let mut clearance =
+                measure_clearance(cell, self.model, trajectory, &recording, period_s);
+            let tolerance_m = self.resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
+            certify_recording(
+                &mut clearance,
+                cell,
+                self.model,
+                trajectory,
+                &recording,
+                tolerance_m,
+            );
             outcome.runs.push((
                 job,
                 EngineRun {

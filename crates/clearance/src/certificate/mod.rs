@@ -80,6 +80,9 @@
 //! no longer helps (intervals of [`LEAST_INTERVAL_S`], [`MOST_INTERVALS`]) a bound is counted as it
 //! is: the certificate stays true and its width shows.
 //!
+//! On the cell of Table 3, to 0.1 mm, all classes: 0.6 to 0.9 ms for an approach of 60 mm (9 to 11
+//! postures, 100 to 270 distances) and 1.2 to 4.2 ms for a transfer; `benches/certificate.rs`.
+//!
 //! # Rounding
 //!
 //! Every bound is lowered by [`ROUNDING_M`], 1 nm. In cells of metres and positions of less than
@@ -134,7 +137,7 @@ impl Default for CertificateOptions {
 pub enum MotionBound {
     /// By separating planes and curvature where both solids are convex: of second order.
     Planes,
-    /// By the Lipschitz lemma alone: of first order, and so many times the work.
+    /// By the Lipschitz lemma alone: of first order, so that intervals near a minimum are many more.
     Lipschitz,
 }
 

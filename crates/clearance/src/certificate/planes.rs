@@ -136,9 +136,10 @@ mod tests {
             assert!(found <= grid + ROUNDING, "{found} {grid}");
             // Slopes are below 2 + K / 2, and the grid has steps of 1e-3.
             assert!(found >= grid - 1e-3 * (2.0 + 0.5 * curvature_m));
-            crossings += usize::from(
-                found > one.least_m(curvature_m) + 1e-6 && found > two.least_m(curvature_m) + 1e-6,
-            );
+            crossings += usize::from([one, two].iter().all(|gaps| {
+                let least_m = gaps.at(gaps.least_at(curvature_m), curvature_m);
+                found > least_m + 1e-6
+            }));
         }
         assert!(crossings > 200, "{crossings}");
     }

@@ -32,7 +32,7 @@ struct Couple<'m> {
     swapped: bool,
 }
 
-impl<'m> Couple<'m> {
+impl Couple<'_> {
     /// First joint that moves the outer solid relative to the inner one.
     fn first_joint(&self) -> usize {
         self.inner_link.map_or(0, |link| link + 1)
@@ -208,18 +208,7 @@ impl<M: Motion> Search<'_, M> {
             .filter(|&couple| counts(self.couples[couple].class, span.phase))
             .map(|couple| Open {
                 couple,
-                known: if self.uses_planes(&self.couples[couple]) {
-                    Known::Capsules
-                } else {
-                    let gap_m = |posture: usize| {
-                        let couple = &self.couples[couple];
-                        couple.capsules_m(&couple.inner_from_outer(&self.postures[posture]))
-                    };
-                    Known::Ends(Gaps {
-                        left_m: gap_m(left),
-                        right_m: gap_m(right),
-                    })
-                },
+                known: self.known_at_ends(couple, left, right),
             })
             .collect();
         Interval {
@@ -228,6 +217,24 @@ impl<M: Motion> Search<'_, M> {
             phase: span.phase,
             open,
         }
+    }
+
+    fn known_at_ends(&self, couple: usize, left: usize, right: usize) -> Known {
+        let couple = &self.couples[couple];
+        if self.uses_planes(couple) {
+            return Known::Capsules;
+        }
+        let [left_m, right_m] = [left, right].map(|posture| {
+            let placement = couple.inner_from_outer(&self.postures[posture]);
+            let capsules_m = couple.capsules_m(&placement);
+            // A bound that is beyond what is attained will do however short the interval.
+            if capsules_m >= self.attained_m(couple.class) {
+                capsules_m
+            } else {
+                couple.separation(&placement).distance_m
+            }
+        });
+        Known::Ends(Gaps { left_m, right_m })
     }
 
     fn uses_planes(&self, couple: &Couple<'_>) -> bool {
@@ -240,7 +247,7 @@ impl<M: Motion> Search<'_, M> {
         let links = self.model.world_from_links(&position);
         let links = links.each_ref().map(Placement::new);
         self.postures
-            .push(Posture::new(&self.model.chain, time_s, position, links));
+            .push(Posture::new(&self.model.chain, time_s, position, &links));
         self.postures.len() - 1
     }
 

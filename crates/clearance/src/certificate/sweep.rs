@@ -18,12 +18,12 @@ pub(super) struct Posture {
 }
 
 impl Posture {
-    pub fn new(chain: &Chain, time_s: f64, position: Joints, links: LinkPlacements) -> Self {
+    pub fn new(chain: &Chain, time_s: f64, position: Joints, links: &LinkPlacements) -> Self {
         let axes = std::array::from_fn(|k| links[k].rotation * chain.joints[k].axis.into_inner());
         Self {
             time_s,
             position,
-            links,
+            links: *links,
             axes,
         }
     }
@@ -109,6 +109,7 @@ pub(super) struct Sweep<'p> {
 
 /// Bounds for the points of one solid relative to an inner body.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "the unit belongs to the name")]
 pub(super) struct PointBounds {
     /// Second derivative by the chord's fraction, m.
     pub curvature_m: f64,

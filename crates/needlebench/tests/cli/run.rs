@@ -140,7 +140,11 @@ fn clearances_name_pair_points_phase_and_time() {
         }
         // This cell has no gantry.
         assert!(!clearance.contains_key("robot_gantry"));
-        for (_, found) in clearance.iter().filter(|(key, _)| *key != "minimum_m") {
+        for (_, found) in clearance.iter().filter(|(_, found)| found.is_object()) {
+            // Sampled or attained, nothing is below what is proven.
+            if let Some(proven_m) = found["certified_lower_bound_m"].as_f64() {
+                assert!(proven_m <= found["minimum_m"].as_f64().unwrap());
+            }
             has_keys(
                 found,
                 &[
