@@ -63,16 +63,9 @@ pub(super) fn robust_hull(points: &[Point3<f64>], tolerance_m: f64) -> Result<Co
 }
 
 fn hull_within(points: &[Point3<f64>], tolerance_m: f64) -> Result<ConvexMesh, String> {
-    /// Points that were inside for the faces at hand may be in front of others; hardly ever twice.
-    const ROUNDS: usize = 4;
     let mut hull = Hull::around(points)?;
     hull.tolerance_m = hull.tolerance_m.max(tolerance_m);
-    for _ in 0..ROUNDS {
-        hull.grow()?;
-        if hull.is_complete() {
-            break;
-        }
-    }
+    hull.grow()?;
     hull.finish()
 }
 
@@ -161,6 +154,8 @@ impl<'a> Hull<'a> {
         let all = 0..self.faces.len();
         self.assign(0..self.points.len(), all);
         let mut at = 0;
+        // Rounding must not make it go round in circles: no point is added twice.
+        let mut added = vec![false; self.points.len()];
         while at < self.faces.len() {
             let face = &self.faces[at];
             let farthest = face.outside.iter().copied().max_by(|&i, &j| {
@@ -168,7 +163,11 @@ impl<'a> Hull<'a> {
                 order.then(j.cmp(&i))
             });
             match farthest {
+                Some(point) if added[point] => {
+                    return Err("rounding broke its convex hull".to_owned());
+                }
                 Some(point) => {
+                    added[point] = true;
                     self.add(point)?;
                     at = 0;
                 }
@@ -217,14 +216,6 @@ impl<'a> Hull<'a> {
             first_new..self.faces.len(),
         );
         Ok(())
-    }
-
-    fn is_complete(&self) -> bool {
-        let mut points = 0..self.points.len();
-        points.all(|point| {
-            let mut faces = self.faces.iter();
-            faces.all(|face| self.height(face, point) <= self.tolerance_m)
-        })
     }
 
     fn finish(self) -> Result<ConvexMesh, String> {
