@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use nalgebra::{Point3, Vector3};
 
-use super::hull::{robust_hull, simplified_hull};
+use super::hull::robust_hull;
 use super::{SurfaceIndex, area_m2, corners, points_on, volume_m3};
 use crate::shape::{ConvexMesh, TriangleMesh};
 
@@ -135,7 +135,7 @@ struct Part {
 impl Part {
     /// None for a part without a volume.
     fn new(triangles: Vec<Triangle>, solid: &SurfaceIndex) -> Option<Self> {
-        let hull = simplified_hull(&distinct(&triangles), LEFT_OUT_M).ok()?;
+        let hull = robust_hull(&distinct(&triangles), LEFT_OUT_M).ok()?;
         let (overhang_m, below) = overhang(&hull, solid, HULL_SAMPLES);
         Some(Self {
             triangles,

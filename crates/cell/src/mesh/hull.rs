@@ -17,23 +17,14 @@ pub fn convex_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> {
     hull_within(points, 0.0)
 }
 
-/// A convex hull that leaves out what is no more than `tolerance_m` outside.
-pub(super) fn simplified_hull(
-    points: &[Point3<f64>],
-    tolerance_m: f64,
-) -> Result<ConvexMesh, String> {
-    let kept = robust_hull(points, tolerance_m)?;
-    // Bent inwards by up to the tolerance where a face was not seen to be visible.
-    robust_hull(&kept.0.vertices_m, 0.0)
-}
-
-/// A hull that rounding does not break, within a tolerance.
+/// A hull that rounding does not break and that leaves out what is no more than about
+/// `left_out_m` outside; it is convex all the same.
 ///
 /// Many points in a plane or on a line, which cuts through a surface leave, make faces without an
 /// area of their own where the tolerance is next to none. If that breaks the hull, the points are
 /// moved by up to 1e-8 of its size (1e-6 if need be), the same way every time.
-pub(super) fn robust_hull(points: &[Point3<f64>], tolerance_m: f64) -> Result<ConvexMesh, String> {
-    let mut hull = hull_within(points, tolerance_m);
+pub(super) fn robust_hull(points: &[Point3<f64>], left_out_m: f64) -> Result<ConvexMesh, String> {
+    let mut hull = hull_within(points, left_out_m);
     let Some(first) = points.first() else {
         return hull;
     };
@@ -57,14 +48,14 @@ pub(super) fn robust_hull(points: &[Point3<f64>], tolerance_m: f64) -> Result<Co
                 point + Vector3::from(way.map(step)) * (share * size)
             })
             .collect();
-        hull = hull_within(&moved, tolerance_m);
+        hull = hull_within(&moved, left_out_m);
     }
     hull
 }
 
-fn hull_within(points: &[Point3<f64>], tolerance_m: f64) -> Result<ConvexMesh, String> {
+fn hull_within(points: &[Point3<f64>], left_out_m: f64) -> Result<ConvexMesh, String> {
     let mut hull = Hull::around(points)?;
-    hull.tolerance_m = hull.tolerance_m.max(tolerance_m);
+    hull.left_out_m = hull.tolerance_m.max(left_out_m);
     hull.grow()?;
     hull.finish()
 }
@@ -80,7 +71,10 @@ struct Face {
 struct Hull<'a> {
     points: &'a [Point3<f64>],
     faces: Vec<Face>,
+    /// From which height over a face a point sees it.
     tolerance_m: f64,
+    /// From which height over a face a point is added.
+    left_out_m: f64,
 }
 
 impl<'a> Hull<'a> {
@@ -115,6 +109,7 @@ impl<'a> Hull<'a> {
             points,
             faces: Vec::new(),
             tolerance_m,
+            left_out_m: tolerance_m,
         };
         for (vertices, opposite) in [
             ([a, b, c], d),
@@ -182,7 +177,7 @@ impl<'a> Hull<'a> {
         for point in points {
             let in_front = faces
                 .clone()
-                .find(|&face| self.height(&self.faces[face], point) > self.tolerance_m);
+                .find(|&face| self.height(&self.faces[face], point) > self.left_out_m);
             if let Some(face) = in_front {
                 self.faces[face].outside.push(point);
             }
@@ -225,7 +220,7 @@ impl<'a> Hull<'a> {
             .flat_map(|face| (0..self.points.len()).map(|i| self.height(face, i)))
             .fold(f64::NEG_INFINITY, f64::max);
         // What is dropped is within the tolerance of a face, but for rounding.
-        if worst > 10.0 * self.tolerance_m {
+        if worst > 10.0 * self.left_out_m {
             return Err(format!("its convex hull misses a point by {worst:.1e} m"));
         }
         let mut kept = BTreeMap::new();
