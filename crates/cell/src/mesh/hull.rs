@@ -17,23 +17,14 @@ pub fn convex_hull(points: &[Point3<f64>]) -> Result<ConvexMesh, String> {
     hull_within(points, 0.0)
 }
 
-/// A convex hull that leaves out what is no more than `tolerance_m` outside.
-pub(super) fn simplified_hull(
-    points: &[Point3<f64>],
-    tolerance_m: f64,
-) -> Result<ConvexMesh, String> {
-    let kept = robust_hull(points, tolerance_m)?;
-    // Bent inwards by up to the tolerance where a face was not seen to be visible.
-    robust_hull(&kept.0.vertices_m, 0.0)
-}
-
-/// A hull that rounding does not break, within a tolerance.
+/// A hull that rounding does not break and that leaves out what is no more than about
+/// `left_out_m` outside; it is convex all the same.
 ///
 /// Many points in a plane or on a line, which cuts through a surface leave, make faces without an
 /// area of their own where the tolerance is next to none. If that breaks the hull, the points are
 /// moved by up to 1e-8 of its size (1e-6 if need be), the same way every time.
-pub(super) fn robust_hull(points: &[Point3<f64>], tolerance_m: f64) -> Result<ConvexMesh, String> {
-    let mut hull = hull_within(points, tolerance_m);
+pub(super) fn robust_hull(points: &[Point3<f64>], left_out_m: f64) -> Result<ConvexMesh, String> {
+    let mut hull = hull_within(points, left_out_m);
     let Some(first) = points.first() else {
         return hull;
     };
@@ -57,22 +48,15 @@ pub(super) fn robust_hull(points: &[Point3<f64>], tolerance_m: f64) -> Result<Co
                 point + Vector3::from(way.map(step)) * (share * size)
             })
             .collect();
-        hull = hull_within(&moved, tolerance_m);
+        hull = hull_within(&moved, left_out_m);
     }
     hull
 }
 
-fn hull_within(points: &[Point3<f64>], tolerance_m: f64) -> Result<ConvexMesh, String> {
-    /// Points that were inside for the faces at hand may be in front of others; hardly ever twice.
-    const ROUNDS: usize = 4;
+fn hull_within(points: &[Point3<f64>], left_out_m: f64) -> Result<ConvexMesh, String> {
     let mut hull = Hull::around(points)?;
-    hull.tolerance_m = hull.tolerance_m.max(tolerance_m);
-    for _ in 0..ROUNDS {
-        hull.grow()?;
-        if hull.is_complete() {
-            break;
-        }
-    }
+    hull.left_out_m = hull.tolerance_m.max(left_out_m);
+    hull.grow()?;
     hull.finish()
 }
 
@@ -87,7 +71,10 @@ struct Face {
 struct Hull<'a> {
     points: &'a [Point3<f64>],
     faces: Vec<Face>,
+    /// From which height over a face a point sees it.
     tolerance_m: f64,
+    /// From which height over a face a point is added.
+    left_out_m: f64,
 }
 
 impl<'a> Hull<'a> {
@@ -122,6 +109,7 @@ impl<'a> Hull<'a> {
             points,
             faces: Vec::new(),
             tolerance_m,
+            left_out_m: tolerance_m,
         };
         for (vertices, opposite) in [
             ([a, b, c], d),
@@ -161,6 +149,8 @@ impl<'a> Hull<'a> {
         let all = 0..self.faces.len();
         self.assign(0..self.points.len(), all);
         let mut at = 0;
+        // Rounding must not make it go round in circles: no point is added twice.
+        let mut added = vec![false; self.points.len()];
         while at < self.faces.len() {
             let face = &self.faces[at];
             let farthest = face.outside.iter().copied().max_by(|&i, &j| {
@@ -168,7 +158,11 @@ impl<'a> Hull<'a> {
                 order.then(j.cmp(&i))
             });
             match farthest {
+                Some(point) if added[point] => {
+                    return Err("rounding broke its convex hull".to_owned());
+                }
                 Some(point) => {
+                    added[point] = true;
                     self.add(point)?;
                     at = 0;
                 }
@@ -183,7 +177,7 @@ impl<'a> Hull<'a> {
         for point in points {
             let in_front = faces
                 .clone()
-                .find(|&face| self.height(&self.faces[face], point) > self.tolerance_m);
+                .find(|&face| self.height(&self.faces[face], point) > self.left_out_m);
             if let Some(face) = in_front {
                 self.faces[face].outside.push(point);
             }
@@ -219,14 +213,6 @@ impl<'a> Hull<'a> {
         Ok(())
     }
 
-    fn is_complete(&self) -> bool {
-        let mut points = 0..self.points.len();
-        points.all(|point| {
-            let mut faces = self.faces.iter();
-            faces.all(|face| self.height(face, point) <= self.tolerance_m)
-        })
-    }
-
     fn finish(self) -> Result<ConvexMesh, String> {
         let worst = self
             .faces
@@ -234,7 +220,7 @@ impl<'a> Hull<'a> {
             .flat_map(|face| (0..self.points.len()).map(|i| self.height(face, i)))
             .fold(f64::NEG_INFINITY, f64::max);
         // What is dropped is within the tolerance of a face, but for rounding.
-        if worst > 10.0 * self.tolerance_m {
+        if worst > 10.0 * self.left_out_m {
             return Err(format!("its convex hull misses a point by {worst:.1e} m"));
         }
         let mut kept = BTreeMap::new();
