@@ -132,8 +132,11 @@ fn assert_bounds(found_rad: f64, truth_rad: f64) {
 
 #[test]
 fn hand_cone_beside_a_ball_touches_it() {
-    for (x, y, z, radius_m) in [(0.1, 0.0, 0.1, 0.03), (-0.02, 0.07, 0.12, 0.02)] {
-        let distance = Vector3::new(x, y, z).norm();
+    for (x, y, z, radius_m) in [
+        (0.1_f64, 0.0_f64, 0.1_f64, 0.03_f64),
+        (-0.02, 0.07, 0.12, 0.02),
+    ] {
+        let distance: f64 = Vector3::new(x, y, z).norm();
         let to_center = Vector3::new(x, y, z).angle(&Vector3::z());
         let truth =
             to_center - f64::atan2(radius_m, (distance * distance - radius_m * radius_m).sqrt());

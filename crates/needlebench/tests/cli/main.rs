@@ -14,6 +14,7 @@ mod help;
 mod interrupt;
 mod kinematics;
 mod paper;
+mod people;
 #[cfg(target_os = "linux")]
 mod process;
 mod run;

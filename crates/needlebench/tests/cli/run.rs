@@ -197,9 +197,15 @@ fn results_folder_holds_what_the_report_lists() {
     let table = answer.exits_with(0).stdout;
     assert!(table.contains("PASS"), "{table}");
     let report = bench.read_json("results/small/report.json");
-    let mut expected: BTreeSet<String> = ["report.json", "junit.xml", "summary.md", "pose.png"]
-        .map(str::to_owned)
-        .into();
+    let mut expected: BTreeSet<String> = [
+        "report.json",
+        "junit.xml",
+        "summary.md",
+        "pose.png",
+        "pose.room.png",
+    ]
+    .map(str::to_owned)
+    .into();
     for configuration in configurations(&report) {
         let label = configuration["label"].as_str().unwrap();
         assert!(table.contains(label), "{table}");
@@ -207,8 +213,8 @@ fn results_folder_holds_what_the_report_lists() {
             expected.insert(file.as_str().unwrap().to_owned());
         }
     }
-    // Eight pictures, six recordings.
-    assert_eq!(expected.len(), 4 + 8 + 6);
+    // Eight pictures of the posture and of the room each, six recordings.
+    assert_eq!(expected.len(), 5 + 16 + 6);
     let found: BTreeSet<String> = bench
         .tree("results/small")
         .iter()
