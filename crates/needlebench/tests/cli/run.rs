@@ -57,6 +57,7 @@ fn report_has_every_promised_key() {
                 "engines",
                 "engine_difference",
                 "clearance",
+                "room",
             ],
         );
         assert_eq!(numbers(&configuration["joints_rad"]).len(), 6);
