@@ -20,7 +20,7 @@ fn refused(people: &str) -> Finding {
 #[test]
 fn person_inside_the_table_is_refused() {
     refused("[[people.persons]]\nposition_mm = [146, -598]")
-        .at("position_mm = [146")
+        .at("position_mm = [146,")
         .key("people.persons[0].position_mm")
         .says("would stand inside the");
     refused("[[people.persons]]\nside = \"left\"\ndistance_mm = 150")
