@@ -97,6 +97,8 @@ fn configuration(index: usize) -> ConfigurationReport {
             end_s,
         })
         .into(),
+        retreat: Vec::new(),
+        search: None,
         commanded: None,
         engines: BTreeMap::from([
             ("mujoco".to_owned(), engine(3e-4)),

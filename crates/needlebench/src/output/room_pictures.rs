@@ -1,10 +1,10 @@
 //! Pictures of what a configuration leaves to people, as the paper's Figure 6: free space shaded,
 //! lines of sight, and the cone for the hand.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use needlebench_cell::ResolvedScenario;
 use needlebench_cell::people::Person;
 use needlebench_cell::shape::{Shape, TriangleMesh};
@@ -20,8 +20,8 @@ use crate::picture::{
 /// Size of one picture, pixels.
 const SIZE_PX: [u32; 2] = [1000, 750];
 /// Translucent green of the free space, and red of what arm and tool take of it.
-const FREE: [f32; 4] = [0.12, 0.65, 0.38, 0.20];
-const TAKEN: [f32; 4] = [0.85, 0.18, 0.12, 0.34];
+const FREE: [f32; 4] = [0.10, 0.68, 0.36, 0.26];
+const TAKEN: [f32; 4] = [0.88, 0.16, 0.10, 0.30];
 /// Translucent blue of the hand's cone.
 const CONE: [f32; 4] = [0.10, 0.30, 0.95, 0.55];
 /// Lines of sight: free, and blocked up to what blocks them.
@@ -32,6 +32,8 @@ const BODY: [f32; 4] = [0.35, 0.42, 0.62, 0.28];
 const HEAD: [f32; 4] = [0.35, 0.42, 0.62, 1.0];
 /// Lines of sight that are drawn per stature, half to the skin and half to the needle.
 const LINES_DRAWN: u32 = 8;
+/// Space over the tallest person's eyes that is in the picture, for the labels, m.
+const HEADROOM_M: f64 = 0.3;
 /// Fineness of curved surfaces, m.
 const CHORD_ERROR_M: f64 = 2e-3;
 
@@ -103,23 +105,24 @@ impl<'a> RoomPictures<'a> {
         Some(render(&scene, &self.camera))
     }
 
-    /// The half ball about the entry point, free and taken.
+    /// The half ball about the entry point, and what the arm takes of it.
     fn add_space(&self, scene: &mut Scene, q: &Joints) {
         let sector = self.room.sector(self.goal);
         let taken = self.room.taken(self.goal, q);
-        for (wanted, color_rgba) in [(false, FREE), (true, TAKEN)] {
-            let set: Vec<bool> = sector
-                .inside
-                .iter()
-                .zip(&taken)
-                .map(|(inside, taken)| *inside && *taken == wanted)
-                .collect();
-            scene.surfaces.push(SurfaceInstance {
-                mesh: Arc::new(voxel_surface(&sector.grid, &set)),
-                world_from_surface: Pose::identity(),
-                color_rgba,
-            });
-        }
+        let in_sector = sector.inside.iter().zip(&taken);
+        let set: Vec<bool> = in_sector.map(|(inside, taken)| *inside && *taken).collect();
+        scene.surfaces.push(SurfaceInstance {
+            mesh: Arc::new(voxel_surface(&sector.grid, &set)),
+            world_from_surface: Pose::identity(),
+            color_rgba: TAKEN,
+        });
+        let outwards = UnitQuaternion::rotation_between(&-Vector3::z(), &sector.outwards)
+            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
+        scene.surfaces.push(SurfaceInstance {
+            mesh: Arc::new(cone(FRAC_PI_2, sector.radius_m)),
+            world_from_surface: Pose::from_parts(sector.center_m.coords.into(), outwards),
+            color_rgba: FREE,
+        });
     }
 
     /// People with their lines of sight; one label for each stature.
@@ -180,7 +183,8 @@ fn camera(resolved: &ResolvedScenario, room: &RoomModel<'_>, goal: usize) -> Cam
         }
     }
     for person in &resolved.people.by_goal[goal] {
-        points.extend(person.statures_m.iter().map(|m| person.eyes_m(*m)));
+        let over = Vector3::z() * HEADROOM_M;
+        points.extend(person.statures_m.iter().map(|m| person.eyes_m(*m) + over));
     }
     Camera::framing(&points, viewpoint(resolved, &resolved.goals[goal]), SIZE_PX)
 }

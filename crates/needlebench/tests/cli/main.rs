@@ -17,6 +17,7 @@ mod interrupt;
 mod kinematics;
 mod pairs;
 mod paper;
+mod people;
 #[cfg(target_os = "linux")]
 mod process;
 mod run;

@@ -57,6 +57,7 @@ fn report_has_every_promised_key() {
                 "engines",
                 "engine_difference",
                 "clearance",
+                "room",
             ],
         );
         assert_eq!(numbers(&configuration["joints_rad"]).len(), 6);
@@ -207,6 +208,7 @@ fn results_folder_holds_what_the_report_lists() {
         "summary.md",
         "pose.png",
         "pose.ranking.png",
+        "pose.room.png",
     ]
     .map(str::to_owned)
     .into();
@@ -217,8 +219,8 @@ fn results_folder_holds_what_the_report_lists() {
             expected.insert(file.as_str().unwrap().to_owned());
         }
     }
-    // Eight pictures, six recordings.
-    assert_eq!(expected.len(), 5 + 8 + 6);
+    // Eight pictures of the posture and of the room each, six recordings.
+    assert_eq!(expected.len(), 6 + 16 + 6);
     let found: BTreeSet<String> = bench
         .tree("results/small")
         .iter()
