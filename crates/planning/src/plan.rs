@@ -191,21 +191,6 @@ impl<'a> Planner<'a> {
         GoalPlan { configurations }
     }
 
-    /// Why a configuration is not among the solutions of a pose.
-    pub(crate) fn absent(&self, configuration: Configuration, found: &Solutions) -> Rejection {
-        match found.unreachable.iter().find(|(c, _)| *c == configuration) {
-            Some((_, reason)) => Rejection {
-                rule: Rule::Unreachable,
-                value: reason.missing_m(),
-                limit: 0.0,
-                unit: "m",
-                detail: unreachable_detail(*reason),
-                class: None,
-            },
-            None => merged(configuration, &found.solutions),
-        }
-    }
-
     fn plan_configuration(
         &self,
         goal: &Goal,
@@ -445,6 +430,21 @@ fn spread_over_rolls<T>(candidates: Vec<(Candidate, T)>) -> Vec<(Candidate, T)> 
     }
     first.extend(rest);
     first
+}
+
+/// Why a configuration is not among the solutions of a pose.
+pub(crate) fn absent(configuration: Configuration, found: &Solutions) -> Rejection {
+    match found.unreachable.iter().find(|(c, _)| *c == configuration) {
+        Some((_, reason)) => Rejection {
+            rule: Rule::Unreachable,
+            value: reason.missing_m(),
+            limit: 0.0,
+            unit: "m",
+            detail: unreachable_detail(*reason),
+            class: None,
+        },
+        None => merged(configuration, &found.solutions),
+    }
 }
 
 fn unreachable_detail(reason: needlebench_kinematics::ik::Unreachable) -> String {

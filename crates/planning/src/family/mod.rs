@@ -23,7 +23,7 @@ use needlebench_kinematics::ik::Configuration;
 pub use aim::Aim;
 pub use ranges::{Best, Edge, Family, RollRange};
 
-use crate::plan::{Candidate, Planner};
+use crate::plan::{Candidate, Planner, absent};
 use crate::{Rejection, Rule};
 
 /// One configuration at one angle of the guide about the needle.
@@ -74,7 +74,7 @@ impl Planner<'_> {
                     rejections,
                 };
             }
-            let rejection = self.absent(configuration, &found);
+            let rejection = absent(configuration, &found);
             Member {
                 roll_rad,
                 candidate: None,
