@@ -35,7 +35,10 @@ fn compare(bench: &Bench, more: &[&str]) -> Answer {
 /// Makes the arm of configuration 0 come this near to the skin.
 fn nearer(report: &mut Value, clearance_m: f64) {
     let configuration = &mut report["goals"][0]["configurations"][0];
-    configuration["clearance"]["robot_phantom"]["minimum_m"] = json!(clearance_m);
+    let found = &mut configuration["clearance"]["robot_phantom"];
+    found["minimum_m"] = json!(clearance_m);
+    // What is compared is the proven bound.
+    found["certified_lower_bound_m"] = json!(clearance_m);
 }
 
 #[test]
