@@ -328,7 +328,6 @@ impl Default for MotionSection {
 pub enum RollAim {
     /// Clearance of the final posture: a soft least over all classes, `-s ln sum exp(-d / s)` with
     /// `s` = 20 mm, so that a class that no roll changes does not decide.
-    #[default]
     Clearance,
     /// Margin to the joint limits.
     JointMargin,
@@ -337,7 +336,9 @@ pub enum RollAim {
     Singularity,
     /// Least motion of the needle's tip under errors of the joints.
     TipAccuracy,
-    /// The weighted mean of the `[ranking]` utilities of all these.
+    /// The weighted mean of the `[ranking]` utilities of all these: what configurations are ranked by,
+    /// as far as the final posture decides it. The default.
+    #[default]
     Balanced,
 }
 

@@ -210,7 +210,19 @@ impl<'a> Planner<'a> {
             .iter()
             .filter(|member| member.candidate.is_some() && (member.works() || !some_work));
         members.extend(of_grid.cloned());
-        let mut candidates: Vec<(Candidate, Vec<Rejection>)> = members
+        // Best first, or nearest to working first; equal ones stay in the order of roll.
+        if some_work {
+            members.sort_by(|a, b| {
+                let value = |member: &Member| {
+                    let candidate = member.candidate.as_ref();
+                    candidate.map_or(f64::NEG_INFINITY, |each| self.value(goal, aim, each))
+                };
+                value(b).total_cmp(&value(a))
+            });
+        } else {
+            members.sort_by(|a, b| b.surplus.total_cmp(&a.surplus));
+        }
+        let candidates: Vec<(Candidate, Vec<Rejection>)> = members
             .into_iter()
             .filter_map(|member| Some((member.candidate?, member.rejections)))
             .collect();
@@ -231,11 +243,6 @@ impl<'a> Planner<'a> {
                 search: None,
             };
         }
-        // Best first; equal ones stay in the order of roll.
-        candidates.sort_by(|(a, _), (b, _)| {
-            self.value(goal, aim, b)
-                .total_cmp(&self.value(goal, aim, a))
-        });
         let mut best: Option<ConfigurationPlan> = None;
         let mut blocked = Vec::new();
         for (candidate, rejections) in spread_over_rolls(candidates).into_iter().take(MOTION_TRIES)
