@@ -23,13 +23,14 @@ const ROUNDINGS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 #[derive(Debug, Clone)]
 enum Transfer {
     Straight,
-    Around(JointPath),
+    /// Paths with a stop between one and the next.
+    Around(Vec<JointPath>),
 }
 
 /// A way around, with the whole turns of its goal.
 struct Around {
     turns: [i32; JOINT_COUNT],
-    path: JointPath,
+    paths: Vec<JointPath>,
     trajectory: JointTrajectory,
 }
 
@@ -99,7 +100,7 @@ impl Planner<'_> {
                 first_failure = None;
                 chosen = Some((
                     around.turns,
-                    Transfer::Around(around.path),
+                    Transfer::Around(around.paths),
                     around.trajectory,
                 ));
             }
@@ -156,7 +157,9 @@ impl Planner<'_> {
         let start = JointTrajectory::starting_at(self.resolved.start);
         let there = match transfer {
             Transfer::Straight => start.then_straight_to(Phase::Transfer, line.start(), motion),
-            Transfer::Around(path) => start.then_through(Phase::Transfer, path.clone(), motion),
+            Transfer::Around(paths) => paths.iter().fold(start, |there, path| {
+                there.then_through(Phase::Transfer, path.clone(), motion)
+            }),
         };
         there
             .then_along(Phase::Approach, line.clone(), motion)
@@ -174,7 +177,9 @@ impl Planner<'_> {
         );
         match transfer {
             Transfer::Straight => out.then_straight_to(Phase::Return, self.resolved.start, motion),
-            Transfer::Around(path) => out.then_through(Phase::Return, path.reversed(), motion),
+            Transfer::Around(paths) => paths.iter().rev().fold(out, |back, path| {
+                back.then_through(Phase::Return, path.reversed(), motion)
+            }),
         }
     }
 
@@ -204,10 +209,11 @@ impl Planner<'_> {
             .and_then(|found| {
                 let waypoints = search.shortened(found.waypoints);
                 let turns = wraps[found.goal];
-                let (path, trajectory) = self.rounded(&waypoints, &line.shifted(&shift(&turns)))?;
+                let (paths, trajectory) =
+                    self.rounded(&waypoints, &line.shifted(&shift(&turns)))?;
                 let around = Around {
                     turns,
-                    path,
+                    paths,
                     trajectory,
                 };
                 Some((around, waypoints.len()))
@@ -226,14 +232,58 @@ impl Planner<'_> {
         &self,
         waypoints: &[Joints],
         line: &JointPath,
-    ) -> Option<(JointPath, JointTrajectory)> {
+    ) -> Option<(Vec<JointPath>, JointTrajectory)> {
         ROUNDINGS.into_iter().find_map(|rounding| {
-            let speed = &self.resolved.motion.velocity;
-            let path = JointPath::through(waypoints, speed, rounding)?;
-            let trajectory = self.motion(&Transfer::Around(path.clone()), line);
+            let paths = self.fastest(waypoints, rounding)?;
+            let trajectory = self.motion(&Transfer::Around(paths.clone()), line);
             let free = self.checker.first_collision(&trajectory).is_none();
-            free.then_some((path, trajectory))
+            free.then_some((paths, trajectory))
         })
+    }
+
+    /// Paths through the waypoints, with stops at those corners where stopping takes less time than
+    /// the whole way would at the speed that the corner allows; one stop after another, the most
+    /// useful first.
+    fn fastest(&self, waypoints: &[Joints], rounding: f64) -> Option<Vec<JointPath>> {
+        let speed = &self.resolved.motion.velocity;
+        let with_stops = |stops: &[usize]| -> Option<(f64, Vec<JointPath>)> {
+            let mut ends = vec![0];
+            ends.extend_from_slice(stops);
+            ends.push(waypoints.len() - 1);
+            let paths: Option<Vec<JointPath>> = ends
+                .windows(2)
+                .map(|pair| JointPath::through(&waypoints[pair[0]..=pair[1]], speed, rounding))
+                .collect();
+            let paths = paths?;
+            let whole =
+                paths
+                    .iter()
+                    .fold(JointTrajectory::starting_at(waypoints[0]), |whole, path| {
+                        whole.then_through(Phase::Transfer, path.clone(), &self.resolved.motion)
+                    });
+            Some((whole.duration_s(), paths))
+        };
+        let mut stops: Vec<usize> = Vec::new();
+        let (mut duration_s, mut paths) = with_stops(&stops)?;
+        loop {
+            let mut better = None;
+            for corner in 1..waypoints.len() - 1 {
+                let Err(place) = stops.binary_search(&corner) else {
+                    continue;
+                };
+                let mut more = stops.clone();
+                more.insert(place, corner);
+                let (takes_s, with_it) = with_stops(&more)?;
+                if takes_s < duration_s {
+                    duration_s = takes_s;
+                    better = Some((more, with_it));
+                }
+            }
+            let Some((more, with_it)) = better else {
+                return Some(paths);
+            };
+            (stops, paths) = (more, with_it);
+        }
     }
 
     fn blocked(&self, violation: &Violation, search: Option<&SearchEffort>) -> Rejection {

@@ -257,18 +257,17 @@ impl JointTrajectory {
         self.end
     }
 
-    /// Phases with their start and end times, s.
+    /// Phases with their start and end times, s; segments in a row that belong to one are one.
     pub fn phases(&self) -> Vec<(Phase, f64, f64)> {
-        self.segments
-            .iter()
-            .map(|segment| {
-                (
-                    segment.phase,
-                    segment.start_s,
-                    segment.start_s + segment.duration_s,
-                )
-            })
-            .collect()
+        let mut phases: Vec<(Phase, f64, f64)> = Vec::new();
+        for segment in &self.segments {
+            let end_s = segment.start_s + segment.duration_s;
+            match phases.last_mut() {
+                Some((phase, _, until_s)) if *phase == segment.phase => *until_s = end_s,
+                _ => phases.push((segment.phase, segment.start_s, end_s)),
+            }
+        }
+        phases
     }
 
     /// Phase at a time; the last one after the end.
