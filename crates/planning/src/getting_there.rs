@@ -120,6 +120,8 @@ impl Planner<'_> {
         };
         candidate.wrap = turns;
         candidate.joints = trajectory.end();
+        // Whole turns change the margin to the joint limits.
+        candidate.margins = self.margins(&candidate.joints);
         // A posture that collides says so already; the motion into it adds nothing.
         let known = rejections
             .iter()

@@ -404,7 +404,7 @@ impl<'a> Planner<'a> {
         (candidate, rejections)
     }
 
-    fn margins(&self, q: &Joints) -> PostureMargins {
+    pub(crate) fn margins(&self, q: &Joints) -> PostureMargins {
         let jacobian = self.kinematics.chain.jacobian(q);
         PostureMargins {
             joint_limit: self.resolved.cell.robot.limits.margin(q),
