@@ -10,7 +10,7 @@ mod plan;
 mod rejection;
 mod transfer;
 
-pub use family::{Aim, Best, Edge, Family, Member, RollRange};
+pub use family::{Aim, Best, EDGE_RAD, Edge, Family, Member, RollRange};
 pub use motion::MotionChecker;
 pub use plan::{Candidate, ConfigurationPlan, GoalPlan, Planner, PostureMargins, SearchEffort};
 pub use rejection::{Rejection, Rule};

@@ -21,7 +21,7 @@ use needlebench_cell::{ClearanceClass, Goal};
 use needlebench_kinematics::ik::Configuration;
 
 pub use aim::Aim;
-pub use ranges::{Best, Edge, Family, RollRange};
+pub use ranges::{Best, EDGE_RAD, Edge, Family, RollRange};
 
 use crate::plan::{Candidate, Planner, absent};
 use crate::{Rejection, Rule};
