@@ -8,6 +8,7 @@ mod grid;
 mod hand_cone;
 mod obstacles;
 mod ray;
+mod ray_tree;
 mod sector;
 mod sight;
 

@@ -8,6 +8,7 @@ use needlebench_kinematics::{Joints, Pose};
 
 use super::grid::VoxelGrid;
 use super::ray::first_hit;
+use super::ray_tree::RayTree;
 
 /// Solids of a cell, ready for distances from points and for lines of sight.
 #[derive(Debug)]
@@ -24,6 +25,8 @@ struct Obstacle<'c> {
     is_robot: bool,
     shape: &'c Shape,
     prepared: PreparedShape,
+    /// Of a mesh.
+    tree: Option<RayTree>,
     body_from_shape: Pose,
     /// Ball around the shape, in its frame.
     ball_center_m: Point3<f64>,
@@ -57,6 +60,10 @@ impl<'c> Obstacles<'c> {
                     is_robot,
                     shape: &solid.shape,
                     prepared,
+                    tree: match &solid.shape {
+                        Shape::Mesh(mesh) => Some(RayTree::new(&mesh.surface)),
+                        _ => None,
+                    },
                     body_from_shape: solid.parent_from_shape,
                     ball_center_m,
                     ball_radius_m,
@@ -180,7 +187,11 @@ impl PlacedObstacles<'_> {
             }
             let from = placed.shape_from_world * from;
             let to = placed.shape_from_world * to;
-            if let Some(t) = first_hit(placed.solid.shape, &from, &to)
+            let hit = match &placed.solid.tree {
+                Some(tree) => tree.first_hit(&from, &(to - from)),
+                None => first_hit(placed.solid.shape, &from, &to),
+            };
+            if let Some(t) = hit
                 && first.is_none_or(|(known, _)| t < known)
             {
                 first = Some((t, index));

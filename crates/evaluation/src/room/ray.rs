@@ -142,27 +142,32 @@ fn in_hull(mesh: &TriangleMesh, from: &Point3<f64>, along: &Vector3<f64>) -> Int
     inside
 }
 
-/// Moeller and Trumbore (1997), for every triangle.
-fn first_triangle(mesh: &TriangleMesh, from: &Point3<f64>, along: &Vector3<f64>) -> Option<f64> {
-    let mut first: Option<f64> = None;
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|i| mesh.vertices_m[i as usize]);
-        let (side_b, side_c) = (b - a, c - a);
-        let across = along.cross(&side_c);
-        let determinant = side_b.dot(&across);
-        if determinant == 0.0 {
-            continue;
-        }
-        let to_start = from - a;
-        let u = to_start.dot(&across) / determinant;
-        let turned = to_start.cross(&side_b);
-        let v = along.dot(&turned) / determinant;
-        let t = side_c.dot(&turned) / determinant;
-        if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && (0.0..=1.0).contains(&t) {
-            first = Some(first.map_or(t, |known| known.min(t)));
-        }
+/// Moeller and Trumbore (1997).
+pub(super) fn triangle_hit(
+    [a, b, c]: &[Point3<f64>; 3],
+    from: &Point3<f64>,
+    along: &Vector3<f64>,
+) -> Option<f64> {
+    let (side_b, side_c) = (b - a, c - a);
+    let across = along.cross(&side_c);
+    let determinant = side_b.dot(&across);
+    if determinant == 0.0 {
+        return None;
     }
-    first
+    let to_start = from - a;
+    let u = to_start.dot(&across) / determinant;
+    let turned = to_start.cross(&side_b);
+    let v = along.dot(&turned) / determinant;
+    let t = side_c.dot(&turned) / determinant;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && (0.0..=1.0).contains(&t)).then_some(t)
+}
+
+/// Asks every triangle; [`super::ray_tree::RayTree`] asks few.
+fn first_triangle(mesh: &TriangleMesh, from: &Point3<f64>, along: &Vector3<f64>) -> Option<f64> {
+    let corners = |t: &[u32; 3]| t.map(|i| mesh.vertices_m[i as usize]);
+    (mesh.triangles.iter())
+        .filter_map(|triangle| triangle_hit(&corners(triangle), from, along))
+        .reduce(f64::min)
 }
 
 #[cfg(test)]
@@ -267,5 +272,22 @@ mod tests {
             None
         );
         assert!(first_hit(&Shape::Sphere { radius_m: 0.3001 }, &from, &to).is_some());
+    }
+
+    #[test]
+    fn a_tree_of_boxes_meets_what_asking_every_triangle_meets() {
+        let mesh = Shape::Sphere { radius_m: 0.3 }.surface(1e-3);
+        let tree = super::super::ray_tree::RayTree::new(&mesh);
+        let mut random = SplitMix64::new(11);
+        let mut coordinate = || random.uniform(-0.6, 0.6);
+        let mut hits = 0;
+        for _ in 0..500 {
+            let from = Point3::new(coordinate(), coordinate(), coordinate());
+            let along = Vector3::new(coordinate(), coordinate(), coordinate());
+            let found = tree.first_hit(&from, &along);
+            assert_eq!(found, first_triangle(&mesh, &from, &along));
+            hits += usize::from(found.is_some());
+        }
+        assert!(hits > 50, "{hits}");
     }
 }
