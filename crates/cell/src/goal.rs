@@ -276,6 +276,10 @@ fn from_entry_and_target(
                     )
                     .hint(match nearest_name(name, names.iter().copied()) {
                         Some(near) => format!("did you mean `{near}`?"),
+                        None if names.is_empty() => {
+                            "it has none: give `target_mm`, or a part with the tissue lesion"
+                                .to_owned()
+                        }
                         None => format!("it has {}", names.join(", ")),
                     }));
             };

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::cache::pieces_of;
+use super::hull::robust_hull;
 use super::{Fidelity, SurfaceIndex, check, convex_hull, is_convex, mend, size_m, volume_m3};
-use crate::shape::{Shape, SolidMesh, TriangleMesh};
+use crate::shape::{ConvexMesh, Shape, SolidMesh, TriangleMesh};
 
 /// Share of a surface that mending may add.
 const MENDABLE: f64 = 0.01;
@@ -34,7 +35,9 @@ pub(crate) fn shape_of_surface(
 ) -> Result<(Shape, Option<Fidelity>), String> {
     let small = surface.vertices_m.len() <= MOST_CONVEX_VERTICES;
     if small && is_convex(&surface) {
-        let hull = convex_hull(&surface.vertices_m)?;
+        // Where rounding breaks the hull, as points in rings and planes can, the surface itself is
+        // convex already; it only has corners more than it needs.
+        let hull = convex_hull(&surface.vertices_m).unwrap_or(ConvexMesh(surface));
         return Ok((Shape::Convex(Arc::new(hull)), None));
     }
     if purpose == Use::Distance {
@@ -68,7 +71,7 @@ pub(crate) fn shape_of_link(
         ));
     }
     let hull_of = |mesh: &TriangleMesh, why: String| {
-        let hull = convex_hull(&mesh.vertices_m)?;
+        let hull = convex_hull(&mesh.vertices_m).or_else(|_| robust_hull(&mesh.vertices_m, 0.0))?;
         let note = format!(
             "collision mesh of '{link}' is used as its convex hull ({} vertices), which contains \
              it{why}",
@@ -122,6 +125,10 @@ pub(crate) fn shape_of_link(
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::{PI, TAU};
+
+    use nalgebra::Point3;
+
     use super::super::test_meshes::{bowl, cuboid, ell, inverted};
     use super::*;
 
@@ -134,6 +141,50 @@ mod tests {
         let (shape, notes) = link(&cuboid([0.03, 0.02, 0.01]));
         assert!(matches!(shape, Shape::Convex(_)), "{shape:?}");
         assert!(notes[0].contains("convex hull (8 vertices)"), "{notes:?}");
+    }
+
+    /// Rings of points in planes, in single precision as an STL has them: where incremental hulls
+    /// make faces without an area.
+    #[test]
+    fn rings_of_a_long_ellipsoid_are_a_convex_solid() {
+        let (rings, spokes) = (12_u32, 24_u32);
+        #[expect(clippy::cast_possible_truncation, reason = "what is tested")]
+        let single = |value: f64| f64::from(value as f32) * 1e-3;
+        let mut vertices_m = vec![Point3::new(0.0, 0.06, single(-150.0))];
+        for ring in 1..rings {
+            let (sine, cosine) = (PI * f64::from(ring) / f64::from(rings)).sin_cos();
+            for spoke in 0..spokes {
+                let (y, x) = (TAU * f64::from(spoke) / f64::from(spokes)).sin_cos();
+                vertices_m.push(Point3::new(
+                    single(20.0 * sine * x),
+                    single(60.0 + 20.0 * sine * y),
+                    single(-150.0 * cosine),
+                ));
+            }
+        }
+        vertices_m.push(Point3::new(0.0, 0.06, single(150.0)));
+        let last = u32::try_from(vertices_m.len()).unwrap() - 1;
+        let at = |ring: u32, spoke: u32| 1 + (ring - 1) * spokes + spoke % spokes;
+        let mut triangles = Vec::new();
+        for spoke in 0..spokes {
+            triangles.push([0, at(1, spoke + 1), at(1, spoke)]);
+            triangles.push([last, at(rings - 1, spoke), at(rings - 1, spoke + 1)]);
+            for ring in 1..rings - 1 {
+                let [a, b] = [at(ring, spoke), at(ring, spoke + 1)];
+                let [c, d] = [at(ring + 1, spoke), at(ring + 1, spoke + 1)];
+                triangles.extend([[a, b, d], [a, d, c]]);
+            }
+        }
+        let surface = TriangleMesh {
+            vertices_m,
+            triangles,
+        };
+        let (shape, _) = shape_of_surface(surface.clone(), Use::Collision).unwrap();
+        match shape {
+            Shape::Convex(hull) => assert!(hull.0.vertices_m.len() <= surface.vertices_m.len()),
+            Shape::Mesh(mesh) => assert_eq!(mesh.surface, surface),
+            other => panic!("{other:?}"),
+        }
     }
 
     #[test]

@@ -11,7 +11,13 @@ use crate::shape::TriangleMesh;
 /// are welded.
 pub(crate) fn read_stl(bytes: &[u8], scale: [f64; 3]) -> Result<TriangleMesh, String> {
     let bytes = with_plain_header(bytes);
-    let mesh = stl_io::read_stl(&mut std::io::Cursor::new(bytes)).map_err(|e| e.to_string())?;
+    let mesh = stl_io::read_stl(&mut std::io::Cursor::new(bytes)).map_err(|error| {
+        if error.kind() == std::io::ErrorKind::UnexpectedEof {
+            "it is empty or cut off".to_owned()
+        } else {
+            error.to_string()
+        }
+    })?;
     let vertices_m: Vec<Point3<f64>> = mesh
         .vertices
         .iter()

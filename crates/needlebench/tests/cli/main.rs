@@ -1,6 +1,7 @@
 //! The program from outside: what it prints, writes, refuses, and how it ends.
 
 mod arguments;
+mod atlas;
 mod bad_mesh;
 mod bad_robot;
 mod bad_scenario;
