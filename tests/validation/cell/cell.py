@@ -267,8 +267,9 @@ def build_cell(header_file: Path) -> Cell:
                 worst_m = max(worst_m, shape_difference_m(shape, solid["shape"]))
             elif body["kind"] == "needle_corridor":
                 shape = coal_shape(solid["shape"])
-                back = pin.SE3(np.eye(3), np.array([0.0, 0.0, -solid["shape"]["half_length_m"]]))
-                placement = entry.placement * back
+                # The cylinder of the corridor ends at the guide's entry, the hand cone's apex is there.
+                back_m = solid["shape"].get("half_length_m", 0.0)
+                placement = entry.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, -back_m]))
             else:
                 placement, shape = ours, coal_shape(solid["shape"])
             off = ours.actInv(placement)
