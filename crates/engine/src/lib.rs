@@ -5,6 +5,7 @@
 //! are built from the one [`Cell`](needlebench_cell::Cell), so that what differs between their
 //! recordings is the engines' doing.
 
+mod actuation;
 mod contact_groups;
 mod error;
 pub mod mujoco;
@@ -17,10 +18,11 @@ mod simulate;
 #[path = "../tests/common/mod.rs"]
 mod test_cell;
 
+pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFriction};
 pub use error::EngineError;
 pub use mujoco::{MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
 pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording};
 pub use servo::{Servo, ServoGains, ServoOutput};
-pub use simulate::{Hooks, simulate};
+pub use simulate::{Drive, Hooks, simulate};

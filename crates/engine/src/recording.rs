@@ -9,7 +9,7 @@ use crate::{EngineIdentity, PlantState};
 
 /// Motion of one plant under one servo.
 ///
-/// All vectors but `torque_nm` have one entry more than there were steps; entry 0 is the state
+/// All vectors but the torques have one entry more than there were steps; entry 0 is the state
 /// after the reset. Everything but `cost` is the same, bit for bit, whenever it is computed.
 #[derive(Debug, Clone)]
 pub struct Recording {
@@ -23,8 +23,11 @@ pub struct Recording {
     pub state: Vec<PlantState>,
     /// The trajectory at the same times, as planned.
     pub reference: Vec<JointState>,
-    /// Torque that acted over each step, N m; entry `k` between states `k` and `k + 1`.
+    /// Torque that acted on the links over each step, N m; entry `k` between states `k` and
+    /// `k + 1`.
     pub torque_nm: Vec<Joints>,
+    /// Torque of the motors over each step, N m: the same where joints have no friction.
+    pub drive_nm: Vec<Joints>,
     /// Steps in which the effort limit cut the torque of at least one joint.
     pub saturated_steps: usize,
     /// What it cost; differs from run to run.

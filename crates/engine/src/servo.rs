@@ -35,8 +35,8 @@ impl Default for ServoGains {
 pub struct ServoOutput {
     /// Torque after the effort clamp, N m.
     pub torque_nm: Joints,
-    /// Whether the clamp changed any joint's torque.
-    pub saturated: bool,
+    /// Whether the clamp changed a joint's torque.
+    pub saturated: [bool; JOINT_COUNT],
 }
 
 /// Joint servo: inverse dynamics of the reference plus a proportional-derivative term.
@@ -61,22 +61,32 @@ impl Servo {
         position: &Joints,
         velocity: &Joints,
     ) -> ServoOutput {
-        let kp = Joints::from(self.gains.kp_nm_per_rad);
-        let kd = Joints::from(self.gains.kd_nms_per_rad);
-        let wanted = self.dynamics.inverse_dynamics(
-            &reference.position,
-            &reference.velocity,
-            &reference.acceleration,
-        ) + kp.component_mul(&(reference.position - position))
-            + kd.component_mul(&(reference.velocity - velocity));
+        let wanted = self.wanted_nm(reference, position, velocity);
         // NaN passes the clamp unchanged, so that the run loop sees the divergence.
         let torque_nm = wanted.zip_map(&self.effort_limit_nm, |torque, limit| {
             torque.clamp(-limit, limit)
         });
         ServoOutput {
             torque_nm,
-            saturated: torque_nm != wanted,
+            saturated: std::array::from_fn(|i| torque_nm[i] != wanted[i]),
         }
+    }
+
+    /// The same without the clamp, N m.
+    pub(crate) fn wanted_nm(
+        &self,
+        reference: &JointState,
+        position: &Joints,
+        velocity: &Joints,
+    ) -> Joints {
+        let kp = Joints::from(self.gains.kp_nm_per_rad);
+        let kd = Joints::from(self.gains.kd_nms_per_rad);
+        self.dynamics.inverse_dynamics(
+            &reference.position,
+            &reference.velocity,
+            &reference.acceleration,
+        ) + kp.component_mul(&(reference.position - position))
+            + kd.component_mul(&(reference.velocity - velocity))
     }
 
     /// `max_i (2 kd_i h + kp_i h^2) / (4 armature_i)` for a step `h`: below 1 the servo is stable
@@ -158,7 +168,10 @@ mod tests {
             &reference.velocity,
             &reference.acceleration,
         );
-        assert_eq!((output.torque_nm, output.saturated), (wanted, false));
+        assert_eq!(
+            (output.torque_nm, output.saturated),
+            (wanted, [false; JOINT_COUNT])
+        );
     }
 
     #[test]
@@ -166,7 +179,7 @@ mod tests {
         let servo = servo();
         let reference = JointState::at_rest(Joints::zeros());
         let output = servo.torque(&reference, &Joints::repeat(1.0), &Joints::zeros());
-        assert!(output.saturated);
+        assert_eq!(output.saturated, [true; JOINT_COUNT]);
         assert_eq!(output.torque_nm, -servo.effort_limit_nm);
     }
 

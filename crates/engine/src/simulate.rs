@@ -3,10 +3,11 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
+use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{JOINT_LABELS, Joints};
 
-use crate::{Cost, EngineError, Plant, PlantState, Recording, Servo};
+use crate::actuation::Drives;
+use crate::{Actuation, Cost, EngineError, EngineIdentity, Plant, PlantState, Recording, Servo};
 
 /// Speed that no arm reaches, rad/s: 16 times the fastest joint of a UR3.
 const ABSURD_SPEED_RAD_S: f64 = 100.0;
@@ -26,80 +27,151 @@ pub struct Hooks<'a> {
     pub progress: Option<&'a mut dyn FnMut(f64)>,
 }
 
-/// Runs `trajectory` from its start to its end on `plant`.
+/// One run: it says what torque the plant gets next, and keeps what the plant did.
 ///
-/// The servo is sampled once per step and its torque held over it. The last state is the first one
-/// at or after the trajectory's end.
+/// Plants are stepped by the caller, so that several of them can go in turn:
+///
+/// ```text
+/// drive.record(plant.reset(&drive.start()))
+/// while let Some(torque) = drive.torque()? { drive.record(plant.step(&torque)?)? }
+/// drive.finish()
+/// ```
+#[derive(Debug)]
+pub struct Drive<'a> {
+    trajectory: &'a JointTrajectory,
+    drives: Drives<'a>,
+    steps: usize,
+    recording: Recording,
+}
+
+impl<'a> Drive<'a> {
+    /// Prepares a run of `trajectory` from its start to its end on a plant with steps of
+    /// `timestep_s`.
+    ///
+    /// The servo is sampled once per step and its torque held over it. The last state is the first
+    /// one at or after the trajectory's end.
+    ///
+    /// # Errors
+    /// [`EngineError::BadSetting`] for gains, limits and imperfections out of range.
+    pub fn new(
+        servo: &'a Servo,
+        actuation: &'a Actuation,
+        trajectory: &'a JointTrajectory,
+        engine: EngineIdentity,
+        timestep_s: f64,
+    ) -> Result<Self, EngineError> {
+        servo.check()?;
+        actuation.check()?;
+        let steps = step_count(trajectory.duration_s(), timestep_s);
+        Ok(Self {
+            trajectory,
+            drives: Drives::new(servo, actuation, timestep_s),
+            steps,
+            recording: Recording {
+                engine,
+                timestep_s,
+                time_s: Vec::with_capacity(steps + 1),
+                state: Vec::with_capacity(steps + 1),
+                reference: Vec::with_capacity(steps + 1),
+                torque_nm: Vec::with_capacity(steps),
+                drive_nm: Vec::with_capacity(steps),
+                saturated_steps: 0,
+                cost: Cost::default(),
+            },
+        })
+    }
+
+    /// Where the plant is to be reset to, rad.
+    pub fn start(&self) -> Joints {
+        self.trajectory.sample(0.0).position
+    }
+
+    /// Torque of the next step, N m; none after the last one.
+    ///
+    /// # Errors
+    /// [`EngineError::Diverged`] if it is not a number.
+    ///
+    /// # Panics
+    /// If no state was recorded yet.
+    pub fn torque(&mut self) -> Result<Option<Joints>, EngineError> {
+        let step = self.recording.torque_nm.len();
+        if step >= self.steps {
+            return Ok(None);
+        }
+        let state = self.recording.state.last().expect("recorded after reset");
+        let time_s = step as f64 * self.recording.timestep_s;
+        let torque = self
+            .drives
+            .torque(self.trajectory, time_s, &state.position, &state.velocity);
+        check_torque(&self.recording.engine.name, time_s, &torque.drive_nm)?;
+        self.recording.saturated_steps += usize::from(torque.saturated.contains(&true));
+        self.recording.torque_nm.push(torque.link_nm);
+        self.recording.drive_nm.push(torque.drive_nm);
+        Ok(Some(torque.link_nm))
+    }
+
+    /// Keeps the state after the reset or after a step.
+    ///
+    /// # Errors
+    /// [`EngineError::Diverged`] if it left every sensible range; it is kept all the same.
+    pub fn record(&mut self, state: PlantState) -> Result<(), EngineError> {
+        let recording = &mut self.recording;
+        let time_s = recording.state.len() as f64 * recording.timestep_s;
+        recording.time_s.push(time_s);
+        recording.state.push(state);
+        recording.reference.push(self.trajectory.sample(time_s));
+        check_state(&recording.engine.name, time_s, &state)
+    }
+
+    /// Simulated time so far, s.
+    pub fn time_s(&self) -> f64 {
+        self.recording.time_s.last().copied().unwrap_or(0.0)
+    }
+
+    /// The recording; its cost is the caller's to fill in.
+    pub fn finish(self) -> Recording {
+        self.recording
+    }
+}
+
+/// Runs `trajectory` from its start to its end on `plant`, through drives as they are.
+///
+/// # Errors
+/// What the plant reports, and [`EngineError::Diverged`].
 pub fn simulate(
     plant: &mut dyn Plant,
     servo: &Servo,
+    actuation: &Actuation,
     trajectory: &JointTrajectory,
     mut hooks: Hooks<'_>,
 ) -> Result<Recording, EngineError> {
-    servo.check()?;
     let started = Instant::now();
-    let timestep_s = plant.timestep_s();
-    let engine = plant.identity();
-    let steps = step_count(trajectory.duration_s(), timestep_s);
-
-    let start = trajectory.sample(0.0);
-    let mut state = plant.reset(&start.position)?;
-    let mut recording = Recording {
-        engine,
-        timestep_s,
-        time_s: Vec::with_capacity(steps + 1),
-        state: Vec::with_capacity(steps + 1),
-        reference: Vec::with_capacity(steps + 1),
-        torque_nm: Vec::with_capacity(steps),
-        saturated_steps: 0,
-        cost: Cost::default(),
-    };
-    recording.time_s.push(0.0);
-    recording.state.push(state);
-    recording.reference.push(start);
-    for k in 0..steps {
+    let mut drive = Drive::new(
+        servo,
+        actuation,
+        trajectory,
+        plant.identity(),
+        plant.timestep_s(),
+    )?;
+    drive.record(plant.reset(&drive.start())?)?;
+    loop {
         if hooks
             .cancel
             .is_some_and(|cancel| cancel.load(Ordering::Relaxed))
         {
             return Err(EngineError::Cancelled);
         }
-        let time_s = k as f64 * timestep_s;
-        let output = servo.torque(
-            &servo_reference(trajectory, time_s, timestep_s),
-            &state.position,
-            &state.velocity,
-        );
-        let next_s = (k + 1) as f64 * timestep_s;
-        check_torque(&recording.engine.name, time_s, &output.torque_nm)?;
-        state = plant.step(&output.torque_nm)?;
-        check_state(&recording.engine.name, next_s, &state)?;
-        recording.saturated_steps += usize::from(output.saturated);
-        recording.torque_nm.push(output.torque_nm);
-        recording.time_s.push(next_s);
-        recording.state.push(state);
-        recording.reference.push(trajectory.sample(next_s));
+        let Some(torque_nm) = drive.torque()? else {
+            break;
+        };
+        drive.record(plant.step(&torque_nm)?)?;
         if let Some(progress) = hooks.progress.as_mut() {
-            progress(next_s);
+            progress(drive.time_s());
         }
     }
+    let mut recording = drive.finish();
     recording.cost.wall = started.elapsed();
     Ok(recording)
-}
-
-/// Reference for the torque of the step that starts at `time_s`.
-///
-/// Semi-implicit Euler is leapfrog in disguise: with the acceleration of the step's start, the
-/// positions follow the trajectory to second order, while the velocities belong half a step
-/// earlier. Taking the velocity there removes a bias of `kd * h / 2 * qdd`, which is 0.3 N m at
-/// 10 rad/s^2 and 1 ms.
-fn servo_reference(trajectory: &JointTrajectory, time_s: f64, timestep_s: f64) -> JointState {
-    JointState {
-        velocity: trajectory
-            .sample((time_s - 0.5 * timestep_s).max(0.0))
-            .velocity,
-        ..trajectory.sample(time_s)
-    }
 }
 
 #[expect(

@@ -8,8 +8,8 @@ use nalgebra::{Point3, Vector3, Vector6};
 use needlebench_cell::shape::{Shape, Solid};
 use needlebench_cell::{BodyKind, Cell, CollisionBody, Frame};
 use needlebench_engine::{
-    Hooks, MujocoPlant, MujocoSettings, Plant, PlantState, RapierPlant, RapierSettings, Recording,
-    Servo, ServoGains, simulate,
+    Actuation, Hooks, MujocoPlant, MujocoSettings, Plant, PlantState, RapierPlant, RapierSettings,
+    Recording, Servo, ServoGains, simulate,
 };
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
 use needlebench_kinematics::{Joints, Pose};
@@ -45,7 +45,16 @@ fn both(cell: &Cell, trajectory: &JointTrajectory) -> [Recording; 2] {
     let mut mujoco =
         MujocoPlant::new(&mut harness, cell, TIMESTEP_S, &MujocoSettings::default()).unwrap();
     let plants: [&mut dyn Plant; 2] = [&mut rapier, &mut mujoco];
-    plants.map(|plant| simulate(plant, &servo, trajectory, Hooks::default()).unwrap())
+    plants.map(|plant| {
+        simulate(
+            plant,
+            &servo,
+            &Actuation::default(),
+            trajectory,
+            Hooks::default(),
+        )
+        .unwrap()
+    })
 }
 
 /// A point 0.25 m before the flange, where the tip of a long needle may be.

@@ -5,7 +5,8 @@ mod common;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use needlebench_engine::{
-    EngineError, Hooks, RapierPlant, RapierSettings, Recording, Servo, ServoGains, simulate,
+    Actuation, EngineError, Hooks, RapierPlant, RapierSettings, Recording, Servo, ServoGains,
+    simulate,
 };
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
@@ -41,7 +42,13 @@ fn servo() -> Servo {
 fn run(servo: &Servo, timestep_s: f64, hooks: Hooks<'_>) -> Result<Recording, EngineError> {
     let cell = common::ur3(Vec::new());
     let mut plant = RapierPlant::new(&cell, timestep_s, &RapierSettings::default())?;
-    simulate(&mut plant, servo, &trajectory(), hooks)
+    simulate(
+        &mut plant,
+        servo,
+        &Actuation::default(),
+        &trajectory(),
+        hooks,
+    )
 }
 
 #[test]

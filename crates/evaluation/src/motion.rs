@@ -112,7 +112,7 @@ pub fn measure_motion(
     }
     let effort_limit = cell.robot.limits.efforts_nm();
     let peak_torque_ratio = recording
-        .torque_nm
+        .drive_nm
         .iter()
         .map(|torque| torque.abs().component_div(&effort_limit).max())
         .fold(0.0, f64::max);

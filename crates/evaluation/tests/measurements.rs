@@ -135,6 +135,7 @@ fn recording(
         state: Vec::new(),
         reference: Vec::new(),
         torque_nm: (0..steps).map(|_| Joints::repeat(6.0)).collect(),
+        drive_nm: (0..steps).map(|_| Joints::repeat(6.0)).collect(),
         saturated_steps: 3,
         cost: Cost::default(),
     };

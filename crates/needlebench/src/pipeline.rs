@@ -10,7 +10,7 @@ use needlebench_cell::scenario::EngineName;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
-    EngineError, EngineIdentity, Hooks, MujocoPlant, MujocoSettings, Plant, RapierPlant,
+    Actuation, EngineError, EngineIdentity, Hooks, MujocoPlant, MujocoSettings, Plant, RapierPlant,
     RapierSettings, Recording, Servo, ServoGains, simulate,
 };
 use needlebench_evaluation::report::{EngineFailure, Report};
@@ -352,6 +352,7 @@ impl Simulation<'_> {
         };
         outcome.identity = Some(plant.identity());
         let servo = servo(self.resolved);
+        let actuation = Actuation::default();
         for &job in self.jobs {
             let goal = &self.resolved.goals[job.goal];
             let plan = &self.plans[job.goal].configurations[job.configuration];
@@ -360,7 +361,7 @@ impl Simulation<'_> {
                 cancel: Some(self.cancel),
                 progress: None,
             };
-            let recording = match simulate(plant.as_mut(), &servo, trajectory, hooks) {
+            let recording = match simulate(plant.as_mut(), &servo, &actuation, trajectory, hooks) {
                 Ok(recording) => recording,
                 Err(EngineError::Cancelled) => return Ok(()),
                 Err(error) => {

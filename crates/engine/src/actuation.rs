@@ -1,0 +1,414 @@
+//! What lies between the servo and the links of a real arm: commands, encoders, gears, friction.
+//!
+//! One implementation serves every plant, so that all engines get the same torques for the same
+//! state. A joint is a motor and a link with a massless torsion spring between them (harmonic
+//! drive); the rotor's inertia is the plant's armature and moves with the link. That holds below
+//! the resonance of rotor and spring, which is above 20 Hz for every joint of a UR3.
+//!
+//! With the motor's torque `tau_m`, the friction `F` at the motor and the torque `tau` that reaches
+//! the link:
+//!
+//! ```text
+//! tau     = tau_m - F
+//! theta   = q + C tau                        motor angle, C the compliance of the gear
+//! reading = round(theta + offset) + noise    encoder at the motor
+//! tau_m   = clamp(tau_ff + kp (q_r - reading) + kd (qd_r - qd))
+//! ```
+//!
+//! `theta` and `tau` are solved for together, so that no step of delay lies in the spring.
+
+use std::collections::VecDeque;
+
+use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
+use needlebench_kinematics::{JOINT_COUNT, Joints};
+
+use crate::{EngineError, Servo};
+
+/// Rounding of `t / period` that still counts as a whole number of periods.
+const PERIOD_SLACK: f64 = 1e-9;
+
+/// Imperfections of the drives. The default is none: ideal torques and measurements.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Actuation {
+    /// Set-points that arrive at a fixed rate; continuous ones if none.
+    pub commands: Option<CommandTiming>,
+    /// Encoders; exact ones if none.
+    pub encoder: Option<Encoder>,
+    /// Compliance of each joint's gear, rad/(N m); 0 is rigid.
+    pub compliance_rad_per_nm: Joints,
+    /// Friction of the joints; none if none.
+    pub friction: Option<JointFriction>,
+    /// Torques that the drives can give, N m, where they are less than the servo believes.
+    pub drive_limit_nm: Option<Joints>,
+    /// Delay from measurement to torque, s; whole steps are used, the next higher number.
+    pub torque_delay_s: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+/// Set-points at a fixed rate, joined by straight lines in joint space.
+///
+/// The servo follows the line between the last two set-points that have arrived, so it is a
+/// period, and the delay, behind the trajectory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommandTiming {
+    /// Time between two set-points, s.
+    pub period_s: f64,
+    /// Age of a set-point when it arrives, s.
+    pub delay_s: f64,
+}
+
+/// Encoders of the motors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Encoder {
+    /// Angle between two readings, rad; 0 for none.
+    pub resolution_rad: Joints,
+    /// Standard deviation of a reading, rad, independent from step to step.
+    pub noise_rad: Joints,
+    /// Error of the zero, rad: reading minus angle.
+    pub offset_rad: Joints,
+}
+
+/// Friction of joints by the LuGre model (Canudas de Wit et al., IEEE Trans. Automatic Control
+/// 40(3), 1995): bristles that bend, and slip beyond the Stribeck curve.
+///
+/// `dz/dt = v - sigma_0 |v| / g(v) z`, `F = sigma_0 z + sigma_1 dz/dt + sigma_2 v`,
+/// `g(v) = F_c + (F_s - F_c) exp(-(v / v_s)^2)`. The bristles are advanced by backward Euler,
+/// which is stable for every step and speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointFriction {
+    /// Sliding friction `F_c`, N m.
+    pub coulomb_nm: Joints,
+    /// Break-away torque `F_s`, N m; at least the sliding friction.
+    pub stiction_nm: Joints,
+    /// Speed `v_s` at which the break-away torque has fallen off to 1/e, rad/s.
+    pub stribeck_rad_s: Joints,
+    /// Viscous friction `sigma_2`, N m s/rad.
+    pub viscous_nms_per_rad: Joints,
+    /// Stiffness of the bristles `sigma_0`, N m/rad.
+    pub bristle_stiffness_nm_per_rad: Joints,
+    /// Damping of the bristles `sigma_1`, N m s/rad.
+    pub bristle_damping_nms_per_rad: Joints,
+    /// Share of the *nominal* friction that the controller adds to its torque, by the sign of the
+    /// reference's speed.
+    pub compensation: f64,
+    /// Factor from the friction that the controller believes in to the true one, per joint.
+    pub true_over_nominal: Joints,
+}
+
+impl JointFriction {
+    /// Stribeck curve of the nominal friction at one joint, N m.
+    pub fn stribeck_nm(&self, joint: usize, speed_rad_s: f64) -> f64 {
+        let (coulomb, stiction) = (self.coulomb_nm[joint], self.stiction_nm[joint]);
+        let ratio = speed_rad_s / self.stribeck_rad_s[joint];
+        coulomb + (stiction - coulomb) * (-ratio * ratio).exp()
+    }
+
+    /// What the controller adds for a reference of this speed, N m.
+    fn compensation_nm(&self, velocity_rad_s: &Joints) -> Joints {
+        Joints::from_fn(|i, _| {
+            let v = velocity_rad_s[i];
+            let sliding = if v == 0.0 {
+                0.0
+            } else {
+                self.stribeck_nm(i, v).copysign(v)
+            };
+            self.compensation * (sliding + self.viscous_nms_per_rad[i] * v)
+        })
+    }
+}
+
+impl Actuation {
+    /// Whether nothing is imperfect.
+    pub fn is_ideal(&self) -> bool {
+        *self
+            == Self {
+                seed: self.seed,
+                ..Self::default()
+            }
+    }
+
+    /// Steps of delay for a step length.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "checked: not negative, and far below 2^52 steps"
+    )]
+    pub fn delay_steps(&self, timestep_s: f64) -> usize {
+        (self.torque_delay_s / timestep_s - PERIOD_SLACK)
+            .ceil()
+            .max(0.0) as usize
+    }
+
+    /// Refuses numbers that are negative or not finite.
+    pub(crate) fn check(&self) -> Result<(), EngineError> {
+        let not_negative = |key, value: f64| {
+            if value >= 0.0 && value.is_finite() {
+                Ok(())
+            } else {
+                Err(EngineError::BadSetting {
+                    key,
+                    value,
+                    expected: "finite and not negative",
+                })
+            }
+        };
+        let positive = |key, value: f64| {
+            if value > 0.0 && value.is_finite() {
+                Ok(())
+            } else {
+                Err(EngineError::BadSetting {
+                    key,
+                    value,
+                    expected: "finite and positive",
+                })
+            }
+        };
+        not_negative("torque_delay_s", self.torque_delay_s)?;
+        for value in &self.compliance_rad_per_nm {
+            not_negative("compliance_rad_per_nm", *value)?;
+        }
+        if let Some(commands) = &self.commands {
+            positive("command period_s", commands.period_s)?;
+            not_negative("command delay_s", commands.delay_s)?;
+        }
+        if let Some(encoder) = &self.encoder {
+            for value in encoder.resolution_rad.iter().chain(&encoder.noise_rad) {
+                not_negative("encoder resolution or noise", *value)?;
+            }
+        }
+        if let Some(limit) = &self.drive_limit_nm {
+            for value in limit {
+                positive("drive_limit_nm", *value)?;
+            }
+        }
+        if let Some(friction) = &self.friction {
+            not_negative("friction compensation", friction.compensation)?;
+            for joint in 0..JOINT_COUNT {
+                not_negative("friction coulomb_nm", friction.coulomb_nm[joint])?;
+                if friction.stiction_nm[joint].is_nan()
+                    || friction.stiction_nm[joint] < friction.coulomb_nm[joint]
+                {
+                    return Err(EngineError::BadSetting {
+                        key: "friction stiction_nm",
+                        value: friction.stiction_nm[joint],
+                        expected: "at least the sliding friction",
+                    });
+                }
+                positive("friction stribeck_rad_s", friction.stribeck_rad_s[joint])?;
+                not_negative("viscous friction", friction.viscous_nms_per_rad[joint])?;
+                positive(
+                    "bristle stiffness",
+                    friction.bristle_stiffness_nm_per_rad[joint],
+                )?;
+                not_negative(
+                    "bristle damping",
+                    friction.bristle_damping_nms_per_rad[joint],
+                )?;
+                not_negative(
+                    "friction true_over_nominal",
+                    friction.true_over_nominal[joint],
+                )?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Torques of one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ActuatedTorque {
+    /// Torque that reaches the links, N m: what the plant gets.
+    pub link_nm: Joints,
+    /// Torque of the motors, N m, within their limits.
+    pub drive_nm: Joints,
+    /// Whether a limit cut the torque, per joint.
+    pub saturated: [bool; JOINT_COUNT],
+}
+
+/// The drives of one run: their settings, and what they remember.
+#[derive(Debug, Clone)]
+pub(crate) struct Drives<'a> {
+    servo: &'a Servo,
+    actuation: &'a Actuation,
+    timestep_s: f64,
+    ideal: bool,
+    delay_steps: usize,
+    limit_nm: Joints,
+    /// Deflection of the bristles, rad.
+    bristles_rad: Joints,
+    /// Torques that were asked for and have not yet reached the motors, oldest first.
+    on_the_way: VecDeque<Joints>,
+    random: SplitMix64,
+    spare_normal: Option<f64>,
+}
+
+impl<'a> Drives<'a> {
+    pub(crate) fn new(servo: &'a Servo, actuation: &'a Actuation, timestep_s: f64) -> Self {
+        Self {
+            servo,
+            actuation,
+            timestep_s,
+            ideal: actuation.is_ideal(),
+            delay_steps: actuation.delay_steps(timestep_s),
+            limit_nm: actuation
+                .drive_limit_nm
+                .map_or(servo.effort_limit_nm, |limit| {
+                    limit.inf(&servo.effort_limit_nm)
+                }),
+            bristles_rad: Joints::zeros(),
+            on_the_way: VecDeque::new(),
+            random: SplitMix64::new(actuation.seed),
+            spare_normal: None,
+        }
+    }
+
+    /// Torques of the step that starts at `time_s` with the arm at `position`, `velocity`.
+    pub(crate) fn torque(
+        &mut self,
+        trajectory: &JointTrajectory,
+        time_s: f64,
+        position: &Joints,
+        velocity: &Joints,
+    ) -> ActuatedTorque {
+        let reference = self.reference(trajectory, time_s);
+        if self.ideal {
+            let output = self.servo.torque(&reference, position, velocity);
+            return ActuatedTorque {
+                link_nm: output.torque_nm,
+                drive_nm: output.torque_nm,
+                saturated: output.saturated,
+            };
+        }
+        let kp = Joints::from(self.servo.gains.kp_nm_per_rad);
+        let compliance = self.actuation.compliance_rad_per_nm;
+        let softening = kp.component_mul(&compliance).add_scalar(1.0);
+        let friction = self.friction_nm(velocity);
+        let mut wanted = self.servo.wanted_nm(&reference, position, velocity);
+        if let Some(friction) = &self.actuation.friction {
+            wanted += friction.compensation_nm(&reference.velocity);
+        }
+        let link_nm = (wanted - friction).component_div(&softening);
+        let motor = position + compliance.component_mul(&link_nm);
+        wanted -= kp.component_mul(&(self.reading(&motor) - motor));
+        self.on_the_way.push_back(wanted);
+        if self.on_the_way.len() > self.delay_steps + 1 {
+            self.on_the_way.pop_front();
+        }
+        // Until the first one has arrived, the first one holds.
+        let wanted = self.on_the_way[0];
+        let link_nm = (wanted - friction).component_div(&softening);
+        let unlimited = link_nm + friction;
+        // NaN passes the clamp unchanged, so that the run loop sees the divergence.
+        let drive_nm =
+            unlimited.zip_map(&self.limit_nm, |torque, limit| torque.clamp(-limit, limit));
+        ActuatedTorque {
+            link_nm: drive_nm - friction,
+            drive_nm,
+            saturated: std::array::from_fn(|i| {
+                drive_nm[i].total_cmp(&unlimited[i]) != std::cmp::Ordering::Equal
+            }),
+        }
+    }
+
+    /// Reference for the torque of the step that starts at `time_s`.
+    ///
+    /// Semi-implicit Euler is leapfrog in disguise: with the acceleration of the step's start, the
+    /// positions follow the trajectory to second order, while the velocities belong half a step
+    /// earlier. Taking the velocity there removes a bias of `kd * h / 2 * qdd`, which is 0.3 N m at
+    /// 10 rad/s^2 and 1 ms.
+    fn reference(&self, trajectory: &JointTrajectory, time_s: f64) -> JointState {
+        let velocity_s = (time_s - 0.5 * self.timestep_s).max(0.0);
+        match self.actuation.commands {
+            None => JointState {
+                velocity: trajectory.sample(velocity_s).velocity,
+                ..trajectory.sample(time_s)
+            },
+            Some(timing) => JointState {
+                velocity: timing.at(trajectory, velocity_s).velocity,
+                ..timing.at(trajectory, time_s)
+            },
+        }
+    }
+
+    /// Friction of the motors at a speed, N m; advances the bristles by one step.
+    fn friction_nm(&mut self, velocity: &Joints) -> Joints {
+        let Some(friction) = &self.actuation.friction else {
+            return Joints::zeros();
+        };
+        let h = self.timestep_s;
+        Joints::from_fn(|i, _| {
+            let v = velocity[i];
+            let scale = friction.true_over_nominal[i];
+            let slip_nm = scale * friction.stribeck_nm(i, v);
+            let stiffness = friction.bristle_stiffness_nm_per_rad[i];
+            let before = self.bristles_rad[i];
+            let after = if slip_nm > 0.0 {
+                (before + h * v) / (1.0 + h * stiffness * v.abs() / slip_nm)
+            } else {
+                0.0
+            };
+            self.bristles_rad[i] = after;
+            stiffness * after
+                + friction.bristle_damping_nms_per_rad[i] * (after - before) / h
+                + scale * friction.viscous_nms_per_rad[i] * v
+        })
+    }
+
+    /// What the encoders read at a motor angle, rad.
+    fn reading(&mut self, motor: &Joints) -> Joints {
+        let Some(encoder) = self.actuation.encoder else {
+            return *motor;
+        };
+        Joints::from_fn(|i, _| {
+            let resolution = encoder.resolution_rad[i];
+            let turned = motor[i] + encoder.offset_rad[i];
+            let rounded = if resolution > 0.0 {
+                (turned / resolution).round() * resolution
+            } else {
+                turned
+            };
+            // Drawn for every joint, so that one joint's noise does not depend on another's.
+            rounded + encoder.noise_rad[i] * self.normal()
+        })
+    }
+
+    /// Standard normal by the polar method of Marsaglia.
+    fn normal(&mut self) -> f64 {
+        if let Some(spare) = self.spare_normal.take() {
+            return spare;
+        }
+        loop {
+            let (x, y) = (
+                self.random.uniform(-1.0, 1.0),
+                self.random.uniform(-1.0, 1.0),
+            );
+            let square = x * x + y * y;
+            if square > 0.0 && square < 1.0 {
+                let factor = (-2.0 * square.ln() / square).sqrt();
+                self.spare_normal = Some(y * factor);
+                return x * factor;
+            }
+        }
+    }
+}
+
+impl CommandTiming {
+    /// What the servo follows at a time.
+    fn at(&self, trajectory: &JointTrajectory, time_s: f64) -> JointState {
+        let arrived_s = time_s - self.delay_s;
+        if arrived_s < 0.0 {
+            return JointState::at_rest(trajectory.sample(0.0).position);
+        }
+        let periods = (arrived_s / self.period_s + PERIOD_SLACK).floor();
+        let newest = trajectory.sample(periods * self.period_s);
+        let before = trajectory.sample((periods - 1.0).max(0.0) * self.period_s);
+        let share = (arrived_s / self.period_s - periods).clamp(0.0, 1.0);
+        JointState {
+            position: before.position.lerp(&newest.position, share),
+            velocity: (newest.position - before.position) / self.period_s,
+            acceleration: before.acceleration.lerp(&newest.acceleration, share),
+        }
+    }
+}
