@@ -9,6 +9,7 @@ mod files;
 mod finding;
 pub mod fixtures;
 mod goal;
+pub mod imperfections;
 mod mesh;
 mod model;
 mod nominal;

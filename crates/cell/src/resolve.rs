@@ -9,6 +9,7 @@ use needlebench_kinematics::{JOINT_LABELS, Joints, Pose};
 use crate::files::{Location, source_of};
 use crate::fixtures::{self, Fixture, FixtureError};
 use crate::goal::{PlacedPhantom, Surroundings, resolve_goal, solid_contains};
+use crate::imperfections::{Imperfections, resolve_imperfections};
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
 use crate::people::{People, Room, resolve_people};
 use crate::phantom_place::place_phantom;
@@ -78,6 +79,8 @@ pub struct ResolvedScenario {
     pub notes: Vec<String>,
     /// The people in the room, by goal.
     pub people: People,
+    /// How the real arm and phantom differ; none if they do not.
+    pub imperfections: Option<Imperfections>,
 }
 
 /// Reads a robot without a scenario: the one of the overrides, or the shipped UR3, with its
@@ -323,6 +326,15 @@ pub fn resolve_scenario(
             .map_or(tool.needle.length_m, |mm| mm * 1e-3),
         hand_cone_half_angle_rad: scenario.tool.hand_cone_half_angle_deg.to_radians(),
     };
+    let imperfections = scenario
+        .imperfections
+        .as_ref()
+        .map(|section| {
+            let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
+            resolve_imperfections(&toml, section, base, bore_clearance_m)
+        })
+        .transpose()
+        .map_err(one)?;
     let cell = Cell::assemble(
         robot,
         tool,
@@ -343,6 +355,7 @@ pub fn resolve_scenario(
         phantom_parts,
         notes,
         people,
+        imperfections,
         scenario,
     })
 }

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
+pub use crate::imperfections::ImperfectionsSection;
 pub use crate::people::{PeopleSection, PersonSection};
 use crate::ranking::RankingSection;
 use crate::robot::MissingInertia;
@@ -22,7 +23,7 @@ pub struct Scenario {
     /// What the scenario is for, in a sentence or two.
     #[serde(default)]
     pub description: String,
-    /// Seed of everything random. Nothing is random yet but the seed is part of the provenance.
+    /// Seed of everything random: searches for motions, and draws of imperfections.
     #[serde(default)]
     pub seed: u64,
     /// The arm and where it stands.
@@ -72,6 +73,10 @@ pub struct Scenario {
     /// The people in the room, and what they prefer.
     #[serde(default)]
     pub people: PeopleSection,
+    /// How the real arm and the real phantom differ from what the controller believes; not at all
+    /// if left out.
+    #[serde(default)]
+    pub imperfections: Option<ImperfectionsSection>,
 }
 
 /// The arm.

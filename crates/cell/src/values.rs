@@ -3,6 +3,7 @@
 use needlebench_kinematics::JOINT_COUNT;
 
 use crate::Finding;
+use crate::imperfections::check_imperfections;
 use crate::people::check_people;
 use crate::ranking::check_ranking;
 use crate::scenario::Scenario;
@@ -340,6 +341,10 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
         }
     }
     findings.extend(check_ranking(toml, &scenario.ranking));
+    if let Some(section) = &scenario.imperfections {
+        let timestep_ms = scenario.engines.timestep_ms;
+        findings.extend(check_imperfections(toml, section, timestep_ms));
+    }
     if scenario.goals.is_empty() {
         findings.push(
             toml.finding("goals", "the scenario has no goal")
