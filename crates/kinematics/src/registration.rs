@@ -25,6 +25,9 @@ pub const FEWEST_FIDUCIALS: usize = 3;
 /// far below any layout that is of use: at this share the TRE is a million times the FLE.
 const COLLINEAR_SPREAD: f64 = 1e-6;
 
+/// Coordinates beyond this are none: no room is as large, and their squares might overflow.
+const FARTHEST_M: f64 = 1e9;
+
 /// Gap of the two largest eigenvalues, as a share of the largest, below which two rotations fit
 /// equally well: the rounding of the eigenvalues of a 4 x 4 matrix, times 100.
 const AMBIGUOUS_GAP: f64 = 1e-13;
@@ -46,9 +49,9 @@ pub enum RegistrationError {
         /// Points of the second set.
         to: usize,
     },
-    /// A coordinate that is no number.
+    /// A coordinate that is no number, or beyond every room.
     #[error("coordinate {axis} of fiducial {index} is {value}")]
-    NotFinite {
+    BadCoordinate {
         /// Which point, from 0.
         index: usize,
         /// `x`, `y` or `z`.
@@ -145,8 +148,7 @@ fn best_rotation(c: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
         .filter(|&other| other != largest)
         .map(|other| eigen.eigenvalues[largest] - eigen.eigenvalues[other])
         .fold(f64::INFINITY, f64::min);
-    // Written so that NaN fails.
-    if !(gap > AMBIGUOUS_GAP * eigen.eigenvalues.amax()) {
+    if gap <= AMBIGUOUS_GAP * eigen.eigenvalues.amax() {
         return None;
     }
     let q = eigen.eigenvectors.column(largest);
@@ -286,8 +288,8 @@ impl Layout {
         check_count(points.len())?;
         for (index, point) in points.iter().enumerate() {
             for (&value, axis) in point.iter().zip(['x', 'y', 'z']) {
-                if !value.is_finite() {
-                    return Err(RegistrationError::NotFinite { index, axis, value });
+                if value.is_nan() || value.abs() > FARTHEST_M {
+                    return Err(RegistrationError::BadCoordinate { index, axis, value });
                 }
             }
         }
@@ -304,8 +306,7 @@ impl Layout {
         let spread_squared_m2 = eigen.eigenvalues.map(|value| value.max(0.0));
         let along_m = spread_squared_m2.max().sqrt();
         let across_m = median(&spread_squared_m2).sqrt();
-        // Written so that points in one place fail.
-        if !(across_m > COLLINEAR_SPREAD * along_m) {
+        if across_m <= COLLINEAR_SPREAD * along_m {
             return Err(RegistrationError::Collinear { along_m, across_m });
         }
         Ok(Self {

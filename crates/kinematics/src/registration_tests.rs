@@ -252,7 +252,7 @@ fn points_that_determine_nothing_are_refused() {
     let refused = register(&five_fiducials(), &broken);
     assert!(matches!(
         refused,
-        Err(RegistrationError::NotFinite {
+        Err(RegistrationError::BadCoordinate {
             index: 3,
             axis: 'y',
             ..
