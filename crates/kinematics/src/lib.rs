@@ -15,6 +15,7 @@ mod limits;
 mod manipulability;
 mod models;
 pub mod pose_sets;
+pub mod registration;
 mod rotation;
 pub mod trajectory;
 
