@@ -29,7 +29,7 @@ pub use judge::judge;
 pub use motion::{
     ContactMeasurement, EngineDifference, MotionMeasurement, engine_difference, measure_motion,
 };
-pub use needle::{NeedleMeasurement, measure_needle};
+pub use needle::{NeedleMeasurement, measure_needle, tip_of};
 pub use sensitivity::tip_sensitivity;
 pub use stored::StoredReport;
 pub use threshold::{Limit, Threshold, ThresholdError};

@@ -10,16 +10,19 @@ use needlebench_cell::scenario::EngineName;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
-    Actuation, EngineError, EngineIdentity, Hooks, MujocoPlant, MujocoSettings, Plant, RapierPlant,
-    RapierSettings, Recording, Servo, ServoGains, simulate,
+    ClosedLoop, EngineError, EngineIdentity, Hooks, MujocoPlant, MujocoSettings, Plant,
+    RapierPlant, RapierSettings, Recording, simulate,
 };
 use needlebench_evaluation::report::{EngineFailure, Report};
 use needlebench_evaluation::{ClearanceSeries, certify_recording, measure_clearance};
 use needlebench_kinematics::NotUrGeometry;
+use needlebench_kinematics::registration::RegistrationError;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
+use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
 
 use crate::assemble::assemble;
 use crate::progress::Progress;
+use crate::reality::{Reality, servo};
 
 /// Engines that a run uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -65,6 +68,17 @@ pub struct ScenarioRun {
     pub interrupted: bool,
 }
 
+/// Why a scenario cannot be run at all.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The robot is not a UR arm.
+    #[error(transparent)]
+    Robot(#[from] NotUrGeometry),
+    /// The markers of `[imperfections.registration]` determine no pose.
+    #[error("imperfections.registration.markers_mm: {0}")]
+    Registration(#[from] RegistrationError),
+}
+
 /// One motion to simulate.
 #[derive(Debug, Clone, Copy)]
 struct Job {
@@ -75,14 +89,14 @@ struct Job {
 /// Plans, simulates, measures and judges one scenario.
 ///
 /// # Errors
-/// [`NotUrGeometry`] if the robot is not a UR arm. A failing engine is no error: the report says
-/// so and keeps what the other one measured.
+/// [`RunError`]. A failing engine is no error: the report says so and keeps what the other one
+/// measured.
 pub(crate) fn run(
     resolved: &ResolvedScenario,
     options: &RunOptions,
     cancel: &AtomicBool,
     progress: &Progress,
-) -> Result<ScenarioRun, NotUrGeometry> {
+) -> Result<ScenarioRun, RunError> {
     let started = Instant::now();
     let mut timings = BTreeMap::new();
     let engines = match options.engines {
@@ -98,6 +112,7 @@ pub(crate) fn run(
     };
     let model = ClearanceModel::new(&resolved.cell);
     let planner = Planner::new(resolved, &model)?;
+    let reality = Reality::new(resolved, &model)?;
 
     // The MuJoCo process starts while the motions are planned.
     let (plans, harness) = std::thread::scope(|scope| {
@@ -123,7 +138,7 @@ pub(crate) fn run(
     let simulation = Simulation {
         resolved,
         plans: &plans,
-        model: &model,
+        reality: &reality,
         jobs: &jobs,
         cancel,
         progress,
@@ -180,9 +195,11 @@ pub(crate) fn run(
         .iter_mut()
         .filter_map(|outcome| outcome.identity.take())
         .collect();
+    let budgets = budgets(resolved, &plans, options.jobs);
     let interrupted = cancel.load(Ordering::Relaxed);
     let mut report = assemble(
-        resolved, &planner, &model, &plans, &runs, &engines, failures, identities, timings,
+        resolved, &planner, &model, &reality, &plans, &runs, &budgets, &engines, failures,
+        identities, timings,
     );
     if interrupted {
         report.notes.push(
@@ -205,7 +222,7 @@ pub(crate) fn run(
 pub fn run_scenario(
     resolved: &ResolvedScenario,
     options: &RunOptions,
-) -> Result<ScenarioRun, NotUrGeometry> {
+) -> Result<ScenarioRun, RunError> {
     run(
         resolved,
         options,
@@ -272,6 +289,46 @@ fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
         .collect()
 }
 
+/// Error budgets by goal and configuration, for every configuration with a motion; with what went
+/// wrong where there is none.
+pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
+
+fn budgets(resolved: &ResolvedScenario, plans: &[GoalPlan], threads: usize) -> Budgets {
+    let Some(imperfections) = &resolved.imperfections else {
+        return plans
+            .iter()
+            .map(|plan| plan.configurations.iter().map(|_| None).collect())
+            .collect();
+    };
+    let servo = servo(resolved);
+    let all: Vec<(usize, &ConfigurationPlan)> = plans
+        .iter()
+        .enumerate()
+        .flat_map(|(goal, plan)| plan.configurations.iter().map(move |each| (goal, each)))
+        .collect();
+    let mut found = in_parallel(threads, &all, |(goal, plan)| {
+        let case = BudgetCase {
+            cell: &resolved.cell,
+            goal: &resolved.goals[*goal],
+            place: resolved
+                .phantom
+                .as_ref()
+                .map(|each| &each.world_from_phantom),
+            servo: &servo,
+            imperfections,
+            trajectory: plan.trajectory.as_ref()?,
+            timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
+        };
+        let seed = resolved.scenario.seed;
+        Some(budget(&case, imperfections.budget_samples, seed).map_err(|error| error.to_string()))
+    })
+    .into_iter();
+    plans
+        .iter()
+        .map(|plan| found.by_ref().take(plan.configurations.len()).collect())
+        .collect()
+}
+
 type Harness = Result<Mutex<HarnessProcess>, String>;
 
 fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
@@ -286,7 +343,7 @@ fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
 struct Simulation<'a> {
     resolved: &'a ResolvedScenario,
     plans: &'a [GoalPlan],
-    model: &'a ClearanceModel,
+    reality: &'a Reality<'a>,
     jobs: &'a [Job],
     cancel: &'a AtomicBool,
     progress: &'a Progress,
@@ -328,7 +385,7 @@ impl Simulation<'_> {
         harness: Option<&Harness>,
         outcome: &mut EngineOutcome,
     ) -> Result<(), (Option<String>, String)> {
-        let cell = &self.resolved.cell;
+        let (cell, model) = (self.reality.cell(), self.reality.model());
         let engines = &self.resolved.scenario.engines;
         let timestep_s = engines.timestep_ms * 1e-3;
         let start = |error: EngineError| (None, error.to_string());
@@ -352,16 +409,21 @@ impl Simulation<'_> {
         };
         outcome.identity = Some(plant.identity());
         let servo = servo(self.resolved);
-        let actuation = Actuation::default();
+        let actuation = self.reality.actuation();
         for &job in self.jobs {
             let goal = &self.resolved.goals[job.goal];
             let plan = &self.plans[job.goal].configurations[job.configuration];
             let trajectory = plan.trajectory.as_ref().expect("jobs have trajectories");
+            let mass = cell.dynamics().mass_matrix(&trajectory.end());
+            if let Some(why) = ClosedLoop::instability(&mass, &servo, actuation, timestep_s) {
+                let during = format!("{} {}", goal.name, plan.configuration);
+                return Err((Some(during), why.to_string()));
+            }
             let hooks = Hooks {
                 cancel: Some(self.cancel),
                 progress: None,
             };
-            let recording = match simulate(plant.as_mut(), &servo, &actuation, trajectory, hooks) {
+            let recording = match simulate(plant.as_mut(), &servo, actuation, trajectory, hooks) {
                 Ok(recording) => recording,
                 Err(EngineError::Cancelled) => return Ok(()),
                 Err(error) => {
@@ -370,17 +432,17 @@ impl Simulation<'_> {
                 }
             };
             let period_s = self.resolved.scenario.recording.period_ms * 1e-3;
-            let mut clearance =
-                measure_clearance(cell, self.model, trajectory, &recording, period_s);
+            let mut clearance = measure_clearance(cell, model, trajectory, &recording, period_s);
             let tolerance_m = self.resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
             certify_recording(
                 &mut clearance,
                 cell,
-                self.model,
+                model,
                 trajectory,
                 &recording,
                 tolerance_m,
             );
+            self.reality.allow_for_breath(&mut clearance);
             outcome.runs.push((
                 job,
                 EngineRun {
@@ -412,17 +474,5 @@ fn mujoco_settings(engines: &needlebench_cell::scenario::EnginesSection) -> Mujo
         contact_impedance: engines.mujoco.contact_impedance,
         friction: engines.friction,
         ..MujocoSettings::default()
-    }
-}
-
-fn servo(resolved: &ResolvedScenario) -> Servo {
-    let controller = &resolved.scenario.controller;
-    Servo {
-        dynamics: resolved.cell.dynamics(),
-        gains: ServoGains {
-            kp_nm_per_rad: controller.stiffness_nm_rad,
-            kd_nms_per_rad: controller.damping_nms_rad,
-        },
-        effort_limit_nm: resolved.cell.robot.limits.efforts_nm(),
     }
 }
