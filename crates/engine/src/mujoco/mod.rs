@@ -11,4 +11,5 @@ pub use plant::{MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use process::{
     ContactSummary, GeomDistance, HarnessError, HarnessProcess, HarnessState, HarnessVersions,
     InverseDynamics, PlantHandle,
+    Replay,
 };
