@@ -9,6 +9,7 @@ mod actuation;
 mod contact_groups;
 mod error;
 pub mod mujoco;
+mod nearness;
 mod plant;
 mod rapier;
 mod recording;
@@ -20,7 +21,7 @@ mod test_cell;
 
 pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFriction};
 pub use error::EngineError;
-pub use mujoco::{MujocoIntegrator, MujocoPlant, MujocoSettings};
+pub use mujoco::{MujocoFleet, MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
 pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording};

@@ -236,8 +236,7 @@ impl HarnessProcess {
 
     /// A plant of the same compiled model with a state of its own, which has to be reset first.
     pub fn copy(&mut self, plant: &PlantHandle) -> Result<PlantHandle, HarnessError> {
-        let sealed =
-            Frame::begin_for_plant(&mut self.outbox, Request::Copy, plant.index).finish();
+        let sealed = Frame::begin_for_plant(&mut self.outbox, Request::Copy, plant.index).finish();
         self.ask(Request::Copy, sealed, |p| answers::copy(p, plant))
     }
 

@@ -227,10 +227,7 @@ pub struct Replay {
     pub qvel: Vec<f64>,
 }
 
-pub(super) fn replay(
-    mut payload: Payload<'_>,
-    plant: &PlantHandle,
-) -> Result<Replay, Malformed> {
+pub(super) fn replay(mut payload: Payload<'_>, plant: &PlantHandle) -> Result<Replay, Malformed> {
     let replay = Replay {
         elapsed_s: payload.f64()?,
         qpos: payload.f64s(plant.qpos_count)?,
