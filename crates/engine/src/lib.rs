@@ -6,6 +6,7 @@
 //! recordings is the engines' doing.
 
 mod actuation;
+mod closed_loop;
 mod contact_groups;
 mod error;
 pub mod mujoco;
@@ -20,6 +21,7 @@ mod simulate;
 mod test_cell;
 
 pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFriction};
+pub use closed_loop::{ClosedLoop, UnstableServo};
 pub use error::EngineError;
 pub use mujoco::{MujocoFleet, MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
