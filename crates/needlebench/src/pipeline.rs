@@ -10,8 +10,8 @@ use needlebench_cell::scenario::EngineName;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
-    ClosedLoop, EngineError, EngineIdentity, Hooks, MujocoPlant, MujocoSettings, Plant,
-    RapierPlant, RapierSettings, Recording, simulate,
+    ClosedLoop, EngineError, EngineIdentity, Hooks, Motion, MujocoFleet, MujocoSettings, Plant,
+    RapierPlant, RapierSettings, Recording, simulate, simulate_fleet,
 };
 use needlebench_evaluation::report::{EngineFailure, Report};
 use needlebench_evaluation::{ClearanceSeries, certify_recording, measure_clearance};
@@ -23,6 +23,9 @@ use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
 use crate::assemble::assemble;
 use crate::progress::Progress;
 use crate::reality::{Reality, servo};
+
+/// Motions that MuJoCo makes at the same time: as many as a goal has configurations.
+const FLEET_ARMS: usize = 8;
 
 /// Engines that a run uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -80,7 +83,7 @@ pub enum RunError {
 }
 
 /// One motion to simulate.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Job {
     goal: usize,
     configuration: usize,
@@ -179,10 +182,12 @@ pub(crate) fn run(
         .map(|plan| plan.configurations.iter().map(|_| Vec::new()).collect())
         .collect();
     for outcome in &mut outcomes {
-        timings.insert(
-            format!("{}_s", outcome.engine.name()),
-            outcome.wall.as_secs_f64(),
-        );
+        let name = outcome.engine.name();
+        let wall_s = outcome.wall.as_secs_f64();
+        timings.insert(format!("{name}_s"), wall_s);
+        if let Some(factor) = outcome.real_time_factor() {
+            timings.insert(format!("{name}_real_time_factor"), factor);
+        }
         for (job, run) in outcome.runs.drain(..) {
             runs[job.goal][job.configuration].push(run);
         }
@@ -357,6 +362,20 @@ struct EngineOutcome {
     wall: Duration,
 }
 
+impl EngineOutcome {
+    /// Simulated time over the wall-clock time of all motions of an engine, with everything that
+    /// belongs to them: building the plants, control, recording and the certified clearance.
+    fn real_time_factor(&self) -> Option<f64> {
+        let durations_s = self
+            .runs
+            .iter()
+            .filter_map(|(_, run)| run.recording.time_s.last());
+        let simulated_s: f64 = durations_s.sum();
+        let wall_s = self.wall.as_secs_f64();
+        (simulated_s > 0.0 && wall_s > 0.0).then(|| simulated_s / wall_s)
+    }
+}
+
 impl Simulation<'_> {
     fn run(&self, engine: EngineName, harness: Option<&Harness>) -> EngineOutcome {
         let started = Instant::now();
@@ -385,75 +404,129 @@ impl Simulation<'_> {
         harness: Option<&Harness>,
         outcome: &mut EngineOutcome,
     ) -> Result<(), (Option<String>, String)> {
-        let (cell, model) = (self.reality.cell(), self.reality.model());
+        let cell = self.reality.cell();
         let engines = &self.resolved.scenario.engines;
         let timestep_s = engines.timestep_ms * 1e-3;
         let start = |error: EngineError| (None, error.to_string());
-        let mut process;
-        let mut plant: Box<dyn Plant> = match engine {
+        let servo = servo(self.resolved);
+        let actuation = self.reality.actuation();
+        for &job in self.jobs {
+            let trajectory = self.plan(job).trajectory.as_ref().expect("jobs have one");
+            let mass = cell.dynamics().mass_matrix(&trajectory.end());
+            if let Some(why) = ClosedLoop::instability(&mass, &servo, actuation, timestep_s) {
+                return Err((Some(self.in_words(job)), why.to_string()));
+            }
+        }
+        let motions: Vec<Motion<'_>> = self
+            .jobs
+            .iter()
+            .map(|job| Motion {
+                servo: &servo,
+                actuation,
+                trajectory: self.plan(*job).trajectory.as_ref().expect("jobs have one"),
+            })
+            .collect();
+        // The first motion that failed, in the order of the jobs.
+        let mut failure: Option<(usize, EngineError)> = None;
+        let mut finished = Vec::new();
+        let mut ended = |index: usize, result: Result<Recording, EngineError>| {
+            match result {
+                Ok(recording) => finished.push((index, self.measured(engine, index, recording))),
+                Err(error) if failure.as_ref().is_none_or(|(first, _)| index < *first) => {
+                    failure = Some((index, error));
+                }
+                Err(_) => {}
+            }
+            self.progress.step();
+        };
+        let outcome_of_all = match engine {
             EngineName::Rapier => {
                 let settings = rapier_settings(engines);
-                Box::new(RapierPlant::new(cell, timestep_s, &settings).map_err(start)?)
+                let mut plant = RapierPlant::new(cell, timestep_s, &settings).map_err(start)?;
+                outcome.identity = Some(plant.identity());
+                motions.iter().enumerate().try_for_each(|(index, motion)| {
+                    let hooks = Hooks {
+                        cancel: Some(self.cancel),
+                        progress: None,
+                    };
+                    let Motion {
+                        servo,
+                        actuation,
+                        trajectory,
+                    } = motion;
+                    match simulate(&mut plant, servo, actuation, trajectory, hooks) {
+                        Err(EngineError::Cancelled) => return Err(EngineError::Cancelled),
+                        result => ended(index, result),
+                    }
+                    Ok(())
+                })
             }
             EngineName::Mujoco => {
                 let harness = harness.expect("a MuJoCo run has a harness or its error");
-                process = match harness {
+                let mut process = match harness {
                     Ok(process) => process.lock().expect("one thread uses it"),
                     Err(message) => return Err((None, message.clone())),
                 };
                 let settings = mujoco_settings(engines);
-                Box::new(
-                    MujocoPlant::new(&mut process, cell, timestep_s, &settings).map_err(start)?,
-                )
+                let arms = motions.len().min(FLEET_ARMS);
+                let mut fleet = MujocoFleet::new(&mut process, cell, timestep_s, &settings, arms)
+                    .map_err(start)?;
+                outcome.identity = Some(fleet.identity());
+                simulate_fleet(&mut fleet, &motions, Some(self.cancel), ended)
             }
         };
-        outcome.identity = Some(plant.identity());
-        let servo = servo(self.resolved);
-        let actuation = self.reality.actuation();
-        for &job in self.jobs {
-            let goal = &self.resolved.goals[job.goal];
-            let plan = &self.plans[job.goal].configurations[job.configuration];
-            let trajectory = plan.trajectory.as_ref().expect("jobs have trajectories");
-            let mass = cell.dynamics().mass_matrix(&trajectory.end());
-            if let Some(why) = ClosedLoop::instability(&mass, &servo, actuation, timestep_s) {
-                let during = format!("{} {}", goal.name, plan.configuration);
-                return Err((Some(during), why.to_string()));
-            }
-            let hooks = Hooks {
-                cancel: Some(self.cancel),
-                progress: None,
-            };
-            let recording = match simulate(plant.as_mut(), &servo, actuation, trajectory, hooks) {
-                Ok(recording) => recording,
-                Err(EngineError::Cancelled) => return Ok(()),
-                Err(error) => {
-                    let during = format!("{} {}", goal.name, plan.configuration);
-                    return Err((Some(during), error.to_string()));
+        finished.sort_by_key(|(index, _)| *index);
+        let runs = finished.into_iter();
+        outcome.runs = runs.map(|(index, run)| (self.jobs[index], run)).collect();
+        match outcome_of_all {
+            Err(EngineError::Cancelled) => return Ok(()),
+            // The process served several motions: the first that is not there stands for all.
+            Err(error) => {
+                let missing = (0..self.jobs.len())
+                    .find(|&index| outcome.runs.iter().all(|(job, _)| *job != self.jobs[index]));
+                if let Some(index) = missing {
+                    failure = Some((index, error));
                 }
-            };
-            let period_s = self.resolved.scenario.recording.period_ms * 1e-3;
-            let mut clearance = measure_clearance(cell, model, trajectory, &recording, period_s);
-            let tolerance_m = self.resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
-            certify_recording(
-                &mut clearance,
-                cell,
-                model,
-                trajectory,
-                &recording,
-                tolerance_m,
-            );
-            self.reality.allow_for_breath(&mut clearance);
-            outcome.runs.push((
-                job,
-                EngineRun {
-                    engine,
-                    recording,
-                    clearance,
-                },
-            ));
-            self.progress.step();
+            }
+            Ok(()) => {}
         }
-        Ok(())
+        failure.map_or(Ok(()), |(index, error)| {
+            Err((Some(self.in_words(self.jobs[index])), error.to_string()))
+        })
+    }
+
+    fn plan(&self, job: Job) -> &ConfigurationPlan {
+        &self.plans[job.goal].configurations[job.configuration]
+    }
+
+    /// Goal and configuration, for people.
+    fn in_words(&self, job: Job) -> String {
+        let goal = &self.resolved.goals[job.goal].name;
+        format!("{goal} {}", self.plan(job).configuration)
+    }
+
+    /// A recording with the clearances along it.
+    fn measured(&self, engine: EngineName, index: usize, recording: Recording) -> EngineRun {
+        let (cell, model) = (self.reality.cell(), self.reality.model());
+        let plan = self.plan(self.jobs[index]);
+        let trajectory = plan.trajectory.as_ref().expect("jobs have trajectories");
+        let period_s = self.resolved.scenario.recording.period_ms * 1e-3;
+        let mut clearance = measure_clearance(cell, model, trajectory, &recording, period_s);
+        let tolerance_m = self.resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
+        certify_recording(
+            &mut clearance,
+            cell,
+            model,
+            trajectory,
+            &recording,
+            tolerance_m,
+        );
+        self.reality.allow_for_breath(&mut clearance);
+        EngineRun {
+            engine,
+            recording,
+            clearance,
+        }
     }
 }
 
