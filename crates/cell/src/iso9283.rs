@@ -192,6 +192,22 @@ pub struct Iso9283Protocol {
     pub tracker_noise_m: f64,
 }
 
+/// A stand at a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stop {
+    /// Which pose, from 0.
+    pub pose: usize,
+    /// Axis of the base frame along which it was approached: 0 to 2 for x to z. None for the
+    /// plain sequence of poses.
+    pub axis: Option<usize>,
+    /// When the motion to it starts, s.
+    pub departure_s: f64,
+    /// When the planned motion ends, s.
+    pub arrival_s: f64,
+    /// When the robot leaves, s.
+    pub end_s: f64,
+}
+
 /// Values of the section outside their sensible ranges, and what contradicts it.
 pub(crate) fn check_iso9283(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
     let Some(section) = &scenario.iso9283 else {
