@@ -6,6 +6,7 @@ mod clearance;
 pub mod compare;
 mod criteria;
 mod facts;
+pub mod iso9283;
 mod judge;
 pub mod metric;
 mod motion;

@@ -7,6 +7,7 @@ use needlebench_engine::EngineIdentity;
 use needlebench_uncertainty::budget::ErrorBudget;
 use serde::Serialize;
 
+use crate::iso9283::Iso9283Report;
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
 use crate::ranking::{Dominance, GoalRanking, RankingReport};
@@ -28,6 +29,9 @@ pub struct Report {
     pub criteria: Vec<CriterionResult>,
     /// The goals.
     pub goals: Vec<GoalReport>,
+    /// The test by ISO 9283, in place of goals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iso9283: Option<Iso9283Report>,
     /// Engines that failed, and how; their results are missing.
     pub engine_failures: Vec<EngineFailure>,
     /// What the shipped arm's enclosing primitives would cost beside the meshes of the robot in

@@ -85,6 +85,7 @@ pub(crate) fn assemble(
         verdict,
         criteria,
         goals,
+        iso9283: None,
         engine_failures,
         enclosure: enclosures(&resolved.cell.robot),
         notes: resolved.notes.clone(),

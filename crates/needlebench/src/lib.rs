@@ -8,6 +8,7 @@ mod atomic;
 mod cli;
 mod command;
 pub mod exit;
+mod iso9283;
 mod output;
 mod paper;
 pub mod picture;
@@ -18,4 +19,5 @@ mod reality;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use cli::{command_line, main};
+pub use iso9283::ProtocolRun;
 pub use pipeline::{EngineChoice, RunOptions, ScenarioRun, run_scenario};

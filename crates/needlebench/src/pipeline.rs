@@ -21,6 +21,7 @@ use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
 use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
 
 use crate::assemble::assemble;
+use crate::iso9283::{self, ProtocolRun};
 use crate::progress::Progress;
 use crate::reality::{Reality, servo};
 
@@ -36,6 +37,23 @@ pub enum EngineChoice {
     Mujoco,
     /// Both.
     Both,
+}
+
+impl EngineChoice {
+    /// The engines of a choice, or else the scenario's own, each once and in order.
+    pub(crate) fn engines(choice: Option<Self>, resolved: &ResolvedScenario) -> Vec<EngineName> {
+        match choice {
+            None => {
+                let mut engines = resolved.scenario.engines.run.clone();
+                engines.sort_unstable();
+                engines.dedup();
+                engines
+            }
+            Some(Self::Rapier) => vec![EngineName::Rapier],
+            Some(Self::Mujoco) => vec![EngineName::Mujoco],
+            Some(Self::Both) => vec![EngineName::Rapier, EngineName::Mujoco],
+        }
+    }
 }
 
 /// How to run a scenario.
@@ -67,6 +85,8 @@ pub struct ScenarioRun {
     pub plans: Vec<GoalPlan>,
     /// Recordings, by goal, configuration and engine.
     pub runs: Vec<Vec<Vec<EngineRun>>>,
+    /// What a test by ISO 9283 left besides its report.
+    pub iso9283: Option<ProtocolRun>,
     /// It was interrupted; what was finished until then is here.
     pub interrupted: bool,
 }
@@ -100,19 +120,12 @@ pub(crate) fn run(
     cancel: &AtomicBool,
     progress: &Progress,
 ) -> Result<ScenarioRun, RunError> {
+    if let Some(protocol) = &resolved.iso9283 {
+        return Ok(iso9283::run(resolved, protocol, options, cancel, progress)?);
+    }
     let started = Instant::now();
     let mut timings = BTreeMap::new();
-    let engines = match options.engines {
-        None => {
-            let mut engines = resolved.scenario.engines.run.clone();
-            engines.sort_unstable();
-            engines.dedup();
-            engines
-        }
-        Some(EngineChoice::Rapier) => vec![EngineName::Rapier],
-        Some(EngineChoice::Mujoco) => vec![EngineName::Mujoco],
-        Some(EngineChoice::Both) => vec![EngineName::Rapier, EngineName::Mujoco],
-    };
+    let engines = EngineChoice::engines(options.engines, resolved);
     let model = ClearanceModel::new(&resolved.cell);
     let planner = Planner::new(resolved, &model)?;
     let reality = Reality::new(resolved, &model)?;
@@ -216,6 +229,7 @@ pub(crate) fn run(
         report,
         plans,
         runs,
+        iso9283: None,
         interrupted,
     })
 }
@@ -334,9 +348,9 @@ fn budgets(resolved: &ResolvedScenario, plans: &[GoalPlan], threads: usize) -> B
         .collect()
 }
 
-type Harness = Result<Mutex<HarnessProcess>, String>;
+pub(crate) type Harness = Result<Mutex<HarnessProcess>, String>;
 
-fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
+pub(crate) fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
     let timeout = Duration::from_secs_f64(resolved.scenario.engines.harness_timeout_s);
     let environment =
         ensure(&mut |text| progress.message(text)).map_err(|error| error.to_string())?;
@@ -530,7 +544,9 @@ impl Simulation<'_> {
     }
 }
 
-fn rapier_settings(engines: &needlebench_cell::scenario::EnginesSection) -> RapierSettings {
+pub(crate) fn rapier_settings(
+    engines: &needlebench_cell::scenario::EnginesSection,
+) -> RapierSettings {
     RapierSettings {
         contact_natural_frequency_hz: engines.rapier.contact_natural_frequency_hz,
         contact_damping_ratio: engines.rapier.contact_damping_ratio,
@@ -540,7 +556,9 @@ fn rapier_settings(engines: &needlebench_cell::scenario::EnginesSection) -> Rapi
     }
 }
 
-fn mujoco_settings(engines: &needlebench_cell::scenario::EnginesSection) -> MujocoSettings {
+pub(crate) fn mujoco_settings(
+    engines: &needlebench_cell::scenario::EnginesSection,
+) -> MujocoSettings {
     MujocoSettings {
         contact_stiffness_per_s2: engines.mujoco.contact_stiffness_per_s2,
         contact_damping_per_s: engines.mujoco.contact_damping_per_s,
