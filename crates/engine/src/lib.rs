@@ -11,6 +11,7 @@ pub mod mujoco;
 mod plant;
 mod rapier;
 mod recording;
+mod referee;
 mod servo;
 mod simulate;
 #[cfg(test)]
@@ -22,5 +23,6 @@ pub use mujoco::{MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
 pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording};
+pub use referee::{RefereePlant, RefereeSettings, TorqueHold};
 pub use servo::{Servo, ServoGains, ServoOutput};
 pub use simulate::{Hooks, simulate};

@@ -39,6 +39,7 @@ pub fn simulate(
     servo.check()?;
     let started = Instant::now();
     let timestep_s = plant.timestep_s();
+    let velocity_age_s = plant.velocity_age_s();
     let engine = plant.identity();
     let steps = step_count(trajectory.duration_s(), timestep_s);
 
@@ -66,7 +67,7 @@ pub fn simulate(
         }
         let time_s = k as f64 * timestep_s;
         let output = servo.torque(
-            &servo_reference(trajectory, time_s, timestep_s),
+            &servo_reference(trajectory, time_s, velocity_age_s),
             &state.position,
             &state.velocity,
         );
@@ -93,10 +94,10 @@ pub fn simulate(
 /// positions follow the trajectory to second order, while the velocities belong half a step
 /// earlier. Taking the velocity there removes a bias of `kd * h / 2 * qdd`, which is 0.3 N m at
 /// 10 rad/s^2 and 1 ms.
-fn servo_reference(trajectory: &JointTrajectory, time_s: f64, timestep_s: f64) -> JointState {
+fn servo_reference(trajectory: &JointTrajectory, time_s: f64, velocity_age_s: f64) -> JointState {
     JointState {
         velocity: trajectory
-            .sample((time_s - 0.5 * timestep_s).max(0.0))
+            .sample((time_s - velocity_age_s).max(0.0))
             .velocity,
         ..trajectory.sample(time_s)
     }
