@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::envelope::EnvelopeSection;
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
 pub use crate::people::{PeopleSection, PersonSection};
 use crate::ranking::RankingSection;
@@ -458,6 +459,8 @@ pub struct EnginesSection {
     pub rapier: RapierSection,
     /// Settings of MuJoCo alone.
     pub mujoco: MujocoSection,
+    /// How far the engines may differ.
+    pub envelope: EnvelopeSection,
 }
 
 /// Settings of rapier alone.
@@ -535,6 +538,7 @@ impl Default for EnginesSection {
             friction: 0.0,
             rapier: RapierSection::default(),
             mujoco: MujocoSection::default(),
+            envelope: EnvelopeSection::default(),
         }
     }
 }

@@ -23,6 +23,6 @@ pub use mujoco::{MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
 pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording};
-pub use referee::{RefereePlant, RefereeSettings, TorqueHold};
+pub use referee::{RefereePlant, RefereeSettings, TorqueHold, retrace};
 pub use servo::{Servo, ServoGains, ServoOutput};
 pub use simulate::{Hooks, simulate};

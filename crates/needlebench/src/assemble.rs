@@ -22,6 +22,7 @@ use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 
 use crate::pipeline::EngineRun;
 use crate::provenance::provenance;
+use crate::trial::Trial;
 
 /// What all parts of a report are made with.
 struct Context<'a> {
@@ -41,6 +42,7 @@ pub(crate) fn assemble(
     model: &ClearanceModel,
     plans: &[GoalPlan],
     runs: &[Vec<Vec<EngineRun>>],
+    trials: &[Vec<Trial>],
     engines: &[EngineName],
     engine_failures: Vec<EngineFailure>,
     identities: Vec<EngineIdentity>,
@@ -55,8 +57,9 @@ pub(crate) fn assemble(
     let mut goals: Vec<GoalReport> = plans
         .iter()
         .zip(runs)
+        .zip(trials)
         .enumerate()
-        .map(|(index, (plan, runs))| goal_report(&context, index, plan, runs))
+        .map(|(index, ((plan, runs), trials))| goal_report(&context, index, plan, runs, trials))
         .collect();
     let both = engines.len() == 2 && engine_failures.is_empty();
     let (verdict, criteria) = judge(
@@ -91,6 +94,7 @@ fn goal_report(
     goal_index: usize,
     plan: &GoalPlan,
     runs: &[Vec<EngineRun>],
+    trials: &[Trial],
 ) -> GoalReport {
     let resolved = context.resolved;
     let goal = &resolved.goals[goal_index];
@@ -110,8 +114,9 @@ fn goal_report(
             .configurations
             .iter()
             .zip(runs)
-            .map(|(plan, runs)| {
-                configuration_report(context, goal_index, plan, runs, route.as_ref())
+            .zip(trials)
+            .map(|((plan, runs), trial)| {
+                configuration_report(context, goal_index, plan, runs, trial, route.as_ref())
             })
             .collect(),
         recommended: None,
@@ -124,6 +129,7 @@ fn configuration_report(
     goal_index: usize,
     plan: &ConfigurationPlan,
     runs: &[EngineRun],
+    trial: &Trial,
     route: Option<&ClassClearance>,
 ) -> ConfigurationReport {
     let Context {
@@ -194,6 +200,8 @@ fn configuration_report(
         }),
         engines,
         engine_difference,
+        adjudication: trial.adjudication.clone(),
+        referee: trial.referee.clone(),
         clearance,
         tip_sensitivity_m_per_rad: candidate.map(|each| tip_sensitivity(cell, goal, &each.joints)),
         pareto: false,

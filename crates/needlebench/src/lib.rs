@@ -14,6 +14,7 @@ pub mod picture;
 mod pipeline;
 mod progress;
 mod provenance;
+mod trial;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use cli::{command_line, main};

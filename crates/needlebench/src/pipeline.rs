@@ -39,6 +39,8 @@ pub struct RunOptions {
     pub engines: Option<EngineChoice>,
     /// Threads; more than there are engines and goals is no use.
     pub jobs: usize,
+    /// Whether to hold every simulated motion against the referee.
+    pub referee: bool,
 }
 
 /// Recording of one engine with the clearances along it.
@@ -172,6 +174,22 @@ pub(crate) fn run(
             runs[job.goal][job.configuration].push(run);
         }
     }
+    let refereed = Instant::now();
+    let trials = crate::trial::try_all(
+        &crate::trial::Court {
+            resolved,
+            plans: &plans,
+            runs: &runs,
+            always: options.referee,
+            threads: options.jobs,
+            cancel,
+            progress,
+        },
+        harness.as_ref().and_then(|harness| harness.as_ref().ok()),
+    );
+    if trials.identity.is_some() {
+        timings.insert("referee_s".to_owned(), refereed.elapsed().as_secs_f64());
+    }
     let failures = outcomes
         .iter_mut()
         .filter_map(|outcome| outcome.failure.take())
@@ -179,11 +197,22 @@ pub(crate) fn run(
     let identities = outcomes
         .iter_mut()
         .filter_map(|outcome| outcome.identity.take())
+        .chain(trials.identity)
         .collect();
     let interrupted = cancel.load(Ordering::Relaxed);
     let mut report = assemble(
-        resolved, &planner, &model, &plans, &runs, &engines, failures, identities, timings,
+        resolved,
+        &planner,
+        &model,
+        &plans,
+        &runs,
+        &trials.by_goal,
+        &engines,
+        failures,
+        identities,
+        timings,
     );
+    report.notes.extend(trials.notes);
     if interrupted {
         report.notes.push(
             "the run was interrupted: motions that had not been simulated by then are missing"
@@ -394,7 +423,9 @@ impl Simulation<'_> {
     }
 }
 
-fn rapier_settings(engines: &needlebench_cell::scenario::EnginesSection) -> RapierSettings {
+pub(crate) fn rapier_settings(
+    engines: &needlebench_cell::scenario::EnginesSection,
+) -> RapierSettings {
     RapierSettings {
         contact_natural_frequency_hz: engines.rapier.contact_natural_frequency_hz,
         contact_damping_ratio: engines.rapier.contact_damping_ratio,
@@ -404,7 +435,9 @@ fn rapier_settings(engines: &needlebench_cell::scenario::EnginesSection) -> Rapi
     }
 }
 
-fn mujoco_settings(engines: &needlebench_cell::scenario::EnginesSection) -> MujocoSettings {
+pub(crate) fn mujoco_settings(
+    engines: &needlebench_cell::scenario::EnginesSection,
+) -> MujocoSettings {
     MujocoSettings {
         contact_stiffness_per_s2: engines.mujoco.contact_stiffness_per_s2,
         contact_damping_per_s: engines.mujoco.contact_damping_per_s,
@@ -414,7 +447,7 @@ fn mujoco_settings(engines: &needlebench_cell::scenario::EnginesSection) -> Mujo
     }
 }
 
-fn servo(resolved: &ResolvedScenario) -> Servo {
+pub(crate) fn servo(resolved: &ResolvedScenario) -> Servo {
     let controller = &resolved.scenario.controller;
     Servo {
         dynamics: resolved.cell.dynamics(),

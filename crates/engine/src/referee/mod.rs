@@ -1,9 +1,13 @@
 //! The arm by our own equations of motion, integrated to rounding: the referee of the engines.
 
+mod retrace;
+
 use nalgebra::SVector;
 use needlebench_cell::Cell;
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, JOINT_LABELS, Joints, Pose, integrate};
 use serde::{Deserialize, Serialize};
+
+pub use retrace::retrace;
 
 use crate::error::check_bodies;
 use crate::plant::checked_timestep_s;

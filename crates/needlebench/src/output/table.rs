@@ -37,6 +37,13 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             writeln!(out, "room for people, in the final posture")?;
             writeln!(out, "{}", room_table(goal))?;
         }
+        if let Some(table) = super::referee::referee_table(goal) {
+            writeln!(
+                out,
+                "each engine beside the referee: distance of the needle's tips"
+            )?;
+            writeln!(out, "{table}")?;
+        }
         write_remarks(out, report, goal)?;
     }
     for failure in &report.engine_failures {
