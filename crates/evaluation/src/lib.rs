@@ -2,6 +2,7 @@
 //!
 //! Definitions are those of the field: see each field's documentation. SI units and radians.
 
+pub mod adjudication;
 mod clearance;
 pub mod compare;
 mod criteria;
@@ -15,6 +16,7 @@ pub mod pareto;
 mod provenance;
 pub mod ranking;
 mod reason;
+pub mod referee;
 pub mod report;
 pub mod room;
 mod sensitivity;

@@ -109,6 +109,8 @@ fn configuration(index: usize) -> ConfigurationReport {
             peak_tip_m: 1e-6,
             settled_tip_m: 1e-9,
         }),
+        adjudication: None,
+        referee: None,
         clearance: ClearanceReport::new(BTreeMap::from(classes)),
         room: None,
         tip_sensitivity_m_per_rad: Some(0.8),

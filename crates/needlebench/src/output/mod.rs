@@ -9,6 +9,7 @@ mod markdown;
 pub(crate) mod pictures;
 mod ranking;
 mod recording;
+mod referee;
 pub(crate) mod room_pictures;
 mod table;
 
