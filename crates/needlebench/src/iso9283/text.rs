@@ -95,7 +95,7 @@ pub(crate) fn measured_text(report: &MeasuredReport) -> String {
 }
 
 /// AP, RP, vAP, stabilisation and drift as tables and lines.
-pub(crate) fn statistics_text(
+fn statistics_text(
     statistics: &ProtocolStatistics,
     stabilisation: &[StabilisationReport],
     drift: Option<&Drift>,
