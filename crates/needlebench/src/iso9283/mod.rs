@@ -7,7 +7,7 @@ mod write;
 
 pub(crate) use picture::{attained_picture, stabilisation_picture};
 pub(crate) use simulate::{EngineCycles, simulate_engine};
-pub(crate) use text::{measured_text, report_markdown, report_text, statistics_text};
+pub(crate) use text::{measured_text, report_markdown, report_text};
 pub(crate) use write::write_results;
 
 use std::collections::BTreeMap;
