@@ -6,6 +6,7 @@
 //! recordings is the engines' doing.
 
 mod actuation;
+mod brakes;
 mod contact_groups;
 mod error;
 pub mod mujoco;
@@ -19,10 +20,14 @@ mod simulate;
 mod test_cell;
 
 pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFriction};
+pub use brakes::{
+    Brakes, PUBLISHED_LOAD_KG, PUBLISHED_SPEED_RAD_S, PUBLISHED_STOPS, PublishedStop, loaded,
+    stretched,
+};
 pub use error::EngineError;
 pub use mujoco::{MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
 pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording};
 pub use servo::{Servo, ServoGains, ServoOutput};
-pub use simulate::{Drive, Hooks, simulate};
+pub use simulate::{Braking, Drive, Hooks, simulate, simulate_with_stop};
