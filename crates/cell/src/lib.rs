@@ -5,6 +5,7 @@
 
 mod calibration;
 mod enclosure;
+mod events;
 mod files;
 mod finding;
 pub mod fixtures;

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use crate::events::{EventsSection, PressClass, PressSection, StopSection};
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
 pub use crate::imperfections::ImperfectionsSection;
 pub use crate::people::{PeopleSection, PersonSection};
@@ -77,6 +78,9 @@ pub struct Scenario {
     /// if left out.
     #[serde(default)]
     pub imperfections: Option<ImperfectionsSection>,
+    /// Contacts, stops and the way back, simulated besides the planned motion; none if left out.
+    #[serde(default)]
+    pub events: Option<EventsSection>,
 }
 
 /// The arm.

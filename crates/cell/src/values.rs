@@ -3,6 +3,7 @@
 use needlebench_kinematics::JOINT_COUNT;
 
 use crate::Finding;
+use crate::events::check_events;
 use crate::imperfections::check_imperfections;
 use crate::people::check_people;
 use crate::ranking::check_ranking;
@@ -341,6 +342,7 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
         }
     }
     findings.extend(check_ranking(toml, &scenario.ranking));
+    findings.extend(check_events(toml, scenario));
     if let Some(section) = &scenario.imperfections {
         let timestep_ms = scenario.engines.timestep_ms;
         findings.extend(check_imperfections(toml, section, timestep_ms));

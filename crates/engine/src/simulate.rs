@@ -134,7 +134,7 @@ impl<'a> Drive<'a> {
                 let torque_nm = brakes.torque(dynamics, &state.position, &state.velocity, h);
                 ActuatedTorque {
                     link_nm: torque_nm,
-                    drive_nm: torque_nm,
+                    drive_nm: Joints::zeros(),
                     saturated: [false; JOINT_COUNT],
                 }
             }

@@ -4,7 +4,9 @@
 
 mod clearance;
 pub mod compare;
+mod contact;
 mod criteria;
+pub mod events;
 mod facts;
 mod judge;
 pub mod metric;
@@ -24,6 +26,7 @@ pub use clearance::{
     ClearanceSeries, certify_recording, measure_clearance, needle_route, planned_clearance,
     posture_clearance, sample_indices,
 };
+pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balance};
 pub use criteria::{Criterion, check_configuration};
 pub use judge::judge;
 pub use motion::{

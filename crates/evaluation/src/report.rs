@@ -6,6 +6,7 @@ use needlebench_cell::LinkEnclosure;
 use needlebench_engine::EngineIdentity;
 use serde::Serialize;
 
+use crate::events::EventsReport;
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
 use crate::ranking::{Dominance, GoalRanking, RankingReport};
@@ -245,6 +246,9 @@ pub struct ConfigurationReport {
     /// Clearances over the motions of all engines; over the planned motion where nothing was
     /// simulated, and of the final posture where there is no motion.
     pub clearance: ClearanceReport,
+    /// Contacts, stop and way back, where the scenario asks for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub events: Option<EventsReport>,
     /// Room that it leaves to the people around it.
     pub room: Option<RoomReport>,
     /// How far the needle's tip moves, root mean square, when every joint has an independent error.

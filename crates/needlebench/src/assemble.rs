@@ -14,12 +14,13 @@ use needlebench_evaluation::report::{
 };
 use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
-    engine_difference, judge, measure_motion, measure_needle, needle_route, planned_clearance,
-    posture_clearance, tip_sensitivity,
+    add_approach_speeds, engine_difference, judge, measure_motion, measure_needle, needle_route,
+    planned_clearance, posture_clearance, tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 
+use crate::events::{EventRun, events_report};
 use crate::pipeline::EngineRun;
 use crate::provenance::provenance;
 
@@ -29,6 +30,7 @@ struct Context<'a> {
     planner: &'a Planner<'a>,
     model: &'a ClearanceModel,
     room: RoomModel<'a>,
+    events: &'a [EventRun],
 }
 
 #[expect(
@@ -41,6 +43,7 @@ pub(crate) fn assemble(
     model: &ClearanceModel,
     plans: &[GoalPlan],
     runs: &[Vec<Vec<EngineRun>>],
+    events: &[EventRun],
     engines: &[EngineName],
     engine_failures: Vec<EngineFailure>,
     identities: Vec<EngineIdentity>,
@@ -51,6 +54,7 @@ pub(crate) fn assemble(
         planner,
         model,
         room: RoomModel::new(resolved),
+        events,
     };
     let mut goals: Vec<GoalReport> = plans
         .iter()
@@ -131,6 +135,7 @@ fn configuration_report(
         planner,
         model,
         room,
+        events,
     } = context;
     let cell = &resolved.cell;
     let goal = &resolved.goals[goal_index];
@@ -138,7 +143,9 @@ fn configuration_report(
     let engines: BTreeMap<String, EngineReport> = runs
         .iter()
         .map(|run| {
-            let report = engine_report(resolved, goal, plan, run);
+            let mut report = engine_report(resolved, goal, plan, run);
+            let contacts = &mut report.motion.contact.episodes;
+            add_approach_speeds(contacts, cell, model, &run.recording);
             (run.engine.name().to_owned(), report)
         })
         .collect();
@@ -199,6 +206,10 @@ fn configuration_report(
         pareto: false,
         dominated_by: None,
         ranking: None,
+        events: events
+            .iter()
+            .find(|run| run.goal == goal_index && run.configuration == plan.configuration.index())
+            .map(|run| events_report(resolved, model, plan, run)),
         room: candidate.map(|each| room.measure(goal_index, &each.joints)),
         files: Vec::new(),
     }

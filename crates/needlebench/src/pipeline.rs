@@ -19,6 +19,7 @@ use needlebench_kinematics::NotUrGeometry;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
 
 use crate::assemble::assemble;
+use crate::events::{self, EventRun, EventSimulation};
 use crate::progress::Progress;
 
 /// Engines that a run uses.
@@ -61,6 +62,8 @@ pub struct ScenarioRun {
     pub plans: Vec<GoalPlan>,
     /// Recordings, by goal, configuration and engine.
     pub runs: Vec<Vec<Vec<EngineRun>>>,
+    /// Events of the configurations that work.
+    pub(crate) events: Vec<EventRun>,
     /// It was interrupted; what was finished until then is here.
     pub interrupted: bool,
 }
@@ -159,6 +162,24 @@ pub(crate) fn run(
         started.elapsed().as_secs_f64() - timings["planning_s"],
     );
 
+    let mut events = events::stage(resolved, &model, &plans, options.jobs);
+    let event_simulation = EventSimulation {
+        resolved,
+        plans: &plans,
+        harness: harness.as_ref(),
+        cancel,
+    };
+    let event_results = in_parallel(options.jobs.min(2), &engines, |engine| {
+        event_simulation.run(*engine, &events)
+    });
+    let mut event_failures = Vec::new();
+    for (engine, (done, failure)) in engines.iter().zip(event_results) {
+        event_failures.extend(failure);
+        for (run, done) in events.iter_mut().zip(done) {
+            run.engines.insert(*engine, done);
+        }
+    }
+
     let mut runs: Vec<Vec<Vec<EngineRun>>> = plans
         .iter()
         .map(|plan| plan.configurations.iter().map(|_| Vec::new()).collect())
@@ -175,6 +196,7 @@ pub(crate) fn run(
     let failures = outcomes
         .iter_mut()
         .filter_map(|outcome| outcome.failure.take())
+        .chain(event_failures)
         .collect();
     let identities = outcomes
         .iter_mut()
@@ -182,7 +204,7 @@ pub(crate) fn run(
         .collect();
     let interrupted = cancel.load(Ordering::Relaxed);
     let mut report = assemble(
-        resolved, &planner, &model, &plans, &runs, &engines, failures, identities, timings,
+        resolved, &planner, &model, &plans, &runs, &events, &engines, failures, identities, timings,
     );
     if interrupted {
         report.notes.push(
@@ -194,6 +216,7 @@ pub(crate) fn run(
         report,
         plans,
         runs,
+        events,
         interrupted,
     })
 }
@@ -272,7 +295,7 @@ fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
         .collect()
 }
 
-type Harness = Result<Mutex<HarnessProcess>, String>;
+pub(crate) type Harness = Result<Mutex<HarnessProcess>, String>;
 
 fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
     let timeout = Duration::from_secs_f64(resolved.scenario.engines.harness_timeout_s);
@@ -395,7 +418,9 @@ impl Simulation<'_> {
     }
 }
 
-fn rapier_settings(engines: &needlebench_cell::scenario::EnginesSection) -> RapierSettings {
+pub(crate) fn rapier_settings(
+    engines: &needlebench_cell::scenario::EnginesSection,
+) -> RapierSettings {
     RapierSettings {
         contact_natural_frequency_hz: engines.rapier.contact_natural_frequency_hz,
         contact_damping_ratio: engines.rapier.contact_damping_ratio,
@@ -405,7 +430,9 @@ fn rapier_settings(engines: &needlebench_cell::scenario::EnginesSection) -> Rapi
     }
 }
 
-fn mujoco_settings(engines: &needlebench_cell::scenario::EnginesSection) -> MujocoSettings {
+pub(crate) fn mujoco_settings(
+    engines: &needlebench_cell::scenario::EnginesSection,
+) -> MujocoSettings {
     MujocoSettings {
         contact_stiffness_per_s2: engines.mujoco.contact_stiffness_per_s2,
         contact_damping_per_s: engines.mujoco.contact_damping_per_s,
@@ -415,7 +442,7 @@ fn mujoco_settings(engines: &needlebench_cell::scenario::EnginesSection) -> Mujo
     }
 }
 
-fn servo(resolved: &ResolvedScenario) -> Servo {
+pub(crate) fn servo(resolved: &ResolvedScenario) -> Servo {
     let controller = &resolved.scenario.controller;
     Servo {
         dynamics: resolved.cell.dynamics(),

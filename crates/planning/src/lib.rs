@@ -7,10 +7,12 @@ mod family;
 mod getting_there;
 mod motion;
 mod plan;
+mod press;
 mod rejection;
 mod transfer;
 
 pub use family::{Aim, Best, EDGE_RAD, Edge, Family, Member, RollRange};
 pub use motion::MotionChecker;
 pub use plan::{Candidate, ConfigurationPlan, GoalPlan, Planner, PostureMargins, SearchEffort};
+pub use press::{PressError, PressPlan, stage_press};
 pub use rejection::{Rejection, Rule};
