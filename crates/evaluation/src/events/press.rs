@@ -13,6 +13,9 @@ use crate::contact::{
 };
 use crate::needle::tip_of;
 
+/// Time before the settled force in which its ripple is taken, s.
+const RIPPLE_S: f64 = 0.05;
+
 /// A contact that was asked for, in all engines.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PressReport {
@@ -51,7 +54,9 @@ pub struct PressEngineReport {
     pub balance_difference: Option<f64>,
     /// Distance of the tip from its reference when settled, m: what the servo yields.
     pub settled_tip_offset_m: Option<f64>,
-    /// Longest time from the end of a contact until the tip follows its reference again, s.
+    /// Range of that force in the 50 ms before, N: a contact that chatters has not settled.
+    pub force_ripple_n: Option<f64>,
+    /// Time from the end of the last contact until the tip follows its reference again, s.
     pub recovery_s: Option<f64>,
     /// Steps in which a torque was cut at its limit.
     pub saturated_steps: usize,
@@ -93,11 +98,22 @@ pub fn measure_press(
             let tip = tip_of(cell, goal, &recording.state[k].world_from_flange);
             (tip - tip_of(cell, goal, &reference)).norm()
         }),
-        recovery_s: episodes
-            .iter()
-            .map(|each| each.tip_recovery_s)
-            .reduce(|worst, next| Some(worst?.max(next?)))
-            .flatten(),
+        force_ripple_n: settled.map(|k| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "small, positive"
+            )]
+            let window = (RIPPLE_S / recording.timestep_s).round() as usize;
+            let forces = recording.state[k.saturating_sub(window)..=k]
+                .iter()
+                .map(|state| state.contact.normal_force_n);
+            let (least, most) = forces.fold((f64::INFINITY, 0.0_f64), |(least, most), force| {
+                (least.min(force), most.max(force))
+            });
+            most - least
+        }),
+        recovery_s: episodes.last().and_then(|each| each.tip_recovery_s),
         episodes,
         saturated_steps: recording.saturated_steps,
     }

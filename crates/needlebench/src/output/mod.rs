@@ -1,6 +1,7 @@
 //! Output formats: terminal, JSON, JUnit, Markdown, CSV, pictures.
 
 pub(crate) mod comparison;
+mod events;
 pub(crate) mod findings;
 mod format;
 mod junit;
@@ -11,6 +12,7 @@ mod recording;
 pub(crate) mod room_pictures;
 mod table;
 
+pub(crate) use events::{press_csv, press_picture};
 pub(crate) use junit::junit;
 pub(crate) use markdown::markdown;
 pub(crate) use ranking::ranking_picture;

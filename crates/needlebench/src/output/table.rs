@@ -6,6 +6,7 @@ use std::fmt::Write;
 use comfy_table::{Cell, CellAlignment, Color, Table};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status, Verdict};
 
+use super::events::events_text;
 use super::format::{millimetres, small_length, value_and_limit};
 use super::ranking::comparison_text;
 
@@ -36,6 +37,9 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
         if goal.configurations.iter().any(|each| each.room.is_some()) {
             writeln!(out, "room for people, in the final posture")?;
             writeln!(out, "{}", room_table(goal))?;
+        }
+        if let Some(events) = events_text(goal) {
+            write!(out, "{events}")?;
         }
         write_remarks(out, report, goal)?;
     }
