@@ -125,6 +125,7 @@ pub(crate) fn run(
         },
         plans: Vec::new(),
         runs: Vec::new(),
+        events: Vec::new(),
         iso9283: Some(ProtocolRun {
             commanded,
             engines,
@@ -265,6 +266,7 @@ fn unplanned(
         },
         plans: Vec::new(),
         runs: Vec::new(),
+        events: Vec::new(),
         iso9283: None,
         interrupted: false,
     }

@@ -8,6 +8,7 @@ use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status, Verdict};
 
 use super::budget::budget_text;
+use super::events::events_text;
 use super::format::{millimetres, small_length, value_and_limit};
 use super::ranking::comparison_text;
 
@@ -48,6 +49,9 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
                 "each engine beside the referee: distance of the needle's tips"
             )?;
             writeln!(out, "{table}")?;
+        }
+        if let Some(events) = events_text(goal) {
+            write!(out, "{events}")?;
         }
         write_remarks(out, report, goal)?;
     }
