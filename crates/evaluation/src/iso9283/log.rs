@@ -267,7 +267,12 @@ pub fn write_commanded(title: &str, commanded: &[Commanded]) -> String {
 }
 
 fn comment(title: &str) -> String {
-    title.lines().map(|line| format!("# {line}\n")).collect()
+    let mut text = String::new();
+    for line in title.lines() {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "# {line}");
+    }
+    text
 }
 
 fn push_pose(

@@ -225,7 +225,7 @@ fn protocols_that_cannot_be_carried_out_are_refused_before_anything_runs() {
         ),
         (
             "cube_edge_mm = 0.25",
-            "`cube_edge_mm` is 0.25 mm, outside 10 to 2000",
+            "`iso9283.cube_edge_mm` is 0.25 mm, outside 10 to 2000",
         ),
         ("measuring_s = 0.4", "outside 0 to 0.3"),
         ("load_kg = 0.1", "the tool alone has 0.2"),
