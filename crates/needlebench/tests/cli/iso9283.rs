@@ -272,7 +272,6 @@ fn logs_that_are_wrong_are_refused_with_line_and_column() {
         ];
         bench.run(&arguments)
     };
-    const HEADER: &str = "cycle,pose,x_mm,y_mm,z_mm\n";
     for (rows, parts) in [
         (
             "1,P1,0,0,0\n2,P1,0,NaN,0\n",
@@ -291,7 +290,7 @@ fn logs_that_are_wrong_are_refused_with_line_and_column() {
             ["log.csv", "P1 was measured 1 times", "30"],
         ),
     ] {
-        analysed(&format!("{HEADER}{rows}"))
+        analysed(&format!("cycle,pose,x_mm,y_mm,z_mm\n{rows}"))
             .exits_with(2)
             .complains(parts);
     }
@@ -326,7 +325,7 @@ fn a_tracker_in_its_own_frame_is_told_how_to_go_on() {
             (3, [900, 500, 0]),
             (4, [900, 600, 20]),
         ] {
-            log.push_str(&format!("P{pose};{x},0{offset};{y};{z}\n"));
+            log += &format!("P{pose};{x},0{offset};{y};{z}\n");
         }
     }
     bench.write("log.csv", log);
