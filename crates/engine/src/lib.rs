@@ -6,12 +6,16 @@
 //! recordings is the engines' doing.
 
 mod actuation;
+mod closed_loop;
 mod contact_groups;
 mod error;
+mod fleet_run;
 pub mod mujoco;
+mod nearness;
 mod plant;
 mod rapier;
 mod recording;
+mod referee;
 mod servo;
 mod simulate;
 #[cfg(test)]
@@ -19,10 +23,13 @@ mod simulate;
 mod test_cell;
 
 pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFriction};
+pub use closed_loop::{ClosedLoop, UnstableServo};
 pub use error::EngineError;
-pub use mujoco::{MujocoIntegrator, MujocoPlant, MujocoSettings};
+pub use fleet_run::{Motion, simulate_fleet};
+pub use mujoco::{MujocoFleet, MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
 pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording};
+pub use referee::{RefereePlant, RefereeSettings, TorqueHold, retrace};
 pub use servo::{Servo, ServoGains, ServoOutput};
 pub use simulate::{Drive, Hooks, simulate};

@@ -46,7 +46,7 @@ pub struct Drive<'a> {
 
 impl<'a> Drive<'a> {
     /// Prepares a run of `trajectory` from its start to its end on a plant with steps of
-    /// `timestep_s`.
+    /// `timestep_s` whose velocities are `velocity_age_s` old (see [`Plant::velocity_age_s`]).
     ///
     /// The servo is sampled once per step and its torque held over it. The last state is the first
     /// one at or after the trajectory's end.
@@ -59,13 +59,14 @@ impl<'a> Drive<'a> {
         trajectory: &'a JointTrajectory,
         engine: EngineIdentity,
         timestep_s: f64,
+        velocity_age_s: f64,
     ) -> Result<Self, EngineError> {
         servo.check()?;
         actuation.check()?;
         let steps = step_count(trajectory.duration_s(), timestep_s);
         Ok(Self {
             trajectory,
-            drives: Drives::new(servo, actuation, timestep_s),
+            drives: Drives::new(servo, actuation, timestep_s, velocity_age_s),
             steps,
             recording: Recording {
                 engine,
@@ -152,6 +153,7 @@ pub fn simulate(
         trajectory,
         plant.identity(),
         plant.timestep_s(),
+        plant.velocity_age_s(),
     )?;
     drive.record(plant.reset(&drive.start())?)?;
     loop {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Goal, ResolvedScenario, enclosures};
+use needlebench_cell::{ResolvedScenario, enclosures};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::EngineIdentity;
 use needlebench_evaluation::ranking::rank_goal;
@@ -15,19 +15,23 @@ use needlebench_evaluation::report::{
 use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
     engine_difference, judge, measure_motion, measure_needle, needle_route, planned_clearance,
-    posture_clearance, tip_sensitivity,
+    posture_clearance, tip_of, tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 
-use crate::pipeline::EngineRun;
+use crate::pipeline::{Budgets, EngineRun};
 use crate::provenance::provenance;
+use crate::reality::Reality;
+use crate::trial::Trial;
 
 /// What all parts of a report are made with.
 struct Context<'a> {
     resolved: &'a ResolvedScenario,
     planner: &'a Planner<'a>,
     model: &'a ClearanceModel,
+    reality: &'a Reality<'a>,
+    budgets: &'a Budgets,
     room: RoomModel<'a>,
 }
 
@@ -39,8 +43,11 @@ pub(crate) fn assemble(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
     model: &ClearanceModel,
+    reality: &Reality<'_>,
     plans: &[GoalPlan],
     runs: &[Vec<Vec<EngineRun>>],
+    budgets: &Budgets,
+    trials: &[Vec<Trial>],
     engines: &[EngineName],
     engine_failures: Vec<EngineFailure>,
     identities: Vec<EngineIdentity>,
@@ -50,13 +57,16 @@ pub(crate) fn assemble(
         resolved,
         planner,
         model,
+        reality,
+        budgets,
         room: RoomModel::new(resolved),
     };
     let mut goals: Vec<GoalReport> = plans
         .iter()
         .zip(runs)
+        .zip(trials)
         .enumerate()
-        .map(|(index, (plan, runs))| goal_report(&context, index, plan, runs))
+        .map(|(index, ((plan, runs), trials))| goal_report(&context, index, plan, runs, trials))
         .collect();
     let both = engines.len() == 2 && engine_failures.is_empty();
     let (verdict, criteria) = judge(
@@ -82,6 +92,7 @@ pub(crate) fn assemble(
         engine_failures,
         enclosure: enclosures(&resolved.cell.robot),
         notes: resolved.notes.clone(),
+        truth: reality.report(),
         provenance: provenance(resolved, identities),
         timings,
     }
@@ -92,6 +103,7 @@ fn goal_report(
     goal_index: usize,
     plan: &GoalPlan,
     runs: &[Vec<EngineRun>],
+    trials: &[Trial],
 ) -> GoalReport {
     let resolved = context.resolved;
     let goal = &resolved.goals[goal_index];
@@ -111,8 +123,17 @@ fn goal_report(
             .configurations
             .iter()
             .zip(runs)
-            .map(|(plan, runs)| {
-                configuration_report(context, goal_index, plan, runs, route.as_ref())
+            .zip(&context.budgets[goal_index])
+            .zip(trials)
+            .map(|(((plan, runs), budget), trial)| {
+                let mut report =
+                    configuration_report(context, goal_index, plan, runs, trial, route.as_ref());
+                match budget {
+                    Some(Ok(budget)) => report.budget = Some(budget.clone()),
+                    Some(Err(error)) => report.budget_failure = Some(error.clone()),
+                    None => {}
+                }
+                report
             })
             .collect(),
         recommended: None,
@@ -125,13 +146,16 @@ fn configuration_report(
     goal_index: usize,
     plan: &ConfigurationPlan,
     runs: &[EngineRun],
+    trial: &Trial,
     route: Option<&ClassClearance>,
 ) -> ConfigurationReport {
     let Context {
         resolved,
         planner,
         model,
+        reality,
         room,
+        ..
     } = context;
     let cell = &resolved.cell;
     let goal = &resolved.goals[goal_index];
@@ -139,7 +163,7 @@ fn configuration_report(
     let engines: BTreeMap<String, EngineReport> = runs
         .iter()
         .map(|run| {
-            let report = engine_report(resolved, goal, plan, run);
+            let report = engine_report(resolved, reality, goal_index, plan, run);
             (run.engine.name().to_owned(), report)
         })
         .collect();
@@ -148,7 +172,10 @@ fn configuration_report(
         clearance.classes.insert("needle_route", route.clone());
     }
     let engine_difference = match runs {
-        [a, b] => Some(engine_difference(cell, goal, &a.recording, &b.recording)),
+        [a, b] => {
+            let (cell, goal) = (reality.cell(), reality.goal(goal_index));
+            Some(engine_difference(cell, goal, &a.recording, &b.recording))
+        }
         _ => None,
     };
     ConfigurationReport {
@@ -195,12 +222,16 @@ fn configuration_report(
         }),
         engines,
         engine_difference,
+        adjudication: trial.adjudication.clone(),
+        referee: trial.referee.clone(),
         clearance,
         tip_sensitivity_m_per_rad: candidate.map(|each| tip_sensitivity(cell, goal, &each.joints)),
         pareto: false,
         dominated_by: None,
         ranking: None,
         room: candidate.map(|each| room.measure(goal_index, &each.joints)),
+        budget: None,
+        budget_failure: None,
         files: Vec::new(),
     }
 }
@@ -219,11 +250,12 @@ fn phases(trajectory: Option<&JointTrajectory>) -> Vec<PhaseReport> {
 
 fn engine_report(
     resolved: &ResolvedScenario,
-    goal: &Goal,
+    reality: &Reality<'_>,
+    goal_index: usize,
     plan: &ConfigurationPlan,
     run: &EngineRun,
 ) -> EngineReport {
-    let cell = &resolved.cell;
+    let (cell, goal) = (reality.cell(), reality.goal(goal_index));
     let trajectory = plan
         .trajectory
         .as_ref()
@@ -235,14 +267,15 @@ fn engine_report(
         .expect("a recording has its initial state");
     let band_m = resolved.scenario.criteria.settling_band_mm * 1e-3;
     let minima = &run.clearance.minima;
+    let rested_m = tip_of(cell, goal, &settled.world_from_flange);
+    // An imperfect arm never comes to its commanded place.
+    let rests_at_m = reality.is_imperfect().then_some(rested_m);
     EngineReport {
-        needle: measure_needle(
-            cell,
-            resolved.phantom.as_ref(),
-            goal,
-            &settled.world_from_flange,
-        ),
-        motion: measure_motion(cell, goal, trajectory, &run.recording, band_m),
+        needle: measure_needle(cell, reality.phantom(), goal, &settled.world_from_flange),
+        unexplained_tip_m: reality
+            .predicted_tip(goal_index, trajectory)
+            .map(|predicted_m| (rested_m - predicted_m).norm()),
+        motion: measure_motion(cell, goal, trajectory, &run.recording, band_m, rests_at_m),
         clearance: ClearanceReport::new(
             minima
                 .iter()

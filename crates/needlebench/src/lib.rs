@@ -15,6 +15,8 @@ pub mod picture;
 mod pipeline;
 mod progress;
 mod provenance;
+mod reality;
+mod trial;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use cli::{command_line, main};

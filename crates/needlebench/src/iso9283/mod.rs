@@ -29,9 +29,10 @@ use needlebench_evaluation::report::{
 };
 use needlebench_planning::iso9283::{ProtocolPlan, plan_protocol};
 
-use crate::pipeline::{EngineChoice, RunOptions, ScenarioRun, start_harness};
+use crate::pipeline::{EngineChoice, RunError, RunOptions, ScenarioRun, start_harness};
 use crate::progress::Progress;
 use crate::provenance::provenance;
+use crate::reality::Reality;
 
 /// What a simulated test leaves besides its report.
 #[derive(Debug)]
@@ -54,17 +55,21 @@ pub(crate) fn run(
     options: &RunOptions,
     cancel: &AtomicBool,
     progress: &Progress,
-) -> ScenarioRun {
+) -> Result<ScenarioRun, RunError> {
     let started = Instant::now();
     let mut timings = BTreeMap::new();
     progress.message("planning");
-    let plan = plan_protocol(resolved, protocol, &ClearanceModel::new(&resolved.cell));
+    let model = ClearanceModel::new(&resolved.cell);
+    let reality = Reality::new(resolved, &model)?;
+    let plan = plan_protocol(resolved, protocol, &model);
     timings.insert("planning_s".to_owned(), started.elapsed().as_secs_f64());
     let plan = match plan {
         Ok(plan) => plan,
-        Err(error) => return unplanned(resolved, &error.to_string(), timings),
+        Err(error) => return Ok(unplanned(resolved, &error.to_string(), timings)),
     };
-    let outcomes = simulate_engines(resolved, protocol, &plan, options, cancel, progress);
+    let outcomes = simulate_engines(
+        &reality, resolved, protocol, &plan, options, cancel, progress,
+    );
     timings.insert(
         "simulation_s".to_owned(),
         started.elapsed().as_secs_f64() - timings["planning_s"],
@@ -109,10 +114,11 @@ pub(crate) fn run(
         .criteria;
     let (verdict, criteria) = judge(&report, own, &scenario.criteria);
     let interrupted = cancel.load(Ordering::Relaxed);
-    ScenarioRun {
+    Ok(ScenarioRun {
         report: Report {
             verdict,
             criteria,
+            truth: reality.report(),
             iso9283: Some(report),
             engine_failures: failures,
             ..empty_report(resolved, identities, timings)
@@ -125,11 +131,12 @@ pub(crate) fn run(
             limit_band_m: protocol.limit_band_m,
         }),
         interrupted,
-    }
+    })
 }
 
 /// Every engine's cycles, or why there are none.
 fn simulate_engines(
+    reality: &Reality<'_>,
     resolved: &ResolvedScenario,
     protocol: &Iso9283Protocol,
     plan: &ProtocolPlan,
@@ -143,6 +150,7 @@ fn simulate_engines(
     let one = |engine: EngineName| {
         let harness = (engine == EngineName::Mujoco).then(|| start_harness(resolved, progress));
         simulate_engine(
+            reality,
             resolved,
             protocol,
             plan,
@@ -268,6 +276,7 @@ fn empty_report(
     timings: BTreeMap<String, f64>,
 ) -> Report {
     Report {
+        truth: None,
         schema_version: SCHEMA_VERSION,
         scenario: ScenarioSummary {
             name: resolved.scenario.name.clone(),

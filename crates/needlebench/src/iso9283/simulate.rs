@@ -14,8 +14,9 @@ use needlebench_evaluation::iso9283::{Arrival, Attained, CycleMeasurement, Effor
 use needlebench_kinematics::pose_sets::SplitMix64;
 use needlebench_planning::iso9283::{Cycle, ProtocolPlan};
 
-use crate::pipeline::{Harness, mujoco_settings, rapier_settings, servo};
+use crate::pipeline::{Harness, mujoco_settings, rapier_settings};
 use crate::progress::Progress;
+use crate::reality::{Reality, servo};
 
 /// Cycles whose arrivals are kept: those over which the standard takes the stabilisation time.
 const ARRIVAL_CYCLES: u32 = 3;
@@ -43,7 +44,9 @@ pub(crate) struct EngineCycles {
 ///
 /// # Errors
 /// What the engine or its process reports, in words.
+#[expect(clippy::too_many_arguments, reason = "what a run is made of, once")]
 pub(crate) fn simulate_engine(
+    reality: &Reality<'_>,
     resolved: &ResolvedScenario,
     protocol: &Iso9283Protocol,
     plan: &ProtocolPlan,
@@ -52,7 +55,7 @@ pub(crate) fn simulate_engine(
     cancel: &AtomicBool,
     progress: &Progress,
 ) -> Result<EngineCycles, String> {
-    let cell = &resolved.cell;
+    let cell = reality.cell();
     let engines = &resolved.scenario.engines;
     let timestep_s = engines.timestep_ms * 1e-3;
     let mut process;
@@ -74,6 +77,7 @@ pub(crate) fn simulate_engine(
         }
     };
     let mut cycles = Cycles {
+        reality,
         resolved,
         protocol,
         servo: servo(resolved),
@@ -116,6 +120,7 @@ struct Repeated {
 }
 
 struct Cycles<'a> {
+    reality: &'a Reality<'a>,
     resolved: &'a ResolvedScenario,
     protocol: &'a Iso9283Protocol,
     servo: Servo,
@@ -183,7 +188,7 @@ impl Cycles<'_> {
         number: u32,
         start_s: f64,
     ) -> Result<CycleMeasurement, String> {
-        let cell = &self.resolved.cell;
+        let cell = self.reality.cell();
         let recording = self.simulated_cycle(plant, cycle, number)?;
         self.effort.add(cell, &recording);
         if number == 1 {
@@ -211,7 +216,7 @@ impl Cycles<'_> {
     ) -> Result<Recording, String> {
         let actuation = Actuation {
             seed: cycle_seed(self.resolved.scenario.seed, number),
-            ..Actuation::default()
+            ..self.reality.actuation().clone()
         };
         let hooks = Hooks {
             cancel: Some(self.cancel),

@@ -1,5 +1,6 @@
 //! Output formats: terminal, JSON, JUnit, Markdown, CSV, pictures.
 
+mod budget;
 pub(crate) mod comparison;
 pub(crate) mod findings;
 mod format;
@@ -8,9 +9,11 @@ mod markdown;
 pub(crate) mod pictures;
 mod ranking;
 mod recording;
+mod referee;
 pub(crate) mod room_pictures;
 mod table;
 
+pub(crate) use budget::budget_picture;
 pub(crate) use format::small_length;
 pub(crate) use junit::junit;
 pub(crate) use markdown::markdown;
