@@ -101,6 +101,51 @@ fn a_robot_without_anything_random_has_no_spread_and_says_so() {
     }
 }
 
+/// Factory calibration, gears, friction and encoders: the accuracy becomes that of a real arm, and
+/// every cycle has its own draw of the noise.
+#[test]
+fn an_imperfect_robot_misses_its_poses_and_scatters() {
+    let text = format!(
+        "{SMALL}{}",
+        "[imperfections.calibration]\n[imperfections.elasticity]\n[imperfections.friction]\n\
+         [imperfections.encoder]\n"
+    );
+    let bench = Bench::with_scenario(&text);
+    let measured = |out: &str| {
+        let arguments = ["run", "s.toml", "--no-pictures", "--quiet", "--out", out];
+        bench.run(&arguments).exits_with(0);
+        bench.read_json(&format!("{out}/small/report.json"))["iso9283"]["engines"]["rapier"].clone()
+    };
+    let found = measured("a");
+    assert_eq!(found["cycles_simulated"], 4);
+    assert_eq!(
+        (&found["nothing_random"], &found["remark"]),
+        (&false.into(), &Value::Null)
+    );
+    // Six real arms are off by 0.9 to 1.7 mm at the flange on average; drawn ones spread further.
+    let value = |key: &str| found[key].as_f64().unwrap();
+    assert!((1e-4..1e-2).contains(&value("ap_m")), "{found}");
+    assert!((1e-7..1e-4).contains(&value("rp_m")), "{found}");
+    // Friction holds the joints where they were pushed from.
+    assert!(value("vap_m") > value("rp_m"), "{found}");
+    assert_eq!(measured("b"), found);
+}
+
+#[test]
+fn commands_about_goals_say_that_there_are_none() {
+    let bench = Bench::with_scenario(SMALL);
+    bench
+        .run(&["atlas", "s.toml"])
+        .exits_with(2)
+        .complains(["no goals", "[iso9283]"]);
+    let answer = bench.run(&["check", "s.toml"]).exits_with(0);
+    assert!(
+        answer.stdout.contains("ok (test by ISO 9283, "),
+        "{}",
+        answer.stdout
+    );
+}
+
 /// The same numbers, whether they stay in the program or go through a file.
 #[test]
 fn the_log_of_a_run_is_analysed_to_the_same_numbers() {
