@@ -1,5 +1,7 @@
 //! Tests by ISO 9283: simulated ones, and those of real robots.
 
+use std::fmt::Write;
+
 use serde_json::Value;
 
 use crate::support::{Bench, files, mujoco_is_ready, workspace};
@@ -370,7 +372,7 @@ fn a_tracker_in_its_own_frame_is_told_how_to_go_on() {
             (3, [900, 500, 0]),
             (4, [900, 600, 20]),
         ] {
-            log += &format!("P{pose};{x},0{offset};{y};{z}\n");
+            writeln!(log, "P{pose};{x},0{offset};{y};{z}").unwrap();
         }
     }
     bench.write("log.csv", log);
