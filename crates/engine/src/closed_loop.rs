@@ -6,11 +6,11 @@ use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 
 use crate::{Actuation, Servo};
 
-/// Spectral radius below which motions die out; 1 with a margin for rounding.
-const STABLE: f64 = 1.0 - 1e-9;
+/// Spectral radius below which motions die out; 1 with a margin for its rounding.
+const STABLE: f64 = 1.0 - 1e-7;
 
-/// Bisections for the highest stable factor: 1e-3 of the range of [`ClosedLoop::LARGEST_FACTOR`].
-const BISECTIONS: usize = 24;
+/// Bisections for the highest stable factor: a ten-thousandth of the range.
+const BISECTIONS: usize = 14;
 
 /// Small motions about a posture at rest: joint errors and speeds, and torques on the way to the
 /// motors where there is a delay.
@@ -45,9 +45,6 @@ pub struct UnstableServo {
 }
 
 impl ClosedLoop {
-    /// Largest factor on gains that is looked at.
-    const LARGEST_FACTOR: f64 = 1.0;
-
     /// The loop at a posture with this mass matrix (kg m^2, armature included).
     pub fn new(mass: &Matrix6<f64>, servo: &Servo, actuation: &Actuation, timestep_s: f64) -> Self {
         Self::scaled(mass, servo, actuation, timestep_s, 1.0)
@@ -132,12 +129,28 @@ impl ClosedLoop {
     }
 
     /// Largest magnitude of an eigenvalue: below 1 every motion dies out.
+    ///
+    /// Gelfand's formula by squaring, `|A^n|^(1/n)` with `n = 2^32`: within 1e-8 of it even where
+    /// eigenvalues are defective, as those of a delay are, on which QR iterations may not end.
     pub fn spectral_radius(&self) -> f64 {
-        self.transition
-            .complex_eigenvalues()
-            .iter()
-            .map(|value| value.norm())
-            .fold(0.0, f64::max)
+        const SQUARINGS: i32 = 32;
+        let mut power = self.transition.clone();
+        let mut logarithm = 0.0;
+        for k in 0..=SQUARINGS {
+            let size = power.norm();
+            if size == 0.0 {
+                return 0.0;
+            }
+            if !size.is_finite() {
+                return f64::INFINITY;
+            }
+            logarithm += size.ln() / 2.0_f64.powi(k);
+            power /= size;
+            if k < SQUARINGS {
+                power = &power * &power;
+            }
+        }
+        logarithm.exp()
     }
 
     /// Covariance of the joints at rest under independent errors of the encoders, rad^2;
@@ -219,7 +232,7 @@ impl ClosedLoop {
             joint: made.fastest_growing_joint(),
             stable_factor: highest(
                 &|factor| stable_at(factor, timestep_s),
-                Self::LARGEST_FACTOR,
+                1.0,
             ),
             stable_timestep_s: highest(&|step_s| stable_at(1.0, step_s), timestep_s),
         })
@@ -294,7 +307,7 @@ mod tests {
         let half = 0.5 * (2.0 - a - b);
         let root = (half * half - (1.0 - b)).sqrt();
         let expected = f64::max((half + root).abs(), (half - root).abs());
-        assert!((radius - expected).abs() < 1e-12, "{radius} {expected}");
+        assert!((radius - expected).abs() < 1e-8, "{radius} {expected}");
     }
 
     #[test]
@@ -313,7 +326,7 @@ mod tests {
         let at =
             |factor: f64| ClosedLoop::scaled(&mass, &servo, &ideal, 1e-3, factor).spectral_radius();
         assert!(
-            at(0.999 * factor) < 1.0 && at(1.001 * factor) > 1.0,
+            at(0.99 * factor) < 1.0 && at(1.01 * factor) > 1.0,
             "{factor}"
         );
     }

@@ -43,7 +43,7 @@ pub fn measure_cycle(
         let poses: Vec<Pose> = recording.state[measured].iter().map(point).collect();
         let mean = mean_pose(&poses);
         let position_m = Point3::from(mean.translation.vector);
-        let pose = stop.pose as u32 + 1;
+        let pose = u32::try_from(stop.pose + 1).expect("there are five poses");
         attained.push(Attained {
             pose,
             cycle,

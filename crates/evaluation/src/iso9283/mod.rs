@@ -7,6 +7,7 @@
 //! have none of the singularities of Euler angles.
 
 mod arrival;
+mod columns;
 mod drift;
 mod judge;
 mod log;
@@ -16,13 +17,12 @@ mod report;
 mod statistics;
 mod table;
 mod timestamp;
+mod written;
 
 pub use arrival::{Arrival, Stabilisation, stabilisation};
 pub use drift::{Drift, DriftBlock, drift};
 pub use judge::{SUBJECT, judge};
-pub use log::{
-    LogUnits, RotationColumns, TrackerLog, read_commanded, read_log, write_commanded, write_log,
-};
+pub use log::{LogUnits, RotationColumns, TrackerLog, read_commanded, read_log};
 pub use measure::{CycleMeasurement, Effort, measure_cycle};
 pub use report::{
     EngineMeasurement, FrameFit, Iso9283Report, MeasuredError, MeasuredReport, ProtocolSummary,
@@ -32,6 +32,7 @@ pub use statistics::{
     AngleStatistics, DirectionalVariation, PoseStatistics, ProtocolStatistics, StatisticsError,
     evaluate,
 };
+pub use written::{write_commanded, write_log};
 
 use nalgebra::{Point3, UnitQuaternion};
 

@@ -65,7 +65,7 @@ impl<'a> Table<'a> {
         while let Some(line) = lines.next() {
             let mut found = cells(text, line.clone(), separator);
             // A separator at the end of every line.
-            while found.len() > headings.len() && found.last().is_some_and(|cell| cell.is_empty()) {
+            while found.len() > headings.len() && found.last().is_some_and(Range::is_empty) {
                 found.pop();
             }
             if found.len() == headings.len() {

@@ -98,6 +98,12 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
 }
 
 fn goals<'r>(resolved: &'r ResolvedScenario, name: Option<&str>) -> Result<Vec<&'r Goal>, Finding> {
+    if resolved.goals.is_empty() {
+        let finding = Finding::new(&resolved.source.file, "it has no goals to look at");
+        return Err(finding
+            .key("goals")
+            .hint("a scenario with [iso9283] is for `run`"));
+    }
     let Some(name) = name else {
         return Ok(resolved.goals.iter().collect());
     };

@@ -28,10 +28,13 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
                 match load_checked(path, &overrides) {
                     Ok(resolved) => {
                         if !arguments.json {
+                            let purpose = match resolved.iso9283 {
+                                Some(_) => "test by ISO 9283".to_owned(),
+                                None => format!("{} goals", resolved.goals.len()),
+                            };
                             print_text(&format!(
-                                "{}: ok ({} goals, {} bodies, {} pairs)",
+                                "{}: ok ({purpose}, {} bodies, {} pairs)",
                                 path.display(),
-                                resolved.goals.len(),
                                 resolved.cell.bodies.len(),
                                 resolved.cell.pairs.len()
                             ))?;

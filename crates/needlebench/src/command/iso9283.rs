@@ -1,5 +1,6 @@
 //! `needlebench iso9283`.
 
+use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -63,11 +64,13 @@ pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus> {
             let value = limit.value_m.map_or("not measured".to_owned(), |value| {
                 format!("{:.4} mm", value * 1e3)
             });
-            text.push_str(&format!(
-                "FAILED {}: {value}, limit {} mm\n",
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                text,
+                "FAILED {}: {value}, limit {} mm",
                 limit.criterion,
                 limit.limit_m * 1e3
-            ));
+            );
         }
         print_text(text.trim_end())?;
     }

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use needlebench_cell::ResolvedScenario;
-use needlebench_cell::iso9283::{Iso9283Protocol, POSE_COUNT};
+use needlebench_cell::iso9283::Iso9283Protocol;
 use needlebench_cell::scenario::EngineName;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::EngineIdentity;
@@ -182,7 +182,7 @@ fn simulate_engines(
 }
 
 fn commanded(protocol: &Iso9283Protocol) -> Vec<Commanded> {
-    (1..=POSE_COUNT as u32)
+    (1_u32..)
         .zip(&protocol.base_from_point)
         .map(|(pose, base_from_point)| Commanded {
             pose,

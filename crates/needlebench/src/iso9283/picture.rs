@@ -36,7 +36,8 @@ const LEAST_HALF_M: f64 = 1e-9;
 const PLANES: [([usize; 2], &str); 2] = [([0, 1], "y over x"), ([0, 2], "z over x")];
 
 /// Attained positions of every pose about its command, in two projections, all on one scale: a
-/// line to the mean as long as AP, and the sphere of radius RP about the mean.
+/// line to the mean as long as AP, the sphere of that radius about the command, and the sphere of
+/// radius RP about the mean.
 pub(crate) fn attained_picture(
     heading: &str,
     statistics: &ProtocolStatistics,
@@ -118,6 +119,7 @@ fn panel(
         FAINT,
     );
     let mean = place(statistics.ap_xyz_m);
+    canvas.circle(centre, scale * statistics.ap_m, 1.5, MEAN);
     if statistics.rp_m > 0.0 {
         canvas.circle(mean, scale * statistics.rp_m, 2.0, SPHERE);
     }
@@ -156,7 +158,7 @@ fn legend(canvas: &mut Canvas, top: usize, half_m: f64, nothing_random: bool) {
     canvas.write([at + 14, top + 2], "attained");
     at += 130;
     canvas.disc([at as f64, middle], 4.0, MEAN);
-    canvas.write([at + 14, top + 2], "mean; the line is AP");
+    canvas.write([at + 14, top + 2], "mean; AP from command");
     at += 220;
     canvas.circle([at as f64, middle], 8.0, 2.0, SPHERE);
     canvas.write([at + 14, top + 2], "sphere of radius RP");

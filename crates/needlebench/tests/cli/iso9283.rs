@@ -1,5 +1,7 @@
 //! Tests by ISO 9283: simulated ones, and those of real robots.
 
+use std::fmt::Write;
+
 use serde_json::Value;
 
 use crate::support::{Bench, files, mujoco_is_ready, workspace};
@@ -99,6 +101,51 @@ fn a_robot_without_anything_random_has_no_spread_and_says_so() {
         assert_eq!(each["overshoot_m"], 0.0);
         assert!(each["after_motion_s"].as_f64().unwrap() < 0.0, "{each}");
     }
+}
+
+/// Factory calibration, gears, friction and encoders: the accuracy becomes that of a real arm, and
+/// every cycle has its own draw of the noise.
+#[test]
+fn an_imperfect_robot_misses_its_poses_and_scatters() {
+    let text = format!(
+        "{SMALL}{}",
+        "[imperfections.calibration]\n[imperfections.elasticity]\n[imperfections.friction]\n\
+         [imperfections.encoder]\n"
+    );
+    let bench = Bench::with_scenario(&text);
+    let measured = |out: &str| {
+        let arguments = ["run", "s.toml", "--no-pictures", "--quiet", "--out", out];
+        bench.run(&arguments).exits_with(0);
+        bench.read_json(&format!("{out}/small/report.json"))["iso9283"]["engines"]["rapier"].clone()
+    };
+    let found = measured("a");
+    assert_eq!(found["cycles_simulated"], 4);
+    assert_eq!(
+        (&found["nothing_random"], &found["remark"]),
+        (&false.into(), &Value::Null)
+    );
+    // Six real arms are off by 0.9 to 1.7 mm at the flange on average; drawn ones spread further.
+    let value = |key: &str| found[key].as_f64().unwrap();
+    assert!((1e-4..1e-2).contains(&value("ap_m")), "{found}");
+    assert!((1e-7..1e-4).contains(&value("rp_m")), "{found}");
+    // Friction holds the joints where they were pushed from.
+    assert!(value("vap_m") > value("rp_m"), "{found}");
+    assert_eq!(measured("b"), found);
+}
+
+#[test]
+fn commands_about_goals_say_that_there_are_none() {
+    let bench = Bench::with_scenario(SMALL);
+    bench
+        .run(&["atlas", "s.toml"])
+        .exits_with(2)
+        .complains(["no goals", "[iso9283]"]);
+    let answer = bench.run(&["check", "s.toml"]).exits_with(0);
+    assert!(
+        answer.stdout.contains("ok (test by ISO 9283, "),
+        "{}",
+        answer.stdout
+    );
 }
 
 /// The same numbers, whether they stay in the program or go through a file.
@@ -225,7 +272,7 @@ fn protocols_that_cannot_be_carried_out_are_refused_before_anything_runs() {
         ),
         (
             "cube_edge_mm = 0.25",
-            "`cube_edge_mm` is 0.25 mm, outside 10 to 2000",
+            "`iso9283.cube_edge_mm` is 0.25 mm, outside 10 to 2000",
         ),
         ("measuring_s = 0.4", "outside 0 to 0.3"),
         ("load_kg = 0.1", "the tool alone has 0.2"),
@@ -272,7 +319,6 @@ fn logs_that_are_wrong_are_refused_with_line_and_column() {
         ];
         bench.run(&arguments)
     };
-    const HEADER: &str = "cycle,pose,x_mm,y_mm,z_mm\n";
     for (rows, parts) in [
         (
             "1,P1,0,0,0\n2,P1,0,NaN,0\n",
@@ -291,7 +337,7 @@ fn logs_that_are_wrong_are_refused_with_line_and_column() {
             ["log.csv", "P1 was measured 1 times", "30"],
         ),
     ] {
-        analysed(&format!("{HEADER}{rows}"))
+        analysed(&format!("cycle,pose,x_mm,y_mm,z_mm\n{rows}"))
             .exits_with(2)
             .complains(parts);
     }
@@ -326,7 +372,7 @@ fn a_tracker_in_its_own_frame_is_told_how_to_go_on() {
             (3, [900, 500, 0]),
             (4, [900, 600, 20]),
         ] {
-            log.push_str(&format!("P{pose};{x},0{offset};{y};{z}\n"));
+            writeln!(log, "P{pose};{x},0{offset};{y};{z}").unwrap();
         }
     }
     bench.write("log.csv", log);
