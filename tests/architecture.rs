@@ -9,17 +9,22 @@ use serde_json::Value;
 /// Every crate under `crates/` and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 7] = [
+const LAYERS: [(&str, &[&str]); 8] = [
     ("kinematics", &[]),
     ("cell", &["kinematics"]),
     ("clearance", &["cell", "kinematics"]),
     ("planning", &["clearance", "cell", "kinematics"]),
     ("engine", &["cell", "kinematics"]),
-    ("evaluation", &["engine", "clearance", "cell", "kinematics"]),
+    ("uncertainty", &["engine", "cell", "kinematics"]),
+    (
+        "evaluation",
+        &["uncertainty", "engine", "clearance", "cell", "kinematics"],
+    ),
     (
         "needlebench",
         &[
             "evaluation",
+            "uncertainty",
             "engine",
             "planning",
             "clearance",

@@ -5,12 +5,14 @@
 
 mod calibration;
 mod enclosure;
+pub mod envelope;
 mod events;
 mod files;
 mod finding;
 pub mod fixtures;
 mod goal;
 pub mod imperfections;
+pub mod iso9283;
 mod mesh;
 mod model;
 mod nominal;

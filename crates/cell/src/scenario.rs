@@ -7,9 +7,11 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::envelope::EnvelopeSection;
 pub use crate::events::{EventsSection, PressClass, PressSection, StopSection};
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
 pub use crate::imperfections::ImperfectionsSection;
+pub use crate::iso9283::Iso9283Section;
 pub use crate::people::{PeopleSection, PersonSection};
 use crate::ranking::RankingSection;
 use crate::robot::MissingInertia;
@@ -45,8 +47,12 @@ pub struct Scenario {
     /// CT gantry; none if left out.
     #[serde(default)]
     pub gantry: Option<GantryParameters>,
-    /// Where needles are to go.
+    /// Where needles are to go. Needed unless there is an `[iso9283]`.
+    #[serde(default)]
     pub goals: Vec<GoalSection>,
+    /// The test of the robot by ISO 9283, instead of goals.
+    #[serde(default)]
+    pub iso9283: Option<Iso9283Section>,
     /// Where every motion starts.
     #[serde(default)]
     pub start: StartSection,
@@ -467,6 +473,8 @@ pub struct EnginesSection {
     pub rapier: RapierSection,
     /// Settings of MuJoCo alone.
     pub mujoco: MujocoSection,
+    /// How far the engines may differ.
+    pub envelope: EnvelopeSection,
 }
 
 /// Settings of rapier alone.
@@ -544,6 +552,7 @@ impl Default for EnginesSection {
             friction: 0.0,
             rapier: RapierSection::default(),
             mujoco: MujocoSection::default(),
+            envelope: EnvelopeSection::default(),
         }
     }
 }
@@ -579,6 +588,11 @@ pub struct ClearanceCriteria {
 pub struct CriteriaSection {
     /// Largest settled distance of the needle tip from the target, mm.
     pub max_tip_position_error_mm: Option<f64>,
+    /// Largest root mean square distance of the needle's tip from the target over all arms and
+    /// patients of `[imperfections]`, mm.
+    pub max_tip_rms_mm: Option<f64>,
+    /// The same across the needle, mm.
+    pub max_tip_lateral_rms_mm: Option<f64>,
     /// Largest settled angle between planned and actual needle, deg.
     pub max_needle_angle_error_deg: Option<f64>,
     /// Largest settled distance of the guide's exit from its planned place, mm.
@@ -611,6 +625,8 @@ impl Default for CriteriaSection {
     fn default() -> Self {
         Self {
             max_tip_position_error_mm: Some(0.1),
+            max_tip_rms_mm: None,
+            max_tip_lateral_rms_mm: None,
             max_needle_angle_error_deg: Some(0.05),
             max_guide_position_error_mm: None,
             max_settling_time_s: None,

@@ -7,12 +7,16 @@
 
 mod actuation;
 mod brakes;
+mod closed_loop;
 mod contact_groups;
 mod error;
+mod fleet_run;
 pub mod mujoco;
+mod nearness;
 mod plant;
 mod rapier;
 mod recording;
+mod referee;
 mod servo;
 mod simulate;
 #[cfg(test)]
@@ -24,10 +28,13 @@ pub use brakes::{
     Brakes, PUBLISHED_LOAD_KG, PUBLISHED_SPEED_RAD_S, PUBLISHED_STOPS, PublishedStop, loaded,
     stretched,
 };
+pub use closed_loop::{ClosedLoop, UnstableServo};
 pub use error::EngineError;
-pub use mujoco::{MujocoIntegrator, MujocoPlant, MujocoSettings};
+pub use fleet_run::{Motion, simulate_fleet};
+pub use mujoco::{MujocoFleet, MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
 pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording};
+pub use referee::{RefereePlant, RefereeSettings, TorqueHold, retrace};
 pub use servo::{Servo, ServoGains, ServoOutput};
 pub use simulate::{Braking, Drive, Hooks, simulate, simulate_with_stop};

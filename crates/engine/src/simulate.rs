@@ -61,7 +61,7 @@ pub struct Braking<'a> {
 
 impl<'a> Drive<'a> {
     /// Prepares a run of `trajectory` from its start to its end on a plant with steps of
-    /// `timestep_s`.
+    /// `timestep_s` whose velocities are `velocity_age_s` old (see [`Plant::velocity_age_s`]).
     ///
     /// The servo is sampled once per step and its torque held over it. The last state is the first
     /// one at or after the trajectory's end.
@@ -74,13 +74,14 @@ impl<'a> Drive<'a> {
         trajectory: &'a JointTrajectory,
         engine: EngineIdentity,
         timestep_s: f64,
+        velocity_age_s: f64,
     ) -> Result<Self, EngineError> {
         servo.check()?;
         actuation.check()?;
         let steps = step_count(trajectory.duration_s(), timestep_s);
         Ok(Self {
             trajectory,
-            drives: Drives::new(servo, actuation, timestep_s),
+            drives: Drives::new(servo, actuation, timestep_s, velocity_age_s),
             steps,
             braking: None,
             recording: Recording {
@@ -206,6 +207,7 @@ pub fn simulate_with_stop(
         trajectory,
         plant.identity(),
         plant.timestep_s(),
+        plant.velocity_age_s(),
     )?
     .braked(braking);
     drive.record(plant.reset(&drive.start())?)?;

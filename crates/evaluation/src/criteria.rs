@@ -2,6 +2,7 @@
 
 use needlebench_cell::scenario::{ClearanceCriteria, CriteriaSection};
 
+use crate::adjudication::sentence;
 use crate::report::{ConfigurationReport, CriterionResult};
 
 /// A limit that a value has to keep.
@@ -179,6 +180,42 @@ pub fn check_configuration(
             difference.map(|difference| difference.settled_tip_m),
             String::new(),
         );
+        for judged in configuration
+            .adjudication
+            .iter()
+            .flat_map(|each| &each.quantities)
+        {
+            check(
+                Some(Criterion {
+                    key: judged.quantity,
+                    limit: judged.limit,
+                    unit: judged.unit,
+                    at_least: false,
+                }),
+                None,
+                Some(judged.value),
+                sentence(judged).unwrap_or_default(),
+            );
+        }
+    }
+    let budget = configuration
+        .budget
+        .as_ref()
+        .map(|budget| &budget.total.at_target.analytic);
+    for (key, limit_mm, value) in [
+        (
+            "max_tip_rms_mm",
+            criteria.max_tip_rms_mm,
+            budget.map(|moments| moments.rms_m),
+        ),
+        (
+            "max_tip_lateral_rms_mm",
+            criteria.max_tip_lateral_rms_mm,
+            budget.map(|moments| moments.lateral_rms_m),
+        ),
+    ] {
+        let detail = configuration.budget_failure.clone().unwrap_or_default();
+        check(most(key, limit_mm, MM, "m"), None, value, detail);
     }
     let room = configuration.room.as_ref();
     let mut at_least = |key, limit: Option<f64>, unit, value: Option<f64>, detail: String| {

@@ -2,12 +2,14 @@
 //!
 //! Definitions are those of the field: see each field's documentation. SI units and radians.
 
+pub mod adjudication;
 mod clearance;
 pub mod compare;
 mod contact;
 mod criteria;
 pub mod events;
 mod facts;
+pub mod iso9283;
 mod judge;
 pub mod metric;
 mod motion;
@@ -16,6 +18,7 @@ pub mod pareto;
 mod provenance;
 pub mod ranking;
 mod reason;
+pub mod referee;
 pub mod report;
 pub mod room;
 mod sensitivity;
@@ -32,7 +35,7 @@ pub use judge::judge;
 pub use motion::{
     ContactMeasurement, EngineDifference, MotionMeasurement, engine_difference, measure_motion,
 };
-pub use needle::{NeedleMeasurement, measure_needle};
+pub use needle::{NeedleMeasurement, measure_needle, tip_of};
 pub use sensitivity::tip_sensitivity;
 pub use stored::StoredReport;
 pub use threshold::{Limit, Threshold, ThresholdError};

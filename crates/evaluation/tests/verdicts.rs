@@ -46,6 +46,8 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
         commanded: None,
         engines: BTreeMap::new(),
         engine_difference: None,
+        adjudication: None,
+        referee: None,
         clearance: ClearanceReport {
             classes: BTreeMap::from([("robot_phantom", found)]),
             minimum_m: Some(clearance_m),
@@ -56,6 +58,8 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
         pareto: false,
         dominated_by: None,
         ranking: None,
+        budget: None,
+        budget_failure: None,
         files: Vec::new(),
     }
 }

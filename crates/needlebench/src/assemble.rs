@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Goal, ResolvedScenario, enclosures};
+use needlebench_cell::{ResolvedScenario, enclosures};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::EngineIdentity;
 use needlebench_evaluation::ranking::rank_goal;
@@ -15,20 +15,24 @@ use needlebench_evaluation::report::{
 use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
     add_approach_speeds, engine_difference, judge, measure_motion, measure_needle, needle_route,
-    planned_clearance, posture_clearance, tip_sensitivity,
+    planned_clearance, posture_clearance, tip_of, tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 
 use crate::events::{EventRun, events_report};
-use crate::pipeline::EngineRun;
+use crate::pipeline::{Budgets, EngineRun};
 use crate::provenance::provenance;
+use crate::reality::Reality;
+use crate::trial::Trial;
 
 /// What all parts of a report are made with.
 struct Context<'a> {
     resolved: &'a ResolvedScenario,
     planner: &'a Planner<'a>,
     model: &'a ClearanceModel,
+    reality: &'a Reality<'a>,
+    budgets: &'a Budgets,
     room: RoomModel<'a>,
     events: &'a [EventRun],
 }
@@ -41,9 +45,12 @@ pub(crate) fn assemble(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
     model: &ClearanceModel,
+    reality: &Reality<'_>,
     plans: &[GoalPlan],
     runs: &[Vec<Vec<EngineRun>>],
     events: &[EventRun],
+    budgets: &Budgets,
+    trials: &[Vec<Trial>],
     engines: &[EngineName],
     engine_failures: Vec<EngineFailure>,
     identities: Vec<EngineIdentity>,
@@ -53,14 +60,17 @@ pub(crate) fn assemble(
         resolved,
         planner,
         model,
+        reality,
+        budgets,
         room: RoomModel::new(resolved),
         events,
     };
     let mut goals: Vec<GoalReport> = plans
         .iter()
         .zip(runs)
+        .zip(trials)
         .enumerate()
-        .map(|(index, (plan, runs))| goal_report(&context, index, plan, runs))
+        .map(|(index, ((plan, runs), trials))| goal_report(&context, index, plan, runs, trials))
         .collect();
     let both = engines.len() == 2 && engine_failures.is_empty();
     let (verdict, criteria) = judge(
@@ -82,9 +92,11 @@ pub(crate) fn assemble(
         verdict,
         criteria,
         goals,
+        iso9283: None,
         engine_failures,
         enclosure: enclosures(&resolved.cell.robot),
         notes: resolved.notes.clone(),
+        truth: reality.report(),
         provenance: provenance(resolved, identities),
         timings,
     }
@@ -95,6 +107,7 @@ fn goal_report(
     goal_index: usize,
     plan: &GoalPlan,
     runs: &[Vec<EngineRun>],
+    trials: &[Trial],
 ) -> GoalReport {
     let resolved = context.resolved;
     let goal = &resolved.goals[goal_index];
@@ -114,8 +127,17 @@ fn goal_report(
             .configurations
             .iter()
             .zip(runs)
-            .map(|(plan, runs)| {
-                configuration_report(context, goal_index, plan, runs, route.as_ref())
+            .zip(&context.budgets[goal_index])
+            .zip(trials)
+            .map(|(((plan, runs), budget), trial)| {
+                let mut report =
+                    configuration_report(context, goal_index, plan, runs, trial, route.as_ref());
+                match budget {
+                    Some(Ok(budget)) => report.budget = Some(budget.clone()),
+                    Some(Err(error)) => report.budget_failure = Some(error.clone()),
+                    None => {}
+                }
+                report
             })
             .collect(),
         recommended: None,
@@ -128,14 +150,17 @@ fn configuration_report(
     goal_index: usize,
     plan: &ConfigurationPlan,
     runs: &[EngineRun],
+    trial: &Trial,
     route: Option<&ClassClearance>,
 ) -> ConfigurationReport {
     let Context {
         resolved,
         planner,
         model,
+        reality,
         room,
         events,
+        ..
     } = context;
     let cell = &resolved.cell;
     let goal = &resolved.goals[goal_index];
@@ -143,9 +168,9 @@ fn configuration_report(
     let engines: BTreeMap<String, EngineReport> = runs
         .iter()
         .map(|run| {
-            let mut report = engine_report(resolved, goal, plan, run);
+            let mut report = engine_report(resolved, reality, goal_index, plan, run);
             let contacts = &mut report.motion.contact.episodes;
-            add_approach_speeds(contacts, cell, model, &run.recording);
+            add_approach_speeds(contacts, reality.cell(), reality.model(), &run.recording);
             (run.engine.name().to_owned(), report)
         })
         .collect();
@@ -154,7 +179,10 @@ fn configuration_report(
         clearance.classes.insert("needle_route", route.clone());
     }
     let engine_difference = match runs {
-        [a, b] => Some(engine_difference(cell, goal, &a.recording, &b.recording)),
+        [a, b] => {
+            let (cell, goal) = (reality.cell(), reality.goal(goal_index));
+            Some(engine_difference(cell, goal, &a.recording, &b.recording))
+        }
         _ => None,
     };
     ConfigurationReport {
@@ -201,6 +229,8 @@ fn configuration_report(
         }),
         engines,
         engine_difference,
+        adjudication: trial.adjudication.clone(),
+        referee: trial.referee.clone(),
         clearance,
         tip_sensitivity_m_per_rad: candidate.map(|each| tip_sensitivity(cell, goal, &each.joints)),
         pareto: false,
@@ -209,8 +239,10 @@ fn configuration_report(
         events: events
             .iter()
             .find(|run| run.goal == goal_index && run.configuration == plan.configuration.index())
-            .map(|run| events_report(resolved, model, plan, run)),
+            .map(|run| events_report(resolved, reality, plan, run)),
         room: candidate.map(|each| room.measure(goal_index, &each.joints)),
+        budget: None,
+        budget_failure: None,
         files: Vec::new(),
     }
 }
@@ -229,11 +261,12 @@ fn phases(trajectory: Option<&JointTrajectory>) -> Vec<PhaseReport> {
 
 fn engine_report(
     resolved: &ResolvedScenario,
-    goal: &Goal,
+    reality: &Reality<'_>,
+    goal_index: usize,
     plan: &ConfigurationPlan,
     run: &EngineRun,
 ) -> EngineReport {
-    let cell = &resolved.cell;
+    let (cell, goal) = (reality.cell(), reality.goal(goal_index));
     let trajectory = plan
         .trajectory
         .as_ref()
@@ -245,14 +278,15 @@ fn engine_report(
         .expect("a recording has its initial state");
     let band_m = resolved.scenario.criteria.settling_band_mm * 1e-3;
     let minima = &run.clearance.minima;
+    let rested_m = tip_of(cell, goal, &settled.world_from_flange);
+    // An imperfect arm never comes to its commanded place.
+    let rests_at_m = reality.is_imperfect().then_some(rested_m);
     EngineReport {
-        needle: measure_needle(
-            cell,
-            resolved.phantom.as_ref(),
-            goal,
-            &settled.world_from_flange,
-        ),
-        motion: measure_motion(cell, goal, trajectory, &run.recording, band_m),
+        needle: measure_needle(cell, reality.phantom(), goal, &settled.world_from_flange),
+        unexplained_tip_m: reality
+            .predicted_tip(goal_index, trajectory)
+            .map(|predicted_m| (rested_m - predicted_m).norm()),
+        motion: measure_motion(cell, goal, trajectory, &run.recording, band_m, rests_at_m),
         clearance: ClearanceReport::new(
             minima
                 .iter()

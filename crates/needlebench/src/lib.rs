@@ -9,13 +9,17 @@ mod cli;
 mod command;
 mod events;
 pub mod exit;
+mod iso9283;
 mod output;
 mod paper;
 pub mod picture;
 mod pipeline;
 mod progress;
 mod provenance;
+mod reality;
+mod trial;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use cli::{command_line, main};
+pub use iso9283::ProtocolRun;
 pub use pipeline::{EngineChoice, RunOptions, ScenarioRun, run_scenario};

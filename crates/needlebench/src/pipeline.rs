@@ -10,17 +10,24 @@ use needlebench_cell::scenario::EngineName;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
-    Actuation, EngineError, EngineIdentity, Hooks, MujocoPlant, MujocoSettings, Plant, RapierPlant,
-    RapierSettings, Recording, Servo, ServoGains, simulate,
+    ClosedLoop, EngineError, EngineIdentity, Hooks, Motion, MujocoFleet, MujocoSettings, Plant,
+    RapierPlant, RapierSettings, Recording, simulate, simulate_fleet,
 };
 use needlebench_evaluation::report::{EngineFailure, Report};
 use needlebench_evaluation::{ClearanceSeries, certify_recording, measure_clearance};
 use needlebench_kinematics::NotUrGeometry;
+use needlebench_kinematics::registration::RegistrationError;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
+use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
 
 use crate::assemble::assemble;
 use crate::events::{self, EventRun, EventSimulation};
+use crate::iso9283::{self, ProtocolRun};
 use crate::progress::Progress;
+use crate::reality::{Reality, servo};
+
+/// Motions that MuJoCo makes at the same time: as many as a goal has configurations.
+const FLEET_ARMS: usize = 8;
 
 /// Engines that a run uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -33,6 +40,23 @@ pub enum EngineChoice {
     Both,
 }
 
+impl EngineChoice {
+    /// The engines of a choice, or else the scenario's own, each once and in order.
+    pub(crate) fn engines(choice: Option<Self>, resolved: &ResolvedScenario) -> Vec<EngineName> {
+        match choice {
+            None => {
+                let mut engines = resolved.scenario.engines.run.clone();
+                engines.sort_unstable();
+                engines.dedup();
+                engines
+            }
+            Some(Self::Rapier) => vec![EngineName::Rapier],
+            Some(Self::Mujoco) => vec![EngineName::Mujoco],
+            Some(Self::Both) => vec![EngineName::Rapier, EngineName::Mujoco],
+        }
+    }
+}
+
 /// How to run a scenario.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunOptions {
@@ -40,6 +64,8 @@ pub struct RunOptions {
     pub engines: Option<EngineChoice>,
     /// Threads; more than there are engines and goals is no use.
     pub jobs: usize,
+    /// Whether to hold every simulated motion against the referee.
+    pub referee: bool,
 }
 
 /// Recording of one engine with the clearances along it.
@@ -64,12 +90,25 @@ pub struct ScenarioRun {
     pub runs: Vec<Vec<Vec<EngineRun>>>,
     /// Events of the configurations that work.
     pub(crate) events: Vec<EventRun>,
+    /// What a test by ISO 9283 left besides its report.
+    pub iso9283: Option<ProtocolRun>,
     /// It was interrupted; what was finished until then is here.
     pub interrupted: bool,
 }
 
+/// Why a scenario cannot be run at all.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The robot is not a UR arm.
+    #[error(transparent)]
+    Robot(#[from] NotUrGeometry),
+    /// The markers of `[imperfections.registration]` determine no pose.
+    #[error("imperfections.registration.markers_mm: {0}")]
+    Registration(#[from] RegistrationError),
+}
+
 /// One motion to simulate.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Job {
     goal: usize,
     configuration: usize,
@@ -78,29 +117,23 @@ struct Job {
 /// Plans, simulates, measures and judges one scenario.
 ///
 /// # Errors
-/// [`NotUrGeometry`] if the robot is not a UR arm. A failing engine is no error: the report says
-/// so and keeps what the other one measured.
+/// [`RunError`]. A failing engine is no error: the report says so and keeps what the other one
+/// measured.
 pub(crate) fn run(
     resolved: &ResolvedScenario,
     options: &RunOptions,
     cancel: &AtomicBool,
     progress: &Progress,
-) -> Result<ScenarioRun, NotUrGeometry> {
+) -> Result<ScenarioRun, RunError> {
+    if let Some(protocol) = &resolved.iso9283 {
+        return Ok(iso9283::run(resolved, protocol, options, cancel, progress)?);
+    }
     let started = Instant::now();
     let mut timings = BTreeMap::new();
-    let engines = match options.engines {
-        None => {
-            let mut engines = resolved.scenario.engines.run.clone();
-            engines.sort_unstable();
-            engines.dedup();
-            engines
-        }
-        Some(EngineChoice::Rapier) => vec![EngineName::Rapier],
-        Some(EngineChoice::Mujoco) => vec![EngineName::Mujoco],
-        Some(EngineChoice::Both) => vec![EngineName::Rapier, EngineName::Mujoco],
-    };
+    let engines = EngineChoice::engines(options.engines, resolved);
     let model = ClearanceModel::new(&resolved.cell);
     let planner = Planner::new(resolved, &model)?;
+    let reality = Reality::new(resolved, &model)?;
 
     // The MuJoCo process starts while the motions are planned.
     let (plans, harness) = std::thread::scope(|scope| {
@@ -126,7 +159,7 @@ pub(crate) fn run(
     let simulation = Simulation {
         resolved,
         plans: &plans,
-        model: &model,
+        reality: &reality,
         jobs: &jobs,
         cancel,
         progress,
@@ -162,9 +195,10 @@ pub(crate) fn run(
         started.elapsed().as_secs_f64() - timings["planning_s"],
     );
 
-    let mut events = events::stage(resolved, &model, &plans, options.jobs);
+    let mut events = events::stage(resolved, &reality, &plans, options.jobs);
     let event_simulation = EventSimulation {
         resolved,
+        reality: &reality,
         plans: &plans,
         harness: harness.as_ref(),
         cancel,
@@ -185,13 +219,32 @@ pub(crate) fn run(
         .map(|plan| plan.configurations.iter().map(|_| Vec::new()).collect())
         .collect();
     for outcome in &mut outcomes {
-        timings.insert(
-            format!("{}_s", outcome.engine.name()),
-            outcome.wall.as_secs_f64(),
-        );
+        let name = outcome.engine.name();
+        let wall_s = outcome.wall.as_secs_f64();
+        timings.insert(format!("{name}_s"), wall_s);
+        if let Some(factor) = outcome.real_time_factor() {
+            timings.insert(format!("{name}_real_time_factor"), factor);
+        }
         for (job, run) in outcome.runs.drain(..) {
             runs[job.goal][job.configuration].push(run);
         }
+    }
+    let refereed = Instant::now();
+    let trials = crate::trial::try_all(
+        &crate::trial::Court {
+            resolved,
+            reality: &reality,
+            plans: &plans,
+            runs: &runs,
+            always: options.referee,
+            threads: options.jobs,
+            cancel,
+            progress,
+        },
+        harness.as_ref().and_then(|harness| harness.as_ref().ok()),
+    );
+    if trials.identity.is_some() {
+        timings.insert("referee_s".to_owned(), refereed.elapsed().as_secs_f64());
     }
     let failures = outcomes
         .iter_mut()
@@ -201,11 +254,26 @@ pub(crate) fn run(
     let identities = outcomes
         .iter_mut()
         .filter_map(|outcome| outcome.identity.take())
+        .chain(trials.identity)
         .collect();
+    let budgets = budgets(resolved, &plans, options.jobs);
     let interrupted = cancel.load(Ordering::Relaxed);
     let mut report = assemble(
-        resolved, &planner, &model, &plans, &runs, &events, &engines, failures, identities, timings,
+        resolved,
+        &planner,
+        &model,
+        &reality,
+        &plans,
+        &runs,
+        &events,
+        &budgets,
+        &trials.by_goal,
+        &engines,
+        failures,
+        identities,
+        timings,
     );
+    report.notes.extend(trials.notes);
     if interrupted {
         report.notes.push(
             "the run was interrupted: motions that had not been simulated by then are missing"
@@ -217,6 +285,7 @@ pub(crate) fn run(
         plans,
         runs,
         events,
+        iso9283: None,
         interrupted,
     })
 }
@@ -228,7 +297,7 @@ pub(crate) fn run(
 pub fn run_scenario(
     resolved: &ResolvedScenario,
     options: &RunOptions,
-) -> Result<ScenarioRun, NotUrGeometry> {
+) -> Result<ScenarioRun, RunError> {
     run(
         resolved,
         options,
@@ -295,9 +364,49 @@ fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
         .collect()
 }
 
+/// Error budgets by goal and configuration, for every configuration with a motion; with what went
+/// wrong where there is none.
+pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
+
+fn budgets(resolved: &ResolvedScenario, plans: &[GoalPlan], threads: usize) -> Budgets {
+    let Some(imperfections) = &resolved.imperfections else {
+        return plans
+            .iter()
+            .map(|plan| plan.configurations.iter().map(|_| None).collect())
+            .collect();
+    };
+    let servo = servo(resolved);
+    let all: Vec<(usize, &ConfigurationPlan)> = plans
+        .iter()
+        .enumerate()
+        .flat_map(|(goal, plan)| plan.configurations.iter().map(move |each| (goal, each)))
+        .collect();
+    let mut found = in_parallel(threads, &all, |(goal, plan)| {
+        let case = BudgetCase {
+            cell: &resolved.cell,
+            goal: &resolved.goals[*goal],
+            place: resolved
+                .phantom
+                .as_ref()
+                .map(|each| &each.world_from_phantom),
+            servo: &servo,
+            imperfections,
+            trajectory: plan.trajectory.as_ref()?,
+            timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
+        };
+        let seed = resolved.scenario.seed;
+        Some(budget(&case, imperfections.budget_samples, seed).map_err(|error| error.to_string()))
+    })
+    .into_iter();
+    plans
+        .iter()
+        .map(|plan| found.by_ref().take(plan.configurations.len()).collect())
+        .collect()
+}
+
 pub(crate) type Harness = Result<Mutex<HarnessProcess>, String>;
 
-fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
+pub(crate) fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
     let timeout = Duration::from_secs_f64(resolved.scenario.engines.harness_timeout_s);
     let environment =
         ensure(&mut |text| progress.message(text)).map_err(|error| error.to_string())?;
@@ -309,7 +418,7 @@ fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
 struct Simulation<'a> {
     resolved: &'a ResolvedScenario,
     plans: &'a [GoalPlan],
-    model: &'a ClearanceModel,
+    reality: &'a Reality<'a>,
     jobs: &'a [Job],
     cancel: &'a AtomicBool,
     progress: &'a Progress,
@@ -321,6 +430,20 @@ struct EngineOutcome {
     runs: Vec<(Job, EngineRun)>,
     failure: Option<EngineFailure>,
     wall: Duration,
+}
+
+impl EngineOutcome {
+    /// Simulated time over the wall-clock time of all motions of an engine, with everything that
+    /// belongs to them: building the plants, control, recording and the certified clearance.
+    fn real_time_factor(&self) -> Option<f64> {
+        let durations_s = self
+            .runs
+            .iter()
+            .filter_map(|(_, run)| run.recording.time_s.last());
+        let simulated_s: f64 = durations_s.sum();
+        let wall_s = self.wall.as_secs_f64();
+        (simulated_s > 0.0 && wall_s > 0.0).then(|| simulated_s / wall_s)
+    }
 }
 
 impl Simulation<'_> {
@@ -351,70 +474,129 @@ impl Simulation<'_> {
         harness: Option<&Harness>,
         outcome: &mut EngineOutcome,
     ) -> Result<(), (Option<String>, String)> {
-        let cell = &self.resolved.cell;
+        let cell = self.reality.cell();
         let engines = &self.resolved.scenario.engines;
         let timestep_s = engines.timestep_ms * 1e-3;
         let start = |error: EngineError| (None, error.to_string());
-        let mut process;
-        let mut plant: Box<dyn Plant> = match engine {
+        let servo = servo(self.resolved);
+        let actuation = self.reality.actuation();
+        for &job in self.jobs {
+            let trajectory = self.plan(job).trajectory.as_ref().expect("jobs have one");
+            let mass = cell.dynamics().mass_matrix(&trajectory.end());
+            if let Some(why) = ClosedLoop::instability(&mass, &servo, actuation, timestep_s) {
+                return Err((Some(self.in_words(job)), why.to_string()));
+            }
+        }
+        let motions: Vec<Motion<'_>> = self
+            .jobs
+            .iter()
+            .map(|job| Motion {
+                servo: &servo,
+                actuation,
+                trajectory: self.plan(*job).trajectory.as_ref().expect("jobs have one"),
+            })
+            .collect();
+        // The first motion that failed, in the order of the jobs.
+        let mut failure: Option<(usize, EngineError)> = None;
+        let mut finished = Vec::new();
+        let mut ended = |index: usize, result: Result<Recording, EngineError>| {
+            match result {
+                Ok(recording) => finished.push((index, self.measured(engine, index, recording))),
+                Err(error) if failure.as_ref().is_none_or(|(first, _)| index < *first) => {
+                    failure = Some((index, error));
+                }
+                Err(_) => {}
+            }
+            self.progress.step();
+        };
+        let outcome_of_all = match engine {
             EngineName::Rapier => {
                 let settings = rapier_settings(engines);
-                Box::new(RapierPlant::new(cell, timestep_s, &settings).map_err(start)?)
+                let mut plant = RapierPlant::new(cell, timestep_s, &settings).map_err(start)?;
+                outcome.identity = Some(plant.identity());
+                motions.iter().enumerate().try_for_each(|(index, motion)| {
+                    let hooks = Hooks {
+                        cancel: Some(self.cancel),
+                        progress: None,
+                    };
+                    let Motion {
+                        servo,
+                        actuation,
+                        trajectory,
+                    } = motion;
+                    match simulate(&mut plant, servo, actuation, trajectory, hooks) {
+                        Err(EngineError::Cancelled) => return Err(EngineError::Cancelled),
+                        result => ended(index, result),
+                    }
+                    Ok(())
+                })
             }
             EngineName::Mujoco => {
                 let harness = harness.expect("a MuJoCo run has a harness or its error");
-                process = match harness {
+                let mut process = match harness {
                     Ok(process) => process.lock().expect("one thread uses it"),
                     Err(message) => return Err((None, message.clone())),
                 };
                 let settings = mujoco_settings(engines);
-                Box::new(
-                    MujocoPlant::new(&mut process, cell, timestep_s, &settings).map_err(start)?,
-                )
+                let arms = motions.len().min(FLEET_ARMS);
+                let mut fleet = MujocoFleet::new(&mut process, cell, timestep_s, &settings, arms)
+                    .map_err(start)?;
+                outcome.identity = Some(fleet.identity());
+                simulate_fleet(&mut fleet, &motions, Some(self.cancel), ended)
             }
         };
-        outcome.identity = Some(plant.identity());
-        let servo = servo(self.resolved);
-        let actuation = Actuation::default();
-        for &job in self.jobs {
-            let goal = &self.resolved.goals[job.goal];
-            let plan = &self.plans[job.goal].configurations[job.configuration];
-            let trajectory = plan.trajectory.as_ref().expect("jobs have trajectories");
-            let hooks = Hooks {
-                cancel: Some(self.cancel),
-                progress: None,
-            };
-            let recording = match simulate(plant.as_mut(), &servo, &actuation, trajectory, hooks) {
-                Ok(recording) => recording,
-                Err(EngineError::Cancelled) => return Ok(()),
-                Err(error) => {
-                    let during = format!("{} {}", goal.name, plan.configuration);
-                    return Err((Some(during), error.to_string()));
+        finished.sort_by_key(|(index, _)| *index);
+        let runs = finished.into_iter();
+        outcome.runs = runs.map(|(index, run)| (self.jobs[index], run)).collect();
+        match outcome_of_all {
+            Err(EngineError::Cancelled) => return Ok(()),
+            // The process served several motions: the first that is not there stands for all.
+            Err(error) => {
+                let missing = (0..self.jobs.len())
+                    .find(|&index| outcome.runs.iter().all(|(job, _)| *job != self.jobs[index]));
+                if let Some(index) = missing {
+                    failure = Some((index, error));
                 }
-            };
-            let period_s = self.resolved.scenario.recording.period_ms * 1e-3;
-            let mut clearance =
-                measure_clearance(cell, self.model, trajectory, &recording, period_s);
-            let tolerance_m = self.resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
-            certify_recording(
-                &mut clearance,
-                cell,
-                self.model,
-                trajectory,
-                &recording,
-                tolerance_m,
-            );
-            outcome.runs.push((
-                job,
-                EngineRun {
-                    engine,
-                    recording,
-                    clearance,
-                },
-            ));
-            self.progress.step();
+            }
+            Ok(()) => {}
         }
-        Ok(())
+        failure.map_or(Ok(()), |(index, error)| {
+            Err((Some(self.in_words(self.jobs[index])), error.to_string()))
+        })
+    }
+
+    fn plan(&self, job: Job) -> &ConfigurationPlan {
+        &self.plans[job.goal].configurations[job.configuration]
+    }
+
+    /// Goal and configuration, for people.
+    fn in_words(&self, job: Job) -> String {
+        let goal = &self.resolved.goals[job.goal].name;
+        format!("{goal} {}", self.plan(job).configuration)
+    }
+
+    /// A recording with the clearances along it.
+    fn measured(&self, engine: EngineName, index: usize, recording: Recording) -> EngineRun {
+        let (cell, model) = (self.reality.cell(), self.reality.model());
+        let plan = self.plan(self.jobs[index]);
+        let trajectory = plan.trajectory.as_ref().expect("jobs have trajectories");
+        let period_s = self.resolved.scenario.recording.period_ms * 1e-3;
+        let mut clearance = measure_clearance(cell, model, trajectory, &recording, period_s);
+        let tolerance_m = self.resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
+        certify_recording(
+            &mut clearance,
+            cell,
+            model,
+            trajectory,
+            &recording,
+            tolerance_m,
+        );
+        self.reality.allow_for_breath(&mut clearance);
+        EngineRun {
+            engine,
+            recording,
+            clearance,
+        }
     }
 }
 
@@ -439,17 +621,5 @@ pub(crate) fn mujoco_settings(
         contact_impedance: engines.mujoco.contact_impedance,
         friction: engines.friction,
         ..MujocoSettings::default()
-    }
-}
-
-pub(crate) fn servo(resolved: &ResolvedScenario) -> Servo {
-    let controller = &resolved.scenario.controller;
-    Servo {
-        dynamics: resolved.cell.dynamics(),
-        gains: ServoGains {
-            kp_nm_per_rad: controller.stiffness_nm_rad,
-            kd_nms_per_rad: controller.damping_nms_rad,
-        },
-        effort_limit_nm: resolved.cell.robot.limits.efforts_nm(),
     }
 }

@@ -2,6 +2,7 @@
 
 import math
 import struct
+import time
 from dataclasses import dataclass
 from typing import Final
 
@@ -21,9 +22,11 @@ NO_PAIR: Final = (-1, -1)
 STATE_FIXED: Final = struct.Struct("<IIiiii")
 """Plant index and `CONTACTS`, in front of the numbers of a state."""
 
-CONTACTS_OFFSET: Final = HEADER.size + 4
+CONTACTS_OFFSET: Final = 4
 TIME, PENETRATION, FORCE, SITE_POSITION, SITE_ROTATION, JOINTS = 0, 1, 2, 3, 6, 15
 """Where the numbers of a state begin, counted in f64."""
+
+NO_CONTACTS: Final = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,106 +41,91 @@ class InverseDynamics:
     xmat: Floats
 
 
-class Plant:
-    """A compiled model, its running state, and the preallocated answer of a step."""
+class Model:
+    """A compiled model, which any number of plants share."""
 
-    def __init__(self, *, index: int, mjcf: str, observed_site: str, inbox: bytearray) -> None:
-        """Compile `mjcf`; `inbox` is where the torques of each step request will lie."""
-        self.index = index
-        self.model = mujoco.MjModel.from_xml_string(mjcf)
-        self.data = mujoco.MjData(self.model)
-        self._scratch: mujoco.MjData | None = None
-        model, data = self.model, self.data
-        site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, observed_site)
-        if site < 0:
+    def __init__(self, *, mjcf: str, observed_site: str) -> None:
+        """Compile `mjcf`."""
+        self.mj = mujoco.MjModel.from_xml_string(mjcf)
+        self.site = mujoco.mj_name2id(self.mj, mujoco.mjtObj.mjOBJ_SITE, observed_site)
+        if self.site < 0:
             raise RequestError(f"the model has no site named {observed_site!r}")
-        torques_at = HEADER.size + PLANT.size
-        if torques_at + 8 * model.nv > INBOX_BYTES:
-            raise RequestError(f"{model.nv} degrees of freedom are more than a step can carry")
+        if HEADER.size + PLANT.size + 8 * self.mj.nv > INBOX_BYTES:
+            raise RequestError(f"{self.mj.nv} degrees of freedom are more than a step can carry")
+        self._options = self.mj.opt
+        self._own_flags = int(self.mj.opt.disableflags)
+        self.detects = not self._own_flags & NO_CONTACTS
 
+    def detect_contacts(self, *, wanted: bool) -> None:
+        """Have the next position stage find contacts, or not."""
+        if wanted != self.detects:
+            flags = self._own_flags if wanted else self._own_flags | NO_CONTACTS
+            self._options.disableflags = flags
+            self.detects = wanted
+
+    def names(self, kind: mujoco.mjtObj, count: int) -> list[str]:
+        """Names of all objects of a kind, empty where the model gives none."""
+        return [mujoco.mj_id2name(self.mj, kind, index) or "" for index in range(count)]
+
+
+class Plant:
+    """A running state of a model.
+
+    Between two steps, MuJoCo's position and velocity stages belong to the present `qpos` and
+    `qvel`. MuJoCo's own step leaves them at the state before integration; beginning it with its
+    second half and ending it with the first half of the next one has them up to date without
+    computing anything twice. The bits are the same.
+    """
+
+    def __init__(self, *, index: int, model: Model) -> None:
+        """Make room for a state."""
+        self.index = index
+        self.model = model
+        self.data = mujoco.MjData(model.mj)
+        self._scratch: mujoco.MjData | None = None
         # Views made once: creating one costs as much as copying through it.
-        self._qpos = data.qpos
-        self._qvel = data.qvel
-        self._applied = data.qfrc_applied
-        self._site_xpos = data.site_xpos[site]
-        self._site_xmat = data.site_xmat[site]
-        self._torques = np.frombuffer(inbox, np.float64, model.nv, torques_at)
-        self._wrench: Floats = np.zeros(6)
-        self._had_contacts = False
-
-        numbers = JOINTS + model.nq + model.nv
-        payload_bytes = STATE_FIXED.size + 8 * numbers
-        self.answer = bytearray(HEADER.size + payload_bytes)
-        HEADER.pack_into(self.answer, 0, Answer.STATE, payload_bytes)
-        STATE_FIXED.pack_into(self.answer, HEADER.size, index, 0, *NO_PAIR, *NO_PAIR)
-        out = np.frombuffer(self.answer, np.float64, numbers, HEADER.size + STATE_FIXED.size)
-        self._out = out
-        self._out_position = out[SITE_POSITION:SITE_ROTATION]
-        self._out_rotation = out[SITE_ROTATION:JOINTS]
-        self._out_qpos = out[JOINTS : JOINTS + model.nq]
-        self._out_qvel = out[JOINTS + model.nq :]
-        self.step_request_bytes = PLANT.size + 8 * model.nv
+        data = self.data
+        self.qpos = data.qpos
+        self.qvel = data.qvel
+        self.applied = data.qfrc_applied
+        self.site_xpos = data.site_xpos[model.site]
+        self.site_xmat = data.site_xmat[model.site]
+        self.wrench: Floats = np.zeros(6)
+        self.looked = True
+        """Whether the position stage at the present state has looked for contacts."""
+        self.state_bytes = STATE_FIXED.size + 8 * (JOINTS + model.mj.nq + model.mj.nv)
+        self.torque_bytes = 8 * model.mj.nv
 
     def reset(self, *, qpos: Floats, qvel: Floats) -> None:
-        """Set the state at time zero and fill `answer` from it."""
-        mujoco.mj_resetData(self.model, self.data)
-        self._qpos[:] = qpos
-        self._qvel[:] = qvel
-        mujoco.mj_forward(self.model, self.data)
-        self._observe()
+        """Set the state at time zero."""
+        self.model.detect_contacts(wanted=True)
+        mujoco.mj_resetData(self.model.mj, self.data)
+        self.qpos[:] = qpos
+        self.qvel[:] = qvel
+        mujoco.mj_forward(self.model.mj, self.data)
+        self.looked = True
 
-    def step(self) -> None:
-        """Advance one time step under the torques in the inbox and fill `answer`.
+    def replay(self, torques: Floats, *, contacts: int) -> float:
+        """Run MuJoCo's own step over rows of torques, with nothing else; return the time it took, s.
 
-        The answer's pose belongs to its `qpos`; its contacts are those that acted during the step,
-        which MuJoCo finds at the state that the step begins with.
+        The yardstick for what a client in lock-step pays.
         """
-        data = self.data
-        self._applied[:] = self._torques
-        mujoco.mj_step(self.model, data)
-        # A step leaves site poses at the state before integration.
-        mujoco.mj_kinematics(self.model, data)
-        self._observe()
-
-    def _observe(self) -> None:
-        data = self.data
-        self._out[TIME] = data.time
-        self._out_position[:] = self._site_xpos
-        self._out_rotation[:] = self._site_xmat
-        self._out_qpos[:] = self._qpos
-        self._out_qvel[:] = self._qvel
-        if data.ncon or self._had_contacts:
-            self._observe_contacts()
-
-    def _observe_contacts(self) -> None:
-        data = self.data
-        count = 0
-        total = strongest = 0.0
-        deepest = -math.inf
-        strongest_pair = deepest_pair = NO_PAIR
-        for index in range(data.ncon):
-            contact = data.contact[index]
-            depth = -float(contact.dist)
-            mujoco.mj_contactForce(self.model, data, index, self._wrench)
-            force = abs(float(self._wrench[0]))
-            # Within a margin a contact can bear force before it touches.
-            if depth < 0.0 and force == 0.0:
-                continue
-            pair = (int(contact.geom[0]), int(contact.geom[1]))
-            count += 1
-            total += force
-            if force > strongest:
-                strongest, strongest_pair = force, pair
-            if depth > deepest:
-                deepest, deepest_pair = depth, pair
-        CONTACTS.pack_into(self.answer, CONTACTS_OFFSET, count, *strongest_pair, *deepest_pair)
-        self._out[PENETRATION] = max(deepest, 0.0)
-        self._out[FORCE] = total
-        self._had_contacts = data.ncon > 0
+        model, data, applied, step = self.model.mj, self.data, self.applied, mujoco.mj_step
+        rows = list(torques)
+        self.model.detect_contacts(wanted=contacts != 0)
+        started = time.perf_counter()
+        for row in rows:
+            applied[:] = row
+            step(model, data)
+        elapsed = time.perf_counter() - started
+        self.model.detect_contacts(wanted=True)
+        mujoco.mj_step1(model, data)
+        self.looked = True
+        return elapsed
 
     def inverse(self, *, qpos: Floats, qvel: Floats, qacc: Floats) -> InverseDynamics:
         """Evaluate the rigid-body dynamics at a state of its own; the running state stays."""
-        model = self.model
+        model = self.model.mj
         if self._scratch is None:
             self._scratch = mujoco.MjData(model)
         scratch = self._scratch
@@ -164,13 +152,107 @@ class Plant:
 
         Beyond `cutoff` the distance is `cutoff` and the segment zero.
         """
+        model = self.model.mj
         for geom in (geom_a, geom_b):
-            if not 0 <= geom < self.model.ngeom:
-                raise RequestError(f"geom {geom} of {self.model.ngeom}")
+            if not 0 <= geom < model.ngeom:
+                raise RequestError(f"geom {geom} of {model.ngeom}")
         fromto: Floats = np.zeros(6)
-        distance = mujoco.mj_geomDistance(self.model, self.data, geom_a, geom_b, cutoff, fromto)
+        distance = mujoco.mj_geomDistance(model, self.data, geom_a, geom_b, cutoff, fromto)
         return distance, fromto
 
-    def names(self, kind: mujoco.mjtObj, count: int) -> list[str]:
-        """Names of all objects of a kind, empty where the model gives none."""
-        return [mujoco.mj_id2name(self.model, kind, index) or "" for index in range(count)]
+
+class Port:
+    """Where a plant's torques come from and its states go to, in buffers that are reused."""
+
+    def __init__(  # noqa: PLR0913 - each of them is a place
+        self,
+        *,
+        plant: Plant,
+        torques_from: bytearray,
+        torques_at: int,
+        state_to: bytearray,
+        state_at: int,
+    ) -> None:
+        """Lay the views."""
+        self.plant = plant
+        model = plant.model.mj
+        self._torques = np.frombuffer(torques_from, np.float64, model.nv, torques_at)
+        numbers = JOINTS + model.nq + model.nv
+        STATE_FIXED.pack_into(state_to, state_at, plant.index, 0, *NO_PAIR, *NO_PAIR)
+        self._answer = state_to
+        self._contacts_at = state_at + CONTACTS_OFFSET
+        out = np.frombuffer(state_to, np.float64, numbers, state_at + STATE_FIXED.size)
+        self._out = out
+        self._out_position = out[SITE_POSITION:SITE_ROTATION]
+        self._out_rotation = out[SITE_ROTATION:JOINTS]
+        self._out_qpos = out[JOINTS : JOINTS + model.nq]
+        self._out_qvel = out[JOINTS + model.nq :]
+        self._shows_contacts = False
+
+    def reset(self, *, qpos: Floats, qvel: Floats) -> None:
+        """Set the plant's state at time zero and write it out."""
+        self.plant.reset(qpos=qpos, qvel=qvel)
+        self._observe_contacts()
+        self._observe()
+
+    def step(self, contacts: int) -> None:
+        """Advance one time step under the torques and write the state out.
+
+        With `contacts` 0 the client vouches that nothing can touch, and nobody looks.
+        The pose belongs to the reported `qpos`; the contacts are those that acted during the step,
+        which are found at the state that the step begins with.
+        """
+        plant = self.plant
+        shared, data = plant.model, plant.data
+        model = shared.mj
+        wanted = contacts != 0
+        shared.detect_contacts(wanted=wanted)
+        if wanted and not plant.looked:
+            mujoco.mj_step1(model, data)
+            plant.looked = True
+        plant.applied[:] = self._torques
+        mujoco.mj_step2(model, data)
+        if plant.looked or self._shows_contacts:
+            self._observe_contacts()
+        mujoco.mj_step1(model, data)
+        plant.looked = wanted
+        self._observe()
+
+    def _observe(self) -> None:
+        plant = self.plant
+        self._out[TIME] = plant.data.time
+        self._out_position[:] = plant.site_xpos
+        self._out_rotation[:] = plant.site_xmat
+        self._out_qpos[:] = plant.qpos
+        self._out_qvel[:] = plant.qvel
+
+    def _observe_contacts(self) -> None:
+        data = self.plant.data
+        found = data.ncon
+        if not found and not self._shows_contacts:
+            return
+        model = self.plant.model.mj
+        wrench = self.plant.wrench
+        count = 0
+        total = strongest = 0.0
+        deepest = -math.inf
+        strongest_pair = deepest_pair = NO_PAIR
+        for index in range(found):
+            contact = data.contact[index]
+            depth = -float(contact.dist)
+            mujoco.mj_contactForce(model, data, index, wrench)
+            force = abs(float(wrench[0]))
+            # Within a margin a contact can bear force before it touches.
+            if depth < 0.0 and force == 0.0:
+                continue
+            pair = (int(contact.geom[0]), int(contact.geom[1]))
+            count += 1
+            total += force
+            if force > strongest:
+                strongest, strongest_pair = force, pair
+            if depth > deepest:
+                deepest, deepest_pair = depth, pair
+        CONTACTS.pack_into(self._answer, self._contacts_at, count, *strongest_pair, *deepest_pair)
+        self._out[PENETRATION] = max(deepest, 0.0)
+        self._out[FORCE] = total
+        self._shows_contacts = found > 0

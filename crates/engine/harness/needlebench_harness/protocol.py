@@ -5,12 +5,15 @@ import struct
 from enum import IntEnum
 from typing import Final
 
-VERSION: Final = 1
+VERSION: Final = 2
 
 HEADER: Final = struct.Struct("<II")
 U32: Final = struct.Struct("<I")
 PLANT: Final = struct.Struct("<II")
-"""Plant index, and four zero bytes that align the numbers behind it."""
+"""Plant index, and four bytes that align the numbers behind it: zero, but see STEP."""
+
+GROUP: Final = struct.Struct("<II")
+"""Number of plants in a STEP_GROUP and zero; number of states in a GROUP_STATE and of failures."""
 
 INBOX_BYTES: Final = 1 << 16
 """Requests up to this size arrive in one reused buffer."""
@@ -29,6 +32,9 @@ class Request(IntEnum):
     INVERSE = 5
     DISTANCE = 6
     QUIT = 7
+    COPY = 8
+    STEP_GROUP = 9
+    REPLAY = 10
 
 
 class Answer(IntEnum):
@@ -39,6 +45,9 @@ class Answer(IntEnum):
     STATE = 0x83
     DYNAMICS = 0x84
     DISTANCE = 0x85
+    COPIED = 0x86
+    GROUP_STATE = 0x87
+    REPLAYED = 0x88
     ERROR = 0xFF
 
 
@@ -109,10 +118,12 @@ class Channel:
         self.write(kind, text.encode("utf-8", "replace"))
 
 
+def pack_string(string: str) -> bytes:
+    """Encode as ``u32 length`` and UTF-8 bytes."""
+    encoded = string.encode("utf-8", "replace")
+    return U32.pack(len(encoded)) + encoded
+
+
 def pack_strings(strings: list[str]) -> bytes:
-    """Encode as ``u32 count``, then ``u32 length`` and UTF-8 bytes of each."""
-    parts = [U32.pack(len(strings))]
-    for string in strings:
-        encoded = string.encode()
-        parts += [U32.pack(len(encoded)), encoded]
-    return b"".join(parts)
+    """Encode as ``u32 count``, then each string."""
+    return U32.pack(len(strings)) + b"".join(map(pack_string, strings))

@@ -1,14 +1,17 @@
 //! MuJoCo, stepped in lock-step by a Python process at the other end of a pipe.
 
 mod environment;
+mod fleet;
+mod member;
 mod mjcf;
 mod plant;
 mod process;
 mod tail;
 
 pub use environment::{Environment, EnvironmentError, EnvironmentOptions, ensure, ensure_with};
+pub use fleet::MujocoFleet;
 pub use plant::{MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use process::{
     ContactSummary, GeomDistance, HarnessError, HarnessProcess, HarnessState, HarnessVersions,
-    InverseDynamics, PlantHandle,
+    InverseDynamics, PlantHandle, Replay,
 };

@@ -1,15 +1,12 @@
 //! The arm in MuJoCo.
 
-use std::collections::BTreeMap;
-
 use needlebench_cell::Cell;
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
 use serde::{Deserialize, Serialize};
 
-use super::mjcf::{FLANGE_SITE, geoms_of, joint_name, link_name, mjcf};
-use super::{HarnessError, HarnessProcess, HarnessState, InverseDynamics, PlantHandle};
-use crate::plant::checked_timestep_s;
-use crate::{Contact, EngineError, EngineIdentity, Plant, PlantState};
+use super::member::{Member, Model, unstable};
+use super::{HarnessError, HarnessProcess, InverseDynamics, Replay};
+use crate::{EngineError, EngineIdentity, Plant, PlantState};
 
 /// How MuJoCo advances velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -80,7 +77,7 @@ impl MujocoSettings {
         )
     }
 
-    fn check(&self) -> Result<(), EngineError> {
+    pub(super) fn check(&self) -> Result<(), EngineError> {
         let bad = |key, value, expected| {
             Err(EngineError::BadSetting {
                 key,
@@ -113,14 +110,8 @@ impl MujocoSettings {
 /// The arm in MuJoCo, stepped in lock-step by a harness process.
 pub struct MujocoPlant<'h> {
     harness: &'h mut HarnessProcess,
-    handle: PlantHandle,
-    settings: MujocoSettings,
-    timestep_s: f64,
-    /// Index into `Cell::bodies` of each geom.
-    body_of_geom: Vec<u32>,
-    /// Index among MuJoCo's bodies of each moving link.
-    link_bodies: [usize; JOINT_COUNT],
-    position: Joints,
+    model: Model,
+    member: Member,
 }
 
 impl<'h> MujocoPlant<'h> {
@@ -133,43 +124,11 @@ impl<'h> MujocoPlant<'h> {
         timestep_s: f64,
         settings: &MujocoSettings,
     ) -> Result<Self, EngineError> {
-        settings.check()?;
-        let timestep_s = checked_timestep_s(timestep_s)?;
-        let model = mjcf(cell, timestep_s, settings)?;
-        let handle = harness.load(&model, FLANGE_SITE)?;
-        let joints = (0..JOINT_COUNT).map(joint_name);
-        if !joints.eq(handle.joint_names.iter().cloned()) {
-            return Err(EngineError::ModelMismatch { missing: "joints" });
-        }
-        let mut bodies = BTreeMap::new();
-        for (body, each) in cell.bodies.iter().enumerate() {
-            for solid in 0..each.solids.len() {
-                let names = geoms_of(cell, body, solid)?.into_iter();
-                bodies.extend(names.map(|(name, _)| (name, body)));
-            }
-        }
-        let body_of_geom = handle
-            .geom_names
-            .iter()
-            .map(|name| bodies.get(name).and_then(|&body| u32::try_from(body).ok()))
-            .collect::<Option<Vec<u32>>>()
-            .ok_or(EngineError::ModelMismatch { missing: "geoms" })?;
-        let mut link_bodies = [0; JOINT_COUNT];
-        for (i, index) in link_bodies.iter_mut().enumerate() {
-            *index = handle
-                .body_names
-                .iter()
-                .position(|name| *name == link_name(i))
-                .ok_or(EngineError::ModelMismatch { missing: "links" })?;
-        }
+        let (model, member) = Model::load(harness, cell, timestep_s, settings)?;
         Ok(Self {
             harness,
-            handle,
-            settings: *settings,
-            timestep_s,
-            body_of_geom,
-            link_bodies,
-            position: Joints::zeros(),
+            model,
+            member,
         })
     }
 
@@ -182,101 +141,60 @@ impl<'h> MujocoPlant<'h> {
         qd: &Joints,
         qdd: &Joints,
     ) -> Result<InverseDynamics, EngineError> {
-        let dynamics =
-            self.harness
-                .inverse(&self.handle, q.as_slice(), qd.as_slice(), qdd.as_slice())?;
+        let handle = &self.member.handle;
+        let dynamics = self
+            .harness
+            .inverse(handle, q.as_slice(), qd.as_slice(), qdd.as_slice())?;
         Ok(dynamics)
     }
 
-    fn observed(&mut self, state: &HarnessState) -> Result<PlantState, EngineError> {
-        let contact = state.contact;
-        let pair = match contact.strongest_pair {
-            None => None,
-            Some([a, b]) => {
-                let body = |geom: u32| {
-                    self.body_of_geom
-                        .get(geom as usize)
-                        .copied()
-                        .ok_or(EngineError::ModelMismatch { missing: "geoms" })
-                };
-                let (a, b) = (body(a)?, body(b)?);
-                Some((a.min(b), a.max(b)))
-            }
-        };
-        // The handle's counts were held against the six joints.
-        self.position = Joints::from_column_slice(&state.qpos);
-        Ok(PlantState {
-            position: self.position,
-            velocity: Joints::from_column_slice(&state.qvel),
-            world_from_flange: state.world_from_site(),
-            contact: Contact {
-                count: contact.count,
-                deepest_penetration_m: contact.deepest_penetration_m,
-                normal_force_n: contact.normal_force_n,
-                pair,
-            },
-        })
+    /// Runs MuJoCo alone under the torques (N m) of one step after the other, from rest at
+    /// `position`, in a loop inside the harness: what lock-step is measured against.
+    ///
+    /// With `look` false MuJoCo does not look for contacts.
+    pub fn replay(
+        &mut self,
+        position: &Joints,
+        look: bool,
+        torque_nm: &[Joints],
+    ) -> Result<Replay, EngineError> {
+        self.reset(position)?;
+        let rows: Vec<f64> = torque_nm.iter().flatten().copied().collect();
+        Ok(self.harness.replay(&self.member.handle, look, &rows)?)
     }
 }
 
 impl Plant for MujocoPlant<'_> {
     fn identity(&self) -> EngineIdentity {
-        let MujocoSettings {
-            integrator,
-            contact_impedance,
-            friction,
-            ..
-        } = self.settings;
-        let (stiffness_per_s2, damping_per_s) = self.settings.contact_spring(self.timestep_s);
-        let versions = self.harness.versions();
-        let setting = |key: &str, value: String| (key.to_owned(), value);
-        EngineIdentity {
-            name: "mujoco".into(),
-            version: versions.mujoco.clone(),
-            settings: vec![
-                setting("timestep_s", self.timestep_s.to_string()),
-                setting("integrator", integrator.name().to_owned()),
-                setting("contact_stiffness_per_s2", stiffness_per_s2.to_string()),
-                setting("contact_damping_per_s", damping_per_s.to_string()),
-                setting("contact_impedance", contact_impedance.to_string()),
-                setting("friction", friction.to_string()),
-                setting("numpy", versions.numpy.clone()),
-                setting("python", versions.python.clone()),
-            ],
-        }
+        self.model.identity(self.harness.versions())
     }
 
     fn reset(&mut self, position: &Joints) -> Result<PlantState, EngineError> {
-        let state = self
-            .harness
-            .reset(&self.handle, position.as_slice(), &[0.0; JOINT_COUNT])?;
-        let mut state = self.observed(&state)?;
-        // MuJoCo solves the forces of the posture at once; no step has borne them yet.
-        state.contact.normal_force_n = 0.0;
-        Ok(state)
+        self.member.reset(self.harness, &self.model, position)
     }
 
     fn step(&mut self, torque_nm: &Joints) -> Result<PlantState, EngineError> {
-        let stepped = self.harness.step(&self.handle, torque_nm.as_slice());
+        let step = self.member.step(torque_nm);
+        let stepped = self.harness.step_looking(step.plant, step.look, step.tau);
         let state = stepped.map_err(|error| match error {
             // The harness is well and serves the next reset.
-            HarnessError::Engine { message, .. } => EngineError::Unstable {
-                engine: "mujoco",
-                reason: message,
-            },
+            HarnessError::Engine { message, .. } => unstable(message),
             other => EngineError::Harness(other),
         })?;
-        self.observed(&state)
+        self.member.observed(&self.model, &state)
     }
 
     fn timestep_s(&self) -> f64 {
-        self.timestep_s
+        self.model.timestep_s
     }
 
     fn link_poses(&mut self) -> Result<[Pose; JOINT_COUNT], EngineError> {
         let still = Joints::zeros();
-        let position = self.position;
+        let position = self.member.position;
         let dynamics = self.inverse_dynamics(&position, &still, &still)?;
-        Ok(self.link_bodies.map(|body| dynamics.world_from_body[body]))
+        Ok(self
+            .model
+            .link_bodies
+            .map(|body| dynamics.world_from_body[body]))
     }
 }

@@ -12,6 +12,7 @@ use super::environment::{Environment, harness_override};
 use super::tail::Tail;
 pub use answers::{
     ContactSummary, GeomDistance, HarnessState, HarnessVersions, InverseDynamics, PlantHandle,
+    Replay,
 };
 use watchdog::Watchdog;
 use wire::{ERROR_KIND, Frame, HEADER_BYTES, MAX_PAYLOAD_BYTES, Malformed, Payload, Request};
@@ -108,6 +109,16 @@ fn quoted(stderr_tail: &str) -> String {
     } else {
         format!("; its last words:\n{stderr_tail}")
     }
+}
+
+/// One plant's part of a message that steps several.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GroupStep<'a> {
+    pub plant: &'a PlantHandle,
+    /// Whether MuJoCo is to look for contacts.
+    pub look: bool,
+    /// Joint torques, N m.
+    pub tau: &'a [f64],
 }
 
 /// A running harness, which holds any number of plants and serves one request after the other.
@@ -223,13 +234,80 @@ impl HarnessProcess {
         self.ask(Request::Reset, sealed, |p| answers::state(p, plant))
     }
 
+    /// A plant of the same compiled model with a state of its own, which has to be reset first.
+    pub fn copy(&mut self, plant: &PlantHandle) -> Result<PlantHandle, HarnessError> {
+        let sealed = Frame::begin_for_plant(&mut self.outbox, Request::Copy, plant.index).finish();
+        self.ask(Request::Copy, sealed, |p| answers::copy(p, plant))
+    }
+
     /// Advances the plant by one time step under the joint torques `tau`, N m (N for slides).
     pub fn step(&mut self, plant: &PlantHandle, tau: &[f64]) -> Result<HarnessState, HarnessError> {
+        self.step_looking(plant, true, tau)
+    }
+
+    /// The same; with `look` false the caller vouches that nothing can touch during the step, and
+    /// MuJoCo does not look for contacts.
+    pub(super) fn step_looking(
+        &mut self,
+        plant: &PlantHandle,
+        look: bool,
+        tau: &[f64],
+    ) -> Result<HarnessState, HarnessError> {
         check_length("tau", plant.dof_count, tau)?;
-        let sealed = Frame::begin_for_plant(&mut self.outbox, Request::Step, plant.index)
+        let sealed = Frame::begin(&mut self.outbox, Request::Step)
+            .plant(plant.index, u32::from(look))
             .f64s(tau)
             .finish();
         self.ask(Request::Step, sealed, |p| answers::state(p, plant))
+    }
+
+    /// Advances several plants, each as [`Self::step_looking`] would, with one message each way.
+    ///
+    /// `states` gets one entry per plant. The failures are the places of the plants that became
+    /// unstable, with MuJoCo's words; what is in `states` there means nothing, and only a reset
+    /// mends such a plant. The others are not concerned.
+    pub(super) fn step_group(
+        &mut self,
+        steps: &[GroupStep<'_>],
+        states: &mut Vec<HarnessState>,
+    ) -> Result<Vec<(usize, String)>, HarnessError> {
+        for step in steps {
+            check_length("tau", step.plant.dof_count, step.tau)?;
+        }
+        let count = u32::try_from(steps.len()).unwrap_or(u32::MAX);
+        let mut frame = Frame::begin(&mut self.outbox, Request::StepGroup)
+            .u32(count)
+            .u32(0);
+        for step in steps {
+            frame = frame.plant(step.plant.index, u32::from(step.look));
+        }
+        for step in steps {
+            frame = frame.f64s(step.tau);
+        }
+        let sealed = frame.finish();
+        self.ask(Request::StepGroup, sealed, |p| {
+            answers::group_state(p, steps.iter().map(|step| step.plant), states)
+        })
+    }
+
+    /// Runs MuJoCo's own step over rows of torques from the plant's present state, in a loop that
+    /// does nothing else, and measures it: what lock-step has to be compared with.
+    ///
+    /// `tau` holds the torques of one step after the other. With `look` false MuJoCo does not look
+    /// for contacts.
+    pub fn replay(
+        &mut self,
+        plant: &PlantHandle,
+        look: bool,
+        tau: &[f64],
+    ) -> Result<Replay, HarnessError> {
+        let rows = tau.len().checked_div(plant.dof_count).unwrap_or(0);
+        check_length("tau", rows * plant.dof_count, tau)?;
+        let sealed = Frame::begin(&mut self.outbox, Request::Replay)
+            .plant(plant.index, u32::from(look))
+            .f64s(tau)
+            .finish();
+        self.ask(Request::Replay, sealed, |p| answers::replay(p, plant))
     }
 
     /// MuJoCo's rigid-body dynamics at a state; the plant's running state is not touched.

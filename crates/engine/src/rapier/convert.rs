@@ -14,7 +14,7 @@ use crate::error::convex_pieces;
 ///
 /// The tolerances of rapier's collision detection are absolute. In metres the normal of a contact
 /// that penetrates by 1 um was off by 0.01 rad, which moved a pressed tip by 80 um.
-pub(super) const UNITS_PER_M: f64 = 1024.0;
+pub(crate) const UNITS_PER_M: f64 = 1024.0;
 
 /// A length, speed or acceleration per metre, in rapier's units.
 pub(super) fn vector(v: &Vector3<f64>) -> Vector {
@@ -22,7 +22,7 @@ pub(super) fn vector(v: &Vector3<f64>) -> Vector {
 }
 
 /// A pose, in rapier's units.
-pub(super) fn pose(pose: &Pose) -> math::Pose {
+pub(crate) fn pose(pose: &Pose) -> math::Pose {
     let mut scaled = *pose;
     scaled.translation.vector *= UNITS_PER_M;
     scaled.into()
@@ -37,7 +37,7 @@ pub(super) fn pose_m(pose: &math::Pose) -> Pose {
 
 /// A solid's shapes in rapier's units, with their pose in the parent frame in metres: one, but for a
 /// mesh its convex pieces.
-pub(super) fn collider_shapes(solid: &Solid) -> Result<Vec<(SharedShape, Pose)>, EngineError> {
+pub(crate) fn collider_shapes(solid: &Solid) -> Result<Vec<(SharedShape, Pose)>, EngineError> {
     let pieces = match &solid.shape {
         Shape::Mesh(mesh) => convex_pieces(solid, mesh)?,
         _ => return Ok(vec![collider_shape(solid)?]),

@@ -1,13 +1,11 @@
-//! What is decided about a pair of colliders inside a rapier step.
+//! What is decided about contacts inside a rapier step.
 
 use needlebench_kinematics::JOINT_COUNT;
 use rapier3d_f64::dynamics::{RigidBodyHandle, RigidBodySet};
-use rapier3d_f64::geometry::SolverFlags;
 use rapier3d_f64::math::Vector;
-use rapier3d_f64::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
+use rapier3d_f64::pipeline::{ContactModificationContext, PhysicsHooks};
 
 use super::convert::UNITS_PER_M;
-use super::far_pairs::FarPairs;
 
 /// Contacts with a shorter lever about every joint are not solved, m.
 ///
@@ -15,10 +13,9 @@ use super::far_pairs::FarPairs;
 /// 100 rad/s.
 const SHORTEST_LEVER_M: f64 = 1e-3;
 
-/// Leaves pairs that are far apart out of collision detection, and contacts that no joint can
-/// answer out of the solver.
+/// Leaves contacts that no joint can answer out of the solver.
 ///
-/// An example of the latter is a contact on the shoulder's barrel, whose normals all meet its axis.
+/// An example is a contact on the shoulder's barrel, whose normals all meet its axis.
 /// rapier solves a contact with the inverse of its mobility `J M^-1 J'`. Where the force line meets
 /// every joint's axis that is the inverse of rounding errors, and one step throws the arm away
 /// (impulses of 1e20 N s were seen). Such contacts are still reported, without a force.
@@ -27,8 +24,6 @@ pub(super) struct Hooks {
     pub links: [RigidBodyHandle; JOINT_COUNT],
     /// Axis of each link's joint in the link's frame; the joint is at the frame's origin.
     pub axes: [Vector; JOINT_COUNT],
-    /// The pairs that cannot have met yet.
-    pub far_pairs: FarPairs,
 }
 
 impl Hooks {
@@ -59,15 +54,6 @@ impl Hooks {
 }
 
 impl PhysicsHooks for Hooks {
-    fn filter_contact_pair(&self, context: &PairFilterContext<'_>) -> Option<SolverFlags> {
-        let links = [context.rigid_body1, context.rigid_body2].map(|body| self.link_index(body));
-        let colliders = [context.collider1, context.collider2];
-        let near = self
-            .far_pairs
-            .may_touch(colliders, links, context.colliders);
-        near.then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)
-    }
-
     fn modify_solver_contacts(&self, context: &mut ContactModificationContext<'_>) {
         let (bodies, body1, body2) = (context.bodies, context.rigid_body1, context.rigid_body2);
         let Some(manifold) = context.rigid_mut() else {

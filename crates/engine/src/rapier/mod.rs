@@ -1,7 +1,6 @@
 //! The arm in rapier, as a reduced-coordinate multibody.
 
-mod convert;
-mod far_pairs;
+pub(crate) mod convert;
 mod hooks;
 mod world;
 
@@ -118,6 +117,20 @@ impl RapierPlant {
         self.world.mass_matrix()
     }
 
+    /// Advances by one step under joint torques, N m, without looking at what came of it: the bare
+    /// engine, which the run loop is measured against.
+    pub fn advance(&mut self, torque_nm: &Joints) -> Result<(), EngineError> {
+        self.world.step(torque_nm);
+        if self.world.has_non_finite_bodies() {
+            let reason = "a body's pose or velocity is no longer finite".to_owned();
+            return Err(EngineError::Unstable {
+                engine: "rapier",
+                reason,
+            });
+        }
+        Ok(())
+    }
+
     fn observe(&self) -> PlantState {
         let (position, velocity) = self.world.joint_state();
         let wrist_3 = self.world.link_pose(JOINT_COUNT - 1);
@@ -200,14 +213,7 @@ impl Plant for RapierPlant {
     }
 
     fn step(&mut self, torque_nm: &Joints) -> Result<PlantState, EngineError> {
-        self.world.step(torque_nm);
-        if self.world.has_non_finite_bodies() {
-            let reason = "a body's pose or velocity is no longer finite".to_owned();
-            return Err(EngineError::Unstable {
-                engine: "rapier",
-                reason,
-            });
-        }
+        self.advance(torque_nm)?;
         Ok(self.observe())
     }
 

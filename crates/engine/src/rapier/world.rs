@@ -1,6 +1,6 @@
 //! Building and stepping a rapier world.
 
-use needlebench_cell::{Cell, Frame};
+use needlebench_cell::Cell;
 use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 use rapier3d_f64::dynamics::{
     FrictionModel, GenericJoint, GenericJointBuilder, IntegrationParameters, JointAxesMask,
@@ -15,14 +15,11 @@ use rapier3d_f64::parry::mass_properties::MassProperties;
 use rapier3d_f64::pipeline::{ActiveHooks, PhysicsWorld};
 
 use super::RapierSettings;
-use super::convert::{
-    UNITS_PER_M, collider_shapes, mass_properties, pose, pose_m, rotation_from_x, vector,
-};
-use super::far_pairs::FarPairs;
+use super::convert::{UNITS_PER_M, mass_properties, pose, pose_m, rotation_from_x, vector};
 use super::hooks::Hooks;
 use crate::EngineError;
-use crate::contact_groups::{ContactBits, contact_bits};
 use crate::error::check_bodies;
+use crate::nearness::{Nearness, Part};
 
 /// Index of a revolute joint's angle among a joint's six coordinates.
 const ANGLE: usize = 3;
@@ -40,10 +37,9 @@ pub(super) struct Blueprint {
     joints: [GenericJoint; JOINT_COUNT],
     masses: [MassProperties; JOINT_COUNT],
     armature_kgm2: Joints,
-    /// Colliders with the link that carries them, if any.
-    colliders: Vec<(Option<usize>, Collider)>,
-    /// Greatest distance of each link's solids from the link's origin, m.
-    link_radii_m: [f64; JOINT_COUNT],
+    nearness: Nearness,
+    /// Colliders of the parts that may touch.
+    colliders: Vec<Collider>,
     gravity: Vector,
     parameters: IntegrationParameters,
 }
@@ -55,46 +51,9 @@ impl Blueprint {
         settings: &RapierSettings,
     ) -> Result<Self, EngineError> {
         check_bodies(cell)?;
-        let bits = contact_bits(cell)?;
-        let mut colliders = Vec::new();
-        let mut link_radii_m = [0.0_f64; JOINT_COUNT];
-        for (index, (body, bits)) in cell.bodies.iter().zip(bits).enumerate() {
-            if bits == ContactBits::default() {
-                continue;
-            }
-            let link = match body.frame {
-                Frame::World => None,
-                Frame::Link(i) => Some(i),
-            };
-            let groups = InteractionGroups::new(
-                Group::from_bits_retain(bits.member),
-                Group::from_bits_retain(bits.mask),
-                InteractionTestMode::And,
-            );
-            for solid in &body.solids {
-                for (shape, parent_from_collider) in collider_shapes(solid)? {
-                    let collider = ColliderBuilder::new(shape)
-                        .position(pose(&parent_from_collider))
-                        .density(0.0)
-                        .friction(settings.friction)
-                        .restitution(0.0)
-                        .collision_groups(groups)
-                        .active_hooks(
-                            ActiveHooks::FILTER_CONTACT_PAIRS | ActiveHooks::MODIFY_SOLVER_CONTACTS,
-                        )
-                        .user_data(index as u128)
-                        .build();
-                    if let Some(link) = link {
-                        let bound = collider
-                            .shape()
-                            .compute_bounding_sphere(collider.position());
-                        let radius_m = (bound.center.length() + bound.radius) / UNITS_PER_M;
-                        link_radii_m[link] = link_radii_m[link].max(radius_m);
-                    }
-                    colliders.push((link, collider));
-                }
-            }
-        }
+        let nearness = Nearness::new(cell)?;
+        let parts = nearness.parts().iter();
+        let colliders = parts.map(|part| collider(part, settings)).collect();
         let dynamics = cell.dynamics();
         Ok(Self {
             chain: dynamics.chain,
@@ -108,12 +67,29 @@ impl Blueprint {
             }),
             masses: dynamics.bodies.map(|body| mass_properties(&body)),
             armature_kgm2: dynamics.armature_kgm2,
+            nearness,
             colliders,
-            link_radii_m,
             gravity: vector(&cell.gravity_m_s2),
             parameters: parameters(timestep_s, settings),
         })
     }
+}
+
+fn collider(part: &Part, settings: &RapierSettings) -> Collider {
+    let groups = InteractionGroups::new(
+        Group::from_bits_retain(part.bits.member),
+        Group::from_bits_retain(part.bits.mask),
+        InteractionTestMode::And,
+    );
+    ColliderBuilder::new(part.shape.clone())
+        .position(pose(&part.parent_from_part))
+        .density(0.0)
+        .friction(settings.friction)
+        .restitution(0.0)
+        .collision_groups(groups)
+        .active_hooks(ActiveHooks::MODIFY_SOLVER_CONTACTS)
+        .user_data(part.body as u128)
+        .build()
 }
 
 fn parameters(timestep_s: f64, settings: &RapierSettings) -> IntegrationParameters {
@@ -141,8 +117,14 @@ fn parameters(timestep_s: f64, settings: &RapierSettings) -> IntegrationParamete
 }
 
 /// A rapier world with the arm at some posture.
+///
+/// A part gets its collider when it first comes near to something that it may touch: most parts
+/// never do, and moving the colliders of all of them would take longer than moving the arm.
 pub(super) struct World {
     physics: PhysicsWorld,
+    nearness: Nearness,
+    /// Colliders of the parts that have not come near yet.
+    colliders: Vec<Option<Collider>>,
     links: [RigidBodyHandle; JOINT_COUNT],
     joints: [MultibodyJointHandle; JOINT_COUNT],
     hooks: Hooks,
@@ -176,9 +158,6 @@ impl World {
                 .insert_multibody_joint(parent, links[i], blueprint.joints[i])
                 .expect("a chain has no loops")
         });
-        for (link, collider) in &blueprint.colliders {
-            physics.insert_collider(collider.clone(), link.map(|i| links[i]));
-        }
         // Mass properties are lazy: before the first step they would read as zero.
         for link in links {
             physics.bodies[link].recompute_mass_properties_from_colliders(&physics.colliders);
@@ -188,15 +167,11 @@ impl World {
             axes: blueprint
                 .joints
                 .map(|joint| joint.local_frame2.rotation * Vector::X),
-            far_pairs: FarPairs::new(
-                &blueprint.chain,
-                &blueprint.link_radii_m,
-                *position,
-                blueprint.colliders.len(),
-            ),
         };
         let mut world = Self {
             physics,
+            nearness: blueprint.nearness.clone(),
+            colliders: blueprint.colliders.iter().cloned().map(Some).collect(),
             links,
             joints,
             hooks,
@@ -217,6 +192,8 @@ impl World {
         arm.apply_displacements(position.as_slice());
         arm.forward_kinematics(bodies, false);
         arm.update_rigid_bodies(bodies, true);
+        world.nearness.reset(position);
+        world.insert_near_colliders();
         // A step without duration: only user changes and collision detection.
         world.physics.integration_parameters.dt = 0.0;
         world.physics.step_with_events(&world.hooks, &());
@@ -237,8 +214,21 @@ impl World {
             beyond = torque;
         }
         let (position, _) = self.joint_state();
-        self.hooks.far_pairs.move_to(position);
+        self.nearness.move_to(&position);
+        if self.nearness.has_news() {
+            self.insert_near_colliders();
+        }
         self.physics.step_with_events(&self.hooks, &());
+    }
+
+    fn insert_near_colliders(&mut self) {
+        for part in self.nearness.near_pairs().flatten() {
+            if let Some(collider) = self.colliders[part].take() {
+                let link = self.nearness.parts()[part].link;
+                let body = link.map(|link| self.links[link]);
+                self.physics.insert_collider(collider, body);
+            }
+        }
     }
 
     /// Whether rapier switched a body off in the last step because its state was not finite.

@@ -5,6 +5,7 @@ mod check;
 mod clearance;
 mod compare;
 mod doctor;
+mod iso9283;
 mod kinematics;
 mod pairs;
 mod paper;
@@ -18,6 +19,7 @@ use needlebench_cell::{
     Finding, MissingInertia, Overrides, PackagePaths, ResolvedScenario, load_scenario,
 };
 use needlebench_clearance::ClearanceModel;
+use needlebench_planning::iso9283::plan_protocol;
 use serde::Serialize;
 
 pub(crate) use atlas::atlas;
@@ -25,6 +27,7 @@ pub(crate) use check::check;
 pub(crate) use clearance::clearance;
 pub(crate) use compare::compare;
 pub(crate) use doctor::doctor;
+pub(crate) use iso9283::iso9283;
 pub(crate) use kinematics::{fk, ik};
 pub(crate) use pairs::pairs;
 pub(crate) use paper::paper;
@@ -45,12 +48,23 @@ fn load(path: &Path, overrides: &Overrides) -> Option<ResolvedScenario> {
     }
 }
 
-/// Reads a scenario and refuses one whose start posture collides.
+/// Reads a scenario and refuses one whose start posture collides, or whose protocol cannot be
+/// carried out.
 fn load_checked(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
     let resolved = load_scenario(path, overrides)?;
     let cell = &resolved.cell;
-    let touching = ClearanceModel::new(cell).first_below(&resolved.start, |_| 0.0);
-    let Some(pair) = touching else {
+    let model = ClearanceModel::new(cell);
+    if let Some(protocol) = &resolved.iso9283 {
+        // It does not start from the start posture.
+        return match plan_protocol(&resolved, protocol, &model) {
+            Ok(_) => Ok(resolved),
+            Err(error) => {
+                let finding = Finding::new(path.display().to_string(), error.to_string());
+                Err(vec![finding.key("iso9283").hint(error.hint())])
+            }
+        };
+    }
+    let Some(pair) = model.first_below(&resolved.start, |_| 0.0) else {
         return Ok(resolved);
     };
     let (a, b) = pair.solid_names(cell);

@@ -19,11 +19,13 @@ use crate::atomic::write_atomically;
 use crate::cli::RunArguments;
 use crate::events::EventRun;
 use crate::exit::ExitStatus;
+use crate::iso9283;
 use crate::output::findings::print_findings;
 use crate::output::pictures::{Backdrop, configuration_picture, goal_camera, sheet_caption};
 use crate::output::room_pictures::{RoomPictures, room_caption};
 use crate::output::{
-    junit, markdown, press_csv, press_picture, ranking_picture, recording_csv, report_text,
+    budget_picture, junit, markdown, press_csv, press_picture, ranking_picture, recording_csv,
+    report_text,
 };
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
@@ -83,6 +85,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     let options = RunOptions {
         engines: arguments.engine,
         jobs,
+        referee: arguments.referee,
     };
 
     let mut status = ExitStatus::Success;
@@ -265,6 +268,10 @@ fn write_results(
             configuration.files = names;
         }
     }
+    if let (Some(run), Some(report)) = (&finished.iso9283, &mut finished.report.iso9283) {
+        let name = &resolved.scenario.name;
+        report.files = iso9283::write_results(name, report, run, folder, pictures)?;
+    }
     finished
         .report
         .timings
@@ -392,12 +399,17 @@ fn write_pictures(
                 tile(sheet, 4).write_png(&folder.join(name))?;
             }
         }
-        let ranking = folder.join(format!("{}.ranking.png", goal.name));
-        match ranking_picture(goal_report) {
-            Some(image) => image.write_png(&ranking)?,
-            // Nobody should take an earlier run's for this one's.
-            None if ranking.exists() => std::fs::remove_file(&ranking)?,
-            None => {}
+        for (kind, picture) in [
+            ("ranking", ranking_picture(goal_report)),
+            ("budget", budget_picture(goal_report)),
+        ] {
+            let path = folder.join(format!("{}.{kind}.png", goal.name));
+            match picture {
+                Some(image) => image.write_png(&path)?,
+                // Nobody should take an earlier run's for this one's.
+                None if path.exists() => std::fs::remove_file(&path)?,
+                None => {}
+            }
         }
     }
     Ok(())

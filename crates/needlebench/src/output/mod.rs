@@ -1,5 +1,6 @@
 //! Output formats: terminal, JSON, JUnit, Markdown, CSV, pictures.
 
+mod budget;
 pub(crate) mod comparison;
 mod events;
 pub(crate) mod findings;
@@ -9,10 +10,13 @@ mod markdown;
 pub(crate) mod pictures;
 mod ranking;
 mod recording;
+mod referee;
 pub(crate) mod room_pictures;
 mod table;
 
+pub(crate) use budget::budget_picture;
 pub(crate) use events::{press_csv, press_picture};
+pub(crate) use format::small_length;
 pub(crate) use junit::junit;
 pub(crate) use markdown::markdown;
 pub(crate) use ranking::ranking_picture;

@@ -16,6 +16,7 @@ mod events;
 mod help;
 #[cfg(target_os = "linux")]
 mod interrupt;
+mod iso9283;
 mod kinematics;
 mod pairs;
 mod paper;

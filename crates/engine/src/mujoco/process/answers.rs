@@ -37,7 +37,7 @@ pub struct PlantHandle {
 }
 
 /// The contacts that acted during a step; MuJoCo finds them at the state that the step begins with.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactSummary {
     /// Number of contact points that touch or bear a force.
     pub count: u32,
@@ -52,7 +52,7 @@ pub struct ContactSummary {
 }
 
 /// State of a plant after a step, all of it read from the engine's own data.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct HarnessState {
     /// Simulated time since the reset, s.
     pub time_s: f64,
@@ -151,33 +151,90 @@ pub(super) fn state(
     mut payload: Payload<'_>,
     plant: &PlantHandle,
 ) -> Result<HarnessState, Malformed> {
+    let mut state = HarnessState::default();
+    state_into(&mut payload, plant, &mut state)?;
+    payload.finish()?;
+    Ok(state)
+}
+
+fn state_into(
+    payload: &mut Payload<'_>,
+    plant: &PlantHandle,
+    state: &mut HarnessState,
+) -> Result<(), Malformed> {
     if payload.u32()? != plant.index {
         return Err(Malformed);
     }
-    let count = payload.u32()?;
-    let strongest_pair = optional_pair(&mut payload)?;
-    let deepest_pair = optional_pair(&mut payload)?;
-    let time_s = payload.f64()?;
-    let contact = ContactSummary {
-        count,
-        deepest_penetration_m: payload.f64()?,
-        normal_force_n: payload.f64()?,
-        strongest_pair,
-        deepest_pair,
-    };
-    let site_position_m = payload.vector()?;
-    let site_rotation = payload.rotation()?;
-    let qpos = payload.f64s(plant.qpos_count)?;
-    let qvel = payload.f64s(plant.dof_count)?;
+    state.contact.count = payload.u32()?;
+    state.contact.strongest_pair = optional_pair(payload)?;
+    state.contact.deepest_pair = optional_pair(payload)?;
+    state.time_s = payload.f64()?;
+    state.contact.deepest_penetration_m = payload.f64()?;
+    state.contact.normal_force_n = payload.f64()?;
+    state.site_position_m = payload.vector()?;
+    state.site_rotation = payload.rotation()?;
+    payload.f64s_into(plant.qpos_count, &mut state.qpos)?;
+    payload.f64s_into(plant.dof_count, &mut state.qvel)
+}
+
+/// States of several plants; a place in the second list failed for the reason given.
+pub(super) fn group_state<'a>(
+    mut payload: Payload<'_>,
+    plants: impl ExactSizeIterator<Item = &'a PlantHandle>,
+    states: &mut Vec<HarnessState>,
+) -> Result<Vec<(usize, String)>, Malformed> {
+    let count = plants.len();
+    if payload.u32()? as usize != count {
+        return Err(Malformed);
+    }
+    let failures = payload.u32()?;
+    states.resize_with(count, HarnessState::default);
+    for (plant, state) in plants.zip(states) {
+        state_into(&mut payload, plant, state)?;
+    }
+    let mut failed = Vec::new();
+    for _ in 0..failures {
+        let place = payload.u32()? as usize;
+        if place >= count {
+            return Err(Malformed);
+        }
+        failed.push((place, payload.string()?));
+    }
     payload.finish()?;
-    Ok(HarnessState {
-        time_s,
-        qpos,
-        qvel,
-        site_position_m,
-        site_rotation,
-        contact,
+    Ok(failed)
+}
+
+pub(super) fn copy(
+    mut payload: Payload<'_>,
+    original: &PlantHandle,
+) -> Result<PlantHandle, Malformed> {
+    let index = payload.u32()?;
+    payload.finish()?;
+    Ok(PlantHandle {
+        index,
+        ..original.clone()
     })
+}
+
+/// How long a replay took in the harness, and where it ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replay {
+    /// Duration of the loop over `mj_step` alone, on the harness's own clock, s.
+    pub elapsed_s: f64,
+    /// Joint positions at its end, rad (m for slides).
+    pub qpos: Vec<f64>,
+    /// Joint velocities at its end, rad/s (m/s for slides).
+    pub qvel: Vec<f64>,
+}
+
+pub(super) fn replay(mut payload: Payload<'_>, plant: &PlantHandle) -> Result<Replay, Malformed> {
+    let replay = Replay {
+        elapsed_s: payload.f64()?,
+        qpos: payload.f64s(plant.qpos_count)?,
+        qvel: payload.f64s(plant.dof_count)?,
+    };
+    payload.finish()?;
+    Ok(replay)
 }
 
 fn optional_pair(payload: &mut Payload<'_>) -> Result<Option<[u32; 2]>, Malformed> {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Version of the protocol that this client speaks.
-pub(super) const PROTOCOL_VERSION: u32 = 1;
+pub(super) const PROTOCOL_VERSION: u32 = 2;
 
 /// Kind and payload length, u32 each.
 pub(super) const HEADER_BYTES: usize = 8;
@@ -21,6 +21,9 @@ pub(super) enum Request {
     Inverse = 5,
     Distance = 6,
     Quit = 7,
+    Copy = 8,
+    StepGroup = 9,
+    Replay = 10,
 }
 
 impl Request {
@@ -33,6 +36,9 @@ impl Request {
             Self::Inverse => "INVERSE",
             Self::Distance => "DISTANCE",
             Self::Quit => "QUIT",
+            Self::Copy => "COPY",
+            Self::StepGroup => "STEP_GROUP",
+            Self::Replay => "REPLAY",
         }
     }
 
@@ -45,6 +51,9 @@ impl Request {
             Self::Inverse => 0x84,
             Self::Distance => 0x85,
             Self::Quit => ERROR_KIND,
+            Self::Copy => 0x86,
+            Self::StepGroup => 0x87,
+            Self::Replay => 0x88,
         }
     }
 }
@@ -66,7 +75,12 @@ impl<'a> Frame<'a> {
 
     /// A request about one plant: its index, then padding that aligns the numbers.
     pub(super) fn begin_for_plant(buffer: &'a mut Vec<u8>, request: Request, plant: u32) -> Self {
-        Self::begin(buffer, request).u32(plant).u32(0)
+        Self::begin(buffer, request).plant(plant, 0)
+    }
+
+    /// Index of a plant, and what a step of it is to look for.
+    pub(super) fn plant(self, plant: u32, look: u32) -> Self {
+        self.u32(plant).u32(look)
     }
 
     pub(super) fn u32(self, value: u32) -> Self {
@@ -144,6 +158,19 @@ impl Payload<'_> {
         (0..count).map(|_| self.f64()).collect()
     }
 
+    /// The same into a vector that keeps its memory.
+    pub(super) fn f64s_into(
+        &mut self,
+        count: usize,
+        values: &mut Vec<f64>,
+    ) -> Result<(), Malformed> {
+        values.clear();
+        for _ in 0..count {
+            values.push(self.f64()?);
+        }
+        Ok(())
+    }
+
     pub(super) fn vector(&mut self) -> Result<Vector3<f64>, Malformed> {
         Ok(Vector3::new(self.f64()?, self.f64()?, self.f64()?))
     }
@@ -157,16 +184,16 @@ impl Payload<'_> {
         Ok(Matrix3::from_row_slice(&rows))
     }
 
+    pub(super) fn string(&mut self) -> Result<String, Malformed> {
+        let length = self.count(1)?;
+        let (head, rest) = self.0.split_at(length);
+        self.0 = rest;
+        String::from_utf8(head.to_vec()).map_err(|_| Malformed)
+    }
+
     pub(super) fn strings(&mut self) -> Result<Vec<String>, Malformed> {
         let count = self.count(4)?;
-        (0..count)
-            .map(|_| {
-                let length = self.count(1)?;
-                let (head, rest) = self.0.split_at(length);
-                self.0 = rest;
-                String::from_utf8(head.to_vec()).map_err(|_| Malformed)
-            })
-            .collect()
+        (0..count).map(|_| self.string()).collect()
     }
 
     pub(super) fn finish(self) -> Result<(), Malformed> {

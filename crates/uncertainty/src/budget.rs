@@ -1,0 +1,242 @@
+//! The error budget of a configuration: covariance and bias of the needle, by source, analytically
+//! and by Monte Carlo.
+
+mod analytic;
+mod monte_carlo;
+
+use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, Vector3};
+use needlebench_cell::imperfections::Imperfections;
+use needlebench_cell::{Cell, Goal};
+use needlebench_engine::Servo;
+use needlebench_kinematics::registration::RegistrationError;
+use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_kinematics::{Joints, Pose};
+use serde::Serialize;
+
+use crate::{RestingFriction, SettleError, Source, resting_friction};
+
+/// What a budget is made for: one configuration of one goal.
+#[derive(Debug, Clone, Copy)]
+pub struct BudgetCase<'a> {
+    /// The nominal cell.
+    pub cell: &'a Cell,
+    /// The goal.
+    pub goal: &'a Goal,
+    /// The phantom's planned place, if there is one.
+    pub place: Option<&'a Pose>,
+    /// The servo.
+    pub servo: &'a Servo,
+    /// All imperfections.
+    pub imperfections: &'a Imperfections,
+    /// The motion that ends in the configuration: friction remembers it.
+    pub trajectory: &'a JointTrajectory,
+    /// Step of the servo, s.
+    pub timestep_s: f64,
+}
+
+impl BudgetCase<'_> {
+    /// Joint positions that the arm holds.
+    fn target(&self) -> Joints {
+        self.trajectory.end()
+    }
+
+    /// Pose of the guide's exit that the controller believes in, world.
+    fn world_from_exit(&self) -> Pose {
+        self.cell.robot.world_from_flange(&self.target()) * self.cell.tool.flange_from_guide_exit
+    }
+
+    /// Turns world vectors into the axes of the budget.
+    fn from_world(&self) -> Rotation3<f64> {
+        let world_from_goal = self.goal.world_from_guide_exit.rotation;
+        world_from_goal.inverse().to_rotation_matrix()
+    }
+
+    /// Depths beyond the guide's exit at which the needle is looked at: skin and target, m.
+    fn depths_m(&self) -> [f64; 2] {
+        [
+            self.goal.standoff_m.unwrap_or(0.0),
+            self.goal.insertion_length_m,
+        ]
+    }
+
+    /// Where the needle should be at those depths, world.
+    fn planned(&self) -> [Point3<f64>; 2] {
+        let exit = self.world_from_exit();
+        self.depths_m()
+            .map(|depth_m| exit * Point3::new(0.0, 0.0, depth_m))
+    }
+
+    fn friction(&self, imperfections: &Imperfections) -> Option<RestingFriction> {
+        let friction =
+            crate::truth::joint_friction(imperfections.friction.as_ref()?, Joints::repeat(1.0));
+        Some(resting_friction(&friction, self.trajectory))
+    }
+}
+
+/// Why there is no budget.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BudgetError {
+    /// The markers determine no pose.
+    #[error(transparent)]
+    Registration(#[from] RegistrationError),
+    /// The arm does not come to rest.
+    #[error(transparent)]
+    Settle(#[from] SettleError),
+}
+
+/// Bias and covariance of a point of the needle, real minus where it should be.
+///
+/// Axes are those of the goal's guide exit at roll 0, the same for all configurations: x and y across
+/// the needle, x as near to the patient's head as it gets, z along the insertion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Moments {
+    /// Mean, m.
+    pub bias_m: [f64; 3],
+    /// Covariance, m^2, row by row.
+    pub covariance_m2: [[f64; 3]; 3],
+    /// Root mean square distance, m: `sqrt(|bias|^2 + trace)`.
+    pub rms_m: f64,
+    /// Root mean square distance across the needle, m.
+    pub lateral_rms_m: f64,
+}
+
+impl Moments {
+    pub(crate) fn new(bias: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
+        let across = |k: usize| bias[k] * bias[k] + covariance[(k, k)];
+        Self {
+            bias_m: (*bias).into(),
+            covariance_m2: std::array::from_fn(|row| {
+                std::array::from_fn(|column| covariance[(row, column)])
+            }),
+            rms_m: (bias.norm_squared() + covariance.trace()).sqrt(),
+            lateral_rms_m: (across(0) + across(1)).sqrt(),
+        }
+    }
+
+    /// Covariance, m^2.
+    pub fn covariance(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|row, column| self.covariance_m2[row][column])
+    }
+
+    /// Mean, m.
+    pub fn bias(&self) -> Vector3<f64> {
+        Vector3::from(self.bias_m)
+    }
+
+    /// Standard deviations along the principal axes, m, largest first, and those axes.
+    pub fn principal(&self) -> [(f64, Vector3<f64>); 3] {
+        let eigen = SymmetricEigen::new(self.covariance());
+        let mut order = [0, 1, 2];
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        order.map(|k| {
+            (
+                eigen.eigenvalues[k].max(0.0).sqrt(),
+                eigen.eigenvectors.column(k).into_owned(),
+            )
+        })
+    }
+}
+
+/// The two ways to the moments of one point, and how far they are apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PointBudget {
+    /// By Jacobians.
+    pub analytic: Moments,
+    /// By many draws, each settled and measured as a run is; none if no samples were asked for.
+    pub monte_carlo: Option<Moments>,
+    /// Distance that 95 % of the draws stay within, m.
+    pub radius_95_m: Option<f64>,
+    /// Frobenius norm of the difference of the covariances over that of the analytic one; none
+    /// without samples or without spread.
+    pub covariance_difference: Option<f64>,
+    /// Distance of the two biases, m.
+    pub bias_difference_m: Option<f64>,
+}
+
+/// Budget of one source, or of all.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SourceBudget {
+    /// The source; none for all together.
+    pub source: Option<Source>,
+    /// Needle where it should enter the skin (at the guide's exit without a phantom).
+    pub at_skin: PointBudget,
+    /// Needle's tip at the end of the insertion.
+    pub at_target: PointBudget,
+}
+
+/// Error budget of one configuration.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ErrorBudget {
+    /// Samples of the Monte Carlo, per source and for all together.
+    pub samples: usize,
+    /// Each source as if it were alone.
+    pub sources: Vec<SourceBudget>,
+    /// All together. Not quite the sum: elastic joints sag under a wrong payload too.
+    pub total: SourceBudget,
+    /// Source with the largest mean square at the target.
+    pub dominant: Option<Source>,
+}
+
+/// The budget of a configuration; `samples` of Monte Carlo, `seed` of its draws.
+///
+/// # Errors
+/// [`BudgetError`].
+pub fn budget(
+    case: &BudgetCase<'_>,
+    samples: usize,
+    seed: u64,
+) -> Result<ErrorBudget, BudgetError> {
+    let of = |source: Option<Source>| -> Result<SourceBudget, BudgetError> {
+        let imperfections = source.map_or_else(
+            || case.imperfections.clone(),
+            |source| source.alone(case.imperfections),
+        );
+        let analytic = analytic::moments(case, &imperfections)?;
+        let sampled = if samples > 1 {
+            Some(monte_carlo::moments(case, &imperfections, samples, seed)?)
+        } else {
+            None
+        };
+        let point = |index: usize| {
+            let analytic = analytic[index];
+            let sampled = sampled.map(|both| both[index]);
+            let size = analytic.covariance().norm();
+            PointBudget {
+                analytic,
+                monte_carlo: sampled.map(|(moments, _)| moments),
+                radius_95_m: sampled.map(|(_, radius_m)| radius_m),
+                covariance_difference: sampled.filter(|_| size > LEAST_VARIANCE_M2).map(
+                    |(moments, _)| (moments.covariance() - analytic.covariance()).norm() / size,
+                ),
+                bias_difference_m: sampled
+                    .map(|(moments, _)| (moments.bias() - analytic.bias()).norm()),
+            }
+        };
+        Ok(SourceBudget {
+            source,
+            at_skin: point(0),
+            at_target: point(1),
+        })
+    };
+    let sources = Source::ALL
+        .into_iter()
+        .filter(|source| source.is_in(case.imperfections))
+        .map(|source| of(Some(source)))
+        .collect::<Result<Vec<_>, _>>()?;
+    let dominant = sources
+        .iter()
+        .max_by(|a, b| {
+            let rms = |each: &SourceBudget| each.at_target.analytic.rms_m;
+            rms(a).total_cmp(&rms(b))
+        })
+        .and_then(|each| each.source);
+    Ok(ErrorBudget {
+        samples,
+        sources,
+        total: of(None)?,
+        dominant,
+    })
+}
+
+/// A variance below this is none, m^2: a nanometre squared.
+const LEAST_VARIANCE_M2: f64 = 1e-18;

@@ -1,0 +1,299 @@
+//! The budget by Jacobians.
+
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, SymmetricEigen, Vector3};
+use needlebench_cell::imperfections::{ArmPopulation, Breathing, Imperfections};
+use needlebench_kinematics::registration::{transform_covariance, tre_covariance};
+use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
+
+use super::{BudgetCase, BudgetError, Moments};
+use crate::jitter::Jitter;
+use crate::truth::moved_by;
+use crate::{Draw, Layout, Truth};
+
+/// Moments at skin and target, axes of the guide's exit.
+///
+/// Covariances are of first order in every source but the breathing, whose moments are exact. The bias
+/// is that of the mean arm in its mean posture, with the second-order parts of what turns: the arm's
+/// origins, its joints and the registration (milliradians over half a metre: micrometres).
+pub(super) fn moments(
+    case: &BudgetCase<'_>,
+    imperfections: &Imperfections,
+) -> Result<[Moments; 2], BudgetError> {
+    let target = case.target();
+    let exit = case.world_from_exit();
+    let layout = Layout::new(imperfections);
+    // Every variable at its mean: the arm about which the Jacobians are taken.
+    let middle = Draw(vec![0.0; layout.len()]);
+    let truth = Truth::new(case.cell, case.place, imperfections, &layout, &middle, 0)?;
+    let joints = JointErrors::new(case, imperfections, &truth, &target);
+    let from_world = case.from_world();
+    let points = case.planned();
+    let mut moments = [Moments::new(&Vector3::zeros(), &Matrix3::zeros()); 2];
+    for (index, point) in points.iter().enumerate() {
+        let jacobian = tip_jacobian(case, &target, point);
+        let displaced = |errors: &Joints| mean_displacement(case, &truth, &target, errors, point);
+        let mut bias = displaced(&joints.bias);
+        for deviation in joints.principal_deviations() {
+            let [ahead, behind] =
+                [1.0, -1.0].map(|sign| displaced(&(joints.bias + deviation * sign)));
+            bias += 0.5 * (ahead + behind) - displaced(&joints.bias);
+        }
+        let mut covariance = jacobian * joints.covariance * jacobian.transpose();
+        if let Some(arms) = &imperfections.calibration {
+            let (curved, spread) = calibration(case, arms, &target, point);
+            bias += curved;
+            covariance += spread;
+        }
+        if let Some((markers, fle_rms_m)) = &imperfections.registration {
+            let place = case.place.copied().unwrap_or_else(Pose::identity);
+            let in_phantom = tre_covariance(markers, &(place.inverse() * point), *fle_rms_m)?;
+            let turn = place.rotation.to_rotation_matrix();
+            covariance += turn * in_phantom * turn.inverse();
+            // A rotation w moves a point by w x r + w x (w x r) / 2.
+            let (centroid, transform) = transform_covariance(markers, *fle_rms_m)?;
+            let rotation = transform.fixed_view::<3, 3>(3, 3).into_owned();
+            let arm = place.inverse() * point - centroid;
+            let curved = 0.5 * (rotation - Matrix3::identity() * rotation.trace()) * arm;
+            bias -= turn * curved;
+        }
+        if let Some(breathing) = &imperfections.breathing {
+            let place = case.place.copied().unwrap_or_else(Pose::identity);
+            let amplitude = [breathing.skin_m, breathing.target_m][index];
+            let moved = place.rotation * amplitude;
+            let (mean, variance) = breath_moments(breathing);
+            bias -= moved * mean;
+            covariance += moved * moved.transpose() * variance;
+        }
+        if let Some(clearance_m) = imperfections.guide_clearance_m {
+            let lever = case.depths_m()[index] / case.cell.tool.guide_length_m();
+            // Variance of one coordinate of a uniform disc: a quarter of the radius squared.
+            let variance = (0.5 * clearance_m).powi(2) / 4.0;
+            let across = variance * ((1.0 + lever).powi(2) + lever.powi(2));
+            let along = exit.rotation * Vector3::z();
+            covariance += (Matrix3::identity() - along * along.transpose()) * across;
+        }
+        let bias = from_world * bias;
+        let mut covariance = from_world * covariance * from_world.inverse();
+        // Symmetric but for rounding.
+        covariance = 0.5 * (covariance + covariance.transpose());
+        moments[index] = Moments::new(&bias, &covariance);
+    }
+    Ok(moments)
+}
+
+/// Linear Jacobian of a point of the last link, world, m/rad.
+fn tip_jacobian(case: &BudgetCase<'_>, q: &Joints, point: &Point3<f64>) -> Matrix3x6<f64> {
+    let robot = &case.cell.robot;
+    let in_flange = robot.world_from_flange(q).inverse() * point;
+    let jacobian = robot.chain.jacobian_at(q, &in_flange.coords);
+    let turn = robot.world_from_base_link.rotation.to_rotation_matrix();
+    turn * jacobian.fixed_rows::<3>(0)
+}
+
+/// How far the mean arm, its joints off by `errors`, carries a point of the last link from where the
+/// nominal arm has it, world.
+fn mean_displacement(
+    case: &BudgetCase<'_>,
+    truth: &Truth,
+    target: &Joints,
+    errors: &Joints,
+    point: &Point3<f64>,
+) -> Vector3<f64> {
+    let robot = &case.cell.robot;
+    let in_flange = robot.world_from_flange(target).inverse() * point;
+    let real = truth.chain.base_link_from_flange(&(target + errors));
+    robot.world_from_base_link * real * in_flange - point
+}
+
+/// Errors of the joints at rest: real minus commanded, rad.
+struct JointErrors {
+    bias: Joints,
+    covariance: Matrix6<f64>,
+}
+
+impl JointErrors {
+    fn new(
+        case: &BudgetCase<'_>,
+        imperfections: &Imperfections,
+        truth: &Truth,
+        target: &Joints,
+    ) -> Self {
+        let kp = Joints::from(case.servo.gains.kp_nm_per_rad);
+        let mut bias = Joints::zeros();
+        let mut covariance = Matrix6::zeros();
+        let believed = case.servo.dynamics.gravity_torque(target);
+        let compliance = truth.actuation.compliance_rad_per_nm;
+        let real = truth.dynamics(case.cell);
+        // The weight of the arm where it has sagged to.
+        let upright = real.gravity_torque(target);
+        let load = real.gravity_torque(&(target - compliance.component_mul(&upright)));
+        // What a torque that the controller does not know does: servo and gear in series.
+        let yields = kp.map(f64::recip) + compliance;
+        let unknown = load - believed;
+        bias -=
+            unknown.component_div(&kp) + truth.actuation.compliance_rad_per_nm.component_mul(&load);
+        if let Some((compliance, spread)) = imperfections.elasticity {
+            let sag = compliance.component_mul(&load) * spread;
+            covariance += Matrix6::from_diagonal(&sag.component_mul(&sag));
+        }
+        if let Some(payload) = imperfections.payload {
+            let mut column = |body: needlebench_kinematics::Body| {
+                let other = Truth {
+                    tool_body: body,
+                    ..truth.clone()
+                };
+                let change = other.dynamics(case.cell).gravity_torque(target) - upright;
+                let moved = yields.component_mul(&change);
+                covariance += moved * moved.transpose();
+            };
+            let mut heavier = truth.tool_body;
+            heavier.mass_kg += payload.mass_spread_kg;
+            column(heavier);
+            for axis in 0..3 {
+                let mut shifted = truth.tool_body;
+                shifted.com_m[axis] += payload.com_spread_m;
+                column(shifted);
+            }
+        }
+        if let (Some(block), Some(resting)) =
+            (&imperfections.friction, case.friction(imperfections))
+        {
+            let bristle = Joints::from(block.bristle_stiffness_nm_rad);
+            let kept = resting.held_nm.component_div(&kp);
+            let sprung = bristle
+                .component_mul(&resting.compensated_nm)
+                .component_div(&kp.component_mul(&(kp + bristle)));
+            bias -= kept - sprung;
+            let spread = kept * block.spread;
+            covariance += Matrix6::from_diagonal(&spread.component_mul(&spread));
+        }
+        if let Some(encoder) = imperfections.encoder {
+            let squared = |values: &Joints| values.component_mul(values);
+            let still = squared(&encoder.zero_spread_rad) + squared(&encoder.resolution_rad) / 12.0;
+            covariance += Matrix6::from_diagonal(&still);
+            if let Some(jitter) = Jitter::new(case.servo, &real, truth, target, case.timestep_s) {
+                covariance += jitter.covariance();
+            }
+        }
+        Self { bias, covariance }
+    }
+
+    /// Deviations along the principal axes of the covariance, one standard deviation each.
+    fn principal_deviations(&self) -> [Joints; JOINT_COUNT] {
+        let eigen = SymmetricEigen::new(self.covariance);
+        std::array::from_fn(|k| eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt())
+    }
+}
+
+/// Second-order part of the mean, and covariance, of a point under a population of arms, world.
+fn calibration(
+    case: &BudgetCase<'_>,
+    arms: &ArmPopulation,
+    q: &Joints,
+    point: &Point3<f64>,
+) -> (Vector3<f64>, Matrix3<f64>) {
+    let robot = &case.cell.robot;
+    let links = robot.world_from_links(q);
+    let origins: [Pose; JOINT_COUNT] = std::array::from_fn(|i| {
+        let parent = if i == 0 {
+            robot.world_from_base_link
+        } else {
+            links[i - 1]
+        };
+        parent * robot.chain.joints[i].parent_from_joint
+    });
+    let in_flange = robot.world_from_flange(q).inverse() * point;
+    let at = |deviations: &[nalgebra::Vector6<f64>; JOINT_COUNT]| -> Point3<f64> {
+        let chain = ArmPopulation::moved(&robot.chain, deviations);
+        robot.world_from_base_link * chain.base_link_from_flange(q) * in_flange
+    };
+    let centre = at(&arms.mean);
+    let mut curved = Vector3::zeros();
+    let mut covariance = Matrix3::zeros();
+    for mode in &arms.modes {
+        let moved: Vector3<f64> = (0..JOINT_COUNT)
+            .map(|i| moved_by(&origins[i], &mode[i], point))
+            .sum();
+        covariance += moved * moved.transpose();
+        let [ahead, behind] = [1.0, -1.0]
+            .map(|sign| at(&std::array::from_fn(|i| arms.mean[i] + mode[i] * sign)) - centre);
+        curved += 0.5 * (ahead + behind);
+    }
+    (curved, covariance)
+}
+
+/// Mean and variance of `sin^4(pi phase)`: by its Fourier series under a normal or uniform phase.
+fn breath_moments(breathing: &Breathing) -> (f64, f64) {
+    /// `sin^4 x = 3/8 - 1/2 cos 2x + 1/8 cos 4x`.
+    const FOURTH: [f64; 5] = [3.0 / 8.0, -0.5, 0.125, 0.0, 0.0];
+    /// `sin^8 x = 35/128 - 7/16 cos 2x + 7/32 cos 4x - 1/16 cos 6x + 1/128 cos 8x`.
+    const EIGHTH: [f64; 5] = [
+        35.0 / 128.0,
+        -7.0 / 16.0,
+        7.0 / 32.0,
+        -1.0 / 16.0,
+        1.0 / 128.0,
+    ];
+    let mean = |series: &[f64; 5]| -> f64 {
+        series
+            .iter()
+            .enumerate()
+            .map(|(k, coefficient)| {
+                let rate = std::f64::consts::TAU * k as f64;
+                let expected = match breathing.phase_spread {
+                    // E cos(a (m + s z)) = cos(a m) exp(-(a s)^2 / 2)
+                    Some(spread) => {
+                        (rate * breathing.phase).cos() * (-0.5 * (rate * spread).powi(2)).exp()
+                    }
+                    None if k == 0 => 1.0,
+                    None => 0.0,
+                };
+                coefficient * expected
+            })
+            .sum()
+    };
+    let first = mean(&FOURTH);
+    (first, (mean(&EIGHTH) - first * first).max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean of 2e5 equal steps, of a smooth function: rounding.
+    const QUADRATURE: f64 = 1e-9;
+
+    #[test]
+    fn moments_of_the_breath_are_those_of_a_quadrature() {
+        for phase_spread in [Some(0.08), Some(0.3), None] {
+            let breathing = Breathing {
+                skin_m: Vector3::zeros(),
+                target_m: Vector3::zeros(),
+                period_s: 4.0,
+                phase: 0.1,
+                phase_spread,
+            };
+            let (mut weight, mut first, mut second) = (0.0, 0.0, 0.0);
+            let steps = 200_000;
+            for k in 0..steps {
+                let u = (f64::from(k) + 0.5) / f64::from(steps);
+                let (phase, density) = match phase_spread {
+                    Some(spread) => {
+                        let z = 16.0 * u - 8.0;
+                        (0.1 + spread * z, (-0.5 * z * z).exp())
+                    }
+                    None => (u, 1.0),
+                };
+                let share = crate::truth::breath(phase);
+                weight += density;
+                first += density * share;
+                second += density * share * share;
+            }
+            first /= weight;
+            second /= weight;
+            let (mean, variance) = breath_moments(&breathing);
+            assert!((mean - first).abs() < QUADRATURE, "{mean} {first}");
+            assert!((variance - (second - first * first)).abs() < QUADRATURE);
+        }
+    }
+}

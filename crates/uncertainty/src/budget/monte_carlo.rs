@@ -1,0 +1,68 @@
+//! The budget by many draws: each one an arm and a patient, settled and measured as in a run.
+
+use nalgebra::{Matrix3, Vector3};
+use needlebench_cell::imperfections::Imperfections;
+use needlebench_kinematics::Joints;
+use needlebench_kinematics::pose_sets::SplitMix64;
+
+use super::{BudgetCase, BudgetError, Moments};
+use crate::jitter::Jitter;
+use crate::{Draw, Layout, Truth, settle};
+
+/// Moments at skin and target, and the distance that 95 % of the draws stay within, m.
+pub(super) fn moments(
+    case: &BudgetCase<'_>,
+    imperfections: &Imperfections,
+    samples: usize,
+    seed: u64,
+) -> Result<[(Moments, f64); 2], BudgetError> {
+    let layout = Layout::new(imperfections);
+    let mut random = SplitMix64::new(seed);
+    let draws = layout.hypercube(samples, &mut random);
+    let friction = case.friction(imperfections);
+    let target = case.target();
+    let planned = case.planned();
+    let depths_m = case.depths_m();
+    let from_world = case.from_world();
+
+    let middle = Draw(vec![0.0; layout.len()]);
+    let typical = Truth::new(case.cell, case.place, imperfections, &layout, &middle, 0)?;
+    let jitter = Jitter::new(
+        case.servo,
+        &typical.dynamics(case.cell),
+        &typical,
+        &target,
+        case.timestep_s,
+    )
+    .map_or_else(
+        || vec![Joints::zeros(); samples],
+        |jitter| jitter.samples(samples, &mut random),
+    );
+
+    let mut errors: [Vec<Vector3<f64>>; 2] = std::array::from_fn(|_| Vec::with_capacity(samples));
+    for (draw, trembling) in draws.iter().zip(&jitter) {
+        let truth = Truth::new(case.cell, case.place, imperfections, &layout, draw, 0)?;
+        let real = truth.dynamics(case.cell);
+        let settled = settle(case.servo, &real, &truth, friction.as_ref(), &target)?;
+        let position = settled.position + trembling;
+        let needle = truth.needle_points(case.cell, &position, depths_m);
+        let wanted = [truth.entry(&planned[0]), truth.target(&planned[1])];
+        for ((errors, needle), wanted) in errors.iter_mut().zip(needle).zip(wanted) {
+            errors.push(from_world * (needle - wanted));
+        }
+    }
+    Ok(errors.map(|errors| {
+        let count = errors.len() as f64;
+        let mean = errors.iter().sum::<Vector3<f64>>() / count;
+        let scatter: Matrix3<f64> = errors
+            .iter()
+            .map(|error| (error - mean) * (error - mean).transpose())
+            .sum();
+        let mut distances: Vec<f64> = errors.iter().map(Vector3::norm).collect();
+        distances.sort_by(f64::total_cmp);
+        (
+            Moments::new(&mean, &(scatter / (count - 1.0))),
+            distances[distances.len() * 95 / 100],
+        )
+    }))
+}

@@ -1,0 +1,21 @@
+//! How imperfect the arm and the phantom are, and what that does to the needle.
+//!
+//! ```text
+//! Imperfections --draw--> Truth --settle--> posture --> tip error        one arm, one patient
+//!      |
+//!      +--Jacobians--> covariance and bias by source        \
+//!      +--many draws, the same way as one--> the same        } error budget
+//! ```
+//!
+//! A [`Truth`] is one arm and one patient: what the engines simulate. The [`budget`] says how far the
+//! needle's tip is off over all arms and patients, by source, analytically and by Monte Carlo; the
+//! two share no formula but the model of each source.
+
+pub mod budget;
+mod distribution;
+mod jitter;
+mod settle;
+mod truth;
+
+pub use settle::{RestingFriction, SettleError, Settled, resting_friction, settle};
+pub use truth::{Draw, Layout, Source, Truth};
