@@ -23,8 +23,10 @@
 //! so `distance / (w time)` gives `x` and the time then `c`. `M` and gravity's torque are those of the
 //! dynamics that is given, stretched out level, with 3 kg at the flange. The manual does not say which
 //! way the joint moves; *assumed* is the worse one, downwards, so the constant torque is `c` plus
-//! gravity's half way down. There are no figures for the wrists; *assumed* is the elbow's brake by the ratio of the
-//! torque limits.
+//! gravity's half way down. There are no figures for the wrists; *assumed* is the elbow's brake by the
+//! ratio of the torque limits. A brake that stands holds [`STANDING_RATIO`] times what it has while it
+//! slips (*assumed*): with no more than that the elbow slips at the start of the shoulder's published
+//! stop, which then ends after 0.184 rad.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use needlebench_kinematics::{Body, Dynamics, JOINT_COUNT, Joints};
@@ -63,14 +65,14 @@ pub const PUBLISHED_STOPS: [PublishedStop; 3] = [
 /// Elbow's torque limit over those of wrists 1 to 3: 28 N m, 12 N m.
 const WRIST_SHARE: f64 = 12.0 / 28.0;
 
-/// Torque of a brake that stands over that of one that slips; at least 1.6 is needed, see above.
+/// Torque of a brake that stands over that of one that slips. Assumed, see above.
 pub const STANDING_RATIO: f64 = 2.0;
 
 /// Speed below which a joint counts as standing, rad/s: a few millimetres a second at the end of the arm,
 /// and ten times what a step of 1 ms leaves of a joint that is held while others stop from full speed.
 const STANDING_RAD_S: f64 = 1e-2;
 
-/// Sweeps over the joints per step. The worst of 10 000 random states was solved to 1e-9 N m in 60.
+/// Most sweeps over the joints per step.
 const SWEEPS: usize = 100;
 
 /// Change of a torque below which the sweeps end, N m.
@@ -169,10 +171,10 @@ impl Brakes {
     }
 }
 
-/// The arm with the load of the published stops at its flange, and no tool.
+/// The arm with the load of the published stops at its flange, level.
 ///
-/// The mass and the inertia of a tool that is part of the last body stay: a fifth of a kilogram, which
-/// is a hundredth of the load's moment.
+/// The mass and the inertia of a tool that is part of the last body stay: a guide weighs a twentieth of
+/// the load.
 pub fn loaded(dynamics: &Dynamics) -> Dynamics {
     let mut loaded = *dynamics;
     let load = Body {

@@ -48,9 +48,9 @@ pub(crate) fn assemble(
     reality: &Reality<'_>,
     plans: &[GoalPlan],
     runs: &[Vec<Vec<EngineRun>>],
+    events: &[EventRun],
     budgets: &Budgets,
     trials: &[Vec<Trial>],
-    events: &[EventRun],
     engines: &[EngineName],
     engine_failures: Vec<EngineFailure>,
     identities: Vec<EngineIdentity>,
@@ -239,7 +239,7 @@ fn configuration_report(
         events: events
             .iter()
             .find(|run| run.goal == goal_index && run.configuration == plan.configuration.index())
-            .map(|run| events_report(resolved, model, plan, run)),
+            .map(|run| events_report(resolved, reality, plan, run)),
         room: candidate.map(|each| room.measure(goal_index, &each.joints)),
         budget: None,
         budget_failure: None,

@@ -6,11 +6,10 @@ use std::sync::atomic::AtomicBool;
 
 use needlebench_cell::scenario::{EngineName, EventsSection, PressSection, StopSection};
 use needlebench_cell::{Cell, Goal, ResolvedScenario};
-use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::HarnessProcess;
 use needlebench_engine::{
-    Actuation, Brakes, Braking, EngineError, Hooks, MujocoPlant, Plant, RapierPlant, Recording,
-    Servo, simulate, simulate_with_stop,
+    Brakes, Braking, EngineError, Hooks, MujocoPlant, Plant, RapierPlant, Recording, Servo,
+    simulate_with_stop,
 };
 use needlebench_evaluation::events::{
     EventsReport, PressReport, StopEnvelope, StopReport, measure_press, measure_retraction,
@@ -21,7 +20,7 @@ use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_planning::{ConfigurationPlan, GoalPlan, PressError, PressPlan, stage_press};
 
 use crate::pipeline::{Harness, in_parallel, mujoco_settings, rapier_settings};
-use crate::reality::servo;
+use crate::reality::{Reality, servo};
 
 /// Events of one configuration, with what the engines made of them.
 #[derive(Debug)]
@@ -61,7 +60,7 @@ pub(crate) struct EngineEvents {
 /// Stages the events of every configuration that works.
 pub(crate) fn stage(
     resolved: &ResolvedScenario,
-    model: &ClearanceModel,
+    reality: &Reality<'_>,
     plans: &[GoalPlan],
     threads: usize,
 ) -> Vec<EventRun> {
@@ -85,26 +84,25 @@ pub(crate) fn stage(
             press: events
                 .press
                 .iter()
-                .map(|press| stage_one(&resolved.cell, model, trajectory, press))
+                .map(|press| stage_one(reality, trajectory, press))
                 .collect(),
             stop: events
                 .stop
                 .as_ref()
-                .map(|stop| stage_stop(resolved, &resolved.goals[goal], trajectory, stop)),
+                .map(|stop| stage_stop(resolved, reality, goal, trajectory, stop)),
             engines: BTreeMap::new(),
         }
     })
 }
 
 fn stage_one(
-    cell: &Cell,
-    model: &ClearanceModel,
+    reality: &Reality<'_>,
     trajectory: &JointTrajectory,
     press: &PressSection,
 ) -> Result<PressPlan, PressError> {
     stage_press(
-        cell,
-        model,
+        reality.cell(),
+        reality.model(),
         &trajectory.end(),
         press.class.class(),
         (press.gap_mm * 1e-3, press.depth_mm * 1e-3),
@@ -115,11 +113,12 @@ fn stage_one(
 
 fn stage_stop(
     resolved: &ResolvedScenario,
-    goal: &Goal,
+    reality: &Reality<'_>,
+    goal: usize,
     trajectory: &JointTrajectory,
     stop: &StopSection,
 ) -> StagedStop {
-    let cell = &resolved.cell;
+    let (cell, goal) = (reality.cell(), reality.goal(goal));
     let brakes = Brakes::of_ur3(&cell.dynamics());
     let deceleration_s = stop.deceleration_ms * 1e-3;
     let by_brakes = (stop.category == 0).then_some(&brakes);
@@ -157,6 +156,7 @@ fn stage_stop(
 /// What a simulation of events works with.
 pub(crate) struct EventSimulation<'a> {
     pub resolved: &'a ResolvedScenario,
+    pub reality: &'a Reality<'a>,
     pub plans: &'a [GoalPlan],
     pub harness: Option<&'a Harness>,
     pub cancel: &'a AtomicBool,
@@ -191,7 +191,7 @@ impl EventSimulation<'_> {
 
     fn run_one(&self, engine: EngineName, run: &EventRun) -> Result<EngineEvents, EngineError> {
         let events = section(self.resolved);
-        let cell = &self.resolved.cell;
+        let cell = self.reality.cell();
         let servo = servo(self.resolved);
         let mut done = EngineEvents::default();
         for (press, asked) in run.press.iter().zip(&events.press) {
@@ -243,11 +243,8 @@ impl EventSimulation<'_> {
             cancel: Some(self.cancel),
             progress: None,
         };
-        let ideal = Actuation::default();
-        match braking {
-            None => simulate(plant, servo, &ideal, trajectory, hooks),
-            some => simulate_with_stop(plant, servo, &ideal, trajectory, some, hooks),
-        }
+        let actuation = self.reality.actuation();
+        simulate_with_stop(plant, servo, actuation, trajectory, braking, hooks)
     }
 
     fn with_plant<T>(
@@ -293,12 +290,12 @@ fn section(resolved: &ResolvedScenario) -> &EventsSection {
 /// The report's part about the events of a configuration.
 pub(crate) fn events_report(
     resolved: &ResolvedScenario,
-    model: &ClearanceModel,
+    reality: &Reality<'_>,
     plan: &ConfigurationPlan,
     run: &EventRun,
 ) -> EventsReport {
     let events = section(resolved);
-    let goal = &resolved.goals[run.goal];
+    let (cell, model, goal) = (reality.cell(), reality.model(), reality.goal(run.goal));
     let scenario = &resolved.scenario;
     let band_m = scenario.criteria.settling_band_mm * 1e-3;
     let settings = (
@@ -323,14 +320,13 @@ pub(crate) fn events_report(
             .filter_map(|(engine, events)| {
                 let recording = events.stop.as_ref()?;
                 let both = (planned, &stop.trajectory);
-                let cell = &resolved.cell;
                 let report = measure_stop(cell, model, goal, both, recording, stop.at_s, settings);
                 Some((engine.name().to_owned(), report))
             })
             .collect();
         let last = |events: &EngineEvents| {
             let state = events.stop.as_ref()?.state.last()?;
-            let exit = state.world_from_flange * resolved.cell.tool.flange_from_guide_exit;
+            let exit = state.world_from_flange * cell.tool.flange_from_guide_exit;
             Some(exit * nalgebra::Point3::new(0.0, 0.0, goal.insertion_length_m))
         };
         let tips: Vec<_> = run.engines.values().filter_map(last).collect();
@@ -351,7 +347,6 @@ pub(crate) fn events_report(
         .iter()
         .filter_map(|(engine, events)| {
             let (recording, retreat) = (events.retract.as_ref()?, plan.retreat.as_ref()?);
-            let cell = &resolved.cell;
             let report = measure_retraction(cell, model, goal, retreat, recording, settings);
             Some((engine.name().to_owned(), report))
         })

@@ -88,10 +88,10 @@ pub struct ScenarioRun {
     pub plans: Vec<GoalPlan>,
     /// Recordings, by goal, configuration and engine.
     pub runs: Vec<Vec<Vec<EngineRun>>>,
-    /// What a test by ISO 9283 left besides its report.
-    pub iso9283: Option<ProtocolRun>,
     /// Events of the configurations that work.
     pub(crate) events: Vec<EventRun>,
+    /// What a test by ISO 9283 left besides its report.
+    pub iso9283: Option<ProtocolRun>,
     /// It was interrupted; what was finished until then is here.
     pub interrupted: bool,
 }
@@ -195,9 +195,10 @@ pub(crate) fn run(
         started.elapsed().as_secs_f64() - timings["planning_s"],
     );
 
-    let mut events = events::stage(resolved, &model, &plans, options.jobs);
+    let mut events = events::stage(resolved, &reality, &plans, options.jobs);
     let event_simulation = EventSimulation {
         resolved,
+        reality: &reality,
         plans: &plans,
         harness: harness.as_ref(),
         cancel,
@@ -264,9 +265,9 @@ pub(crate) fn run(
         &reality,
         &plans,
         &runs,
+        &events,
         &budgets,
         &trials.by_goal,
-        &events,
         &engines,
         failures,
         identities,
@@ -283,8 +284,8 @@ pub(crate) fn run(
         report,
         plans,
         runs,
-        iso9283: None,
         events,
+        iso9283: None,
         interrupted,
     })
 }

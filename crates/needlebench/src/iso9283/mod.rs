@@ -115,6 +115,7 @@ pub(crate) fn run(
     let (verdict, criteria) = judge(&report, own, &scenario.criteria);
     let interrupted = cancel.load(Ordering::Relaxed);
     Ok(ScenarioRun {
+        events: Vec::new(),
         report: Report {
             verdict,
             criteria,
@@ -260,6 +261,7 @@ fn unplanned(
         detail: reason.to_owned(),
     };
     ScenarioRun {
+        events: Vec::new(),
         report: Report {
             criteria: vec![criterion],
             ..empty_report(resolved, Vec::new(), timings)

@@ -349,7 +349,9 @@ fn panel(
         let value = low + step * k as f64;
         let y = y_of(value);
         canvas.fill([LEFT_PX, y], [width, 1], GRID);
-        let digits = if step < 0.5 { 1 } else { 0 };
+        let digits = usize::from(step < 1.0);
+        // Rounding may leave a negative zero.
+        let value = if value.abs() < 0.5 * step { 0.0 } else { value };
         let text = format!("{value:.digits$}");
         let text_left = LEFT_PX - 10 - canvas.width_of(&text);
         canvas.write([text_left, y.saturating_sub(8)], &text);

@@ -40,6 +40,9 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             writeln!(out, "room for people, in the final posture")?;
             writeln!(out, "{}", room_table(goal))?;
         }
+        if let Some(events) = events_text(goal) {
+            write!(out, "{events}")?;
+        }
         if let Some(budget) = budget_text(goal) {
             write!(out, "{budget}")?;
         }
@@ -49,9 +52,6 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
                 "each engine beside the referee: distance of the needle's tips"
             )?;
             writeln!(out, "{table}")?;
-        }
-        if let Some(events) = events_text(goal) {
-            write!(out, "{events}")?;
         }
         write_remarks(out, report, goal)?;
     }

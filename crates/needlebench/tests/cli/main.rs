@@ -12,6 +12,7 @@ mod compare;
 mod determinism;
 #[cfg(target_os = "linux")]
 mod environment;
+mod events;
 mod help;
 #[cfg(target_os = "linux")]
 mod interrupt;
