@@ -6,6 +6,7 @@
 //! recordings is the engines' doing.
 
 mod contact_groups;
+mod deviations;
 mod error;
 pub mod mujoco;
 mod plant;
@@ -18,6 +19,7 @@ mod simulate;
 #[path = "../tests/common/mod.rs"]
 mod test_cell;
 
+pub use deviations::{KNOWN_DEVIATIONS, KnownDeviation};
 pub use error::EngineError;
 pub use mujoco::{MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
