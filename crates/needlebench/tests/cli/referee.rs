@@ -4,13 +4,9 @@ use serde_json::Value;
 
 use crate::support::{Bench, Finding, SMALL, has_keys, mujoco_is_ready, with_edit};
 
-/// What the quick motions of `SMALL` may differ by, and less.
+/// `SMALL` with another envelope.
 fn with_envelope(keys: &str) -> String {
-    with_edit(
-        SMALL,
-        "[recording]",
-        &format!("[engines.envelope]\n{keys}\n[recording]"),
-    )
+    with_edit(SMALL, "peak_tip_um = 10", keys)
 }
 
 fn simulated(report: &Value) -> Vec<&Value> {
