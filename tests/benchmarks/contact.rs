@@ -7,7 +7,8 @@ use needlebench_kinematics::Joints;
 use crate::mechanism::{GRAVITY_M_S2, Mechanism, RESTING_KGM2};
 use crate::with_engines;
 
-pub const TIMESTEP_S: f64 = 1e-3;
+pub const STEPS_PER_S: u32 = 1000;
+pub const TIMESTEP_S: f64 = 1.0 / STEPS_PER_S as f64;
 pub const LEVER_M: f64 = 0.5;
 pub const BALL_KG: f64 = 2.0;
 
@@ -23,8 +24,7 @@ pub fn mechanism() -> Mechanism {
     }
 }
 
-pub fn run(plant: &mut dyn Plant, duration_s: f64, torque_nm: &Joints) -> PlantState {
-    let steps = (duration_s / TIMESTEP_S).round() as u32;
+pub fn run(plant: &mut dyn Plant, steps: u32, torque_nm: &Joints) -> PlantState {
     let mut state = plant.step(torque_nm).unwrap();
     for _ in 1..steps {
         state = plant.step(torque_nm).unwrap();
@@ -43,7 +43,7 @@ fn a_resting_ball_is_borne_by_its_weight_and_what_presses_it() {
         for pressing_nm in [0.0, 5.0, 20.0] {
             let mut torque = Joints::zeros();
             torque[1] = pressing_nm;
-            let state = run(plant, 1.0, &torque);
+            let state = run(plant, STEPS_PER_S, &torque);
             let expected_n = BALL_KG * GRAVITY_M_S2 + pressing_nm / LEVER_M;
             let force_n = state.contact.normal_force_n;
             println!(
@@ -70,13 +70,13 @@ fn a_ball_slides_over_a_smooth_table_as_through_nothing() {
     println!("sliding contact:");
     with_engines(&cell, TIMESTEP_S, 0.0, |name, plant| {
         plant.reset(&Joints::zeros()).unwrap();
-        run(plant, 0.5, &Joints::zeros());
+        run(plant, STEPS_PER_S / 2, &Joints::zeros());
         let mut torque = Joints::zeros();
         torque[0] = SWEEP_NM;
         let speed = SWEEP_NM / moment * f64::from(STEPS) * TIMESTEP_S;
-        let pushed = run(plant, f64::from(STEPS) * TIMESTEP_S, &torque);
+        let pushed = run(plant, STEPS, &torque);
         // Then on by itself for a second.
-        let coasted = run(plant, 1.0, &Joints::zeros());
+        let coasted = run(plant, STEPS_PER_S, &Joints::zeros());
         let weight_n = BALL_KG * GRAVITY_M_S2;
         println!(
             "    {name}: {:.9} and {:.9} rad/s of {speed:.9} rad/s, {:.9} N of {weight_n:.9} N",

@@ -7,7 +7,7 @@ use needlebench_engine::{
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
 
-use crate::contact::{BALL_KG, LEVER_M, TIMESTEP_S, mechanism, run};
+use crate::contact::{BALL_KG, LEVER_M, STEPS_PER_S, TIMESTEP_S, mechanism, run};
 use crate::mechanism::GRAVITY_M_S2;
 use crate::{harness, ur3, with_engines};
 
@@ -47,7 +47,7 @@ fn engines_run_half_a_step_early() {
         plant.reset(&Joints::zeros()).unwrap();
         // One step from rest: a h^2 instead of a h^2 / 2. Later ones keep the lead of h / 2.
         let first_rad = plant.step(&Joints::zeros()).unwrap().position[0];
-        let state = run(plant, 21.0 * TIMESTEP_S, &Joints::zeros());
+        let state = run(plant, 21, &Joints::zeros());
         let acceleration = first_rad / TIMESTEP_S.powi(2);
         let elapsed_s = 22.0 * TIMESTEP_S;
         let ahead_rad = state.position[0] - 0.5 * acceleration * elapsed_s.powi(2);
@@ -142,7 +142,7 @@ fn sinks(engine: &str, key: &str) {
     with_engines(&mechanism().cell(), TIMESTEP_S, 0.0, |name, plant| {
         if name == engine {
             plant.reset(&Joints::zeros()).unwrap();
-            let state = run(plant, 1.0, &Joints::zeros());
+            let state = run(plant, STEPS_PER_S, &Joints::zeros());
             check(key, state.contact.deepest_penetration_m);
         }
     });
@@ -152,7 +152,7 @@ fn sinks(engine: &str, key: &str) {
 fn rapier_loses_friction_where_the_point_cannot_yield() {
     const FRICTION: f64 = 0.3;
     const SWEEP_NM: f64 = 10.0;
-    const SWEEP_S: f64 = 0.3;
+    const SWEEP_STEPS: u32 = 300;
     let mechanism = mechanism();
     let settings = RapierSettings {
         friction: FRICTION,
@@ -160,11 +160,12 @@ fn rapier_loses_friction_where_the_point_cannot_yield() {
     };
     let mut plant = RapierPlant::new(&mechanism.cell(), TIMESTEP_S, &settings).unwrap();
     plant.reset(&Joints::zeros()).unwrap();
-    run(&mut plant, 0.5, &Joints::zeros());
+    run(&mut plant, STEPS_PER_S / 2, &Joints::zeros());
     let mut torque = Joints::zeros();
     torque[0] = SWEEP_NM;
-    let speed_rad_s = run(&mut plant, SWEEP_S, &torque).velocity[0];
-    let lost_nm = SWEEP_NM - speed_rad_s / SWEEP_S * mechanism.moment_kgm2();
+    let speed_rad_s = run(&mut plant, SWEEP_STEPS, &torque).velocity[0];
+    let lost_nm =
+        SWEEP_NM - speed_rad_s / (f64::from(SWEEP_STEPS) * TIMESTEP_S) * mechanism.moment_kgm2();
     let coulomb_nm = FRICTION * BALL_KG * GRAVITY_M_S2 * LEVER_M;
     check(
         "rapier_loses_friction_where_the_point_cannot_yield",

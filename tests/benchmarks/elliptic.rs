@@ -25,7 +25,7 @@ fn sn_cn(u: f64, k: f64) -> (f64, f64) {
         c[n + 1] = 0.5 * (a[n] - b);
         b = (a[n] * b).sqrt();
     }
-    let mut amplitude = (1_u32 << STEPS) as f64 * a[STEPS] * u;
+    let mut amplitude = f64::from(1_u32 << STEPS) * a[STEPS] * u;
     for n in (1..=STEPS).rev() {
         let sine = (c[n] / a[n] * amplitude.sin()).clamp(-1.0, 1.0);
         amplitude = 0.5 * (amplitude + sine.atan2((1.0 - sine * sine).sqrt()));

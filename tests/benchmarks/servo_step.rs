@@ -58,8 +58,8 @@ fn worst(plant: &mut dyn Plant, moment_kgm2: f64, discrete: &Matrix2<f64>) -> [f
     let mut state = plant.reset(&Joints::zeros()).unwrap();
     let mut worst = [0.0_f64; 2];
     let timestep_s = plant.timestep_s();
-    let steps = (DURATION_S / timestep_s).round() as u32;
-    for k in 1..=steps {
+    // A hundredth of a step is no step.
+    for k in (1..).take_while(|k| f64::from(*k) * timestep_s < DURATION_S + 0.01 * timestep_s) {
         let mut torque = Joints::zeros();
         torque[0] = KP_NM_RAD * (STEP_RAD - state.position[0]) - KD_NMS_RAD * state.velocity[0];
         state = plant.step(&torque).unwrap();
