@@ -230,10 +230,7 @@ impl ClosedLoop {
         Some(UnstableServo {
             growth,
             joint: made.fastest_growing_joint(),
-            stable_factor: highest(
-                &|factor| stable_at(factor, timestep_s),
-                1.0,
-            ),
+            stable_factor: highest(&|factor| stable_at(factor, timestep_s), 1.0),
             stable_timestep_s: highest(&|step_s| stable_at(1.0, step_s), timestep_s),
         })
     }

@@ -9,6 +9,7 @@ mod actuation;
 mod brakes;
 mod closed_loop;
 mod contact_groups;
+mod deviations;
 mod error;
 mod fleet_run;
 pub mod mujoco;
@@ -29,6 +30,7 @@ pub use brakes::{
     stretched,
 };
 pub use closed_loop::{ClosedLoop, UnstableServo};
+pub use deviations::{KNOWN_DEVIATIONS, KnownDeviation};
 pub use error::EngineError;
 pub use fleet_run::{Motion, simulate_fleet};
 pub use mujoco::{MujocoFleet, MujocoIntegrator, MujocoPlant, MujocoSettings};

@@ -36,8 +36,9 @@ pub struct RefereeComparison {
     /// The referee under the engine's recorded torques, what it differs by held back with the
     /// servo's gains.
     pub same_torques: TipDifference,
-    /// The same with nothing held back: what gravity makes of the engine's error, m.
-    pub unaided_peak_tip_m: f64,
+    /// The same with nothing held back, which leaves the engine's error to gravity: when the tips
+    /// are first a millimetre apart. None if they never are.
+    pub unaided_until_s: Option<f64>,
     /// The closed loop again at smaller steps, the first entry at the scenario's own.
     pub convergence: Vec<StepDifference>,
     /// Order of convergence from the two smallest steps; none where the differences are rounding.
@@ -72,6 +73,25 @@ pub struct StepDifference {
     pub timestep_s: f64,
     /// Largest distance of the tips.
     pub peak_tip_m: f64,
+}
+
+/// Distance of the tips at which a motion that is not held back counts as lost, m.
+const LOST_M: f64 = 1e-3;
+
+/// When the tips are first a millimetre apart, s.
+pub fn time_until_lost(
+    cell: &Cell,
+    goal: &Goal,
+    recording: &Recording,
+    states: &[PlantState],
+) -> Option<f64> {
+    let tip = |state: &PlantState| tip_of(cell, goal, &state.world_from_flange);
+    let index = recording
+        .state
+        .iter()
+        .zip(states)
+        .position(|(a, b)| (tip(a) - tip(b)).norm() > LOST_M)?;
+    Some(recording.time_s[index])
 }
 
 /// Number of steps before the first contact of a recording; all of them without one.

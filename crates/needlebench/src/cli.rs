@@ -149,6 +149,7 @@ pub(crate) enum MissingInertiaArgument {
 }
 
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct RunArguments {
     /// Scenario files.
     #[arg(required = true, value_name = "SCENARIO")]

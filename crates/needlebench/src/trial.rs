@@ -13,7 +13,7 @@ use needlebench_engine::{
 use needlebench_evaluation::adjudication::{Adjudication, Evidence, adjudicate, judge_differences};
 use needlebench_evaluation::referee::{
     DOCUMENTED_ORDER, RefereeComparison, RefereeReport, StepDifference, TipDifference,
-    measured_order, steps_before_contact, tip_difference,
+    measured_order, steps_before_contact, time_until_lost, tip_difference,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::GoalPlan;
@@ -217,7 +217,7 @@ impl Court<'_> {
         for (index, (case, retraced)) in cases.iter().zip(retraced).enumerate() {
             let steps: Vec<&AtStep> = by_step.iter().map(|measured| &measured[index]).collect();
             let mut report = RefereeReport::default();
-            for (which, (run, (same_torques, unaided))) in
+            for (which, (run, (same_torques, unaided_until_s))) in
                 case.runs.iter().zip(retraced?).enumerate()
             {
                 let convergence: Vec<StepDifference> = steps
@@ -234,7 +234,7 @@ impl Court<'_> {
                         until_s: run.recording.time_s[until],
                         closed_loop: steps[0].closed_loop[which],
                         same_torques,
-                        unaided_peak_tip_m: unaided.peak_tip_m,
+                        unaided_until_s,
                         order: measured_order(&convergence),
                         convergence,
                         documented_order: DOCUMENTED_ORDER,
@@ -352,7 +352,7 @@ impl Court<'_> {
         &self,
         case: &Case<'_>,
         timestep_s: f64,
-    ) -> Result<Vec<(TipDifference, TipDifference)>, EngineError> {
+    ) -> Result<Vec<(TipDifference, Option<f64>)>, EngineError> {
         let gains = servo(self.resolved).gains;
         let mut plant = self.plant(timestep_s)?;
         case.runs
@@ -360,12 +360,13 @@ impl Court<'_> {
             .map(|run| {
                 let recording = &run.recording;
                 let steps = steps_before_contact(recording);
-                let mut difference = |hold_back| -> Result<TipDifference, EngineError> {
-                    let states = retrace(&mut plant, recording, steps, hold_back)?;
-                    let cell = self.reality.cell();
-                    Ok(tip_difference(cell, case.goal, recording, &states))
-                };
-                Ok((difference(Some(&gains))?, difference(None)?))
+                let cell = self.reality.cell();
+                let held = retrace(&mut plant, recording, steps, Some(&gains))?;
+                let free = retrace(&mut plant, recording, steps, None)?;
+                Ok((
+                    tip_difference(cell, case.goal, recording, &held),
+                    time_until_lost(cell, case.goal, recording, &free),
+                ))
             })
             .collect()
     }

@@ -126,7 +126,6 @@ pub(crate) fn run(
         },
         plans: Vec::new(),
         runs: Vec::new(),
-        events: Vec::new(),
         iso9283: Some(ProtocolRun {
             commanded,
             engines,
@@ -268,7 +267,6 @@ fn unplanned(
         },
         plans: Vec::new(),
         runs: Vec::new(),
-        events: Vec::new(),
         iso9283: None,
         interrupted: false,
     }

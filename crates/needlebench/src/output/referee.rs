@@ -15,7 +15,7 @@ pub(super) fn referee_table(goal: &GoalReport) -> Option<Table> {
         "closed loop\npeak",
         "\nsettled",
         "same torques\npeak",
-        "\nunaided",
+        "unaided\nlost after",
         "at smaller steps\npeak",
         "order\n(documented)",
         "compared\nto (s)",
@@ -33,7 +33,9 @@ pub(super) fn referee_table(goal: &GoalReport) -> Option<Table> {
                     .settled_tip_m
                     .map_or("-".to_owned(), small_length),
                 small_length(found.same_torques.peak_tip_m),
-                small_length(found.unaided_peak_tip_m),
+                found
+                    .unaided_until_s
+                    .map_or("-".to_owned(), |time_s| format!("{time_s:.2} s")),
                 smaller_steps(found),
             ];
             cells.extend(numbers.map(right));

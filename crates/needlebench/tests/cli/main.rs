@@ -23,6 +23,7 @@ mod paper;
 mod people;
 #[cfg(target_os = "linux")]
 mod process;
+mod referee;
 mod run;
 mod schema;
 mod support;

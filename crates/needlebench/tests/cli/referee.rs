@@ -1,0 +1,115 @@
+//! `run --referee` and the envelope of the engines' differences.
+
+use serde_json::Value;
+
+use crate::support::{Bench, Finding, SMALL, has_keys, mujoco_is_ready, with_edit};
+
+/// `SMALL` with another envelope.
+fn with_envelope(keys: &str) -> String {
+    with_edit(SMALL, "peak_tip_um = 10", keys)
+}
+
+fn simulated(report: &Value) -> Vec<&Value> {
+    let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+    configurations
+        .iter()
+        .filter(|each| each["engine_difference"].is_object())
+        .collect()
+}
+
+#[test]
+fn referee_measures_both_engines_and_their_order() {
+    mujoco_is_ready();
+    let bench = Bench::with_scenario(SMALL);
+    let answer = bench.run(&["run", "s.toml", "--referee"]).exits_with(0);
+    assert!(answer.stdout.contains("each engine beside the referee"));
+    let report = bench.read_json("out/small/report.json");
+    let engines = report["provenance"]["engines"].as_array().unwrap();
+    assert!(engines.iter().any(|each| each["name"] == "referee"));
+    let simulated = simulated(&report);
+    assert!(!simulated.is_empty());
+    for configuration in simulated {
+        for engine in ["rapier", "mujoco"] {
+            let found = &configuration["referee"][engine];
+            has_keys(
+                found,
+                &[
+                    "until_s",
+                    "closed_loop",
+                    "same_torques",
+                    "unaided_until_s",
+                    "convergence",
+                    "order",
+                    "documented_order",
+                ],
+            );
+            let peak = |key: &str| found[key]["peak_tip_m"].as_f64().unwrap();
+            // The same comparison by two ways, while no torque is at its limit.
+            if configuration["engines"][engine]["saturated_steps"] == 0 {
+                let difference = (peak("closed_loop") - peak("same_torques")).abs();
+                assert!(difference < 1e-3 * peak("closed_loop"), "{found}");
+                assert!(
+                    (found["order"].as_f64().unwrap() - 1.0).abs() < 0.25,
+                    "{found}"
+                );
+            }
+            assert_eq!(found["convergence"].as_array().unwrap().len(), 3);
+        }
+    }
+}
+
+#[test]
+fn difference_beyond_the_envelope_fails_and_is_explained() {
+    mujoco_is_ready();
+    let bench = Bench::with_scenario(&with_envelope("peak_tip_um = 0.001"));
+    let answer = bench.run(&["run", "s.toml"]).exits_with(1);
+    assert!(answer.stdout.contains("is nearer to the referee"));
+    let report = bench.read_json("out/small/report.json");
+    let broken: Vec<&Value> = report["criteria"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|each| each["criterion"] == "engines.envelope.peak_tip_um")
+        .filter(|each| each["pass"] == false)
+        .collect();
+    assert!(!broken.is_empty());
+    for criterion in broken {
+        let detail = criterion["detail"].as_str().unwrap();
+        for part in ["engines differ from", "likely cause:", " ms"] {
+            assert!(detail.contains(part), "{detail}");
+        }
+    }
+    for configuration in simulated(&report) {
+        let quantities = configuration["adjudication"]["quantities"].as_array();
+        for quantity in quantities.unwrap() {
+            let is_broken = quantity["pass"] == false;
+            assert_eq!(quantity["ruling"].is_object(), is_broken);
+            if is_broken {
+                has_keys(
+                    &quantity["ruling"],
+                    &["first_time_s", "nearer", "cause", "evidence"],
+                );
+                assert_eq!(quantity["ruling"]["cause"], "step_too_long");
+            }
+        }
+    }
+}
+
+#[test]
+fn envelope_outside_its_range_is_refused() {
+    let refused = |keys: &str| {
+        let text = with_envelope(keys);
+        let bench = Bench::with_scenario(&text);
+        let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(2);
+        Finding::only(&answer, &text).in_file("s.toml")
+    };
+    refused("peak_tip_um = 0")
+        .at("peak_tip_um")
+        .key("engines.envelope.peak_tip_um")
+        .says("is 0 um, outside")
+        .hints("in um");
+    refused("contact_force_relative = 5")
+        .key("engines.envelope.contact_force_relative")
+        .says("is 5, outside")
+        .hints("0.01 is one percent");
+}
