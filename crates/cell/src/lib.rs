@@ -10,6 +10,7 @@ mod finding;
 pub mod fixtures;
 mod goal;
 pub mod imperfections;
+pub mod iso9283;
 mod mesh;
 mod model;
 mod nominal;

@@ -10,6 +10,7 @@ use crate::files::{Location, source_of};
 use crate::fixtures::{self, Fixture, FixtureError};
 use crate::goal::{PlacedPhantom, Surroundings, resolve_goal, solid_contains};
 use crate::imperfections::{Imperfections, resolve_imperfections};
+use crate::iso9283::{Iso9283Protocol, resolve_iso9283};
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
 use crate::people::{People, Room, resolve_people};
 use crate::phantom_place::place_phantom;
@@ -67,6 +68,8 @@ pub struct ResolvedScenario {
     pub fixtures: Vec<Fixture>,
     /// Where needles are to go.
     pub goals: Vec<Goal>,
+    /// The test by ISO 9283, in place of goals.
+    pub iso9283: Option<Iso9283Protocol>,
     /// Where every motion starts.
     pub start: Joints,
     /// Limits of the motion: the scenario's and the URDF's, whichever are lower.
@@ -200,7 +203,7 @@ pub fn resolve_scenario(
 
     let tool_location = Location::of_model(&scenario.tool.urdf, "needle_guide", "urdf", base);
     let tool_overrides = tool_overrides(&toml, &scenario).map_err(one)?;
-    let tool = read_tool(
+    let mut tool = read_tool(
         &tool_location,
         &overrides.packages,
         &tool_overrides,
@@ -220,6 +223,12 @@ pub fn resolve_scenario(
         })
     })?;
 
+    let iso9283 = scenario
+        .iso9283
+        .as_ref()
+        .map(|section| resolve_iso9283(&toml, section, &robot, &mut tool, &mut notes))
+        .transpose()
+        .map_err(one)?;
     let table = scenario.table.as_ref().map(fixtures::table).transpose();
     let table = table.map_err(|error| one(fixture_finding(&toml, "table", &error)))?;
     let gantry = scenario.gantry.as_ref().map(fixtures::gantry).transpose();
@@ -349,6 +358,7 @@ pub fn resolve_scenario(
         phantom,
         fixtures,
         goals,
+        iso9283,
         start,
         motion,
         phantom_source,

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
 pub use crate::imperfections::ImperfectionsSection;
+pub use crate::iso9283::Iso9283Section;
 pub use crate::people::{PeopleSection, PersonSection};
 use crate::ranking::RankingSection;
 use crate::robot::MissingInertia;
@@ -44,8 +45,12 @@ pub struct Scenario {
     /// CT gantry; none if left out.
     #[serde(default)]
     pub gantry: Option<GantryParameters>,
-    /// Where needles are to go.
+    /// Where needles are to go. Needed unless there is an `[iso9283]`.
+    #[serde(default)]
     pub goals: Vec<GoalSection>,
+    /// The test of the robot by ISO 9283, instead of goals.
+    #[serde(default)]
+    pub iso9283: Option<Iso9283Section>,
     /// Where every motion starts.
     #[serde(default)]
     pub start: StartSection,

@@ -4,6 +4,7 @@ use needlebench_kinematics::JOINT_COUNT;
 
 use crate::Finding;
 use crate::imperfections::check_imperfections;
+use crate::iso9283::check_iso9283;
 use crate::people::check_people;
 use crate::ranking::check_ranking;
 use crate::scenario::Scenario;
@@ -345,10 +346,17 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
         let timestep_ms = scenario.engines.timestep_ms;
         findings.extend(check_imperfections(toml, section, timestep_ms));
     }
-    if scenario.goals.is_empty() {
+    findings.extend(check_iso9283(toml, scenario));
+    if scenario.goals.is_empty() && scenario.iso9283.is_none() {
         findings.push(
-            toml.finding("goals", "the scenario has no goal")
-                .hint("add a [[goals]]"),
+            toml.finding(
+                "goals",
+                match toml.span_of("goals") {
+                    Some(_) => "the scenario has no goal",
+                    None => "the key `goals` is missing",
+                },
+            )
+            .hint("add a [[goals]], or an [iso9283] for a test of the robot itself"),
         );
     }
     if scenario.engines.run.is_empty() {

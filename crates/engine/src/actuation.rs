@@ -15,7 +15,8 @@
 //! tau_m   = clamp(tau_ff + kp (q_r - reading) + kd (qd_r - qd))
 //! ```
 //!
-//! `theta` and `tau` are solved for together, so that no step of delay lies in the spring.
+//! `theta` and `tau` are solved for together, so that no step of delay lies in the spring. The servo's
+//! speed `qd` is taken as measured exactly.
 
 use std::collections::VecDeque;
 
@@ -60,6 +61,12 @@ pub struct CommandTiming {
 }
 
 /// Encoders of the motors.
+///
+/// Rounding is an error of its own, independent of the angle (Widrow, IRE Trans. Circuit Theory
+/// 3(4), 1956): uniform within half a reading, new in every step while the joint's reference moves,
+/// and a given one while it holds. A joint passes many readings in a step, so that the real error is
+/// as good as that; and engines whose states differ by less than rounding get the same torques
+/// instead of ones that differ by the gain times a whole reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Encoder {
     /// Angle between two readings, rad; 0 for none.
@@ -68,6 +75,8 @@ pub struct Encoder {
     pub noise_rad: Joints,
     /// Error of the zero, rad: reading minus angle.
     pub offset_rad: Joints,
+    /// Rounding while the reference holds, rad: reading minus angle.
+    pub resting_rounding_rad: Joints,
 }
 
 /// Friction of joints by the LuGre model (Canudas de Wit et al., IEEE Trans. Automatic Control
@@ -289,9 +298,7 @@ impl<'a> Drives<'a> {
         if let Some(friction) = &self.actuation.friction {
             wanted += friction.compensation_nm(&reference.velocity);
         }
-        let link_nm = (wanted - friction).component_div(&softening);
-        let motor = position + compliance.component_mul(&link_nm);
-        wanted -= kp.component_mul(&(self.reading(&motor) - motor));
+        wanted -= kp.component_mul(&self.encoder_error(&reference.velocity));
         self.on_the_way.push_back(wanted);
         if self.on_the_way.len() > self.delay_steps + 1 {
             self.on_the_way.pop_front();
@@ -356,21 +363,20 @@ impl<'a> Drives<'a> {
         })
     }
 
-    /// What the encoders read at a motor angle, rad.
-    fn reading(&mut self, motor: &Joints) -> Joints {
+    /// What the encoders read beyond a motor's angle, rad, while the reference has this speed.
+    fn encoder_error(&mut self, reference_rad_s: &Joints) -> Joints {
         let Some(encoder) = self.actuation.encoder else {
-            return *motor;
+            return Joints::zeros();
         };
+        // Drawn for every joint in every step, so that one does not depend on another's motion.
         Joints::from_fn(|i, _| {
-            let resolution = encoder.resolution_rad[i];
-            let turned = motor[i] + encoder.offset_rad[i];
-            let rounded = if resolution > 0.0 {
-                (turned / resolution).round() * resolution
+            let passing = 0.5 * encoder.resolution_rad[i] * self.random.uniform(-1.0, 1.0);
+            let rounding = if reference_rad_s[i] == 0.0 {
+                encoder.resting_rounding_rad[i]
             } else {
-                turned
+                passing
             };
-            // Drawn for every joint, so that one joint's noise does not depend on another's.
-            rounded + encoder.noise_rad[i] * self.normal()
+            encoder.offset_rad[i] + rounding + encoder.noise_rad[i] * self.normal()
         })
     }
 

@@ -6,6 +6,7 @@ mod clearance;
 pub mod compare;
 mod criteria;
 mod facts;
+pub mod iso9283;
 mod judge;
 pub mod metric;
 mod motion;
@@ -29,7 +30,7 @@ pub use judge::judge;
 pub use motion::{
     ContactMeasurement, EngineDifference, MotionMeasurement, engine_difference, measure_motion,
 };
-pub use needle::{NeedleMeasurement, measure_needle};
+pub use needle::{NeedleMeasurement, measure_needle, tip_of};
 pub use sensitivity::tip_sensitivity;
 pub use stored::StoredReport;
 pub use threshold::{Limit, Threshold, ThresholdError};

@@ -1,5 +1,6 @@
 //! How a plant followed its trajectory.
 
+use nalgebra::Point3;
 use needlebench_cell::{Cell, Goal};
 use needlebench_engine::Recording;
 use needlebench_kinematics::Joints;
@@ -31,7 +32,8 @@ pub struct ContactMeasurement {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MotionMeasurement {
     /// Time from the end of the planned motion until the needle's tip stays within the band about
-    /// its commanded place, s; none if it never does.
+    /// its commanded place, s; none if it never does. For an imperfect arm, which never comes to
+    /// its commanded place, the band is about where it ends.
     pub settling_time_s: Option<f64>,
     /// Half-width of that band, m.
     pub settling_band_m: f64,
@@ -58,16 +60,18 @@ pub struct EngineDifference {
     pub settled_tip_m: f64,
 }
 
-/// Measures a recording.
+/// Measures a recording. `rests_at_m` is where the needle's tip is to settle, world; its commanded
+/// place if none.
 pub fn measure_motion(
     cell: &Cell,
     goal: &Goal,
     trajectory: &JointTrajectory,
     recording: &Recording,
     settling_band_m: f64,
+    rests_at_m: Option<Point3<f64>>,
 ) -> MotionMeasurement {
     let reference_tip = |q: &Joints| tip_of(cell, goal, &cell.robot.world_from_flange(q));
-    let commanded = reference_tip(&trajectory.end());
+    let rests_at_m = rests_at_m.unwrap_or_else(|| reference_tip(&trajectory.end()));
     let motion_end_s = trajectory
         .phases()
         .iter()
@@ -88,7 +92,7 @@ pub fn measure_motion(
         let tip = tip_of(cell, goal, &state.world_from_flange);
         peak_tracking_error_m =
             peak_tracking_error_m.max((tip - reference_tip(&reference.position)).norm());
-        if (tip - commanded).norm() > settling_band_m {
+        if (tip - rests_at_m).norm() > settling_band_m {
             last_outside_s = Some(time_s);
         }
         peak_speed_ratio =

@@ -28,7 +28,7 @@ pub struct NeedleMeasurement {
 }
 
 /// Tip of the needle in the world for a pose of the flange.
-pub(crate) fn tip_of(cell: &Cell, goal: &Goal, world_from_flange: &Pose) -> Point3<f64> {
+pub fn tip_of(cell: &Cell, goal: &Goal, world_from_flange: &Pose) -> Point3<f64> {
     world_from_flange
         * cell.tool.flange_from_guide_exit
         * Point3::new(0.0, 0.0, goal.insertion_length_m)

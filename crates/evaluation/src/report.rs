@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 
 use needlebench_cell::LinkEnclosure;
 use needlebench_engine::EngineIdentity;
+use needlebench_uncertainty::budget::ErrorBudget;
 use serde::Serialize;
 
+use crate::iso9283::Iso9283Report;
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
 use crate::ranking::{Dominance, GoalRanking, RankingReport};
@@ -27,6 +29,9 @@ pub struct Report {
     pub criteria: Vec<CriterionResult>,
     /// The goals.
     pub goals: Vec<GoalReport>,
+    /// The test by ISO 9283, in place of goals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iso9283: Option<Iso9283Report>,
     /// Engines that failed, and how; their results are missing.
     pub engine_failures: Vec<EngineFailure>,
     /// What the shipped arm's enclosing primitives would cost beside the meshes of the robot in
@@ -34,10 +39,42 @@ pub struct Report {
     pub enclosure: Vec<LinkEnclosure>,
     /// What was assumed or adjusted.
     pub notes: Vec<String>,
+    /// The arm and the patient that were simulated, where they are not the nominal ones.
+    pub truth: Option<TruthReport>,
     /// Where the numbers come from.
     pub provenance: Provenance,
     /// Wall-clock times; the only part that differs between two runs of the same inputs.
     pub timings: BTreeMap<String, f64>,
+}
+
+/// One draw of the scenario's imperfections: real minus what the controller believes, world axes
+/// unless said.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TruthReport {
+    /// The scenario's seed, which decides the draw.
+    pub seed: u64,
+    /// Place of the flange in the start posture.
+    pub flange_offset_m: [f64; 3],
+    /// Mass of the tool.
+    pub tool_mass_error_kg: f64,
+    /// Centre of mass of the tool, flange frame.
+    pub tool_com_error_m: [f64; 3],
+    /// Zeros of the encoders: reading minus angle.
+    pub encoder_offset_rad: Option<[f64; 6]>,
+    /// Compliance of the gears.
+    pub compliance_rad_per_nm: [f64; 6],
+    /// Friction over what the controller believes in.
+    pub friction_true_over_nominal: Option<[f64; 6]>,
+    /// Registration error of the phantom at the world's origin: translation.
+    pub phantom_shift_m: [f64; 3],
+    /// Registration error of the phantom: rotation vector.
+    pub phantom_turn_rad: [f64; 3],
+    /// Displacement of the skin by breathing.
+    pub breath_skin_m: [f64; 3],
+    /// Displacement of the target by breathing.
+    pub breath_target_m: [f64; 3],
+    /// Place of the needle's axis at entry and exit of the guide, x and y of the guide's frame.
+    pub needle_in_guide_m: [[f64; 2]; 2],
 }
 
 /// Which scenario it was.
@@ -256,6 +293,10 @@ pub struct ConfigurationReport {
     pub dominated_by: Option<Dominance>,
     /// Its score; none unless it works.
     pub ranking: Option<RankingReport>,
+    /// How far the needle is off over all arms and patients; none without imperfections.
+    pub budget: Option<ErrorBudget>,
+    /// Why there is no budget, where there should be one.
+    pub budget_failure: Option<String>,
     /// Files written for it, relative to the results folder.
     pub files: Vec<String>,
 }
@@ -266,6 +307,9 @@ pub struct EngineReport {
     /// Needle metrics of the settled state, from the engine's own body poses.
     #[serde(flatten)]
     pub needle: NeedleMeasurement,
+    /// Distance of the settled tip from where the balance of torques predicts it, without any
+    /// engine; none for the nominal robot. Trembling by the encoders' noise is no part of it.
+    pub unexplained_tip_m: Option<f64>,
     /// Time and effort.
     #[serde(flatten)]
     pub motion: MotionMeasurement,

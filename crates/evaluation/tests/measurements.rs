@@ -188,6 +188,7 @@ fn settling_ends_when_the_tip_stays_in_its_band() {
         &trajectory,
         &recording,
         1e-5,
+        None,
     );
     let settled_s = found.settling_time_s.expect("it settles");
     assert!(
@@ -213,6 +214,7 @@ fn a_tip_that_ends_outside_its_band_never_settles() {
         &trajectory,
         &recording,
         1e-5,
+        None,
     );
     assert_eq!(found.settling_time_s, None);
 }
@@ -235,6 +237,7 @@ fn contact_is_reported_with_its_first_time_pair_force_and_impulse() {
         &trajectory,
         &recording,
         1e-5,
+        None,
     )
     .contact;
     assert!(contact.occurred);

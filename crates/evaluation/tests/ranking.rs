@@ -33,6 +33,7 @@ fn clearance(minimum_m: f64, certified_lower_bound_m: Option<f64>) -> ClassClear
 
 fn engine(tip_error_m: f64) -> EngineReport {
     EngineReport {
+        unexplained_tip_m: None,
         needle: NeedleMeasurement {
             tip_position_error_m: tip_error_m,
             depth_error_m: 0.0,
@@ -114,6 +115,8 @@ fn configuration(index: usize) -> ConfigurationReport {
         pareto: false,
         dominated_by: None,
         ranking: None,
+        budget: None,
+        budget_failure: None,
         files: Vec::new(),
     }
 }

@@ -56,6 +56,8 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
         pareto: false,
         dominated_by: None,
         ranking: None,
+        budget: None,
+        budget_failure: None,
         files: Vec::new(),
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Goal, ResolvedScenario, enclosures};
+use needlebench_cell::{ResolvedScenario, enclosures};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::EngineIdentity;
 use needlebench_evaluation::ranking::rank_goal;
@@ -15,19 +15,22 @@ use needlebench_evaluation::report::{
 use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
     engine_difference, judge, measure_motion, measure_needle, needle_route, planned_clearance,
-    posture_clearance, tip_sensitivity,
+    posture_clearance, tip_of, tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 
-use crate::pipeline::EngineRun;
+use crate::pipeline::{Budgets, EngineRun};
 use crate::provenance::provenance;
+use crate::reality::Reality;
 
 /// What all parts of a report are made with.
 struct Context<'a> {
     resolved: &'a ResolvedScenario,
     planner: &'a Planner<'a>,
     model: &'a ClearanceModel,
+    reality: &'a Reality<'a>,
+    budgets: &'a Budgets,
     room: RoomModel<'a>,
 }
 
@@ -39,8 +42,10 @@ pub(crate) fn assemble(
     resolved: &ResolvedScenario,
     planner: &Planner<'_>,
     model: &ClearanceModel,
+    reality: &Reality<'_>,
     plans: &[GoalPlan],
     runs: &[Vec<Vec<EngineRun>>],
+    budgets: &Budgets,
     engines: &[EngineName],
     engine_failures: Vec<EngineFailure>,
     identities: Vec<EngineIdentity>,
@@ -50,6 +55,8 @@ pub(crate) fn assemble(
         resolved,
         planner,
         model,
+        reality,
+        budgets,
         room: RoomModel::new(resolved),
     };
     let mut goals: Vec<GoalReport> = plans
@@ -78,9 +85,11 @@ pub(crate) fn assemble(
         verdict,
         criteria,
         goals,
+        iso9283: None,
         engine_failures,
         enclosure: enclosures(&resolved.cell.robot),
         notes: resolved.notes.clone(),
+        truth: reality.report(),
         provenance: provenance(resolved, identities),
         timings,
     }
@@ -110,8 +119,16 @@ fn goal_report(
             .configurations
             .iter()
             .zip(runs)
-            .map(|(plan, runs)| {
-                configuration_report(context, goal_index, plan, runs, route.as_ref())
+            .zip(&context.budgets[goal_index])
+            .map(|((plan, runs), budget)| {
+                let mut report =
+                    configuration_report(context, goal_index, plan, runs, route.as_ref());
+                match budget {
+                    Some(Ok(budget)) => report.budget = Some(budget.clone()),
+                    Some(Err(error)) => report.budget_failure = Some(error.clone()),
+                    None => {}
+                }
+                report
             })
             .collect(),
         recommended: None,
@@ -130,7 +147,9 @@ fn configuration_report(
         resolved,
         planner,
         model,
+        reality,
         room,
+        ..
     } = context;
     let cell = &resolved.cell;
     let goal = &resolved.goals[goal_index];
@@ -138,7 +157,7 @@ fn configuration_report(
     let engines: BTreeMap<String, EngineReport> = runs
         .iter()
         .map(|run| {
-            let report = engine_report(resolved, goal, plan, run);
+            let report = engine_report(resolved, reality, goal_index, plan, run);
             (run.engine.name().to_owned(), report)
         })
         .collect();
@@ -147,7 +166,10 @@ fn configuration_report(
         clearance.classes.insert("needle_route", route.clone());
     }
     let engine_difference = match runs {
-        [a, b] => Some(engine_difference(cell, goal, &a.recording, &b.recording)),
+        [a, b] => {
+            let (cell, goal) = (reality.cell(), reality.goal(goal_index));
+            Some(engine_difference(cell, goal, &a.recording, &b.recording))
+        }
         _ => None,
     };
     ConfigurationReport {
@@ -200,6 +222,8 @@ fn configuration_report(
         dominated_by: None,
         ranking: None,
         room: candidate.map(|each| room.measure(goal_index, &each.joints)),
+        budget: None,
+        budget_failure: None,
         files: Vec::new(),
     }
 }
@@ -218,11 +242,12 @@ fn phases(trajectory: Option<&JointTrajectory>) -> Vec<PhaseReport> {
 
 fn engine_report(
     resolved: &ResolvedScenario,
-    goal: &Goal,
+    reality: &Reality<'_>,
+    goal_index: usize,
     plan: &ConfigurationPlan,
     run: &EngineRun,
 ) -> EngineReport {
-    let cell = &resolved.cell;
+    let (cell, goal) = (reality.cell(), reality.goal(goal_index));
     let trajectory = plan
         .trajectory
         .as_ref()
@@ -234,14 +259,15 @@ fn engine_report(
         .expect("a recording has its initial state");
     let band_m = resolved.scenario.criteria.settling_band_mm * 1e-3;
     let minima = &run.clearance.minima;
+    let rested_m = tip_of(cell, goal, &settled.world_from_flange);
+    // An imperfect arm never comes to its commanded place.
+    let rests_at_m = reality.is_imperfect().then_some(rested_m);
     EngineReport {
-        needle: measure_needle(
-            cell,
-            resolved.phantom.as_ref(),
-            goal,
-            &settled.world_from_flange,
-        ),
-        motion: measure_motion(cell, goal, trajectory, &run.recording, band_m),
+        needle: measure_needle(cell, reality.phantom(), goal, &settled.world_from_flange),
+        unexplained_tip_m: reality
+            .predicted_tip(goal_index, trajectory)
+            .map(|predicted_m| (rested_m - predicted_m).norm()),
+        motion: measure_motion(cell, goal, trajectory, &run.recording, band_m, rests_at_m),
         clearance: ClearanceReport::new(
             minima
                 .iter()

@@ -8,13 +8,16 @@ mod atomic;
 mod cli;
 mod command;
 pub mod exit;
+mod iso9283;
 mod output;
 mod paper;
 pub mod picture;
 mod pipeline;
 mod progress;
 mod provenance;
+mod reality;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use cli::{command_line, main};
+pub use iso9283::ProtocolRun;
 pub use pipeline::{EngineChoice, RunOptions, ScenarioRun, run_scenario};

@@ -10,16 +10,20 @@ use needlebench_cell::scenario::EngineName;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
-    Actuation, EngineError, EngineIdentity, Hooks, Motion, MujocoFleet, MujocoSettings, Plant,
-    RapierPlant, RapierSettings, Recording, Servo, ServoGains, simulate, simulate_fleet,
+    ClosedLoop, EngineError, EngineIdentity, Hooks, Motion, MujocoFleet, MujocoSettings, Plant,
+    RapierPlant, RapierSettings, Recording, simulate, simulate_fleet,
 };
 use needlebench_evaluation::report::{EngineFailure, Report};
 use needlebench_evaluation::{ClearanceSeries, certify_recording, measure_clearance};
 use needlebench_kinematics::NotUrGeometry;
+use needlebench_kinematics::registration::RegistrationError;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
+use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
 
 use crate::assemble::assemble;
+use crate::iso9283::{self, ProtocolRun};
 use crate::progress::Progress;
+use crate::reality::{Reality, servo};
 
 /// Motions that MuJoCo makes at the same time: as many as a goal has configurations.
 const FLEET_ARMS: usize = 8;
@@ -33,6 +37,23 @@ pub enum EngineChoice {
     Mujoco,
     /// Both.
     Both,
+}
+
+impl EngineChoice {
+    /// The engines of a choice, or else the scenario's own, each once and in order.
+    pub(crate) fn engines(choice: Option<Self>, resolved: &ResolvedScenario) -> Vec<EngineName> {
+        match choice {
+            None => {
+                let mut engines = resolved.scenario.engines.run.clone();
+                engines.sort_unstable();
+                engines.dedup();
+                engines
+            }
+            Some(Self::Rapier) => vec![EngineName::Rapier],
+            Some(Self::Mujoco) => vec![EngineName::Mujoco],
+            Some(Self::Both) => vec![EngineName::Rapier, EngineName::Mujoco],
+        }
+    }
 }
 
 /// How to run a scenario.
@@ -64,8 +85,21 @@ pub struct ScenarioRun {
     pub plans: Vec<GoalPlan>,
     /// Recordings, by goal, configuration and engine.
     pub runs: Vec<Vec<Vec<EngineRun>>>,
+    /// What a test by ISO 9283 left besides its report.
+    pub iso9283: Option<ProtocolRun>,
     /// It was interrupted; what was finished until then is here.
     pub interrupted: bool,
+}
+
+/// Why a scenario cannot be run at all.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The robot is not a UR arm.
+    #[error(transparent)]
+    Robot(#[from] NotUrGeometry),
+    /// The markers of `[imperfections.registration]` determine no pose.
+    #[error("imperfections.registration.markers_mm: {0}")]
+    Registration(#[from] RegistrationError),
 }
 
 /// One motion to simulate.
@@ -78,29 +112,23 @@ struct Job {
 /// Plans, simulates, measures and judges one scenario.
 ///
 /// # Errors
-/// [`NotUrGeometry`] if the robot is not a UR arm. A failing engine is no error: the report says
-/// so and keeps what the other one measured.
+/// [`RunError`]. A failing engine is no error: the report says so and keeps what the other one
+/// measured.
 pub(crate) fn run(
     resolved: &ResolvedScenario,
     options: &RunOptions,
     cancel: &AtomicBool,
     progress: &Progress,
-) -> Result<ScenarioRun, NotUrGeometry> {
+) -> Result<ScenarioRun, RunError> {
+    if let Some(protocol) = &resolved.iso9283 {
+        return Ok(iso9283::run(resolved, protocol, options, cancel, progress)?);
+    }
     let started = Instant::now();
     let mut timings = BTreeMap::new();
-    let engines = match options.engines {
-        None => {
-            let mut engines = resolved.scenario.engines.run.clone();
-            engines.sort_unstable();
-            engines.dedup();
-            engines
-        }
-        Some(EngineChoice::Rapier) => vec![EngineName::Rapier],
-        Some(EngineChoice::Mujoco) => vec![EngineName::Mujoco],
-        Some(EngineChoice::Both) => vec![EngineName::Rapier, EngineName::Mujoco],
-    };
+    let engines = EngineChoice::engines(options.engines, resolved);
     let model = ClearanceModel::new(&resolved.cell);
     let planner = Planner::new(resolved, &model)?;
+    let reality = Reality::new(resolved, &model)?;
 
     // The MuJoCo process starts while the motions are planned.
     let (plans, harness) = std::thread::scope(|scope| {
@@ -126,7 +154,7 @@ pub(crate) fn run(
     let simulation = Simulation {
         resolved,
         plans: &plans,
-        model: &model,
+        reality: &reality,
         jobs: &jobs,
         cancel,
         progress,
@@ -185,9 +213,11 @@ pub(crate) fn run(
         .iter_mut()
         .filter_map(|outcome| outcome.identity.take())
         .collect();
+    let budgets = budgets(resolved, &plans, options.jobs);
     let interrupted = cancel.load(Ordering::Relaxed);
     let mut report = assemble(
-        resolved, &planner, &model, &plans, &runs, &engines, failures, identities, timings,
+        resolved, &planner, &model, &reality, &plans, &runs, &budgets, &engines, failures,
+        identities, timings,
     );
     if interrupted {
         report.notes.push(
@@ -199,6 +229,7 @@ pub(crate) fn run(
         report,
         plans,
         runs,
+        iso9283: None,
         interrupted,
     })
 }
@@ -210,7 +241,7 @@ pub(crate) fn run(
 pub fn run_scenario(
     resolved: &ResolvedScenario,
     options: &RunOptions,
-) -> Result<ScenarioRun, NotUrGeometry> {
+) -> Result<ScenarioRun, RunError> {
     run(
         resolved,
         options,
@@ -277,9 +308,49 @@ fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
         .collect()
 }
 
-type Harness = Result<Mutex<HarnessProcess>, String>;
+/// Error budgets by goal and configuration, for every configuration with a motion; with what went
+/// wrong where there is none.
+pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
 
-fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
+fn budgets(resolved: &ResolvedScenario, plans: &[GoalPlan], threads: usize) -> Budgets {
+    let Some(imperfections) = &resolved.imperfections else {
+        return plans
+            .iter()
+            .map(|plan| plan.configurations.iter().map(|_| None).collect())
+            .collect();
+    };
+    let servo = servo(resolved);
+    let all: Vec<(usize, &ConfigurationPlan)> = plans
+        .iter()
+        .enumerate()
+        .flat_map(|(goal, plan)| plan.configurations.iter().map(move |each| (goal, each)))
+        .collect();
+    let mut found = in_parallel(threads, &all, |(goal, plan)| {
+        let case = BudgetCase {
+            cell: &resolved.cell,
+            goal: &resolved.goals[*goal],
+            place: resolved
+                .phantom
+                .as_ref()
+                .map(|each| &each.world_from_phantom),
+            servo: &servo,
+            imperfections,
+            trajectory: plan.trajectory.as_ref()?,
+            timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
+        };
+        let seed = resolved.scenario.seed;
+        Some(budget(&case, imperfections.budget_samples, seed).map_err(|error| error.to_string()))
+    })
+    .into_iter();
+    plans
+        .iter()
+        .map(|plan| found.by_ref().take(plan.configurations.len()).collect())
+        .collect()
+}
+
+pub(crate) type Harness = Result<Mutex<HarnessProcess>, String>;
+
+pub(crate) fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
     let timeout = Duration::from_secs_f64(resolved.scenario.engines.harness_timeout_s);
     let environment =
         ensure(&mut |text| progress.message(text)).map_err(|error| error.to_string())?;
@@ -291,7 +362,7 @@ fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
 struct Simulation<'a> {
     resolved: &'a ResolvedScenario,
     plans: &'a [GoalPlan],
-    model: &'a ClearanceModel,
+    reality: &'a Reality<'a>,
     jobs: &'a [Job],
     cancel: &'a AtomicBool,
     progress: &'a Progress,
@@ -347,18 +418,25 @@ impl Simulation<'_> {
         harness: Option<&Harness>,
         outcome: &mut EngineOutcome,
     ) -> Result<(), (Option<String>, String)> {
-        let cell = &self.resolved.cell;
+        let cell = self.reality.cell();
         let engines = &self.resolved.scenario.engines;
         let timestep_s = engines.timestep_ms * 1e-3;
         let start = |error: EngineError| (None, error.to_string());
         let servo = servo(self.resolved);
-        let actuation = Actuation::default();
+        let actuation = self.reality.actuation();
+        for &job in self.jobs {
+            let trajectory = self.plan(job).trajectory.as_ref().expect("jobs have one");
+            let mass = cell.dynamics().mass_matrix(&trajectory.end());
+            if let Some(why) = ClosedLoop::instability(&mass, &servo, actuation, timestep_s) {
+                return Err((Some(self.in_words(job)), why.to_string()));
+            }
+        }
         let motions: Vec<Motion<'_>> = self
             .jobs
             .iter()
             .map(|job| Motion {
                 servo: &servo,
-                actuation: &actuation,
+                actuation,
                 trajectory: self.plan(*job).trajectory.as_ref().expect("jobs have one"),
             })
             .collect();
@@ -427,10 +505,7 @@ impl Simulation<'_> {
             Ok(()) => {}
         }
         failure.map_or(Ok(()), |(index, error)| {
-            let job = self.jobs[index];
-            let goal = &self.resolved.goals[job.goal];
-            let during = format!("{} {}", goal.name, self.plan(job).configuration);
-            Err((Some(during), error.to_string()))
+            Err((Some(self.in_words(self.jobs[index])), error.to_string()))
         })
     }
 
@@ -438,22 +513,29 @@ impl Simulation<'_> {
         &self.plans[job.goal].configurations[job.configuration]
     }
 
+    /// Goal and configuration, for people.
+    fn in_words(&self, job: Job) -> String {
+        let goal = &self.resolved.goals[job.goal].name;
+        format!("{goal} {}", self.plan(job).configuration)
+    }
+
     /// A recording with the clearances along it.
     fn measured(&self, engine: EngineName, index: usize, recording: Recording) -> EngineRun {
-        let cell = &self.resolved.cell;
+        let (cell, model) = (self.reality.cell(), self.reality.model());
         let plan = self.plan(self.jobs[index]);
         let trajectory = plan.trajectory.as_ref().expect("jobs have trajectories");
         let period_s = self.resolved.scenario.recording.period_ms * 1e-3;
-        let mut clearance = measure_clearance(cell, self.model, trajectory, &recording, period_s);
+        let mut clearance = measure_clearance(cell, model, trajectory, &recording, period_s);
         let tolerance_m = self.resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
         certify_recording(
             &mut clearance,
             cell,
-            self.model,
+            model,
             trajectory,
             &recording,
             tolerance_m,
         );
+        self.reality.allow_for_breath(&mut clearance);
         EngineRun {
             engine,
             recording,
@@ -462,7 +544,9 @@ impl Simulation<'_> {
     }
 }
 
-fn rapier_settings(engines: &needlebench_cell::scenario::EnginesSection) -> RapierSettings {
+pub(crate) fn rapier_settings(
+    engines: &needlebench_cell::scenario::EnginesSection,
+) -> RapierSettings {
     RapierSettings {
         contact_natural_frequency_hz: engines.rapier.contact_natural_frequency_hz,
         contact_damping_ratio: engines.rapier.contact_damping_ratio,
@@ -472,24 +556,14 @@ fn rapier_settings(engines: &needlebench_cell::scenario::EnginesSection) -> Rapi
     }
 }
 
-fn mujoco_settings(engines: &needlebench_cell::scenario::EnginesSection) -> MujocoSettings {
+pub(crate) fn mujoco_settings(
+    engines: &needlebench_cell::scenario::EnginesSection,
+) -> MujocoSettings {
     MujocoSettings {
         contact_stiffness_per_s2: engines.mujoco.contact_stiffness_per_s2,
         contact_damping_per_s: engines.mujoco.contact_damping_per_s,
         contact_impedance: engines.mujoco.contact_impedance,
         friction: engines.friction,
         ..MujocoSettings::default()
-    }
-}
-
-fn servo(resolved: &ResolvedScenario) -> Servo {
-    let controller = &resolved.scenario.controller;
-    Servo {
-        dynamics: resolved.cell.dynamics(),
-        gains: ServoGains {
-            kp_nm_per_rad: controller.stiffness_nm_rad,
-            kd_nms_per_rad: controller.damping_nms_rad,
-        },
-        effort_limit_nm: resolved.cell.robot.limits.efforts_nm(),
     }
 }

@@ -33,6 +33,8 @@ pub(crate) fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentit
     );
     let parts = &resolved.phantom_parts;
     inputs.extend(parts.iter().map(|source| input("phantom part", source)));
+    let arms = resolved.imperfections.iter().flat_map(|each| &each.sources);
+    inputs.extend(arms.map(|source| input("real arm", source)));
     Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         git_revision: GIT_REVISION.to_owned(),
@@ -40,7 +42,10 @@ pub(crate) fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentit
         engines,
         inputs,
         seed: resolved.scenario.seed,
-        truth: if calibration.is_some() {
+        truth: if resolved.imperfections.is_some() {
+            "an imperfect robot and phantom, drawn from the seed: errors are those of the \
+             scenario's imperfections, of control and of simulation"
+        } else if calibration.is_some() {
             "factory-calibrated robot: errors are those of inverse kinematics, control and \
              simulation"
         } else {

@@ -5,6 +5,7 @@
 
 mod family;
 mod getting_there;
+pub mod iso9283;
 mod motion;
 mod plan;
 mod rejection;

@@ -127,10 +127,9 @@ pub fn settle(
             (held_nm[i] - spring_back) / kp[i]
         });
     }
-    let offset = actuation
-        .encoder
-        .map_or_else(Joints::zeros, |encoder| encoder.offset_rad)
-        + truth.rounding_rad;
+    let offset = actuation.encoder.map_or_else(Joints::zeros, |encoder| {
+        encoder.offset_rad + encoder.resting_rounding_rad
+    });
     let mut position = *target;
     let mut load = Joints::zeros();
     for _ in 0..ITERATIONS {

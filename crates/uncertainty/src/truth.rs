@@ -196,8 +196,6 @@ pub struct Truth {
     pub tool_body: Body,
     /// The drives.
     pub actuation: Actuation,
-    /// Rounding of the encoders at rest, rad: reading minus angle.
-    pub rounding_rad: Joints,
     /// The real phantom's place in terms of the planned one: `p_real = shift * p_planned`, world.
     pub shift: Pose,
     /// Displacement of skin and target by breathing, world, m.
@@ -233,14 +231,15 @@ impl Truth {
         let factors = |values: &[f64], spread: f64| {
             Joints::from_fn(|i, _| (1.0 + spread * values[i]).max(LEAST_FACTOR))
         };
-        let mut rounding_rad = Joints::zeros();
         let encoder = imperfections.encoder.map(|encoder| {
             let (zeros, rounding) = of(Source::Encoder).split_at(JOINT_COUNT);
-            rounding_rad = Joints::from_fn(|i, _| 0.5 * encoder.resolution_rad[i] * rounding[i]);
             Encoder {
                 resolution_rad: encoder.resolution_rad,
                 noise_rad: encoder.noise_rad,
                 offset_rad: Joints::from_fn(|i, _| encoder.zero_spread_rad[i] * zeros[i]),
+                resting_rounding_rad: Joints::from_fn(|i, _| {
+                    0.5 * encoder.resolution_rad[i] * rounding[i]
+                }),
             }
         });
         let compliance_rad_per_nm =
@@ -313,7 +312,6 @@ impl Truth {
                 torque_delay_s: imperfections.control.map_or(0.0, |[_, _, delay_s]| delay_s),
                 seed,
             },
-            rounding_rad,
             shift,
             breath_m,
             breath_allowance_m,

@@ -18,6 +18,7 @@ use needlebench_cell::{
     Finding, MissingInertia, Overrides, PackagePaths, ResolvedScenario, load_scenario,
 };
 use needlebench_clearance::ClearanceModel;
+use needlebench_planning::iso9283::plan_protocol;
 use serde::Serialize;
 
 pub(crate) use atlas::atlas;
@@ -45,12 +46,23 @@ fn load(path: &Path, overrides: &Overrides) -> Option<ResolvedScenario> {
     }
 }
 
-/// Reads a scenario and refuses one whose start posture collides.
+/// Reads a scenario and refuses one whose start posture collides, or whose protocol cannot be
+/// carried out.
 fn load_checked(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
     let resolved = load_scenario(path, overrides)?;
     let cell = &resolved.cell;
-    let touching = ClearanceModel::new(cell).first_below(&resolved.start, |_| 0.0);
-    let Some(pair) = touching else {
+    let model = ClearanceModel::new(cell);
+    if let Some(protocol) = &resolved.iso9283 {
+        // It does not start from the start posture.
+        return match plan_protocol(&resolved, protocol, &model) {
+            Ok(_) => Ok(resolved),
+            Err(error) => {
+                let finding = Finding::new(path.display().to_string(), error.to_string());
+                Err(vec![finding.key("iso9283").hint(error.hint())])
+            }
+        };
+    }
+    let Some(pair) = model.first_below(&resolved.start, |_| 0.0) else {
         return Ok(resolved);
     };
     let (a, b) = pair.solid_names(cell);

@@ -17,6 +17,7 @@ use super::{load, overrides, print_json, print_text};
 use crate::atomic::write_atomically;
 use crate::cli::RunArguments;
 use crate::exit::ExitStatus;
+use crate::iso9283;
 use crate::output::findings::print_findings;
 use crate::output::pictures::{Backdrop, configuration_picture, goal_camera, sheet_caption};
 use crate::output::room_pictures::{RoomPictures, room_caption};
@@ -256,6 +257,10 @@ fn write_results(
         for (configuration, names) in goal.configurations.iter_mut().zip(names) {
             configuration.files = names;
         }
+    }
+    if let (Some(run), Some(report)) = (&finished.iso9283, &mut finished.report.iso9283) {
+        let name = &resolved.scenario.name;
+        report.files = iso9283::write_results(name, report, run, folder, pictures)?;
     }
     finished
         .report

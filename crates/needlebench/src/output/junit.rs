@@ -1,6 +1,7 @@
 //! JUnit XML: a suite for each goal, a case for each configuration.
 
 use anyhow::Result;
+use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::report::{CriterionResult, Report, Status};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 
@@ -55,6 +56,9 @@ pub(crate) fn junit(reports: &[&Report]) -> Result<String> {
             suite.add_test_case(case);
             document.add_test_suite(suite);
         }
+        if report.iso9283.is_some() || report.criteria.iter().any(|each| each.goal == SUBJECT) {
+            document.add_test_suite(iso9283_suite(report));
+        }
         if !report.engine_failures.is_empty() {
             let mut suite = TestSuite::new(format!("{}.engines", report.scenario.name));
             for broken in &report.engine_failures {
@@ -66,6 +70,27 @@ pub(crate) fn junit(reports: &[&Report]) -> Result<String> {
         }
     }
     Ok(document.to_string()?)
+}
+
+/// A test by ISO 9283: a case for each criterion.
+fn iso9283_suite(report: &Report) -> TestSuite {
+    let name = format!("{}.{SUBJECT}", report.scenario.name);
+    let mut suite = TestSuite::new(name.clone());
+    for result in report.criteria.iter().filter(|each| each.goal == SUBJECT) {
+        let status = if result.pass {
+            TestCaseStatus::success()
+        } else {
+            failure(&[described(result)])
+        };
+        let engine = result
+            .engine
+            .as_ref()
+            .map_or(String::new(), |engine| format!(" ({engine})"));
+        let mut case = TestCase::new(format!("{}{engine}", result.criterion), status);
+        case.set_classname(name.clone());
+        suite.add_test_case(case);
+    }
+    suite
 }
 
 fn failure(reasons: &[String]) -> TestCaseStatus {

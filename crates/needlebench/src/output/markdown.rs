@@ -93,6 +93,9 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             None => writeln!(out, "No configuration works.\n")?,
         }
     }
+    if let Some(iso9283) = &report.iso9283 {
+        out.push_str(&crate::iso9283::report_markdown(iso9283));
+    }
     let failed: Vec<_> = report
         .criteria
         .iter()

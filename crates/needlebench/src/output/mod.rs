@@ -11,6 +11,7 @@ mod recording;
 pub(crate) mod room_pictures;
 mod table;
 
+pub(crate) use format::small_length;
 pub(crate) use junit::junit;
 pub(crate) use markdown::markdown;
 pub(crate) use ranking::ranking_picture;

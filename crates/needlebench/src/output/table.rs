@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use comfy_table::{Cell, CellAlignment, Color, Table};
+use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status, Verdict};
 
 use super::format::{millimetres, small_length, value_and_limit};
@@ -38,6 +39,10 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             writeln!(out, "{}", room_table(goal))?;
         }
         write_remarks(out, report, goal)?;
+    }
+    if let Some(iso9283) = &report.iso9283 {
+        out.push_str(&crate::iso9283::report_text(iso9283));
+        write_missed(out, report, SUBJECT)?;
     }
     for failure in &report.engine_failures {
         let during = failure
@@ -343,6 +348,34 @@ fn worst_of(goal: &GoalReport, column: &Column) -> Option<f64> {
     Some(if column.worst_is_large { most } else { least })
 }
 
+/// Criteria on a goal, or on what stands in its place, that were not met.
+fn write_missed(out: &mut String, report: &Report, goal: &str) -> std::fmt::Result {
+    for result in report
+        .criteria
+        .iter()
+        .filter(|result| result.goal == goal && !result.pass)
+    {
+        let measured = result.value.zip(result.limit).map(|(value, limit)| {
+            let (value, limit) = value_and_limit(value, limit, result.unit);
+            format!("{value}, limit {limit}")
+        });
+        let parts = [
+            result.label.clone(),
+            result.engine.clone(),
+            Some(format!("{}:", result.criterion)),
+            measured,
+            Some(result.detail.clone()),
+        ];
+        let parts: Vec<String> = parts
+            .into_iter()
+            .flatten()
+            .filter(|p| !p.is_empty())
+            .collect();
+        writeln!(out, "FAILED {}", parts.join(" "))?;
+    }
+    Ok(())
+}
+
 fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::fmt::Result {
     if let Some(route) = goal
         .configurations
@@ -366,29 +399,7 @@ fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::f
             )?;
         }
     }
-    for result in report
-        .criteria
-        .iter()
-        .filter(|result| result.goal == goal.name && !result.pass)
-    {
-        let measured = result.value.zip(result.limit).map(|(value, limit)| {
-            let (value, limit) = value_and_limit(value, limit, result.unit);
-            format!("{value}, limit {limit}")
-        });
-        let parts = [
-            result.label.clone(),
-            result.engine.clone(),
-            Some(format!("{}:", result.criterion)),
-            measured,
-            Some(result.detail.clone()),
-        ];
-        let parts: Vec<String> = parts
-            .into_iter()
-            .flatten()
-            .filter(|p| !p.is_empty())
-            .collect();
-        writeln!(out, "FAILED {}", parts.join(" "))?;
-    }
+    write_missed(out, report, &goal.name)?;
     match &goal.recommended {
         Some(found) => writeln!(out, "recommended: {} - {}", found.label, found.reason),
         None => writeln!(out, "recommended: none, no configuration works"),

@@ -61,7 +61,69 @@ impl Canvas {
         self.small.extent_px(text)[0]
     }
 
+    /// Fills a disc; centre and radius in pixels.
+    pub fn disc(&mut self, centre: [f64; 2], radius: f64, color: Rgb) {
+        self.shade(centre, centre, radius, color, |distance| radius - distance);
+    }
+
+    /// Draws a circle.
+    pub fn circle(&mut self, centre: [f64; 2], radius: f64, width: f64, color: Rgb) {
+        self.shade(centre, centre, radius + width, color, |distance| {
+            0.5 * width - (distance - radius).abs()
+        });
+    }
+
+    /// Draws a straight line with round ends.
+    pub fn stroke(&mut self, from: [f64; 2], to: [f64; 2], width: f64, color: Rgb) {
+        self.shade(from, to, width, color, |distance| 0.5 * width - distance);
+    }
+
+    /// Covers each pixel near a segment by how deep it lies inside, a function of its distance from
+    /// the segment, in pixels. What is not finite or outside the picture is left out.
+    fn shade(
+        &mut self,
+        from: [f64; 2],
+        to: [f64; 2],
+        reach: f64,
+        color: Rgb,
+        depth: impl Fn(f64) -> f64,
+    ) {
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let length_squared = along[0] * along[0] + along[1] * along[1];
+        let sides = [self.image.width_px(), self.image.height_px()];
+        let [columns, rows] = [0, 1].map(|k| {
+            let low = from[k].min(to[k]) - reach - 1.0;
+            let high = from[k].max(to[k]) + reach + 1.0;
+            whole(low)..whole(high + 1.0).min(sides[k])
+        });
+        for y in rows {
+            for x in columns.clone() {
+                let offset = [x as f64 + 0.5 - from[0], y as f64 + 0.5 - from[1]];
+                let share = if length_squared > 0.0 {
+                    let dot = offset[0] * along[0] + offset[1] * along[1];
+                    (dot / length_squared).clamp(0.0, 1.0)
+                } else {
+                    0.0
+                };
+                let distance = (offset[0] - share * along[0]).hypot(offset[1] - share * along[1]);
+                let opacity = whole(255.0 * (depth(distance) + 0.5).clamp(0.0, 1.0));
+                let opacity = u8::try_from(opacity).unwrap_or(u8::MAX);
+                self.image.blend(signed(x), signed(y), color, opacity);
+            }
+        }
+    }
+
     pub fn into_image(self) -> Image {
         self.image
     }
+}
+
+/// The next lower whole number; 0 for negative ones and NaN.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates, and NaN becomes 0"
+)]
+fn whole(value: f64) -> usize {
+    value as usize
 }

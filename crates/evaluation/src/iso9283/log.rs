@@ -1,0 +1,677 @@
+//! Logs of laser trackers: one row per measured pose.
+//!
+//! Columns are found by their names, in any order; what is not known is left out and said so. The
+//! text that [`write_log`] makes reads back to the same numbers, bit for bit.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
+use needlebench_cell::{Finding, nearest_name};
+
+use super::number::{parse_shifted, shifted};
+use super::table::{HEADER_HINT, Heading, Table};
+use super::timestamp::seconds_of;
+use super::{AXES, Attained, Commanded};
+
+/// Findings of a file beyond this many help nobody.
+const MOST_FINDINGS: usize = 20;
+
+/// No robot is as large: a coordinate beyond has another unit, m.
+const FARTHEST_M: f64 = 50.0;
+
+/// A quaternion whose norm differs from 1 by more is none: rounding to four decimals gives 1e-4.
+const QUATERNION_SLACK: f64 = 1e-3;
+
+/// A quaternion this near to norm 1 is taken as it is, so that what was written reads back.
+const QUATERNION_ROUNDING: f64 = 1e-12;
+
+/// Units of columns whose names do not say them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LogUnits {
+    /// Unit of lengths.
+    pub length: Option<&'static str>,
+    /// Unit of angles.
+    pub angle: Option<&'static str>,
+    /// What columns `rx`, `ry`, `rz` mean.
+    pub rotation: Option<RotationColumns>,
+}
+
+/// What columns `rx`, `ry`, `rz` mean: the same names are in use for different things.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RotationColumns {
+    /// Axis times angle, as a UR controller shows poses.
+    RotationVector,
+    /// Turns about the fixed axes x, then y, then z, as SpatialAnalyzer shows frames.
+    FixedXyz,
+}
+
+/// What a log says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackerLog {
+    /// Measurements, in the order of the file.
+    pub attained: Vec<Attained>,
+    /// What was left out or assumed.
+    pub notes: Vec<String>,
+}
+
+/// What a column can be, and its names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Role {
+    Time,
+    Cycle,
+    Pose,
+    Direction,
+    Position(usize),
+    Quaternion(usize),
+    Rotation(usize),
+}
+
+const NAMES: [(Role, &[&str]); 14] = [
+    (
+        Role::Time,
+        &[
+            "time",
+            "t",
+            "timestamp",
+            "time stamp",
+            "date",
+            "datetime",
+            "date time",
+        ],
+    ),
+    (
+        Role::Cycle,
+        &[
+            "cycle",
+            "cycle id",
+            "run",
+            "run number",
+            "repetition",
+            "iteration",
+        ],
+    ),
+    (
+        Role::Pose,
+        &[
+            "pose",
+            "pose id",
+            "point",
+            "point name",
+            "pointname",
+            "point id",
+            "pt",
+            "name",
+            "target",
+            "target name",
+            "waypoint",
+            "waypoint number",
+        ],
+    ),
+    (
+        Role::Direction,
+        &[
+            "direction",
+            "approach",
+            "approach direction",
+            "approach axis",
+        ],
+    ),
+    (Role::Position(0), &["x"]),
+    (Role::Position(1), &["y"]),
+    (Role::Position(2), &["z"]),
+    (Role::Quaternion(0), &["qw", "q0", "quat w"]),
+    (Role::Quaternion(1), &["qx", "q1", "quat x"]),
+    (Role::Quaternion(2), &["qy", "q2", "quat y"]),
+    (Role::Quaternion(3), &["qz", "q3", "quat z"]),
+    (Role::Rotation(0), &["rx"]),
+    (Role::Rotation(1), &["ry"]),
+    (Role::Rotation(2), &["rz"]),
+];
+
+/// Reads measurements.
+///
+/// Each row is a measurement of a pose that is in `commanded`. Without a column for cycles, those of
+/// names like `P3_07` are taken, or else the measurements of a pose are counted.
+///
+/// # Errors
+/// What is wrong with the file, with line and column.
+pub fn read_log(
+    file: &str,
+    text: &str,
+    commanded: &[Commanded],
+    units: LogUnits,
+) -> Result<TrackerLog, Vec<Finding>> {
+    let table = Table::parse(file, text)?;
+    let columns = Columns::find(&table, units, true)?;
+    let mut notes = columns.notes.clone();
+    let mut findings = Vec::new();
+    let mut attained = Vec::with_capacity(table.rows.len());
+    let mut counted: BTreeMap<(u32, Option<usize>), u32> = BTreeMap::new();
+    let mut seen: BTreeMap<(u32, Option<usize>, u32), usize> = BTreeMap::new();
+    let times = columns.times(&table, &mut notes);
+    for (row, time_s) in times.into_iter().enumerate() {
+        let parsed = columns.row(&table, row, commanded).and_then(|parsed| {
+            let key = (parsed.commanded.pose, parsed.axis);
+            let count = counted.entry(key).or_default();
+            *count += 1;
+            let cycle = parsed.cycle.unwrap_or(*count);
+            match seen.insert((key.0, key.1, cycle), row) {
+                None => Ok((parsed, cycle)),
+                Some(earlier) => Err(twice(&table, row, earlier, &columns, cycle)),
+            }
+        });
+        match parsed {
+            Ok((parsed, cycle)) => attained.push(Attained {
+                pose: parsed.commanded.pose,
+                cycle,
+                axis: parsed.axis,
+                time_s,
+                position_m: parsed.commanded.position_m,
+                orientation: parsed.commanded.orientation,
+            }),
+            Err(finding) => findings.push(finding),
+        }
+        if findings.len() >= MOST_FINDINGS {
+            break;
+        }
+    }
+    if findings.is_empty() {
+        Ok(TrackerLog { attained, notes })
+    } else {
+        Err(findings)
+    }
+}
+
+/// Reads commanded poses: one row per pose.
+///
+/// # Errors
+/// What is wrong with the file, with line and column.
+pub fn read_commanded(
+    file: &str,
+    text: &str,
+    units: LogUnits,
+) -> Result<Vec<Commanded>, Vec<Finding>> {
+    let table = Table::parse(file, text)?;
+    let columns = Columns::find(&table, units, false)?;
+    let (mut commanded, mut findings): (Vec<Commanded>, Vec<Finding>) = (Vec::new(), Vec::new());
+    for row in 0..table.rows.len() {
+        match columns.row(&table, row, &[]) {
+            Ok(parsed)
+                if commanded
+                    .iter()
+                    .any(|each| each.pose == parsed.commanded.pose) =>
+            {
+                let column = columns.of[&Role::Pose];
+                let message = format!("P{} is commanded twice", parsed.commanded.pose);
+                findings.push(
+                    table
+                        .finding(row, column, message)
+                        .hint("one row per pose; measurements belong into --csv"),
+                );
+            }
+            Ok(parsed) => commanded.push(parsed.commanded),
+            Err(finding) => findings.push(finding),
+        }
+    }
+    findings.truncate(MOST_FINDINGS);
+    if commanded.is_empty() && findings.is_empty() {
+        findings.push(Finding::new(file, "there is no pose in it").hint("one row per pose"));
+    }
+    if findings.is_empty() {
+        Ok(commanded)
+    } else {
+        Err(findings)
+    }
+}
+
+/// Measurements as a log that [`read_log`] reads back to the same numbers.
+pub fn write_log(title: &str, attained: &[Attained]) -> String {
+    let oriented = attained.iter().any(|each| each.orientation.is_some());
+    let mut text = comment(title);
+    text.push_str("time_s,cycle,pose,direction,x_mm,y_mm,z_mm");
+    text.push_str(if oriented { ",qw,qx,qy,qz\n" } else { "\n" });
+    for each in attained {
+        let time = each
+            .time_s
+            .map_or(String::new(), |time_s| time_s.to_string());
+        let direction = each.axis.map_or("", |axis| AXES[axis]);
+        // Writing to a String cannot fail.
+        let _ = write!(text, "{time},{},P{},{direction},", each.cycle, each.pose);
+        push_pose(
+            &mut text,
+            &each.position_m,
+            oriented,
+            each.orientation.as_ref(),
+        );
+    }
+    text
+}
+
+/// Commanded poses as a text that [`read_commanded`] reads back to the same numbers.
+pub fn write_commanded(title: &str, commanded: &[Commanded]) -> String {
+    let oriented = commanded.iter().any(|each| each.orientation.is_some());
+    let mut text = comment(title);
+    text.push_str("pose,x_mm,y_mm,z_mm");
+    text.push_str(if oriented { ",qw,qx,qy,qz\n" } else { "\n" });
+    for each in commanded {
+        let _ = write!(text, "P{},", each.pose);
+        push_pose(
+            &mut text,
+            &each.position_m,
+            oriented,
+            each.orientation.as_ref(),
+        );
+    }
+    text
+}
+
+fn comment(title: &str) -> String {
+    title.lines().map(|line| format!("# {line}\n")).collect()
+}
+
+fn push_pose(
+    text: &mut String,
+    position_m: &Point3<f64>,
+    oriented: bool,
+    orientation: Option<&UnitQuaternion<f64>>,
+) {
+    let mm: Vec<String> = position_m.iter().map(|value| shifted(*value, 3)).collect();
+    text.push_str(&mm.join(","));
+    match orientation {
+        Some(q) => {
+            let _ = write!(text, ",{},{},{},{}", q.w, q.i, q.j, q.k);
+        }
+        None if oriented => text.push_str(",,,,"),
+        None => {}
+    }
+    text.push('\n');
+}
+
+/// One row, understood.
+struct Row {
+    commanded: Commanded,
+    cycle: Option<u32>,
+    axis: Option<usize>,
+}
+
+/// Which column is what, and in which unit.
+struct Columns {
+    of: BTreeMap<Role, usize>,
+    /// Power of ten and factor to metres, per coordinate.
+    length: [(i32, f64); 3],
+    /// Factor to radians.
+    angle: f64,
+    rotation: Option<RotationColumns>,
+    notes: Vec<String>,
+}
+
+impl Columns {
+    fn find(table: &Table<'_>, units: LogUnits, is_log: bool) -> Result<Self, Vec<Finding>> {
+        let mut of = BTreeMap::new();
+        let (mut findings, mut ignored) = (Vec::new(), Vec::new());
+        for (column, heading) in table.headings.iter().enumerate() {
+            match role_of(heading) {
+                Some(role) => {
+                    if of.insert(role, column).is_some() {
+                        let message = format!("there are two columns for `{}`", heading.name);
+                        findings.push(table.column_finding(column, message));
+                    }
+                }
+                None => ignored.push(table.text[heading.span.clone()].to_owned()),
+            }
+        }
+        for (role, name) in [
+            (Role::Pose, "pose"),
+            (Role::Position(0), "x_mm"),
+            (Role::Position(1), "y_mm"),
+            (Role::Position(2), "z_mm"),
+        ] {
+            if !of.contains_key(&role) {
+                findings.push(missing(table, name, &ignored));
+            }
+        }
+        let mut length = [(0, 1.0); 3];
+        for (axis, found) in length.iter_mut().enumerate() {
+            if let Some(&column) = of.get(&Role::Position(axis)) {
+                match length_unit(table, column, units.length) {
+                    Ok(unit) => *found = unit,
+                    Err(finding) => findings.push(finding),
+                }
+            }
+        }
+        let mut angle = 1.0;
+        let whole = |roles: &[Role]| roles.iter().filter(|role| of.contains_key(role)).count();
+        let quaternion = [0, 1, 2, 3].map(Role::Quaternion);
+        let rotation = [0, 1, 2].map(Role::Rotation);
+        for (roles, what) in [
+            (&quaternion[..], "qw, qx, qy, qz"),
+            (&rotation[..], "rx, ry, rz"),
+        ] {
+            if !matches!(whole(roles), 0) && whole(roles) != roles.len() {
+                let message = format!("the columns {what} are not all there");
+                findings.push(
+                    Finding::new(table.file, message)
+                        .hint("an orientation needs all of them; remove the others to go without"),
+                );
+            }
+        }
+        if let Some(&column) = of.get(&Role::Rotation(0)) {
+            match angle_unit(table, column, units.angle) {
+                Ok(factor) => angle = factor,
+                Err(finding) => findings.push(finding),
+            }
+            if units.rotation.is_none() {
+                findings.push(
+                    table
+                        .column_finding(column, "rx, ry, rz may mean different things".to_owned())
+                        .hint(
+                            "--rotation rotation-vector (as a UR controller shows poses) or \
+                             --rotation fixed-xyz (as SpatialAnalyzer shows frames)",
+                        ),
+                );
+            }
+        }
+        if !findings.is_empty() {
+            return Err(findings);
+        }
+        let mut notes = Vec::new();
+        if !ignored.is_empty() {
+            notes.push(format!(
+                "{}: columns not used: {}",
+                table.file,
+                ignored.join(", ")
+            ));
+        }
+        if is_log && !of.contains_key(&Role::Cycle) {
+            notes.push(format!(
+                "{}: no column for cycles: they are taken from the names of points (P3_07), or \
+                 counted",
+                table.file
+            ));
+        }
+        Ok(Self {
+            of,
+            length,
+            angle,
+            rotation: units.rotation,
+            notes,
+        })
+    }
+
+    fn row(&self, table: &Table<'_>, row: usize, commanded: &[Commanded]) -> Result<Row, Finding> {
+        let (pose, suffix) = self.pose(table, row, commanded)?;
+        let mut position_m = Point3::origin();
+        for axis in 0..3 {
+            position_m[axis] = self.coordinate(table, row, axis)?;
+        }
+        let cycle = match self.of.get(&Role::Cycle) {
+            Some(&column) => Some(whole_number(table, row, column)?),
+            None => suffix,
+        };
+        Ok(Row {
+            commanded: Commanded {
+                pose,
+                position_m,
+                orientation: self.orientation(table, row)?,
+            },
+            cycle,
+            axis: self.axis(table, row)?,
+        })
+    }
+
+    /// Number of the pose, and of the cycle if the name has one.
+    fn pose(
+        &self,
+        table: &Table<'_>,
+        row: usize,
+        commanded: &[Commanded],
+    ) -> Result<(u32, Option<u32>), Finding> {
+        let column = self.of[&Role::Pose];
+        let text = table.cell(row, column);
+        let known = || {
+            let names: Vec<String> = commanded
+                .iter()
+                .map(|each| format!("P{}", each.pose))
+                .collect();
+            names.join(", ")
+        };
+        let Some((pose, cycle)) = pose_name(text) else {
+            return Err(table
+                .finding(row, column, format!("`{text}` is no pose"))
+                .hint("P1 to P5, or 1 to 5; P3_07 for pose 3 in cycle 7"));
+        };
+        if !commanded.is_empty() && commanded.iter().all(|each| each.pose != pose) {
+            return Err(table
+                .finding(
+                    row,
+                    column,
+                    format!("`{text}` is none of the commanded poses"),
+                )
+                .hint(format!("commanded are {}", known())));
+        }
+        Ok((pose, cycle))
+    }
+
+    fn coordinate(&self, table: &Table<'_>, row: usize, axis: usize) -> Result<f64, Finding> {
+        let column = self.of[&Role::Position(axis)];
+        let (places, factor) = self.length[axis];
+        let text = finite(table, row, column)?;
+        let value_m = parse_shifted(&text, places).map_or(f64::NAN, |value| value * factor);
+        if value_m.abs() <= FARTHEST_M {
+            Ok(value_m)
+        } else {
+            Err(table
+                .finding(row, column, format!("{text} would be {value_m:.0} m"))
+                .hint("is the unit in the header the right one?"))
+        }
+    }
+
+    fn axis(&self, table: &Table<'_>, row: usize) -> Result<Option<usize>, Finding> {
+        let Some(&column) = self.of.get(&Role::Direction) else {
+            return Ok(None);
+        };
+        match table.cell(row, column).trim_start_matches(['+', '-']) {
+            "" | "none" => Ok(None),
+            "x" | "X" | "1" => Ok(Some(0)),
+            "y" | "Y" | "2" => Ok(Some(1)),
+            "z" | "Z" | "3" => Ok(Some(2)),
+            other => Err(table
+                .finding(row, column, format!("`{other}` is no approach direction"))
+                .hint("x, y or z (1, 2 or 3); empty for the plain sequence of poses")),
+        }
+    }
+
+    fn orientation(
+        &self,
+        table: &Table<'_>,
+        row: usize,
+    ) -> Result<Option<UnitQuaternion<f64>>, Finding> {
+        let number = |role: Role| -> Result<f64, Finding> {
+            let text = finite(table, row, self.of[&role])?;
+            Ok(text.parse().unwrap_or(f64::NAN))
+        };
+        if let Some(&column) = self.of.get(&Role::Quaternion(0)) {
+            if table.cell(row, column).is_empty() {
+                return Ok(None);
+            }
+            let [w, x, y, z] = [0, 1, 2, 3].map(|part| number(Role::Quaternion(part)));
+            let q = Quaternion::new(w?, x?, y?, z?);
+            let defect = (q.norm() - 1.0).abs();
+            if defect > QUATERNION_SLACK {
+                let message = format!("the quaternion has norm {:.4} instead of 1", q.norm());
+                return Err(table
+                    .finding(row, column, message)
+                    .hint("columns are qw, qx, qy, qz: are they in another order?"));
+            }
+            return Ok(Some(if defect <= QUATERNION_ROUNDING {
+                UnitQuaternion::new_unchecked(q)
+            } else {
+                UnitQuaternion::new_normalize(q)
+            }));
+        }
+        let Some(meaning) = self
+            .rotation
+            .filter(|_| self.of.contains_key(&Role::Rotation(0)))
+        else {
+            return Ok(None);
+        };
+        let [x, y, z] = [0, 1, 2].map(|part| number(Role::Rotation(part)));
+        let r = Vector3::new(x?, y?, z?) * self.angle;
+        Ok(Some(match meaning {
+            RotationColumns::RotationVector => UnitQuaternion::from_scaled_axis(r),
+            RotationColumns::FixedXyz => UnitQuaternion::from_euler_angles(r.x, r.y, r.z),
+        }))
+    }
+
+    /// Time of every row, s; none where there is no column or it is not understood.
+    fn times(&self, table: &Table<'_>, notes: &mut Vec<String>) -> Vec<Option<f64>> {
+        let count = table.rows.len();
+        let Some(&column) = self.of.get(&Role::Time) else {
+            return vec![None; count];
+        };
+        let unit = table.headings[column].unit.as_deref();
+        let times: Vec<Option<f64>> = (0..count)
+            .map(|row| match unit {
+                Some("s") => parse_shifted(&table.number(row, column), 0),
+                Some("ms") => parse_shifted(&table.number(row, column), -3),
+                _ => seconds_of(table.cell(row, column)),
+            })
+            .map(|time_s| time_s.filter(|time_s| time_s.is_finite()))
+            .collect();
+        let unread = (0..count)
+            .filter(|&row| times[row].is_none() && !table.cell(row, column).is_empty())
+            .count();
+        if unread > 0 {
+            notes.push(format!(
+                "{}: {unread} time stamps are not understood and not used: give seconds in a \
+                 column `time_s`, or dates like 2026-01-31T12:00:00",
+                table.file
+            ));
+        }
+        times
+    }
+}
+
+fn role_of(heading: &Heading) -> Option<Role> {
+    NAMES
+        .iter()
+        .find(|(_, names)| names.contains(&heading.name.as_str()))
+        .map(|(role, _)| *role)
+}
+
+/// `P3`, `3`, `pose 3`, `Point3`; with a cycle `P3_07`, `P3-7`, `3.7`.
+fn pose_name(text: &str) -> Option<(u32, Option<u32>)> {
+    let text = text.to_ascii_lowercase();
+    let rest = ["pose", "point", "pt", "p"]
+        .iter()
+        .find_map(|prefix| text.strip_prefix(prefix))
+        .unwrap_or(&text)
+        .trim_start_matches([' ', '_', '-']);
+    let digits = rest
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(rest.len());
+    let pose = rest[..digits].parse().ok().filter(|pose| *pose > 0)?;
+    let suffix = rest[digits..].trim_start_matches([' ', '_', '-', '.', '#', '/', ':']);
+    if rest.len() == digits {
+        return Some((pose, None));
+    }
+    let cycle = suffix.parse().ok().filter(|cycle| *cycle > 0)?;
+    Some((pose, Some(cycle)))
+}
+
+fn missing(table: &Table<'_>, name: &str, ignored: &[String]) -> Finding {
+    let near = nearest_name(name, ignored.iter().map(String::as_str));
+    Finding::new(table.file, format!("there is no column `{name}`"))
+        .at(
+            table.text,
+            table.headings[0].span.start..table.headings[table.headings.len() - 1].span.end,
+        )
+        .hint(match near {
+            Some(near) => format!("is it `{near}`? {HEADER_HINT}"),
+            None => HEADER_HINT.to_owned(),
+        })
+}
+
+/// Power of ten and factor from a column's unit to metres.
+fn length_unit(
+    table: &Table<'_>,
+    column: usize,
+    given: Option<&'static str>,
+) -> Result<(i32, f64), Finding> {
+    let heading = &table.headings[column];
+    let name = &table.text[heading.span.clone()];
+    match heading.unit.as_deref().or(given) {
+        Some("m") => Ok((0, 1.0)),
+        Some("mm") => Ok((-3, 1.0)),
+        Some("um" | "µm") => Ok((-6, 1.0)),
+        Some("in" | "inch") => Ok((0, 0.0254)),
+        Some(unit) => Err(table
+            .column_finding(column, format!("`{unit}` is no unit of length in `{name}`"))
+            .hint("m, mm, um or in")),
+        None => Err(table
+            .column_finding(column, format!("`{name}` does not say its unit"))
+            .hint(format!("write it as `{name}_mm`, or give --length-unit mm"))),
+    }
+}
+
+/// Factor from a column's unit to radians.
+fn angle_unit(
+    table: &Table<'_>,
+    column: usize,
+    given: Option<&'static str>,
+) -> Result<f64, Finding> {
+    let heading = &table.headings[column];
+    let name = &table.text[heading.span.clone()];
+    match heading.unit.as_deref().or(given) {
+        Some("rad") => Ok(1.0),
+        Some("mrad") => Ok(1e-3),
+        Some("deg" | "°") => Ok(1.0_f64.to_radians()),
+        Some(unit) => Err(table
+            .column_finding(column, format!("`{unit}` is no unit of angle in `{name}`"))
+            .hint("deg, rad or mrad")),
+        None => Err(table
+            .column_finding(column, format!("`{name}` does not say its unit"))
+            .hint(format!(
+                "write it as `{name}_deg`, or give --angle-unit deg"
+            ))),
+    }
+}
+
+/// Text of a cell that is a finite number.
+fn finite(table: &Table<'_>, row: usize, column: usize) -> Result<String, Finding> {
+    let text = table.number(row, column);
+    let message = match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => return Ok(text),
+        Ok(_) => format!("{text} is not a finite number"),
+        Err(_) if text.is_empty() => "the value is missing".to_owned(),
+        Err(_) => format!("`{text}` is not a number"),
+    };
+    Err(table
+        .finding(row, column, message)
+        .hint("leave out the whole line if the tracker lost the target"))
+}
+
+fn whole_number(table: &Table<'_>, row: usize, column: usize) -> Result<u32, Finding> {
+    let text = table.cell(row, column);
+    text.parse()
+        .ok()
+        .filter(|number| *number > 0)
+        .ok_or_else(|| {
+            table
+                .finding(row, column, format!("`{text}` is no number of a cycle"))
+                .hint("cycles are counted 1, 2, 3 ...")
+        })
+}
+
+fn twice(table: &Table<'_>, row: usize, earlier: usize, columns: &Columns, cycle: u32) -> Finding {
+    let column = columns.of[&Role::Pose];
+    let message = format!(
+        "{} of cycle {cycle} was measured in line {} already",
+        table.cell(row, column),
+        table.line(earlier)
+    );
+    table
+        .finding(row, column, message)
+        .hint("one row per pose and cycle: average the readings of one stand before")
+}

@@ -1,0 +1,241 @@
+//! Delimited text with a header: cells with their places, for messages that point at them.
+
+use std::ops::Range;
+
+use needlebench_cell::Finding;
+
+/// Starts of lines that are comments: needlebench's own, SpatialAnalyzer's, MATLAB's.
+const COMMENTS: [&str; 3] = ["#", "//", "%"];
+
+/// A header cell: its name in lower case without the unit, and the unit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Heading {
+    pub name: String,
+    pub unit: Option<String>,
+    pub span: Range<usize>,
+}
+
+/// A text as a table.
+#[derive(Debug)]
+pub(super) struct Table<'a> {
+    pub file: &'a str,
+    pub text: &'a str,
+    pub headings: Vec<Heading>,
+    /// Cells of each line, as many as there are headings.
+    pub rows: Vec<Vec<Range<usize>>>,
+    /// Numbers have a comma for a point.
+    decimal_comma: bool,
+}
+
+impl<'a> Table<'a> {
+    /// Splits a text into cells.
+    ///
+    /// The separator is a semicolon, a tab or a comma, whichever of these in this order is in the
+    /// header. With the first two, numbers may have a decimal comma.
+    pub(super) fn parse(file: &'a str, text: &'a str) -> Result<Self, Vec<Finding>> {
+        let mut lines = lines(text);
+        let Some(header) = lines.next() else {
+            return Err(vec![
+                Finding::new(file, "the file has no header").hint(HEADER_HINT),
+            ]);
+        };
+        let separator = [';', '\t', ',']
+            .into_iter()
+            .find(|each| text[header.clone()].contains(*each))
+            .unwrap_or(',');
+        let headings: Vec<Heading> = cells(text, header.clone(), separator)
+            .into_iter()
+            .map(|span| heading(text, span))
+            .collect();
+        if headings
+            .iter()
+            .all(|each| each.name.parse::<f64>().is_ok() || each.name.is_empty())
+        {
+            return Err(vec![
+                Finding::new(
+                    file,
+                    "the first line has numbers instead of names of columns",
+                )
+                .at(text, header)
+                .hint(HEADER_HINT),
+            ]);
+        }
+        let (mut rows, mut findings) = (Vec::new(), Vec::new());
+        let mut lines = lines.peekable();
+        while let Some(line) = lines.next() {
+            let mut found = cells(text, line.clone(), separator);
+            // A separator at the end of every line.
+            while found.len() > headings.len() && found.last().is_some_and(|cell| cell.is_empty()) {
+                found.pop();
+            }
+            if found.len() == headings.len() {
+                rows.push(found);
+                continue;
+            }
+            let message = format!(
+                "the line has {} values, the header {} columns",
+                found.len(),
+                headings.len()
+            );
+            let cut_off = lines.peek().is_none() && found.len() < headings.len();
+            findings.push(Finding::new(file, message).at(text, line).hint(if cut_off {
+                "it is the last line: the file looks cut off; copy it again, or remove the line"
+            } else {
+                "every line needs a value for every column; numbers with a decimal comma need a \
+                 semicolon between them"
+            }));
+        }
+        if findings.is_empty() {
+            Ok(Self {
+                file,
+                text,
+                headings,
+                rows,
+                decimal_comma: separator != ',',
+            })
+        } else {
+            Err(findings)
+        }
+    }
+
+    /// Text of a cell.
+    pub(super) fn cell(&self, row: usize, column: usize) -> &'a str {
+        &self.text[self.rows[row][column].clone()]
+    }
+
+    /// Text of a cell that should be a number, with a decimal point.
+    pub(super) fn number(&self, row: usize, column: usize) -> String {
+        let text = self.cell(row, column);
+        if self.decimal_comma {
+            text.replace(',', ".")
+        } else {
+            text.to_owned()
+        }
+    }
+
+    /// A finding about a cell.
+    pub(super) fn finding(&self, row: usize, column: usize, message: String) -> Finding {
+        Finding::new(self.file, message)
+            .key(&self.text[self.headings[column].span.clone()])
+            .at(self.text, self.rows[row][column].clone())
+    }
+
+    /// A finding about a column.
+    pub(super) fn column_finding(&self, column: usize, message: String) -> Finding {
+        Finding::new(self.file, message).at(self.text, self.headings[column].span.clone())
+    }
+
+    /// Line of a row, from 1.
+    pub(super) fn line(&self, row: usize) -> usize {
+        let start = self.rows[row].first().map_or(0, |cell| cell.start);
+        1 + self.text[..start].matches('\n').count()
+    }
+}
+
+pub(super) const HEADER_HINT: &str = "the first line that is no comment names the columns and their \
+     units, such as: time_s,cycle,pose,direction,x_mm,y_mm,z_mm,qw,qx,qy,qz";
+
+/// Lines that are neither empty nor comments, without line ends.
+fn lines(text: &str) -> impl Iterator<Item = Range<usize>> {
+    let mut start = 0;
+    text.split_inclusive('\n').filter_map(move |line| {
+        let begin = start;
+        start += line.len();
+        let mut content = line.trim_end();
+        let mut from = begin;
+        if let Some(rest) = content.strip_prefix('\u{feff}') {
+            // Spreadsheets mark UTF-8 files so.
+            from += content.len() - rest.len();
+            content = rest;
+        }
+        let trimmed = content.trim_start();
+        let comment = COMMENTS.iter().any(|mark| trimmed.starts_with(mark));
+        (!trimmed.is_empty() && !comment).then(|| from..from + content.len())
+    })
+}
+
+/// Cells of a line, without the blanks and quotes around them.
+fn cells(text: &str, line: Range<usize>, separator: char) -> Vec<Range<usize>> {
+    let mut quoted = false;
+    let mut cells = Vec::new();
+    let mut start = line.start;
+    let ends = text[line.clone()]
+        .char_indices()
+        .filter(|(_, c)| {
+            quoted ^= *c == '"';
+            *c == separator && !quoted
+        })
+        .map(|(index, _)| line.start + index)
+        .collect::<Vec<usize>>();
+    for end in ends.into_iter().chain([line.end]) {
+        cells.push(trimmed(text, start..end));
+        start = end + separator.len_utf8();
+    }
+    cells
+}
+
+fn trimmed(text: &str, span: Range<usize>) -> Range<usize> {
+    let outer = &text[span.clone()];
+    let inner = outer.trim_matches(|c: char| c.is_whitespace() || c == '"');
+    let offset = inner.as_ptr() as usize - outer.as_ptr() as usize;
+    span.start + offset..span.start + offset + inner.len()
+}
+
+/// `x_mm`, `x [mm]`, `x (mm)`, `x/mm` and `x mm` are all x in mm.
+fn heading(text: &str, span: Range<usize>) -> Heading {
+    const UNITS: [&str; 12] = [
+        "mm", "m", "um", "µm", "in", "inch", "s", "ms", "deg", "rad", "mrad", "°",
+    ];
+    let whole = text[span.clone()].to_lowercase();
+    let tidy = |name: &str| {
+        let words: Vec<&str> = name
+            .split(|c: char| c.is_whitespace() || c == '_' || c == '-' || c == '.')
+            .filter(|word| !word.is_empty())
+            .collect();
+        words.join(" ")
+    };
+    let bracketed = whole
+        .strip_suffix([']', ')'])
+        .and_then(|rest| rest.split_once(['[', '(']));
+    let (name, unit) = match bracketed {
+        Some((name, unit)) => (name, Some(unit.trim())),
+        None => match whole.rsplit_once(['_', ' ', '/']) {
+            Some((name, unit)) if UNITS.contains(&unit.trim()) => (name, Some(unit.trim())),
+            _ => (whole.as_str(), None),
+        },
+    };
+    Heading {
+        name: tidy(name),
+        unit: unit.filter(|unit| !unit.is_empty()).map(str::to_owned),
+        span,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_read_however_they_are_written() {
+        for text in ["X_mm", "x [mm]", "x (mm)", "X/mm", "x mm", "\"X [mm]\""] {
+            let span = trimmed(text, 0..text.len());
+            let found = heading(text, span);
+            assert_eq!(
+                (found.name.as_str(), found.unit.as_deref()),
+                ("x", Some("mm"))
+            );
+        }
+        let name = heading("Point_Name", 0..10);
+        assert_eq!((name.name.as_str(), name.unit), ("point name", None));
+    }
+
+    #[test]
+    fn separators_comments_and_quotes_are_found() {
+        let text = "\u{feff}// a comment\r\n# another\n\npose;x [mm];\"note; free\"\r\nP1; 1,5 ;\"a;b\"\r\n";
+        let table = Table::parse("log.csv", text).unwrap();
+        assert_eq!(table.headings.len(), 3);
+        assert_eq!(table.number(0, 1), "1.5");
+        assert_eq!(table.cell(0, 2), "a;b");
+        assert_eq!(table.line(0), 5);
+    }
+}
