@@ -16,6 +16,7 @@ mod pipeline;
 mod progress;
 mod provenance;
 mod reality;
+mod servo;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use cli::{command_line, main};
