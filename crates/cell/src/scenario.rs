@@ -580,6 +580,11 @@ pub struct ClearanceCriteria {
 pub struct CriteriaSection {
     /// Largest settled distance of the needle tip from the target, mm.
     pub max_tip_position_error_mm: Option<f64>,
+    /// Largest root mean square distance of the needle's tip from the target over all arms and
+    /// patients of `[imperfections]`, mm.
+    pub max_tip_rms_mm: Option<f64>,
+    /// The same across the needle, mm.
+    pub max_tip_lateral_rms_mm: Option<f64>,
     /// Largest settled angle between planned and actual needle, deg.
     pub max_needle_angle_error_deg: Option<f64>,
     /// Largest settled distance of the guide's exit from its planned place, mm.
@@ -612,6 +617,8 @@ impl Default for CriteriaSection {
     fn default() -> Self {
         Self {
             max_tip_position_error_mm: Some(0.1),
+            max_tip_rms_mm: None,
+            max_tip_lateral_rms_mm: None,
             max_needle_angle_error_deg: Some(0.05),
             max_guide_position_error_mm: None,
             max_settling_time_s: None,

@@ -180,6 +180,25 @@ pub fn check_configuration(
             String::new(),
         );
     }
+    let budget = configuration
+        .budget
+        .as_ref()
+        .map(|budget| &budget.total.at_target.analytic);
+    for (key, limit_mm, value) in [
+        (
+            "max_tip_rms_mm",
+            criteria.max_tip_rms_mm,
+            budget.map(|moments| moments.rms_m),
+        ),
+        (
+            "max_tip_lateral_rms_mm",
+            criteria.max_tip_lateral_rms_mm,
+            budget.map(|moments| moments.lateral_rms_m),
+        ),
+    ] {
+        let detail = configuration.budget_failure.clone().unwrap_or_default();
+        check(most(key, limit_mm, MM, "m"), None, value, detail);
+    }
     let room = configuration.room.as_ref();
     let mut at_least = |key, limit: Option<f64>, unit, value: Option<f64>, detail: String| {
         let criterion = limit.map(|limit| Criterion {

@@ -21,7 +21,7 @@ use crate::iso9283;
 use crate::output::findings::print_findings;
 use crate::output::pictures::{Backdrop, configuration_picture, goal_camera, sheet_caption};
 use crate::output::room_pictures::{RoomPictures, room_caption};
-use crate::output::{junit, markdown, ranking_picture, recording_csv, report_text};
+use crate::output::{budget_picture, junit, markdown, ranking_picture, recording_csv, report_text};
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
 use crate::progress::Progress;
@@ -355,12 +355,17 @@ fn write_pictures(
                 tile(sheet, 4).write_png(&folder.join(name))?;
             }
         }
-        let ranking = folder.join(format!("{}.ranking.png", goal.name));
-        match ranking_picture(goal_report) {
-            Some(image) => image.write_png(&ranking)?,
-            // Nobody should take an earlier run's for this one's.
-            None if ranking.exists() => std::fs::remove_file(&ranking)?,
-            None => {}
+        for (kind, picture) in [
+            ("ranking", ranking_picture(goal_report)),
+            ("budget", budget_picture(goal_report)),
+        ] {
+            let path = folder.join(format!("{}.{kind}.png", goal.name));
+            match picture {
+                Some(image) => image.write_png(&path)?,
+                // Nobody should take an earlier run's for this one's.
+                None if path.exists() => std::fs::remove_file(&path)?,
+                None => {}
+            }
         }
     }
     Ok(())

@@ -276,6 +276,7 @@ fn empty_report(
     timings: BTreeMap<String, f64>,
 ) -> Report {
     Report {
+        truth: None,
         schema_version: SCHEMA_VERSION,
         scenario: ScenarioSummary {
             name: resolved.scenario.name.clone(),

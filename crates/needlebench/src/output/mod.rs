@@ -1,5 +1,6 @@
 //! Output formats: terminal, JSON, JUnit, Markdown, CSV, pictures.
 
+mod budget;
 pub(crate) mod comparison;
 pub(crate) mod findings;
 mod format;
@@ -11,6 +12,7 @@ mod recording;
 pub(crate) mod room_pictures;
 mod table;
 
+pub(crate) use budget::budget_picture;
 pub(crate) use format::small_length;
 pub(crate) use junit::junit;
 pub(crate) use markdown::markdown;

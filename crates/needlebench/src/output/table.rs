@@ -7,6 +7,7 @@ use comfy_table::{Cell, CellAlignment, Color, Table};
 use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status, Verdict};
 
+use super::budget::budget_text;
 use super::format::{millimetres, small_length, value_and_limit};
 use super::ranking::comparison_text;
 
@@ -37,6 +38,9 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
         if goal.configurations.iter().any(|each| each.room.is_some()) {
             writeln!(out, "room for people, in the final posture")?;
             writeln!(out, "{}", room_table(goal))?;
+        }
+        if let Some(budget) = budget_text(goal) {
+            write!(out, "{budget}")?;
         }
         write_remarks(out, report, goal)?;
     }
