@@ -5,6 +5,7 @@
 
 mod calibration;
 mod enclosure;
+pub mod envelope;
 mod files;
 mod finding;
 pub mod fixtures;

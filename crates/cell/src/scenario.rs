@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::envelope::EnvelopeSection;
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
 pub use crate::imperfections::ImperfectionsSection;
 pub use crate::iso9283::Iso9283Section;
@@ -468,6 +469,8 @@ pub struct EnginesSection {
     pub rapier: RapierSection,
     /// Settings of MuJoCo alone.
     pub mujoco: MujocoSection,
+    /// How far the engines may differ.
+    pub envelope: EnvelopeSection,
 }
 
 /// Settings of rapier alone.
@@ -545,6 +548,7 @@ impl Default for EnginesSection {
             friction: 0.0,
             rapier: RapierSection::default(),
             mujoco: MujocoSection::default(),
+            envelope: EnvelopeSection::default(),
         }
     }
 }

@@ -3,6 +3,7 @@
 use needlebench_kinematics::JOINT_COUNT;
 
 use crate::Finding;
+use crate::envelope::check_envelope;
 use crate::imperfections::check_imperfections;
 use crate::iso9283::check_iso9283;
 use crate::people::check_people;
@@ -308,6 +309,7 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
         }
     }
     findings.extend(check_people(toml, scenario));
+    findings.extend(check_envelope(toml, scenario));
 
     let is_name = |name: &str| {
         !name.is_empty()

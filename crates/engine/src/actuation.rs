@@ -242,6 +242,7 @@ pub(crate) struct Drives<'a> {
     servo: &'a Servo,
     actuation: &'a Actuation,
     timestep_s: f64,
+    velocity_age_s: f64,
     ideal: bool,
     delay_steps: usize,
     limit_nm: Joints,
@@ -254,11 +255,17 @@ pub(crate) struct Drives<'a> {
 }
 
 impl<'a> Drives<'a> {
-    pub(crate) fn new(servo: &'a Servo, actuation: &'a Actuation, timestep_s: f64) -> Self {
+    pub(crate) fn new(
+        servo: &'a Servo,
+        actuation: &'a Actuation,
+        timestep_s: f64,
+        velocity_age_s: f64,
+    ) -> Self {
         Self {
             servo,
             actuation,
             timestep_s,
+            velocity_age_s,
             ideal: actuation.is_ideal(),
             delay_steps: actuation.delay_steps(timestep_s),
             limit_nm: actuation
@@ -323,10 +330,10 @@ impl<'a> Drives<'a> {
     ///
     /// Semi-implicit Euler is leapfrog in disguise: with the acceleration of the step's start, the
     /// positions follow the trajectory to second order, while the velocities belong half a step
-    /// earlier. Taking the velocity there removes a bias of `kd * h / 2 * qdd`, which is 0.3 N m at
+    /// earlier (the plant says how old its velocities are). Taking the velocity there removes a bias of `kd * h / 2 * qdd`, which is 0.3 N m at
     /// 10 rad/s^2 and 1 ms.
     fn reference(&self, trajectory: &JointTrajectory, time_s: f64) -> JointState {
-        let velocity_s = (time_s - 0.5 * self.timestep_s).max(0.0);
+        let velocity_s = (time_s - self.velocity_age_s).max(0.0);
         match self.actuation.commands {
             None => JointState {
                 velocity: trajectory.sample(velocity_s).velocity,

@@ -120,6 +120,8 @@ fn begin<'a>(
         motion.trajectory,
         fleet.identity(),
         fleet.timestep_s(),
+        // As `Plant::velocity_age_s` has it.
+        0.5 * fleet.timestep_s(),
     )?;
     drive.record(fleet.reset(arm, &drive.start())?)?;
     Ok(Active {

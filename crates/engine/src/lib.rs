@@ -15,6 +15,7 @@ mod nearness;
 mod plant;
 mod rapier;
 mod recording;
+mod referee;
 mod servo;
 mod simulate;
 #[cfg(test)]
@@ -28,6 +29,7 @@ pub use fleet_run::{Motion, simulate_fleet};
 pub use mujoco::{MujocoFleet, MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
 pub use rapier::{RapierPlant, RapierSettings};
-pub use recording::{Cost, Recording};
+pub use recording::{Cost, Recording, Saturation};
+pub use referee::{RefereePlant, RefereeSettings, TorqueHold, retrace};
 pub use servo::{Servo, ServoGains, ServoOutput};
 pub use simulate::{Drive, Hooks, simulate};

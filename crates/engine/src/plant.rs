@@ -8,7 +8,7 @@ use crate::EngineError;
 /// Name, version and settings of an engine, for the provenance of a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct EngineIdentity {
-    /// `rapier` or `mujoco`.
+    /// `rapier`, `mujoco` or `referee`.
     pub name: String,
     /// Version of the engine.
     pub version: String,
@@ -67,6 +67,11 @@ pub trait Plant {
 
     /// Length of a step, s.
     fn timestep_s(&self) -> f64;
+
+    /// How long before the time of a state its velocity was, s: half a step in the engines.
+    fn velocity_age_s(&self) -> f64 {
+        0.5 * self.timestep_s()
+    }
 
     /// World poses of the six moving links' frames, from the engine's bodies.
     fn link_poses(&mut self) -> Result<[Pose; JOINT_COUNT], EngineError>;

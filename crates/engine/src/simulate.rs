@@ -46,7 +46,7 @@ pub struct Drive<'a> {
 
 impl<'a> Drive<'a> {
     /// Prepares a run of `trajectory` from its start to its end on a plant with steps of
-    /// `timestep_s`.
+    /// `timestep_s` whose velocities are `velocity_age_s` old (see [`Plant::velocity_age_s`]).
     ///
     /// The servo is sampled once per step and its torque held over it. The last state is the first
     /// one at or after the trajectory's end.
@@ -59,13 +59,14 @@ impl<'a> Drive<'a> {
         trajectory: &'a JointTrajectory,
         engine: EngineIdentity,
         timestep_s: f64,
+        velocity_age_s: f64,
     ) -> Result<Self, EngineError> {
         servo.check()?;
         actuation.check()?;
         let steps = step_count(trajectory.duration_s(), timestep_s);
         Ok(Self {
             trajectory,
-            drives: Drives::new(servo, actuation, timestep_s),
+            drives: Drives::new(servo, actuation, timestep_s, velocity_age_s),
             steps,
             recording: Recording {
                 engine,
@@ -76,6 +77,7 @@ impl<'a> Drive<'a> {
                 torque_nm: Vec::with_capacity(steps),
                 drive_nm: Vec::with_capacity(steps),
                 saturated_steps: 0,
+                saturation: Default::default(),
                 cost: Cost::default(),
             },
         })
@@ -105,6 +107,12 @@ impl<'a> Drive<'a> {
             .torque(self.trajectory, time_s, &state.position, &state.velocity);
         check_torque(&self.recording.engine.name, time_s, &torque.drive_nm)?;
         self.recording.saturated_steps += usize::from(torque.saturated.contains(&true));
+        for (joint, cut) in self.recording.saturation.iter_mut().zip(torque.saturated) {
+            if cut {
+                joint.steps += 1;
+                joint.first_time_s.get_or_insert(time_s);
+            }
+        }
         self.recording.torque_nm.push(torque.link_nm);
         self.recording.drive_nm.push(torque.drive_nm);
         Ok(Some(torque.link_nm))
@@ -152,6 +160,7 @@ pub fn simulate(
         trajectory,
         plant.identity(),
         plant.timestep_s(),
+        plant.velocity_age_s(),
     )?;
     drive.record(plant.reset(&drive.start())?)?;
     loop {

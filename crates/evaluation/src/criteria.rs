@@ -2,6 +2,7 @@
 
 use needlebench_cell::scenario::{ClearanceCriteria, CriteriaSection};
 
+use crate::adjudication::sentence;
 use crate::report::{ConfigurationReport, CriterionResult};
 
 /// A limit that a value has to keep.
@@ -179,6 +180,23 @@ pub fn check_configuration(
             difference.map(|difference| difference.settled_tip_m),
             String::new(),
         );
+        for judged in configuration
+            .adjudication
+            .iter()
+            .flat_map(|each| &each.quantities)
+        {
+            check(
+                Some(Criterion {
+                    key: judged.quantity,
+                    limit: judged.limit,
+                    unit: judged.unit,
+                    at_least: false,
+                }),
+                None,
+                Some(judged.value),
+                sentence(judged).unwrap_or_default(),
+            );
+        }
     }
     let budget = configuration
         .budget

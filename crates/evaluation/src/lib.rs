@@ -2,6 +2,7 @@
 //!
 //! Definitions are those of the field: see each field's documentation. SI units and radians.
 
+pub mod adjudication;
 mod clearance;
 pub mod compare;
 mod criteria;
@@ -15,6 +16,7 @@ pub mod pareto;
 mod provenance;
 pub mod ranking;
 mod reason;
+pub mod referee;
 pub mod report;
 pub mod room;
 mod sensitivity;
@@ -28,7 +30,8 @@ pub use clearance::{
 pub use criteria::{Criterion, check_configuration};
 pub use judge::judge;
 pub use motion::{
-    ContactMeasurement, EngineDifference, MotionMeasurement, engine_difference, measure_motion,
+    ContactMeasurement, EngineDifference, MotionMeasurement, SaturatedJoint, engine_difference,
+    measure_motion,
 };
 pub use needle::{NeedleMeasurement, measure_needle, tip_of};
 pub use sensitivity::tip_sensitivity;

@@ -7,10 +7,12 @@ use needlebench_engine::EngineIdentity;
 use needlebench_uncertainty::budget::ErrorBudget;
 use serde::Serialize;
 
+use crate::adjudication::Adjudication;
 use crate::iso9283::Iso9283Report;
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
 use crate::ranking::{Dominance, GoalRanking, RankingReport};
+use crate::referee::RefereeReport;
 use crate::room::RoomReport;
 
 /// Version of the report's keys.
@@ -279,6 +281,10 @@ pub struct ConfigurationReport {
     pub engines: BTreeMap<String, EngineReport>,
     /// Difference of the engines; none unless both ran.
     pub engine_difference: Option<EngineDifference>,
+    /// The engines' difference and the scenario's envelope; none unless both ran.
+    pub adjudication: Option<Adjudication>,
+    /// Each engine beside the referee; none unless asked for, or the envelope was exceeded.
+    pub referee: Option<RefereeReport>,
     /// Clearances over the motions of all engines; over the planned motion where nothing was
     /// simulated, and of the final posture where there is no motion.
     pub clearance: ClearanceReport,

@@ -46,6 +46,8 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
         commanded: None,
         engines: BTreeMap::new(),
         engine_difference: None,
+        adjudication: None,
+        referee: None,
         clearance: ClearanceReport {
             classes: BTreeMap::from([("robot_phantom", found)]),
             minimum_m: Some(clearance_m),

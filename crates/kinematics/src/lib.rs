@@ -9,8 +9,10 @@
 
 mod chain;
 mod dynamics;
+mod forward_dynamics;
 mod geometry;
 pub mod ik;
+mod integrate;
 mod limits;
 mod manipulability;
 mod models;
@@ -21,7 +23,9 @@ pub mod trajectory;
 
 pub use chain::{Chain, ChainJoint};
 pub use dynamics::{Body, Dynamics};
+pub use forward_dynamics::AboutBase;
 pub use geometry::{NotUrGeometry, UrGeometry, base_from_base_link};
+pub use integrate::{NotSmooth, integrate};
 pub use limits::{JointLimit, JointLimits, LIMIT_ROUNDING_RAD, LimitPolicy, MAX_TURNS};
 pub use manipulability::{Manipulability, SingularityDistances, determinant_gradient};
 pub use models::{UnknownUrModel, UrModel};

@@ -23,6 +23,7 @@ use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 use crate::pipeline::{Budgets, EngineRun};
 use crate::provenance::provenance;
 use crate::reality::Reality;
+use crate::trial::Trial;
 
 /// What all parts of a report are made with.
 struct Context<'a> {
@@ -46,6 +47,7 @@ pub(crate) fn assemble(
     plans: &[GoalPlan],
     runs: &[Vec<Vec<EngineRun>>],
     budgets: &Budgets,
+    trials: &[Vec<Trial>],
     engines: &[EngineName],
     engine_failures: Vec<EngineFailure>,
     identities: Vec<EngineIdentity>,
@@ -62,8 +64,9 @@ pub(crate) fn assemble(
     let mut goals: Vec<GoalReport> = plans
         .iter()
         .zip(runs)
+        .zip(trials)
         .enumerate()
-        .map(|(index, (plan, runs))| goal_report(&context, index, plan, runs))
+        .map(|(index, ((plan, runs), trials))| goal_report(&context, index, plan, runs, trials))
         .collect();
     let both = engines.len() == 2 && engine_failures.is_empty();
     let (verdict, criteria) = judge(
@@ -100,6 +103,7 @@ fn goal_report(
     goal_index: usize,
     plan: &GoalPlan,
     runs: &[Vec<EngineRun>],
+    trials: &[Trial],
 ) -> GoalReport {
     let resolved = context.resolved;
     let goal = &resolved.goals[goal_index];
@@ -120,9 +124,10 @@ fn goal_report(
             .iter()
             .zip(runs)
             .zip(&context.budgets[goal_index])
-            .map(|((plan, runs), budget)| {
+            .zip(trials)
+            .map(|(((plan, runs), budget), trial)| {
                 let mut report =
-                    configuration_report(context, goal_index, plan, runs, route.as_ref());
+                    configuration_report(context, goal_index, plan, runs, trial, route.as_ref());
                 match budget {
                     Some(Ok(budget)) => report.budget = Some(budget.clone()),
                     Some(Err(error)) => report.budget_failure = Some(error.clone()),
@@ -141,6 +146,7 @@ fn configuration_report(
     goal_index: usize,
     plan: &ConfigurationPlan,
     runs: &[EngineRun],
+    trial: &Trial,
     route: Option<&ClassClearance>,
 ) -> ConfigurationReport {
     let Context {
@@ -216,6 +222,8 @@ fn configuration_report(
         }),
         engines,
         engine_difference,
+        adjudication: trial.adjudication.clone(),
+        referee: trial.referee.clone(),
         clearance,
         tip_sensitivity_m_per_rad: candidate.map(|each| tip_sensitivity(cell, goal, &each.joints)),
         pareto: false,

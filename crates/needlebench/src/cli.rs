@@ -153,6 +153,10 @@ pub(crate) struct RunArguments {
     /// Engines, instead of the scenario's own choice.
     #[arg(long, value_enum)]
     pub engine: Option<EngineChoice>,
+    /// Hold every simulated motion against the referee, our own dynamics integrated to rounding, at
+    /// the scenario's time step, its half and its quarter; three to ten times as long.
+    #[arg(long)]
+    pub referee: bool,
     /// Folder for results; each scenario gets a folder of its name in it.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,

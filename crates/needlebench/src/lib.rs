@@ -17,6 +17,7 @@ mod progress;
 mod provenance;
 mod reality;
 mod servo;
+mod trial;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use cli::{command_line, main};

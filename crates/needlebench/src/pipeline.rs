@@ -63,6 +63,8 @@ pub struct RunOptions {
     pub engines: Option<EngineChoice>,
     /// Threads; more than there are engines and goals is no use.
     pub jobs: usize,
+    /// Whether to hold every simulated motion against the referee.
+    pub referee: bool,
 }
 
 /// Recording of one engine with the clearances along it.
@@ -205,6 +207,23 @@ pub(crate) fn run(
             runs[job.goal][job.configuration].push(run);
         }
     }
+    let refereed = Instant::now();
+    let trials = crate::trial::try_all(
+        &crate::trial::Court {
+            resolved,
+            reality: &reality,
+            plans: &plans,
+            runs: &runs,
+            always: options.referee,
+            threads: options.jobs,
+            cancel,
+            progress,
+        },
+        harness.as_ref().and_then(|harness| harness.as_ref().ok()),
+    );
+    if trials.identity.is_some() {
+        timings.insert("referee_s".to_owned(), refereed.elapsed().as_secs_f64());
+    }
     let failures = outcomes
         .iter_mut()
         .filter_map(|outcome| outcome.failure.take())
@@ -212,13 +231,25 @@ pub(crate) fn run(
     let identities = outcomes
         .iter_mut()
         .filter_map(|outcome| outcome.identity.take())
+        .chain(trials.identity)
         .collect();
     let budgets = budgets(resolved, &plans, options.jobs);
     let interrupted = cancel.load(Ordering::Relaxed);
     let mut report = assemble(
-        resolved, &planner, &model, &reality, &plans, &runs, &budgets, &engines, failures,
-        identities, timings,
+        resolved,
+        &planner,
+        &model,
+        &reality,
+        &plans,
+        &runs,
+        &budgets,
+        &trials.by_goal,
+        &engines,
+        failures,
+        identities,
+        timings,
     );
+    report.notes.extend(trials.notes);
     if interrupted {
         report.notes.push(
             "the run was interrupted: motions that had not been simulated by then are missing"

@@ -4,7 +4,7 @@
 mod analytic;
 mod monte_carlo;
 
-use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, Vector3};
 use needlebench_cell::imperfections::Imperfections;
 use needlebench_cell::{Cell, Goal};
 use needlebench_engine::Servo;
@@ -45,6 +45,12 @@ impl BudgetCase<'_> {
         self.cell.robot.world_from_flange(&self.target()) * self.cell.tool.flange_from_guide_exit
     }
 
+    /// Turns world vectors into the axes of the budget.
+    fn from_world(&self) -> Rotation3<f64> {
+        let world_from_goal = self.goal.world_from_guide_exit.rotation;
+        world_from_goal.inverse().to_rotation_matrix()
+    }
+
     /// Depths beyond the guide's exit at which the needle is looked at: skin and target, m.
     fn depths_m(&self) -> [f64; 2] {
         [
@@ -80,7 +86,8 @@ pub enum BudgetError {
 
 /// Bias and covariance of a point of the needle, real minus where it should be.
 ///
-/// Axes are those of the guide's exit as planned: x and y across the needle, z along the insertion.
+/// Axes are those of the goal's guide exit at roll 0, the same for all configurations: x and y across
+/// the needle, x as near to the patient's head as it gets, z along the insertion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Moments {
     /// Mean, m.

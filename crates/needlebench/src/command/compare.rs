@@ -193,6 +193,7 @@ impl Input {
         let options = RunOptions {
             engines: Some(arguments.engine),
             jobs: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            referee: false,
         };
         let progress = Progress::new(arguments.quiet);
         let cancel = std::sync::atomic::AtomicBool::new(false);

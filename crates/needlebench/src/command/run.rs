@@ -80,6 +80,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     let options = RunOptions {
         engines: arguments.engine,
         jobs,
+        referee: arguments.referee,
     };
 
     let mut status = ExitStatus::Success;

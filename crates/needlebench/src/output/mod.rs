@@ -9,7 +9,9 @@ mod markdown;
 pub(crate) mod pictures;
 mod ranking;
 mod recording;
+mod referee;
 pub(crate) mod room_pictures;
+mod saturation;
 mod table;
 
 pub(crate) use budget::budget_picture;

@@ -42,6 +42,14 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
         if let Some(budget) = budget_text(goal) {
             write!(out, "{budget}")?;
         }
+        if let Some(table) = super::referee::referee_table(goal) {
+            writeln!(
+                out,
+                "each engine beside the referee: distance of the needle's tips"
+            )?;
+            writeln!(out, "{table}")?;
+        }
+        out.push_str(&super::saturation::saturation_text(goal));
         write_remarks(out, report, goal)?;
     }
     if let Some(iso9283) = &report.iso9283 {

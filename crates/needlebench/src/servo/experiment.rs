@@ -300,3 +300,53 @@ fn figures(course: &Course, height_rad: f64, timestep_s: f64, limit_nm: f64) -> 
 pub(crate) fn whole(value: f64) -> usize {
     value.round() as usize
 }
+
+#[cfg(test)]
+mod tests {
+    use needlebench_cell::{Overrides, load_scenario};
+    use needlebench_engine::{RapierPlant, RapierSettings, ServoGains};
+
+    use super::*;
+
+    /// Share of the amplitude; the engine's arm is not linear, by 1e-5 of a milliradian's motion.
+    const LINEAR_GAIN: f64 = 1e-3;
+
+    #[test]
+    fn an_engine_answers_as_the_linear_loop_does() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/table3.toml");
+        let scenario = load_scenario(path.as_ref(), &Overrides::default()).unwrap();
+        let servo = Servo {
+            dynamics: scenario.cell.dynamics(),
+            gains: ServoGains::default(),
+            effort_limit_nm: scenario.cell.robot.limits.efforts_nm(),
+        };
+        let timestep_s = 1e-3;
+        let posture = scenario.start;
+        let linear = Linear::new(&servo, &posture, timestep_s);
+        let settings = RapierSettings::default();
+        let mut plant = RapierPlant::new(&scenario.cell, timestep_s, &settings).unwrap();
+        let mut bench = Bench {
+            plant: &mut plant,
+            servo: &servo,
+            linear: &linear,
+            posture,
+            held_nm: servo.dynamics.gravity_torque(&posture),
+        };
+        let response = bench.joint(2).unwrap();
+        assert!(
+            response.step_deviation < LINEAR_GAIN,
+            "{}",
+            response.step_deviation
+        );
+        assert!(response.frequencies.len() > 10);
+        for point in &response.frequencies {
+            let linear = Complex::from_polar(point.linear_gain, point.linear_phase_rad);
+            let error = (Complex::from_polar(point.gain, point.phase_rad) - linear).norm();
+            assert!(error < LINEAR_GAIN, "{point:?}");
+        }
+        // The small step stays within the torque, the large one is cut.
+        assert_eq!(response.small_step.saturated_steps, 0);
+        assert!(response.large_step.saturated_steps > 0);
+        assert!((response.large_step.peak_torque_ratio - 1.0).abs() < 1e-12);
+    }
+}

@@ -203,3 +203,94 @@ fn last_stable(stable: impl Fn(f64) -> bool) -> Option<f64> {
     }
     Some(low)
 }
+
+#[cfg(test)]
+mod tests {
+    use needlebench_cell::{Overrides, load_scenario};
+    use needlebench_engine::ServoGains;
+
+    use super::*;
+
+    const TIMESTEP_S: f64 = 1e-3;
+
+    fn linear() -> (Servo, Joints, Linear) {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/table3.toml");
+        let scenario = load_scenario(path.as_ref(), &Overrides::default()).unwrap();
+        let servo = Servo {
+            dynamics: scenario.cell.dynamics(),
+            gains: ServoGains::default(),
+            effort_limit_nm: scenario.cell.robot.limits.efforts_nm(),
+        };
+        let linear = Linear::new(&servo, &scenario.start, TIMESTEP_S);
+        (servo, scenario.start, linear)
+    }
+
+    /// Of the amplitude: what is left of the transient after 2 s, and rounding.
+    const STEADY: f64 = 1e-9;
+
+    /// The closed form in `z` against the recursion that it stands for.
+    #[test]
+    fn sine_settles_at_the_closed_form() {
+        let (_, _, linear) = linear();
+        let inverse = linear.mass.try_inverse().unwrap();
+        let (joint, hz) = (1, 8.0);
+        let omega = std::f64::consts::TAU * hz;
+        let expected = linear.response(joint, hz);
+        let (mut x, mut v) = (Joints::zeros(), Joints::zeros());
+        let mut worst: f64 = 0.0;
+        for step in 0..3000 {
+            let time_s = f64::from(step) * TIMESTEP_S;
+            if time_s > 2.0 {
+                let steady = (expected * Complex::from_polar(1.0, omega * time_s)).im;
+                worst = worst.max((x[joint] - steady).abs());
+            }
+            let (mut reference, mut speed) = (Joints::zeros(), Joints::zeros());
+            reference[joint] = (omega * time_s).sin();
+            speed[joint] = omega * (omega * (time_s - 0.5 * TIMESTEP_S)).cos();
+            let torque = linear.kp.component_mul(&(reference - x))
+                + linear.kd.component_mul(&(speed - v))
+                - linear.gravity_gradient * x;
+            v += inverse * torque * TIMESTEP_S;
+            x += v * TIMESTEP_S;
+        }
+        assert!(worst < STEADY, "{worst:e}");
+    }
+
+    #[test]
+    fn slow_motions_are_followed_and_fast_ones_are_not() {
+        let (_, _, linear) = linear();
+        for joint in 0..JOINT_COUNT {
+            let slow = linear.response(joint, 0.01).norm();
+            // Gravity bends the servo by its gradient over kp.
+            assert!((slow - 1.0).abs() < 0.03, "{joint}: {slow}");
+            assert!(linear.response(joint, 400.0).norm() < 0.5, "{joint}");
+            let bandwidth_hz = linear.joint(joint).bandwidth_hz.unwrap();
+            let there = linear.response(joint, bandwidth_hz).norm();
+            assert!((there - std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn margins_are_where_stability_ends() {
+        let (mut servo, posture, _) = linear();
+        let margins = Margins::new(&servo, &posture, TIMESTEP_S);
+        assert!(margins.spectral_radius < 1.0);
+        let step_s = margins.timestep_s.unwrap();
+        for (factor, stable) in [(0.999, true), (1.001, false)] {
+            let there = Margins::new(&servo, &posture, factor * step_s);
+            assert_eq!(there.spectral_radius < 1.0, stable, "{factor}");
+        }
+        let factor = margins.gain_factor.unwrap();
+        let gains = &mut servo.gains;
+        for gain in gains
+            .kp_nm_per_rad
+            .iter_mut()
+            .chain(&mut gains.kd_nms_per_rad)
+        {
+            *gain *= 1.001 * factor;
+        }
+        let beyond = Margins::new(&servo, &posture, TIMESTEP_S);
+        assert!(beyond.spectral_radius > 1.0);
+        assert_eq!((beyond.gain_factor, beyond.timestep_s), (None, None));
+    }
+}

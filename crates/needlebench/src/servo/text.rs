@@ -48,8 +48,8 @@ pub(crate) fn text(report: &ServoReport) -> String {
     let margins = &report.margins;
     let _ = writeln!(
         out,
-        "all joints together: slowest motion shrinks by {:.4} a step; gains could be {} as high, \
-         the step {}",
+        "all joints together: the slowest motion shrinks to {:.4} in a step; stable up to {} these \
+         gains, or steps {}",
         margins.spectral_radius,
         margins
             .gain_factor
@@ -118,9 +118,9 @@ fn rows(joint: &JointReport, response: &JointResponse) -> Vec<Vec<String>> {
             let [deviation, gain, phase] = if *small {
                 let (gain_db, phase_deg) = worst_deviation(response);
                 [
-                    format!("{:.2} %", 100.0 * response.step_deviation),
-                    format!("{gain_db:.3}"),
-                    format!("{phase_deg:.2}"),
+                    format!("{:.1e}", response.step_deviation),
+                    format!("{gain_db:.1e}"),
+                    format!("{phase_deg:.1e}"),
                 ]
             } else {
                 ["-", "-", "-"].map(str::to_owned)

@@ -26,7 +26,7 @@ pub(super) fn moments(
     let middle = Draw(vec![0.0; layout.len()]);
     let truth = Truth::new(case.cell, case.place, imperfections, &layout, &middle, 0)?;
     let joints = JointErrors::new(case, imperfections, &truth, &target);
-    let to_guide = exit.rotation.inverse().to_rotation_matrix();
+    let from_world = case.from_world();
     let points = case.planned();
     let mut moments = [Moments::new(&Vector3::zeros(), &Matrix3::zeros()); 2];
     for (index, point) in points.iter().enumerate() {
@@ -64,15 +64,16 @@ pub(super) fn moments(
             bias -= moved * mean;
             covariance += moved * moved.transpose() * variance;
         }
-        let bias = to_guide * bias;
-        let mut covariance = to_guide * covariance * to_guide.inverse();
         if let Some(clearance_m) = imperfections.guide_clearance_m {
             let lever = case.depths_m()[index] / case.cell.tool.guide_length_m();
             // Variance of one coordinate of a uniform disc: a quarter of the radius squared.
             let variance = (0.5 * clearance_m).powi(2) / 4.0;
             let across = variance * ((1.0 + lever).powi(2) + lever.powi(2));
-            covariance += Matrix3::from_diagonal(&Vector3::new(across, across, 0.0));
+            let along = exit.rotation * Vector3::z();
+            covariance += (Matrix3::identity() - along * along.transpose()) * across;
         }
+        let bias = from_world * bias;
+        let mut covariance = from_world * covariance * from_world.inverse();
         // Symmetric but for rounding.
         covariance = 0.5 * (covariance + covariance.transpose());
         moments[index] = Moments::new(&bias, &covariance);

@@ -23,7 +23,7 @@ pub(super) fn moments(
     let target = case.target();
     let planned = case.planned();
     let depths_m = case.depths_m();
-    let to_guide = case.world_from_exit().rotation.inverse();
+    let from_world = case.from_world();
 
     let middle = Draw(vec![0.0; layout.len()]);
     let typical = Truth::new(case.cell, case.place, imperfections, &layout, &middle, 0)?;
@@ -48,7 +48,7 @@ pub(super) fn moments(
         let needle = truth.needle_points(case.cell, &position, depths_m);
         let wanted = [truth.entry(&planned[0]), truth.target(&planned[1])];
         for ((errors, needle), wanted) in errors.iter_mut().zip(needle).zip(wanted) {
-            errors.push(to_guide * (needle - wanted));
+            errors.push(from_world * (needle - wanted));
         }
     }
     Ok(errors.map(|errors| {

@@ -1,0 +1,144 @@
+//! What an engine's motion differs from the referee's by.
+
+use std::collections::BTreeMap;
+
+use needlebench_cell::{Cell, Goal};
+use needlebench_engine::{PlantState, Recording};
+use serde::Serialize;
+
+use crate::needle::tip_of;
+
+/// Below this a difference is rounding, and no order can be read from it, m.
+const ROUNDING_M: f64 = 1e-12;
+
+/// Order of convergence that is documented for both engines: semi-implicit Euler.
+pub const DOCUMENTED_ORDER: f64 = 1.0;
+
+/// How far a measured order may be from the documented one: at steps that are not small the next
+/// order shows.
+pub const ORDER_TOLERANCE: f64 = 0.25;
+
+/// Each engine beside the referee, by the engine's name.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct RefereeReport {
+    /// By engine.
+    #[serde(flatten)]
+    pub engines: BTreeMap<String, RefereeComparison>,
+}
+
+/// One engine beside the referee, on the part of the motion before the first contact.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RefereeComparison {
+    /// End of what was compared: that of the motion, or the first contact that the engine saw.
+    pub until_s: f64,
+    /// Engine and referee, each in a closed loop with its own servo.
+    pub closed_loop: TipDifference,
+    /// The referee under the engine's recorded torques, what it differs by held back with the
+    /// servo's gains.
+    pub same_torques: TipDifference,
+    /// The same with nothing held back: what gravity makes of the engine's error, m.
+    pub unaided_peak_tip_m: f64,
+    /// The closed loop again at smaller steps, the first entry at the scenario's own.
+    pub convergence: Vec<StepDifference>,
+    /// Order of convergence from the two smallest steps; none where the differences are rounding.
+    pub order: Option<f64>,
+    /// The order that is documented for the engine.
+    pub documented_order: f64,
+}
+
+impl RefereeComparison {
+    /// Whether the measured order, if there is one, is the documented one.
+    pub fn order_is_documented(&self) -> bool {
+        self.order
+            .is_none_or(|order| (order - self.documented_order).abs() <= ORDER_TOLERANCE)
+    }
+}
+
+/// Distance of two tips along a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
+pub struct TipDifference {
+    /// Largest distance at the same time, m.
+    pub peak_tip_m: f64,
+    /// When.
+    pub peak_time_s: f64,
+    /// Distance at the end, m; none if the motion was compared up to a contact only.
+    pub settled_tip_m: Option<f64>,
+}
+
+/// Difference at one length of the step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StepDifference {
+    /// Length of the step.
+    pub timestep_s: f64,
+    /// Largest distance of the tips.
+    pub peak_tip_m: f64,
+}
+
+/// Number of steps before the first contact of a recording; all of them without one.
+pub fn steps_before_contact(recording: &Recording) -> usize {
+    recording
+        .state
+        .iter()
+        .position(|state| state.contact.count > 0)
+        .map_or(recording.steps(), |index| index.saturating_sub(1))
+}
+
+/// Distance of the needle's tips, state by state, over the states that both have.
+pub fn tip_difference(
+    cell: &Cell,
+    goal: &Goal,
+    recording: &Recording,
+    states: &[PlantState],
+) -> TipDifference {
+    let tip = |state: &PlantState| tip_of(cell, goal, &state.world_from_flange);
+    let mut difference = TipDifference::default();
+    let mut last = 0.0;
+    for ((a, b), &time_s) in recording.state.iter().zip(states).zip(&recording.time_s) {
+        last = (tip(a) - tip(b)).norm();
+        if last > difference.peak_tip_m {
+            difference.peak_tip_m = last;
+            difference.peak_time_s = time_s;
+        }
+    }
+    let to_the_end = states.len() >= recording.state.len();
+    difference.settled_tip_m = to_the_end.then_some(last);
+    difference
+}
+
+/// `log(e1 / e2) / log(h1 / h2)` of the two smallest steps.
+pub fn measured_order(convergence: &[StepDifference]) -> Option<f64> {
+    let [.., coarse, fine] = convergence else {
+        return None;
+    };
+    (fine.peak_tip_m > ROUNDING_M).then(|| {
+        (coarse.peak_tip_m / fine.peak_tip_m).ln() / (coarse.timestep_s / fine.timestep_s).ln()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(errors_m: [f64; 3]) -> Vec<StepDifference> {
+        errors_m
+            .into_iter()
+            .zip([1e-3, 5e-4, 2.5e-4])
+            .map(|(peak_tip_m, timestep_s)| StepDifference {
+                timestep_s,
+                peak_tip_m,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_order_is_that_of_the_smallest_steps() {
+        let order = measured_order(&series([9e-6, 4e-6, 1e-6])).unwrap();
+        assert!((order - 2.0).abs() < 1e-12, "{order}");
+    }
+
+    #[test]
+    fn rounding_has_no_order() {
+        assert_eq!(measured_order(&series([1e-15, 3e-15, 2e-15])), None);
+        assert_eq!(measured_order(&series([1e-6, 1e-6, 1e-6])[..1]), None);
+    }
+}
