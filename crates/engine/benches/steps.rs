@@ -173,7 +173,7 @@ impl Bench {
                             group.extend((0..ARMS).map(|arm| (arm, *torque_nm)));
                             fleet.step(&group).expect("stable before");
                         }
-                    }) / ARMS as u32
+                    }) / u32::try_from(ARMS).expect("a few")
                 },
                 &mut || {
                     timed(|| {
@@ -181,7 +181,7 @@ impl Bench {
                             assert_eq!(ended.expect("stable before").state, recording.state);
                         })
                         .expect("stable before");
-                    }) / ARMS as u32
+                    }) / u32::try_from(ARMS).expect("a few")
                 },
             ],
         );

@@ -285,7 +285,7 @@ fn figures(course: &Course, height_rad: f64, timestep_s: f64, limit_nm: f64) -> 
             .zip(first(0.9))
             .map(|(low, high)| (high - low) as f64 * timestep_s),
         overshoot: shares.iter().copied().fold(0.0, f64::max).max(1.0) - 1.0,
-        settling_time_s: (settled < shares.len()).then(|| settled as f64 * timestep_s),
+        settling_time_s: (settled < shares.len()).then_some(settled as f64 * timestep_s),
         saturated_steps: course.saturated.iter().filter(|cut| **cut).count(),
         peak_torque_ratio: peak_nm / limit_nm,
     }

@@ -45,47 +45,42 @@ pub(crate) fn page(report: &ServoReport, joint: &JointReport) -> Image {
         ),
     );
     legend(&mut canvas, joint);
-    let timestep_s = report.timestep_s;
-    let milliseconds = move |step: usize| step as f64 * timestep_s * 1e3;
     let small: Vec<f64> = joint
         .linear_step
         .iter()
         .map(|share| share * SMALL_RAD)
         .collect();
-    let steps: [(&str, fn(&JointResponse) -> &Course, Option<Vec<f64>>); 2] = [
-        ("small step", |response| &response.small, Some(small)),
-        ("large step", |response| &response.large, None),
-    ];
-    for (column, (name, course, linear)) in steps.into_iter().enumerate() {
-        // The step is over long before the recording ends.
-        let shown = steps_shown(timestep_s) / 2;
-        courses(
-            &mut canvas,
-            joint,
-            column,
-            name,
-            shown,
-            milliseconds,
-            &course,
-            linear.as_deref(),
-        );
-    }
-    let shown = joint
+    let sine_steps = joint
         .responses
         .first()
         .map_or(1, |each| each.sine.torque_nm.len());
-    let name = format!("sine at {:.1} Hz", closed.natural_frequency_hz);
-    courses(
-        &mut canvas,
-        joint,
-        2,
-        &name,
-        shown,
-        milliseconds,
-        &|each| &each.sine,
-        None,
-    );
-    tracked(&mut canvas, joint, shown, milliseconds);
+    // A step is over long before its recording ends.
+    let shown = steps_shown(report.timestep_s) / 2;
+    let columns = [
+        Column {
+            name: "small step".to_owned(),
+            course: |response| &response.small,
+            linear_rad: Some(&small),
+            shown,
+        },
+        Column {
+            name: "large step".to_owned(),
+            course: |response| &response.large,
+            linear_rad: None,
+            shown,
+        },
+        Column {
+            name: format!("sine at {:.1} Hz", closed.natural_frequency_hz),
+            course: |response| &response.sine,
+            linear_rad: None,
+            shown: sine_steps,
+        },
+    ];
+    let milliseconds = |step: usize| step as f64 * report.timestep_s * 1e3;
+    for (place, column) in columns.iter().enumerate() {
+        column.draw(&mut canvas, joint, place, milliseconds);
+    }
+    tracked(&mut canvas, joint, sine_steps, milliseconds);
     bode(&mut canvas, joint);
     canvas.into_image()
 }
@@ -116,108 +111,122 @@ fn legend(canvas: &mut Canvas, joint: &JointReport) {
     }
 }
 
-/// Motion above, torque below, for one column.
-#[expect(clippy::too_many_arguments, reason = "what is drawn, where and how")]
-fn courses(
-    canvas: &mut Canvas,
-    joint: &JointReport,
-    column: usize,
-    name: &str,
+/// Motion above, torque below.
+struct Column<'a> {
+    name: String,
+    course: fn(&JointResponse) -> &Course,
+    /// The linear loop's course beside it.
+    linear_rad: Option<&'a [f64]>,
+    /// Time steps.
     shown: usize,
-    milliseconds: impl Fn(usize) -> f64 + Copy,
-    course: &dyn Fn(&JointResponse) -> &Course,
-    linear_rad: Option<&[f64]>,
-) {
-    let Some(first) = joint.responses.first() else {
-        return;
-    };
-    let time = Axis::linear(0.0, milliseconds(shown));
-    let milli = |value: &f64| value * 1e3;
-    let all = joint.responses.iter().map(course);
-    let values = all.clone().flat_map(|course| {
-        course
-            .motion_rad
-            .iter()
-            .chain(&course.reference_rad)
-            .take(2 * shown)
-            .map(milli)
-    });
-    let motion = graph(column, 0, time, Axis::around(values.chain([0.0])));
-    motion.draw(canvas, &format!("{name}: motion (mrad) over time (ms)"));
-    let points = |values: &[f64]| -> Vec<[f64; 2]> {
-        let values = values.iter().take(shown + 1).enumerate();
-        values
-            .map(|(step, value)| [milliseconds(step), value * 1e3])
-            .collect()
-    };
-    // A step of the set-point at time zero is drawn as one.
-    let reference = &course(first).reference_rad;
-    let mut wanted = points(reference);
-    if reference[0] != 0.0 {
-        wanted.insert(0, [0.0, 0.0]);
-    }
-    motion.curve(canvas, wanted, [1.5, 0.0], REFERENCE);
-    for (index, response) in joint.responses.iter().enumerate().take(ENGINES.len()) {
-        let style = [ENGINE_WIDTHS[index], 0.0];
-        motion.curve(
-            canvas,
-            points(&course(response).motion_rad),
-            style,
-            ENGINES[index],
-        );
-    }
-    if let Some(linear_rad) = linear_rad {
-        motion.curve(canvas, points(linear_rad), [1.5, 5.0], LINEAR);
-    }
+}
 
-    let torques = all.flat_map(|course| course.torque_nm.iter().take(shown).copied());
-    let torques: Vec<f64> = torques.collect();
-    let highest = torques
-        .iter()
-        .fold(0.0, |high: f64, each| high.max(each.abs()));
-    // The limit is shown where the torque comes near to it.
-    let near = highest > 0.6 * joint.limit_nm;
-    let ends = if near {
-        vec![joint.limit_nm, -joint.limit_nm]
-    } else {
-        Vec::new()
-    };
-    let torque = graph(
-        column,
-        1,
-        time,
-        Axis::around(torques.into_iter().chain(ends)),
-    );
-    torque.draw(canvas, "torque (N m) over time (ms)");
-    for (index, response) in joint.responses.iter().enumerate().take(ENGINES.len()) {
-        let course = course(response);
-        let points: Vec<[f64; 2]> = course
-            .torque_nm
+impl Column<'_> {
+    fn draw(
+        &self,
+        canvas: &mut Canvas,
+        joint: &JointReport,
+        column: usize,
+        milliseconds: impl Fn(usize) -> f64,
+    ) {
+        let Self {
+            name,
+            course,
+            linear_rad,
+            shown,
+        } = self;
+        let shown = *shown;
+        let Some(first) = joint.responses.first() else {
+            return;
+        };
+        let time = Axis::linear(0.0, milliseconds(shown));
+        let milli = |value: &f64| value * 1e3;
+        let all = joint.responses.iter().map(course);
+        let values = all.clone().flat_map(|course| {
+            course
+                .motion_rad
+                .iter()
+                .chain(&course.reference_rad)
+                .take(2 * shown)
+                .map(milli)
+        });
+        let motion = graph(column, 0, time, Axis::around(values.chain([0.0])));
+        motion.draw(canvas, &format!("{name}: motion (mrad) over time (ms)"));
+        let points = |values: &[f64]| -> Vec<[f64; 2]> {
+            let values = values.iter().take(shown + 1).enumerate();
+            values
+                .map(|(step, value)| [milliseconds(step), value * 1e3])
+                .collect()
+        };
+        // A step of the set-point at time zero is drawn as one.
+        let reference = &course(first).reference_rad;
+        let mut wanted = points(reference);
+        if reference[0] != 0.0 {
+            wanted.insert(0, [0.0, 0.0]);
+        }
+        motion.curve(canvas, wanted, [1.5, 0.0], REFERENCE);
+        for (index, response) in joint.responses.iter().enumerate().take(ENGINES.len()) {
+            let style = [ENGINE_WIDTHS[index], 0.0];
+            motion.curve(
+                canvas,
+                points(&course(response).motion_rad),
+                style,
+                ENGINES[index],
+            );
+        }
+        if let Some(linear_rad) = linear_rad {
+            motion.curve(canvas, points(linear_rad), [1.5, 5.0], LINEAR);
+        }
+
+        let torques = all.flat_map(|course| course.torque_nm.iter().take(shown).copied());
+        let torques: Vec<f64> = torques.collect();
+        let highest = torques
             .iter()
-            .take(shown)
-            .enumerate()
-            .flat_map(|(step, torque)| {
-                // Held over its step.
-                [
-                    [milliseconds(step), *torque],
-                    [milliseconds(step + 1), *torque],
-                ]
-            })
-            .collect();
-        torque.curve(canvas, points, [ENGINE_WIDTHS[index], 0.0], ENGINES[index]);
-        let cut = course
-            .saturated
-            .iter()
-            .take(shown)
-            .enumerate()
-            .filter(|(_, cut)| **cut);
-        let cut = cut.map(|(step, _)| [milliseconds(step), course.torque_nm[step]]);
-        torque.marks(canvas, cut.collect::<Vec<_>>(), 2.5, CUT);
-    }
-    if near {
-        for limit in [joint.limit_nm, -joint.limit_nm] {
-            let ends = [[0.0, limit], [milliseconds(shown), limit]];
-            torque.curve(canvas, ends, [1.5, 0.0], LIMIT);
+            .fold(0.0, |high: f64, each| high.max(each.abs()));
+        // The limit is shown where the torque comes near to it.
+        let near = highest > 0.6 * joint.limit_nm;
+        let ends = if near {
+            vec![joint.limit_nm, -joint.limit_nm]
+        } else {
+            Vec::new()
+        };
+        let torque = graph(
+            column,
+            1,
+            time,
+            Axis::around(torques.into_iter().chain(ends)),
+        );
+        torque.draw(canvas, "torque (N m) over time (ms)");
+        for (index, response) in joint.responses.iter().enumerate().take(ENGINES.len()) {
+            let course = course(response);
+            let points: Vec<[f64; 2]> = course
+                .torque_nm
+                .iter()
+                .take(shown)
+                .enumerate()
+                .flat_map(|(step, torque)| {
+                    // Held over its step.
+                    [
+                        [milliseconds(step), *torque],
+                        [milliseconds(step + 1), *torque],
+                    ]
+                })
+                .collect();
+            torque.curve(canvas, points, [ENGINE_WIDTHS[index], 0.0], ENGINES[index]);
+            let cut = course
+                .saturated
+                .iter()
+                .take(shown)
+                .enumerate()
+                .filter(|(_, cut)| **cut);
+            let cut = cut.map(|(step, _)| [milliseconds(step), course.torque_nm[step]]);
+            torque.marks(canvas, cut.collect::<Vec<_>>(), 2.5, CUT);
+        }
+        if near {
+            for limit in [joint.limit_nm, -joint.limit_nm] {
+                let ends = [[0.0, limit], [milliseconds(shown), limit]];
+                torque.curve(canvas, ends, [1.5, 0.0], LIMIT);
+            }
         }
     }
 }
