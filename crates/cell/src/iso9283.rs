@@ -43,7 +43,7 @@ const TOOL_SPEED_M_S: f64 = 1.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Iso9283Section {
-    /// Configuration of the arm at every pose, in the words of reports: `Right-Up-Unfold`.
+    /// Configuration of the arm at every pose, in the words of reports: `Right-Up-Fold`.
     pub configuration: String,
     /// Middle of the test cube in the controller's `base` frame, mm. The default lies between the
     /// robot and the chest of the shipped scenarios. Assumed.
@@ -94,7 +94,7 @@ pub struct Iso9283Section {
 impl Default for Iso9283Section {
     fn default() -> Self {
         Self {
-            configuration: "Right-Up-Unfold".to_owned(),
+            configuration: "Right-Up-Fold".to_owned(),
             cube_centre_mm: [0.0, -300.0, 150.0],
             cube_edge_mm: STANDARD_EDGES_MM[0],
             plane_rises_towards: Horizontal::PlusY,

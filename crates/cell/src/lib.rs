@@ -6,6 +6,7 @@
 mod calibration;
 mod enclosure;
 pub mod envelope;
+mod events;
 mod files;
 mod finding;
 pub mod fixtures;

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::envelope::EnvelopeSection;
+pub use crate::events::{EventsSection, PressClass, PressSection, StopSection};
 use crate::fixtures::{GantryParameters, MountParameters, TableParameters};
 pub use crate::imperfections::ImperfectionsSection;
 pub use crate::iso9283::Iso9283Section;
@@ -83,6 +84,9 @@ pub struct Scenario {
     /// if left out.
     #[serde(default)]
     pub imperfections: Option<ImperfectionsSection>,
+    /// Contacts, stops and the way back, simulated besides the planned motion; none if left out.
+    #[serde(default)]
+    pub events: Option<EventsSection>,
 }
 
 /// The arm.

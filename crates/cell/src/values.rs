@@ -4,6 +4,7 @@ use needlebench_kinematics::JOINT_COUNT;
 
 use crate::Finding;
 use crate::envelope::check_envelope;
+use crate::events::check_events;
 use crate::imperfections::check_imperfections;
 use crate::iso9283::check_iso9283;
 use crate::people::check_people;
@@ -344,9 +345,21 @@ pub(crate) fn check_values(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Find
         }
     }
     findings.extend(check_ranking(toml, &scenario.ranking));
+    findings.extend(check_events(toml, scenario));
     if let Some(section) = &scenario.imperfections {
         let timestep_ms = scenario.engines.timestep_ms;
         findings.extend(check_imperfections(toml, section, timestep_ms));
+        if scenario.events.is_some() {
+            findings.push(
+                toml.finding(
+                    "events",
+                    "`[events]` are staged and measured on the nominal robot",
+                )
+                .hint(
+                    "leave out `[imperfections]`, or put the events into a scenario of their own",
+                ),
+            );
+        }
     }
     findings.extend(check_iso9283(toml, scenario));
     if scenario.goals.is_empty() && scenario.iso9283.is_none() {

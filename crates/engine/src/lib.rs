@@ -6,6 +6,7 @@
 //! recordings is the engines' doing.
 
 mod actuation;
+mod brakes;
 mod closed_loop;
 mod contact_groups;
 mod error;
@@ -23,6 +24,10 @@ mod simulate;
 mod test_cell;
 
 pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFriction};
+pub use brakes::{
+    Brakes, PUBLISHED_LOAD_KG, PUBLISHED_SPEED_RAD_S, PUBLISHED_STOPS, PublishedStop, loaded,
+    stretched,
+};
 pub use closed_loop::{ClosedLoop, UnstableServo};
 pub use error::EngineError;
 pub use fleet_run::{Motion, simulate_fleet};
@@ -32,4 +37,4 @@ pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording, Saturation};
 pub use referee::{RefereePlant, RefereeSettings, TorqueHold, retrace};
 pub use servo::{Servo, ServoGains, ServoOutput};
-pub use simulate::{Drive, Hooks, simulate};
+pub use simulate::{Braking, Drive, Hooks, simulate, simulate_with_stop};

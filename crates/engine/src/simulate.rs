@@ -4,10 +4,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_kinematics::{JOINT_LABELS, Joints};
+use needlebench_kinematics::{Dynamics, JOINT_COUNT, JOINT_LABELS, Joints};
 
 use crate::actuation::Drives;
-use crate::{Actuation, Cost, EngineError, EngineIdentity, Plant, PlantState, Recording, Servo};
+use crate::{
+    ActuatedTorque, Actuation, Brakes, Cost, EngineError, EngineIdentity, Plant, PlantState,
+    Recording, Servo,
+};
 
 /// Speed that no arm reaches, rad/s: 16 times the fastest joint of a UR3.
 const ABSURD_SPEED_RAD_S: f64 = 100.0;
@@ -41,7 +44,19 @@ pub struct Drive<'a> {
     trajectory: &'a JointTrajectory,
     drives: Drives<'a>,
     steps: usize,
+    braking: Option<Braking<'a>>,
     recording: Recording,
+}
+
+/// From a moment on the drives are off and the brakes act.
+#[derive(Debug, Clone, Copy)]
+pub struct Braking<'a> {
+    /// The moment, s.
+    pub from_s: f64,
+    /// The brakes.
+    pub brakes: Brakes,
+    /// The arm that they brake: the plant's own.
+    pub dynamics: &'a Dynamics,
 }
 
 impl<'a> Drive<'a> {
@@ -68,6 +83,7 @@ impl<'a> Drive<'a> {
             trajectory,
             drives: Drives::new(servo, actuation, timestep_s, velocity_age_s),
             steps,
+            braking: None,
             recording: Recording {
                 engine,
                 timestep_s,
@@ -81,6 +97,13 @@ impl<'a> Drive<'a> {
                 cost: Cost::default(),
             },
         })
+    }
+
+    /// Brakes the arm from a moment on.
+    #[must_use]
+    pub fn braked(mut self, braking: Option<Braking<'a>>) -> Self {
+        self.braking = braking;
+        self
     }
 
     /// Where the plant is to be reset to, rad.
@@ -102,9 +125,25 @@ impl<'a> Drive<'a> {
         }
         let state = self.recording.state.last().expect("recorded after reset");
         let time_s = step as f64 * self.recording.timestep_s;
-        let torque = self
-            .drives
-            .torque(self.trajectory, time_s, &state.position, &state.velocity);
+        let braking = self
+            .braking
+            .filter(|braking| time_s >= braking.from_s - STEP_SLACK * self.recording.timestep_s);
+        let torque = match braking {
+            Some(Braking {
+                brakes, dynamics, ..
+            }) => {
+                let h = self.recording.timestep_s;
+                let torque_nm = brakes.torque(dynamics, &state.position, &state.velocity, h);
+                ActuatedTorque {
+                    link_nm: torque_nm,
+                    drive_nm: Joints::zeros(),
+                    saturated: [false; JOINT_COUNT],
+                }
+            }
+            None => self
+                .drives
+                .torque(self.trajectory, time_s, &state.position, &state.velocity),
+        };
         check_torque(&self.recording.engine.name, time_s, &torque.drive_nm)?;
         self.recording.saturated_steps += usize::from(torque.saturated.contains(&true));
         for (joint, cut) in self.recording.saturation.iter_mut().zip(torque.saturated) {
@@ -151,6 +190,21 @@ pub fn simulate(
     servo: &Servo,
     actuation: &Actuation,
     trajectory: &JointTrajectory,
+    hooks: Hooks<'_>,
+) -> Result<Recording, EngineError> {
+    simulate_with_stop(plant, servo, actuation, trajectory, None, hooks)
+}
+
+/// [`simulate`] with brakes that act from a moment on.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_with_stop(
+    plant: &mut dyn Plant,
+    servo: &Servo,
+    actuation: &Actuation,
+    trajectory: &JointTrajectory,
+    braking: Option<Braking<'_>>,
     mut hooks: Hooks<'_>,
 ) -> Result<Recording, EngineError> {
     let started = Instant::now();
@@ -161,7 +215,8 @@ pub fn simulate(
         plant.identity(),
         plant.timestep_s(),
         plant.velocity_age_s(),
-    )?;
+    )?
+    .braked(braking);
     drive.record(plant.reset(&drive.start())?)?;
     loop {
         if hooks

@@ -270,6 +270,9 @@ pub fn check_configuration(
             ),
         );
     }
+    if let Some(events) = &configuration.events {
+        results.extend(events.checks.iter().cloned());
+    }
     results
 }
 

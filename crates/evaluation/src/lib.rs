@@ -5,7 +5,9 @@
 pub mod adjudication;
 mod clearance;
 pub mod compare;
+mod contact;
 mod criteria;
+pub mod events;
 mod facts;
 pub mod iso9283;
 mod judge;
@@ -27,6 +29,7 @@ pub use clearance::{
     ClearanceSeries, certify_recording, measure_clearance, needle_route, planned_clearance,
     posture_clearance, sample_indices,
 };
+pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balance};
 pub use criteria::{Criterion, check_configuration};
 pub use judge::judge;
 pub use motion::{

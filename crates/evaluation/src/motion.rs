@@ -7,6 +7,7 @@ use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_kinematics::{JOINT_LABELS, Joints};
 use serde::Serialize;
 
+use crate::contact::{ContactEpisode, episodes};
 use crate::needle::tip_of;
 
 /// Contact of arm or tool during a motion.
@@ -26,6 +27,8 @@ pub struct ContactMeasurement {
     pub impulse_ns: f64,
     /// Deepest penetration, m.
     pub deepest_penetration_m: f64,
+    /// The contacts one by one.
+    pub episodes: Vec<ContactEpisode>,
 }
 
 /// Time and effort of one simulated motion.
@@ -144,6 +147,7 @@ pub fn measure_motion(
                 .max(state.contact.deepest_penetration_m);
         }
     }
+    contact.episodes = episodes(cell, goal, trajectory, recording, settling_band_m);
     let effort_limit = cell.robot.limits.efforts_nm();
     let peak_torque_ratio = recording
         .drive_nm

@@ -8,6 +8,7 @@ use needlebench_uncertainty::budget::ErrorBudget;
 use serde::Serialize;
 
 use crate::adjudication::Adjudication;
+use crate::events::EventsReport;
 use crate::iso9283::Iso9283Report;
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
@@ -45,7 +46,9 @@ pub struct Report {
     pub truth: Option<TruthReport>,
     /// Where the numbers come from.
     pub provenance: Provenance,
-    /// Wall-clock times; the only part that differs between two runs of the same inputs.
+    /// Wall-clock times, s, and per engine the real time factor: simulated time over the wall-clock
+    /// time of its motions, with control, recording and certified clearance. The only part that
+    /// differs between two runs of the same inputs.
     pub timings: BTreeMap<String, f64>,
 }
 
@@ -288,6 +291,9 @@ pub struct ConfigurationReport {
     /// Clearances over the motions of all engines; over the planned motion where nothing was
     /// simulated, and of the final posture where there is no motion.
     pub clearance: ClearanceReport,
+    /// Contacts, stop and way back, where the scenario asks for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub events: Option<EventsReport>,
     /// Room that it leaves to the people around it.
     pub room: Option<RoomReport>,
     /// How far the needle's tip moves, root mean square, when every joint has an independent error.

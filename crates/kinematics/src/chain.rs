@@ -57,6 +57,27 @@ impl Chain {
         jacobian
     }
 
+    /// Velocity along `direction` of a point fixed to moving link `link`, per joint speed: `direction .
+    /// (z_i x (p - o_i))`, m/rad, and 0 for joints beyond the link. Point and direction in `base_link`.
+    ///
+    /// The same numbers are the torques about the joints of a unit force along `direction`.
+    pub fn point_response(
+        &self,
+        q: &Joints,
+        link: usize,
+        point_m: &Vector3<f64>,
+        direction: &Vector3<f64>,
+    ) -> Joints {
+        let links = self.link_poses(q);
+        Joints::from_fn(|i, _| {
+            if i > link {
+                return 0.0;
+            }
+            let axis = links[i].rotation * self.joints[i].axis.into_inner();
+            direction.dot(&axis.cross(&(point_m - links[i].translation.vector)))
+        })
+    }
+
     /// Every joint's axis `z_i` and the velocity `z_i x (p - o_i)` that it gives the point, in
     /// `base_link`.
     fn screws(

@@ -14,12 +14,13 @@ use needlebench_evaluation::report::{
 };
 use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
-    engine_difference, judge, measure_motion, measure_needle, needle_route, planned_clearance,
-    posture_clearance, tip_of, tip_sensitivity,
+    add_approach_speeds, engine_difference, judge, measure_motion, measure_needle, needle_route,
+    planned_clearance, posture_clearance, tip_of, tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 
+use crate::events::{EventRun, events_report};
 use crate::pipeline::{Budgets, EngineRun};
 use crate::provenance::provenance;
 use crate::reality::Reality;
@@ -33,6 +34,7 @@ struct Context<'a> {
     reality: &'a Reality<'a>,
     budgets: &'a Budgets,
     room: RoomModel<'a>,
+    events: &'a [EventRun],
 }
 
 #[expect(
@@ -48,6 +50,7 @@ pub(crate) fn assemble(
     runs: &[Vec<Vec<EngineRun>>],
     budgets: &Budgets,
     trials: &[Vec<Trial>],
+    events: &[EventRun],
     engines: &[EngineName],
     engine_failures: Vec<EngineFailure>,
     identities: Vec<EngineIdentity>,
@@ -60,6 +63,7 @@ pub(crate) fn assemble(
         reality,
         budgets,
         room: RoomModel::new(resolved),
+        events,
     };
     let mut goals: Vec<GoalReport> = plans
         .iter()
@@ -155,6 +159,7 @@ fn configuration_report(
         model,
         reality,
         room,
+        events,
         ..
     } = context;
     let cell = &resolved.cell;
@@ -163,7 +168,9 @@ fn configuration_report(
     let engines: BTreeMap<String, EngineReport> = runs
         .iter()
         .map(|run| {
-            let report = engine_report(resolved, reality, goal_index, plan, run);
+            let mut report = engine_report(resolved, reality, goal_index, plan, run);
+            let contacts = &mut report.motion.contact.episodes;
+            add_approach_speeds(contacts, reality.cell(), reality.model(), &run.recording);
             (run.engine.name().to_owned(), report)
         })
         .collect();
@@ -229,6 +236,10 @@ fn configuration_report(
         pareto: false,
         dominated_by: None,
         ranking: None,
+        events: events
+            .iter()
+            .find(|run| run.goal == goal_index && run.configuration == plan.configuration.index())
+            .map(|run| events_report(resolved, model, plan, run)),
         room: candidate.map(|each| room.measure(goal_index, &each.joints)),
         budget: None,
         budget_failure: None,

@@ -65,6 +65,12 @@ enum Command {
         after_long_help = COMPARE_HELP
     )]
     Compare(Box<CompareArguments>),
+    /// Accuracy and repeatability of a real robot by ISO 9283, from a laser tracker's log.
+    #[command(
+        after_help = "Example: needlebench iso9283 --csv robot.csv --commanded commanded.csv --max-rp 0.1",
+        after_long_help = ISO9283_HELP
+    )]
+    Iso9283(Iso9283Arguments),
     /// Every pair of bodies: measured or left out, why, and the evidence; and checks an SRDF.
     #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
     Pairs(PairsArguments),
@@ -356,6 +362,118 @@ pub(crate) struct ServoArguments {
     pub robot: RobotArguments,
 }
 
+const ISO9283_HELP: &str = "\
+Both files are tables whose first line names the columns and their units; comma, semicolon (with \
+decimal commas) or tab between them; lines that start with #, // or % are comments. `needlebench \
+run` of a scenario with [iso9283] writes both as an example.
+
+  pose         P1 to P5 or 1 to 5; P3_07 is pose 3 in cycle 7
+  x_mm y_mm z_mm   or x [mm], X (m) and so on: m, mm, um or in
+  cycle        1, 2, 3 ...; counted if there is none
+  direction    x, y or z where a pose was approached along an axis (for vAP), else empty
+  qw qx qy qz  orientation, or rx_deg ry_deg rz_deg with --rotation
+  time_s       seconds, or dates like 2026-01-31T12:00:00
+
+Positions are in the robot's base frame; --fit-frame finds the tracker's own frame first.
+
+Example: needlebench iso9283 --csv robot.csv --commanded commanded.csv --max-rp 0.1
+Example: needlebench iso9283 --csv export.txt --commanded poses.csv --length-unit mm --fit-frame";
+
+#[derive(Debug, Args)]
+pub(crate) struct Iso9283Arguments {
+    /// The tracker's log: a row for each measured pose.
+    #[arg(long, value_name = "CSV")]
+    pub csv: PathBuf,
+    /// Commanded poses: a row for each pose.
+    #[arg(long, value_name = "CSV")]
+    pub commanded: PathBuf,
+    /// The log is in the tracker's own frame: find it by the best fit of the mean positions to the
+    /// commanded ones. AP is then without the error of the base's place.
+    #[arg(long)]
+    pub fit_frame: bool,
+    /// Unit of lengths where the header does not say it.
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub length_unit: Option<LengthUnit>,
+    /// Unit of angles where the header does not say it.
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub angle_unit: Option<AngleUnit>,
+    /// What columns rx, ry, rz mean.
+    #[arg(long, value_enum, value_name = "MEANING")]
+    pub rotation: Option<RotationArgument>,
+    /// Largest pose accuracy AP of any pose, mm.
+    #[arg(long, value_name = "MM")]
+    pub max_ap: Option<f64>,
+    /// Largest pose repeatability RP of any pose, mm.
+    #[arg(long, value_name = "MM")]
+    pub max_rp: Option<f64>,
+    /// Largest multi-directional variation vAP of any pose, mm.
+    #[arg(long, value_name = "MM")]
+    pub max_vap: Option<f64>,
+    /// Folder for report.json, the measurements in the base frame, and a picture.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    /// Draw no picture.
+    #[arg(long)]
+    pub no_pictures: bool,
+}
+
+/// Units of length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LengthUnit {
+    /// Metres.
+    M,
+    /// Millimetres.
+    Mm,
+    /// Micrometres.
+    Um,
+    /// Inches.
+    In,
+}
+
+impl LengthUnit {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::M => "m",
+            Self::Mm => "mm",
+            Self::Um => "um",
+            Self::In => "in",
+        }
+    }
+}
+
+/// Units of angle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AngleUnit {
+    /// Degrees.
+    Deg,
+    /// Radians.
+    Rad,
+    /// Milliradians.
+    Mrad,
+}
+
+impl AngleUnit {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Deg => "deg",
+            Self::Rad => "rad",
+            Self::Mrad => "mrad",
+        }
+    }
+}
+
+/// What three columns of a rotation mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RotationArgument {
+    /// Axis times angle, as a UR controller shows poses.
+    RotationVector,
+    /// Turns about the fixed axes x, then y, then z, as SpatialAnalyzer shows frames.
+    FixedXyz,
+}
+
 const COMPARE_HELP: &str = "\
 Exits with 1 if a configuration that worked is missing, fails or is rejected (unless \
 --allow-status-change), or if a metric got worse than its --max-loss allows.
@@ -558,6 +676,7 @@ pub fn main() -> ExitCode {
         Command::Clearance(arguments) => command::clearance(&arguments),
         Command::Atlas(arguments) => command::atlas(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
+        Command::Iso9283(arguments) => command::iso9283(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),

@@ -7,6 +7,7 @@ mod atlas;
 mod atomic;
 mod cli;
 mod command;
+mod events;
 pub mod exit;
 mod iso9283;
 mod output;

@@ -21,6 +21,7 @@ use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
 use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
 
 use crate::assemble::assemble;
+use crate::events::{self, EventRun, EventSimulation};
 use crate::iso9283::{self, ProtocolRun};
 use crate::progress::Progress;
 use crate::reality::{Reality, servo};
@@ -89,6 +90,8 @@ pub struct ScenarioRun {
     pub runs: Vec<Vec<Vec<EngineRun>>>,
     /// What a test by ISO 9283 left besides its report.
     pub iso9283: Option<ProtocolRun>,
+    /// Events of the configurations that work.
+    pub(crate) events: Vec<EventRun>,
     /// It was interrupted; what was finished until then is here.
     pub interrupted: bool,
 }
@@ -192,6 +195,24 @@ pub(crate) fn run(
         started.elapsed().as_secs_f64() - timings["planning_s"],
     );
 
+    let mut events = events::stage(resolved, &model, &plans, options.jobs);
+    let event_simulation = EventSimulation {
+        resolved,
+        plans: &plans,
+        harness: harness.as_ref(),
+        cancel,
+    };
+    let event_results = in_parallel(options.jobs.min(2), &engines, |engine| {
+        event_simulation.run(*engine, &events)
+    });
+    let mut event_failures = Vec::new();
+    for (engine, (done, failure)) in engines.iter().zip(event_results) {
+        event_failures.extend(failure);
+        for (run, done) in events.iter_mut().zip(done) {
+            run.engines.insert(*engine, done);
+        }
+    }
+
     let mut runs: Vec<Vec<Vec<EngineRun>>> = plans
         .iter()
         .map(|plan| plan.configurations.iter().map(|_| Vec::new()).collect())
@@ -227,6 +248,7 @@ pub(crate) fn run(
     let failures = outcomes
         .iter_mut()
         .filter_map(|outcome| outcome.failure.take())
+        .chain(event_failures)
         .collect();
     let identities = outcomes
         .iter_mut()
@@ -244,6 +266,7 @@ pub(crate) fn run(
         &runs,
         &budgets,
         &trials.by_goal,
+        &events,
         &engines,
         failures,
         identities,
@@ -261,6 +284,7 @@ pub(crate) fn run(
         plans,
         runs,
         iso9283: None,
+        events,
         interrupted,
     })
 }

@@ -8,10 +8,12 @@ mod getting_there;
 pub mod iso9283;
 mod motion;
 mod plan;
+mod press;
 mod rejection;
 mod transfer;
 
 pub use family::{Aim, Best, EDGE_RAD, Edge, Family, Member, RollRange};
 pub use motion::MotionChecker;
 pub use plan::{Candidate, ConfigurationPlan, GoalPlan, Planner, PostureMargins, SearchEffort};
+pub use press::{PressError, PressPlan, stage_press};
 pub use rejection::{Rejection, Rule};

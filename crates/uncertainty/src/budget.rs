@@ -46,7 +46,7 @@ impl BudgetCase<'_> {
     }
 
     /// Turns world vectors into the axes of the budget.
-    fn from_world(&self) -> Rotation3<f64> {
+    fn axes_from_world(&self) -> Rotation3<f64> {
         let world_from_goal = self.goal.world_from_guide_exit.rotation;
         world_from_goal.inverse().to_rotation_matrix()
     }

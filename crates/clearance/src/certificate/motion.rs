@@ -80,6 +80,8 @@ impl RecordedMotion {
                 end_s: span.end_s.clamp(first_s, last_s),
                 ..span
             })
+            // A phase that was over before the recording began.
+            .filter(|span| span.end_s > span.start_s)
             .collect();
         match spans.last_mut() {
             Some(last) => last.end_s = last_s,

@@ -3,6 +3,9 @@
 /// `value * 10^places` as the shortest decimal that reads back as `value` with
 /// [`parse_shifted`] and `-places`.
 pub(super) fn shifted(value: f64, places: i32) -> String {
+    if value == 0.0 {
+        return value.to_string(); // `0` or `-0`
+    }
     let text = format!("{value:e}");
     let Some((mantissa, exponent)) = text.split_once('e') else {
         return text; // not finite
@@ -33,7 +36,6 @@ pub(super) fn shifted(value: f64, places: i32) -> String {
 
 /// The number that is nearest to `text * 10^places`; none if the text is no number.
 pub(super) fn parse_shifted(text: &str, places: i32) -> Option<f64> {
-    // Rejects what is a number to Rust alone, such as `inf`, only after the caller has seen it.
     let plain: f64 = text.parse().ok()?;
     if !plain.is_finite() || places == 0 {
         return Some(plain);

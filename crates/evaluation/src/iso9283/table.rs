@@ -49,7 +49,7 @@ impl<'a> Table<'a> {
             .collect();
         if headings
             .iter()
-            .all(|each| each.name.parse::<f64>().is_ok() || each.name.is_empty())
+            .all(|each| text[each.span.clone()].parse::<f64>().is_ok() || each.span.is_empty())
         {
             return Err(vec![
                 Finding::new(

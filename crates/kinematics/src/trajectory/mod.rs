@@ -6,12 +6,15 @@
 mod line;
 mod path;
 mod profile;
+mod slowing;
 mod through;
 mod travel;
 
 pub use line::LineError;
 pub use path::{JointPath, PathPoint};
 pub use profile::{DoubleS, ProfileLimits};
+
+use slowing::Slowing;
 
 use crate::{JOINT_COUNT, Joints};
 
@@ -63,6 +66,12 @@ pub enum Phase {
     Retract,
     /// From there back to the start posture.
     Return,
+    /// Into a contact that was asked for.
+    Press,
+    /// Back out of it.
+    Release,
+    /// From the moment of a stop on.
+    Stop,
 }
 
 impl Phase {
@@ -74,6 +83,9 @@ impl Phase {
             Self::Hold => "hold",
             Self::Retract => "retract",
             Self::Return => "return",
+            Self::Press => "press",
+            Self::Release => "release",
+            Self::Stop => "stop",
         }
     }
 }
@@ -94,6 +106,8 @@ enum Course {
     },
     /// At rest.
     Hold { position: Joints },
+    /// Along another trajectory, slower and slower until it stands.
+    Slowing(Slowing),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -313,6 +327,7 @@ impl JointTrajectory {
                 }
             }
             Course::Hold { position } => JointState::at_rest(*position),
+            Course::Slowing(slowing) => slowing.sample(local_s),
         }
     }
 

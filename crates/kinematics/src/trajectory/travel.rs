@@ -83,6 +83,7 @@ impl Segment {
                 padded(&path.travel(s_m(from_s), s_m(to_s)))
             }
             Course::Hold { .. } => Joints::zeros(),
+            Course::Slowing(slowing) => slowing.travel(from_s, to_s),
         }
     }
 
@@ -99,6 +100,7 @@ impl Segment {
                 let s_m = |time_s: f64| profile.sample(time_s / time_scale).position;
                 padded(&path.chord_deviation(s_m(from_s), s_m(to_s)))
             }
+            Course::Slowing(slowing) => slowing.chord_deviation(from_s, to_s),
         }
     }
 }

@@ -11,17 +11,22 @@ use anyhow::{Context, Result};
 use needlebench_cell::{Finding, ResolvedScenario};
 use needlebench_evaluation::report::{Report, Verdict};
 use needlebench_evaluation::room::RoomModel;
+use needlebench_planning::GoalPlan;
 use serde::Serialize;
 
 use super::{load, overrides, print_json, print_text};
 use crate::atomic::write_atomically;
 use crate::cli::RunArguments;
+use crate::events::EventRun;
 use crate::exit::ExitStatus;
 use crate::iso9283;
 use crate::output::findings::print_findings;
 use crate::output::pictures::{Backdrop, configuration_picture, goal_camera, sheet_caption};
 use crate::output::room_pictures::{RoomPictures, room_caption};
-use crate::output::{budget_picture, junit, markdown, ranking_picture, recording_csv, report_text};
+use crate::output::{
+    budget_picture, junit, markdown, press_csv, press_picture, ranking_picture, recording_csv,
+    report_text,
+};
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
 use crate::progress::Progress;
@@ -247,6 +252,10 @@ fn write_results(
         }
         files.push(of_goal);
     }
+    for run in &finished.events {
+        let names = write_events(resolved, run, &finished.plans, folder, pictures)?;
+        files[run.goal][run.configuration].extend(names);
+    }
     if pictures && !cancel.load(Ordering::Relaxed) {
         progress.message("drawing");
         write_pictures(resolved, &finished.report, folder, jobs, &mut files)?;
@@ -274,6 +283,40 @@ fn write_results(
     write_atomically(&folder.join("junit.xml"), junit(&[report])?.as_bytes())?;
     write_atomically(&folder.join("summary.md"), markdown(report).as_bytes())?;
     Ok(())
+}
+
+/// Recordings of the contacts that were asked for, and a picture of each.
+fn write_events(
+    resolved: &ResolvedScenario,
+    run: &EventRun,
+    plans: &[GoalPlan],
+    folder: &Path,
+    pictures: bool,
+) -> Result<Vec<String>> {
+    let goal = &resolved.goals[run.goal];
+    let label = plans[run.goal].configurations[run.configuration].configuration;
+    let mut names = Vec::new();
+    for (index, press) in run.press.iter().enumerate() {
+        let Ok(press) = press else { continue };
+        let number = index + 1;
+        for (engine, events) in &run.engines {
+            let Some(Some(recording)) = events.press.get(index) else {
+                continue;
+            };
+            let name = format!("{}/{label}.press-{number}.{}.csv", goal.name, engine.name());
+            let csv = press_csv(goal, press, recording);
+            write_atomically(&folder.join(&name), csv.as_bytes())?;
+            names.push(name);
+        }
+        if pictures {
+            let name = format!("{}/{label}.press-{number}.png", goal.name);
+            let title = format!("{}, {label}", goal.name);
+            let png = press_picture(&title, press, run, index).to_png()?;
+            write_atomically(&folder.join(&name), &png)?;
+            names.push(name);
+        }
+    }
+    Ok(names)
 }
 
 /// Removes recordings and pictures that an earlier run left in a goal's folder: nobody should

@@ -7,7 +7,7 @@ mod write;
 
 pub(crate) use picture::{attained_picture, stabilisation_picture};
 pub(crate) use simulate::{EngineCycles, simulate_engine};
-pub(crate) use text::{measured_text, report_markdown, report_text, statistics_text};
+pub(crate) use text::{measured_text, report_markdown, report_text};
 pub(crate) use write::write_results;
 
 use std::collections::BTreeMap;
@@ -125,6 +125,7 @@ pub(crate) fn run(
         },
         plans: Vec::new(),
         runs: Vec::new(),
+        events: Vec::new(),
         iso9283: Some(ProtocolRun {
             commanded,
             engines,
@@ -265,6 +266,7 @@ fn unplanned(
         },
         plans: Vec::new(),
         runs: Vec::new(),
+        events: Vec::new(),
         iso9283: None,
         interrupted: false,
     }

@@ -69,7 +69,11 @@ pub(crate) fn attained_picture(
                     "P{}: AP {}, RP {}",
                     each.pose,
                     small_length(each.ap_m),
-                    small_length(each.rp_m)
+                    if each.rp_m == 0.0 {
+                        "0".to_owned()
+                    } else {
+                        small_length(each.rp_m)
+                    }
                 );
                 canvas.write([left, top - 22], &label);
             }
@@ -177,7 +181,8 @@ fn round_length(length_m: f64) -> f64 {
 /// Decades of distance that the plot of arrivals shows: 1 nm to 100 mm.
 const DECADES: [i32; 2] = [-9, -1];
 const PLOT_PX: [usize; 2] = [980, 480];
-/// Earliest time before the end of the motion that is shown, s.
+/// Earliest time before the end of the motion that is shown, in tenths of a second, and in s.
+const TENTHS_BEFORE: i32 = 4;
 const BEFORE_S: f64 = 0.4;
 
 /// Distance from the attained position over the time from the end of the planned motion, of the
@@ -214,12 +219,14 @@ pub(crate) fn stabilisation_picture(
             .and_then(|index| names.get(index));
         canvas.write([14, pixel(at) - 8], text.copied().unwrap_or(""));
     }
-    let mut tick_s = -BEFORE_S;
-    while tick_s <= last_s + 1e-9 {
+    for tick in -TENTHS_BEFORE.. {
+        let tick_s = 0.1 * f64::from(tick);
+        if tick_s > last_s + 1e-9 {
+            break;
+        }
         let at = x(tick_s);
         canvas.stroke([at, top as f64], [at, bottom], 1.0, FAINT);
         canvas.write_centred([pixel(at), pixel(bottom) + 6], &format!("{tick_s:.1}"));
-        tick_s += 0.1;
     }
     canvas.stroke([x(0.0), top as f64], [x(0.0), bottom], 1.5, INK);
     canvas.write_centred(

@@ -9,6 +9,15 @@ use needlebench_evaluation::iso9283::{
 
 use crate::output::{plain_table, small_length};
 
+/// A length; 0 where it is none at all.
+fn length(metres: f64) -> String {
+    if metres == 0.0 {
+        "0".to_owned()
+    } else {
+        small_length(metres)
+    }
+}
+
 /// What a run prints of its test.
 pub(crate) fn report_text(report: &Iso9283Report) -> String {
     let mut text = String::new();
@@ -56,8 +65,8 @@ fn write_report(out: &mut String, report: &Iso9283Report) -> std::fmt::Result {
         writeln!(
             out,
             "engines differ by up to {} on the way and {} in attained positions",
-            small_length(difference.peak_tip_m),
-            small_length(difference.settled_tip_m)
+            length(difference.peak_tip_m),
+            length(difference.settled_tip_m)
         )?;
     }
     Ok(())
@@ -80,7 +89,7 @@ pub(crate) fn measured_text(report: &MeasuredReport) -> String {
              {:.4} deg; {} rms left",
             fit.poses,
             angle_deg.to_degrees(),
-            small_length(fit.residual_rms_m)
+            length(fit.residual_rms_m)
         );
     }
     text.push_str(&statistics_text(
@@ -95,7 +104,7 @@ pub(crate) fn measured_text(report: &MeasuredReport) -> String {
 }
 
 /// AP, RP, vAP, stabilisation and drift as tables and lines.
-pub(crate) fn statistics_text(
+fn statistics_text(
     statistics: &ProtocolStatistics,
     stabilisation: &[StabilisationReport],
     drift: Option<&Drift>,
@@ -119,16 +128,17 @@ pub(crate) fn statistics_text(
         let angles = |value: Option<[f64; 3]>| {
             value.map_or("-".to_owned(), |value| {
                 value
-                    .map(|rad| format!("{:.2}", rad.to_degrees() * 1e3))
+                    // No minus before what rounds to zero.
+                    .map(|rad| format!("{:.2}", rad.to_degrees() * 1e3).replace("-0.00", "0.00"))
                     .join(", ")
             })
         };
         table.add_row([
             format!("P{}", each.pose),
             each.count.to_string(),
-            small_length(each.ap_m),
+            length(each.ap_m),
             each.ap_xyz_m.map(small_length).join(", "),
-            small_length(each.rp_m),
+            length(each.rp_m),
             angles(each.angles.map(|angles| angles.ap_rad)),
             angles(each.angles.map(|angles| angles.rp_rad)),
             seconds(settled.and_then(|each| each.time_s)),
@@ -139,7 +149,7 @@ pub(crate) fn statistics_text(
                     if metres == 0.0 {
                         "none".to_owned()
                     } else {
-                        small_length(metres)
+                        length(metres)
                     }
                 }),
         ]);
@@ -153,7 +163,7 @@ pub(crate) fn statistics_text(
             text,
             "vAP at P{}: {} between approaches along {} and {}, {} of each",
             each.pose,
-            small_length(each.vap_m),
+            length(each.vap_m),
             each.between[0],
             each.between[1],
             each.count.iter().min().unwrap_or(&0)
@@ -165,8 +175,8 @@ pub(crate) fn statistics_text(
             "drift at P{} over {} blocks of ten cycles: AP {}, RP {}",
             drift.pose,
             drift.blocks.len(),
-            small_length(drift.dap_m),
-            small_length(drift.drp_m)
+            length(drift.dap_m),
+            length(drift.drp_m)
         );
     }
     text
@@ -193,8 +203,8 @@ pub(crate) fn report_markdown(report: &Iso9283Report) -> String {
                 text,
                 "| {engine} | P{} | {} | {} | {} | {} |",
                 each.pose,
-                small_length(each.ap_m),
-                small_length(each.rp_m),
+                length(each.ap_m),
+                length(each.rp_m),
                 settled
                     .and_then(|found| found.time_s)
                     .map_or("-".to_owned(), |value| format!("{value:.3}")),
@@ -207,7 +217,7 @@ pub(crate) fn report_markdown(report: &Iso9283Report) -> String {
     text.push('\n');
     for (engine, measured) in &report.engines {
         if let Some(vap_m) = measured.statistics.vap_m {
-            let _ = writeln!(text, "- {engine}: vAP {}", small_length(vap_m));
+            let _ = writeln!(text, "- {engine}: vAP {}", length(vap_m));
         }
         if let Some(remark) = &measured.remark {
             let _ = writeln!(text, "- {engine}: {remark}");

@@ -2,6 +2,7 @@
 
 mod budget;
 pub(crate) mod comparison;
+mod events;
 pub(crate) mod findings;
 mod format;
 mod junit;
@@ -15,6 +16,7 @@ mod saturation;
 mod table;
 
 pub(crate) use budget::budget_picture;
+pub(crate) use events::{press_csv, press_picture};
 pub(crate) use format::small_length;
 pub(crate) use junit::junit;
 pub(crate) use markdown::markdown;

@@ -8,6 +8,7 @@ use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status, Verdict};
 
 use super::budget::budget_text;
+use super::events::events_text;
 use super::format::{millimetres, small_length, value_and_limit};
 use super::ranking::comparison_text;
 
@@ -50,6 +51,9 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             writeln!(out, "{table}")?;
         }
         out.push_str(&super::saturation::saturation_text(goal));
+        if let Some(events) = events_text(goal) {
+            write!(out, "{events}")?;
+        }
         write_remarks(out, report, goal)?;
     }
     if let Some(iso9283) = &report.iso9283 {

@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 13] = [
     "run",
     "check",
     "ik",
@@ -10,6 +10,7 @@ const COMMANDS: [&str; 12] = [
     "clearance",
     "atlas",
     "compare",
+    "iso9283",
     "pairs",
     "paper",
     "schema",

@@ -15,6 +15,7 @@ mod environment;
 mod help;
 #[cfg(target_os = "linux")]
 mod interrupt;
+mod iso9283;
 mod kinematics;
 mod pairs;
 mod paper;

@@ -26,7 +26,7 @@ pub(super) fn moments(
     let middle = Draw(vec![0.0; layout.len()]);
     let truth = Truth::new(case.cell, case.place, imperfections, &layout, &middle, 0)?;
     let joints = JointErrors::new(case, imperfections, &truth, &target);
-    let from_world = case.from_world();
+    let from_world = case.axes_from_world();
     let points = case.planned();
     let mut moments = [Moments::new(&Vector3::zeros(), &Matrix3::zeros()); 2];
     for (index, point) in points.iter().enumerate() {

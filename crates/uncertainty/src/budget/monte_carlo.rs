@@ -23,7 +23,7 @@ pub(super) fn moments(
     let target = case.target();
     let planned = case.planned();
     let depths_m = case.depths_m();
-    let from_world = case.from_world();
+    let from_world = case.axes_from_world();
 
     let middle = Draw(vec![0.0; layout.len()]);
     let typical = Truth::new(case.cell, case.place, imperfections, &layout, &middle, 0)?;

@@ -1,0 +1,48 @@
+//! What is measured of contacts that were asked for, of stops, and of the way back.
+
+mod envelope;
+mod press;
+mod retract;
+mod stop;
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+pub use envelope::{StopEnvelope, stopping_envelope};
+pub use press::{PressEngineReport, PressReport, measure_press, press_difference};
+pub use retract::{RetractionEngineReport, measure_retraction};
+pub use stop::{StopEngineReport, measure_stop};
+
+use crate::report::CriterionResult;
+
+/// Events of one configuration.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct EventsReport {
+    /// Contacts, in the order of the scenario.
+    pub press: Vec<PressReport>,
+    /// The stop; none if the scenario asks for none.
+    pub stop: Option<StopReport>,
+    /// The way back, by engine; empty if the scenario does not ask for it.
+    pub retract: BTreeMap<String, RetractionEngineReport>,
+    /// What was judged; in the report's own list of criteria.
+    #[serde(skip)]
+    pub checks: Vec<CriterionResult>,
+}
+
+/// A stop on the way in.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StopReport {
+    /// Category of IEC 60204-1.
+    pub category: u8,
+    /// When it was triggered, s.
+    pub at_s: f64,
+    /// In which phase.
+    pub phase: &'static str,
+    /// What the engines measured.
+    pub engines: BTreeMap<String, StopEngineReport>,
+    /// Distance of the engines' tips in the end, m; none unless both ran.
+    pub tip_difference_m: Option<f64>,
+    /// How far a stop at any moment of the way in would go, by our own dynamics.
+    pub envelope: StopEnvelope,
+}

@@ -1,0 +1,351 @@
+//! Tests by ISO 9283: simulated ones, and those of real robots.
+
+use serde_json::Value;
+
+use crate::support::{Bench, files, mujoco_is_ready, workspace};
+
+/// A test that takes a second: fewer cycles than the standard asks for, rapier alone.
+const SMALL: &str = r#"
+name = "small"
+seed = 3
+
+[robot]
+base_rpy_deg = [0, 0, 180]
+
+[tool]
+mount_rotation_deg = 90
+
+[engines]
+run = ["rapier"]
+
+[iso9283]
+cycles = 4
+dwell_s = 0.3
+"#;
+
+fn with_keys(keys: &str) -> String {
+    SMALL.replace("cycles = 4\n", &format!("cycles = 4\n{keys}\n"))
+}
+
+#[test]
+fn shipped_test_passes_in_both_engines() {
+    mujoco_is_ready();
+    let scenario = workspace().join("scenarios/iso9283.toml");
+    assert!(files("scenarios", "toml").len() > 1);
+    let bench = Bench::new();
+    let report = bench
+        .run(&["run", scenario.to_str().unwrap(), "--json", "--quiet"])
+        .exits_with(0)
+        .json();
+    assert_eq!(report["verdict"], "pass");
+    let test = &report["iso9283"];
+    assert_eq!(test["protocol"]["cycles"], 30);
+    for engine in ["rapier", "mujoco"] {
+        let found = &test["engines"][engine];
+        assert_eq!(
+            found["cycles_simulated"], 2,
+            "the nominal robot repeats itself"
+        );
+        assert_eq!(found["poses"].as_array().unwrap().len(), 5);
+        assert_eq!(found["directional"].as_array().unwrap().len(), 3);
+        // The tracker's noise alone: 30 draws of sigma 5 um give l' + 3 S of 13 to 22 um.
+        let rp_m = found["rp_m"].as_f64().unwrap();
+        assert!((1e-5..3e-5).contains(&rp_m), "{rp_m}");
+        assert!(
+            found["remark"]
+                .as_str()
+                .unwrap()
+                .contains("tracker's noise alone")
+        );
+    }
+    for name in [
+        "commanded.csv",
+        "attained.rapier.csv",
+        "attained.mujoco.csv",
+        "attained.rapier.png",
+        "stabilisation.mujoco.png",
+        "report.json",
+        "junit.xml",
+        "summary.md",
+    ] {
+        assert!(
+            !bench.read(&format!("out/iso9283/{name}")).is_empty(),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn a_robot_without_anything_random_has_no_spread_and_says_so() {
+    let bench = Bench::with_scenario(SMALL);
+    let answer = bench.run(&["run", "s.toml"]).exits_with(0);
+    assert!(
+        answer
+            .stdout
+            .contains("RP = 0 because nothing random is switched on")
+    );
+    assert!(
+        answer
+            .stdout
+            .contains("4 cycles instead of the standard's 30")
+    );
+    let report = bench.read_json("out/small/report.json");
+    let found = &report["iso9283"]["engines"]["rapier"];
+    assert_eq!(found["nothing_random"], true);
+    assert_eq!(found["rp_m"], 0.0);
+    // What servo and rounding leave.
+    assert!(found["ap_m"].as_f64().unwrap() < 1e-9);
+    for each in found["stabilisation"].as_array().unwrap() {
+        assert_eq!(each["overshoot_m"], 0.0);
+        assert!(each["after_motion_s"].as_f64().unwrap() < 0.0, "{each}");
+    }
+}
+
+/// The same numbers, whether they stay in the program or go through a file.
+#[test]
+fn the_log_of_a_run_is_analysed_to_the_same_numbers() {
+    let bench = Bench::with_scenario(&with_keys("tracker_noise_um = 20"));
+    bench.run(&["run", "s.toml", "--no-pictures"]).exits_with(0);
+    let report = bench.read_json("out/small/report.json");
+    let arguments = [
+        "iso9283",
+        "--csv",
+        "out/small/attained.rapier.csv",
+        "--commanded",
+        "out/small/commanded.csv",
+        "--json",
+        "--out",
+        "again",
+    ];
+    let answer = bench.run(&arguments).exits_with(0).json();
+    let simulated = &report["iso9283"]["engines"]["rapier"];
+    for key in [
+        "poses",
+        "directional",
+        "ap_m",
+        "rp_m",
+        "vap_m",
+        "nothing_random",
+        "drift",
+    ] {
+        assert_eq!(answer[key], simulated[key], "{key}");
+    }
+    // And once more, from what the analysis wrote.
+    let comments_apart = |name: &str| {
+        let text = String::from_utf8(bench.read(name)).unwrap();
+        let lines = text.lines().filter(|line| !line.starts_with('#'));
+        lines.map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        comments_apart("again/attained.csv"),
+        comments_apart("out/small/attained.rapier.csv")
+    );
+    assert!(!bench.read("again/attained.png").is_empty());
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let bench = Bench::with_scenario(&with_keys("tracker_noise_um = 20"));
+    for jobs in ["1", "3"] {
+        let arguments = ["run", "s.toml", "--jobs", jobs, "--out", jobs, "--quiet"];
+        bench.run(&arguments).exits_with(0);
+    }
+    let without_timings = |name: &str| {
+        let mut report = bench.read_json(name);
+        report["timings"] = Value::Null;
+        report
+    };
+    assert_eq!(
+        without_timings("1/small/report.json"),
+        without_timings("3/small/report.json")
+    );
+    for name in ["attained.rapier.csv", "attained.rapier.png", "junit.xml"] {
+        assert_eq!(
+            bench.read(&format!("1/small/{name}")),
+            bench.read(&format!("3/small/{name}"))
+        );
+    }
+}
+
+#[test]
+fn a_limit_that_is_missed_fails_the_run() {
+    let text = format!(
+        "{}\n[iso9283.criteria]\nmax_repeatability_mm = 0.001\n",
+        with_keys("tracker_noise_um = 20\napproach_mm = 0")
+    );
+    let bench = Bench::with_scenario(&text);
+    let answer = bench.run(&["run", "s.toml", "--no-pictures"]).exits_with(1);
+    assert!(
+        answer
+            .stdout
+            .contains("FAILED Right-Up-Fold rapier max_repeatability_mm:")
+    );
+    let junit = String::from_utf8(bench.read("out/small/junit.xml")).unwrap();
+    assert!(junit.contains("max_repeatability_mm (rapier)"), "{junit}");
+    let arguments = [
+        "iso9283",
+        "--csv",
+        "out/small/attained.rapier.csv",
+        "--commanded",
+        "out/small/commanded.csv",
+        "--max-rp",
+        "0.001",
+    ];
+    let answer = bench.run(&arguments).exits_with(1);
+    assert!(
+        answer.stdout.contains("FAILED max_rp:"),
+        "{}",
+        answer.stdout
+    );
+    let mut arguments = arguments;
+    arguments[5] = "--max-vap";
+    let answer = bench.run(&arguments).exits_with(1);
+    assert!(
+        answer.stdout.contains("max_vap: not measured"),
+        "{}",
+        answer.stdout
+    );
+}
+
+#[test]
+fn protocols_that_cannot_be_carried_out_are_refused_before_anything_runs() {
+    for (keys, said) in [
+        (
+            "configuration = \"Right-Up-Fold\"\ncube_centre_mm = [0, -700, 150]",
+            "P1 is out of reach",
+        ),
+        ("configuration = \"Right-Up-Unfold\"", "Right-Up-Fold"),
+        (
+            "configuration = \"Right-Up\"",
+            "there is no configuration `Right-Up`",
+        ),
+        (
+            "cube_centre_mm = [0, -300, 0.15]\napproach_mm = 500",
+            "cannot be approached along",
+        ),
+        (
+            "cube_edge_mm = 0.25",
+            "`cube_edge_mm` is 0.25 mm, outside 10 to 2000",
+        ),
+        ("measuring_s = 0.4", "outside 0 to 0.3"),
+        ("load_kg = 0.1", "the tool alone has 0.2"),
+        ("guide_axis = [0, 0, 0]", "the direction has no length"),
+        (
+            "plane_rises_towards = \"up\"",
+            "iso9283.plane_rises_towards",
+        ),
+        ("speed = 1", "did you mean `speed_share`?"),
+    ] {
+        let bench = Bench::with_scenario(&with_keys(keys));
+        let answer = bench.run(&["run", "s.toml"]).exits_with(2);
+        answer.complains([said, "s.toml", "hint:"]);
+        assert!(!bench.path("out").exists());
+    }
+    let bench = Bench::with_scenario(&SMALL.replace("cycles = 4", "cycles = 1"));
+    bench
+        .run(&["check", "s.toml"])
+        .exits_with(2)
+        .complains(["`iso9283.cycles` is 1"]);
+    let goal = "[[goals]]\nname = \"a\"\nentry_mm = [0, 0, 0]\ntarget_mm = [0, 0, 0]\n";
+    let bench = Bench::with_scenario(&format!("{SMALL}{goal}"));
+    bench
+        .run(&["check", "s.toml"])
+        .exits_with(2)
+        .complains(["either goals or [iso9283]"]);
+}
+
+#[test]
+fn logs_that_are_wrong_are_refused_with_line_and_column() {
+    let bench = Bench::new();
+    bench.write(
+        "commanded.csv",
+        "pose,x_mm,y_mm,z_mm\nP1,0,0,0\nP2,100,0,0\n",
+    );
+    let analysed = |log: &str| {
+        bench.write("log.csv", log);
+        let arguments = [
+            "iso9283",
+            "--csv",
+            "log.csv",
+            "--commanded",
+            "commanded.csv",
+        ];
+        bench.run(&arguments)
+    };
+    const HEADER: &str = "cycle,pose,x_mm,y_mm,z_mm\n";
+    for (rows, parts) in [
+        (
+            "1,P1,0,0,0\n2,P1,0,NaN,0\n",
+            ["log.csv:3:8", "NaN is not a finite number", "hint:"],
+        ),
+        (
+            "1,P1,0,0,0\n2,P9,0,0,0\n",
+            ["log.csv:3:3", "none of the commanded poses", "P1, P2"],
+        ),
+        (
+            "1,P1,0,0,0\n2,P1,0,0",
+            ["log.csv:3:1", "4 values", "cut off"],
+        ),
+        (
+            "1,P1,0,0,0\n1,P2,0,0,0\n",
+            ["log.csv", "P1 was measured 1 times", "30"],
+        ),
+    ] {
+        analysed(&format!("{HEADER}{rows}"))
+            .exits_with(2)
+            .complains(parts);
+    }
+    analysed("pose,x,y,z\n1,0,0,0\n").exits_with(2).complains([
+        "log.csv:1:6",
+        "does not say its unit",
+        "--length-unit",
+    ]);
+    let arguments = [
+        "iso9283",
+        "--csv",
+        "none.csv",
+        "--commanded",
+        "commanded.csv",
+    ];
+    bench
+        .run(&arguments)
+        .exits_with(2)
+        .complains(["none.csv", "cannot read the file"]);
+}
+
+#[test]
+fn a_tracker_in_its_own_frame_is_told_how_to_go_on() {
+    let bench = Bench::new();
+    let commanded = "pose,x_mm,y_mm,z_mm\n1,0,0,0\n2,100,0,0\n3,0,100,0\n4,100,100,20\n";
+    bench.write("commanded.csv", commanded);
+    let mut log = "pose;x [mm];y [mm];z [mm]\n".to_owned();
+    for offset in ["1", "2", "3"] {
+        for (pose, [x, y, z]) in [
+            (1, [1000, 500, 0]),
+            (2, [1000, 600, 0]),
+            (3, [900, 500, 0]),
+            (4, [900, 600, 20]),
+        ] {
+            log.push_str(&format!("P{pose};{x},0{offset};{y};{z}\n"));
+        }
+    }
+    bench.write("log.csv", log);
+    let plain = [
+        "iso9283",
+        "--csv",
+        "log.csv",
+        "--commanded",
+        "commanded.csv",
+    ];
+    let answer = bench.run(&plain).exits_with(0);
+    assert!(answer.stdout.contains("--fit-frame"), "{}", answer.stdout);
+    let mut fitted: Vec<&str> = plain.to_vec();
+    fitted.extend(["--fit-frame", "--json"]);
+    let report = bench.run(&fitted).exits_with(0).json();
+    // Measured exactly but for the shift, which the fit takes away.
+    assert!(report["ap_m"].as_f64().unwrap() < 1e-12, "{report}");
+    let rp_m = report["rp_m"].as_f64().unwrap();
+    // Distances 10, 0, 10 um: l' = 20/3 um, S = sqrt(100/3) um.
+    assert!((rp_m - 1e-6 * (20.0 / 3.0 + 3.0 * (100.0_f64 / 3.0).sqrt())).abs() < 1e-12);
+    assert_eq!(report["frame_fit"]["poses"], 4);
+}
