@@ -195,7 +195,7 @@ mod tests {
     fn ticks_are_round_and_inside() {
         let axis = Axis::linear(-0.13, 1.07);
         assert_eq!(
-            axis.ticks(6.0),
+            axis.ticks(7.0),
             [0.0, 0.2, 0.4, 0.6000000000000001, 0.8, 1.0]
         );
         let decades = Axis {
