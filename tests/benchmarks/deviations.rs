@@ -1,8 +1,9 @@
 //! Known deviations of the engines: each test fails when its deviation disappears.
 
 use needlebench_engine::{
-    Hooks, KNOWN_DEVIATIONS, MujocoIntegrator, MujocoPlant, MujocoSettings, Plant, RapierPlant,
-    RapierSettings, Recording, RefereePlant, RefereeSettings, Servo, ServoGains, simulate,
+    Actuation, Hooks, KNOWN_DEVIATIONS, MujocoIntegrator, MujocoPlant, MujocoSettings, Plant,
+    RapierPlant, RapierSettings, Recording, RefereePlant, RefereeSettings, Servo, ServoGains,
+    simulate,
 };
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
@@ -95,7 +96,14 @@ fn driven(plant: &mut dyn Plant) -> Recording {
         gains: ServoGains::default(),
         effort_limit_nm: cell.robot.limits.efforts_nm(),
     };
-    simulate(plant, &servo, &fast_motion(), Hooks::default()).unwrap()
+    simulate(
+        plant,
+        &servo,
+        &Actuation::default(),
+        &fast_motion(),
+        Hooks::default(),
+    )
+    .unwrap()
 }
 
 #[test]

@@ -17,7 +17,7 @@ use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
 
 const TIMESTEP_S: f64 = 1e-3;
-const REPETITIONS: usize = 15;
+const REPETITIONS: usize = 25;
 /// As many as a goal has configurations.
 const ARMS: usize = 8;
 
@@ -129,25 +129,29 @@ impl Bench {
             actuation: &self.actuation,
             trajectory: &self.trajectory,
         }; ARMS];
-        let mut looking = new_looking(&mut bare, torques_nm);
-        let looking_us = {
-            let [us] = minima(recording.steps(), [&mut looking]);
-            us
+        let bare = std::cell::RefCell::new(&mut bare);
+        let replay = |look| {
+            let replay = bare.borrow_mut().replay(&START, look, torques_nm);
+            let replay = replay.expect("stable before");
+            let last = recording.state.last().expect("not empty");
+            assert_eq!(replay.qpos, last.position.as_slice(), "the same motion");
+            Duration::from_secs_f64(replay.elapsed_s)
         };
         let mut group = Vec::new();
         let plant = std::cell::RefCell::new(&mut plant);
         let fleet = std::cell::RefCell::new(&mut fleet);
-        let [bare_us, alone_us, alone_loop_us, frame_us, frame_loop_us] = minima(
+        let [
+            looking_us,
+            bare_us,
+            alone_us,
+            alone_loop_us,
+            frame_us,
+            frame_loop_us,
+        ] = minima(
             recording.steps(),
             [
-                &mut || {
-                    let replay = bare
-                        .replay(&START, false, torques_nm)
-                        .expect("stable before");
-                    let last = recording.state.last().expect("not empty");
-                    assert_eq!(replay.qpos, last.position.as_slice(), "the same motion");
-                    Duration::from_secs_f64(replay.elapsed_s)
-                },
+                &mut || replay(true),
+                &mut || replay(false),
                 &mut || {
                     let mut plant = plant.borrow_mut();
                     plant.reset(&START).expect("a sound posture");
@@ -169,7 +173,7 @@ impl Bench {
                             group.extend((0..ARMS).map(|arm| (arm, *torque_nm)));
                             fleet.step(&group).expect("stable before");
                         }
-                    }) / ARMS as u32
+                    }) / u32::try_from(ARMS).expect("a few")
                 },
                 &mut || {
                     timed(|| {
@@ -177,7 +181,7 @@ impl Bench {
                             assert_eq!(ended.expect("stable before").state, recording.state);
                         })
                         .expect("stable before");
-                    }) / ARMS as u32
+                    }) / u32::try_from(ARMS).expect("a few")
                 },
             ],
         );
@@ -195,16 +199,6 @@ impl Bench {
                 us - bare_us
             );
         }
-    }
-}
-
-fn new_looking<'a>(
-    plant: &'a mut MujocoPlant<'_>,
-    torques_nm: &'a [Joints],
-) -> impl FnMut() -> Duration + 'a {
-    move || {
-        let replay = plant.replay(&START, true, torques_nm);
-        Duration::from_secs_f64(replay.expect("stable before").elapsed_s)
     }
 }
 

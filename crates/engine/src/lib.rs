@@ -36,7 +36,7 @@ pub use fleet_run::{Motion, simulate_fleet};
 pub use mujoco::{MujocoFleet, MujocoIntegrator, MujocoPlant, MujocoSettings};
 pub use plant::{Contact, EngineIdentity, Plant, PlantState};
 pub use rapier::{RapierPlant, RapierSettings};
-pub use recording::{Cost, Recording};
+pub use recording::{Cost, Recording, Saturation};
 pub use referee::{RefereePlant, RefereeSettings, TorqueHold, retrace};
 pub use servo::{Servo, ServoGains, ServoOutput};
 pub use simulate::{Braking, Drive, Hooks, simulate, simulate_with_stop};

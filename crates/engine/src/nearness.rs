@@ -29,7 +29,7 @@ pub(crate) struct Part {
     /// The shape, in rapier's units.
     pub shape: SharedShape,
     /// Pose in the frame of the link or of the world, m.
-    pub parent_from_part: Pose,
+    pub parent_from_shape: Pose,
     /// What it may touch.
     pub bits: ContactBits,
 }
@@ -46,12 +46,12 @@ pub(crate) fn parts(cell: &Cell) -> Result<Vec<Part>, EngineError> {
             Frame::Link(i) => Some(i),
         };
         for solid in &each.solids {
-            for (shape, parent_from_part) in collider_shapes(solid)? {
+            for (shape, parent_from_shape) in collider_shapes(solid)? {
                 parts.push(Part {
                     body,
                     link,
                     shape,
-                    parent_from_part,
+                    parent_from_shape,
                     bits,
                 });
             }
@@ -267,7 +267,7 @@ fn gap_m(parts: &[Part], spheres: &[Sphere], pair: [usize; 2], poses: &[Pose; JO
     }
     let [a, b] = [0, 1].map(|k| {
         let part = &parts[pair[k]];
-        (pose(&(parents[k] * part.parent_from_part)), &part.shape)
+        (pose(&(parents[k] * part.parent_from_shape)), &part.shape)
     });
     // Unsupported shapes do not occur; if they did, the engine would see to them.
     query::distance(&a.0, a.1.as_ref(), &b.0, b.1.as_ref())
@@ -277,7 +277,7 @@ fn gap_m(parts: &[Part], spheres: &[Sphere], pair: [usize; 2], poses: &[Pose; JO
 fn bounding_sphere(part: &Part) -> Sphere {
     let sphere = part
         .shape
-        .compute_bounding_sphere(&pose(&part.parent_from_part));
+        .compute_bounding_sphere(&pose(&part.parent_from_shape));
     let Vector { x, y, z } = sphere.center;
     Sphere {
         center_m: nalgebra::Point3::new(x, y, z) / UNITS_PER_M,

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::JointState;
+use needlebench_kinematics::{JOINT_COUNT, Joints};
 
 use crate::{EngineIdentity, PlantState};
 
@@ -30,8 +30,19 @@ pub struct Recording {
     pub drive_nm: Vec<Joints>,
     /// Steps in which the effort limit cut the torque of at least one joint.
     pub saturated_steps: usize,
+    /// The same for each joint.
+    pub saturation: [Saturation; JOINT_COUNT],
     /// What it cost; differs from run to run.
     pub cost: Cost,
+}
+
+/// How often the effort limit cut a joint's torque.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Saturation {
+    /// Number of steps.
+    pub steps: usize,
+    /// Start of the first of them, s.
+    pub first_time_s: Option<f64>,
 }
 
 /// Cost of a simulation.

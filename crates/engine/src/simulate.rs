@@ -93,6 +93,7 @@ impl<'a> Drive<'a> {
                 torque_nm: Vec::with_capacity(steps),
                 drive_nm: Vec::with_capacity(steps),
                 saturated_steps: 0,
+                saturation: Default::default(),
                 cost: Cost::default(),
             },
         })
@@ -145,6 +146,12 @@ impl<'a> Drive<'a> {
         };
         check_torque(&self.recording.engine.name, time_s, &torque.drive_nm)?;
         self.recording.saturated_steps += usize::from(torque.saturated.contains(&true));
+        for (joint, cut) in self.recording.saturation.iter_mut().zip(torque.saturated) {
+            if cut {
+                joint.steps += 1;
+                joint.first_time_s.get_or_insert(time_s);
+            }
+        }
         self.recording.torque_nm.push(torque.link_nm);
         self.recording.drive_nm.push(torque.drive_nm);
         Ok(Some(torque.link_nm))

@@ -130,6 +130,14 @@ fn saturated_steps_are_counted() {
         .count();
     assert!(at_limit > 0);
     assert_eq!(limited.saturated_steps, at_limit);
+    for (joint, saturation) in limited.saturation.iter().enumerate() {
+        let cut = |torque: &Joints| torque[joint].abs() >= limit_nm;
+        let of_joint = limited.torque_nm.iter().filter(|torque| cut(torque));
+        assert_eq!(saturation.steps, of_joint.count(), "joint {joint}");
+        let first = limited.torque_nm.iter().position(cut);
+        let first_time_s = first.map(|step| limited.time_s[step]);
+        assert_eq!(saturation.first_time_s, first_time_s, "joint {joint}");
+    }
 }
 
 #[test]

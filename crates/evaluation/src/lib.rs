@@ -33,7 +33,8 @@ pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balan
 pub use criteria::{Criterion, check_configuration};
 pub use judge::judge;
 pub use motion::{
-    ContactMeasurement, EngineDifference, MotionMeasurement, engine_difference, measure_motion,
+    ContactMeasurement, EngineDifference, MotionMeasurement, SaturatedJoint, engine_difference,
+    measure_motion,
 };
 pub use needle::{NeedleMeasurement, measure_needle, tip_of};
 pub use sensitivity::tip_sensitivity;

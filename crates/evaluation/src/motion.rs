@@ -3,8 +3,8 @@
 use nalgebra::Point3;
 use needlebench_cell::{Cell, Goal};
 use needlebench_engine::Recording;
-use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
+use needlebench_kinematics::{JOINT_LABELS, Joints};
 use serde::Serialize;
 
 use crate::contact::{ContactEpisode, episodes};
@@ -48,10 +48,40 @@ pub struct MotionMeasurement {
     pub peak_speed_ratio: f64,
     /// Steps in which a torque was cut at its limit.
     pub saturated_steps: usize,
+    /// Joints whose torque was cut at its limit.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub saturated_joints: Vec<SaturatedJoint>,
     /// Largest torque in the last step minus the torque that gravity asks for there, N m.
     pub holding_torque_error_nm: f64,
     /// Contact.
     pub contact: ContactMeasurement,
+}
+
+/// A joint that asked for more torque than it has.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SaturatedJoint {
+    /// Label of the joint.
+    pub joint: &'static str,
+    /// Steps in which its torque was cut.
+    pub steps: usize,
+    /// The same as a share of all steps.
+    pub share: f64,
+    /// When that happened first, s.
+    pub first_time_s: Option<f64>,
+}
+
+fn saturated_joints(recording: &Recording) -> Vec<SaturatedJoint> {
+    JOINT_LABELS
+        .into_iter()
+        .zip(&recording.saturation)
+        .filter(|(_, saturation)| saturation.steps > 0)
+        .map(|(joint, saturation)| SaturatedJoint {
+            joint,
+            steps: saturation.steps,
+            share: saturation.steps as f64 / recording.steps().max(1) as f64,
+            first_time_s: saturation.first_time_s,
+        })
+        .collect()
 }
 
 /// Difference of two engines that followed the same trajectory.
@@ -144,6 +174,7 @@ pub fn measure_motion(
         peak_torque_ratio,
         peak_speed_ratio,
         saturated_steps: recording.saturated_steps,
+        saturated_joints: saturated_joints(recording),
         holding_torque_error_nm,
         contact,
     }

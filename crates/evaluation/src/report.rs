@@ -46,7 +46,9 @@ pub struct Report {
     pub truth: Option<TruthReport>,
     /// Where the numbers come from.
     pub provenance: Provenance,
-    /// Wall-clock times; the only part that differs between two runs of the same inputs.
+    /// Wall-clock times, s, and per engine the real time factor: simulated time over the wall-clock
+    /// time of its motions, with control, recording and certified clearance. The only part that
+    /// differs between two runs of the same inputs.
     pub timings: BTreeMap<String, f64>,
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
-use needlebench_engine::{Contact, Cost, EngineIdentity, PlantState, Recording};
+use needlebench_engine::{Contact, Cost, EngineIdentity, PlantState, Recording, Saturation};
 use needlebench_evaluation::{engine_difference, measure_motion, measure_needle};
 use needlebench_kinematics::trajectory::{
     JointState, JointTrajectory, MotionLimits, Phase, ProfileLimits,
@@ -137,6 +137,10 @@ fn recording(
         torque_nm: (0..steps).map(|_| Joints::repeat(6.0)).collect(),
         drive_nm: (0..steps).map(|_| Joints::repeat(6.0)).collect(),
         saturated_steps: 3,
+        saturation: std::array::from_fn(|joint| Saturation {
+            steps: if joint == 5 { 3 } else { 0 },
+            first_time_s: (joint == 5).then_some(0.25),
+        }),
         cost: Cost::default(),
     };
     for k in 0..=steps {
@@ -200,6 +204,12 @@ fn settling_ends_when_the_tip_stays_in_its_band() {
     // 6 N m of wrist 3's 12 N m.
     assert!((found.peak_torque_ratio - 0.5).abs() < 1e-12);
     assert_eq!(found.saturated_steps, 3);
+    let [cut] = found.saturated_joints.as_slice() else {
+        panic!("{:?}", found.saturated_joints);
+    };
+    assert_eq!((cut.joint, cut.steps), ("wrist_3", 3));
+    assert_eq!(cut.first_time_s, Some(0.25));
+    assert!((cut.share - 3.0 / recording.steps() as f64).abs() < 1e-15);
     assert!(!found.contact.occurred);
 }
 

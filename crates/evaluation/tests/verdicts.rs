@@ -58,6 +58,7 @@ fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationRe
         pareto: false,
         dominated_by: None,
         ranking: None,
+        events: None,
         budget: None,
         budget_failure: None,
         files: Vec::new(),

@@ -74,6 +74,9 @@ enum Command {
     /// Every pair of bodies: measured or left out, why, and the evidence; and checks an SRDF.
     #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
     Pairs(PairsArguments),
+    /// The joint servo's data sheet: settings with sources, closed loop, step and sine responses.
+    #[command(after_help = "Example: needlebench servo scenarios/table3.toml --joint wrist_1")]
+    Servo(ServoArguments),
     /// Reproduce the paper: Table 3, every equation, both methods, and Figure 6.
     #[command(after_help = "Example: needlebench paper --out out/paper")]
     Paper(PaperArguments),
@@ -332,6 +335,30 @@ pub(crate) struct ClearanceArguments {
     /// Print one JSON document.
     #[arg(long)]
     pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ServoArguments {
+    /// Scenario whose robot and servo are looked at, at the first goal that is reached.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// One joint, such as `wrist_1`; all of them if left out.
+    #[arg(long, value_name = "JOINT")]
+    pub joint: Option<String>,
+    /// Engines; the scenario's own choice if left out.
+    #[arg(long, value_enum)]
+    pub engine: Option<EngineChoice>,
+    /// Folder for results; the scenario gets a folder of its name in it.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Print one JSON document instead of the tables.
+    #[arg(long)]
+    pub json: bool,
+    /// Draw no pictures.
+    #[arg(long)]
+    pub no_pictures: bool,
     #[command(flatten)]
     pub robot: RobotArguments,
 }
@@ -652,6 +679,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => command::compare(&arguments),
         Command::Iso9283(arguments) => command::iso9283(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
+        Command::Servo(arguments) => command::servo(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),
         Command::Schema { format } => command::schema(format),
         Command::Doctor { json } => command::doctor(json),

@@ -17,6 +17,7 @@ mod pipeline;
 mod progress;
 mod provenance;
 mod reality;
+mod servo;
 mod trial;
 
 pub use atlas::{GoalAtlas, goal_atlas};

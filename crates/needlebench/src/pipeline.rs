@@ -126,7 +126,7 @@ pub(crate) fn run(
     progress: &Progress,
 ) -> Result<ScenarioRun, RunError> {
     if let Some(protocol) = &resolved.iso9283 {
-        return Ok(iso9283::run(resolved, protocol, options, cancel, progress)?);
+        return iso9283::run(resolved, protocol, options, cancel, progress);
     }
     let started = Instant::now();
     let mut timings = BTreeMap::new();

@@ -10,8 +10,8 @@ use needlebench_cell::{Cell, Goal, Overrides, ResolvedScenario, resolve_scenario
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
-    Hooks, MujocoPlant, MujocoSettings, Plant, PlantState, RapierPlant, RapierSettings, Recording,
-    Servo, ServoGains, simulate,
+    Actuation, Hooks, MujocoPlant, MujocoSettings, Plant, PlantState, RapierPlant, RapierSettings,
+    Recording, Servo, ServoGains, simulate,
 };
 use needlebench_kinematics::{Joints, Pose, rotation_angle_between};
 use needlebench_planning::Planner;
@@ -219,8 +219,16 @@ fn engines_agree_along_every_planned_motion() {
         working += 1;
         let trajectory = configuration.trajectory.as_ref().unwrap();
         let plants: [&mut dyn Plant; 2] = [&mut rapier, &mut mujoco];
-        let [a, b]: [Recording; 2] =
-            plants.map(|plant| simulate(plant, &servo, trajectory, Hooks::default()).unwrap());
+        let [a, b]: [Recording; 2] = plants.map(|plant| {
+            simulate(
+                plant,
+                &servo,
+                &Actuation::default(),
+                trajectory,
+                Hooks::default(),
+            )
+            .unwrap()
+        });
         let differences: Vec<f64> = a
             .state
             .iter()

@@ -132,7 +132,7 @@ mod tests {
     }
 
     const ARMS: usize = 3;
-    const STEPS: usize = 400;
+    const STEPS: usize = 900;
 
     fn start(arm: usize) -> Joints {
         [
@@ -173,7 +173,7 @@ mod tests {
         let together = fleet_states(&mut harness);
         let touched = together.iter().flatten().filter(|s| s.contact.count > 0);
         let touched = touched.count();
-        assert!(touched > 20, "touched in {touched} states");
+        assert!(touched > 10, "touched in {touched} states");
         let settings = MujocoSettings::default();
         let mut plant = MujocoPlant::new(&mut harness, &cell(), TIMESTEP_S, &settings).unwrap();
         for (arm, together) in together.iter().enumerate() {

@@ -82,7 +82,7 @@ fn collider(part: &Part, settings: &RapierSettings) -> Collider {
         InteractionTestMode::And,
     );
     ColliderBuilder::new(part.shape.clone())
-        .position(pose(&part.parent_from_part))
+        .position(pose(&part.parent_from_shape))
         .density(0.0)
         .friction(settings.friction)
         .restitution(0.0)

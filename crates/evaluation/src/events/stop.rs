@@ -137,6 +137,7 @@ fn since(recording: &Recording, from: usize) -> Recording {
         torque_nm: recording.torque_nm[from..].to_vec(),
         drive_nm: recording.drive_nm[from..].to_vec(),
         saturated_steps: 0,
+        saturation: Default::default(),
         cost: recording.cost,
     }
 }

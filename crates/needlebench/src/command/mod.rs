@@ -10,6 +10,7 @@ mod kinematics;
 mod pairs;
 mod paper;
 mod run;
+mod servo;
 
 use std::io::Write;
 use std::path::Path;
@@ -32,6 +33,7 @@ pub(crate) use kinematics::{fk, ik};
 pub(crate) use pairs::pairs;
 pub(crate) use paper::paper;
 pub(crate) use run::run;
+pub(crate) use servo::servo;
 
 use crate::cli::{MissingInertiaArgument, RobotArguments, SchemaFormat};
 use crate::exit::ExitStatus;

@@ -12,6 +12,7 @@ mod ranking;
 mod recording;
 mod referee;
 pub(crate) mod room_pictures;
+mod saturation;
 mod table;
 
 pub(crate) use budget::budget_picture;

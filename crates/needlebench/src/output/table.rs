@@ -53,6 +53,7 @@ fn write_report(out: &mut String, report: &Report) -> std::fmt::Result {
             )?;
             writeln!(out, "{table}")?;
         }
+        out.push_str(&super::saturation::saturation_text(goal));
         write_remarks(out, report, goal)?;
     }
     if let Some(iso9283) = &report.iso9283 {

@@ -11,6 +11,7 @@ mod color;
 pub(crate) mod flat;
 mod floor;
 mod geometry;
+pub(crate) mod graph;
 mod image;
 mod label;
 mod lamps;
