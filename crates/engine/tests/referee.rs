@@ -7,7 +7,7 @@ mod harness;
 use nalgebra::{Point3, Vector3};
 use needlebench_cell::Cell;
 use needlebench_engine::{
-    EngineError, Hooks, MujocoPlant, MujocoSettings, Plant, PlantState, RapierPlant,
+    Actuation, EngineError, Hooks, MujocoPlant, MujocoSettings, Plant, PlantState, RapierPlant,
     RapierSettings, Recording, RefereePlant, RefereeSettings, Servo, ServoGains, TorqueHold,
     retrace, simulate,
 };
@@ -74,7 +74,16 @@ fn engines(cell: &Cell, timestep_s: f64) -> [Recording; 2] {
     let mut mujoco =
         MujocoPlant::new(&mut harness, cell, timestep_s, &MujocoSettings::default()).unwrap();
     let plants: [&mut dyn Plant; 2] = [&mut rapier, &mut mujoco];
-    plants.map(|plant| simulate(plant, &servo, &trajectory(), Hooks::default()).unwrap())
+    plants.map(|plant| {
+        simulate(
+            plant,
+            &servo,
+            &Actuation::default(),
+            &trajectory(),
+            Hooks::default(),
+        )
+        .unwrap()
+    })
 }
 
 /// The figure that was asked for; 0.06 um is seen.
@@ -113,7 +122,14 @@ fn engines_converge_to_the_referee_with_first_order() {
     for (which, timestep_s) in [1e-3, 5e-4, 2.5e-4].into_iter().enumerate() {
         let [centred, plain] = [TorqueHold::AroundSample, TorqueHold::FromSample].map(|hold| {
             let mut plant = referee(&cell, timestep_s, hold);
-            simulate(&mut plant, &servo, &trajectory(), Hooks::default()).unwrap()
+            simulate(
+                &mut plant,
+                &servo,
+                &Actuation::default(),
+                &trajectory(),
+                Hooks::default(),
+            )
+            .unwrap()
         });
         for (engine, recording) in engines(&cell, timestep_s).iter().enumerate() {
             let speed = recording
@@ -151,9 +167,23 @@ fn closed_loop_and_held_back_torques_are_the_same_comparison() {
     let cell = common::ur3(Vec::new());
     let servo = servo(&cell);
     let mut rapier = RapierPlant::new(&cell, 1e-3, &RapierSettings::default()).unwrap();
-    let recording = simulate(&mut rapier, &servo, &trajectory(), Hooks::default()).unwrap();
+    let recording = simulate(
+        &mut rapier,
+        &servo,
+        &Actuation::default(),
+        &trajectory(),
+        Hooks::default(),
+    )
+    .unwrap();
     let mut plant = referee(&cell, 1e-3, TorqueHold::AroundSample);
-    let closed = simulate(&mut plant, &servo, &trajectory(), Hooks::default()).unwrap();
+    let closed = simulate(
+        &mut plant,
+        &servo,
+        &Actuation::default(),
+        &trajectory(),
+        Hooks::default(),
+    )
+    .unwrap();
     let steps = recording.steps();
     let held = retrace(&mut plant, &recording, steps, Some(&servo.gains)).unwrap();
     // The same torques in another order of summation, over 2000 steps; 2e-14 m is seen.

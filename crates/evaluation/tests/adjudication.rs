@@ -64,7 +64,9 @@ fn recording(
             .map(|time_s| Joints::repeat(torque_nm(time_s - TIMESTEP_S)))
             .collect(),
         time_s: times,
+        drive_nm: Vec::new(),
         saturated_steps: 0,
+        saturation: Default::default(),
         cost: Cost::default(),
     }
 }
