@@ -348,7 +348,9 @@ mod tests {
 
     #[test]
     fn noise_at_rest_has_the_covariance_of_the_loops_own_motion() {
-        let servo = servo();
+        let mut servo = servo();
+        // With a step of delay, 60 N m s/rad on the wrists' armature would be unstable.
+        servo.gains.kd_nms_per_rad = [20.0; JOINT_COUNT];
         let mass = servo.dynamics.mass_matrix(&POSTURE);
         let friction = JointFriction {
             coulomb_nm: Joints::repeat(1.0),

@@ -8,9 +8,6 @@ use crate::support::{Bench, Finding, SMALL, has_keys, mujoco_is_ready, with_edit
 
 /// Contacts as in `scenarios/contact.toml`, a stop at its worst moment, and the way back.
 const EVENTS: &str = r#"
-# Quick motions at 1 ms: 1.2 um.
-[engines.envelope]
-peak_tip_um = 5
 [engines.mujoco]
 contact_stiffness_per_s2 = 4e4
 contact_damping_per_s = 200

@@ -14,6 +14,7 @@ mod determinism;
 mod environment;
 mod events;
 mod help;
+mod imperfect;
 #[cfg(target_os = "linux")]
 mod interrupt;
 mod iso9283;

@@ -1,0 +1,155 @@
+//! Imperfect arms: what a run says of them, and what is refused.
+
+use serde_json::Value;
+
+use crate::support::{Bench, Finding, SMALL, mujoco_is_ready, with_edit};
+
+/// Every block with its defaults, few samples; the criteria of a nominal robot do not hold.
+const BLOCKS: &str = "
+[imperfections]
+budget_samples = 200
+[imperfections.calibration]
+[imperfections.encoder]
+[imperfections.elasticity]
+[imperfections.payload]
+[imperfections.friction]
+[imperfections.control]
+[imperfections.guide]
+diametral_clearance_mm = 0.1
+[imperfections.registration]
+[imperfections.breathing]
+";
+
+fn imperfect(blocks: &str) -> String {
+    format!("{SMALL}\n{blocks}")
+}
+
+/// Everything of a report but the timings.
+fn report(bench: &Bench, name: &str) -> Value {
+    let mut report = bench.read_json(name);
+    report
+        .as_object_mut()
+        .expect("a report is an object")
+        .remove("timings");
+    report
+}
+
+#[test]
+fn engines_and_balance_of_torques_agree_on_where_an_imperfect_arm_ends() {
+    /// How the joints stop decides on a part of the friction, and here they stop within 20 ms.
+    const UNEXPLAINED_M: f64 = 0.3e-3;
+    mujoco_is_ready();
+    let text = with_edit(&imperfect(BLOCKS), "hold_s = 0.1", "hold_s = 0.6");
+    let bench = Bench::with_scenario(&text);
+    let answer = bench.run(&["run", "s.toml", "--out", "a", "--jobs", "1"]);
+    assert!(
+        answer.stdout.contains("error budget of the needle's tip"),
+        "{answer:#?}"
+    );
+    let once = report(&bench, "a/small/report.json");
+    assert!(once["truth"]["flange_offset_m"][0].as_f64().unwrap() != 0.0);
+    let configurations = once["goals"][0]["configurations"].as_array().unwrap();
+    let mut simulated = 0;
+    for each in configurations {
+        for engine in each["engines"].as_object().unwrap().values() {
+            simulated += 1;
+            let error_m = engine["tip_position_error_m"].as_f64().unwrap();
+            let unexplained_m = engine["unexplained_tip_m"].as_f64().unwrap();
+            assert!(error_m > 0.1e-3, "an imperfect arm misses: {error_m}");
+            assert!(unexplained_m < UNEXPLAINED_M, "{unexplained_m}");
+        }
+        if each["engines"].as_object().unwrap().is_empty() {
+            continue;
+        }
+        let total = &each["budget"]["total"]["at_target"];
+        assert!(
+            total["analytic"]["rms_m"].as_f64().unwrap() > 0.5e-3,
+            "{total}"
+        );
+        assert_eq!(each["budget"]["sources"].as_array().unwrap().len(), 8);
+    }
+    assert!(simulated > 0);
+
+    bench.run(&["run", "s.toml", "--out", "b", "--jobs", "2"]);
+    assert_eq!(
+        once,
+        report(&bench, "b/small/report.json"),
+        "threads change nothing"
+    );
+}
+
+#[test]
+fn unstable_gains_are_explained_before_anything_moves() {
+    let text = format!(
+        "{SMALL}\n[controller]\nstiffness_nm_rad = [{0}, {0}, {0}, {0}, {0}, {0}]\n",
+        500_000.0
+    );
+    let bench = Bench::with_scenario(&text);
+    let answer = bench.run(&["run", "s.toml", "--engine", "rapier"]);
+    for part in [
+        "the servo is unstable",
+        "kp, kd, armature and time step",
+        "stable below",
+    ] {
+        assert!(answer.stdout.contains(part), "no `{part}` in {answer:#?}");
+    }
+    answer.exits_with(3);
+}
+
+#[track_caller]
+fn refused(blocks: &str) -> Finding {
+    let text = imperfect(blocks);
+    let bench = Bench::with_scenario(&text);
+    let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(2);
+    Finding::only(&answer, &text).in_file("s.toml")
+}
+
+#[test]
+fn negative_stiffness_is_refused() {
+    refused("[imperfections.elasticity]\nstiffness_nm_rad = [-1, 1e4, 1e4, 1e4, 1e4, 1e4]\n")
+        .key("imperfections.elasticity.stiffness_nm_rad[0]")
+        .says("-1 N m/rad")
+        .hints("N m/rad");
+}
+
+#[test]
+fn noise_above_its_range_is_refused() {
+    refused("[imperfections.encoder]\nnoise_deg = [0, 0, 0, 0, 0, 5]\n")
+        .key("imperfections.encoder.noise_deg[5]")
+        .says("outside 0 to 0.1");
+}
+
+#[test]
+fn friction_that_holds_less_than_it_slides_is_refused() {
+    refused("[imperfections.friction]\nstiction_nm = [1, 5, 5, 5, 5, 5]\n")
+        .key("imperfections.friction.stiction_nm[0]")
+        .says("below the sliding friction")
+        .hints("at rest");
+}
+
+#[test]
+fn markers_on_a_line_are_refused() {
+    refused("[imperfections.registration]\nmarkers_mm = [[0, 0, 0], [0, 0, 50], [0, 0, 120]]\n")
+        .key("imperfections.registration.markers_mm")
+        .says("on one line");
+}
+
+#[test]
+fn unknown_arm_is_refused_with_the_one_that_was_meant() {
+    refused("[imperfections.calibration]\narm = \"ur3-11\"\n")
+        .key("imperfections.calibration.arm")
+        .hints("did you mean");
+}
+
+#[test]
+fn set_points_closer_than_steps_are_refused() {
+    refused("[imperfections.control]\nperiod_ms = 0.1\n")
+        .key("imperfections.control.period_ms")
+        .says("closer than the time step");
+}
+
+#[test]
+fn the_small_scenario_is_sound_before_it_is_spoilt() {
+    let bench = Bench::with_scenario(&with_edit(&imperfect(BLOCKS), "budget_samples = 200", ""));
+    bench.run(&["check", "s.toml"]).exits_with(0);
+}
