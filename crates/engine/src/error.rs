@@ -4,6 +4,7 @@ use needlebench_cell::Cell;
 use needlebench_cell::shape::{ConvexMesh, Solid, SolidMesh};
 use needlebench_kinematics::JOINT_LABELS;
 
+use crate::Recording;
 use crate::mujoco::HarnessError;
 
 /// Errors of the engines and of the run loop.
@@ -30,6 +31,14 @@ pub enum EngineError {
         engine: &'static str,
         /// The engine's own words.
         reason: String,
+    },
+    /// A motion that could not be carried on; what was recorded until then is kept.
+    #[error("{error}")]
+    Stopped {
+        /// What happened.
+        error: Box<EngineError>,
+        /// The states until then, all of them sensible.
+        recording: Box<Recording>,
     },
     /// The process that runs MuJoCo failed.
     #[error(transparent)]

@@ -81,9 +81,14 @@ pub fn simulate_fleet(
         for (place, error) in ended.into_iter().rev() {
             let done = active.remove(place);
             idle.push(done.arm);
-            let mut recording = done.drive.finish();
-            recording.cost.wall = done.wall;
-            finished(done.motion, error.map_or(Ok(recording), Err));
+            let result = if let Some(error) = error {
+                Err(done.drive.stopped_by(error))
+            } else {
+                let mut recording = done.drive.finish();
+                recording.cost.wall = done.wall;
+                Ok(recording)
+            };
+            finished(done.motion, result);
         }
         if any_ended && torques.is_empty() {
             continue;
@@ -102,7 +107,7 @@ pub fn simulate_fleet(
         for (place, error) in failed.into_iter().rev() {
             let done = active.remove(place);
             idle.push(done.arm);
-            finished(done.motion, Err(error));
+            finished(done.motion, Err(done.drive.stopped_by(error)));
         }
     }
 }

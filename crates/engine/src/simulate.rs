@@ -179,12 +179,35 @@ impl<'a> Drive<'a> {
     pub fn finish(self) -> Recording {
         self.recording
     }
+
+    /// The error with what was recorded until it came: [`EngineError::Stopped`]. Errors that are
+    /// not the motion's own stay as they are.
+    pub fn stopped_by(self, error: EngineError) -> EngineError {
+        if !matches!(
+            error,
+            EngineError::Diverged { .. } | EngineError::Unstable { .. }
+        ) {
+            return error;
+        }
+        let mut recording = self.recording;
+        let sensible = |state: &PlantState| check_state("", 0.0, state).is_ok();
+        let count = recording.state.iter().take_while(|s| sensible(s)).count();
+        recording.time_s.truncate(count);
+        recording.state.truncate(count);
+        recording.reference.truncate(count);
+        recording.torque_nm.truncate(count.saturating_sub(1));
+        recording.drive_nm.truncate(count.saturating_sub(1));
+        EngineError::Stopped {
+            error: Box::new(error),
+            recording: Box::new(recording),
+        }
+    }
 }
 
 /// Runs `trajectory` from its start to its end on `plant`, through drives as they are.
 ///
 /// # Errors
-/// What the plant reports, and [`EngineError::Diverged`].
+/// What the plant reports; [`EngineError::Stopped`] if the motion diverged or the engine gave it up.
 pub fn simulate(
     plant: &mut dyn Plant,
     servo: &Servo,
@@ -217,6 +240,20 @@ pub fn simulate_with_stop(
         plant.velocity_age_s(),
     )?
     .braked(braking);
+    if let Err(error) = follow(plant, &mut drive, &mut hooks) {
+        return Err(drive.stopped_by(error));
+    }
+    let mut recording = drive.finish();
+    recording.cost.wall = started.elapsed();
+    Ok(recording)
+}
+
+/// Steps a plant until the drive has no more torque for it.
+fn follow(
+    plant: &mut dyn Plant,
+    drive: &mut Drive<'_>,
+    hooks: &mut Hooks<'_>,
+) -> Result<(), EngineError> {
     drive.record(plant.reset(&drive.start())?)?;
     loop {
         if hooks
@@ -226,16 +263,13 @@ pub fn simulate_with_stop(
             return Err(EngineError::Cancelled);
         }
         let Some(torque_nm) = drive.torque()? else {
-            break;
+            return Ok(());
         };
         drive.record(plant.step(&torque_nm)?)?;
         if let Some(progress) = hooks.progress.as_mut() {
             progress(drive.time_s());
         }
     }
-    let mut recording = drive.finish();
-    recording.cost.wall = started.elapsed();
-    Ok(recording)
 }
 
 #[expect(

@@ -104,13 +104,26 @@ fn unstable_gains_are_reported_as_divergence() {
     servo.gains.kd_nms_per_rad = [600.0; 6];
     servo.effort_limit_nm = Joints::repeat(f64::INFINITY);
     assert!(servo.stability_ratio(TIMESTEP_S) > 1.0);
-    let error = run(&servo, TIMESTEP_S, Hooks::default()).unwrap_err();
+    let stopped = run(&servo, TIMESTEP_S, Hooks::default()).unwrap_err();
+    let EngineError::Stopped { error, recording } = stopped else {
+        panic!("{stopped}");
+    };
     assert!(
         matches!(
-            error,
+            *error,
             EngineError::Diverged { .. } | EngineError::Unstable { .. }
         ),
         "{error}"
+    );
+    // What came before is kept, and nothing that is no number.
+    let states = recording.state.len();
+    assert!(states > 1, "{states}");
+    assert_eq!(recording.torque_nm.len(), states - 1);
+    assert!(
+        recording
+            .state
+            .iter()
+            .all(|state| state.position.amax() < 100.0)
     );
 }
 

@@ -79,6 +79,17 @@ pub struct EngineRun {
     pub clearance: ClearanceSeries,
 }
 
+/// A motion that an engine could not carry on, with its recording until then.
+#[derive(Debug, Clone)]
+pub struct StoppedRun {
+    /// Index of the goal.
+    pub goal: usize,
+    /// Index of the configuration.
+    pub configuration: usize,
+    /// What there is of it.
+    pub run: EngineRun,
+}
+
 /// Everything that a run of a scenario leaves.
 #[derive(Debug)]
 pub struct ScenarioRun {
@@ -90,6 +101,8 @@ pub struct ScenarioRun {
     pub runs: Vec<Vec<Vec<EngineRun>>>,
     /// Events of the configurations that work.
     pub(crate) events: Vec<EventRun>,
+    /// Motions that an engine could not carry on, until then.
+    pub stopped: Vec<StoppedRun>,
     /// What a test by ISO 9283 left besides its report.
     pub iso9283: Option<ProtocolRun>,
     /// It was interrupted; what was finished until then is here.
@@ -218,6 +231,7 @@ pub(crate) fn run(
         .iter()
         .map(|plan| plan.configurations.iter().map(|_| Vec::new()).collect())
         .collect();
+    let mut stopped = Vec::new();
     for outcome in &mut outcomes {
         let name = outcome.engine.name();
         let wall_s = outcome.wall.as_secs_f64();
@@ -228,6 +242,12 @@ pub(crate) fn run(
         for (job, run) in outcome.runs.drain(..) {
             runs[job.goal][job.configuration].push(run);
         }
+        let broken = outcome.stopped.drain(..);
+        stopped.extend(broken.map(|(job, run)| StoppedRun {
+            goal: job.goal,
+            configuration: job.configuration,
+            run,
+        }));
     }
     let refereed = Instant::now();
     let trials = crate::trial::try_all(
@@ -285,6 +305,7 @@ pub(crate) fn run(
         plans,
         runs,
         events,
+        stopped,
         iso9283: None,
         interrupted,
     })
@@ -428,6 +449,8 @@ struct EngineOutcome {
     engine: EngineName,
     identity: Option<EngineIdentity>,
     runs: Vec<(Job, EngineRun)>,
+    /// Motions that the engine could not carry on, until then.
+    stopped: Vec<(Job, EngineRun)>,
     failure: Option<EngineFailure>,
     wall: Duration,
 }
@@ -453,6 +476,7 @@ impl Simulation<'_> {
             engine,
             identity: None,
             runs: Vec::new(),
+            stopped: Vec::new(),
             failure: None,
             wall: Duration::ZERO,
         };
@@ -499,9 +523,19 @@ impl Simulation<'_> {
         // The first motion that failed, in the order of the jobs.
         let mut failure: Option<(usize, EngineError)> = None;
         let mut finished = Vec::new();
+        let mut stopped = Vec::new();
         let mut ended = |index: usize, result: Result<Recording, EngineError>| {
             match result {
                 Ok(recording) => finished.push((index, self.measured(engine, index, recording))),
+                Err(EngineError::Stopped { error, recording }) => {
+                    if recording.state.len() > 1 {
+                        stopped
+                            .push((self.jobs[index], self.unfinished(engine, index, *recording)));
+                    }
+                    if failure.as_ref().is_none_or(|(first, _)| index < *first) {
+                        failure = Some((index, *error));
+                    }
+                }
                 Err(error) if failure.as_ref().is_none_or(|(first, _)| index < *first) => {
                     failure = Some((index, error));
                 }
@@ -548,6 +582,8 @@ impl Simulation<'_> {
         finished.sort_by_key(|(index, _)| *index);
         let runs = finished.into_iter();
         outcome.runs = runs.map(|(index, run)| (self.jobs[index], run)).collect();
+        stopped.sort_by_key(|(job, _)| (job.goal, job.configuration));
+        outcome.stopped = stopped;
         match outcome_of_all {
             Err(EngineError::Cancelled) => return Ok(()),
             // The process served several motions: the first that is not there stands for all.
@@ -573,6 +609,23 @@ impl Simulation<'_> {
     fn in_words(&self, job: Job) -> String {
         let goal = &self.resolved.goals[job.goal].name;
         format!("{goal} {}", self.plan(job).configuration)
+    }
+
+    /// A recording that broke off, with the clearances along it, sampled.
+    fn unfinished(&self, engine: EngineName, index: usize, recording: Recording) -> EngineRun {
+        let trajectory = self.plan(self.jobs[index]).trajectory.as_ref();
+        let clearance = measure_clearance(
+            self.reality.cell(),
+            self.reality.model(),
+            trajectory.expect("jobs have trajectories"),
+            &recording,
+            self.resolved.scenario.recording.period_ms * 1e-3,
+        );
+        EngineRun {
+            engine,
+            recording,
+            clearance,
+        }
     }
 
     /// A recording with the clearances along it.

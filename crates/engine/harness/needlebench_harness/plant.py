@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from needlebench_harness.protocol import HEADER, INBOX_BYTES, PLANT, Answer, RequestError
+from needlebench_harness.protocol import HEADER, INBOX_BYTES, PLANT, RequestError
 
 Floats = npt.NDArray[np.float64]
 
@@ -106,7 +106,7 @@ class Plant:
         self.looked = True
 
     def replay(self, torques: Floats, *, contacts: int) -> float:
-        """Run MuJoCo's own step over rows of torques, with nothing else; return the time it took, s.
+        """Run MuJoCo's own step over rows of torques, with nothing else; return the time, s.
 
         The yardstick for what a client in lock-step pays.
         """
@@ -164,7 +164,7 @@ class Plant:
 class Port:
     """Where a plant's torques come from and its states go to, in buffers that are reused."""
 
-    def __init__(  # noqa: PLR0913 - each of them is a place
+    def __init__(
         self,
         *,
         plant: Plant,

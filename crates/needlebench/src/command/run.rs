@@ -252,6 +252,20 @@ fn write_results(
         }
         files.push(of_goal);
     }
+    for stopped in &finished.stopped {
+        let (goal, run) = (&resolved.goals[stopped.goal], &stopped.run);
+        let plan = &finished.plans[stopped.goal].configurations[stopped.configuration];
+        let trajectory = plan.trajectory.as_ref().context("a run has a trajectory")?;
+        let name = format!(
+            "{}/{}.{}.stopped.csv",
+            goal.name,
+            plan.configuration,
+            run.engine.name()
+        );
+        let csv = recording_csv(run, trajectory, period_s);
+        write_atomically(&folder.join(&name), csv.as_bytes())?;
+        files[stopped.goal][stopped.configuration].push(name);
+    }
     for run in &finished.events {
         let names = write_events(resolved, run, &finished.plans, folder, pictures)?;
         files[run.goal][run.configuration].extend(names);

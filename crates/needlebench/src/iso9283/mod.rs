@@ -116,6 +116,7 @@ pub(crate) fn run(
     let interrupted = cancel.load(Ordering::Relaxed);
     Ok(ScenarioRun {
         events: Vec::new(),
+        stopped: Vec::new(),
         report: Report {
             verdict,
             criteria,
@@ -261,6 +262,7 @@ fn unplanned(
     };
     ScenarioRun {
         events: Vec::new(),
+        stopped: Vec::new(),
         report: Report {
             criteria: vec![criterion],
             ..empty_report(resolved, Vec::new(), timings)
