@@ -56,6 +56,45 @@ pub fn resting_friction(friction: &JointFriction, trajectory: &JointTrajectory) 
     }
 }
 
+/// Error of the joints at rest by friction, rad: reference minus position.
+///
+/// `kp`: position gains, N m/rad; `held_nm`: what the bristles held when the reference stopped,
+/// `compensated_nm`: what the controller then took away.
+pub(crate) fn friction_error(
+    kp: &Joints,
+    friction: &JointFriction,
+    held_nm: &Joints,
+    compensated_nm: &Joints,
+) -> Joints {
+    Joints::from_fn(|i, _| {
+        let stiffness = friction.bristle_stiffness_nm_per_rad[i];
+        let moving = (held_nm[i] - compensated_nm[i]) / kp[i];
+        moving + spring_back_rad(held_nm[i], compensated_nm[i], kp[i], stiffness)
+    })
+}
+
+/// How far a joint springs back, in the direction against its motion, when compensation is taken
+/// away from bent bristles.
+///
+/// On the way back the bristles follow `dz/dx = 1 + z / z_ss`, so after a way `d` they hold
+/// `F (2 exp(-d / z_ss) - 1)`: the balance is `2 F (1 - exp(-d / z_ss)) + kp d = c`.
+fn spring_back_rad(held_nm: f64, compensated_nm: f64, kp: f64, stiffness: f64) -> f64 {
+    /// Newton steps on a concave, increasing function from 0: quadratic from the first.
+    const STEPS: usize = 8;
+    let (held, compensated) = (held_nm.abs(), compensated_nm.abs());
+    if held == 0.0 || compensated == 0.0 || held_nm.signum() != compensated_nm.signum() {
+        return 0.0;
+    }
+    let slip_rad = held / stiffness;
+    let mut way = 0.0;
+    for _ in 0..STEPS {
+        let left = (-way / slip_rad).exp();
+        let torque = 2.0 * held * (1.0 - left) + kp * way - compensated;
+        way -= torque / (2.0 * stiffness * left + kp);
+    }
+    way.copysign(held_nm)
+}
+
 /// Posture at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settled {
@@ -94,9 +133,8 @@ pub enum SettleError {
 /// the posture, and the error `x = q_r - reading` of the encoder:
 ///
 /// ```text
-/// moving:   kp x0 + g + c - F = t                       F friction, c its compensation
-/// at rest:  kp x  + g - (F - sigma_0 (x - x0)) = t      c gone, bristles spring back
-/// so        x = (t - g + F) / kp - sigma_0 c / (kp (kp + sigma_0))
+/// moving:   kp x0 + g + c - F = t          F friction, c its compensation
+/// at rest:  kp x  + g - F' = t             c gone; the bristles hold F' after springing back
 /// q = q_r - x - offset - rounding - C t
 /// ```
 ///
@@ -121,11 +159,7 @@ pub fn settle(
     let mut error_of_friction = Joints::zeros();
     if let (Some(model), Some(resting)) = (&actuation.friction, friction) {
         let held_nm = resting.held_nm.component_mul(&model.true_over_nominal);
-        error_of_friction = Joints::from_fn(|i, _| {
-            let stiffness = model.bristle_stiffness_nm_per_rad[i];
-            let spring_back = stiffness * resting.compensated_nm[i] / (kp[i] + stiffness);
-            (held_nm[i] - spring_back) / kp[i]
-        });
+        error_of_friction = friction_error(&kp, model, &held_nm, &resting.compensated_nm);
     }
     let offset = actuation.encoder.map_or_else(Joints::zeros, |encoder| {
         encoder.offset_rad + encoder.resting_rounding_rad

@@ -86,7 +86,7 @@ fn encoders_leave_the_arm_trembling_about_its_prediction() {
 }
 
 /// How the joints stop decides on a part of the break-away torque: measured, see the message.
-const FRICTION_M: f64 = 80e-6;
+const FRICTION_M: f64 = 30e-6;
 
 #[test]
 fn friction_is_predicted_but_for_how_the_joints_stop() {

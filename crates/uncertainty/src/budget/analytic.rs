@@ -7,7 +7,8 @@ use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
 
 use super::{BudgetCase, BudgetError, Moments};
 use crate::jitter::Jitter;
-use crate::truth::moved_by;
+use crate::settle::friction_error;
+use crate::truth::{joint_friction, moved_by};
 use crate::{Draw, Layout, Truth};
 
 /// Moments at skin and target, axes of the guide's exit.
@@ -158,13 +159,18 @@ impl JointErrors {
         if let (Some(block), Some(resting)) =
             (&imperfections.friction, case.friction(imperfections))
         {
-            let bristle = Joints::from(block.bristle_stiffness_nm_rad);
-            let kept = resting.held_nm.component_div(&kp);
-            let sprung = bristle
-                .component_mul(&resting.compensated_nm)
-                .component_div(&kp.component_mul(&(kp + bristle)));
-            bias -= kept - sprung;
-            let spread = kept * block.spread;
+            let model = joint_friction(block, Joints::repeat(1.0));
+            let error = |scale: f64| {
+                friction_error(
+                    &kp,
+                    &model,
+                    &(resting.held_nm * scale),
+                    &resting.compensated_nm,
+                )
+            };
+            bias -= error(1.0);
+            // Central difference over one standard deviation: the spring-back is not linear.
+            let spread = 0.5 * (error(1.0 + block.spread) - error(1.0 - block.spread));
             covariance += Matrix6::from_diagonal(&spread.component_mul(&spread));
         }
         if let Some(encoder) = imperfections.encoder {
