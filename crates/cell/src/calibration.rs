@@ -296,7 +296,7 @@ fn hint_on_other_formats(text: &str) -> Option<&'static str> {
     if start.starts_with('<') {
         return Some("it is XML: a URDF is given with --robot");
     }
-    // The controller's own file, /root/.urcontrol/calibration.conf.
+    // The controller's own file, `.urcontrol/calibration.conf`.
     if start.starts_with('[') || text.contains("delta_theta") {
         return Some(
             "the controller's own calibration.conf has other numbers: ROS's `ur_calibration` \

@@ -47,19 +47,9 @@ pub struct UnstableServo {
 impl ClosedLoop {
     /// The loop at a posture with this mass matrix (kg m^2, armature included).
     pub fn new(mass: &Matrix6<f64>, servo: &Servo, actuation: &Actuation, timestep_s: f64) -> Self {
-        Self::scaled(mass, servo, actuation, timestep_s, 1.0)
-    }
-
-    fn scaled(
-        mass: &Matrix6<f64>,
-        servo: &Servo,
-        actuation: &Actuation,
-        timestep_s: f64,
-        factor: f64,
-    ) -> Self {
         let n = JOINT_COUNT;
-        let kp = Joints::from(servo.gains.kp_nm_per_rad) * factor;
-        let kd = Joints::from(servo.gains.kd_nms_per_rad) * factor;
+        let kp = Joints::from(servo.gains.kp_nm_per_rad);
+        let kd = Joints::from(servo.gains.kd_nms_per_rad);
         let softening = kp
             .component_mul(&actuation.compliance_rad_per_nm)
             .map(|each| (1.0 + each).recip());
@@ -213,7 +203,7 @@ impl ClosedLoop {
             return None;
         }
         let stable_at = |factor: f64, step_s: f64| {
-            Self::scaled(mass, servo, actuation, step_s, factor).spectral_radius() < STABLE
+            Self::new(mass, &servo.scaled(factor), actuation, step_s).spectral_radius() < STABLE
         };
         let highest = |stable: &dyn Fn(f64) -> bool, top: f64| {
             let (mut low, mut high) = (0.0, top);
@@ -320,8 +310,9 @@ mod tests {
         // The wrists, where there is little but the armature, set the limit.
         assert!(found.joint.starts_with("wrist"), "{}", found.joint);
         let factor = found.stable_factor.unwrap();
-        let at =
-            |factor: f64| ClosedLoop::scaled(&mass, &servo, &ideal, 1e-3, factor).spectral_radius();
+        let at = |factor: f64| {
+            ClosedLoop::new(&mass, &servo.scaled(factor), &ideal, 1e-3).spectral_radius()
+        };
         assert!(
             at(0.99 * factor) < 1.0 && at(1.01 * factor) > 1.0,
             "{factor}"

@@ -89,6 +89,17 @@ impl Servo {
             + kd.component_mul(&(reference.velocity - velocity))
     }
 
+    /// The same servo with all gains times a factor.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self {
+            gains: ServoGains {
+                kp_nm_per_rad: self.gains.kp_nm_per_rad.map(|gain| gain * factor),
+                kd_nms_per_rad: self.gains.kd_nms_per_rad.map(|gain| gain * factor),
+            },
+            ..*self
+        }
+    }
+
     /// `max_i (2 kd_i h + kp_i h^2) / (4 armature_i)` for a step `h`: below 1 the servo is stable
     /// at every posture, by a bound that takes the arm for its rotors alone.
     ///

@@ -20,8 +20,9 @@ use needlebench_evaluation::{
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 
+use crate::budgets::Budgets;
 use crate::events::{EventRun, events_report};
-use crate::pipeline::{Budgets, EngineRun};
+use crate::pipeline::EngineRun;
 use crate::provenance::provenance;
 use crate::reality::Reality;
 use crate::trial::Trial;

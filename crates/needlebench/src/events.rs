@@ -1,15 +1,12 @@
 //! Events of a scenario: staged once, simulated in each engine, put into the report.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
 use needlebench_cell::scenario::{EngineName, EventsSection, PressSection, StopSection};
 use needlebench_cell::{Cell, Goal, ResolvedScenario};
-use needlebench_engine::mujoco::HarnessProcess;
 use needlebench_engine::{
-    Brakes, Braking, EngineError, Hooks, MujocoPlant, Plant, RapierPlant, Recording, Servo,
-    simulate_with_stop,
+    Brakes, Braking, EngineError, Hooks, Plant, Recording, Servo, simulate_with_stop,
 };
 use needlebench_evaluation::events::{
     EventsReport, PressReport, StopEnvelope, StopReport, measure_press, measure_retraction,
@@ -19,7 +16,8 @@ use needlebench_evaluation::report::{CriterionResult, EngineFailure};
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_planning::{ConfigurationPlan, GoalPlan, PressError, PressPlan, stage_press};
 
-use crate::pipeline::{Harness, in_parallel, mujoco_settings, rapier_settings};
+use crate::pipeline::in_parallel;
+use crate::plants::{Harness, plant};
 use crate::reality::{Reality, servo};
 
 /// Events of one configuration, with what the engines made of them.
@@ -254,31 +252,19 @@ impl EventSimulation<'_> {
         friction: Option<f64>,
         work: &mut dyn FnMut(&mut dyn Plant) -> Result<T, EngineError>,
     ) -> Result<T, EngineError> {
-        let engines = &self.resolved.scenario.engines;
+        let mut engines = self.resolved.scenario.engines.clone();
+        engines.friction = friction.unwrap_or(engines.friction);
+        let mut process = match (engine, self.harness) {
+            (EngineName::Rapier, _) => None,
+            (EngineName::Mujoco, Some(Ok(harness))) => {
+                Some(harness.lock().expect("one thread uses it"))
+            }
+            // The planned motions have failed for the same reason, which is reported.
+            (EngineName::Mujoco, _) => return Err(EngineError::Cancelled),
+        };
         let timestep_s = engines.timestep_ms * 1e-3;
-        match engine {
-            EngineName::Rapier => {
-                let mut settings = rapier_settings(engines);
-                settings.friction = friction.unwrap_or(settings.friction);
-                work(&mut RapierPlant::new(cell, timestep_s, &settings)?)
-            }
-            EngineName::Mujoco => {
-                let mut settings = mujoco_settings(engines);
-                settings.friction = friction.unwrap_or(settings.friction);
-                let Some(Ok(harness)) = self.harness else {
-                    // The planned motions have failed for the same reason, which is reported.
-                    return Err(EngineError::Cancelled);
-                };
-                let mut process: std::sync::MutexGuard<'_, HarnessProcess> =
-                    Mutex::lock(harness).expect("one thread uses it");
-                work(&mut MujocoPlant::new(
-                    &mut process,
-                    cell,
-                    timestep_s,
-                    &settings,
-                )?)
-            }
-        }
+        let mut plant = plant(engine, cell, &engines, timestep_s, process.as_deref_mut())?;
+        work(plant.as_mut())
     }
 }
 

@@ -5,6 +5,7 @@
 mod assemble;
 mod atlas;
 mod atomic;
+mod budgets;
 mod cli;
 mod command;
 mod events;
@@ -14,6 +15,7 @@ mod output;
 mod paper;
 pub mod picture;
 mod pipeline;
+mod plants;
 mod progress;
 mod provenance;
 mod reality;

@@ -8,21 +8,21 @@ use std::time::{Duration, Instant};
 use needlebench_cell::ResolvedScenario;
 use needlebench_cell::scenario::EngineName;
 use needlebench_clearance::ClearanceModel;
-use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
-    ClosedLoop, EngineError, EngineIdentity, Hooks, Motion, MujocoFleet, MujocoSettings, Plant,
-    RapierPlant, RapierSettings, Recording, simulate, simulate_fleet,
+    ClosedLoop, EngineError, EngineIdentity, Hooks, Motion, MujocoFleet, Plant, RapierPlant,
+    Recording, simulate, simulate_fleet,
 };
 use needlebench_evaluation::report::{EngineFailure, Report};
 use needlebench_evaluation::{ClearanceSeries, certify_recording, measure_clearance};
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::registration::RegistrationError;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
-use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
 
 use crate::assemble::assemble;
+use crate::budgets::budgets;
 use crate::events::{self, EventRun, EventSimulation};
 use crate::iso9283::{self, ProtocolRun};
+use crate::plants::{Harness, mujoco_settings, rapier_settings, start_harness};
 use crate::progress::Progress;
 use crate::reality::{Reality, servo};
 
@@ -385,57 +385,6 @@ fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
         .collect()
 }
 
-/// Error budgets by goal and configuration, for every configuration with a motion; with what went
-/// wrong where there is none.
-pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
-
-fn budgets(resolved: &ResolvedScenario, plans: &[GoalPlan], threads: usize) -> Budgets {
-    let Some(imperfections) = &resolved.imperfections else {
-        return plans
-            .iter()
-            .map(|plan| plan.configurations.iter().map(|_| None).collect())
-            .collect();
-    };
-    let servo = servo(resolved);
-    let all: Vec<(usize, &ConfigurationPlan)> = plans
-        .iter()
-        .enumerate()
-        .flat_map(|(goal, plan)| plan.configurations.iter().map(move |each| (goal, each)))
-        .collect();
-    let mut found = in_parallel(threads, &all, |(goal, plan)| {
-        let case = BudgetCase {
-            cell: &resolved.cell,
-            goal: &resolved.goals[*goal],
-            place: resolved
-                .phantom
-                .as_ref()
-                .map(|each| &each.world_from_phantom),
-            servo: &servo,
-            imperfections,
-            trajectory: plan.trajectory.as_ref()?,
-            timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
-        };
-        let seed = resolved.scenario.seed;
-        Some(budget(&case, imperfections.budget_samples, seed).map_err(|error| error.to_string()))
-    })
-    .into_iter();
-    plans
-        .iter()
-        .map(|plan| found.by_ref().take(plan.configurations.len()).collect())
-        .collect()
-}
-
-pub(crate) type Harness = Result<Mutex<HarnessProcess>, String>;
-
-pub(crate) fn start_harness(resolved: &ResolvedScenario, progress: &Progress) -> Harness {
-    let timeout = Duration::from_secs_f64(resolved.scenario.engines.harness_timeout_s);
-    let environment =
-        ensure(&mut |text| progress.message(text)).map_err(|error| error.to_string())?;
-    HarnessProcess::start(&environment, timeout)
-        .map(Mutex::new)
-        .map_err(|error| error.to_string())
-}
-
 struct Simulation<'a> {
     resolved: &'a ResolvedScenario,
     plans: &'a [GoalPlan],
@@ -650,29 +599,5 @@ impl Simulation<'_> {
             recording,
             clearance,
         }
-    }
-}
-
-pub(crate) fn rapier_settings(
-    engines: &needlebench_cell::scenario::EnginesSection,
-) -> RapierSettings {
-    RapierSettings {
-        contact_natural_frequency_hz: engines.rapier.contact_natural_frequency_hz,
-        contact_damping_ratio: engines.rapier.contact_damping_ratio,
-        contact_sweeps: engines.rapier.contact_sweeps as usize,
-        friction: engines.friction,
-        ..RapierSettings::default()
-    }
-}
-
-pub(crate) fn mujoco_settings(
-    engines: &needlebench_cell::scenario::EnginesSection,
-) -> MujocoSettings {
-    MujocoSettings {
-        contact_stiffness_per_s2: engines.mujoco.contact_stiffness_per_s2,
-        contact_damping_per_s: engines.mujoco.contact_damping_per_s,
-        contact_impedance: engines.mujoco.contact_impedance,
-        friction: engines.friction,
-        ..MujocoSettings::default()
     }
 }

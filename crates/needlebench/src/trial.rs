@@ -7,8 +7,8 @@ use needlebench_cell::scenario::EngineName;
 use needlebench_cell::{Goal, ResolvedScenario};
 use needlebench_engine::mujoco::HarnessProcess;
 use needlebench_engine::{
-    EngineError, EngineIdentity, Hooks, MujocoPlant, Plant, RapierPlant, Recording, RefereePlant,
-    RefereeSettings, Servo, retrace, simulate,
+    EngineError, EngineIdentity, Hooks, Plant, Recording, RefereePlant, RefereeSettings, Servo,
+    retrace, simulate,
 };
 use needlebench_evaluation::adjudication::{Adjudication, Evidence, adjudicate, judge_differences};
 use needlebench_evaluation::referee::{
@@ -18,7 +18,8 @@ use needlebench_evaluation::referee::{
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::GoalPlan;
 
-use crate::pipeline::{EngineRun, in_parallel, mujoco_settings, rapier_settings};
+use crate::pipeline::{EngineRun, in_parallel};
+use crate::plants::plant;
 use crate::progress::Progress;
 use crate::reality::{Reality, servo};
 
@@ -319,17 +320,8 @@ impl Court<'_> {
             if plants.iter().any(|(engine, _)| *engine == run.engine) {
                 continue;
             }
-            let plant: Box<dyn Plant + '_> = match run.engine {
-                EngineName::Rapier => {
-                    let settings = rapier_settings(engines);
-                    Box::new(RapierPlant::new(cell, timestep_s, &settings)?)
-                }
-                EngineName::Mujoco => {
-                    let settings = mujoco_settings(engines);
-                    let process = process.take().expect("its recordings came from a harness");
-                    Box::new(MujocoPlant::new(process, cell, timestep_s, &settings)?)
-                }
-            };
+            let process = process.take_if(|_| run.engine == EngineName::Mujoco);
+            let plant = plant(run.engine, cell, engines, timestep_s, process)?;
             plants.push((run.engine, plant));
         }
         let servo = servo(self.resolved);

@@ -4,7 +4,6 @@ use anyhow::{Context, Result};
 use needlebench_cell::scenario::EngineName;
 use needlebench_cell::{Finding, ResolvedScenario, nearest_name};
 use needlebench_clearance::ClearanceModel;
-use needlebench_engine::{MujocoPlant, RapierPlant};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_planning::Planner;
 
@@ -13,7 +12,8 @@ use crate::atomic::write_atomically;
 use crate::cli::ServoArguments;
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
-use crate::pipeline::{self, EngineChoice};
+use crate::pipeline::EngineChoice;
+use crate::plants::{plant, start_harness};
 use crate::progress::Progress;
 use crate::reality;
 use crate::servo::linear::{Linear, Margins};
@@ -141,23 +141,21 @@ fn measure_in(
     linear: &Linear,
     posture: &Joints,
 ) -> Result<()> {
+    let harness = (engine == EngineName::Mujoco)
+        .then(|| start_harness(resolved, &Progress::new(true)).map_err(anyhow::Error::msg))
+        .transpose()?;
+    let mut process = harness
+        .as_ref()
+        .map(|harness| harness.lock().expect("nobody else uses it"));
     let (cell, engines) = (&resolved.cell, &resolved.scenario.engines);
-    let timestep_s = report.timestep_s;
-    match engine {
-        EngineName::Rapier => {
-            let settings = pipeline::rapier_settings(engines);
-            let mut plant = RapierPlant::new(cell, timestep_s, &settings)?;
-            measure(report, &mut plant, servo, linear, posture)?;
-        }
-        EngineName::Mujoco => {
-            let harness = pipeline::start_harness(resolved, &Progress::new(true));
-            let harness = harness.map_err(anyhow::Error::msg)?;
-            let mut process = harness.lock().expect("nobody else uses it");
-            let settings = pipeline::mujoco_settings(engines);
-            let mut plant = MujocoPlant::new(&mut process, cell, timestep_s, &settings)?;
-            measure(report, &mut plant, servo, linear, posture)?;
-        }
-    }
+    let mut plant = plant(
+        engine,
+        cell,
+        engines,
+        report.timestep_s,
+        process.as_deref_mut(),
+    )?;
+    measure(report, plant.as_mut(), servo, linear, posture)?;
     Ok(())
 }
 

@@ -29,7 +29,8 @@ use needlebench_evaluation::report::{
 };
 use needlebench_planning::iso9283::{ProtocolPlan, plan_protocol};
 
-use crate::pipeline::{EngineChoice, RunError, RunOptions, ScenarioRun, start_harness};
+use crate::pipeline::{EngineChoice, RunError, RunOptions, ScenarioRun};
+use crate::plants::start_harness;
 use crate::progress::Progress;
 use crate::provenance::provenance;
 use crate::reality::Reality;

@@ -7,14 +7,12 @@ use nalgebra::{Point3, Vector3};
 use needlebench_cell::ResolvedScenario;
 use needlebench_cell::iso9283::Iso9283Protocol;
 use needlebench_cell::scenario::EngineName;
-use needlebench_engine::{
-    Actuation, EngineIdentity, Hooks, MujocoPlant, Plant, RapierPlant, Recording, Servo, simulate,
-};
+use needlebench_engine::{Actuation, EngineIdentity, Hooks, Plant, Recording, Servo, simulate};
 use needlebench_evaluation::iso9283::{Arrival, Attained, CycleMeasurement, Effort, measure_cycle};
 use needlebench_kinematics::pose_sets::SplitMix64;
 use needlebench_planning::iso9283::{Cycle, ProtocolPlan};
 
-use crate::pipeline::{Harness, mujoco_settings, rapier_settings};
+use crate::plants::{Harness, plant};
 use crate::progress::Progress;
 use crate::reality::{Reality, servo};
 
@@ -58,24 +56,13 @@ pub(crate) fn simulate_engine(
     let cell = reality.cell();
     let engines = &resolved.scenario.engines;
     let timestep_s = engines.timestep_ms * 1e-3;
-    let mut process;
-    let mut plant: Box<dyn Plant> = match engine {
-        EngineName::Rapier => {
-            let settings = rapier_settings(engines);
-            let plant = RapierPlant::new(cell, timestep_s, &settings);
-            Box::new(plant.map_err(|error| error.to_string())?)
-        }
-        EngineName::Mujoco => {
-            let harness = harness.expect("a MuJoCo run has a harness or its error");
-            process = match harness {
-                Ok(process) => process.lock().expect("one thread uses it"),
-                Err(message) => return Err(message.clone()),
-            };
-            let settings = mujoco_settings(engines);
-            let plant = MujocoPlant::new(&mut process, cell, timestep_s, &settings);
-            Box::new(plant.map_err(|error| error.to_string())?)
-        }
+    let mut process = match harness {
+        Some(Ok(process)) => Some(process.lock().expect("one thread uses it")),
+        Some(Err(message)) => return Err(message.clone()),
+        None => None,
     };
+    let mut plant = plant(engine, cell, engines, timestep_s, process.as_deref_mut())
+        .map_err(|error| error.to_string())?;
     let mut cycles = Cycles {
         reality,
         resolved,

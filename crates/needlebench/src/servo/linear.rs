@@ -160,16 +160,7 @@ impl Margins {
         let mass = servo.dynamics.mass_matrix(posture);
         let ideal = Actuation::default();
         let radius = |factor: f64, step_s: f64| {
-            let mut scaled = *servo;
-            let gains = &mut scaled.gains;
-            for gain in gains
-                .kp_nm_per_rad
-                .iter_mut()
-                .chain(&mut gains.kd_nms_per_rad)
-            {
-                *gain *= factor;
-            }
-            ClosedLoop::new(&mass, &scaled, &ideal, step_s).spectral_radius()
+            ClosedLoop::new(&mass, &servo.scaled(factor), &ideal, step_s).spectral_radius()
         };
         Self {
             spectral_radius: radius(1.0, timestep_s),
@@ -273,7 +264,7 @@ mod tests {
 
     #[test]
     fn margins_are_where_stability_ends() {
-        let (mut servo, posture, _) = linear();
+        let (servo, posture, _) = linear();
         let margins = Margins::new(&servo, &posture, TIMESTEP_S);
         assert!(margins.spectral_radius < 1.0);
         let step_s = margins.timestep_s.unwrap();
@@ -282,14 +273,7 @@ mod tests {
             assert_eq!(there.spectral_radius < 1.0, stable, "{factor}");
         }
         let factor = margins.gain_factor.unwrap();
-        let gains = &mut servo.gains;
-        for gain in gains
-            .kp_nm_per_rad
-            .iter_mut()
-            .chain(&mut gains.kd_nms_per_rad)
-        {
-            *gain *= 1.001 * factor;
-        }
+        let servo = servo.scaled(1.001 * factor);
         let beyond = Margins::new(&servo, &posture, TIMESTEP_S);
         assert!(beyond.spectral_radius > 1.0);
         assert_eq!((beyond.gain_factor, beyond.timestep_s), (None, None));

@@ -1,0 +1,49 @@
+//! The error budgets of a run.
+
+use needlebench_cell::ResolvedScenario;
+use needlebench_planning::{ConfigurationPlan, GoalPlan};
+use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
+
+use crate::pipeline::in_parallel;
+use crate::reality::servo;
+
+/// Error budgets by goal and configuration, for every configuration with a motion; with what went
+/// wrong where there is none.
+pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
+
+/// Budgets of all configurations that have a motion; none at all without imperfections.
+pub(crate) fn budgets(resolved: &ResolvedScenario, plans: &[GoalPlan], threads: usize) -> Budgets {
+    let Some(imperfections) = &resolved.imperfections else {
+        return plans
+            .iter()
+            .map(|plan| plan.configurations.iter().map(|_| None).collect())
+            .collect();
+    };
+    let servo = servo(resolved);
+    let all: Vec<(usize, &ConfigurationPlan)> = plans
+        .iter()
+        .enumerate()
+        .flat_map(|(goal, plan)| plan.configurations.iter().map(move |each| (goal, each)))
+        .collect();
+    let mut found = in_parallel(threads, &all, |(goal, plan)| {
+        let case = BudgetCase {
+            cell: &resolved.cell,
+            goal: &resolved.goals[*goal],
+            place: resolved
+                .phantom
+                .as_ref()
+                .map(|each| &each.world_from_phantom),
+            servo: &servo,
+            imperfections,
+            trajectory: plan.trajectory.as_ref()?,
+            timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
+        };
+        let seed = resolved.scenario.seed;
+        Some(budget(&case, imperfections.budget_samples, seed).map_err(|error| error.to_string()))
+    })
+    .into_iter();
+    plans
+        .iter()
+        .map(|plan| found.by_ref().take(plan.configurations.len()).collect())
+        .collect()
+}
