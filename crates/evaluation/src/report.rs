@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::LinkEnclosure;
+use needlebench_cell::{ClearanceClass, LinkEnclosure};
 use needlebench_engine::EngineIdentity;
 use needlebench_uncertainty::budget::ErrorBudget;
 use serde::Serialize;
@@ -361,6 +361,14 @@ pub struct ClearanceReport {
 }
 
 impl ClearanceReport {
+    /// The least clearances of a motion.
+    pub fn of(minima: &BTreeMap<ClearanceClass, ClassClearance>) -> Self {
+        let named = minima
+            .iter()
+            .map(|(class, found)| (class.name(), found.clone()));
+        Self::new(named.collect())
+    }
+
     /// Clearances by class with the least of those that count.
     pub fn new(classes: BTreeMap<&'static str, ClassClearance>) -> Self {
         let mut made = Self {

@@ -278,7 +278,6 @@ fn engine_report(
         .last()
         .expect("a recording has its initial state");
     let band_m = resolved.scenario.criteria.settling_band_mm * 1e-3;
-    let minima = &run.clearance.minima;
     let rested_m = tip_of(cell, goal, &settled.world_from_flange);
     // An imperfect arm never comes to its commanded place.
     let rests_at_m = reality.is_imperfect().then_some(rested_m);
@@ -288,12 +287,7 @@ fn engine_report(
             .predicted_tip(goal_index, trajectory)
             .map(|predicted_m| (rested_m - predicted_m).norm()),
         motion: measure_motion(cell, goal, trajectory, &run.recording, band_m, rests_at_m),
-        clearance: ClearanceReport::new(
-            minima
-                .iter()
-                .map(|(class, found)| (class.name(), found.clone()))
-                .collect(),
-        ),
+        clearance: ClearanceReport::of(&run.clearance.minima),
     }
 }
 

@@ -95,12 +95,6 @@ pub fn measure_retraction(
         at_s,
         duration_s: trajectory.duration_s(),
         contacts,
-        clearance: ClearanceReport::new(
-            series
-                .minima
-                .into_iter()
-                .map(|(class, found)| (class.name(), found))
-                .collect(),
-        ),
+        clearance: ClearanceReport::of(&series.minima),
     }
 }

@@ -72,13 +72,7 @@ pub fn measure_stop(
             .norm(),
         off_path_m: off_path_m(cell, planned, &after, at_s),
         contacts,
-        clearance: ClearanceReport::new(
-            series
-                .minima
-                .into_iter()
-                .map(|(class, found)| (class.name(), found))
-                .collect(),
-        ),
+        clearance: ClearanceReport::of(&series.minima),
     }
 }
 

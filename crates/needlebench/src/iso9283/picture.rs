@@ -4,7 +4,7 @@ use needlebench_evaluation::iso9283::{Arrival, Attained, PoseStatistics, Protoco
 
 use crate::output::small_length;
 use crate::picture::Image;
-use crate::picture::flat::{Canvas, Rgb};
+use crate::picture::flat::{Canvas, Rgb, pixel};
 
 const PAGE: Rgb = [255, 255, 255];
 const INK: Rgb = [40, 44, 52];
@@ -265,15 +265,6 @@ pub(crate) fn stabilisation_picture(
     }
     canvas.frame([left, top], [width, height], INK);
     canvas.into_image()
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "places in the picture, not negative; NaN becomes 0"
-)]
-fn pixel(value: f64) -> usize {
-    value.round() as usize
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use needlebench_uncertainty::budget::{ErrorBudget, Moments, SourceBudget};
 
 use super::table::plain_table;
 use crate::picture::Image;
-use crate::picture::flat::Canvas;
+use crate::picture::flat::{Canvas, pixel};
 
 /// Mean of the largest errors that 153 interventional radiologists allow, m.
 const ALLOWED_M: f64 = 2.7e-3;
@@ -337,16 +337,8 @@ fn draw_shares(canvas: &mut Canvas, [left, top]: [usize; 2], width: usize, budge
             .position(|known| *known == source)
             .map_or(AXES, |index| SOURCES[index]);
         let share = square(each) / sum;
-        let pixels = |share: f64| {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "between 0 and the width"
-            )]
-            let pixels = (share * width as f64).round() as usize;
-            pixels
-        };
-        let (from, to) = (pixels(drawn), pixels(drawn + share));
+        let place = |share: f64| pixel(share * width as f64);
+        let (from, to) = (place(drawn), place(drawn + share));
         canvas.fill([left + from, top], [to - from, TEXT - 4], color);
         drawn += share;
         if share >= 0.02 {

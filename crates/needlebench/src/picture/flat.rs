@@ -118,6 +118,16 @@ impl Canvas {
     }
 }
 
+/// The pixel nearest to a place in the picture; 0 for negative ones and NaN.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates, and NaN becomes 0"
+)]
+pub(crate) fn pixel(place: f64) -> usize {
+    place.round() as usize
+}
+
 /// The next lower whole number; 0 for negative ones and NaN.
 #[expect(
     clippy::cast_possible_truncation,

@@ -1,6 +1,6 @@
 //! Curves over axes.
 
-use super::flat::{Canvas, Rgb};
+use super::flat::{Canvas, Rgb, pixel};
 
 /// Colours of grid, frame and what a graph is drawn on.
 const GRID: Rgb = [224, 227, 231];
@@ -106,14 +106,14 @@ impl Graph {
             let [x, _] = self.at(value, self.y.low);
             let (foot, head) = ((top + height) as f64, top as f64);
             canvas.stroke([x, head], [x, foot], 1.0, GRID);
-            canvas.write_centred([round(x), top + height + 4], &label(value));
+            canvas.write_centred([pixel(x), top + height + 4], &label(value));
         }
         for value in self.y.ticks(height as f64 / 45.0) {
             let [_, y] = self.at(self.x.low, value);
             canvas.stroke([left as f64, y], [(left + width) as f64, y], 1.0, GRID);
             let text = label(value);
             let start = left.saturating_sub(canvas.width_of(&text) + 6);
-            canvas.write([start, round(y).saturating_sub(8)], &text);
+            canvas.write([start, pixel(y).saturating_sub(8)], &text);
         }
         canvas.frame(self.corner, self.size, FRAME);
         canvas.write([left, top.saturating_sub(20)], title);
@@ -176,15 +176,6 @@ fn label(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0" } else { text }.to_owned()
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a pixel inside the picture"
-)]
-fn round(value: f64) -> usize {
-    value.max(0.0).round() as usize
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Bars whose widths are weights: the filled area of a row is its weighted mean.
 
+use super::flat::pixel;
 use super::image::Image;
 use super::text::{TextSize, signed};
 
@@ -77,7 +78,7 @@ pub fn weighted_bars(bars: &WeightedBars) -> Image {
                 continue;
             };
             let left = cells_left + column.left;
-            let filled = pixels(share.clamp(0.0, 1.0) * column.width as f64);
+            let filled = pixel(share.clamp(0.0, 1.0) * column.width as f64);
             page.fill([left, top], [column.width, row_px], EMPTY);
             let fill = FILLS[column.index % FILLS.len()];
             page.fill([left, top], [filled, row_px], fill);
@@ -109,7 +110,7 @@ fn placed(columns: &[(String, f64)]) -> Vec<Placed> {
     let mut before = 0.0;
     let mut placed = Vec::new();
     for (index, (_, weight)) in columns.iter().enumerate() {
-        let at = |weight: f64| pixels(weight / total * CELLS_PX as f64);
+        let at = |weight: f64| pixel(weight / total * CELLS_PX as f64);
         let left = at(before);
         before += weight.max(0.0);
         let width = at(before).saturating_sub(left + GAP_PX);
@@ -136,15 +137,6 @@ fn legend(columns: &[(String, f64)], most: usize) -> Vec<String> {
         }
     }
     lines
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "between 0 and the width of the cells; NaN becomes 0"
-)]
-fn pixels(value: f64) -> usize {
-    value.round() as usize
 }
 
 #[cfg(test)]
