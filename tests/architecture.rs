@@ -9,13 +9,14 @@ use serde_json::Value;
 /// Every crate under `crates/` and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 8] = [
+const LAYERS: [(&str, &[&str]); 9] = [
     ("kinematics", &[]),
     ("cell", &["kinematics"]),
     ("clearance", &["cell", "kinematics"]),
     ("planning", &["clearance", "cell", "kinematics"]),
     ("engine", &["cell", "kinematics"]),
     ("uncertainty", &["engine", "cell", "kinematics"]),
+    ("study", &["cell", "kinematics"]),
     (
         "evaluation",
         &["uncertainty", "engine", "clearance", "cell", "kinematics"],
@@ -23,6 +24,7 @@ const LAYERS: [(&str, &[&str]); 8] = [
     (
         "needlebench",
         &[
+            "study",
             "evaluation",
             "uncertainty",
             "engine",

@@ -1,0 +1,13 @@
+//! Studies: many cases of one scenario, from a design to a table of results.
+//!
+//! A *case* is one layout with one goal; its number decides everything about it, so that it can be
+//! rerun alone. Each case gives one [`Row`] per configuration. What computes the rows is a
+//! [`CaseWorker`]; this crate knows neither arms nor engines.
+
+mod case;
+mod design;
+mod row;
+
+pub use case::{CaseError, CaseEvaluator, CaseWorker};
+pub use design::{Design, DesignError, Factor, FactorKind, FactorValue, Level, Role};
+pub use row::{CaseResult, METRIC_COUNT, METRICS, Metric, MetricColumn, Outcome, Row};
