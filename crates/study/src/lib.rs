@@ -6,8 +6,10 @@
 
 mod case;
 mod design;
+mod results;
 mod row;
 
 pub use case::{CaseError, CaseEvaluator, CaseWorker};
 pub use design::{Design, DesignError, Factor, FactorKind, FactorValue, Level, Role};
+pub use results::{Results, ResultsError};
 pub use row::{CaseResult, METRIC_COUNT, METRICS, Metric, MetricColumn, Outcome, Row};
