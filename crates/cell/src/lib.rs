@@ -7,6 +7,7 @@ mod calibration;
 mod enclosure;
 pub mod envelope;
 mod events;
+pub mod family;
 mod files;
 mod finding;
 pub mod fixtures;
@@ -37,6 +38,7 @@ mod yaml_text;
 
 pub use calibration::{AppliedCalibration, Calibration, OriginDeviation};
 pub use enclosure::{LinkEnclosure, enclosures};
+pub use family::{Change, KeyPath, ScenarioFamily, Setting};
 pub use files::{PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};
 pub use goal::{Expectation, Goal, PlacedPhantom, REJECTION_RULES, Roll};
