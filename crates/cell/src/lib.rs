@@ -27,6 +27,7 @@ mod robot;
 pub mod scenario;
 pub mod shape;
 mod srdf;
+pub mod study;
 mod tessellate;
 mod thresholds;
 mod toml_text;

@@ -10,9 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
 use crate::scenario::EngineName;
-use crate::study_criteria::StudyCriteriaSection;
-use crate::toml_text::TomlText;
-use crate::{Finding, ModelSource, Overrides, nearest_name};
+use crate::{Finding, ModelSource, Overrides};
 
 mod check;
 
@@ -46,9 +44,6 @@ pub struct StudyFile {
     pub sampling: SamplingSection,
     /// What is varied.
     pub factors: Vec<FactorSection>,
-    /// What is asked of the results.
-    #[serde(default)]
-    pub criteria: StudyCriteriaSection,
     /// The smallest shift and tilt of the phantom that break a configuration; not computed if left
     /// out.
     #[serde(default)]
@@ -57,7 +52,18 @@ pub struct StudyFile {
 
 /// What is computed of a case.
 #[derive(
-    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+    Debug,
+    Clone,
+    Copy,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    JsonSchema,
 )]
 #[serde(rename_all = "lowercase")]
 pub enum StudyMode {

@@ -117,7 +117,10 @@ mod tests {
         /// Rounding of both, near the tails relative to the probability.
         const TOLERANCE: f64 = 1e-13;
         for p in [1e-12, 1e-3, 0.1, 0.4, 0.5, 0.77, 0.999] {
-            assert!((probability_below(quantile(p)) / p - 1.0).abs() < TOLERANCE, "{p}");
+            assert!(
+                (probability_below(quantile(p)) / p - 1.0).abs() < TOLERANCE,
+                "{p}"
+            );
         }
     }
 }

@@ -1,7 +1,9 @@
 //! From the number of a case to the values of its factors.
 
-use needlebench_cell::study::{Distribution, FactorValues, ResolvedStudy, SamplingMethod, StudyFactor};
 pub use needlebench_cell::study::Role;
+use needlebench_cell::study::{
+    Distribution, FactorValues, ResolvedStudy, SamplingMethod, StudyFactor,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::distribution::{ends, quantile};
@@ -91,9 +93,18 @@ pub struct Design {
 #[derive(Debug, Clone, PartialEq)]
 enum Source {
     /// Level `case / stride % levels`.
-    Crossed { stride: u64, levels: u64 },
-    SampledLevel { dimension: Dimension, levels: usize },
-    Sampled { dimension: Dimension, distribution: Distribution },
+    Crossed {
+        stride: u64,
+        levels: u64,
+    },
+    SampledLevel {
+        dimension: Dimension,
+        levels: usize,
+    },
+    Sampled {
+        dimension: Dimension,
+        distribution: Distribution,
+    },
 }
 
 impl Design {
@@ -103,7 +114,13 @@ impl Design {
     /// [`DesignError`].
     pub fn new(study: &ResolvedStudy) -> Result<Self, DesignError> {
         let sampling = &study.file.sampling;
-        Self::of(&study.goals, &study.factors, sampling.method, sampling.samples, study.file.seed)
+        Self::of(
+            &study.goals,
+            &study.factors,
+            sampling.method,
+            sampling.samples,
+            study.file.seed,
+        )
     }
 
     /// The design of goals and factors.
@@ -120,7 +137,11 @@ impl Design {
         let sampled = factors.iter().filter(|factor| factor.sampled).count();
         let most = most_dimensions(method);
         if sampled > most {
-            return Err(DesignError::TooManyDimensions { sampled, method: method.name(), most });
+            return Err(DesignError::TooManyDimensions {
+                sampled,
+                method: method.name(),
+                most,
+            });
         }
         let samples = samples.filter(|_| sampled > 0).unwrap_or(1);
         let goal = Factor {
@@ -130,7 +151,10 @@ impl Design {
             kind: FactorKind::Levels(
                 goals
                     .iter()
-                    .map(|name| Level { label: name.clone(), number: None })
+                    .map(|name| Level {
+                        label: name.clone(),
+                        number: None,
+                    })
                     .collect(),
             ),
         };
@@ -145,15 +169,19 @@ impl Design {
                 FactorKind::Continuous { .. } => 0,
             };
             let Some(study_factor) = study_factor.filter(|each| each.sampled) else {
-                sources.push(Source::Crossed { stride: 0, levels: levels as u64 });
+                sources.push(Source::Crossed {
+                    stride: 0,
+                    levels: levels as u64,
+                });
                 continue;
             };
             let dimension = Dimension::new(method, next_dimension, samples, seed);
             next_dimension += 1;
             sources.push(match &study_factor.values {
-                FactorValues::Continuum { distribution, .. } => {
-                    Source::Sampled { dimension, distribution: *distribution }
-                }
+                FactorValues::Continuum { distribution, .. } => Source::Sampled {
+                    dimension,
+                    distribution: *distribution,
+                },
                 FactorValues::Levels(_) => Source::SampledLevel { dimension, levels },
             });
         }
@@ -167,7 +195,12 @@ impl Design {
                     .ok_or(DesignError::TooMany)?;
             }
         }
-        Ok(Self { factors: descriptions, sources, cases, samples })
+        Ok(Self {
+            factors: descriptions,
+            sources,
+            cases,
+            samples,
+        })
     }
 
     /// The factors, in the order of their columns.
@@ -197,7 +230,9 @@ impl Design {
         self.sources
             .iter()
             .map(|source| match source {
-                Source::Crossed { stride, levels } => FactorValue::Level(index(case / stride % levels)),
+                Source::Crossed { stride, levels } => {
+                    FactorValue::Level(index(case / stride % levels))
+                }
                 Source::SampledLevel { dimension, levels } => {
                     #[expect(
                         clippy::cast_possible_truncation,
@@ -207,9 +242,10 @@ impl Design {
                     let level = (dimension.coordinate(sample) * *levels as f64) as usize;
                     FactorValue::Level(level.min(levels - 1))
                 }
-                Source::Sampled { dimension, distribution } => {
-                    FactorValue::Number(quantile(distribution, dimension.coordinate(sample)))
-                }
+                Source::Sampled {
+                    dimension,
+                    distribution,
+                } => FactorValue::Number(quantile(distribution, dimension.coordinate(sample))),
             })
             .collect()
     }
@@ -228,7 +264,10 @@ fn described(factor: &StudyFactor) -> Factor {
             FactorValues::Levels(levels) => FactorKind::Levels(
                 levels
                     .iter()
-                    .map(|level| Level { label: level.label.clone(), number: level.number })
+                    .map(|level| Level {
+                        label: level.label.clone(),
+                        number: level.number,
+                    })
                     .collect(),
             ),
             FactorValues::Continuum { distribution, .. } => {

@@ -6,8 +6,11 @@
 
 mod case;
 mod design;
+mod distribution;
 mod results;
 mod row;
+mod sampling;
+mod sobol;
 
 pub use case::{CaseError, CaseEvaluator, CaseWorker};
 pub use design::{Design, DesignError, Factor, FactorKind, FactorValue, Level, Role};

@@ -5,9 +5,6 @@ use needlebench_kinematics::pose_sets::SplitMix64;
 
 use crate::sobol::{DIMENSIONS, SobolDimension};
 
-/// Most points: the Sobol sequence has 32 bits.
-pub(crate) const MOST_SAMPLES: u64 = 1 << 32;
-
 /// Most dimensions of the methods: those of Sobol's table.
 pub(crate) fn most_dimensions(method: SamplingMethod) -> usize {
     match method {
@@ -33,20 +30,26 @@ enum Method {
 
 impl Dimension {
     pub fn new(method: SamplingMethod, dimension: usize, points: u64, seed: u64) -> Self {
-        let seed = SplitMix64::new(seed ^ (dimension as u64 + 1).wrapping_mul(0xd134_2543_de82_ef95)).next_u64();
+        let seed =
+            SplitMix64::new(seed ^ (dimension as u64 + 1).wrapping_mul(0xd134_2543_de82_ef95))
+                .next_u64();
         let method = match method {
             SamplingMethod::Sobol => Method::Sobol(Box::new(SobolDimension::new(dimension, seed))),
             SamplingMethod::LatinHypercube => Method::LatinHypercube,
             SamplingMethod::Random => Method::Random,
         };
-        Self { seed, points, method }
+        Self {
+            seed,
+            points,
+            method,
+        }
     }
 
     /// Coordinate of a point, strictly between 0 and 1.
     pub fn coordinate(&self, index: u64) -> f64 {
         match &self.method {
             Method::Sobol(sequence) => {
-                sequence.coordinate(u32::try_from(index).expect("fewer than `MOST_SAMPLES`"))
+                sequence.coordinate(u32::try_from(index).expect("studies have at most 2^32 samples"))
             }
             Method::LatinHypercube => {
                 // Each point has a stratum of its own, and a random place in it.
@@ -112,7 +115,11 @@ mod tests {
             let axis = Dimension::new(SamplingMethod::LatinHypercube, dimension, POINTS, 1);
             let mut strata: Vec<u64> = (0..POINTS)
                 .map(|index| {
-                    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 37")]
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "below 37"
+                    )]
                     let stratum = (axis.coordinate(index) * POINTS as f64) as u64;
                     stratum
                 })
@@ -126,8 +133,14 @@ mod tests {
     #[test]
     fn dimensions_are_uniform_and_independent() {
         const POINTS: u64 = 4096;
-        for method in [SamplingMethod::Sobol, SamplingMethod::LatinHypercube, SamplingMethod::Random] {
-            let axes: Vec<_> = (0..6).map(|k| Dimension::new(method, k, POINTS, 3)).collect();
+        for method in [
+            SamplingMethod::Sobol,
+            SamplingMethod::LatinHypercube,
+            SamplingMethod::Random,
+        ] {
+            let axes: Vec<_> = (0..6)
+                .map(|k| Dimension::new(method, k, POINTS, 3))
+                .collect();
             for (k, a) in axes.iter().enumerate() {
                 for b in &axes[..k] {
                     let covariance: f64 = (0..POINTS)
@@ -135,10 +148,15 @@ mod tests {
                         .sum::<f64>()
                         / POINTS as f64;
                     // Variance of the product of two uniform variables: 1/144.
-                    assert!(covariance.abs() < 5.0 / 12.0 / (POINTS as f64).sqrt(), "{method:?}");
+                    assert!(
+                        covariance.abs() < 5.0 / 12.0 / (POINTS as f64).sqrt(),
+                        "{method:?}"
+                    );
                 }
                 let mean = (0..POINTS).map(|i| a.coordinate(i)).sum::<f64>() / POINTS as f64;
-                assert!((mean - 0.5).abs() < 5.0 * (1.0 / 12.0_f64).sqrt() / (POINTS as f64).sqrt());
+                assert!(
+                    (mean - 0.5).abs() < 5.0 * (1.0 / 12.0_f64).sqrt() / (POINTS as f64).sqrt()
+                );
             }
         }
     }

@@ -119,7 +119,8 @@ fn scrambled(x: u32, seed: u64) -> u32 {
     (0..BITS).fold(0, |flips, bit| {
         // The bits above this one, behind a one that marks how many they are.
         let prefix = (1_u64 << bit) | (u64::from(x) >> (BITS - bit));
-        let flip = SplitMix64::new(seed ^ prefix.wrapping_mul(0x9e37_79b9_7f4a_7c15)).next_u64() >> 63;
+        let flip =
+            SplitMix64::new(seed ^ prefix.wrapping_mul(0x9e37_79b9_7f4a_7c15)).next_u64() >> 63;
         flips | u32::from(flip == 1) << (BITS - 1 - bit)
     }) ^ x
 }
@@ -154,11 +155,18 @@ mod tests {
                 let points = 1_u32 << log;
                 let mut hit = vec![0; points as usize];
                 for index in 0..points {
-                    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 256")]
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "below 256"
+                    )]
                     let stratum = (sequence.coordinate(index) * f64::from(points)) as usize;
                     hit[stratum] += 1;
                 }
-                assert!(hit.iter().all(|&count| count == 1), "dimension {dimension}, {points} points");
+                assert!(
+                    hit.iter().all(|&count| count == 1),
+                    "dimension {dimension}, {points} points"
+                );
             }
         }
     }
@@ -169,9 +177,16 @@ mod tests {
         const POINTS: u32 = 4096;
         /// By chance the error is `sqrt((4/3)^3 - 1) / sqrt(n)` = 0.018 (one standard deviation).
         const ERROR: f64 = 5e-4;
-        let dimensions: Vec<_> = (0..3).map(|k| SobolDimension::new(k, 99 + k as u64)).collect();
+        let dimensions: Vec<_> = (0..3)
+            .map(|k| SobolDimension::new(k, 99 + k as u64))
+            .collect();
         let sum: f64 = (0..POINTS)
-            .map(|index| dimensions.iter().map(|each| 2.0 * each.coordinate(index)).product::<f64>())
+            .map(|index| {
+                dimensions
+                    .iter()
+                    .map(|each| 2.0 * each.coordinate(index))
+                    .product::<f64>()
+            })
             .sum();
         assert!((sum / f64::from(POINTS) - 1.0).abs() < ERROR);
     }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::{
-    Distribution, FactorSection, FactorValues, GridSection, NormalSection, ResolvedStudy, StudyFactor, StudyFile,
-    StudyLevel, StudyMode,
+    Distribution, FactorSection, FactorValues, GridSection, NormalSection, ResolvedStudy,
+    StudyFactor, StudyFile, StudyLevel, StudyMode,
 };
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
 use crate::files::source_of;
@@ -16,6 +16,8 @@ use crate::{Finding, Overrides, nearest_name};
 const MOST_SAMPLES: u64 = 1 << 32;
 /// Most values of one factor.
 const MOST_LEVELS: usize = 100_000;
+/// Standard deviations from the mean beyond which quantiles of a truncated distribution lose digits.
+const FARTHEST_SD: f64 = 6.0;
 /// Names of factors that are columns of the results already.
 const TAKEN: [&str; 5] = ["case", "goal", "configuration", "outcome", "detail"];
 
@@ -43,7 +45,12 @@ pub(super) fn resolve(
     let goals = goals(&toml, &study, &family).map_err(one)?;
     let mut factors = Vec::new();
     for (index, section) in study.factors.iter().enumerate() {
-        let context = FactorContext { toml: &toml, index, study: &study, family: &family };
+        let context = FactorContext {
+            toml: &toml,
+            index,
+            study: &study,
+            family: &family,
+        };
         match context.resolve(section) {
             Ok(factor) => factors.push(factor),
             Err(finding) => findings.push(finding),
@@ -65,7 +72,10 @@ pub(super) fn resolve(
 }
 
 fn is_name(name: &str, and: &str) -> bool {
-    !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || and.contains(c))
+    !name.is_empty()
+        && name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || and.contains(c))
 }
 
 fn check_head(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Finding>) {
@@ -86,7 +96,10 @@ fn check_head(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Finding
     if let Some(engines) = &study.engines
         && engines.is_empty()
     {
-        findings.push(toml.finding("engines", "no engine at all").hint("rapier, mujoco"));
+        findings.push(
+            toml.finding("engines", "no engine at all")
+                .hint("rapier, mujoco"),
+        );
     }
     if study.factors.is_empty() {
         findings.push(
@@ -114,24 +127,36 @@ fn check_head(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Finding
             );
         } else if TAKEN.contains(&factor.name.as_str()) {
             findings.push(
-                toml.finding(&key, format!("the results have a column `{}` already", factor.name))
-                    .hint(if factor.name == "goal" {
-                        "every goal is studied anyway; `goals = [..]` names some of them"
-                    } else {
-                        "give the factor another name"
-                    }),
+                toml.finding(
+                    &key,
+                    format!("the results have a column `{}` already", factor.name),
+                )
+                .hint(if factor.name == "goal" {
+                    "every goal is studied anyway; `goals = [..]` names some of them"
+                } else {
+                    "give the factor another name"
+                }),
             );
         } else if let Some(first) = names.insert(factor.name.clone(), index) {
             findings.push(toml.finding(
                 &key,
-                format!("factors {} and {} are both called `{}`", first + 1, index + 1, factor.name),
+                format!(
+                    "factors {} and {} are both called `{}`",
+                    first + 1,
+                    index + 1,
+                    factor.name
+                ),
             ));
         }
     }
 }
 
-fn goals(toml: &TomlText<'_>, study: &StudyFile, family: &ScenarioFamily) -> Result<Vec<String>, Finding> {
-    let known = family.goals();
+fn goals(
+    toml: &TomlText<'_>,
+    study: &StudyFile,
+    family: &ScenarioFamily,
+) -> Result<Vec<String>, Finding> {
+    let known: Vec<String> = family.goals().map(str::to_owned).collect();
     let Some(wanted) = &study.goals else {
         if known.is_empty() {
             return Err(toml
@@ -141,7 +166,10 @@ fn goals(toml: &TomlText<'_>, study: &StudyFile, family: &ScenarioFamily) -> Res
         return Ok(known);
     };
     if wanted.is_empty() {
-        return Err(toml.finding("goals", "no goal at all").hint(format!("leave it out, or name some of {}", known.join(", "))));
+        return Err(toml.finding("goals", "no goal at all").hint(format!(
+            "leave it out, or name some of {}",
+            known.join(", ")
+        )));
     }
     for (index, name) in wanted.iter().enumerate() {
         let key = format!("goals[{index}]");
@@ -191,7 +219,10 @@ impl FactorContext<'_> {
         match given.as_slice() {
             [] => {
                 return Err(self
-                    .finding("name", format!("the factor `{}` has no values", section.name))
+                    .finding(
+                        "name",
+                        format!("the factor `{}` has no values", section.name),
+                    )
                     .hint("one of `values`, `grid`, `range`, `normal` and `levels`"));
             }
             [_] => {}
@@ -205,22 +236,54 @@ impl FactorContext<'_> {
         let sampled = section.sampled || section.range.is_some() || section.normal.is_some();
         if sampled && self.study.sampling.samples.is_none() {
             return Err(self
-                .finding(given[0], format!("the factor `{}` is sampled, but nothing says how often", section.name))
+                .finding(
+                    given[0],
+                    format!(
+                        "the factor `{}` is sampled, but nothing says how often",
+                        section.name
+                    ),
+                )
                 .hint("`samples = 256` under [sampling]"));
         }
         let values = match (&key, section) {
-            (None, FactorSection { levels: Some(levels), .. }) => FactorValues::Levels(self.levels(levels)?),
-            (Some(key), FactorSection { values: Some(values), .. }) => {
-                FactorValues::Levels(self.listed(key, section, values)?)
-            }
-            (Some(key), FactorSection { grid: Some(grid), .. }) => FactorValues::Levels(self.grid(key, section, *grid)?),
-            (Some(key), FactorSection { range: Some(range), .. }) => self.range(key, section, *range)?,
-            (Some(key), FactorSection { normal: Some(normal), .. }) => self.normal(key, section, *normal)?,
+            (
+                None,
+                FactorSection {
+                    levels: Some(levels),
+                    ..
+                },
+            ) => FactorValues::Levels(self.levels(levels)?),
+            (
+                Some(key),
+                FactorSection {
+                    values: Some(values),
+                    ..
+                },
+            ) => FactorValues::Levels(self.listed(key, section, values)?),
+            (
+                Some(key),
+                FactorSection {
+                    grid: Some(grid), ..
+                },
+            ) => FactorValues::Levels(self.grid(key, section, *grid)?),
+            (
+                Some(key),
+                FactorSection {
+                    range: Some(range), ..
+                },
+            ) => self.range(key, section, *range)?,
+            (
+                Some(key),
+                FactorSection {
+                    normal: Some(normal),
+                    ..
+                },
+            ) => self.normal(key, section, *normal)?,
             _ => unreachable!("one of the five is given, and only levels have no key"),
         };
         Ok(StudyFactor {
             name: section.name.clone(),
-            unit: key.as_ref().map_or_else(String::new, unit_of),
+            unit: key.as_ref().map_or("", KeyPath::unit).to_owned(),
             role: section.role,
             sampled,
             values,
@@ -244,7 +307,10 @@ impl FactorContext<'_> {
         }
         let Some(key) = &section.key else {
             return Err(self
-                .finding("name", format!("the factor `{}` has no `key`", section.name))
+                .finding(
+                    "name",
+                    format!("the factor `{}` has no `key`", section.name),
+                )
                 .hint("the key of the scenario that it sets, such as `phantom.position_mm[0]`"));
         };
         KeyPath::parse(key)
@@ -252,20 +318,18 @@ impl FactorContext<'_> {
             .map_err(|message| self.finding("key", message))
     }
 
-    fn change(&self, section: &FactorSection, value: &Setting) -> Result<Change, String> {
-        if !section.relative {
-            return Ok(Change::Set(value.clone()));
-        }
-        value
-            .number()
-            .map(Change::Add)
-            .ok_or_else(|| format!("{value} cannot be added to a number"))
-    }
-
-    fn listed(&self, key: &KeyPath, section: &FactorSection, values: &[Setting]) -> Result<Vec<StudyLevel>, Finding> {
+    fn listed(
+        &self,
+        key: &KeyPath,
+        section: &FactorSection,
+        values: &[Setting],
+    ) -> Result<Vec<StudyLevel>, Finding> {
         if values.is_empty() {
             return Err(self
-                .finding("values", format!("the factor `{}` has no values", section.name))
+                .finding(
+                    "values",
+                    format!("the factor `{}` has no values", section.name),
+                )
                 .hint("an empty list has no case at all"));
         }
         let mut levels: Vec<StudyLevel> = Vec::with_capacity(values.len());
@@ -275,8 +339,9 @@ impl FactorContext<'_> {
             if levels.iter().any(|level| level.label == label) {
                 return Err(self.finding(&here, format!("{label} is listed twice")));
             }
-            let change = self.change(section, value).map_err(|message| self.finding(&here, message))?;
-            self.check(key, &change, "key", &here)?;
+            let change =
+                change_of(section, value).map_err(|message| self.finding(&here, message))?;
+            self.check(key, &change, &here)?;
             levels.push(StudyLevel {
                 label,
                 number: value.number(),
@@ -288,7 +353,12 @@ impl FactorContext<'_> {
         Ok(levels)
     }
 
-    fn grid(&self, key: &KeyPath, section: &FactorSection, grid: GridSection) -> Result<Vec<StudyLevel>, Finding> {
+    fn grid(
+        &self,
+        key: &KeyPath,
+        section: &FactorSection,
+        grid: GridSection,
+    ) -> Result<Vec<StudyLevel>, Finding> {
         let GridSection { from, to, steps } = grid;
         if steps < 2 || steps as usize > MOST_LEVELS {
             return Err(self
@@ -297,7 +367,10 @@ impl FactorContext<'_> {
         }
         if from == to {
             return Err(self
-                .finding("grid.to", format!("the grid ends where it begins, at {from}"))
+                .finding(
+                    "grid.to",
+                    format!("the grid ends where it begins, at {from}"),
+                )
                 .hint("a single value goes into `values`"));
         }
         (0..steps)
@@ -306,8 +379,9 @@ impl FactorContext<'_> {
                 let share = f64::from(step) / f64::from(steps - 1);
                 let number = from * (1.0 - share) + to * share;
                 let value = Setting::from(number);
-                let change = self.change(section, &value).map_err(|message| self.finding("grid", message))?;
-                self.check(key, &change, "key", "grid")?;
+                let change =
+                    change_of(section, &value).map_err(|message| self.finding("grid", message))?;
+                self.check(key, &change, "grid")?;
                 Ok(StudyLevel {
                     label: value.to_string(),
                     number: Some(number),
@@ -319,30 +393,52 @@ impl FactorContext<'_> {
             .collect()
     }
 
-    fn range(&self, key: &KeyPath, section: &FactorSection, [low, high]: [f64; 2]) -> Result<FactorValues, Finding> {
+    fn range(
+        &self,
+        key: &KeyPath,
+        section: &FactorSection,
+        [low, high]: [f64; 2],
+    ) -> Result<FactorValues, Finding> {
         if low >= high {
             return Err(self
                 .finding("range", format!("the range from {low} to {high} is empty"))
                 .hint("the lower end first"));
         }
-        self.continuum(key, section, "range", Distribution::Uniform { low, high }, &[low, high])
+        self.continuum(
+            key,
+            section,
+            "range",
+            Distribution::Uniform { low, high },
+            &[low, high],
+        )
     }
 
-    fn normal(&self, key: &KeyPath, section: &FactorSection, normal: NormalSection) -> Result<FactorValues, Finding> {
+    fn normal(
+        &self,
+        key: &KeyPath,
+        section: &FactorSection,
+        normal: NormalSection,
+    ) -> Result<FactorValues, Finding> {
         if normal.sd <= 0.0 {
             return Err(self
-                .finding("normal.sd", format!("a standard deviation of {}", normal.sd))
+                .finding(
+                    "normal.sd",
+                    format!("a standard deviation of {}", normal.sd),
+                )
                 .hint("it has to be positive; a fixed value goes into the scenario"));
         }
         if let Some([low, high]) = normal.within {
             if low >= high {
                 return Err(self
-                    .finding("normal.within", format!("the range from {low} to {high} is empty"))
+                    .finding(
+                        "normal.within",
+                        format!("the range from {low} to {high} is empty"),
+                    )
                     .hint("the lower end first"));
             }
-            // Beyond that, quantiles of what is left lose their digits.
-            const FARTHEST_SD: f64 = 6.0;
-            if low > normal.mean + FARTHEST_SD * normal.sd || high < normal.mean - FARTHEST_SD * normal.sd {
+            if low > normal.mean + FARTHEST_SD * normal.sd
+                || high < normal.mean - FARTHEST_SD * normal.sd
+            {
                 return Err(self
                     .finding(
                         "normal.within",
@@ -351,7 +447,13 @@ impl FactorContext<'_> {
                     .hint("nearly nothing of the distribution lies there: use `range`"));
             }
         }
-        self.continuum(key, section, "normal", Distribution::Normal(normal), &[normal.mean])
+        self.continuum(
+            key,
+            section,
+            "normal",
+            Distribution::Normal(normal),
+            &[normal.mean],
+        )
     }
 
     fn continuum(
@@ -364,7 +466,10 @@ impl FactorContext<'_> {
     ) -> Result<FactorValues, Finding> {
         if section.sampled {
             return Err(self
-                .finding("sampled", format!("a factor with `{name}` is always sampled"))
+                .finding(
+                    "sampled",
+                    format!("a factor with `{name}` is always sampled"),
+                )
                 .hint("leave `sampled` out"));
         }
         for &example in examples {
@@ -373,14 +478,20 @@ impl FactorContext<'_> {
             } else {
                 Change::Set(Setting::from(example))
             };
-            self.check(key, &change, "key", name)?;
+            self.check(key, &change, name)?;
         }
-        Ok(FactorValues::Continuum { key: key.clone(), relative: section.relative, distribution })
+        Ok(FactorValues::Continuum {
+            key: key.clone(),
+            relative: section.relative,
+            distribution,
+        })
     }
 
     fn levels(&self, sections: &[super::LevelSection]) -> Result<Vec<StudyLevel>, Finding> {
         if sections.is_empty() {
-            return Err(self.finding("levels", "no level at all").hint("an empty list has no case at all"));
+            return Err(self
+                .finding("levels", "no level at all")
+                .hint("an empty list has no case at all"));
         }
         let mut levels: Vec<StudyLevel> = Vec::with_capacity(sections.len());
         for (index, section) in sections.iter().enumerate() {
@@ -389,13 +500,22 @@ impl FactorContext<'_> {
                 return Err(self.finding(&here("name"), "a level needs a name"));
             }
             if levels.iter().any(|level| level.label == section.name) {
-                return Err(self.finding(&here("name"), format!("two levels are called `{}`", section.name)));
+                return Err(self.finding(
+                    &here("name"),
+                    format!("two levels are called `{}`", section.name),
+                ));
             }
             if section.set.is_empty() && section.mode.is_none() && section.engines.is_none() {
                 let unchanged = sections.iter().filter(|each| each.set.is_empty()).count();
                 if unchanged > 1 {
                     return Err(self
-                        .finding(&here("name"), format!("the level `{}` changes nothing, and is not alone", section.name))
+                        .finding(
+                            &here("name"),
+                            format!(
+                                "the level `{}` changes nothing, and is not alone",
+                                section.name
+                            ),
+                        )
                         .hint("one level may stand for the scenario as it is"));
                 }
             }
@@ -404,7 +524,7 @@ impl FactorContext<'_> {
                 let here = format!("levels[{index}].set.\"{key}\"");
                 let path = KeyPath::parse(key).map_err(|message| self.finding(&here, message))?;
                 let change = Change::Set(value.clone());
-                self.check(&path, &change, &here, &here)?;
+                self.check(&path, &change, &here)?;
                 changes.push((path, change));
             }
             levels.push(StudyLevel {
@@ -418,48 +538,32 @@ impl FactorContext<'_> {
         Ok(levels)
     }
 
-    /// Whether the scenario has the key and the value fits; points at the key or at the value.
-    fn check(&self, key: &KeyPath, change: &Change, at_key: &str, at_value: &str) -> Result<(), Finding> {
-        self.family.check(key, change).map_err(|found| {
-            let place = if found.is_about_key { at_key } else { at_value };
-            let finding = self.finding(place, found.message);
-            match found.hint {
-                Some(hint) => finding.hint(hint),
-                None => finding,
-            }
-        })
+    /// Whether the scenario has the key and the value fits.
+    fn check(&self, key: &KeyPath, change: &Change, at: &str) -> Result<(), Finding> {
+        self.family
+            .check(key, change)
+            .map_err(|message| self.finding(at, message))
     }
 }
 
-/// Unit that the last name of a key says.
-fn unit_of(key: &KeyPath) -> String {
-    const UNITS: [(&str, &str); 14] = [
-        ("_mm_s3", "mm/s^3"),
-        ("_mm_s2", "mm/s^2"),
-        ("_mm_s", "mm/s"),
-        ("_deg_s3", "deg/s^3"),
-        ("_deg_s2", "deg/s^2"),
-        ("_deg_s", "deg/s"),
-        ("_nm_rad", "N m/rad"),
-        ("_nms_rad", "N m s/rad"),
-        ("_kgm2", "kg m^2"),
-        ("_hz", "Hz"),
-        ("_mm", "mm"),
-        ("_deg", "deg"),
-        ("_ms", "ms"),
-        ("_s", "s"),
-    ];
-    let text = key.to_string();
-    let name = text.rsplit('.').next().unwrap_or(&text);
-    let name = name.split('[').next().unwrap_or(name);
-    UNITS
-        .into_iter()
-        .find(|(ending, _)| name.ends_with(ending))
-        .map_or_else(String::new, |(_, unit)| unit.to_owned())
+/// What a value does to its key.
+fn change_of(section: &FactorSection, value: &Setting) -> Result<Change, String> {
+    if !section.relative {
+        return Ok(Change::Set(value.clone()));
+    }
+    value
+        .number()
+        .map(Change::Add)
+        .ok_or_else(|| format!("{value} cannot be added to a number"))
 }
 
 /// Two factors must not set the same key, and engines need dynamic cases.
-fn check_together(toml: &TomlText<'_>, study: &StudyFile, factors: &[StudyFactor], findings: &mut Vec<Finding>) {
+fn check_together(
+    toml: &TomlText<'_>,
+    study: &StudyFile,
+    factors: &[StudyFactor],
+    findings: &mut Vec<Finding>,
+) {
     let mut setters: BTreeMap<String, usize> = BTreeMap::new();
     for (index, factor) in factors.iter().enumerate() {
         let keys: Vec<(String, bool)> = match &factor.values {
@@ -500,7 +604,9 @@ fn check_together(toml: &TomlText<'_>, study: &StudyFile, factors: &[StudyFactor
     }
     let some_dynamic = study.mode == StudyMode::Dynamic
         || factors.iter().any(|factor| match &factor.values {
-            FactorValues::Levels(levels) => levels.iter().any(|level| level.mode == Some(StudyMode::Dynamic)),
+            FactorValues::Levels(levels) => levels
+                .iter()
+                .any(|level| level.mode == Some(StudyMode::Dynamic)),
             FactorValues::Continuum { .. } => false,
         });
     if study.engines.is_some() && !some_dynamic {
