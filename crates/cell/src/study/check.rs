@@ -505,19 +505,19 @@ impl FactorContext<'_> {
                     format!("two levels are called `{}`", section.name),
                 ));
             }
-            if section.set.is_empty() && section.mode.is_none() && section.engines.is_none() {
-                let unchanged = sections.iter().filter(|each| each.set.is_empty()).count();
-                if unchanged > 1 {
-                    return Err(self
-                        .finding(
-                            &here("name"),
-                            format!(
-                                "the level `{}` changes nothing, and is not alone",
-                                section.name
-                            ),
-                        )
-                        .hint("one level may stand for the scenario as it is"));
-                }
+            let is_bare = |each: &super::LevelSection| {
+                each.set.is_empty() && each.mode.is_none() && each.engines.is_none()
+            };
+            if is_bare(section) && sections.iter().filter(|each| is_bare(each)).count() > 1 {
+                return Err(self
+                    .finding(
+                        &here("name"),
+                        format!(
+                            "the level `{}` changes nothing, and is not alone",
+                            section.name
+                        ),
+                    )
+                    .hint("one level may stand for the scenario as it is"));
             }
             let mut changes = Vec::new();
             for (key, value) in &section.set {

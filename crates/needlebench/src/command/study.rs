@@ -1,0 +1,1 @@
+//! `needlebench study` and `needlebench merge`.
