@@ -27,7 +27,7 @@ use crate::progress::Progress;
 use crate::reality::{Reality, servo};
 
 /// Motions that MuJoCo makes at the same time: as many as a goal has configurations.
-const FLEET_ARMS: usize = 8;
+pub(crate) const FLEET_ARMS: usize = 8;
 
 /// Engines that a run uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -122,9 +122,9 @@ pub enum RunError {
 
 /// One motion to simulate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Job {
-    goal: usize,
-    configuration: usize,
+pub(crate) struct Job {
+    pub goal: usize,
+    pub configuration: usize,
 }
 
 /// Plans, simulates, measures and judges one scenario.
@@ -356,7 +356,7 @@ pub(crate) fn in_parallel<T: Sync, R: Send>(
 }
 
 /// Configurations that are simulated: those that work, and on request those that only collide.
-fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
+pub(crate) fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
     let everything = resolved.scenario.planning.simulate_rejected;
     let worth = |plan: &ConfigurationPlan| {
         plan.trajectory.is_some()
