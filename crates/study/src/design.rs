@@ -14,7 +14,7 @@ pub enum Role {
 }
 
 /// What a case varies.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Factor {
     /// Name of the column: letters, digits and `_`.
     pub name: String,
@@ -27,7 +27,8 @@ pub struct Factor {
 }
 
 /// Values of a factor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum FactorKind {
     /// Some.
     Levels(Vec<Level>),
@@ -41,7 +42,7 @@ pub enum FactorKind {
 }
 
 /// One of some values.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Level {
     /// In tables.
     pub label: String,
