@@ -11,8 +11,13 @@ mod results;
 mod row;
 mod sampling;
 mod sobol;
+mod store;
 
 pub use case::{CaseError, CaseEvaluator, CaseWorker};
 pub use design::{Design, DesignError, Factor, FactorKind, FactorValue, Level, Role};
 pub use results::{Results, ResultsError};
 pub use row::{CaseResult, METRIC_COUNT, METRICS, Metric, MetricColumn, Outcome, Row};
+pub use store::{
+    CSV_FILE, CaseDesign, JOURNAL_FILE, MANIFEST_FILE, Manifest, ParquetResults, Progress,
+    RESULTS_FILE, RunEnd, SCHEMA_VERSION, Shard, Status, StudyError, StudyRun, merge, write_csv,
+};
