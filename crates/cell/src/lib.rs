@@ -26,6 +26,7 @@ mod robot;
 pub mod scenario;
 pub mod shape;
 mod srdf;
+pub mod study_criteria;
 mod tessellate;
 mod thresholds;
 mod toml_text;

@@ -8,6 +8,7 @@ mod case;
 mod design;
 mod results;
 mod row;
+pub mod statistics;
 
 pub use case::{CaseError, CaseEvaluator, CaseWorker};
 pub use design::{Design, DesignError, Factor, FactorKind, FactorValue, Level, Role};
