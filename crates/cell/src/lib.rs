@@ -28,6 +28,7 @@ pub mod scenario;
 pub mod shape;
 mod srdf;
 pub mod study;
+pub mod study_criteria;
 mod tessellate;
 mod thresholds;
 mod toml_text;

@@ -12,6 +12,7 @@ mod row;
 mod sampling;
 mod sobol;
 mod store;
+pub mod statistics;
 
 pub use case::{CaseError, CaseEvaluator, CaseWorker};
 pub use design::{Design, DesignError, Factor, FactorKind, FactorValue, Level, Role};

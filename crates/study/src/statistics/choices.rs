@@ -1,0 +1,344 @@
+//! Which choice is the best: where the robot should stand, which tool it should have.
+
+use std::rc::Rc;
+
+use serde::{Deserialize, Serialize};
+
+use super::axis::Axis;
+use super::evidence::push_first;
+use super::interval::{Interval, Rate, about_mean};
+use super::layout::Layout;
+use super::moments::{Grouped, Points, combinations};
+use super::selection::Quantiles;
+use super::spread::QuantileValue;
+use crate::{CaseResult, Factor, FactorKind, FactorValue, Metric, Role};
+
+/// Combinations of sampled choices, in bins, that are ranked at most.
+const MOST_BINNED: usize = 256;
+
+/// Combinations of levels that are ranked at most.
+const MOST_CHOICES: usize = 1024;
+
+/// Bins of a sampled choice, where there are few others.
+const MOST_BINS: usize = 12;
+
+/// Fewest layouts that two choices have to differ by: even if all of them went one way, an exact
+/// McNemar test of fewer stays above 5 %.
+const FEWEST_DIFFERENT: u64 = 6;
+
+/// Share of the quantile of the best clearance.
+const CLEARANCE_P: f64 = 0.05;
+
+/// Choices, best first.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChoiceRanking {
+    /// The factors that are ours to choose and take more than one value.
+    pub axes: Vec<Axis>,
+    /// Configurations that have to be ok, of [`Choice::works_k`].
+    pub working_configurations: usize,
+    /// Whether all choices met the same circumstances.
+    pub paired: bool,
+    /// Whether the choices differ in which layouts can exist at all, so that their rates are not of
+    /// the same layouts.
+    pub validity_differs: bool,
+    /// By the share of layouts in which at least one configuration is ok, then by the 5 % quantile of
+    /// the best clearance, then by the median tip error.
+    pub choices: Vec<Choice>,
+}
+
+/// One combination of what is ours to choose.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Choice {
+    /// Bin of each axis.
+    pub bins: Vec<usize>,
+    /// In tables: the labels of its bins.
+    pub label: String,
+    /// Cases.
+    pub cases: u64,
+    /// Cases whose layout cannot exist.
+    pub invalid: u64,
+    /// Share of the valid layouts in which at least one configuration is ok.
+    pub works: Rate,
+    /// Share of the valid layouts in which at least [`ChoiceRanking::working_configurations`] are.
+    pub works_k: Rate,
+    /// 5 % quantile of the clearance of the best configuration, mm, over the layouts that have one.
+    pub best_clearance_mm: Option<QuantileValue>,
+    /// Median tip error of the best configuration, mm.
+    pub tip_error_mm: Option<QuantileValue>,
+    /// How much less often it works than the first; none of the first.
+    pub against_first: Option<Difference>,
+    /// First valid cases in which no configuration is ok.
+    pub failing: Vec<u64>,
+}
+
+/// Difference of two shares over the same circumstances, where they are the same.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Difference {
+    /// Share of the first less the share of this.
+    pub difference: f64,
+    /// Its interval; none where all layouts come from one sampled point.
+    pub interval: Option<Interval>,
+    /// Whether the interval leaves 0 out and at least 6 layouts differ.
+    pub distinguishable: bool,
+}
+
+struct Counter {
+    cases: u64,
+    invalid: u64,
+    works: Grouped,
+    works_k: Grouped,
+    working: u64,
+    working_k: u64,
+    clearance: Quantiles,
+    tip_error: Quantiles,
+    failing: Vec<u64>,
+    /// Sum of what identifies the circumstances, whatever their order.
+    circumstances: u64,
+}
+
+/// Counts over the choices.
+pub(crate) struct ChoiceCounter {
+    axes: Vec<Axis>,
+    k: usize,
+    repeats: u64,
+    cells: Vec<Counter>,
+    circumstances: Points,
+}
+
+impl ChoiceCounter {
+    /// None where nothing is ours to choose; an error in words where there is too much.
+    pub(crate) fn new(factors: &[Factor], k: usize) -> Option<Result<Self, String>> {
+        let chosen: Vec<(usize, &Factor)> = factors
+            .iter()
+            .enumerate()
+            .filter(|(_, factor)| factor.role == Role::Choice)
+            .filter(|(_, factor)| match &factor.kind {
+                FactorKind::Levels(levels) => levels.len() > 1,
+                FactorKind::Continuous { low, high } => high > low,
+            })
+            .collect();
+        if chosen.is_empty() {
+            return None;
+        }
+        let levels = combinations(factors, |factor| factor.role == Role::Choice);
+        let sampled = chosen
+            .iter()
+            .filter(|(_, factor)| matches!(factor.kind, FactorKind::Continuous { .. }))
+            .count();
+        let cells = |bins: usize| {
+            let bins = u32::try_from(sampled)
+                .ok()
+                .and_then(|n| (bins as u64).checked_pow(n));
+            bins.and_then(|bins| bins.checked_mul(levels))
+                .unwrap_or(u64::MAX)
+        };
+        let bins = (2..=MOST_BINS)
+            .rev()
+            .find(|&bins| cells(bins) <= MOST_BINNED as u64)
+            .unwrap_or(2);
+        let size = cells(bins);
+        if size > MOST_CHOICES as u64 {
+            return Some(Err(format!(
+                "{size} combinations of what is to be chosen are more than {MOST_CHOICES}: not ranked"
+            )));
+        }
+        let axes: Vec<Axis> = chosen
+            .into_iter()
+            .map(|(index, factor)| match factor.kind {
+                FactorKind::Levels(_) => Axis::new(index, factor, usize::MAX),
+                FactorKind::Continuous { .. } => Axis::new(index, factor, bins),
+            })
+            .collect();
+        let any_sampled = factors
+            .iter()
+            .any(|factor| matches!(factor.kind, FactorKind::Continuous { .. }));
+        let repeats = if any_sampled {
+            combinations(factors, |factor| factor.role == Role::Circumstance)
+        } else {
+            1
+        };
+        let count = axes.iter().map(Axis::len).product();
+        let quantiles = |p: f64| Quantiles::new(Rc::from([p]), repeats);
+        let counter = || Counter {
+            cases: 0,
+            invalid: 0,
+            works: Grouped::default(),
+            works_k: Grouped::default(),
+            working: 0,
+            working_k: 0,
+            clearance: quantiles(CLEARANCE_P),
+            tip_error: quantiles(0.5),
+            failing: Vec::new(),
+            circumstances: 0,
+        };
+        Some(Ok(Self {
+            axes,
+            k,
+            repeats,
+            cells: std::iter::repeat_with(counter).take(count).collect(),
+            circumstances: Points::of_circumstances(factors),
+        }))
+    }
+
+    fn cell(&self, values: &[FactorValue]) -> usize {
+        self.axes.iter().fold(0, |index, axis| {
+            index * axis.len() + axis.bin(values[axis.factor])
+        })
+    }
+
+    pub(crate) fn push(
+        &mut self,
+        values: &[FactorValue],
+        result: &CaseResult,
+        layout: Option<&Layout>,
+        group: usize,
+        pass: usize,
+    ) {
+        let cell = self.cell(values);
+        let circumstances = self.circumstances.hash(values);
+        let (k, cell) = (self.k, &mut self.cells[cell]);
+        if pass == 0 {
+            cell.cases += 1;
+            cell.circumstances = cell.circumstances.wrapping_add(circumstances);
+        }
+        let Some(layout) = layout else {
+            cell.invalid += u64::from(pass == 0);
+            return;
+        };
+        if pass == 0 {
+            let (works, works_k) = (layout.ok != 0, layout.working() >= k);
+            cell.works.push(group, f64::from(u8::from(works)));
+            cell.works_k.push(group, f64::from(u8::from(works_k)));
+            cell.working += u64::from(works);
+            cell.working_k += u64::from(works_k);
+            if !works {
+                push_first(&mut cell.failing, result.case);
+            }
+        }
+        if let Some(clearance) = layout.best_clearance {
+            cell.clearance.push(clearance);
+        }
+        if let Some(error) = layout
+            .best
+            .and_then(|best| result.rows[best].get(Metric::TipError))
+        {
+            cell.tip_error.push(error);
+        }
+    }
+
+    pub(crate) fn next_pass(&mut self) {
+        for cell in &mut self.cells {
+            cell.clearance.next_pass();
+            cell.tip_error.next_pass();
+        }
+    }
+
+    fn choice(&self, index: usize) -> Choice {
+        let cell = &self.cells[index];
+        let mut bins = Vec::new();
+        let mut left = index;
+        for axis in self.axes.iter().rev() {
+            bins.push(left % axis.len());
+            left /= axis.len();
+        }
+        bins.reverse();
+        let labels = self.axes.iter().zip(&bins).map(|(axis, &bin)| {
+            let label = &axis.bins[bin].label;
+            let unit = if axis.unit.is_empty() { "" } else { " " };
+            // A name needs no factor before it, a number does.
+            if axis.bins[bin].low.is_some() {
+                format!("{} {label}{unit}{}", axis.name, axis.unit)
+            } else {
+                label.clone()
+            }
+        });
+        let rate = |successes, grouped: &Grouped| {
+            let effect = grouped.design_effect_of_rate(self.repeats);
+            Rate::new(successes, cell.cases - cell.invalid, effect)
+        };
+        let quantile = |quantiles: &Quantiles, p: f64| {
+            let interval = quantiles.interval(p);
+            Some(QuantileValue {
+                p,
+                value: quantiles.value(p)?,
+                interval,
+                remark: interval
+                    .is_none()
+                    .then(|| "sample too small for an interval".to_owned()),
+            })
+        };
+        Choice {
+            label: labels.collect::<Vec<_>>().join(", "),
+            bins,
+            cases: cell.cases,
+            invalid: cell.invalid,
+            works: rate(cell.working, &cell.works),
+            works_k: rate(cell.working_k, &cell.works_k),
+            best_clearance_mm: quantile(&cell.clearance, CLEARANCE_P),
+            tip_error_mm: quantile(&cell.tip_error, 0.5),
+            against_first: None,
+            failing: cell.failing.clone(),
+        }
+    }
+
+    fn difference(&self, first: usize, other: usize) -> Option<Difference> {
+        let (a, b) = (&self.cells[first], &self.cells[other]);
+        let (size_a, size_b) = (a.cases - a.invalid, b.cases - b.invalid);
+        if size_a == 0 || size_b == 0 {
+            return None;
+        }
+        let (share_a, share_b) = (
+            a.working as f64 / size_a as f64,
+            b.working as f64 / size_b as f64,
+        );
+        let difference = share_a - share_b;
+        let spread = Grouped::squared_error_of_difference(&a.works, &b.works);
+        let interval =
+            spread.map(|(square, freedom)| about_mean(difference, square.sqrt(), freedom));
+        let layouts = difference.abs() * size_a.min(size_b) as f64;
+        Some(Difference {
+            difference,
+            interval,
+            distinguishable: interval.is_some_and(|interval| interval.low > 0.0)
+                && layouts.round() >= FEWEST_DIFFERENT as f64,
+        })
+    }
+
+    pub(crate) fn finish(&self) -> ChoiceRanking {
+        let used = (0..self.cells.len()).filter(|&index| self.cells[index].cases > 0);
+        let mut choices: Vec<(usize, Choice)> =
+            used.map(|index| (index, self.choice(index))).collect();
+        let quantile = |found: &Option<QuantileValue>, none: f64| {
+            found.as_ref().map_or(none, |found| found.value)
+        };
+        choices.sort_by(|(_, a), (_, b)| {
+            let share = |choice: &Choice| choice.works.rate.unwrap_or(-1.0);
+            let clearance =
+                |choice: &Choice| quantile(&choice.best_clearance_mm, f64::NEG_INFINITY);
+            let error = |choice: &Choice| quantile(&choice.tip_error_mm, f64::INFINITY);
+            share(b)
+                .total_cmp(&share(a))
+                .then(clearance(b).total_cmp(&clearance(a)))
+                .then(error(a).total_cmp(&error(b)))
+        });
+        let first = choices.first().map(|(index, _)| *index);
+        for (index, choice) in choices.iter_mut().skip(1) {
+            choice.against_first = first.and_then(|first| self.difference(first, *index));
+        }
+        let mut used = self.cells.iter().filter(|cell| cell.cases > 0);
+        let paired = used.next().is_some_and(|first| {
+            used.all(|each| each.cases == first.cases && each.circumstances == first.circumstances)
+        });
+        let invalid = |choice: &Choice| choice.invalid as f64 / choice.cases as f64;
+        let validity_differs = choices
+            .iter()
+            .any(|(_, choice)| invalid(choice) != invalid(&choices[0].1));
+        ChoiceRanking {
+            axes: self.axes.clone(),
+            working_configurations: self.k,
+            paired,
+            validity_differs,
+            choices: choices.into_iter().map(|(_, choice)| choice).collect(),
+        }
+    }
+}

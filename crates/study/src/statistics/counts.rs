@@ -1,0 +1,208 @@
+//! Cases, outcomes and success rates.
+
+use std::collections::BTreeMap;
+
+use needlebench_kinematics::ik::Configuration;
+use serde::{Deserialize, Serialize};
+
+use super::interval::Rate;
+use super::layout::{CONFIGURATIONS, Layout};
+use super::moments::Grouped;
+use crate::{CaseResult, Outcome};
+
+/// Details that are told apart for each configuration and outcome; the rest count as `other`.
+const MOST_DETAILS: usize = 100;
+
+/// What became of cases and configurations: of all, or of one goal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Counts {
+    /// The goal; none of all.
+    pub goal: Option<String>,
+    /// Cases.
+    pub cases: u64,
+    /// Cases whose layout cannot exist. They are in none of the rates.
+    pub invalid: u64,
+    /// Why they cannot, by the key that is at fault; the most frequent first.
+    pub invalid_details: Vec<DetailCount>,
+    /// Valid layouts: cases that are not invalid.
+    pub layouts: u64,
+    /// Share of the valid layouts in which at least 1, 2, ... 8 configurations are ok.
+    pub at_least: Vec<Rate>,
+    /// Valid layouts in which exactly 0, 1, ... 8 configurations are ok.
+    pub working: Vec<u64>,
+    /// The eight configurations.
+    pub configurations: Vec<ConfigurationCounts>,
+}
+
+/// What became of a configuration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ConfigurationCounts {
+    /// Its label.
+    pub label: String,
+    /// Layouts in which it is ok.
+    pub ok: u64,
+    /// Layouts in which it misses a criterion.
+    pub failed: u64,
+    /// Layouts in which a rule rejects it.
+    pub rejected: u64,
+    /// Layouts in which it is the best: ok, with the largest clearance of those that are.
+    pub best: u64,
+    /// Share of the valid layouts in which it is ok.
+    pub success: Rate,
+    /// What failed and rejected it, the most frequent first.
+    pub details: Vec<DetailCount>,
+}
+
+/// How often a detail was the reason.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DetailCount {
+    /// The outcome that it explains.
+    pub outcome: Outcome,
+    /// The rule, criterion or key.
+    pub detail: String,
+    /// Rows, or cases of an invalid layout.
+    pub count: u64,
+}
+
+/// Counters of one goal.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Counter {
+    invalid: u64,
+    outcomes: [[u64; CONFIGURATIONS]; 3],
+    best: [u64; CONFIGURATIONS],
+    working: [u64; CONFIGURATIONS + 1],
+    details: [BTreeMap<String, u64>; CONFIGURATIONS],
+    failed_details: [BTreeMap<String, u64>; CONFIGURATIONS],
+    invalid_details: BTreeMap<String, u64>,
+    success: [Grouped; CONFIGURATIONS],
+    at_least: [Grouped; CONFIGURATIONS],
+}
+
+/// Counts without allocating where the detail is known.
+fn count_detail(details: &mut BTreeMap<String, u64>, detail: &str, by: u64) {
+    if let Some(count) = details.get_mut(detail) {
+        *count += by;
+    } else if details.len() < MOST_DETAILS {
+        details.insert(detail.to_owned(), by);
+    } else {
+        *details.entry("other".to_owned()).or_default() += by;
+    }
+}
+
+impl Counter {
+    pub(crate) fn push(&mut self, result: &CaseResult, layout: Option<&Layout>, group: usize) {
+        let Some(layout) = layout else {
+            self.invalid += 1;
+            let rows = result.rows.iter();
+            let detail = rows
+                .filter(|row| row.outcome == Outcome::Invalid)
+                .map(|row| row.detail.as_ref())
+                .next();
+            count_detail(&mut self.invalid_details, detail.unwrap_or_default(), 1);
+            return;
+        };
+        for (index, row) in result.rows.iter().enumerate() {
+            self.outcomes[row.outcome as usize][index] += 1;
+            match row.outcome {
+                Outcome::Failed => count_detail(&mut self.failed_details[index], &row.detail, 1),
+                Outcome::Rejected => count_detail(&mut self.details[index], &row.detail, 1),
+                Outcome::Ok | Outcome::Invalid => {}
+            }
+            self.success[index].push(group, f64::from(u8::from(layout.works(index))));
+        }
+        if let Some(best) = layout.best {
+            self.best[best] += 1;
+        }
+        self.working[layout.working()] += 1;
+        for (index, grouped) in self.at_least.iter_mut().enumerate() {
+            grouped.push(group, f64::from(u8::from(layout.working() > index)));
+        }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        fn add<const N: usize>(to: &mut [u64; N], from: &[u64; N]) {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to += from;
+            }
+        }
+        fn add_details(to: &mut BTreeMap<String, u64>, from: &BTreeMap<String, u64>) {
+            for (detail, count) in from {
+                count_detail(to, detail, *count);
+            }
+        }
+        self.invalid += other.invalid;
+        for (to, from) in self.outcomes.iter_mut().zip(&other.outcomes) {
+            add(to, from);
+        }
+        add(&mut self.best, &other.best);
+        add(&mut self.working, &other.working);
+        add_details(&mut self.invalid_details, &other.invalid_details);
+        for index in 0..CONFIGURATIONS {
+            add_details(&mut self.details[index], &other.details[index]);
+            add_details(
+                &mut self.failed_details[index],
+                &other.failed_details[index],
+            );
+            self.success[index].add(&other.success[index]);
+            self.at_least[index].add(&other.at_least[index]);
+        }
+    }
+
+    /// Design effect of a configuration's success rate.
+    pub(crate) fn design_effect(&self, configuration: usize, repeats: u64) -> f64 {
+        self.success[configuration].design_effect_of_rate(repeats)
+    }
+
+    /// The numbers of a goal, or of all; `repeats` cases come from each sampled point.
+    pub(crate) fn finish(&self, goal: Option<String>, repeats: u64) -> Counts {
+        let layouts: u64 = self.working.iter().sum();
+        let rate = |successes, grouped: &Grouped| {
+            Rate::new(successes, layouts, grouped.design_effect_of_rate(repeats))
+        };
+        let configurations = Configuration::ALL.iter().enumerate();
+        Counts {
+            goal,
+            cases: layouts + self.invalid,
+            invalid: self.invalid,
+            invalid_details: sorted([(Outcome::Invalid, &self.invalid_details)]),
+            layouts,
+            at_least: (1..=CONFIGURATIONS)
+                .map(|k| rate(self.working[k..].iter().sum(), &self.at_least[k - 1]))
+                .collect(),
+            working: self.working.to_vec(),
+            configurations: configurations
+                .map(|(index, configuration)| {
+                    let outcome = |outcome: Outcome| self.outcomes[outcome as usize][index];
+                    ConfigurationCounts {
+                        label: configuration.label().to_owned(),
+                        ok: outcome(Outcome::Ok),
+                        failed: outcome(Outcome::Failed),
+                        rejected: outcome(Outcome::Rejected),
+                        best: self.best[index],
+                        success: rate(outcome(Outcome::Ok), &self.success[index]),
+                        details: sorted([
+                            (Outcome::Failed, &self.failed_details[index]),
+                            (Outcome::Rejected, &self.details[index]),
+                        ]),
+                    }
+                })
+                .collect(),
+        }
+    }
+}
+
+/// The most frequent first, equal ones in the order of their names.
+fn sorted<const N: usize>(maps: [(Outcome, &BTreeMap<String, u64>); N]) -> Vec<DetailCount> {
+    let mut found: Vec<DetailCount> = maps
+        .into_iter()
+        .flat_map(|(outcome, map)| {
+            map.iter().map(move |(detail, count)| DetailCount {
+                outcome,
+                detail: detail.clone(),
+                count: *count,
+            })
+        })
+        .collect();
+    found.sort_by_key(|each| std::cmp::Reverse(each.count));
+    found
+}

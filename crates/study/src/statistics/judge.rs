@@ -1,0 +1,213 @@
+//! Whether a study shows what it has to.
+
+use needlebench_cell::study_criteria::{BEST, EVERY, QuantileCriterion, StudyCriteria};
+use needlebench_kinematics::ik::Configuration;
+use serde::{Deserialize, Serialize};
+
+use super::interval::{Interval, Rate};
+use super::{MOST_CASES, Summary};
+
+/// Verdict of one criterion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CriterionResult {
+    /// Key of the criterion.
+    pub criterion: String,
+    /// Configuration that it is about, or `best`; none of the layouts as such.
+    pub of: Option<String>,
+    /// Whether it is met.
+    pub pass: bool,
+    /// The estimate; none where there is nothing to estimate it from.
+    pub value: Option<f64>,
+    /// Its 95 % interval.
+    pub interval: Option<Interval>,
+    /// The limit.
+    pub limit: f64,
+    /// Unit of the three; `1` of a share.
+    pub unit: String,
+    /// Whether the unfavourable end of the interval was judged instead of the estimate.
+    pub confidence: bool,
+    /// In words: what was judged, and what to keep in mind.
+    pub detail: String,
+    /// Numbers of the worst cases, whatever the verdict.
+    pub cases: Vec<u64>,
+}
+
+/// What is judged.
+struct Judged {
+    criterion: &'static str,
+    of: Option<String>,
+    value: Option<f64>,
+    interval: Option<Interval>,
+    limit: f64,
+    at_least: bool,
+    unit: &'static str,
+    what: String,
+    cases: Vec<u64>,
+}
+
+impl Judged {
+    fn verdict(self, confidence: bool) -> CriterionResult {
+        let end = |interval: Interval| {
+            if self.at_least {
+                interval.low
+            } else {
+                interval.high
+            }
+        };
+        let judged = if confidence {
+            self.interval.map(end)
+        } else {
+            self.value
+        };
+        let meets = |value: f64| {
+            if self.at_least {
+                value >= self.limit
+            } else {
+                value <= self.limit
+            }
+        };
+        let detail = match (self.value, judged) {
+            (None, _) => format!("{}: there are no values", self.what),
+            (Some(_), None) => format!("{}: the sample is too small for an interval", self.what),
+            _ => self.what,
+        };
+        CriterionResult {
+            criterion: self.criterion.to_owned(),
+            of: self.of,
+            pass: judged.is_some_and(meets),
+            value: self.value,
+            interval: self.interval,
+            limit: self.limit,
+            unit: self.unit.to_owned(),
+            confidence,
+            detail,
+            cases: self.cases,
+        }
+    }
+}
+
+/// Judges a study. One result per criterion, or per configuration of a criterion on `every`, in the
+/// order of the keys.
+pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<CriterionResult> {
+    let mut judged = Vec::new();
+    let k = criteria.working_configurations.unwrap_or(1).clamp(1, 8) as usize;
+    let overall = &summary.overall;
+    if let Some(limit) = criteria.min_layouts_working {
+        let what = match k {
+            1 => "layouts in which at least one configuration is ok".to_owned(),
+            _ => format!("layouts in which at least {k} configurations are ok"),
+        };
+        let cases = summary.evidence.fewer_than[k - 1].clone();
+        judged.push(of_rate(
+            "min_layouts_working",
+            &overall.at_least[k - 1],
+            limit,
+            what,
+            cases,
+        ));
+    }
+    if !criteria.min_success_rate.is_empty() {
+        for (index, configuration) in Configuration::ALL.iter().enumerate() {
+            let label = configuration.label();
+            let rates = &criteria.min_success_rate;
+            let Some(limit) = rates.get(label).or_else(|| rates.get(EVERY)) else {
+                continue;
+            };
+            let cases = summary.evidence.configurations[index].not_ok.clone();
+            let rate = &overall.configurations[index].success;
+            let what = format!("layouts in which {label} is ok");
+            judged.push(Judged {
+                of: Some(label.to_owned()),
+                ..of_rate("min_success_rate", rate, *limit, what, cases)
+            });
+        }
+    }
+    if let Some(limit) = criteria.max_invalid_layouts {
+        // Which layouts can exist is as good as known of each point.
+        let rate = Rate::new(overall.invalid, overall.cases, summary.repeats as f64);
+        let what = "layouts that cannot exist".to_owned();
+        judged.push(Judged {
+            at_least: false,
+            ..of_rate(
+                "max_invalid_layouts",
+                &rate,
+                limit,
+                what,
+                summary.evidence.invalid.clone(),
+            )
+        });
+    }
+    for criterion in criteria.quantiles() {
+        if criterion.of == EVERY {
+            let labels = Configuration::ALL.iter().map(|each| each.label());
+            // A configuration that is always rejected has no values, and nothing to be judged by.
+            let seen = labels.filter(|label| summary.spread(label, criterion.column).is_some());
+            let before = judged.len();
+            judged.extend(seen.map(|label| of_quantile(summary, &criterion, label)));
+            if judged.len() == before {
+                judged.push(of_quantile(summary, &criterion, EVERY));
+            }
+        } else {
+            judged.push(of_quantile(summary, &criterion, criterion.of));
+        }
+    }
+    judged
+        .into_iter()
+        .map(|each| each.verdict(criteria.confidence))
+        .collect()
+}
+
+fn of_rate(
+    criterion: &'static str,
+    rate: &Rate,
+    limit: f64,
+    what: String,
+    cases: Vec<u64>,
+) -> Judged {
+    Judged {
+        criterion,
+        of: None,
+        value: rate.rate,
+        interval: rate.interval,
+        limit,
+        at_least: true,
+        unit: "1",
+        what: match &rate.remark {
+            Some(remark) => format!("{what}; {remark}"),
+            None => what,
+        },
+        cases,
+    }
+}
+
+fn of_quantile(summary: &Summary, criterion: &QuantileCriterion<'_>, of: &str) -> Judged {
+    let spread = summary.spread(of, criterion.column);
+    let quantile = spread.and_then(|spread| spread.quantile(criterion.quantile));
+    let worst = summary.evidence.configurations.iter();
+    let cases = worst
+        .filter(|each| each.of == of)
+        .flat_map(|each| &each.worst)
+        .filter(|each| each.metric == criterion.column)
+        .flat_map(|each| each.cases.iter().map(|each| each.case))
+        .take(MOST_CASES);
+    let who = if of == BEST {
+        "the best configuration"
+    } else {
+        of
+    };
+    let count = spread.map_or(0, |spread| spread.count);
+    Judged {
+        criterion: criterion.key,
+        of: Some(of.to_owned()),
+        value: quantile.map(|quantile| quantile.value),
+        interval: quantile.and_then(|quantile| quantile.interval),
+        limit: criterion.limit,
+        at_least: criterion.at_least,
+        unit: "mm",
+        what: format!(
+            "{} % quantile of {who} over {count} layouts",
+            100.0 * criterion.quantile
+        ),
+        cases: cases.collect(),
+    }
+}

@@ -1,0 +1,113 @@
+//! What the statistics need to know of a case.
+
+use crate::{CaseResult, FactorValue, Metric, Outcome, Results, ResultsError, Row};
+
+/// Number of configurations.
+pub(crate) const CONFIGURATIONS: usize = 8;
+
+/// What became of a layout, over its configurations.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layout {
+    /// Configurations that are ok, as bits.
+    pub ok: u8,
+    /// Configuration with the largest clearance of those that are ok; the first of equal ones.
+    pub best: Option<usize>,
+    /// Its clearance, mm.
+    pub best_clearance: Option<f32>,
+    /// Least tip error of those that are ok, mm.
+    pub least_tip_error: Option<f32>,
+}
+
+impl Layout {
+    /// None of a layout that cannot exist.
+    pub(crate) fn of(result: &CaseResult) -> Option<Self> {
+        let mut layout = Self {
+            ok: 0,
+            best: None,
+            best_clearance: None,
+            least_tip_error: None,
+        };
+        for (index, row) in result.rows.iter().enumerate() {
+            match row.outcome {
+                Outcome::Invalid => return None,
+                Outcome::Ok => layout.ok |= 1 << index,
+                Outcome::Failed | Outcome::Rejected => continue,
+            }
+            if let Some(clearance) = row.get(Metric::Clearance)
+                && layout.best_clearance.is_none_or(|best| clearance > best)
+            {
+                layout.best = Some(index);
+                layout.best_clearance = Some(clearance);
+            }
+            if let Some(error) = row.get(Metric::TipError)
+                && layout.least_tip_error.is_none_or(|least| error < least)
+            {
+                layout.least_tip_error = Some(error);
+            }
+        }
+        Some(layout)
+    }
+
+    /// Number of configurations that are ok.
+    pub(crate) fn working(&self) -> usize {
+        self.ok.count_ones() as usize
+    }
+
+    /// Whether a configuration is ok.
+    pub(crate) fn works(&self, configuration: usize) -> bool {
+        self.ok >> configuration & 1 == 1
+    }
+}
+
+/// Whether a row's numbers are of a configuration that was not rejected.
+pub(crate) fn has_numbers(row: &Row) -> bool {
+    matches!(row.outcome, Outcome::Ok | Outcome::Failed)
+}
+
+/// Visits all cases and refuses such as do not fit the factors.
+pub(crate) fn visit_checked(
+    results: &dyn Results,
+    mut visit: impl FnMut(&[FactorValue], &CaseResult),
+) -> Result<(), ResultsError> {
+    use crate::FactorKind;
+    let factors = results.factors();
+    let mut wrong: Option<String> = None;
+    let mut seen = 0_u64;
+    results.visit(&mut |values, result| {
+        if wrong.is_some() {
+            return;
+        }
+        let fits = values.len() == factors.len()
+            && factors
+                .iter()
+                .zip(values)
+                .all(|(factor, value)| match (&factor.kind, value) {
+                    (FactorKind::Levels(levels), FactorValue::Level(level)) => {
+                        *level < levels.len()
+                    }
+                    (FactorKind::Continuous { .. }, FactorValue::Number(number)) => {
+                        number.is_finite()
+                    }
+                    _ => false,
+                });
+        if fits {
+            seen += 1;
+            visit(values, result);
+        } else {
+            wrong = Some(format!(
+                "case {} has values that its factors cannot have",
+                result.case
+            ));
+        }
+    })?;
+    if wrong.is_none() && seen != results.cases() {
+        wrong = Some(format!("{seen} cases instead of {}", results.cases()));
+    }
+    match wrong {
+        None => Ok(()),
+        Some(message) => Err(ResultsError {
+            file: "results".to_owned(),
+            message,
+        }),
+    }
+}

@@ -1,0 +1,290 @@
+//! Statistics of a table of results.
+//!
+//! [`summarise`] reads the table from the first case to the last, three times, and keeps counters
+//! alone: its memory does not grow with the number of cases, and the result depends on the table
+//! alone. Lengths are in mm and angles in degrees, as in the table; shares are 0 to 1.
+
+mod axis;
+mod choices;
+mod counts;
+mod effects;
+mod evidence;
+mod interval;
+mod judge;
+mod layout;
+mod methods;
+mod moments;
+mod regions;
+mod selection;
+mod spread;
+#[cfg(test)]
+pub(crate) mod synthetic;
+#[cfg(test)]
+mod tests;
+
+use std::rc::Rc;
+
+use serde::{Deserialize, Serialize};
+
+pub use axis::{Axis, Bin};
+pub use choices::{Choice, ChoiceRanking, Difference};
+pub use counts::{ConfigurationCounts, Counts, DetailCount};
+pub use effects::{BinMean, Effects, Interaction, MainEffect, ResponseEffects};
+pub use evidence::{CaseValue, ConfigurationEvidence, Evidence, MOST_CASES, WorstCases};
+pub use interval::{CONFIDENCE, Interval, Rate, mcnemar, wilson};
+pub use judge::{CriterionResult, judge_study};
+pub use methods::Method;
+pub use regions::{RegionCell, RegionMap, Regions};
+pub use spread::{BEST, PROBABILITIES, QuantileValue, SPREAD_METRICS, Spread};
+
+pub(crate) use evidence::Largest;
+pub(crate) use layout::{CONFIGURATIONS, Layout, has_numbers};
+pub(crate) use moments::{Grouped, Points};
+pub(crate) use selection::{PASSES, Quantiles};
+
+use crate::{Factor, FactorKind, FactorValue, Results, ResultsError};
+use choices::ChoiceCounter;
+use counts::Counter;
+use effects::{Interactions, MainEffects};
+use evidence::Collector;
+use regions::RegionCounter;
+use spread::Spreads;
+
+/// Version of the keys of a [`Summary`].
+pub const SUMMARY_VERSION: u32 = 1;
+
+/// Bins of a factor in its effects, at most.
+const MOST_EFFECT_BINS: usize = 16;
+/// Bins of a factor in maps, at most.
+const MOST_MAP_BINS: usize = 12;
+/// Factors whose pairs are looked at, at most.
+const MOST_PAIRED: usize = 10;
+
+/// How the sampled factors' points were chosen.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Independent random points, or not known.
+    #[default]
+    Random,
+    /// Sobol's sequence.
+    Sobol,
+    /// Latin hypercube.
+    LatinHypercube,
+}
+
+/// What to sum up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SummaryOptions {
+    /// How the points were chosen, which the remarks on intervals depend on.
+    pub sampling: Sampling,
+    /// Configurations that have to be ok in [`Choice::works_k`], 1 to 8.
+    pub working_configurations: usize,
+    /// Quantiles to give beside [`PROBABILITIES`], such as those of criteria.
+    pub more_quantiles: Vec<f64>,
+    /// Whether to give effects, maps and the ranking of choices.
+    pub factors: bool,
+}
+
+impl Default for SummaryOptions {
+    fn default() -> Self {
+        Self {
+            sampling: Sampling::Random,
+            working_configurations: 2,
+            more_quantiles: Vec::new(),
+            factors: true,
+        }
+    }
+}
+
+/// Statistics of a table of results.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Version of the keys.
+    pub schema_version: u32,
+    /// Confidence of every interval, 0 to 1.
+    pub confidence: f64,
+    /// How the sampled factors' points were chosen.
+    pub sampling: Sampling,
+    /// Cases that each sampled point appears in: once in each combination of the crossed factors.
+    pub repeats: u64,
+    /// What became of all cases.
+    pub overall: Counts,
+    /// The same by goal.
+    pub goals: Vec<Counts>,
+    /// Spread of the metrics, configuration by configuration, the best of each layout last.
+    pub spreads: Vec<Spread>,
+    /// What the factors do.
+    pub effects: Effects,
+    /// Which configuration is the best where.
+    pub regions: Regions,
+    /// Which choice is the best; none where nothing is ours to choose.
+    pub choices: Option<ChoiceRanking>,
+    /// Cases that are worth a look.
+    pub evidence: Evidence,
+    /// What to keep in mind, in words.
+    pub notes: Vec<String>,
+    /// How the numbers were found, with sources.
+    pub methods: Vec<Method>,
+}
+
+impl Summary {
+    /// Spread of a metric's column over a configuration, by label, or [`BEST`].
+    pub fn spread(&self, of: &str, metric: &str) -> Option<&Spread> {
+        let mut all = self.spreads.iter();
+        all.find(|each| each.of == of && each.metric == metric)
+    }
+}
+
+/// Whether a factor takes more than one value.
+fn varies(factor: &Factor) -> bool {
+    match &factor.kind {
+        FactorKind::Levels(levels) => levels.len() > 1,
+        FactorKind::Continuous { low, high } => high > low,
+    }
+}
+
+/// Cuts all factors that vary.
+fn axes(factors: &[Factor], bins: usize) -> Vec<Axis> {
+    let varying = factors.iter().enumerate().filter(|(_, each)| varies(each));
+    varying
+        .map(|(index, factor)| Axis::new(index, factor, bins))
+        .collect()
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped"
+)]
+fn bins(wanted: f64, most: usize) -> usize {
+    (wanted.min(most as f64) as usize).max(2)
+}
+
+/// Sums up a table of results.
+///
+/// # Errors
+/// If it cannot be read, or if its cases do not fit its factors.
+pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summary, ResultsError> {
+    let factors = results.factors();
+    let points = Points::new(factors);
+    let independent = results.cases() as f64 / points.repeats as f64;
+    let goals = match factors.first().map(|factor| &factor.kind) {
+        Some(FactorKind::Levels(levels)) => {
+            levels.iter().map(|level| level.label.clone()).collect()
+        }
+        _ => vec![String::new()],
+    };
+    let mut counters = vec![Counter::default(); goals.len()];
+    let mut probabilities = PROBABILITIES.to_vec();
+    probabilities.extend(&options.more_quantiles);
+    probabilities.sort_by(f64::total_cmp);
+    probabilities.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+    let mut spreads = Spreads::new(Rc::from(probabilities), points.repeats);
+    let mut evidence = Collector::default();
+    let considered = if options.factors { factors } else { &[] };
+    let mut main = MainEffects::new(
+        // Ten layouts or more in a bin, on average.
+        axes(considered, bins(independent / 10.0, MOST_EFFECT_BINS)),
+        points.repeats,
+    );
+    let k = options.working_configurations.clamp(1, CONFIGURATIONS);
+    let (mut choices, too_many) = match ChoiceCounter::new(considered, k) {
+        None => (None, None),
+        Some(Ok(choices)) => (Some(choices), None),
+        Some(Err(message)) => (None, Some(message)),
+    };
+
+    visit_goals(results, |goal, values, result, layout| {
+        let group = points.group(values);
+        counters[goal].push(result, layout, group);
+        evidence.push(result, layout);
+        if let Some(choices) = &mut choices {
+            choices.push(values, result, layout, group, 0);
+        }
+        if let Some(layout) = layout {
+            spreads.push(result, layout, 0);
+            main.push(values, layout, group);
+        }
+    })?;
+    spreads.next_pass();
+    if let Some(choices) = &mut choices {
+        choices.next_pass();
+    }
+
+    let strongest = main.strongest(MOST_PAIRED);
+    // Five layouts or more in a cell of an interaction, twenty in one of a map, on average.
+    let fine = axes(
+        considered,
+        bins((independent / 5.0).sqrt(), MOST_EFFECT_BINS),
+    );
+    let coarse = axes(considered, bins((independent / 20.0).sqrt(), MOST_MAP_BINS));
+    let paired = strongest.iter().map(|&axis| (axis, fine[axis].clone()));
+    let mut interactions = Interactions::new(paired.collect(), &main);
+    let mut regions = RegionCounter::new(coarse, strongest.clone());
+    for pass in 1..PASSES {
+        visit_goals(results, |_, values, result, layout| {
+            if let Some(choices) = &mut choices {
+                choices.push(values, result, layout, 0, pass);
+            }
+            if let Some(layout) = layout {
+                spreads.push(result, layout, pass);
+                if pass == 1 {
+                    interactions.push(values, layout);
+                    regions.push(values, layout);
+                }
+            }
+        })?;
+        spreads.next_pass();
+        if let Some(choices) = &mut choices {
+            choices.next_pass();
+        }
+    }
+
+    let mut all = Counter::default();
+    for counter in &counters {
+        all.add(counter);
+    }
+    // Which configuration is the best depends on the point at most as much as which of them work.
+    let effect = (0..CONFIGURATIONS)
+        .map(|configuration| all.design_effect(configuration, points.repeats))
+        .fold(1.0, f64::max);
+    let per_goal = points.repeats / goals.len().max(1) as u64;
+    let overall = all.finish(None, points.repeats);
+    let goals = goals.into_iter().zip(&counters);
+    let mut summary = Summary {
+        schema_version: SUMMARY_VERSION,
+        confidence: CONFIDENCE,
+        sampling: options.sampling,
+        repeats: points.repeats,
+        overall,
+        goals: goals
+            .map(|(goal, counter)| counter.finish(Some(goal), per_goal))
+            .collect(),
+        spreads: spreads.finish(),
+        effects: main.finish(&interactions),
+        regions: regions.finish(effect),
+        choices: choices.map(|choices| choices.finish()),
+        evidence: evidence.finish(),
+        notes: Vec::new(),
+        methods: methods::methods(),
+    };
+    summary.notes = methods::notes(&summary, factors, strongest.len());
+    summary.notes.extend(too_many);
+    Ok(summary)
+}
+
+/// Visits all cases with their goals.
+fn visit_goals(
+    results: &dyn Results,
+    mut visit: impl FnMut(usize, &[FactorValue], &crate::CaseResult, Option<&Layout>),
+) -> Result<(), ResultsError> {
+    layout::visit_checked(results, |values, result| {
+        let goal = match values.first() {
+            Some(FactorValue::Level(level)) => *level,
+            _ => 0,
+        };
+        let layout = Layout::of(result);
+        visit(goal, values, result, layout.as_ref());
+    })
+}

@@ -1,0 +1,219 @@
+//! Means, variances, and what repeated points make of them.
+
+use crate::{Factor, FactorKind, FactorValue, Role};
+
+/// Count, mean and variance of a stream, about its first value so that nothing cancels.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Moments {
+    count: u64,
+    shift: f64,
+    sum: f64,
+    square: f64,
+}
+
+impl Moments {
+    pub(crate) fn push(&mut self, value: f64) {
+        if self.count == 0 {
+            self.shift = value;
+        }
+        self.count += 1;
+        let d = value - self.shift;
+        self.sum += d;
+        self.square += d * d;
+    }
+
+    pub(crate) fn count(&self) -> u64 {
+        self.count
+    }
+
+    pub(crate) fn mean(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.shift + self.sum / self.count as f64)
+    }
+
+    /// Sum of the squared deviations from the mean.
+    pub(crate) fn deviations(&self) -> f64 {
+        if self.count == 0 {
+            return 0.0;
+        }
+        (self.square - self.sum * self.sum / self.count as f64).max(0.0)
+    }
+
+    /// Standard deviation of the sample, with `n - 1`.
+    pub(crate) fn standard_deviation(&self) -> Option<f64> {
+        (self.count > 1).then(|| (self.deviations() / (self.count - 1) as f64).sqrt())
+    }
+}
+
+/// Random groups that the sampled points are put into.
+pub(crate) const GROUPS: usize = 64;
+
+/// Which cases come from the same sampled point, and how many there are of each.
+#[derive(Debug, Clone)]
+pub(crate) struct Points {
+    /// Factors whose values together are a point.
+    keys: Vec<usize>,
+    /// Cases of a point.
+    pub repeats: u64,
+}
+
+impl Points {
+    /// Points of sampled circumstances; without such, of all circumstances; without any, of all
+    /// factors. Sampled factors have the same points in each combination of the crossed ones, so
+    /// that each point appears in as many cases as there are combinations.
+    pub(crate) fn new(factors: &[Factor]) -> Self {
+        let some = |wanted: &dyn Fn(&Factor) -> bool| -> Vec<usize> {
+            let found = factors.iter().enumerate().filter(|(_, each)| wanted(each));
+            found.map(|(index, _)| index).collect()
+        };
+        let sampled = |factor: &Factor| matches!(factor.kind, FactorKind::Continuous { .. });
+        let circumstance = |factor: &Factor| factor.role == Role::Circumstance;
+        let repeats = if factors.iter().any(sampled) {
+            combinations(factors, |_| true)
+        } else {
+            1
+        };
+        let keys = [
+            some(&|factor| sampled(factor) && circumstance(factor)),
+            some(&circumstance),
+            some(&|_| true),
+        ];
+        Self {
+            keys: keys
+                .into_iter()
+                .find(|keys| !keys.is_empty())
+                .unwrap_or_default(),
+            repeats,
+        }
+    }
+
+    /// All circumstances together.
+    pub(crate) fn of_circumstances(factors: &[Factor]) -> Self {
+        let all = factors.iter().enumerate();
+        let keys = all.filter(|(_, factor)| factor.role == Role::Circumstance);
+        Self {
+            keys: keys.map(|(index, _)| index).collect(),
+            repeats: 1,
+        }
+    }
+
+    /// Group of a case: the same for all cases of a point.
+    pub(crate) fn group(&self, values: &[FactorValue]) -> usize {
+        usize::try_from(self.hash(values) % GROUPS as u64).expect("below 64")
+    }
+
+    /// What identifies the point of a case.
+    pub(crate) fn hash(&self, values: &[FactorValue]) -> u64 {
+        self.keys.iter().fold(0, |hash, &key| {
+            mixed(
+                hash ^ match values[key] {
+                    FactorValue::Level(level) => level as u64,
+                    FactorValue::Number(number) => number.to_bits(),
+                },
+            )
+        })
+    }
+}
+
+/// Combinations of the levels of those factors that are wanted.
+pub(crate) fn combinations(factors: &[Factor], wanted: impl Fn(&Factor) -> bool) -> u64 {
+    let levels = factors.iter().filter(|each| wanted(each));
+    levels.fold(1_u64, |product, factor| match &factor.kind {
+        FactorKind::Levels(levels) => product.saturating_mul(levels.len().max(1) as u64),
+        FactorKind::Continuous { .. } => product,
+    })
+}
+
+/// Finaliser of `SplitMix64` (Steele, Lea, Flood, 2014): every bit depends on every other.
+fn mixed(value: u64) -> u64 {
+    let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// Sums of a response over random groups of the sampled points.
+#[derive(Debug, Clone)]
+pub(crate) struct Grouped {
+    count: [f64; GROUPS],
+    sum: [f64; GROUPS],
+}
+
+impl Default for Grouped {
+    fn default() -> Self {
+        Self {
+            count: [0.0; GROUPS],
+            sum: [0.0; GROUPS],
+        }
+    }
+}
+
+impl Grouped {
+    pub(crate) fn push(&mut self, group: usize, value: f64) {
+        self.count[group] += 1.0;
+        self.sum[group] += value;
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        for group in 0..GROUPS {
+            self.count[group] += other.count[group];
+            self.sum[group] += other.sum[group];
+        }
+    }
+
+    /// How much larger the variance of the mean is than that of as many independent cases: from the
+    /// spread of the groups, at least 1. A sample of which no point appears twice has 1.
+    pub(crate) fn design_effect(&self, variance: f64, repeats: u64) -> f64 {
+        let count: f64 = self.count.iter().sum();
+        if repeats <= 1 || count < 2.0 || variance <= 0.0 {
+            return 1.0;
+        }
+        let Some((squared_error, _)) = self.squared_error() else {
+            // All that there is comes from one point.
+            return count;
+        };
+        (squared_error / (variance / count)).clamp(1.0, repeats as f64)
+    }
+
+    /// The same for a share, whose variance is its own.
+    pub(crate) fn design_effect_of_rate(&self, repeats: u64) -> f64 {
+        let count: f64 = self.count.iter().sum();
+        let rate = self.sum.iter().sum::<f64>() / count.max(1.0);
+        self.design_effect(rate * (1.0 - rate), repeats)
+    }
+
+    /// Squared standard error of the mean, from the spread of the groups, with its degrees of
+    /// freedom; none of a single group.
+    pub(crate) fn squared_error(&self) -> Option<(f64, usize)> {
+        spread_of_groups(&[(self, 1.0)])
+    }
+
+    /// Squared standard error of the difference of two means over the same points.
+    pub(crate) fn squared_error_of_difference(a: &Self, b: &Self) -> Option<(f64, usize)> {
+        spread_of_groups(&[(a, 1.0), (b, -1.0)])
+    }
+}
+
+/// Linearised ratio means over random groups: Wolter, Introduction to Variance Estimation, 2007,
+/// chapters 2 and 6.
+fn spread_of_groups(terms: &[(&Grouped, f64)]) -> Option<(f64, usize)> {
+    let mut residuals = [0.0; GROUPS];
+    let mut used = [false; GROUPS];
+    for (grouped, sign) in terms {
+        let count: f64 = grouped.count.iter().sum();
+        if count == 0.0 {
+            return None;
+        }
+        let mean = grouped.sum.iter().sum::<f64>() / count;
+        for group in 0..GROUPS {
+            residuals[group] += sign * (grouped.sum[group] - mean * grouped.count[group]) / count;
+            used[group] |= grouped.count[group] > 0.0;
+        }
+    }
+    let groups = used.iter().filter(|used| **used).count();
+    if groups < 2 {
+        return None;
+    }
+    let correction = groups as f64 / (groups - 1) as f64;
+    let squares: f64 = residuals.iter().map(|residual| residual * residual).sum();
+    Some((correction * squares, groups - 1))
+}
