@@ -179,6 +179,9 @@ pub(crate) struct RunArguments {
     /// Draw no pictures.
     #[arg(long)]
     pub no_pictures: bool,
+    /// Write no report page.
+    #[arg(long)]
+    pub no_page: bool,
     /// Show no progress.
     #[arg(long)]
     pub quiet: bool,
@@ -210,6 +213,9 @@ pub(crate) struct AtlasArguments {
     /// Draw no pictures.
     #[arg(long)]
     pub no_pictures: bool,
+    /// Write no page.
+    #[arg(long)]
+    pub no_page: bool,
     /// Threads; the number of cores if left out. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: Option<u16>,

@@ -12,6 +12,7 @@ mod events;
 pub mod exit;
 mod iso9283;
 mod output;
+mod page;
 mod paper;
 pub mod picture;
 mod pipeline;

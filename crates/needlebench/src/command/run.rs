@@ -27,6 +27,7 @@ use crate::output::{
     budget_picture, junit, markdown, press_csv, press_picture, ranking_picture, recording_csv,
     report_text,
 };
+use crate::page::run_page;
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
 use crate::progress::Progress;
@@ -100,6 +101,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
             &mut finished,
             folder,
             pictures,
+            !arguments.no_page,
             jobs,
             &cancel,
             &progress,
@@ -223,6 +225,7 @@ fn write_results(
     finished: &mut ScenarioRun,
     folder: &Path,
     pictures: bool,
+    page: bool,
     jobs: usize,
     cancel: &AtomicBool,
     progress: &Progress,
@@ -285,6 +288,14 @@ fn write_results(
     if let (Some(run), Some(report)) = (&finished.iso9283, &mut finished.report.iso9283) {
         let name = &resolved.scenario.name;
         report.files = iso9283::write_results(name, report, run, folder, pictures)?;
+    }
+    let page_path = folder.join("report.html");
+    if page {
+        progress.message("writing the page");
+        write_atomically(&page_path, run_page(resolved, finished).as_bytes())?;
+    } else if page_path.exists() {
+        // Nobody should take an earlier run's for this one's.
+        std::fs::remove_file(&page_path)?;
     }
     finished
         .report
