@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
 use crate::scenario::EngineName;
+use crate::study_criteria::StudyCriteria;
 use crate::{Finding, ModelSource, Overrides};
 
 mod check;
@@ -44,6 +45,9 @@ pub struct StudyFile {
     pub sampling: SamplingSection,
     /// What is varied.
     pub factors: Vec<FactorSection>,
+    /// What is asked of the results.
+    #[serde(default)]
+    pub criteria: StudyCriteria,
     /// The smallest shift and tilt of the phantom that break a configuration; not computed if left
     /// out.
     #[serde(default)]

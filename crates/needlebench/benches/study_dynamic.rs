@@ -90,8 +90,7 @@ impl Bare {
         let cell = &self.case.cell;
         let settings = MujocoSettings::default();
         process.clear().expect("a sound process");
-        let mut plant =
-            MujocoPlant::new(process, cell, self.timestep_s, &settings).expect("sound");
+        let mut plant = MujocoPlant::new(process, cell, self.timestep_s, &settings).expect("sound");
         let elapsed_s = self.mujoco.iter().map(|(start, torques_nm)| {
             let replay = plant.replay(start, look, torques_nm);
             replay.expect("stable before").elapsed_s
@@ -133,7 +132,10 @@ fn main() {
         let mut costs = [most; 2];
         let mut bares = [Duration::MAX; 3];
         for _ in 0..REPETITIONS {
-            for (engine, cost) in [EngineName::Rapier, EngineName::Mujoco].into_iter().zip(&mut costs) {
+            for (engine, cost) in [EngineName::Rapier, EngineName::Mujoco]
+                .into_iter()
+                .zip(&mut costs)
+            {
                 let done = dynamic_case(&bare.case, &[engine], &mut set).expect("a sound case");
                 least(cost, done.cost);
             }

@@ -11,8 +11,8 @@ mod results;
 mod row;
 mod sampling;
 mod sobol;
-mod store;
 pub mod statistics;
+mod store;
 
 pub use case::{CaseError, CaseEvaluator, CaseWorker};
 pub use design::{Design, DesignError, Factor, FactorKind, FactorValue, Level, Role};

@@ -48,9 +48,8 @@ impl Dimension {
     /// Coordinate of a point, strictly between 0 and 1.
     pub fn coordinate(&self, index: u64) -> f64 {
         match &self.method {
-            Method::Sobol(sequence) => {
-                sequence.coordinate(u32::try_from(index).expect("studies have at most 2^32 samples"))
-            }
+            Method::Sobol(sequence) => sequence
+                .coordinate(u32::try_from(index).expect("studies have at most 2^32 samples")),
             Method::LatinHypercube => {
                 // Each point has a stratum of its own, and a random place in it.
                 let stratum = permuted(index, self.points, self.seed);

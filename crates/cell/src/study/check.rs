@@ -9,6 +9,7 @@ use super::{
 };
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
 use crate::files::source_of;
+use crate::study_criteria::check_study_criteria;
 use crate::toml_text::TomlText;
 use crate::{Finding, Overrides, nearest_name};
 
@@ -117,6 +118,7 @@ fn check_head(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Finding
             }
         }
     }
+    findings.extend(check_study_criteria(toml, "criteria", &study.criteria));
     let mut names = BTreeMap::new();
     for (index, factor) in study.factors.iter().enumerate() {
         let key = format!("factors[{index}].name");

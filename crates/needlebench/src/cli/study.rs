@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use needlebench_study::Shard;
 
 use super::RobotArguments;
 
@@ -36,7 +37,7 @@ pub(crate) struct StudyArguments {
     pub yes: bool,
     /// Compute one of N parts: 1/N to N/N.
     #[arg(long, value_name = "K/N")]
-    pub shard: Option<ShardArgument>,
+    pub shard: Option<Shard>,
     /// Compute these cases alone and print their rows; nothing is written.
     #[arg(long, value_name = "ID", conflicts_with_all = ["resume", "shard", "csv"])]
     pub case: Vec<u64>,
@@ -97,26 +98,4 @@ pub(crate) struct MergeArguments {
     pub quiet: bool,
     #[command(flatten)]
     pub robot: RobotArguments,
-}
-
-/// Part `k` of `n`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ShardArgument {
-    /// From 1.
-    pub k: u32,
-    /// How many there are.
-    pub n: u32,
-}
-
-impl std::str::FromStr for ShardArgument {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let parts = text.split_once('/');
-        let parts = parts.and_then(|(k, n)| Some((k.trim().parse().ok()?, n.trim().parse().ok()?)));
-        match parts {
-            Some((k, n)) if k >= 1 && k <= n => Ok(Self { k, n }),
-            _ => Err("needs which part of how many, such as 1/3, 2/3 and 3/3".to_owned()),
-        }
-    }
 }

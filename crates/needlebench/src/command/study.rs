@@ -9,11 +9,11 @@ use anyhow::{Context, Result};
 use needlebench_cell::study::load_study;
 use needlebench_cell::{Finding, ResolvedScenario};
 use needlebench_study::{
-    CSV_FILE, CaseEvaluator, ParquetResults, Progress as Event, RunEnd, StudyError, StudyRun, merge as merge_shards,
-    write_csv,
+    CSV_FILE, CaseEvaluator, Manifest, ParquetResults, Progress as Event, RunEnd, StudyError,
+    StudyRun, merge as merge_shards, write_csv,
 };
 
-use super::run::{prepare_folder, probe_file, run_into};
+use super::run::{Outputs, prepare_folder, probe_file, run_into};
 use super::{overrides, print_json, print_text};
 use crate::cli::{MergeArguments, RobotArguments, StudyArguments};
 use crate::exit::ExitStatus;
@@ -21,8 +21,8 @@ use crate::output::findings::print_findings;
 use crate::pipeline::RunOptions;
 use crate::progress::Progress;
 use crate::study::{
-    CaseReport, PreparedStudy, StudyCase, StudyEvaluator, StudyOutput, case_text, in_words, time_per_case,
-    write_study,
+    CaseReport, PreparedStudy, StudyCase, StudyEvaluator, StudyOutput, case_text, in_words,
+    time_per_case, write_study,
 };
 
 /// Longest time that a study is expected to take and starts without `--yes`.
@@ -76,7 +76,10 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
             );
             Ok(ExitStatus::Interrupted)
         }
-        Ok(RunEnd::Finished { cases, results: None }) => {
+        Ok(RunEnd::Finished {
+            cases,
+            results: None,
+        }) => {
             print_text(&format!(
                 "{cases} of {} cases are in {}; `needlebench merge` joins all shards",
                 prepared.design.cases(),
@@ -84,7 +87,10 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
             ))?;
             Ok(ExitStatus::Success)
         }
-        Ok(RunEnd::Finished { results: Some(results), .. }) => {
+        Ok(RunEnd::Finished {
+            results: Some(results),
+            ..
+        }) => {
             let options = FinishOptions {
                 csv: arguments.csv,
                 json: arguments.json,
@@ -110,12 +116,19 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
     }
     let threads = threads(arguments.jobs);
     let progress = Progress::new(arguments.quiet);
-    let manifest = prepared.manifest(None);
-    let end = merge_shards(&folder, &manifest, &arguments.shards, threads, true, &|event| show(&progress, event));
+    if let Some(error) = foreign_shard(&prepared, &arguments.shards) {
+        return Ok(failed(&error));
+    }
+    let end = merge_shards(&folder, &arguments.shards, threads, true, &|event| {
+        show(&progress, event);
+    });
     progress.finish();
     match end {
         Err(error) => Ok(failed(&error)),
-        Ok(RunEnd::Finished { results: Some(results), .. }) => {
+        Ok(RunEnd::Finished {
+            results: Some(results),
+            ..
+        }) => {
             let options = FinishOptions {
                 csv: arguments.csv,
                 json: arguments.json,
@@ -143,6 +156,19 @@ fn prepare(path: &Path, robot: &RobotArguments) -> Option<PreparedStudy> {
             None
         }
     }
+}
+
+/// Why a folder holds no shard of this study.
+fn foreign_shard(prepared: &PreparedStudy, shards: &[PathBuf]) -> Option<StudyError> {
+    let ours = prepared.manifest(None);
+    shards
+        .iter()
+        .find_map(|folder| match Manifest::read(folder) {
+            Ok(Some(manifest)) => ours.other_study(folder, &manifest),
+            // What is no folder of a study is refused by the merge.
+            Ok(None) => None,
+            Err(error) => Some(error),
+        })
 }
 
 fn prepare_outputs(folder: &Path, junit: Option<&Path>) -> Result<(), Finding> {
@@ -213,7 +239,11 @@ fn show(progress: &Progress, event: Event<'_>) {
 
 fn failed(error: &StudyError) -> ExitStatus {
     anstream::eprintln!("error: {error}");
-    if error.is_input() { ExitStatus::BadInput } else { ExitStatus::EnvironmentFailed }
+    if error.is_input() {
+        ExitStatus::BadInput
+    } else {
+        ExitStatus::EnvironmentFailed
+    }
 }
 
 struct FinishOptions<'a> {
@@ -243,25 +273,42 @@ fn finish(
             return Ok(failed(&error));
         }
     }
-    let output = StudyOutput { folder, junit: options.junit, page: options.page, threads: options.threads };
+    let output = StudyOutput {
+        folder,
+        junit: options.junit,
+        page: options.page,
+        threads: options.threads,
+    };
     let written = write_study(prepared, &results, &output, &progress);
     progress.finish();
-    let finished = written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
+    let finished =
+        written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
     if options.json {
         print_json(&finished.summary)?;
     } else {
         print_text(&format!("{}results: {}", finished.text, folder.display()))?;
     }
-    Ok(if finished.passed { ExitStatus::Success } else { ExitStatus::CriterionFailed })
+    Ok(if finished.passed {
+        ExitStatus::Success
+    } else {
+        ExitStatus::CriterionFailed
+    })
 }
 
 /// Computes cases alone.
 fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus> {
     let total = prepared.design.cases();
     if let Some(case) = arguments.case.iter().find(|&&case| case >= total) {
-        let finding = Finding::new(&prepared.study.source.file, format!("there is no case {case}"))
-            .key("--case")
-            .hint(format!("the study has {total} cases, 0 to {}: {}", total - 1, prepared.product()));
+        let finding = Finding::new(
+            &prepared.study.source.file,
+            format!("there is no case {case}"),
+        )
+        .key("--case")
+        .hint(format!(
+            "the study has {total} cases, 0 to {}: {}",
+            total - 1,
+            prepared.product()
+        ));
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
@@ -306,7 +353,11 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
                 if let Some(engines) = layout.engines {
                     resolved.scenario.engines.run = engines;
                 }
-                let options = RunOptions { engines: None, jobs: threads(arguments.jobs), referee: false };
+                let options = RunOptions {
+                    engines: None,
+                    jobs: threads(arguments.jobs),
+                    referee: false,
+                };
                 runs.push((resolved, folder.join(number.to_string()), options));
             }
             Err(findings) => {
@@ -318,12 +369,24 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
     }
     let cancel = watch_interrupts()?;
     let mut status = ExitStatus::Success;
+    let mut reports = Vec::new();
+    let outputs = Outputs {
+        pictures: true,
+        page: !arguments.no_page,
+        text: !arguments.json,
+        quiet: arguments.quiet,
+    };
     for (resolved, folder, options) in &runs {
         if let Err(finding) = prepare_folder(folder) {
             print_findings(&[finding]);
             return Ok(ExitStatus::BadInput);
         }
-        status = status.max(run_into(resolved, options, folder, !arguments.no_page, arguments.json, &cancel, arguments.quiet)?);
+        let (outcome, report) = run_into(resolved, options, folder, outputs, &cancel)?;
+        status = status.max(outcome);
+        reports.push(report);
+    }
+    if arguments.json {
+        print_json(&reports)?;
     }
     Ok(status)
 }

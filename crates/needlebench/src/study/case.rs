@@ -83,11 +83,17 @@ impl StudyCase {
             .zip(&self.values)
             .map(|(factor, value)| {
                 let text = match (value, &factor.kind) {
-                    (FactorValue::Level(index), FactorKind::Levels(levels)) => levels[*index].label.clone(),
+                    (FactorValue::Level(index), FactorKind::Levels(levels)) => {
+                        levels[*index].label.clone()
+                    }
                     (FactorValue::Level(index), FactorKind::Continuous { .. }) => index.to_string(),
                     (FactorValue::Number(number), _) => format!("{number:.4}"),
                 };
-                let unit = if factor.unit.is_empty() { String::new() } else { format!(" {}", factor.unit) };
+                let unit = if factor.unit.is_empty() {
+                    String::new()
+                } else {
+                    format!(" {}", factor.unit)
+                };
                 (factor.name.clone(), format!("{text}{unit}"))
             })
             .collect()

@@ -41,7 +41,9 @@ impl CaseReport {
                     (FactorValue::Number(number), _) => json!(number),
                     (FactorValue::Level(index), FactorKind::Levels(levels)) => {
                         let level = &levels[*index];
-                        level.number.map_or_else(|| json!(level.label), |number| json!(number))
+                        level
+                            .number
+                            .map_or_else(|| json!(level.label), |number| json!(number))
                     }
                     (FactorValue::Level(index), FactorKind::Continuous { .. }) => json!(index),
                 };
@@ -76,7 +78,9 @@ fn row_report(row: &Row) -> RowReport {
 }
 
 fn label(row: &Row) -> String {
-    Configuration::ALL[usize::from(row.configuration)].label().to_owned()
+    Configuration::ALL[usize::from(row.configuration)]
+        .label()
+        .to_owned()
 }
 
 /// Columns of the table of a case.
@@ -107,7 +111,9 @@ pub(crate) fn case_text(design: &Design, layout: &StudyCase, result: &CaseResult
     for row in &result.rows {
         let mut cells = vec![Cell::new(label(row)), Cell::new(row.outcome.name())];
         cells.extend(COLUMNS.iter().map(|(metric, _, digits)| {
-            let value = row.get(*metric).map_or_else(String::new, |value| format!("{value:.digits$}"));
+            let value = row
+                .get(*metric)
+                .map_or_else(String::new, |value| format!("{value:.digits$}"));
             Cell::new(value).set_alignment(CellAlignment::Right)
         }));
         cells.push(Cell::new(&row.detail));

@@ -4,9 +4,9 @@ use needlebench_cell::study::{ResolvedStudy, StudyMode};
 use needlebench_study::{CaseError, CaseEvaluator, CaseResult, CaseWorker, Design, Outcome, Row};
 
 use super::case::StudyCase;
-use super::dynamic::{EngineSet, dynamic_rows};
+use super::dynamic::dynamic_rows;
+use super::engines::EngineSet;
 use super::planned::planned_rows;
-use super::static_case::static_rows;
 
 /// Computes the cases of a study.
 pub(crate) struct StudyEvaluator<'a> {
@@ -22,7 +22,11 @@ impl<'a> StudyEvaluator<'a> {
 
 impl CaseEvaluator for StudyEvaluator<'_> {
     fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String> {
-        Ok(Box::new(Worker { study: self.study, design: self.design, engines: EngineSet::default() }))
+        Ok(Box::new(Worker {
+            study: self.study,
+            design: self.design,
+            engines: EngineSet::default(),
+        }))
     }
 }
 
@@ -36,12 +40,18 @@ impl CaseWorker for Worker<'_> {
     fn evaluate(&mut self, case: u64) -> Result<CaseResult, CaseError> {
         let layout = StudyCase::new(self.study, self.design, case);
         let rows = match layout.scenario(self.study) {
-            Err(findings) => invalid_rows(findings.first().and_then(|finding| finding.key.as_deref())),
+            Err(findings) => {
+                invalid_rows(findings.first().and_then(|finding| finding.key.as_deref()))
+            }
             Ok(resolved) => match layout.mode {
-                StudyMode::Static => static_rows(&resolved),
-                StudyMode::Planned => planned_rows(&resolved),
+                StudyMode::Static | StudyMode::Planned => {
+                    planned_rows(&resolved).map_err(|message| CaseError { case, message })?
+                }
                 StudyMode::Dynamic => {
-                    let engines = layout.engines.as_ref().unwrap_or(&resolved.scenario.engines.run);
+                    let engines = layout
+                        .engines
+                        .as_ref()
+                        .unwrap_or(&resolved.scenario.engines.run);
                     dynamic_rows(&resolved, engines, &mut self.engines)
                         .map_err(|message| CaseError { case, message })?
                 }
@@ -55,6 +65,10 @@ impl CaseWorker for Worker<'_> {
 fn invalid_rows(key: Option<&str>) -> [Row; 8] {
     std::array::from_fn(|configuration| {
         let configuration = u8::try_from(configuration).expect("eight");
-        Row::new(configuration, Outcome::Invalid, key.unwrap_or_default().to_owned())
+        Row::new(
+            configuration,
+            Outcome::Invalid,
+            key.unwrap_or_default().to_owned(),
+        )
     })
 }

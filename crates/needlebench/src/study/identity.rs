@@ -23,10 +23,19 @@ impl Identity {
     /// A level that names a file which cannot be used.
     pub fn new(study: &ResolvedStudy) -> Result<Self, Vec<Finding>> {
         let mut inputs: BTreeMap<String, String> = BTreeMap::new();
-        inputs.insert("program".to_owned(), format!("{} {GIT_REVISION}", env!("CARGO_PKG_VERSION")));
+        inputs.insert(
+            "program".to_owned(),
+            format!("{} {GIT_REVISION}", env!("CARGO_PKG_VERSION")),
+        );
         let mut add = |role: &str, name: &str, sha256: &str| {
             // Files of the same name in different folders are told apart by their order.
-            let named = |k: usize| if k == 1 { format!("{role} {name}") } else { format!("{role} {name} ({k})") };
+            let named = |k: usize| {
+                if k == 1 {
+                    format!("{role} {name}")
+                } else {
+                    format!("{role} {name} ({k})")
+                }
+            };
             let free = (1..)
                 .map(named)
                 .find(|name| inputs.get(name).is_none_or(|known| known == sha256))
@@ -64,9 +73,9 @@ impl Identity {
                     Ok(resolved) => add_scenario(&resolved),
                     Err(findings) => {
                         // A level that no layout can have; others are results.
-                        let own = findings
-                            .iter()
-                            .any(|finding| finding.key.as_ref().is_some_and(|key| keys.contains(key)));
+                        let own = findings.iter().any(|finding| {
+                            finding.key.as_ref().is_some_and(|key| keys.contains(key))
+                        });
                         if own {
                             return Err(findings
                                 .into_iter()
@@ -88,11 +97,18 @@ impl Identity {
             .iter()
             .map(|(name, hash)| format!("{name} {hash}\n"))
             .collect();
-        Ok(Self { id: sha256_hex(text.as_bytes()), inputs })
+        Ok(Self {
+            id: sha256_hex(text.as_bytes()),
+            inputs,
+        })
     }
 }
 
 /// The last part of a file's path: results must not depend on where a study lies.
 fn file_name(source: &ModelSource) -> &str {
-    source.file.rsplit(['/', '\\']).next().unwrap_or(&source.file)
+    source
+        .file
+        .rsplit(['/', '\\'])
+        .next()
+        .unwrap_or(&source.file)
 }

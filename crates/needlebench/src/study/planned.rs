@@ -73,12 +73,7 @@ impl<'a> Stage<'a> {
     }
 
     /// Where the needle is predicted to come to rest; where it is commanded to without imperfections.
-    fn set_predicted(
-        &self,
-        row: &mut Row,
-        plan: &ConfigurationPlan,
-        report: &ConfigurationReport,
-    ) {
+    fn set_predicted(&self, row: &mut Row, plan: &ConfigurationPlan, report: &ConfigurationReport) {
         let needle = if self.reality.is_imperfect() {
             let trajectory = plan.trajectory.as_ref();
             trajectory.and_then(|trajectory| self.reality.predicted_needle(0, trajectory))

@@ -2,9 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use needlebench_cell::study::{FactorValues, ResolvedStudy, StudyMode};
 use needlebench_cell::Finding;
-use needlebench_study::{CaseEvaluator, Design, DesignError, FactorKind, Manifest, SCHEMA_VERSION, Shard, Status};
+use needlebench_cell::study::{FactorValues, ResolvedStudy, StudyMode};
+use needlebench_study::{
+    CaseEvaluator, Design, DesignError, FactorKind, Manifest, SCHEMA_VERSION, Shard, Status,
+};
 use serde_json::json;
 
 use super::identity::Identity;
@@ -31,15 +33,23 @@ impl PreparedStudy {
     pub fn new(study: ResolvedStudy) -> Result<Self, Vec<Finding>> {
         let design = Design::new(&study).map_err(|error| vec![design_finding(&study, &error)])?;
         let identity = Identity::new(&study)?;
-        Ok(Self { study, design, identity })
+        Ok(Self {
+            study,
+            design,
+            identity,
+        })
     }
 
     /// Everything that is computed of any case.
     pub fn most_costly_mode(&self) -> StudyMode {
-        let of_levels = self.study.factors.iter().flat_map(|factor| match &factor.values {
-            FactorValues::Levels(levels) => levels.as_slice(),
-            FactorValues::Continuum { .. } => &[],
-        });
+        let of_levels = self
+            .study
+            .factors
+            .iter()
+            .flat_map(|factor| match &factor.values {
+                FactorValues::Levels(levels) => levels.as_slice(),
+                FactorValues::Continuum { .. } => &[],
+            });
         of_levels
             .filter_map(|level| level.mode)
             .fold(self.study.file.mode, StudyMode::max)
@@ -78,16 +88,25 @@ impl PreparedStudy {
 
     /// Number of cases by factors, for people: `4 goal x 6 size x 256 samples`.
     pub fn product(&self) -> String {
-        product(&self.study, self.design.factors().iter().map(|factor| match &factor.kind {
-            FactorKind::Levels(levels) => levels.len(),
-            FactorKind::Continuous { .. } => 0,
-        }), self.design.samples())
+        product(
+            &self.study,
+            self.design
+                .factors()
+                .iter()
+                .map(|factor| match &factor.kind {
+                    FactorKind::Levels(levels) => levels.len(),
+                    FactorKind::Continuous { .. } => 0,
+                }),
+            self.design.samples(),
+        )
     }
 }
 
 fn product(study: &ResolvedStudy, levels: impl Iterator<Item = usize>, samples: u64) -> String {
-    let names = std::iter::once("goals").chain(study.factors.iter().map(|factor| factor.name.as_str()));
-    let is_sampled = std::iter::once(false).chain(study.factors.iter().map(|factor| factor.sampled));
+    let names =
+        std::iter::once("goals").chain(study.factors.iter().map(|factor| factor.name.as_str()));
+    let is_sampled =
+        std::iter::once(false).chain(study.factors.iter().map(|factor| factor.sampled));
     let mut parts: Vec<String> = names
         .zip(levels)
         .zip(is_sampled)
@@ -104,12 +123,13 @@ fn design_finding(study: &ResolvedStudy, error: &DesignError) -> Finding {
     let finding = Finding::new(&study.source.file, error.to_string());
     match error {
         DesignError::TooMany => {
-            let levels = std::iter::once(study.goals.len()).chain(study.factors.iter().map(|factor| {
-                match &factor.values {
-                    FactorValues::Levels(levels) => levels.len(),
-                    FactorValues::Continuum { .. } => 0,
-                }
-            }));
+            let levels =
+                std::iter::once(study.goals.len()).chain(study.factors.iter().map(|factor| {
+                    match &factor.values {
+                        FactorValues::Levels(levels) => levels.len(),
+                        FactorValues::Continuum { .. } => 0,
+                    }
+                }));
             let samples = study.file.sampling.samples.unwrap_or(1);
             finding.key("factors").hint(format!(
                 "{}: sample factors with `range` or `sampled = true` instead of crossing them",
@@ -140,7 +160,10 @@ pub(crate) fn time_per_case(evaluator: &dyn CaseEvaluator, cases: u64) -> Result
     let mut done = 0;
     for k in 0..count {
         worker
-            .evaluate(u64::try_from(u128::from(cases) * u128::from(k) / u128::from(count)).expect("a case"))
+            .evaluate(
+                u64::try_from(u128::from(cases) * u128::from(k) / u128::from(count))
+                    .expect("a case"),
+            )
             .map_err(|error| error.to_string())?;
         done += 1;
         if started.elapsed() > ESTIMATE {

@@ -85,6 +85,20 @@ pub enum StudyError {
 }
 
 impl StudyError {
+    /// Whether folders, files or the request are at fault, not the machine.
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Locked { .. }
+            | Self::Exists { .. }
+            | Self::OtherStudy { .. }
+            | Self::File { .. }
+            | Self::Request(_)
+            | Self::Merge(_)
+            | Self::Results(_) => true,
+            Self::Io { .. } | Self::Write { .. } | Self::Case { .. } | Self::Worker(_) => false,
+        }
+    }
+
     /// For `map_err`.
     pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();

@@ -162,13 +162,8 @@ fn check(path: &Path, manifest: &Manifest, resume: bool) -> Result<Option<Status
         }
         return Ok(None);
     };
-    if !found.same_study(manifest) {
-        return Err(StudyError::OtherStudy {
-            folder: path.to_owned(),
-            found: found.describe(),
-            expected: manifest.describe(),
-            differences: found.differences(manifest),
-        });
+    if let Some(error) = manifest.other_study(path, &found) {
+        return Err(error);
     }
     let part = |manifest: &Manifest| {
         manifest

@@ -187,6 +187,16 @@ impl Manifest {
         format!("\"{}\" ({}){shard}", self.name, self.study_id)
     }
 
+    /// Why a folder with the manifest `found` holds no results of this study.
+    pub fn other_study(&self, folder: &Path, found: &Self) -> Option<StudyError> {
+        (!found.same_study(self)).then(|| StudyError::OtherStudy {
+            folder: folder.to_owned(),
+            found: found.describe(),
+            expected: self.describe(),
+            differences: found.differences(self),
+        })
+    }
+
     /// Reads the manifest of a folder, if there is one.
     ///
     /// # Errors

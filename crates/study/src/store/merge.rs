@@ -67,16 +67,9 @@ fn manifests(folders: &[PathBuf]) -> Result<Vec<(PathBuf, Manifest)>, StudyError
                 "holds no study\nhint: give the folders of its shards",
             )
         })?;
-        if let Some((_, first)) = shards
-            .first()
-            .filter(|(_, first)| !first.same_study(&manifest))
-        {
-            return Err(StudyError::OtherStudy {
-                folder: folder.clone(),
-                found: manifest.describe(),
-                expected: first.describe(),
-                differences: manifest.differences(first),
-            });
+        let first = shards.first().map(|(_, first)| first);
+        if let Some(error) = first.and_then(|first| first.other_study(folder, &manifest)) {
+            return Err(error);
         }
         if manifest.shard.is_none() && manifest.status == Status::Complete {
             return Err(StudyError::Merge(format!(
