@@ -37,7 +37,7 @@ const LAYERS: [(&str, &[&str]); 9] = [
 ];
 
 /// Dependencies that one crate alone has, hidden behind its own types.
-const OWNERS: [(&str, &str); 8] = [
+const OWNERS: [(&str, &str); 11] = [
     ("rapier3d-f64", "engine"),
     ("parry3d-f64", "cell"),
     ("toml", "cell"),
@@ -45,6 +45,9 @@ const OWNERS: [(&str, &str); 8] = [
     ("roxmltree", "cell"),
     ("granit-parser", "cell"),
     ("stl_io", "cell"),
+    ("parquet", "study"),
+    ("zstd", "study"),
+    ("crc32fast", "study"),
     ("clap", "needlebench"),
 ];
 

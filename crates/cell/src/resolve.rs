@@ -149,10 +149,22 @@ pub fn resolve_scenario(
     base: &Path,
     overrides: &Overrides,
 ) -> Result<ResolvedScenario, Vec<Finding>> {
+    let toml = TomlText::parse(file, text).map_err(|finding| vec![finding])?;
+    let scenario: Scenario = toml.deserialize().map_err(|finding| vec![finding])?;
+    let source = source_of(file.to_owned(), text.as_bytes());
+    resolve(&toml, scenario, source, base, overrides)
+}
+
+/// Resolves a scenario's struct; `toml` says where its values stand.
+pub(crate) fn resolve(
+    toml: &TomlText<'_>,
+    scenario: Scenario,
+    source: ModelSource,
+    base: &Path,
+    overrides: &Overrides,
+) -> Result<ResolvedScenario, Vec<Finding>> {
     let one = |finding: Finding| vec![finding];
-    let toml = TomlText::parse(file, text).map_err(one)?;
-    let scenario: Scenario = toml.deserialize().map_err(one)?;
-    let findings = check_values(&toml, &scenario);
+    let findings = check_values(toml, &scenario);
     if !findings.is_empty() {
         return Err(findings);
     }
@@ -176,7 +188,7 @@ pub fn resolve_scenario(
         one(if overrides.robot_urdf.is_some() {
             finding
         } else {
-            with_model_names(&toml, finding, &robot_location, "robot.urdf", "ur3")
+            with_model_names(toml, finding, &robot_location, "robot.urdf", "ur3")
         })
     })?;
     calibrate(&mut robot, overrides).map_err(one)?;
@@ -202,7 +214,7 @@ pub fn resolve_scenario(
     notes.extend(robot.notes.iter().cloned());
 
     let tool_location = Location::of_model(&scenario.tool.urdf, "needle_guide", "urdf", base);
-    let tool_overrides = tool_overrides(&toml, &scenario).map_err(one)?;
+    let tool_overrides = tool_overrides(toml, &scenario).map_err(one)?;
     let mut tool = read_tool(
         &tool_location,
         &overrides.packages,
@@ -219,30 +231,30 @@ pub fn resolve_scenario(
                 hint: finding.hint,
                 ..toml.finding(key, finding.message)
             },
-            _ => with_model_names(&toml, finding, &tool_location, "tool.urdf", "needle_guide"),
+            _ => with_model_names(toml, finding, &tool_location, "tool.urdf", "needle_guide"),
         })
     })?;
 
     let iso9283 = scenario
         .iso9283
         .as_ref()
-        .map(|section| resolve_iso9283(&toml, section, &robot, &mut tool, &mut notes))
+        .map(|section| resolve_iso9283(toml, section, &robot, &mut tool, &mut notes))
         .transpose()
         .map_err(one)?;
     let table = scenario.table.as_ref().map(fixtures::table).transpose();
-    let table = table.map_err(|error| one(fixture_finding(&toml, "table", &error)))?;
+    let table = table.map_err(|error| one(fixture_finding(toml, "table", &error)))?;
     let gantry = scenario.gantry.as_ref().map(fixtures::gantry).transpose();
-    let gantry = gantry.map_err(|error| one(fixture_finding(&toml, "gantry", &error)))?;
+    let gantry = gantry.map_err(|error| one(fixture_finding(toml, "gantry", &error)))?;
     let mount = scenario
         .mount
         .as_ref()
         .map(|mount| fixtures::mount(mount, &world_from_base_link))
         .transpose()
-        .map_err(|error| one(fixture_finding(&toml, "mount", &error)))?;
+        .map_err(|error| one(fixture_finding(toml, "mount", &error)))?;
     let found = match &scenario.phantom {
         None => None,
         Some(section) => {
-            Some(place_phantom(&toml, section, &scenario, base, &mut notes).map_err(one)?)
+            Some(place_phantom(toml, section, &scenario, base, &mut notes).map_err(one)?)
         }
     };
     let (phantom, phantom_source, phantom_parts) = found
@@ -268,7 +280,7 @@ pub fn resolve_scenario(
         }
     }
 
-    check_base(&toml, &world_from_base_link, &surroundings).map_err(one)?;
+    check_base(toml, &world_from_base_link, &surroundings).map_err(one)?;
     let goals = {
         let context = Surroundings {
             robot: &robot,
@@ -282,7 +294,7 @@ pub fn resolve_scenario(
         };
         let (mut goals, mut findings) = (Vec::new(), Vec::new());
         for (index, section) in scenario.goals.iter().enumerate() {
-            match resolve_goal(&toml, index, section, &context, &mut notes) {
+            match resolve_goal(toml, index, section, &context, &mut notes) {
                 Ok(goal) => goals.push(goal),
                 Err(finding) => findings.push(finding),
             }
@@ -310,7 +322,7 @@ pub fn resolve_scenario(
             solids: &solids,
             robot_base_m: Point3::from(world_from_base_link.translation.vector),
         };
-        resolve_people(&toml, &scenario.people, &goals, &room).map_err(one)?
+        resolve_people(toml, &scenario.people, &goals, &room).map_err(one)?
     };
     let start = Joints::from_column_slice(&scenario.start.joints_deg.map(f64::to_radians));
     if let Some(joint) = robot.limits.first_violation(&start) {
@@ -340,7 +352,7 @@ pub fn resolve_scenario(
         .as_ref()
         .map(|section| {
             let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
-            resolve_imperfections(&toml, section, base, bore_clearance_m)
+            resolve_imperfections(toml, section, base, bore_clearance_m)
         })
         .transpose()
         .map_err(one)?;
@@ -353,7 +365,7 @@ pub fn resolve_scenario(
         Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
     );
     Ok(ResolvedScenario {
-        source: source_of(file.to_owned(), text.as_bytes()),
+        source,
         cell,
         phantom,
         fixtures,

@@ -158,7 +158,6 @@ fn is_label(name: &str) -> bool {
 
 /// Shares outside 0 to 1, and names of configurations that are none, in the table `section` of a
 /// study file.
-#[cfg_attr(not(test), expect(dead_code, reason = "for the reader of study files"))]
 pub(crate) fn check_study_criteria(
     toml: &TomlText<'_>,
     section: &str,

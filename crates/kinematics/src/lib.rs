@@ -16,6 +16,7 @@ mod integrate;
 mod limits;
 mod manipulability;
 mod models;
+pub mod normal;
 pub mod pose_sets;
 pub mod registration;
 mod rotation;

@@ -28,14 +28,15 @@ use crate::reality::Reality;
 use crate::trial::Trial;
 
 /// What all parts of a report are made with.
-struct Context<'a> {
-    resolved: &'a ResolvedScenario,
-    planner: &'a Planner<'a>,
-    model: &'a ClearanceModel,
-    reality: &'a Reality<'a>,
-    budgets: &'a Budgets,
-    room: RoomModel<'a>,
-    events: &'a [EventRun],
+pub(crate) struct Context<'a> {
+    pub resolved: &'a ResolvedScenario,
+    pub planner: &'a Planner<'a>,
+    pub model: &'a ClearanceModel,
+    pub reality: &'a Reality<'a>,
+    pub budgets: &'a Budgets,
+    /// None where nobody asks for the room.
+    pub room: Option<RoomModel<'a>>,
+    pub events: &'a [EventRun],
 }
 
 #[expect(
@@ -63,7 +64,7 @@ pub(crate) fn assemble(
         model,
         reality,
         budgets,
-        room: RoomModel::new(resolved),
+        room: Some(RoomModel::new(resolved)),
         events,
     };
     let mut goals: Vec<GoalReport> = plans
@@ -103,7 +104,7 @@ pub(crate) fn assemble(
     }
 }
 
-fn goal_report(
+pub(crate) fn goal_report(
     context: &Context<'_>,
     goal_index: usize,
     plan: &GoalPlan,
@@ -241,7 +242,10 @@ fn configuration_report(
             .iter()
             .find(|run| run.goal == goal_index && run.configuration == plan.configuration.index())
             .map(|run| events_report(resolved, reality, plan, run)),
-        room: candidate.map(|each| room.measure(goal_index, &each.joints)),
+        room: room
+            .as_ref()
+            .zip(candidate)
+            .map(|(room, each)| room.measure(goal_index, &each.joints)),
         budget: None,
         budget_failure: None,
         files: Vec::new(),

@@ -2,7 +2,7 @@
 
 use needlebench_cell::ResolvedScenario;
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
-use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
+use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, analytic_total, budget};
 
 use crate::pipeline::in_parallel;
 use crate::reality::servo;
@@ -13,6 +13,31 @@ pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
 
 /// Budgets of all configurations that have a motion; none at all without imperfections.
 pub(crate) fn budgets(resolved: &ResolvedScenario, plans: &[GoalPlan], threads: usize) -> Budgets {
+    let seed = resolved.scenario.seed;
+    of_each(resolved, plans, threads, |case| {
+        budget(case, case.imperfections.budget_samples, seed).map_err(|error| error.to_string())
+    })
+}
+
+/// The same with nothing but the analytic totals: no sources of their own, no draws.
+pub(crate) fn analytic_budgets(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Budgets {
+    of_each(resolved, plans, 1, |case| {
+        let total = analytic_total(case).map_err(|error| error.to_string())?;
+        Ok(ErrorBudget {
+            samples: 0,
+            sources: Vec::new(),
+            total,
+            dominant: None,
+        })
+    })
+}
+
+fn of_each(
+    resolved: &ResolvedScenario,
+    plans: &[GoalPlan],
+    threads: usize,
+    budget: impl Fn(&BudgetCase<'_>) -> Result<ErrorBudget, String> + Sync,
+) -> Budgets {
     let Some(imperfections) = &resolved.imperfections else {
         return plans
             .iter()
@@ -38,8 +63,7 @@ pub(crate) fn budgets(resolved: &ResolvedScenario, plans: &[GoalPlan], threads: 
             trajectory: plan.trajectory.as_ref()?,
             timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
         };
-        let seed = resolved.scenario.seed;
-        Some(budget(&case, imperfections.budget_samples, seed).map_err(|error| error.to_string()))
+        Some(budget(&case))
     })
     .into_iter();
     plans

@@ -1,11 +1,16 @@
 //! Arguments of the command line.
 
+mod study;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use nalgebra::Matrix3x4;
 use needlebench_kinematics::UrModel;
+
+use study::STUDY_HELP;
+pub(crate) use study::{MergeArguments, StudyArguments};
 
 use crate::command;
 use crate::exit::ExitStatus;
@@ -65,6 +70,17 @@ enum Command {
         after_long_help = COMPARE_HELP
     )]
     Compare(Box<CompareArguments>),
+    /// Many cases of one scenario: a table of results, statistics, and a page to look at them.
+    #[command(
+        after_help = "Example: needlebench study scenarios/studies/layouts.toml",
+        after_long_help = STUDY_HELP
+    )]
+    Study(Box<StudyArguments>),
+    /// Join the shards of a study.
+    #[command(
+        after_help = "Example: needlebench merge scenarios/studies/layouts.toml shard1/layouts shard2/layouts"
+    )]
+    Merge(MergeArguments),
     /// Accuracy and repeatability of a real robot by ISO 9283, from a laser tracker's log.
     #[command(
         after_help = "Example: needlebench iso9283 --csv robot.csv --commanded commanded.csv --max-rp 0.1",
@@ -80,7 +96,7 @@ enum Command {
     /// Reproduce the paper: Table 3, every equation, both methods, and Figure 6.
     #[command(after_help = "Example: needlebench paper --out out/paper")]
     Paper(PaperArguments),
-    /// JSON schema of scenario files, for editors.
+    /// JSON schema of scenario or study files, for editors.
     #[command(after_help = "Example: needlebench schema scenario > scenario.schema.json")]
     Schema {
         /// Which file format.
@@ -108,6 +124,8 @@ enum Command {
 pub(crate) enum SchemaFormat {
     /// Scenario files.
     Scenario,
+    /// Study files.
+    Study,
 }
 
 /// Another robot than the scenario's.
@@ -179,6 +197,9 @@ pub(crate) struct RunArguments {
     /// Draw no pictures.
     #[arg(long)]
     pub no_pictures: bool,
+    /// Write no report page.
+    #[arg(long)]
+    pub no_page: bool,
     /// Show no progress.
     #[arg(long)]
     pub quiet: bool,
@@ -210,6 +231,9 @@ pub(crate) struct AtlasArguments {
     /// Draw no pictures.
     #[arg(long)]
     pub no_pictures: bool,
+    /// Write no page.
+    #[arg(long)]
+    pub no_page: bool,
     /// Threads; the number of cores if left out. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: Option<u16>,
@@ -677,6 +701,8 @@ pub fn main() -> ExitCode {
         Command::Clearance(arguments) => command::clearance(&arguments),
         Command::Atlas(arguments) => command::atlas(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
+        Command::Study(arguments) => command::study(&arguments),
+        Command::Merge(arguments) => command::merge(&arguments),
         Command::Iso9283(arguments) => command::iso9283(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments),

@@ -12,6 +12,7 @@ mod events;
 pub mod exit;
 mod iso9283;
 mod output;
+mod page;
 mod paper;
 pub mod picture;
 mod pipeline;
@@ -20,6 +21,7 @@ mod progress;
 mod provenance;
 mod reality;
 mod servo;
+pub mod study;
 mod trial;
 
 pub use atlas::{GoalAtlas, goal_atlas};

@@ -5,8 +5,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use needlebench_cell::ResolvedScenario;
 use needlebench_cell::scenario::EngineName;
+use needlebench_cell::{Cell, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{
     ClosedLoop, EngineError, EngineIdentity, Hooks, Motion, MujocoFleet, Plant, RapierPlant,
@@ -14,8 +14,8 @@ use needlebench_engine::{
 };
 use needlebench_evaluation::report::{EngineFailure, Report};
 use needlebench_evaluation::{ClearanceSeries, certify_recording, measure_clearance};
-use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::registration::RegistrationError;
+use needlebench_kinematics::{Chain, NotUrGeometry, Pose};
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, Rule};
 
 use crate::assemble::assemble;
@@ -27,7 +27,7 @@ use crate::progress::Progress;
 use crate::reality::{Reality, servo};
 
 /// Motions that MuJoCo makes at the same time: as many as a goal has configurations.
-const FLEET_ARMS: usize = 8;
+pub(crate) const FLEET_ARMS: usize = 8;
 
 /// Engines that a run uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -107,6 +107,26 @@ pub struct ScenarioRun {
     pub iso9283: Option<ProtocolRun>,
     /// It was interrupted; what was finished until then is here.
     pub interrupted: bool,
+    /// The arm that was simulated.
+    pub(crate) real_arm: RealArm,
+}
+
+/// The arm that was simulated: the nominal one, or one draw of the imperfections.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RealArm {
+    /// Its place.
+    pub world_from_base_link: Pose,
+    /// Its links.
+    pub chain: Chain,
+}
+
+impl RealArm {
+    pub fn of(cell: &Cell) -> Self {
+        Self {
+            world_from_base_link: cell.robot.world_from_base_link,
+            chain: cell.robot.chain,
+        }
+    }
 }
 
 /// Why a scenario cannot be run at all.
@@ -122,9 +142,9 @@ pub enum RunError {
 
 /// One motion to simulate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Job {
-    goal: usize,
-    configuration: usize,
+pub(crate) struct Job {
+    pub goal: usize,
+    pub configuration: usize,
 }
 
 /// Plans, simulates, measures and judges one scenario.
@@ -308,6 +328,7 @@ pub(crate) fn run(
         stopped,
         iso9283: None,
         interrupted,
+        real_arm: RealArm::of(reality.cell()),
     })
 }
 
@@ -356,7 +377,7 @@ pub(crate) fn in_parallel<T: Sync, R: Send>(
 }
 
 /// Configurations that are simulated: those that work, and on request those that only collide.
-fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
+pub(crate) fn jobs(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Vec<Job> {
     let everything = resolved.scenario.planning.simulate_rejected;
     let worth = |plan: &ConfigurationPlan| {
         plan.trajectory.is_some()

@@ -36,6 +36,12 @@ impl Progress {
         self.0.inc_length(steps);
     }
 
+    /// So many steps of all are done.
+    pub(crate) fn at(&self, done: u64, total: u64) {
+        self.0.set_length(total);
+        self.0.set_position(done);
+    }
+
     pub(crate) fn step(&self) {
         self.0.inc(1);
     }

@@ -3,14 +3,14 @@
 use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Actuation, Servo, ServoGains};
-use needlebench_evaluation::ClearanceSeries;
 use needlebench_evaluation::report::TruthReport;
+use needlebench_evaluation::{ClearanceSeries, NeedleMeasurement, measure_needle};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::pose_sets::SplitMix64;
 use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::rotation_vector;
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_uncertainty::{Layout, Truth, resting_friction, settle};
+use needlebench_uncertainty::{Layout, Settled, Truth, resting_friction, settle};
 
 /// Keeps the draw of imperfections apart from the other things that a scenario's seed decides.
 const STREAM: u64 = 0x7472_7574_6821;
@@ -174,20 +174,35 @@ impl<'a> Reality<'a> {
         goal: usize,
         trajectory: &JointTrajectory,
     ) -> Option<nalgebra::Point3<f64>> {
+        let (truth, settled) = self.settled(trajectory)?;
+        let nominal = &self.resolved.cell;
+        let depth_m = self.resolved.goals[goal].insertion_length_m;
+        Some(truth.needle_points(nominal, &settled.position, [0.0, depth_m])[1])
+    }
+
+    /// The needle where it is predicted to come to rest at the end of a motion; none for the nominal
+    /// robot, and where a drive is too weak.
+    pub fn predicted_needle(
+        &self,
+        goal: usize,
+        trajectory: &JointTrajectory,
+    ) -> Option<NeedleMeasurement> {
+        let (_, settled) = self.settled(trajectory)?;
+        let flange = self.cell().robot.world_from_flange(&settled.position);
+        let needle = measure_needle(self.cell(), self.phantom(), self.goal(goal), &flange);
+        Some(needle)
+    }
+
+    /// The truth, and where the arm rests in it at the end of a motion.
+    fn settled(&self, trajectory: &JointTrajectory) -> Option<(&Truth, Settled)> {
         let Imperfect { truth, .. } = self.imperfect.as_ref()?;
         let friction = truth.actuation.friction.as_ref();
         let resting = friction.map(|friction| resting_friction(friction, trajectory));
-        let nominal = &self.resolved.cell;
-        let settled = settle(
-            &servo(self.resolved),
-            &truth.dynamics(nominal),
-            truth,
-            resting.as_ref(),
-            &trajectory.end(),
-        )
-        .ok()?;
-        let depth_m = self.resolved.goals[goal].insertion_length_m;
-        Some(truth.needle_points(nominal, &settled.position, [0.0, depth_m])[1])
+        let dynamics = truth.dynamics(&self.resolved.cell);
+        let servo = servo(self.resolved);
+        let target = trajectory.end();
+        let settled = settle(&servo, &dynamics, truth, resting.as_ref(), &target).ok()?;
+        Some((truth, settled))
     }
 }
 

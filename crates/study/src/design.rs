@@ -1,20 +1,16 @@
 //! From the number of a case to the values of its factors.
 
+pub use needlebench_cell::study::Role;
+use needlebench_cell::study::{
+    Distribution, FactorValues, ResolvedStudy, SamplingMethod, StudyFactor,
+};
 use serde::{Deserialize, Serialize};
 
-/// Whether a factor is ours to choose.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Role {
-    /// Where the robot stands, which tool it has: what a study is to find the best level of.
-    Choice,
-    /// How the patient lies, what was drawn: what a study is to hold for.
-    #[default]
-    Circumstance,
-}
+use crate::distribution::{ends, quantile};
+use crate::sampling::{Dimension, most_dimensions};
 
 /// What a case varies.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Factor {
     /// Name of the column: letters, digits and `_`.
     pub name: String,
@@ -27,11 +23,12 @@ pub struct Factor {
 }
 
 /// Values of a factor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum FactorKind {
     /// Some.
     Levels(Vec<Level>),
-    /// A continuum, with the ends of the middle 99.8 % of its distribution.
+    /// A continuum, with its ends.
     Continuous {
         /// 0.1 % quantile, or the lower end of a bounded range.
         low: f64,
@@ -41,7 +38,7 @@ pub enum FactorKind {
 }
 
 /// One of some values.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Level {
     /// In tables.
     pub label: String,
@@ -64,16 +61,148 @@ pub enum DesignError {
     /// More cases than can be counted.
     #[error("the design has more than 2^53 cases")]
     TooMany,
+    /// More factors are sampled than the method has dimensions.
+    #[error("{sampled} factors are sampled, but {method} has {most} dimensions")]
+    TooManyDimensions {
+        /// Number of sampled factors.
+        sampled: usize,
+        /// Name of the method.
+        method: &'static str,
+        /// Its dimensions.
+        most: usize,
+    },
 }
 
+/// Most cases: numbers of cases stay exact in every table.
+const MOST_CASES: u64 = 1 << 53;
+
 /// All cases of a study. `goal` is always the first factor: the goal's name.
+///
+/// The number of a case counts the samples fastest, then the levels of the last crossed factor, and
+/// so on; the goal slowest. Sampled factors have the same points in every combination of the others,
+/// so that levels can be compared in pairs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Design {
     factors: Vec<Factor>,
+    sources: Vec<Source>,
     cases: u64,
+    samples: u64,
+}
+
+/// Where the value of a factor comes from.
+#[derive(Debug, Clone, PartialEq)]
+enum Source {
+    /// Level `case / stride % levels`.
+    Crossed {
+        stride: u64,
+        levels: u64,
+    },
+    SampledLevel {
+        dimension: Dimension,
+        levels: usize,
+    },
+    Sampled {
+        dimension: Dimension,
+        distribution: Distribution,
+    },
 }
 
 impl Design {
+    /// The design of a study.
+    ///
+    /// # Errors
+    /// [`DesignError`].
+    pub fn new(study: &ResolvedStudy) -> Result<Self, DesignError> {
+        let sampling = &study.file.sampling;
+        Self::of(
+            &study.goals,
+            &study.factors,
+            sampling.method,
+            sampling.samples,
+            study.file.seed,
+        )
+    }
+
+    /// The design of goals and factors.
+    ///
+    /// # Errors
+    /// [`DesignError`].
+    pub fn of(
+        goals: &[String],
+        factors: &[StudyFactor],
+        method: SamplingMethod,
+        samples: Option<u64>,
+        seed: u64,
+    ) -> Result<Self, DesignError> {
+        let sampled = factors.iter().filter(|factor| factor.sampled).count();
+        let most = most_dimensions(method);
+        if sampled > most {
+            return Err(DesignError::TooManyDimensions {
+                sampled,
+                method: method.name(),
+                most,
+            });
+        }
+        let samples = samples.filter(|_| sampled > 0).unwrap_or(1);
+        let goal = Factor {
+            name: "goal".to_owned(),
+            unit: String::new(),
+            role: Role::Circumstance,
+            kind: FactorKind::Levels(
+                goals
+                    .iter()
+                    .map(|name| Level {
+                        label: name.clone(),
+                        number: None,
+                    })
+                    .collect(),
+            ),
+        };
+        let described = factors.iter().map(described);
+        let descriptions: Vec<Factor> = std::iter::once(goal).chain(described).collect();
+        let mut next_dimension = 0;
+        let mut sources: Vec<Source> = Vec::with_capacity(descriptions.len());
+        for (index, factor) in descriptions.iter().enumerate() {
+            let study_factor = index.checked_sub(1).map(|index| &factors[index]);
+            let levels = match &factor.kind {
+                FactorKind::Levels(levels) => levels.len(),
+                FactorKind::Continuous { .. } => 0,
+            };
+            let Some(study_factor) = study_factor.filter(|each| each.sampled) else {
+                sources.push(Source::Crossed {
+                    stride: 0,
+                    levels: levels as u64,
+                });
+                continue;
+            };
+            let dimension = Dimension::new(method, next_dimension, samples, seed);
+            next_dimension += 1;
+            sources.push(match &study_factor.values {
+                FactorValues::Continuum { distribution, .. } => Source::Sampled {
+                    dimension,
+                    distribution: *distribution,
+                },
+                FactorValues::Levels(_) => Source::SampledLevel { dimension, levels },
+            });
+        }
+        let mut cases = samples;
+        for source in sources.iter_mut().rev() {
+            if let Source::Crossed { stride, levels } = source {
+                *stride = cases;
+                cases = cases
+                    .checked_mul(*levels)
+                    .filter(|&cases| cases <= MOST_CASES)
+                    .ok_or(DesignError::TooMany)?;
+            }
+        }
+        Ok(Self {
+            factors: descriptions,
+            sources,
+            cases,
+            samples,
+        })
+    }
+
     /// The factors, in the order of their columns.
     pub fn factors(&self) -> &[Factor] {
         &self.factors
@@ -84,13 +213,67 @@ impl Design {
         self.cases
     }
 
+    /// Number of samples in every combination of the crossed factors: cases whose numbers differ by a
+    /// multiple of it have the same sampled values.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
     /// Values of all factors in a case, in the order of [`Design::factors`]. Depends on the design
     /// and the number alone.
     ///
     /// # Panics
     /// Beyond [`Design::cases`].
     pub fn values(&self, case: u64) -> Vec<FactorValue> {
-        assert!(case < self.cases);
-        Vec::new()
+        assert!(case < self.cases, "case {case} of {}", self.cases);
+        let sample = case % self.samples;
+        self.sources
+            .iter()
+            .map(|source| match source {
+                Source::Crossed { stride, levels } => {
+                    FactorValue::Level(index(case / stride % levels))
+                }
+                Source::SampledLevel { dimension, levels } => {
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "between 0 and the number of levels"
+                    )]
+                    let level = (dimension.coordinate(sample) * *levels as f64) as usize;
+                    FactorValue::Level(level.min(levels - 1))
+                }
+                Source::Sampled {
+                    dimension,
+                    distribution,
+                } => FactorValue::Number(quantile(distribution, dimension.coordinate(sample))),
+            })
+            .collect()
+    }
+}
+
+fn index(number: u64) -> usize {
+    usize::try_from(number).expect("a level's index")
+}
+
+fn described(factor: &StudyFactor) -> Factor {
+    Factor {
+        name: factor.name.clone(),
+        unit: factor.unit.clone(),
+        role: factor.role,
+        kind: match &factor.values {
+            FactorValues::Levels(levels) => FactorKind::Levels(
+                levels
+                    .iter()
+                    .map(|level| Level {
+                        label: level.label.clone(),
+                        number: level.number,
+                    })
+                    .collect(),
+            ),
+            FactorValues::Continuum { distribution, .. } => {
+                let [low, high] = ends(distribution);
+                FactorKind::Continuous { low, high }
+            }
+        },
     }
 }

@@ -6,11 +6,19 @@
 
 mod case;
 mod design;
+mod distribution;
 mod results;
 mod row;
+mod sampling;
+mod sobol;
 pub mod statistics;
+mod store;
 
 pub use case::{CaseError, CaseEvaluator, CaseWorker};
 pub use design::{Design, DesignError, Factor, FactorKind, FactorValue, Level, Role};
 pub use results::{Results, ResultsError};
 pub use row::{CaseResult, METRIC_COUNT, METRICS, Metric, MetricColumn, Outcome, Row};
+pub use store::{
+    CSV_FILE, CaseDesign, JOURNAL_FILE, MANIFEST_FILE, Manifest, ParquetResults, Progress,
+    RESULTS_FILE, RunEnd, SCHEMA_VERSION, Shard, Status, StudyError, StudyRun, merge, write_csv,
+};

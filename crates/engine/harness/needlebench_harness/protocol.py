@@ -5,7 +5,7 @@ import struct
 from enum import IntEnum
 from typing import Final
 
-VERSION: Final = 2
+VERSION: Final = 3
 
 HEADER: Final = struct.Struct("<II")
 U32: Final = struct.Struct("<I")
@@ -35,6 +35,7 @@ class Request(IntEnum):
     COPY = 8
     STEP_GROUP = 9
     REPLAY = 10
+    CLEAR = 11
 
 
 class Answer(IntEnum):
@@ -48,6 +49,7 @@ class Answer(IntEnum):
     COPIED = 0x86
     GROUP_STATE = 0x87
     REPLAYED = 0x88
+    CLEARED = 0x89
     ERROR = 0xFF
 
 

@@ -182,6 +182,8 @@ class Server:
             self._copy(payload)
         elif kind == Request.REPLAY:
             self._replay(payload)
+        elif kind == Request.CLEAR:
+            self._clear()
         else:
             raise ProtocolError(f"unknown request kind {kind}")
 
@@ -213,6 +215,13 @@ class Server:
             + pack_strings(model.names(mujoco.mjtObj.mjOBJ_BODY, mj.nbody))
             + pack_strings(model.names(mujoco.mjtObj.mjOBJ_GEOM, mj.ngeom)),
         )
+
+    def _clear(self) -> None:
+        self._groups.clear()
+        self._plants.clear()
+        # Only now: models and plants may refer to each other, and nobody waits for a step.
+        gc.collect()
+        self._channel.write(Answer.CLEARED, b"")
 
     def _add(self, model: Model) -> int:
         index = len(self._plants)

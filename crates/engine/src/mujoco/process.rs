@@ -205,6 +205,18 @@ impl HarnessProcess {
         self.watchdog.process_id()
     }
 
+    /// Why the process is of no further use, if it is not.
+    pub fn failure(&self) -> Option<&HarnessError> {
+        self.failure.as_ref()
+    }
+
+    /// Forgets all plants and models, so that a process can serve one cell after the other without
+    /// growing. Handles from before name plants that are gone, or others.
+    pub fn clear(&mut self) -> Result<(), HarnessError> {
+        let sealed = Frame::begin(&mut self.outbox, Request::Clear).finish();
+        self.ask(Request::Clear, sealed, |p| p.finish())
+    }
+
     /// Compiles an MJCF model, whose site `observed_site` every state will report.
     pub fn load(&mut self, mjcf: &str, observed_site: &str) -> Result<PlantHandle, HarnessError> {
         let site_bytes = u32::try_from(observed_site.len()).unwrap_or(u32::MAX);

@@ -11,6 +11,7 @@ mod pairs;
 mod paper;
 mod run;
 mod servo;
+mod study;
 
 use std::io::Write;
 use std::path::Path;
@@ -34,6 +35,7 @@ pub(crate) use pairs::pairs;
 pub(crate) use paper::paper;
 pub(crate) use run::run;
 pub(crate) use servo::servo;
+pub(crate) use study::{merge, study};
 
 use crate::cli::{MissingInertiaArgument, RobotArguments, SchemaFormat};
 use crate::exit::ExitStatus;
@@ -114,6 +116,7 @@ fn print_text(text: &str) -> Result<()> {
 pub(crate) fn schema(format: SchemaFormat) -> Result<ExitStatus> {
     match format {
         SchemaFormat::Scenario => print_json(&needlebench_cell::scenario::scenario_schema())?,
+        SchemaFormat::Study => print_json(&needlebench_cell::study::study_schema())?,
     }
     Ok(ExitStatus::Success)
 }

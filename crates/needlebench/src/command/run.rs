@@ -27,6 +27,7 @@ use crate::output::{
     budget_picture, junit, markdown, press_csv, press_picture, ranking_picture, recording_csv,
     report_text,
 };
+use crate::page::run_page;
 use crate::picture::{Image, tile};
 use crate::pipeline::{self, RunOptions, ScenarioRun};
 use crate::progress::Progress;
@@ -90,34 +91,17 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
 
     let mut status = ExitStatus::Success;
     let mut reports = Vec::new();
+    let outputs = Outputs {
+        pictures: !arguments.no_pictures,
+        page: !arguments.no_page,
+        text: !arguments.json,
+        quiet: arguments.quiet,
+    };
     for (resolved, folder) in scenarios.iter().zip(&folders) {
-        let progress = Progress::new(arguments.quiet);
-        // A robot that is not a UR arm was refused while the scenario was read.
-        let mut finished = pipeline::run(resolved, &options, &cancel, &progress)?;
-        let pictures = resolved.scenario.recording.pictures && !arguments.no_pictures;
-        let written = write_results(
-            resolved,
-            &mut finished,
-            folder,
-            pictures,
-            jobs,
-            &cancel,
-            &progress,
-        );
-        progress.finish();
-        written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
-        status = status.max(outcome(&finished));
-        if !arguments.json {
-            let name = &resolved.scenario.name;
-            let text = report_text(&finished.report);
-            print_text(&format!("{name}\n{text}results: {}", folder.display()))?;
-        }
-        reports.push(finished.report);
-        if finished.interrupted {
-            anstream::eprintln!(
-                "interrupted: what was finished until then is in {}",
-                folder.display()
-            );
+        let (outcome, report) = run_into(resolved, &options, folder, outputs, &cancel)?;
+        status = status.max(outcome);
+        reports.push(report);
+        if outcome == ExitStatus::Interrupted {
             break;
         }
     }
@@ -137,6 +121,57 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     }
     append_to_step_summary(&all)?;
     Ok(status)
+}
+
+/// What a run leaves besides its report.
+#[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub(super) struct Outputs {
+    /// Pictures, if the scenario wants any.
+    pub pictures: bool,
+    /// The page.
+    pub page: bool,
+    /// The table on standard output.
+    pub text: bool,
+    /// No progress.
+    pub quiet: bool,
+}
+
+/// Runs one scenario and writes its results into a folder that is there.
+pub(super) fn run_into(
+    resolved: &ResolvedScenario,
+    options: &RunOptions,
+    folder: &Path,
+    outputs: Outputs,
+    cancel: &AtomicBool,
+) -> Result<(ExitStatus, Report)> {
+    let progress = Progress::new(outputs.quiet);
+    // A robot that is not a UR arm was refused while the scenario was read.
+    let mut finished = pipeline::run(resolved, options, cancel, &progress)?;
+    let written = write_results(
+        resolved,
+        &mut finished,
+        folder,
+        resolved.scenario.recording.pictures && outputs.pictures,
+        outputs.page,
+        options.jobs,
+        cancel,
+        &progress,
+    );
+    progress.finish();
+    written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
+    if outputs.text {
+        let name = &resolved.scenario.name;
+        let text = report_text(&finished.report);
+        print_text(&format!("{name}\n{text}results: {}", folder.display()))?;
+    }
+    if finished.interrupted {
+        anstream::eprintln!(
+            "interrupted: what was finished until then is in {}",
+            folder.display()
+        );
+    }
+    Ok((outcome(&finished), finished.report))
 }
 
 fn outcome(finished: &ScenarioRun) -> ExitStatus {
@@ -176,19 +211,24 @@ fn prepare_folders(
     let mut folders = Vec::new();
     for resolved in scenarios {
         let folder = arguments.out.join(&resolved.scenario.name);
-        std::fs::create_dir_all(&folder)
-            .and_then(|()| probe_folder(&folder))
-            .map_err(|error| {
-                Finding::new(
-                    folder.display().to_string(),
-                    format!("the results folder cannot be written: {error}"),
-                )
-                .key("--out")
-                .hint("choose another folder with --out DIR")
-            })?;
+        prepare_folder(&folder)?;
         folders.push(folder);
     }
     Ok(folders)
+}
+
+/// Makes a results folder and proves that it can be written.
+pub(super) fn prepare_folder(folder: &Path) -> Result<(), Finding> {
+    std::fs::create_dir_all(folder)
+        .and_then(|()| probe_folder(folder))
+        .map_err(|error| {
+            Finding::new(
+                folder.display().to_string(),
+                format!("the results folder cannot be written: {error}"),
+            )
+            .key("--out")
+            .hint("choose another folder with --out DIR")
+        })
 }
 
 /// Proves that a file that an argument names can be written, before a long run.
@@ -223,6 +263,7 @@ fn write_results(
     finished: &mut ScenarioRun,
     folder: &Path,
     pictures: bool,
+    page: bool,
     jobs: usize,
     cancel: &AtomicBool,
     progress: &Progress,
@@ -285,6 +326,14 @@ fn write_results(
     if let (Some(run), Some(report)) = (&finished.iso9283, &mut finished.report.iso9283) {
         let name = &resolved.scenario.name;
         report.files = iso9283::write_results(name, report, run, folder, pictures)?;
+    }
+    let page_path = folder.join("report.html");
+    if page {
+        progress.message("writing the page");
+        write_atomically(&page_path, run_page(resolved, finished).as_bytes())?;
+    } else if page_path.exists() {
+        // Nobody should take an earlier run's for this one's.
+        std::fs::remove_file(&page_path)?;
     }
     finished
         .report

@@ -29,7 +29,7 @@ use needlebench_evaluation::report::{
 };
 use needlebench_planning::iso9283::{ProtocolPlan, plan_protocol};
 
-use crate::pipeline::{EngineChoice, RunError, RunOptions, ScenarioRun};
+use crate::pipeline::{EngineChoice, RealArm, RunError, RunOptions, ScenarioRun};
 use crate::plants::start_harness;
 use crate::progress::Progress;
 use crate::provenance::provenance;
@@ -134,6 +134,7 @@ pub(crate) fn run(
             limit_band_m: protocol.limit_band_m,
         }),
         interrupted,
+        real_arm: RealArm::of(reality.cell()),
     })
 }
 
@@ -272,6 +273,7 @@ fn unplanned(
         runs: Vec::new(),
         iso9283: None,
         interrupted: false,
+        real_arm: RealArm::of(&resolved.cell),
     }
 }
 

@@ -101,7 +101,10 @@ impl Planner<'_> {
     }
 
     /// Least distance of a posture from breaking a rule.
-    fn surplus(&self, candidate: &Candidate, rejections: &[Rejection]) -> f64 {
+    ///
+    /// Of `rejections` those for its joint limits and for what it misses count: the others say what
+    /// the candidate's own numbers say.
+    pub fn surplus(&self, candidate: &Candidate, rejections: &[Rejection]) -> f64 {
         let planning = self.planning();
         let margins = &candidate.margins;
         let clearances = candidate.clearance.iter().map(|pair| {

@@ -61,18 +61,7 @@ const MOST_MAP_BINS: usize = 12;
 /// Factors whose pairs are looked at, at most.
 const MOST_PAIRED: usize = 10;
 
-/// How the sampled factors' points were chosen.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Sampling {
-    /// Independent random points, or not known.
-    #[default]
-    Random,
-    /// Sobol's sequence.
-    Sobol,
-    /// Latin hypercube.
-    LatinHypercube,
-}
+pub use needlebench_cell::study::SamplingMethod as Sampling;
 
 /// What to sum up.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Version of the protocol that this client speaks.
-pub(super) const PROTOCOL_VERSION: u32 = 2;
+pub(super) const PROTOCOL_VERSION: u32 = 3;
 
 /// Kind and payload length, u32 each.
 pub(super) const HEADER_BYTES: usize = 8;
@@ -24,6 +24,7 @@ pub(super) enum Request {
     Copy = 8,
     StepGroup = 9,
     Replay = 10,
+    Clear = 11,
 }
 
 impl Request {
@@ -39,6 +40,7 @@ impl Request {
             Self::Copy => "COPY",
             Self::StepGroup => "STEP_GROUP",
             Self::Replay => "REPLAY",
+            Self::Clear => "CLEAR",
         }
     }
 
@@ -54,6 +56,7 @@ impl Request {
             Self::Copy => 0x86,
             Self::StepGroup => 0x87,
             Self::Replay => 0x88,
+            Self::Clear => 0x89,
         }
     }
 }

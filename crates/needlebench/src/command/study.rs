@@ -1,0 +1,392 @@
+//! `needlebench study` and `needlebench merge`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use needlebench_cell::study::load_study;
+use needlebench_cell::{Finding, ResolvedScenario};
+use needlebench_study::{
+    CSV_FILE, CaseEvaluator, Manifest, ParquetResults, Progress as Event, RunEnd, StudyError,
+    StudyRun, merge as merge_shards, write_csv,
+};
+
+use super::run::{Outputs, prepare_folder, probe_file, run_into};
+use super::{overrides, print_json, print_text};
+use crate::cli::{MergeArguments, RobotArguments, StudyArguments};
+use crate::exit::ExitStatus;
+use crate::output::findings::print_findings;
+use crate::pipeline::RunOptions;
+use crate::progress::Progress;
+use crate::study::{
+    CaseReport, PreparedStudy, StudyCase, StudyEvaluator, StudyOutput, case_text, in_words,
+    time_per_case, write_study,
+};
+
+/// Longest time that a study is expected to take and starts without `--yes`.
+const WITHOUT_ASKING: Duration = Duration::from_secs(20 * 60);
+/// Cases of the costs of which nothing is measured before: they are few, whatever they cost.
+const FEW_CASES: u64 = 200;
+
+/// Computes a study, or some of its cases.
+pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
+    let Some(prepared) = prepare(&arguments.study, &arguments.robot) else {
+        return Ok(ExitStatus::BadInput);
+    };
+    if !arguments.case.is_empty() {
+        return cases(arguments, &prepared);
+    }
+    let folder = arguments.out.join(&prepared.study.file.name);
+    if let Err(finding) = prepare_outputs(&folder, arguments.junit.as_deref()) {
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
+    let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design);
+    let threads = threads(arguments.jobs);
+    let manifest = prepared.manifest(arguments.shard);
+    if !arguments.yes && !arguments.resume {
+        match too_long(&prepared, &evaluator, manifest.own_cases(), threads) {
+            Ok(None) => {}
+            Ok(Some(finding)) => {
+                print_findings(&[finding]);
+                return Ok(ExitStatus::BadInput);
+            }
+            Err(message) => anyhow::bail!(message),
+        }
+    }
+    let cancel = watch_interrupts()?;
+    let progress = Progress::new(arguments.quiet);
+    let run = StudyRun {
+        design: &prepared.design,
+        manifest,
+        evaluator: &evaluator,
+        threads,
+        resume: arguments.resume,
+    };
+    let end = run.run(&folder, &cancel, &|event| show(&progress, event));
+    progress.finish();
+    match end {
+        Err(error) => Ok(failed(&error)),
+        Ok(RunEnd::Partial { done, total }) => {
+            anstream::eprintln!(
+                "interrupted: {done} of {total} cases are in {}; --resume goes on",
+                folder.display()
+            );
+            Ok(ExitStatus::Interrupted)
+        }
+        Ok(RunEnd::Finished {
+            cases,
+            results: None,
+        }) => {
+            print_text(&format!(
+                "{cases} of {} cases are in {}; `needlebench merge` joins all shards",
+                prepared.design.cases(),
+                folder.display()
+            ))?;
+            Ok(ExitStatus::Success)
+        }
+        Ok(RunEnd::Finished {
+            results: Some(results),
+            ..
+        }) => {
+            let options = FinishOptions {
+                csv: arguments.csv,
+                json: arguments.json,
+                junit: arguments.junit.as_deref(),
+                page: !arguments.no_page,
+                quiet: arguments.quiet,
+                threads,
+            };
+            finish(&prepared, &folder, &results, &options)
+        }
+    }
+}
+
+/// Joins the shards of a study.
+pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
+    let Some(prepared) = prepare(&arguments.study, &arguments.robot) else {
+        return Ok(ExitStatus::BadInput);
+    };
+    let folder = arguments.out.join(&prepared.study.file.name);
+    if let Err(finding) = prepare_outputs(&folder, arguments.junit.as_deref()) {
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
+    let threads = threads(arguments.jobs);
+    let progress = Progress::new(arguments.quiet);
+    if let Some(error) = foreign_shard(&prepared, &arguments.shards) {
+        return Ok(failed(&error));
+    }
+    let end = merge_shards(&folder, &arguments.shards, threads, true, &|event| {
+        show(&progress, event);
+    });
+    progress.finish();
+    match end {
+        Err(error) => Ok(failed(&error)),
+        Ok(RunEnd::Finished {
+            results: Some(results),
+            ..
+        }) => {
+            let options = FinishOptions {
+                csv: arguments.csv,
+                json: arguments.json,
+                junit: arguments.junit.as_deref(),
+                page: !arguments.no_page,
+                quiet: arguments.quiet,
+                threads,
+            };
+            finish(&prepared, &folder, &results, &options)
+        }
+        Ok(_) => unreachable!("a merge writes a table or fails"),
+    }
+}
+
+/// Reads a study; prints what is wrong with it.
+fn prepare(path: &Path, robot: &RobotArguments) -> Option<PreparedStudy> {
+    let prepared = overrides(robot)
+        .map_err(|finding| vec![finding])
+        .and_then(|overrides| load_study(path, &overrides))
+        .and_then(PreparedStudy::new);
+    match prepared {
+        Ok(prepared) => Some(prepared),
+        Err(findings) => {
+            print_findings(&findings);
+            None
+        }
+    }
+}
+
+/// Why a folder holds no shard of this study.
+fn foreign_shard(prepared: &PreparedStudy, shards: &[PathBuf]) -> Option<StudyError> {
+    let ours = prepared.manifest(None);
+    shards
+        .iter()
+        .find_map(|folder| match Manifest::read(folder) {
+            Ok(Some(manifest)) => ours.other_study(folder, &manifest),
+            // What is no folder of a study is refused by the merge.
+            Ok(None) => None,
+            Err(error) => Some(error),
+        })
+}
+
+fn prepare_outputs(folder: &Path, junit: Option<&Path>) -> Result<(), Finding> {
+    prepare_folder(folder)?;
+    junit.map_or(Ok(()), |path| probe_file(path, "--junit"))
+}
+
+fn threads(jobs: Option<u16>) -> usize {
+    jobs.map_or_else(
+        || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        usize::from,
+    )
+}
+
+fn watch_interrupts() -> Result<Arc<AtomicBool>> {
+    let cancel = Arc::new(AtomicBool::new(false));
+    let requested = Arc::clone(&cancel);
+    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
+        .context("cannot watch for interrupts")?;
+    Ok(cancel)
+}
+
+/// A finding if the study will take long, or an error if its cases cannot be computed.
+fn too_long(
+    prepared: &PreparedStudy,
+    evaluator: &dyn CaseEvaluator,
+    cases: u64,
+    threads: usize,
+) -> Result<Option<Finding>, String> {
+    if cases <= FEW_CASES {
+        return Ok(None);
+    }
+    let each = time_per_case(evaluator, prepared.design.cases())?;
+    let time = each.mul_f64(cases as f64 / threads as f64);
+    if time <= WITHOUT_ASKING {
+        return Ok(None);
+    }
+    let finding = Finding::new(
+        &prepared.study.source.file,
+        format!(
+            "{cases} cases ({}) will take about {} on {threads} threads",
+            prepared.product(),
+            in_words(time)
+        ),
+    );
+    Ok(Some(finding.key("factors").hint(
+        "--yes starts all the same; --shard K/N computes a part; fewer levels or samples cost less",
+    )))
+}
+
+fn show(progress: &Progress, event: Event<'_>) {
+    match event {
+        Event::CutOff { .. } | Event::Damage { .. } => anstream::eprintln!("{event}"),
+        Event::Begin { kept, total } => {
+            if kept > 0 {
+                anstream::eprintln!("{event}");
+            }
+            progress.message("cases");
+            progress.at(kept, total);
+        }
+        Event::Cases { done, total } => progress.at(done, total),
+        Event::Table { done, total } => {
+            progress.message("table");
+            progress.at(done, total);
+        }
+    }
+}
+
+fn failed(error: &StudyError) -> ExitStatus {
+    anstream::eprintln!("error: {error}");
+    if error.is_input() {
+        ExitStatus::BadInput
+    } else {
+        ExitStatus::EnvironmentFailed
+    }
+}
+
+struct FinishOptions<'a> {
+    csv: bool,
+    json: bool,
+    junit: Option<&'a Path>,
+    page: bool,
+    quiet: bool,
+    threads: usize,
+}
+
+/// Statistics, page and verdict of a table that is there.
+fn finish(
+    prepared: &PreparedStudy,
+    folder: &Path,
+    results: &Path,
+    options: &FinishOptions<'_>,
+) -> Result<ExitStatus> {
+    let progress = Progress::new(options.quiet);
+    let results = match ParquetResults::open(results) {
+        Ok(results) => results,
+        Err(error) => return Ok(failed(&error.into())),
+    };
+    if options.csv {
+        progress.message("csv");
+        if let Err(error) = write_csv(&results, &folder.join(CSV_FILE), options.threads) {
+            return Ok(failed(&error));
+        }
+    }
+    let output = StudyOutput {
+        folder,
+        junit: options.junit,
+        page: options.page,
+        threads: options.threads,
+    };
+    let written = write_study(prepared, &results, &output, &progress);
+    progress.finish();
+    let finished =
+        written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
+    if options.json {
+        print_json(&finished.summary)?;
+    } else {
+        print_text(&format!("{}results: {}", finished.text, folder.display()))?;
+    }
+    Ok(if finished.passed {
+        ExitStatus::Success
+    } else {
+        ExitStatus::CriterionFailed
+    })
+}
+
+/// Computes cases alone.
+fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus> {
+    let total = prepared.design.cases();
+    if let Some(case) = arguments.case.iter().find(|&&case| case >= total) {
+        let finding = Finding::new(
+            &prepared.study.source.file,
+            format!("there is no case {case}"),
+        )
+        .key("--case")
+        .hint(format!(
+            "the study has {total} cases, 0 to {}: {}",
+            total - 1,
+            prepared.product()
+        ));
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
+    if arguments.run {
+        return run_cases(arguments, prepared);
+    }
+    let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design);
+    let mut worker = evaluator.worker().map_err(anyhow::Error::msg)?;
+    let mut reports = Vec::new();
+    for &number in &arguments.case {
+        let layout = StudyCase::new(&prepared.study, &prepared.design, number);
+        let result = worker.evaluate(number)?;
+        if arguments.json {
+            reports.push(CaseReport::new(&prepared.design, &layout, &result));
+            continue;
+        }
+        print_text(&case_text(&prepared.design, &layout, &result))?;
+        if let Err(findings) = layout.scenario(&prepared.study) {
+            print_findings(&findings);
+        }
+    }
+    if arguments.json {
+        match reports.as_slice() {
+            [report] => print_json(report)?,
+            reports => print_json(&reports)?,
+        }
+    }
+    Ok(ExitStatus::Success)
+}
+
+/// Runs cases as `run` does.
+fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus> {
+    let mut runs: Vec<(ResolvedScenario, PathBuf, RunOptions)> = Vec::new();
+    let folder = arguments.out.join(&prepared.study.file.name).join("cases");
+    for &number in &arguments.case {
+        let layout = StudyCase::new(&prepared.study, &prepared.design, number);
+        match layout.scenario(&prepared.study) {
+            Ok(mut resolved) => {
+                resolved.scenario.name = format!("case_{number}");
+                resolved.scenario.description =
+                    format!("Case {number} of the study {}.", prepared.study.file.name);
+                if let Some(engines) = layout.engines {
+                    resolved.scenario.engines.run = engines;
+                }
+                let options = RunOptions {
+                    engines: None,
+                    jobs: threads(arguments.jobs),
+                    referee: false,
+                };
+                runs.push((resolved, folder.join(number.to_string()), options));
+            }
+            Err(findings) => {
+                anstream::eprintln!("case {number} cannot exist:");
+                print_findings(&findings);
+                return Ok(ExitStatus::BadInput);
+            }
+        }
+    }
+    let cancel = watch_interrupts()?;
+    let mut status = ExitStatus::Success;
+    let mut reports = Vec::new();
+    let outputs = Outputs {
+        pictures: true,
+        page: !arguments.no_page,
+        text: !arguments.json,
+        quiet: arguments.quiet,
+    };
+    for (resolved, folder, options) in &runs {
+        if let Err(finding) = prepare_folder(folder) {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+        let (outcome, report) = run_into(resolved, options, folder, outputs, &cancel)?;
+        status = status.max(outcome);
+        reports.push(report);
+    }
+    if arguments.json {
+        print_json(&reports)?;
+    }
+    Ok(status)
+}

@@ -1,0 +1,96 @@
+//! What a study leaves besides its table.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use needlebench_study::ParquetResults;
+use needlebench_study::statistics::{
+    CriterionResult, Summary, SummaryOptions, judge_study, summarise,
+};
+use serde::Serialize;
+
+use super::prepare::PreparedStudy;
+use crate::atomic::write_atomically;
+use crate::progress::Progress;
+
+/// Statistics of a study, with the verdict.
+#[derive(Debug, Serialize)]
+pub(crate) struct StudySummary {
+    /// Name of the study.
+    name: String,
+    /// The question that it answers.
+    description: String,
+    /// Hash of everything that decides the results.
+    study_id: String,
+    /// Number of cases.
+    cases: u64,
+    /// `pass` if all criteria are met.
+    verdict: &'static str,
+    /// Criteria of the study.
+    criteria: Vec<CriterionResult>,
+    /// Statistics.
+    #[serde(flatten)]
+    statistics: Summary,
+}
+
+/// Where results go, and which.
+pub(crate) struct StudyOutput<'a> {
+    pub folder: &'a Path,
+    pub junit: Option<&'a Path>,
+    pub page: bool,
+    pub threads: usize,
+}
+
+/// What was written.
+pub(crate) struct FinishedStudy {
+    pub summary: StudySummary,
+    /// The summary for a terminal.
+    pub text: String,
+    /// All criteria are met.
+    pub passed: bool,
+}
+
+/// Sums up a study's table and writes what there is to write.
+pub(crate) fn write_study(
+    prepared: &PreparedStudy,
+    results: &ParquetResults,
+    output: &StudyOutput<'_>,
+    progress: &Progress,
+) -> Result<FinishedStudy> {
+    let file = &prepared.study.file;
+    progress.message("statistics");
+    let options = SummaryOptions {
+        sampling: file.sampling.method,
+        working_configurations: file.criteria.working_configurations.unwrap_or(2) as usize,
+        more_quantiles: file
+            .criteria
+            .quantiles()
+            .iter()
+            .map(|each| each.quantile)
+            .collect(),
+        factors: true,
+    };
+    let statistics = summarise(results, &options)?;
+    let criteria = judge_study(&statistics, &file.criteria);
+    let passed = criteria.iter().all(|criterion| criterion.pass);
+    let summary = StudySummary {
+        name: file.name.clone(),
+        description: file.description.clone(),
+        study_id: prepared.identity.id.clone(),
+        cases: prepared.design.cases(),
+        verdict: if passed { "pass" } else { "fail" },
+        criteria,
+        statistics,
+    };
+    let write = |name: &str, text: &str| {
+        let path = output.folder.join(name);
+        write_atomically(&path, text.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))
+    };
+    write("summary.json", &serde_json::to_string_pretty(&summary)?)?;
+    Ok(FinishedStudy {
+        summary,
+        text: String::new(),
+        passed,
+    })
+}

@@ -1,0 +1,118 @@
+//! Why a study does not go on.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::{CaseError, ResultsError};
+
+/// Why a study cannot be begun, continued or merged.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "fields are named in the messages")]
+pub enum StudyError {
+    /// The system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        action: &'static str,
+        path: PathBuf,
+        source: io::Error,
+    },
+    /// No room left, or the disk failed, while results were written.
+    #[error(
+        "cannot write {}: {source}\n{kept} of {total} cases are kept in {}; nothing is damaged\n\
+         hint: {}continue with --resume",
+        path.display(),
+        folder.display(),
+        if source.kind() == io::ErrorKind::StorageFull { "free some space and " } else { "" }
+    )]
+    Write {
+        path: PathBuf,
+        source: io::Error,
+        kept: u64,
+        total: u64,
+        folder: PathBuf,
+    },
+    /// The environment failed in a case.
+    #[error(
+        "{source}\n{kept} of {total} cases are kept in {}\nhint: continue with --resume",
+        folder.display()
+    )]
+    Case {
+        source: CaseError,
+        kept: u64,
+        total: u64,
+        folder: PathBuf,
+    },
+    /// A thread cannot begin to work.
+    #[error("no worker could be started: {0}")]
+    Worker(String),
+    /// Two processes, one folder.
+    #[error(
+        "{}: another process is writing here\nhint: wait for it or choose another folder",
+        folder.display()
+    )]
+    Locked { folder: PathBuf },
+    /// Results are there, and `--resume` was not asked for.
+    #[error(
+        "{}: holds {what} already\nhint: --resume continues it; or choose another folder",
+        folder.display()
+    )]
+    Exists { folder: PathBuf, what: String },
+    /// Results of another study are there.
+    #[error(
+        "{}: holds the results of another study\n  there: {found}\n  here:  {expected}{}\n\
+         hint: choose another folder",
+        folder.display(),
+        differences.iter().map(|each| format!("\n  different: {each}")).collect::<String>()
+    )]
+    OtherStudy {
+        folder: PathBuf,
+        found: String,
+        expected: String,
+        differences: Vec<String>,
+    },
+    /// A file of a study that cannot be understood.
+    #[error("{}: {message}", path.display())]
+    File { path: PathBuf, message: String },
+    /// Nothing can come of such a request.
+    #[error("{0}")]
+    Request(String),
+    /// Shards that do not make up a study.
+    #[error("{0}")]
+    Merge(String),
+    /// Results that cannot be read.
+    #[error(transparent)]
+    Results(#[from] ResultsError),
+}
+
+impl StudyError {
+    /// Whether folders, files or the request are at fault, not the machine.
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Locked { .. }
+            | Self::Exists { .. }
+            | Self::OtherStudy { .. }
+            | Self::File { .. }
+            | Self::Request(_)
+            | Self::Merge(_)
+            | Self::Results(_) => true,
+            Self::Io { .. } | Self::Write { .. } | Self::Case { .. } | Self::Worker(_) => false,
+        }
+    }
+
+    /// For `map_err`.
+    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io {
+            action,
+            path,
+            source,
+        }
+    }
+
+    pub(crate) fn file(path: &Path, message: impl Into<String>) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            message: message.into(),
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! A study's folder: begun, continued, completed.
+
+use std::io;
+use std::num::NonZeroU64;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use super::atomic::sync_folder;
+use super::columns::Columns;
+use super::error::StudyError;
+use super::journal::{BlockReader, JOURNAL_FILE, Journal, Places, kept};
+use super::manifest::{MANIFEST_FILE, Manifest, Status};
+use super::parquet_write::{self, WriteError};
+use super::run::Progress;
+
+/// Name of the table in a study's folder.
+pub const RESULTS_FILE: &str = "results.parquet";
+
+/// Name of the table as CSV in a study's folder.
+pub const CSV_FILE: &str = "results.csv";
+
+/// A folder that this process alone writes to.
+#[derive(Debug)]
+pub(crate) struct Folder {
+    pub(crate) path: PathBuf,
+    pub(crate) manifest: Manifest,
+    pub(crate) journal: Journal,
+    pub(crate) places: Places,
+}
+
+/// What is in a folder.
+#[derive(Debug)]
+pub(crate) enum Opened {
+    /// All of it.
+    Complete,
+    /// Some blocks, or none.
+    Running(Box<Folder>),
+}
+
+impl Folder {
+    /// Begins a study in a folder, or goes on with it.
+    pub(crate) fn open(
+        path: &Path,
+        manifest: &Manifest,
+        resume: bool,
+        watch: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Opened, StudyError> {
+        std::fs::create_dir_all(path).map_err(StudyError::io("create", path))?;
+        if check(path, manifest, resume)? == Some(Status::Complete) {
+            return Ok(Opened::Complete);
+        }
+        let mut journal = Journal::lock(path)?;
+        // Another process may have completed the study while this one waited for its turn.
+        if check(path, manifest, true)? == Some(Status::Complete) {
+            if manifest.shard.is_none() {
+                remove_journal(path)?;
+            }
+            return Ok(Opened::Complete);
+        }
+        let mut manifest = manifest.clone();
+        manifest.status = Status::Running;
+        manifest.write(path)?;
+        let journal_path = path.join(JOURNAL_FILE);
+        let scan = journal.prepare(&journal_path, &manifest)?;
+        for damage in &scan.damages {
+            watch(Progress::Damage {
+                journal: &journal_path,
+                offset: damage.offset,
+                bytes: damage.bytes,
+            });
+        }
+        if scan.tail_bytes > 0 {
+            watch(Progress::CutOff {
+                journal: &journal_path,
+                offset: scan.end,
+                bytes: scan.tail_bytes,
+            });
+        }
+        Ok(Opened::Running(Box::new(Self {
+            path: path.to_owned(),
+            manifest,
+            journal,
+            places: scan.places,
+        })))
+    }
+
+    /// Adds a block.
+    pub(crate) fn append(&mut self, block: u64, record: &[u8]) -> io::Result<()> {
+        let place = self.journal.append(record)?;
+        let index = usize::try_from(block).expect("blocks are indexed in memory");
+        self.places[index] = NonZeroU64::new(place);
+        Ok(())
+    }
+
+    /// An error of writing, with what is kept.
+    pub(crate) fn write_error(&self, file: &str, source: io::Error, kept: u64) -> StudyError {
+        StudyError::Write {
+            path: self.path.join(file),
+            source,
+            kept,
+            total: self.manifest.own_cases(),
+            folder: self.path.clone(),
+        }
+    }
+
+    /// Makes the folder complete, once all blocks are there.
+    pub(crate) fn complete(
+        self,
+        threads: usize,
+        watch: &(dyn Fn(Progress) + Sync),
+    ) -> Result<(), StudyError> {
+        if self.manifest.shard.is_none() {
+            let blocks = Blocks {
+                folders: vec![(self.path.clone(), self.manifest.clone())],
+                places: self
+                    .places
+                    .iter()
+                    .map(|place| place.map(|at| (0, at)))
+                    .collect(),
+            };
+            write_results(&self.path, &blocks, &self.manifest, threads, watch).map_err(
+                |error| match error {
+                    WriteError::Source(error) => error,
+                    WriteError::File(source) => {
+                        let kept = kept(&self.manifest, &self.places);
+                        self.write_error(RESULTS_FILE, source, kept)
+                    }
+                },
+            )?;
+        }
+        self.completed()
+    }
+
+    /// Says that the folder is complete.
+    pub(crate) fn completed(mut self) -> Result<(), StudyError> {
+        self.manifest.status = Status::Complete;
+        self.manifest.write(&self.path)?;
+        // A shard's journal is its result.
+        if self.manifest.shard.is_none() {
+            remove_journal(&self.path)?;
+        }
+        Ok(())
+    }
+}
+
+/// Refuses a folder that must not be touched; otherwise says how far it is.
+fn check(path: &Path, manifest: &Manifest, resume: bool) -> Result<Option<Status>, StudyError> {
+    let exists = |what: &str| StudyError::Exists {
+        folder: path.to_owned(),
+        what: what.to_owned(),
+    };
+    let Some(found) = Manifest::read(path)? else {
+        if path.join(RESULTS_FILE).exists() {
+            let message = format!(
+                "is there without {MANIFEST_FILE}, so nobody knows what it is of\n\
+                 hint: choose another folder"
+            );
+            return Err(StudyError::file(&path.join(RESULTS_FILE), message));
+        }
+        if path.join(JOURNAL_FILE).exists() && !resume {
+            return Err(exists("the beginning of a study"));
+        }
+        return Ok(None);
+    };
+    if let Some(error) = manifest.other_study(path, &found) {
+        return Err(error);
+    }
+    let part = |manifest: &Manifest| {
+        manifest
+            .shard
+            .map_or("the whole".to_owned(), |shard| format!("shard {shard}"))
+    };
+    if found.shard != manifest.shard {
+        let message = format!(
+            "is of {} of this study, not of {}\nhint: every shard needs a folder of its own",
+            part(&found),
+            part(manifest)
+        );
+        return Err(StudyError::file(&path.join(MANIFEST_FILE), message));
+    }
+    if !resume {
+        return Err(exists(match found.status {
+            Status::Complete => "this study, complete,",
+            Status::Running => "this study, not complete,",
+        }));
+    }
+    let data = if manifest.shard.is_some() {
+        JOURNAL_FILE
+    } else {
+        RESULTS_FILE
+    };
+    if found.status == Status::Complete && !path.join(data).exists() {
+        let message = format!(
+            "says that the study is complete, but {data} is not there\n\
+             hint: remove {MANIFEST_FILE} to compute it again"
+        );
+        return Err(StudyError::file(&path.join(MANIFEST_FILE), message));
+    }
+    Ok(Some(found.status))
+}
+
+fn remove_journal(folder: &Path) -> Result<(), StudyError> {
+    let path = folder.join(JOURNAL_FILE);
+    std::fs::remove_file(&path)
+        .and_then(|()| sync_folder(&path))
+        .map_err(StudyError::io("remove", &path))
+}
+
+/// All blocks of a study, in the journals of some folders.
+pub(crate) struct Blocks {
+    pub(crate) folders: Vec<(PathBuf, Manifest)>,
+    /// Index of the folder and place of each block's record.
+    pub(crate) places: Vec<Option<(usize, NonZeroU64)>>,
+}
+
+/// Writes the table of a study whose blocks are all there.
+pub(crate) fn write_results(
+    folder: &Path,
+    blocks: &Blocks,
+    manifest: &Manifest,
+    threads: usize,
+    watch: &(dyn Fn(Progress) + Sync),
+) -> Result<(), WriteError<StudyError>> {
+    let open = || -> Result<Vec<BlockReader>, StudyError> {
+        let folders = blocks.folders.iter();
+        folders
+            .map(|(folder, manifest)| BlockReader::open(folder, manifest))
+            .collect()
+    };
+    // Every thread takes readers from here and puts them back.
+    let idle = Mutex::new(Vec::new());
+    let idle = || idle.lock().unwrap_or_else(PoisonError::into_inner);
+    let source = |first: u64, count: u64| -> Result<Columns, StudyError> {
+        let taken = idle().pop();
+        let mut readers = match taken {
+            Some(readers) => readers,
+            None => open()?,
+        };
+        let mut columns = Columns::new(&manifest.factors);
+        let (mut case, end) = (first, first + count);
+        while case < end {
+            let block = case / u64::from(manifest.block_cases);
+            let cases = manifest.block(block);
+            let index = usize::try_from(block).expect("blocks are indexed in memory");
+            let (folder, place) = blocks.places[index].expect("all blocks are there");
+            let content = readers[folder].read(place, manifest)?;
+            let until = cases.end.min(end);
+            let place = |case: u64| usize::try_from(case - cases.start).expect("within a block");
+            columns.extend(&content, place(case)..place(until));
+            case = until;
+        }
+        idle().push(readers);
+        Ok(columns)
+    };
+    let mut done = 0;
+    parquet_write::write(
+        &folder.join(RESULTS_FILE),
+        manifest,
+        threads,
+        source,
+        |cases| {
+            done += cases;
+            watch(Progress::Table {
+                done,
+                total: manifest.cases,
+            });
+        },
+    )
+}

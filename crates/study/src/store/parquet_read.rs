@@ -1,0 +1,424 @@
+//! `results.parquet`, read again.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use needlebench_kinematics::ik::Configuration;
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::DataType;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::RowGroupMetaData;
+use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
+
+use super::columns::{Columns, FactorColumn, ROWS, blank_case};
+use super::manifest::SCHEMA_VERSION;
+use super::schema::{
+    self, CASES_KEY, CRC_KEY, Column, Content, FACTORS_KEY, ID_KEY, NAME_KEY, PROVENANCE_KEY,
+    VERSION_KEY,
+};
+use crate::{CaseResult, Factor, FactorKind, FactorValue, Outcome, Results, ResultsError};
+
+/// A complete `results.parquet`. Its row groups are read one at a time, each checked against the sum
+/// that was written with it.
+pub struct ParquetResults {
+    path: PathBuf,
+    reader: SerializedFileReader<File>,
+    id: String,
+    name: String,
+    provenance: serde_json::Value,
+    factors: Vec<Factor>,
+    columns: Vec<Column>,
+    cases: u64,
+    checks: Vec<u32>,
+}
+
+impl ParquetResults {
+    /// Opens a table and checks that it is one of a study and that all of it is there.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    pub fn open(path: &Path) -> Result<Self, ResultsError> {
+        let fail = |message: String| failure(path, message);
+        let mut file =
+            File::open(path).map_err(|error| fail(format!("cannot be opened: {error}")))?;
+        check_ends(&mut file).map_err(fail)?;
+        let reader = SerializedFileReader::new(file)
+            .map_err(|error| fail(format!("is damaged: {}", text_of(&error))))?;
+        let file_metadata = reader.metadata().file_metadata();
+        let get = |key: &str| {
+            let pairs = file_metadata.key_value_metadata();
+            pairs?.iter().find(|pair| pair.key == key)?.value.as_deref()
+        };
+        let version = get(VERSION_KEY).ok_or_else(|| {
+            fail("is a Parquet file, but no results of a study of needlebench".to_owned())
+        })?;
+        if version != SCHEMA_VERSION.to_string() {
+            return Err(fail(format!(
+                "has schema version {version}; this program reads version {SCHEMA_VERSION}"
+            )));
+        }
+        let need =
+            |key: &str| get(key).ok_or_else(|| fail(format!("has no {key} in its metadata")));
+        let garbled = |key: &str| fail(format!("cannot be understood: {key} in its metadata"));
+        let factors: Vec<Factor> =
+            serde_json::from_str(need(FACTORS_KEY)?).map_err(|_| garbled(FACTORS_KEY))?;
+        let cases: u64 = need(CASES_KEY)?.parse().map_err(|_| garbled(CASES_KEY))?;
+        let checks: Vec<u32> =
+            serde_json::from_str(need(CRC_KEY)?).map_err(|_| garbled(CRC_KEY))?;
+        let provenance =
+            serde_json::from_str(need(PROVENANCE_KEY)?).map_err(|_| garbled(PROVENANCE_KEY))?;
+        let results = Self {
+            id: need(ID_KEY)?.to_owned(),
+            name: need(NAME_KEY)?.to_owned(),
+            columns: schema::columns(&factors),
+            path: path.to_owned(),
+            provenance,
+            factors,
+            cases,
+            checks,
+            reader,
+        };
+        results.check_layout().map_err(fail)?;
+        Ok(results)
+    }
+
+    /// Hash of everything that decides the results.
+    pub fn study_id(&self) -> &str {
+        &self.id
+    }
+
+    /// Name of the study.
+    pub fn study_name(&self) -> &str {
+        &self.name
+    }
+
+    /// Where the results come from.
+    pub fn provenance(&self) -> &serde_json::Value {
+        &self.provenance
+    }
+
+    pub(crate) fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    pub(crate) fn groups(&self) -> usize {
+        self.reader.num_row_groups()
+    }
+
+    fn check_layout(&self) -> Result<(), String> {
+        let metadata = self.reader.metadata();
+        let found = metadata.file_metadata().schema();
+        let expected = schema::parquet_schema(&self.columns);
+        if found.get_fields() != expected.get_fields() {
+            let names: Vec<&str> = found
+                .get_fields()
+                .iter()
+                .map(|field| field.name())
+                .collect();
+            let wrong = expected
+                .get_fields()
+                .iter()
+                .enumerate()
+                .find(|(index, field)| found.get_fields().get(*index) != Some(field));
+            return Err(match wrong {
+                Some((_, field)) if names.contains(&field.name()) => {
+                    format!("column {} is not where or what it should be", field.name())
+                }
+                Some((_, field)) => format!("has no column {}", field.name()),
+                None => "has columns that this program does not know".to_owned(),
+            });
+        }
+        let groups = metadata.row_groups();
+        let rows: u64 = groups.iter().map(rows_of).sum();
+        if self.cases.checked_mul(ROWS as u64) != Some(rows) {
+            return Err(format!(
+                "is not complete: it has {rows} rows, but {} cases need {ROWS} each",
+                self.cases
+            ));
+        }
+        if groups.len() != self.checks.len()
+            || groups
+                .iter()
+                .any(|group| !rows_of(group).is_multiple_of(ROWS as u64))
+        {
+            return Err("its row groups are not those of a study".to_owned());
+        }
+        Ok(())
+    }
+
+    /// A row group, and the number of its first case. `file` is for the check alone.
+    pub(crate) fn group(
+        &self,
+        index: usize,
+        file: &mut File,
+    ) -> Result<(u64, Columns), ResultsError> {
+        let groups = self.reader.metadata().row_groups();
+        let first = groups[..index].iter().map(rows_of).sum::<u64>() / ROWS as u64;
+        let fail = |message: String| {
+            failure(
+                &self.path,
+                format!("row group {index} (case {first} on) {message}"),
+            )
+        };
+        let group = &groups[index];
+        let sound = check_group(group, self.checks[index], file)
+            .map_err(|error| fail(format!("cannot be read: {error}")))?;
+        if !sound {
+            return Err(fail("is damaged: its CRC32 is another".to_owned()));
+        }
+        let reader = self.reader.get_row_group(index);
+        let columns = reader
+            .and_then(|reader| self.decode(reader.as_ref(), first))
+            .map_err(|error| fail(format!("cannot be read: {}", text_of(&error))))?;
+        Ok((first, columns))
+    }
+
+    /// Another handle of the file.
+    pub(crate) fn file(&self) -> Result<File, ResultsError> {
+        File::open(&self.path)
+            .map_err(|error| failure(&self.path, format!("cannot be opened: {error}")))
+    }
+
+    fn decode(&self, group: &dyn RowGroupReader, first: u64) -> Result<Columns, ParquetError> {
+        let rows = usize::try_from(rows_of(group.metadata())).map_err(|_| bad("too many rows"))?;
+        let mut cases = Columns::new(&self.factors);
+        cases.cases = rows / ROWS;
+        for (index, column) in self.columns.iter().enumerate() {
+            let reader = group.get_column_reader(index)?;
+            self.decode_column(reader, column, first, rows, &mut cases)
+                .map_err(|error| bad(&format!("column {}: {}", column.name, text_of(&error))))?;
+        }
+        Ok(cases)
+    }
+
+    fn decode_column(
+        &self,
+        reader: ColumnReader,
+        column: &Column,
+        first: u64,
+        rows: usize,
+        cases: &mut Columns,
+    ) -> Result<(), ParquetError> {
+        match (reader, column.content) {
+            (ColumnReader::Int64ColumnReader(reader), Content::Case) => {
+                let numbers = required(reader, rows)?;
+                let expected = (first..).flat_map(|case| std::iter::repeat_n(case, ROWS));
+                if numbers
+                    .iter()
+                    .zip(expected)
+                    .any(|(number, case)| u64::try_from(*number) != Ok(case))
+                {
+                    return Err(bad("cases are not in their order"));
+                }
+            }
+            (ColumnReader::DoubleColumnReader(reader), Content::Number(factor)) => {
+                let numbers = per_case(required(reader, rows)?, |a, b| a.to_bits() == b.to_bits())?;
+                match (&mut cases.factors[factor], &self.factors[factor].kind) {
+                    (FactorColumn::Levels(column), FactorKind::Levels(levels)) => {
+                        for number in numbers {
+                            let level =
+                                levels.iter().position(|level| level.number == Some(number));
+                            column.push(index_of(level)?);
+                        }
+                    }
+                    (FactorColumn::Numbers(column), _) => *column = numbers,
+                    (FactorColumn::Levels(_), _) => return Err(bad("a continuum with levels")),
+                }
+            }
+            (ColumnReader::FloatColumnReader(mut reader), Content::Metric(metric)) => {
+                let (mut values, mut present) = (Vec::new(), Vec::new());
+                let (records, _, _) =
+                    reader.read_records(rows, Some(&mut present), None, &mut values)?;
+                if records != rows {
+                    return Err(bad("rows are missing"));
+                }
+                let mut values = values.into_iter();
+                let value = |present: i16| if present == 0 { None } else { values.next() };
+                cases.metrics[metric] = present
+                    .into_iter()
+                    .map(value)
+                    .map(|value| value.unwrap_or(f32::NAN))
+                    .collect();
+            }
+            (ColumnReader::ByteArrayColumnReader(reader), content) => {
+                let texts = required(reader, rows)?;
+                match content {
+                    Content::Label(factor) => {
+                        let FactorKind::Levels(levels) = &self.factors[factor].kind else {
+                            return Err(bad("a continuum with labels"));
+                        };
+                        let FactorColumn::Levels(column) = &mut cases.factors[factor] else {
+                            return Err(bad("a continuum with labels"));
+                        };
+                        for text in per_case(texts, |a, b| a == b)? {
+                            let same = |label: &str| label.as_bytes() == text.data();
+                            column.push(index_of(
+                                levels.iter().position(|level| same(&level.label)),
+                            )?);
+                        }
+                    }
+                    Content::Configuration => {
+                        let labels = Configuration::ALL.map(Configuration::label);
+                        let expected = labels.iter().cycle();
+                        if texts
+                            .iter()
+                            .zip(expected)
+                            .any(|(text, label)| text.data() != label.as_bytes())
+                        {
+                            return Err(bad("configurations are not in their order"));
+                        }
+                    }
+                    Content::Outcome => {
+                        for text in texts {
+                            let same = |outcome: &Outcome| outcome.name().as_bytes() == text.data();
+                            let index = Outcome::ALL.iter().position(same);
+                            let index = u8::try_from(index_of(index)?).expect("four outcomes");
+                            cases.outcomes.push(index);
+                        }
+                    }
+                    Content::Detail => {
+                        for text in texts {
+                            let text = text.as_utf8()?;
+                            let index = cases.text(text);
+                            cases.details.push(index);
+                        }
+                    }
+                    Content::Case | Content::Number(_) | Content::Metric(_) => {
+                        return Err(bad("text in place of numbers"));
+                    }
+                }
+            }
+            _ => return Err(bad("another type than expected")),
+        }
+        Ok(())
+    }
+}
+
+impl Results for ParquetResults {
+    fn factors(&self) -> &[Factor] {
+        &self.factors
+    }
+
+    fn cases(&self) -> u64 {
+        self.cases
+    }
+
+    fn visit(
+        &self,
+        visit: &mut dyn FnMut(&[FactorValue], &CaseResult),
+    ) -> Result<(), ResultsError> {
+        let mut file = self.file()?;
+        let mut values = Vec::new();
+        let mut result = blank_case();
+        for index in 0..self.groups() {
+            let (first, cases) = self.group(index, &mut file)?;
+            for place in 0..cases.cases {
+                cases.get(place, &mut values, &mut result);
+                result.case = first + place as u64;
+                visit(&values, &result);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A file that is empty, no Parquet, or cut off, told apart before anything is decoded.
+fn check_ends(file: &mut File) -> Result<(), String> {
+    const MAGIC: [u8; 4] = *b"PAR1";
+    let unreadable = |error: std::io::Error| format!("cannot be read: {error}");
+    let length = file.metadata().map_err(unreadable)?.len();
+    if length == 0 {
+        return Err("is empty".to_owned());
+    }
+    let mut ends = [[0; 4]; 2];
+    if length >= 12 {
+        file.read_exact(&mut ends[0]).map_err(unreadable)?;
+        file.seek(SeekFrom::End(-4)).map_err(unreadable)?;
+        file.read_exact(&mut ends[1]).map_err(unreadable)?;
+    }
+    match ends.map(|end| end == MAGIC) {
+        [true, true] => Ok(()),
+        [true, false] => Err(format!(
+            "is cut off: it has {length} bytes and no end\n\
+             hint: copy it again, or run the study again"
+        )),
+        _ => Err("is no Parquet file".to_owned()),
+    }
+}
+
+/// Whether the bytes of a row group are those that were written.
+fn check_group(group: &RowGroupMetaData, expected: u32, file: &mut File) -> std::io::Result<bool> {
+    let mut crc = crc32fast::Hasher::new();
+    let mut chunk = [0; 1 << 16];
+    let ranges = group.columns().iter().map(|column| column.byte_range());
+    for (start, length) in ranges {
+        file.seek(SeekFrom::Start(start))?;
+        let mut column = file.take(length);
+        loop {
+            match column.read(&mut chunk)? {
+                0 => break,
+                count => crc.update(&chunk[..count]),
+            }
+        }
+    }
+    Ok(crc.finalize() == expected)
+}
+
+fn rows_of(group: &RowGroupMetaData) -> u64 {
+    u64::try_from(group.num_rows()).unwrap_or_default()
+}
+
+/// All values of a column without gaps.
+fn required<T: DataType>(
+    mut reader: ColumnReaderImpl<T>,
+    rows: usize,
+) -> Result<Vec<T::T>, ParquetError> {
+    let mut values = Vec::with_capacity(rows);
+    let (records, _, _) = reader.read_records(rows, None, None, &mut values)?;
+    if records == rows && values.len() == rows {
+        Ok(values)
+    } else {
+        Err(bad("rows are missing"))
+    }
+}
+
+/// One value per case, which all its rows have.
+fn per_case<T: Clone>(
+    values: Vec<T>,
+    same: impl Fn(&T, &T) -> bool,
+) -> Result<Vec<T>, ParquetError> {
+    let (cases, _) = values.as_chunks::<ROWS>();
+    if cases
+        .iter()
+        .any(|case| case.iter().any(|value| !same(value, &case[0])))
+    {
+        return Err(bad("rows of a case differ"));
+    }
+    Ok(cases.iter().map(|case| case[0].clone()).collect())
+}
+
+fn index_of(position: Option<usize>) -> Result<u32, ParquetError> {
+    position
+        .and_then(|position| u32::try_from(position).ok())
+        .ok_or_else(|| bad("a value that the study does not have"))
+}
+
+fn bad(message: &str) -> ParquetError {
+    ParquetError::General(message.to_owned())
+}
+
+/// Without the library's prefix.
+fn text_of(error: &ParquetError) -> String {
+    match error {
+        ParquetError::General(message) | ParquetError::EOF(message) => message.clone(),
+        other => other.to_string(),
+    }
+}
+
+fn failure(path: &Path, message: String) -> ResultsError {
+    ResultsError {
+        file: path.display().to_string(),
+        message,
+    }
+}

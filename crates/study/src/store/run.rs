@@ -1,0 +1,322 @@
+//! Cases computed in parallel, block by block, into a folder.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use super::codec::Packer;
+use super::columns::Columns;
+use super::error::StudyError;
+use super::folder::{Folder, Opened, RESULTS_FILE};
+use super::journal::{JOURNAL_FILE, Key, kept};
+use super::manifest::Manifest;
+use super::schema;
+use crate::{CaseError, CaseEvaluator, Design, Factor, FactorValue};
+
+/// What the runner needs of a design.
+pub trait CaseDesign: Sync {
+    /// The factors, in the order of their columns.
+    fn factors(&self) -> &[Factor];
+
+    /// Number of cases.
+    fn cases(&self) -> u64;
+
+    /// Values of all factors in a case.
+    fn values(&self, case: u64) -> Vec<FactorValue>;
+}
+
+impl CaseDesign for Design {
+    fn factors(&self) -> &[Factor] {
+        self.factors()
+    }
+
+    fn cases(&self) -> u64 {
+        self.cases()
+    }
+
+    fn values(&self, case: u64) -> Vec<FactorValue> {
+        self.values(case)
+    }
+}
+
+/// What happens in a run. `Display` gives a line for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "fields are named in the messages")]
+pub enum Progress<'a> {
+    /// The journal ends within a record, as after a kill; its block is computed again.
+    CutOff {
+        journal: &'a Path,
+        offset: u64,
+        bytes: u64,
+    },
+    /// Something else has changed the journal; what was there is computed again.
+    Damage {
+        journal: &'a Path,
+        offset: u64,
+        bytes: u64,
+    },
+    /// So many cases were there at the beginning.
+    Begin { kept: u64, total: u64 },
+    /// So many cases are in the journal.
+    Cases { done: u64, total: u64 },
+    /// So many cases are in the table.
+    Table { done: u64, total: u64 },
+}
+
+impl std::fmt::Display for Progress<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::CutOff {
+                journal,
+                offset,
+                bytes,
+            } => write!(
+                f,
+                "{}: ends within a block; {bytes} bytes from byte {offset} on are cut off",
+                journal.display()
+            ),
+            Self::Damage {
+                journal,
+                offset,
+                bytes,
+            } => write!(
+                f,
+                "{}: {bytes} bytes from byte {offset} on are damaged; what was there is computed again",
+                journal.display()
+            ),
+            Self::Begin { kept, total } => write!(f, "{kept} of {total} cases are there already"),
+            Self::Cases { done, total } => write!(f, "{done} of {total} cases"),
+            Self::Table { done, total } => write!(f, "{done} of {total} cases in the table"),
+        }
+    }
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RunEnd {
+    /// Everything is there.
+    Finished {
+        /// Number of cases of the folder.
+        cases: u64,
+        /// The table; a shard has none.
+        results: Option<PathBuf>,
+    },
+    /// It was cancelled. What is done is kept.
+    Partial {
+        /// Number of cases that are in the journal.
+        done: u64,
+        /// Number of cases of the folder.
+        total: u64,
+    },
+}
+
+/// A study, or a shard of it, to be computed.
+pub struct StudyRun<'a> {
+    /// Which cases there are.
+    pub design: &'a dyn CaseDesign,
+    /// What the results are results of; its status is of no interest.
+    pub manifest: Manifest,
+    /// What computes the cases.
+    pub evaluator: &'a dyn CaseEvaluator,
+    /// Number of threads, at least one. The results do not depend on it.
+    pub threads: usize,
+    /// Whether to go on where an earlier run has stopped.
+    pub resume: bool,
+}
+
+impl StudyRun<'_> {
+    /// Computes all cases that are not yet in the folder, then writes the table. `watch` is called from
+    /// any thread, one at a time.
+    ///
+    /// # Errors
+    /// See [`StudyError`]. Blocks that were finished are kept, whatever happens.
+    pub fn run(
+        &self,
+        folder: &Path,
+        cancel: &AtomicBool,
+        watch: &(dyn Fn(Progress) + Sync),
+    ) -> Result<RunEnd, StudyError> {
+        self.check()?;
+        let total = self.manifest.own_cases();
+        let finished = || RunEnd::Finished {
+            cases: total,
+            results: self
+                .manifest
+                .shard
+                .is_none()
+                .then(|| folder.join(RESULTS_FILE)),
+        };
+        let mut folder = match Folder::open(folder, &self.manifest, self.resume, watch)? {
+            Opened::Complete => return Ok(finished()),
+            Opened::Running(folder) => folder,
+        };
+        watch(Progress::Begin {
+            kept: kept(&folder.manifest, &folder.places),
+            total,
+        });
+        let end = self.compute(&mut folder, cancel, watch);
+        // What was finished is kept, however it ended.
+        let synced = folder.journal.sync();
+        let done = end?;
+        synced.map_err(|source| folder.write_error(JOURNAL_FILE, source, done))?;
+        if done < total {
+            return Ok(RunEnd::Partial { done, total });
+        }
+        folder.complete(self.threads.max(1), watch)?;
+        Ok(finished())
+    }
+
+    fn check(&self) -> Result<(), StudyError> {
+        let manifest = &self.manifest;
+        if manifest.factors != self.design.factors() || manifest.cases != self.design.cases() {
+            let message = "the manifest is not that of the design";
+            return Err(StudyError::Request(message.to_owned()));
+        }
+        if manifest.block_cases == 0 {
+            let message = "a block has at least one case";
+            return Err(StudyError::Request(message.to_owned()));
+        }
+        if let Some(shard) = manifest
+            .shard
+            .filter(|shard| u64::from(shard.parts()) > manifest.blocks())
+        {
+            return Err(StudyError::Request(format!(
+                "shard {shard}: the study has {} blocks of {} cases only\nhint: ask for fewer shards",
+                manifest.blocks(),
+                manifest.block_cases
+            )));
+        }
+        schema::check(&manifest.factors).map_err(StudyError::Request)
+    }
+
+    /// Computes what is missing; returns the number of cases that are there then.
+    fn compute(
+        &self,
+        folder: &mut Folder,
+        cancel: &AtomicBool,
+        watch: &(dyn Fn(Progress) + Sync),
+    ) -> Result<u64, StudyError> {
+        let manifest = folder.manifest.clone();
+        let missing: Vec<u64> = (0..manifest.blocks())
+            .zip(&folder.places)
+            .filter(|(block, place)| place.is_none() && manifest.owns(*block))
+            .map(|(block, _)| block)
+            .collect();
+        let key = Key::new(&manifest);
+        let total = manifest.own_cases();
+        let done = kept(&manifest, &folder.places);
+        let next = AtomicUsize::new(0);
+        let stop = AtomicBool::new(false);
+        let shared = Mutex::new(Shared {
+            folder,
+            done,
+            failure: None,
+        });
+        let work = || {
+            let failed = |failure: Failure| {
+                stop.store(true, Ordering::Relaxed);
+                let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                shared.fail(failure);
+            };
+            let mut worker = match self.evaluator.worker() {
+                Ok(worker) => worker,
+                Err(message) => return failed(Failure::Worker(message)),
+            };
+            let mut packer = match Packer::new() {
+                Ok(packer) => packer,
+                Err(error) => return failed(Failure::Worker(error.to_string())),
+            };
+            let stopped = || stop.load(Ordering::Relaxed) || cancel.load(Ordering::Relaxed);
+            while let Some(block) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let mut columns = Columns::new(&manifest.factors);
+                for case in manifest.block(*block) {
+                    if stopped() {
+                        return;
+                    }
+                    match worker.evaluate(case) {
+                        Ok(result) => columns.push(&self.design.values(case), &result),
+                        // Asked to stop, a worker may well not finish.
+                        Err(_) if cancel.load(Ordering::Relaxed) => return,
+                        Err(error) => return failed(Failure::Case(error)),
+                    }
+                }
+                let record = match packer.pack(&columns) {
+                    Ok(packed) => key.record(*block, columns.cases, &packed),
+                    Err(error) => return failed(Failure::Write(error)),
+                };
+                let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                if let Err(error) = shared.folder.append(*block, &record) {
+                    stop.store(true, Ordering::Relaxed);
+                    shared.fail(Failure::Write(error));
+                    return;
+                }
+                shared.done += columns.cases as u64;
+                watch(Progress::Cases {
+                    done: shared.done,
+                    total,
+                });
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 1..self.threads {
+                scope.spawn(work);
+            }
+            work();
+        });
+        let shared = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
+        match shared.failure {
+            None => Ok(shared.done),
+            Some(failure) => Err(failure.into_error(shared.folder, shared.done)),
+        }
+    }
+}
+
+/// What threads share.
+struct Shared<'a> {
+    folder: &'a mut Folder,
+    done: u64,
+    failure: Option<Failure>,
+}
+
+impl Shared<'_> {
+    /// Keeps the failure of the first case, so that the message does not depend on the threads more
+    /// than it must.
+    fn fail(&mut self, failure: Failure) {
+        if self
+            .failure
+            .as_ref()
+            .is_none_or(|known| failure.rank() < known.rank())
+        {
+            self.failure = Some(failure);
+        }
+    }
+}
+
+enum Failure {
+    Worker(String),
+    Write(std::io::Error),
+    Case(CaseError),
+}
+
+impl Failure {
+    fn rank(&self) -> (u8, u64) {
+        match self {
+            Self::Worker(_) => (0, 0),
+            Self::Write(_) => (1, 0),
+            Self::Case(error) => (2, error.case),
+        }
+    }
+
+    fn into_error(self, folder: &Folder, kept: u64) -> StudyError {
+        match self {
+            Self::Worker(message) => StudyError::Worker(message),
+            Self::Write(source) => folder.write_error(JOURNAL_FILE, source, kept),
+            Self::Case(source) => StudyError::Case {
+                source,
+                kept,
+                total: folder.manifest.own_cases(),
+                folder: folder.path.clone(),
+            },
+        }
+    }
+}
