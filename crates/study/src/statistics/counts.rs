@@ -76,6 +76,7 @@ pub(crate) struct Counter {
     invalid_details: BTreeMap<String, u64>,
     success: [Grouped; CONFIGURATIONS],
     at_least: [Grouped; CONFIGURATIONS],
+    is_best: [Grouped; CONFIGURATIONS],
 }
 
 /// Counts without allocating where the detail is known.
@@ -109,6 +110,8 @@ impl Counter {
                 Outcome::Ok | Outcome::Invalid => {}
             }
             self.success[index].push(group, f64::from(u8::from(layout.works(index))));
+            let is_best = layout.best == Some(index);
+            self.is_best[index].push(group, f64::from(u8::from(is_best)));
         }
         if let Some(best) = layout.best {
             self.best[best] += 1;
@@ -145,12 +148,16 @@ impl Counter {
             );
             self.success[index].add(&other.success[index]);
             self.at_least[index].add(&other.at_least[index]);
+            self.is_best[index].add(&other.is_best[index]);
         }
     }
 
-    /// Design effect of a configuration's success rate.
-    pub(crate) fn design_effect(&self, configuration: usize, repeats: u64) -> f64 {
-        self.success[configuration].design_effect_of_rate(repeats)
+    /// Largest design effect of the shares in which the configurations are the best.
+    pub(crate) fn design_effect_of_best(&self, repeats: u64) -> f64 {
+        let effects = self.is_best.iter();
+        effects
+            .map(|grouped| grouped.design_effect_of_rate(repeats))
+            .fold(1.0, f64::max)
     }
 
     /// The numbers of a goal, or of all; `repeats` cases come from each sampled point.

@@ -123,7 +123,7 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
         }
     }
     if let Some(limit) = criteria.max_invalid_layouts {
-        // Which layouts can exist is as good as known of each point.
+        // Layouts of one sampled point are taken for one: no more is known of how alike they are.
         let rate = Rate::new(overall.invalid, overall.cases, summary.repeats as f64);
         let what = "layouts that cannot exist".to_owned();
         judged.push(Judged {
@@ -204,10 +204,17 @@ fn of_quantile(summary: &Summary, criterion: &QuantileCriterion<'_>, of: &str) -
         limit: criterion.limit,
         at_least: criterion.at_least,
         unit: "mm",
-        what: format!(
-            "{} % quantile of {who} over {count} layouts",
-            100.0 * criterion.quantile
-        ),
+        what: if spread.is_some() && quantile.is_none() {
+            format!(
+                "the summary lacks the {} % quantile",
+                100.0 * criterion.quantile
+            )
+        } else {
+            format!(
+                "{} % quantile of {who} over {count} layouts",
+                100.0 * criterion.quantile
+            )
+        },
         cases: cases.collect(),
     }
 }

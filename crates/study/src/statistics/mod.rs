@@ -24,6 +24,7 @@ mod tests;
 
 use std::rc::Rc;
 
+use needlebench_cell::study_criteria::StudyCriteria;
 use serde::{Deserialize, Serialize};
 
 pub use axis::{Axis, Bin};
@@ -83,6 +84,20 @@ impl Default for SummaryOptions {
             more_quantiles: Vec::new(),
             factors: true,
         }
+    }
+}
+
+impl SummaryOptions {
+    /// With what it takes to judge by criteria.
+    #[must_use]
+    pub fn judged_by(mut self, criteria: &StudyCriteria) -> Self {
+        if let Some(count) = criteria.working_configurations.filter(|count| *count > 1) {
+            self.working_configurations = count as usize;
+        }
+        let quantiles = criteria.quantiles().into_iter();
+        self.more_quantiles
+            .extend(quantiles.map(|each| each.quantile));
+        self
     }
 }
 
@@ -234,10 +249,7 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
     for counter in &counters {
         all.add(counter);
     }
-    // Which configuration is the best depends on the point at most as much as which of them work.
-    let effect = (0..CONFIGURATIONS)
-        .map(|configuration| all.design_effect(configuration, points.repeats))
-        .fold(1.0, f64::max);
+    let effect = all.design_effect_of_best(points.repeats);
     let per_goal = points.repeats / goals.len().max(1) as u64;
     let overall = all.finish(None, points.repeats);
     let goals = goals.into_iter().zip(&counters);
