@@ -27,7 +27,7 @@ mod threshold;
 
 pub use clearance::{
     ClearanceSeries, certify_recording, measure_clearance, needle_route, planned_clearance,
-    posture_clearance, sample_indices,
+    posture_clearance, recorded_clearance, sample_indices,
 };
 pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balance};
 pub use criteria::{Criterion, check_configuration};

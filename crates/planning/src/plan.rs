@@ -200,7 +200,7 @@ impl<'a> Planner<'a> {
         let aim = self.planning().roll_aim;
         // The best of each range that works, then the rest of what works.
         let mut members: Vec<Member> = self
-            .family(goal, configuration, &grid)
+            .family_for(goal, configuration, &grid, &[aim])
             .ranges
             .into_iter()
             .map(|range| range.best_for(aim).member.clone())

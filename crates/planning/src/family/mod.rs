@@ -18,7 +18,7 @@ mod aim;
 mod ranges;
 
 use needlebench_cell::{ClearanceClass, Goal};
-use needlebench_kinematics::ik::Configuration;
+use needlebench_kinematics::ik::{Configuration, Solutions};
 
 pub use aim::Aim;
 pub use ranges::{Best, EDGE_RAD, Edge, Family, RollRange};
@@ -60,44 +60,42 @@ impl Planner<'_> {
     pub fn members_at(&self, goal: &Goal, roll_rad: f64) -> [Member; 8] {
         let pose = self.base_link_from_flange(goal, roll_rad);
         let found = self.kinematics().branches(&pose, Some(self.start()));
-        Configuration::ALL.map(|configuration| {
-            let solution = found
-                .solutions
-                .iter()
-                .find(|each| each.configuration == configuration);
-            if let Some(solution) = solution {
-                let (candidate, rejections) = self.candidate(roll_rad, solution);
-                return Member {
-                    roll_rad,
-                    surplus: self.surplus(&candidate, &rejections),
-                    candidate: Some(candidate),
-                    rejections,
-                };
-            }
-            let rejection = absent(configuration, &found);
-            Member {
-                roll_rad,
-                candidate: None,
-                surplus: if rejection.rule == Rule::Unreachable {
-                    -rejection.value.max(f64::MIN_POSITIVE)
-                } else {
-                    MERGED_SURPLUS
-                },
-                rejections: vec![rejection],
-            }
-        })
+        Configuration::ALL.map(|configuration| self.member(configuration, roll_rad, &found))
     }
 
     /// One configuration at one roll.
     pub fn member_at(&self, goal: &Goal, configuration: Configuration, roll_rad: f64) -> Member {
-        let mut members = self.members_at(goal, roll_rad);
-        let blank = Member {
+        let pose = self.base_link_from_flange(goal, roll_rad);
+        let found = self.kinematics().branches(&pose, Some(self.start()));
+        self.member(configuration, roll_rad, &found)
+    }
+
+    /// One configuration among the solutions at one roll.
+    fn member(&self, configuration: Configuration, roll_rad: f64, found: &Solutions) -> Member {
+        let solution = found
+            .solutions
+            .iter()
+            .find(|each| each.configuration == configuration);
+        if let Some(solution) = solution {
+            let (candidate, rejections) = self.candidate(roll_rad, solution);
+            return Member {
+                roll_rad,
+                surplus: self.surplus(&candidate, &rejections),
+                candidate: Some(candidate),
+                rejections,
+            };
+        }
+        let rejection = absent(configuration, found);
+        Member {
             roll_rad,
             candidate: None,
-            rejections: Vec::new(),
-            surplus: 0.0,
-        };
-        std::mem::replace(&mut members[configuration.index()], blank)
+            surplus: if rejection.rule == Rule::Unreachable {
+                -rejection.value.max(f64::MIN_POSITIVE)
+            } else {
+                MERGED_SURPLUS
+            },
+            rejections: vec![rejection],
+        }
     }
 
     /// Least distance of a posture from breaking a rule.

@@ -43,7 +43,7 @@ pub struct RollRange {
     pub before: Option<Edge>,
     /// Why it ends where it does.
     pub after: Option<Edge>,
-    /// The best member for each aim, in the order of [`Aim::ALL`].
+    /// The best member for each aim that was asked for, in their order.
     pub best: Vec<Best>,
     /// How far each joint turns on the way from one end to the other, largest position less
     /// smallest, rad.
@@ -64,11 +64,14 @@ impl RollRange {
     }
 
     /// The best member for an aim.
+    ///
+    /// # Panics
+    /// If the family was not made for that aim.
     pub fn best_for(&self, aim: Aim) -> &Best {
         self.best
             .iter()
             .find(|best| best.aim == aim)
-            .expect("a range has a best member for every aim")
+            .expect("a range has a best member for every aim that was asked for")
     }
 }
 
@@ -97,8 +100,19 @@ struct Knot {
 
 impl Planner<'_> {
     /// Ranges of one configuration from its members on an even grid of rolls, in ascending order
-    /// from 0; or from the one member of a goal with a fixed roll.
+    /// from 0; or from the one member of a goal with a fixed roll. With the best members for all aims.
     pub fn family(&self, goal: &Goal, configuration: Configuration, grid: &[Member]) -> Family {
+        self.family_for(goal, configuration, grid, &Aim::ALL)
+    }
+
+    /// The same with the best members for some aims alone: searching for them takes most of the time.
+    pub fn family_for(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        grid: &[Member],
+        aims: &[Aim],
+    ) -> Family {
         let at = |roll_rad: f64| self.member_at(goal, configuration, roll_rad);
         let empty = Family {
             configuration,
@@ -110,7 +124,7 @@ impl Planner<'_> {
                 member: only.clone(),
             }];
             let ranges = if only.works() {
-                vec![self.range(goal, configuration, &knots, None, None)]
+                vec![self.range((goal, configuration, aims), &knots, None, None)]
             } else {
                 Vec::new()
             };
@@ -118,7 +132,7 @@ impl Planner<'_> {
         }
         let knots = closer_look(grid, &at);
         if knots.iter().all(|knot| knot.member.works()) {
-            let mut range = self.range(goal, configuration, &knots, None, None);
+            let mut range = self.range((goal, configuration, aims), &knots, None, None);
             range.is_whole_circle = true;
             range.to_rad = range.from_rad + TAU;
             return Family {
@@ -158,8 +172,7 @@ impl Planner<'_> {
                     }));
                     inside.extend(high);
                     ranges.push(self.range(
-                        goal,
-                        configuration,
+                        (goal, configuration, aims),
                         &inside,
                         Some(before),
                         Some(after),
@@ -180,17 +193,17 @@ impl Planner<'_> {
     /// A range from all its members in ascending order, which all work.
     fn range(
         &self,
-        goal: &Goal,
-        configuration: Configuration,
+        (goal, configuration, aims): (&Goal, Configuration, &[Aim]),
         knots: &[Knot],
         before: Option<Edge>,
         after: Option<Edge>,
     ) -> RollRange {
         let whole = before.is_none() && knots.len() > 1;
         let (from_rad, to_rad) = (knots[0].roll_rad, knots[knots.len() - 1].roll_rad);
-        let best = Aim::ALL
-            .map(|aim| self.best(goal, configuration, knots, whole, aim))
-            .into();
+        let best = aims
+            .iter()
+            .map(|&aim| self.best(goal, configuration, knots, whole, aim))
+            .collect();
         let (low, high) = joint_extent(knots);
         let limits = &self.cell().robot.limits;
         let fits_joint_limits = (0..JOINT_COUNT).all(|joint| {
