@@ -20,6 +20,7 @@ mod progress;
 mod provenance;
 mod reality;
 mod servo;
+pub mod study;
 mod trial;
 
 pub use atlas::{GoalAtlas, goal_atlas};

@@ -238,5 +238,14 @@ pub fn budget(
     })
 }
 
+/// Analytic moments of all sources together, at the skin and at the target: those of
+/// [`ErrorBudget::total`], without the sources one by one.
+///
+/// # Errors
+/// [`BudgetError`].
+pub fn analytic_total(case: &BudgetCase<'_>) -> Result<[Moments; 2], BudgetError> {
+    analytic::moments(case, case.imperfections)
+}
+
 /// A variance below this is none, m^2: a nanometre squared.
 const LEAST_VARIANCE_M2: f64 = 1e-18;
