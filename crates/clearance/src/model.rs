@@ -17,7 +17,7 @@ pub(crate) const CLASS_COUNT: usize = ClearanceClass::NeedleRoute as usize + 1;
 
 /// What a lower bound by enclosing volumes has to exceed a distance by before the pair is left
 /// out, m. More than the distances' own error, so that leaving out never changes a result.
-const PRUNING_MARGIN_M: f64 = 3e-7;
+pub(crate) const PRUNING_MARGIN_M: f64 = 3e-7;
 
 /// All classes, each at the index that it is cast to.
 const CLASSES: [ClearanceClass; CLASS_COUNT] = [
@@ -137,6 +137,27 @@ impl ClearanceModel {
     /// as between the layouts of a study.
     pub fn for_cell(&self, cell: &Cell) -> Self {
         Self::made_of(cell, &self.bodies)
+    }
+
+    /// Number of bodies that the model of a cell would share with this one.
+    pub fn bodies_in_common(&self, cell: &Cell) -> usize {
+        let pairs = self.bodies.iter().zip(&cell.bodies);
+        pairs
+            .filter(|(placed, body)| placed.is_of(body, placed.first_moving))
+            .count()
+    }
+
+    /// Whether the model of a cell would need no shape that this one lacks.
+    pub fn has_shapes_of(&self, cell: &Cell) -> bool {
+        self.bodies.len() == cell.bodies.len()
+            && self.bodies.iter().zip(&cell.bodies).all(|(placed, body)| {
+                placed.solids.len() == body.solids.len()
+                    && placed
+                        .solids
+                        .iter()
+                        .zip(&body.solids)
+                        .all(|(placed, solid)| same_shape(&placed.solid.0, &solid.shape))
+            })
     }
 
     fn made_of(cell: &Cell, known: &[Arc<PlacedBody>]) -> Self {
