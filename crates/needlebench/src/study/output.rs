@@ -9,9 +9,14 @@ use needlebench_study::statistics::{
 };
 use serde::Serialize;
 
+use super::case::StudyCase;
 use super::prepare::PreparedStudy;
 use crate::atomic::write_atomically;
+use crate::page::study::{CasePlaces, StudyPage};
 use crate::progress::Progress;
+
+/// Name of the page in a study's folder.
+const PAGE_FILE: &str = "report.html";
 
 /// Statistics of a study, with the verdict.
 #[derive(Debug, Serialize)]
@@ -88,9 +93,41 @@ pub(crate) fn write_study(
             .with_context(|| format!("cannot write {}", path.display()))
     };
     write("summary.json", &serde_json::to_string_pretty(&summary)?)?;
+    if output.page {
+        progress.message("writing the page");
+        let places = |case: u64| {
+            let layout = StudyCase::new(&prepared.study, &prepared.design, case);
+            let resolved = layout.scenario(&prepared.study).ok()?;
+            Some(CasePlaces {
+                world_from_base_link: resolved.cell.robot.world_from_base_link,
+                world_from_phantom: resolved.phantom.map(|placed| placed.world_from_phantom),
+            })
+        };
+        let page = StudyPage {
+            name: &file.name,
+            description: &file.description,
+            file: &prepared.study.source.file,
+            results,
+            summary: &serde_json::to_value(&summary)?,
+            manifest: &serde_json::to_value(prepared.manifest(None))?,
+            base: Some(prepared.study.family.base()),
+            places: Some(&places),
+        };
+        write(PAGE_FILE, &page.html()?)?;
+    } else {
+        remove_stale(&output.folder.join(PAGE_FILE))?;
+    }
     Ok(FinishedStudy {
         summary,
         text: String::new(),
         passed,
     })
+}
+
+/// Removes an earlier file that nobody should take for this study's.
+fn remove_stale(path: &Path) -> std::io::Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
 }
