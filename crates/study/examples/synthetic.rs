@@ -65,13 +65,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     })?;
     let total = begin.elapsed();
-    let computed = computed.get().copied().unwrap_or_default();
+    let computed = computed.get().copied().unwrap_or_default().as_secs_f64();
     let table = folder.join(RESULTS_FILE);
     let bytes = std::fs::metadata(&table)?.len();
     let results = ParquetResults::open(&table)?;
     let rows = results.cases() * 8;
-    println!("cases       {:8.2} s", computed.as_secs_f64());
-    println!("table       {:8.2} s", (total - computed).as_secs_f64());
+    println!("cases       {computed:8.2} s");
+    println!("table       {:8.2} s", total.as_secs_f64() - computed);
     println!("bytes a row {:8.2}", bytes as f64 / rows as f64);
     let begin = Instant::now();
     let mut good = 0;
