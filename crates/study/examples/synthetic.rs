@@ -1,25 +1,52 @@
 //! Runs a study without physics: what the runner, the journal and the tables cost by themselves.
 //!
 //! ```text
-//! cargo run --release -p needlebench-study --example synthetic -- FOLDER CASES THREADS [csv]
+//! cargo run --release -p needlebench-study --example synthetic -- FOLDER CASES THREADS DRAWS [csv]
 //! ```
+//!
+//! DRAWS random numbers per case stand for the work of computing it: 200 000 take about half a
+//! millisecond.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use needlebench_kinematics::pose_sets::SplitMix64;
 use needlebench_study::{
-    CSV_FILE, ParquetResults, Progress, RESULTS_FILE, Results, StudyRun, write_csv,
+    CSV_FILE, CaseError, CaseEvaluator, CaseResult, CaseWorker, ParquetResults, Progress,
+    RESULTS_FILE, Results, StudyRun, write_csv,
 };
 use synthetic::{SyntheticDesign, SyntheticEvaluator};
 
 #[path = "../tests/store/synthetic.rs"]
 mod synthetic;
 
+/// Works for its rows.
+struct Busy(u64);
+
+struct BusyWorker<'a>(&'a Busy, Box<dyn CaseWorker>);
+
+impl CaseEvaluator for Busy {
+    fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String> {
+        let worker = SyntheticEvaluator::FAST.worker()?;
+        Ok(Box::new(BusyWorker(self, worker)))
+    }
+}
+
+impl CaseWorker for BusyWorker<'_> {
+    fn evaluate(&mut self, case: u64) -> Result<CaseResult, CaseError> {
+        let mut random = SplitMix64::new(case);
+        for _ in 0..self.0.0 {
+            std::hint::black_box(random.next_u64());
+        }
+        self.1.evaluate(case)
+    }
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [folder, cases, threads, rest @ ..] = arguments.as_slice() else {
-        return Err("usage: synthetic FOLDER CASES THREADS [csv]".into());
+    let [folder, cases, threads, draws, rest @ ..] = arguments.as_slice() else {
+        return Err("usage: synthetic FOLDER CASES THREADS DRAWS [csv]".into());
     };
     let (folder, threads) = (PathBuf::from(folder), threads.parse()?);
     let design = SyntheticDesign::new(cases.parse()?);
@@ -28,7 +55,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let run = StudyRun {
         manifest: design.manifest(64),
         design: &design,
-        evaluator: &SyntheticEvaluator::FAST,
+        evaluator: &Busy(draws.parse()?),
         threads,
         resume: true,
     };
@@ -38,13 +65,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     })?;
     let total = begin.elapsed();
-    let computed = computed.get().copied().unwrap_or_default();
+    let computed = computed.get().copied().unwrap_or_default().as_secs_f64();
     let table = folder.join(RESULTS_FILE);
     let bytes = std::fs::metadata(&table)?.len();
     let results = ParquetResults::open(&table)?;
     let rows = results.cases() * 8;
-    println!("cases       {:8.2} s", computed.as_secs_f64());
-    println!("table       {:8.2} s", (total - computed).as_secs_f64());
+    println!("cases       {computed:8.2} s");
+    println!("table       {:8.2} s", total.as_secs_f64() - computed);
     println!("bytes a row {:8.2}", bytes as f64 / rows as f64);
     let begin = Instant::now();
     let mut good = 0;

@@ -62,7 +62,7 @@ pub enum StudyError {
         "{}: holds the results of another study\n  there: {found}\n  here:  {expected}{}\n\
          hint: choose another folder",
         folder.display(),
-        differences.iter().map(|each| format!("\n  different: {each}")).collect::<String>()
+        lines(differences)
     )]
     OtherStudy {
         folder: PathBuf,
@@ -82,6 +82,13 @@ pub enum StudyError {
     /// Results that cannot be read.
     #[error(transparent)]
     Results(#[from] ResultsError),
+}
+
+fn lines(differences: &[String]) -> String {
+    let lines = differences
+        .iter()
+        .map(|each| format!("\n  different: {each}"));
+    lines.collect::<Vec<_>>().concat()
 }
 
 impl StudyError {

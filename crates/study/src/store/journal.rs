@@ -276,15 +276,15 @@ pub(crate) fn scan(path: &Path, manifest: &Manifest) -> Result<Scan, StudyError>
     scan.end = at;
     loop {
         let mut found = source.record(at, &key).map_err(failed())?;
-        if found.is_none() {
-            if let Some((next, record)) = source.search(at + 1, &key).map_err(failed())? {
-                scan.damages.push(Damage {
-                    offset: at,
-                    bytes: next - at,
-                });
-                at = next;
-                found = Some(record);
-            }
+        if found.is_none()
+            && let Some((next, record)) = source.search(at + 1, &key).map_err(failed())?
+        {
+            scan.damages.push(Damage {
+                offset: at,
+                bytes: next - at,
+            });
+            at = next;
+            found = Some(record);
         }
         let Some(record) = found else {
             scan.tail_bytes = length.saturating_sub(scan.end);

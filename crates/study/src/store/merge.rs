@@ -166,13 +166,13 @@ fn missing_message(manifest: &Manifest, shards: &[(PathBuf, Manifest)], missing:
         .iter()
         .map(|block| manifest.block_len(*block) as u64)
         .sum();
-    let mut message = format!("{cases} of {} cases are missing", manifest.cases);
+    let mut lines = vec![format!("{cases} of {} cases are missing", manifest.cases)];
     for (folder, shard) in shards {
         if missing.iter().any(|block| shard.owns(*block)) {
             let part = shard
                 .shard
                 .map_or("the study".to_owned(), |part| format!("shard {part}"));
-            message += &format!("\n  {}: {part} is not complete", folder.display());
+            lines.push(format!("  {}: {part} is not complete", folder.display()));
         }
     }
     let parts: std::collections::BTreeSet<u32> = shards
@@ -183,9 +183,10 @@ fn missing_message(manifest: &Manifest, shards: &[(PathBuf, Manifest)], missing:
         for part in (1..=parts).filter_map(|part| Shard::new(part, parts)) {
             let given = shards.iter().any(|(_, shard)| shard.shard == Some(part));
             if !given && missing.iter().any(|block| part.owns(*block)) {
-                message += &format!("\n  shard {part} is not among the folders");
+                lines.push(format!("  shard {part} is not among the folders"));
             }
         }
     }
-    message + "\nhint: finish unfinished shards with --resume"
+    lines.push("hint: finish unfinished shards with --resume".to_owned());
+    lines.join("\n")
 }

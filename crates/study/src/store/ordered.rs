@@ -90,3 +90,64 @@ impl<W, E> Drop for StopOnPanic<'_, W, E> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicUsize;
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_and_few_wait() {
+        let waiting = AtomicUsize::new(0);
+        let most = AtomicUsize::new(0);
+        let mut written = Vec::new();
+        let make = |index: u64| {
+            // The first of every four is the slowest.
+            std::thread::sleep(Duration::from_micros(500 * (3 - index % 4)));
+            most.fetch_max(waiting.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+            Ok::<u64, ()>(index)
+        };
+        in_order(100, 4, make, |index| {
+            waiting.fetch_sub(1, Ordering::SeqCst);
+            written.push(index);
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(written, (0..100).collect::<Vec<_>>());
+        assert!(most.into_inner() <= 4);
+    }
+
+    #[test]
+    fn the_first_error_ends_it() {
+        for threads in [1, 2, 3] {
+            let mut written = Vec::new();
+            let make = |index: u64| if index >= 7 { Err(index) } else { Ok(index) };
+            let end = in_order(100, threads, make, |index| {
+                written.push(index);
+                Ok(())
+            });
+            assert_eq!(end, Err(7));
+            assert_eq!(written, (0..7).collect::<Vec<_>>());
+            let end = in_order(100, threads, Ok, |index| {
+                if index == 5 { Err("full") } else { Ok(()) }
+            });
+            assert_eq!(end, Err("full"));
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "a scoped thread panicked")]
+    fn a_panic_does_not_leave_the_others_waiting() {
+        let main = std::thread::current().id();
+        let make = |index: u64| {
+            let spawned = std::thread::current().id() != main;
+            assert!(!spawned, "our own bug");
+            // Leaves something for the other thread.
+            std::thread::sleep(Duration::from_millis(20));
+            Ok::<u64, ()>(index)
+        };
+        let _ = in_order(100, 2, make, |_| Ok(()));
+    }
+}

@@ -10,7 +10,9 @@ use needlebench_kinematics::ik::Configuration;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::metadata::{
+    ColumnChunkMetaData, ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData,
+};
 use parquet::file::properties::ReaderProperties;
 use parquet::file::reader::{ChunkReader, Length, RowGroupReader};
 use parquet::file::serialized_reader::SerializedRowGroupReader;
@@ -181,7 +183,7 @@ impl ParquetResults {
 
     /// The bytes of a row group.
     fn part(&self, group: &RowGroupMetaData) -> io::Result<Part> {
-        let ranges = group.columns().iter().map(|column| column.byte_range());
+        let ranges = group.columns().iter().map(ColumnChunkMetaData::byte_range);
         let start = ranges
             .clone()
             .map(|(start, _)| start)
@@ -231,7 +233,8 @@ impl ParquetResults {
                 }
             }
             (ColumnReader::DoubleColumnReader(reader), Content::Number(factor)) => {
-                let numbers = per_case(required(reader, rows)?, |a, b| a.to_bits() == b.to_bits())?;
+                let numbers =
+                    per_case(&required(reader, rows)?, |a, b| a.to_bits() == b.to_bits())?;
                 match (&mut cases.factors[factor], &self.factors[factor].kind) {
                     (FactorColumn::Levels(column), FactorKind::Levels(levels)) => {
                         for number in numbers {
@@ -269,7 +272,7 @@ impl ParquetResults {
                         let FactorColumn::Levels(column) = &mut cases.factors[factor] else {
                             return Err(bad("a continuum with labels"));
                         };
-                        for text in per_case(texts, |a, b| a == b)? {
+                        for text in per_case(&texts, |a, b| a == b)? {
                             let same = |label: &str| label.as_bytes() == text.data();
                             column.push(index_of(
                                 levels.iter().position(|level| same(&level.label)),
@@ -416,10 +419,7 @@ fn required<T: DataType>(
 }
 
 /// One value per case, which all its rows have.
-fn per_case<T: Clone>(
-    values: Vec<T>,
-    same: impl Fn(&T, &T) -> bool,
-) -> Result<Vec<T>, ParquetError> {
+fn per_case<T: Clone>(values: &[T], same: impl Fn(&T, &T) -> bool) -> Result<Vec<T>, ParquetError> {
     let (cases, _) = values.as_chunks::<ROWS>();
     if cases
         .iter()

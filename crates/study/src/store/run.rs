@@ -155,8 +155,9 @@ impl StudyRun<'_> {
             total,
         });
         let end = self.compute(&mut folder, cancel, watch);
-        // What was finished is kept, however it ended.
-        let synced = folder.journal.sync();
+        let lasts = self.manifest.shard.is_some() || !matches!(end, Ok(done) if done == total);
+        // A journal that a table will soon replace need not outlast a power failure.
+        let synced = if lasts { folder.journal.sync() } else { Ok(()) };
         let done = end?;
         synced.map_err(|source| folder.write_error(JOURNAL_FILE, source, done))?;
         if done < total {

@@ -41,12 +41,12 @@ impl CaseWorker for RecordingWorker<'_> {
 impl Recorder {
     /// Indices of the blocks that were computed, in order.
     fn blocks(self) -> Vec<u64> {
-        let mut blocks = self.0.into_inner().unwrap();
-        blocks.iter_mut().for_each(|case| *case /= u64::from(BLOCK));
+        let cases = self.0.into_inner().unwrap().into_iter();
+        let mut blocks: Vec<u64> = cases.map(|case| case / u64::from(BLOCK)).collect();
         blocks.sort_unstable();
-        blocks
-            .chunk_by(|a, b| a == b)
-            .for_each(|block| assert_eq!(block.len(), BLOCK as usize));
+        for block in blocks.chunk_by(|a, b| a == b) {
+            assert_eq!(block.len(), BLOCK as usize);
+        }
         blocks.dedup();
         blocks
     }

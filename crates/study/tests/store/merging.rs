@@ -50,6 +50,22 @@ fn missing_shards_are_listed() {
 }
 
 #[test]
+fn a_shard_that_is_not_complete_is_named() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let folders = [shard(place, 1, 2), shard(place, 2, 2)];
+    let journal = folders[1].join("journal.nbj");
+    let bytes = std::fs::read(&journal).unwrap();
+    std::fs::write(&journal, &bytes[..bytes.len() - 1]).unwrap();
+    assert_eq!(
+        refused(place, &folders),
+        "8 of 100 cases are missing\n  \
+         /2of2: shard 2/2 is not complete\n\
+         hint: finish unfinished shards with --resume"
+    );
+}
+
+#[test]
 fn shards_that_agree_may_overlap() {
     let place = tempfile::tempdir().unwrap();
     let place = place.path();

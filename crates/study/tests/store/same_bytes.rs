@@ -88,7 +88,7 @@ fn journals_cut_off_anywhere_are_continued() {
     for _ in 0..20 {
         shard.run(place.path()).unwrap();
         let bytes = std::fs::read(&journal).unwrap();
-        let cut = random.uniform(0.0, bytes.len() as f64) as usize;
+        let cut = random.below(u32::try_from(bytes.len()).unwrap()) as usize;
         std::fs::write(&journal, &bytes[..cut]).unwrap();
         running(place.path());
     }
@@ -130,7 +130,7 @@ fn twenty_kills_at_random_moments_lose_nothing() {
         });
         // A machine that takes long to kill may let it finish.
         kept.push(begin.unwrap_or(CHILD_CASES));
-        std::thread::sleep(Duration::from_micros(random.uniform(0.0, 30_000.0) as u64));
+        std::thread::sleep(Duration::from_micros(random.below(30_000).into()));
         child.kill().unwrap();
         child.wait().unwrap();
     }
@@ -168,7 +168,7 @@ fn child() {
     };
     let never = std::sync::atomic::AtomicBool::new(false);
     run.run(Path::new(&folder), &never, &|progress| {
-        println!("{progress}")
+        println!("{progress}");
     })
     .unwrap();
 }

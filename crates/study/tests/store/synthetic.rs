@@ -148,7 +148,7 @@ fn row(configuration: usize, random: &mut SplitMix64) -> Row {
         let dynamic = column.metric == Metric::CertifiedClearance
             || column.metric as usize >= Metric::MotionTime as usize;
         if !dynamic {
-            let scale = 10.0 + 5.0 * column.metric as u8 as f64 + configuration as f64;
+            let scale = 10.0 + 5.0 * f64::from(column.metric as u8) + configuration as f64;
             row.set(column.metric, random.uniform(-0.3, 1.0) * scale);
         }
     }
