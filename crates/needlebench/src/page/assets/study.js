@@ -142,7 +142,7 @@ NB.StudyPage = class {
         ? `Share of valid cases in which it is ok, with ${Math.round(100 * (this.page.summary.confidence || 0.95))} % interval; of all cases.`
         : 'Share of the valid cases on this page in which it is ok.', this.strip.element),
       controls, this.shown,
-      NB.el('div', { class: 'grid' },
+      NB.el('div', { class: 'grid cases' },
         NB.el('div', null,
           figure('Cases', 'Each point is a case: click it, or use the arrow keys on the list of cases, to see it at the right.', this.scatter.element, this.scatterLegend),
           figure('Success rate', 'Share of valid cases in each cell that are ok. Click a cell for its cases.', this.map.element, this.mapLegend, this.cellPanel)),
@@ -153,8 +153,8 @@ NB.StudyPage = class {
         figure('Histogram', 'Rows of the configuration chosen above; ok and failed ones.', this.histogram.element)),
       this.tip, ...this.statistics());
     this.redraw();
-    const first = this.numbers === null ? 0 : 0;
-    this.choose(Number.isFinite(this.firstNoted()) ? this.firstNoted() : first);
+    const noted = this.firstNoted();
+    this.choose(Number.isNaN(noted) ? 0 : noted);
   }
 
   /** The first case that the statistics name and that is here. */
