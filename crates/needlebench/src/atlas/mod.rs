@@ -13,7 +13,7 @@ use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::{Aim, Family, Member, Planner};
 
 pub(crate) use picture::picture;
-pub(crate) use report::{AtlasReport, GoalAtlasReport};
+pub(crate) use report::{AtlasReport, BranchReport, GoalAtlasReport};
 pub(crate) use text::text;
 
 use crate::pipeline::in_parallel;

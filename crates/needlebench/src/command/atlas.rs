@@ -13,6 +13,7 @@ use crate::atomic::write_atomically;
 use crate::cli::{AimArgument, AtlasArguments};
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
+use crate::page::atlas_page;
 
 /// Computes and writes the atlas of one or all goals.
 pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
@@ -73,6 +74,7 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
         &atlases,
         &report,
         !arguments.no_pictures,
+        !arguments.no_page,
     )?;
     if arguments.json {
         print_json(&report)?;
@@ -141,11 +143,21 @@ fn write(
     atlases: &[(&Goal, GoalAtlas)],
     report: &AtlasReport,
     pictures: bool,
+    page: bool,
 ) -> Result<()> {
     let path = folder.join("atlas.json");
     let mut json = serde_json::to_vec(report)?;
     json.push(b'\n');
     write_atomically(&path, &json).with_context(|| format!("cannot write {}", path.display()))?;
+    let path = folder.join("atlas.html");
+    if page {
+        let html = atlas_page(resolved, atlases, report);
+        write_atomically(&path, html.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    } else if path.exists() {
+        // Nobody should take an earlier atlas's for this one's.
+        std::fs::remove_file(&path)?;
+    }
     if pictures {
         for (goal, atlas) in atlases {
             picture(&resolved.scenario.name, goal, atlas)

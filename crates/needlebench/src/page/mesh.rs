@@ -1,6 +1,6 @@
 //! Surfaces small enough for a page: merged, thinned out, quantised.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Point3, Vector3};
 use needlebench_cell::shape::TriangleMesh;
@@ -111,13 +111,37 @@ pub(super) fn surface(pack: &mut Pack, mesh: TriangleMesh) -> Value {
             [steps.x, steps.y, steps.z].map(|x| x.round().clamp(0.0, 65535.0) as u16)
         })
         .collect();
-    let indices: Vec<u32> = mesh.triangles.concat();
+    let indices = without_inner_walls(&mesh.triangles, &codes).concat();
     json!({
         "low": [low.x, low.y, low.z],
         "step": [step.x, step.y, step.z],
         "vertices": pack.u16s(&codes),
         "triangles": pack.indices(&indices),
     })
+}
+
+/// Leaves out the faces where convex pieces of one part touch: two triangles with the same corners and
+/// opposite sides. Nobody sees them, but they flicker along the seams.
+fn without_inner_walls(triangles: &[[u32; 3]], codes: &[u16]) -> Vec<[u32; 3]> {
+    let place = |corner: u32| {
+        let at = 3 * corner as usize;
+        [codes[at], codes[at + 1], codes[at + 2]]
+    };
+    // Corners from the least on, in the order of the triangle, and the same seen from behind.
+    let key = |[a, b, c]: [u32; 3]| {
+        let corners = [place(a), place(b), place(c)];
+        let least = (0..3).min_by_key(|&k| corners[k]).unwrap_or(0);
+        [0, 1, 2].map(|k| corners[(least + k) % 3])
+    };
+    let sides: BTreeSet<[[u16; 3]; 3]> = triangles.iter().map(|&each| key(each)).collect();
+    triangles
+        .iter()
+        .copied()
+        .filter(|&each| {
+            let [a, b, c] = key(each);
+            !sides.contains(&[a, c, b])
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -138,6 +162,20 @@ mod tests {
         for vertex in &thin.vertices_m {
             assert!((vertex.coords.norm() - 0.1).abs() < BALL_M);
         }
+    }
+
+    #[test]
+    fn walls_between_touching_pieces_are_left_out() {
+        let half_extents_m = Vector3::repeat(0.1);
+        let cube = Shape::Cuboid { half_extents_m }.surface(1e-3);
+        let mut both = cube.clone();
+        append(&mut both, &cube, &Pose::translation(0.2, 0.0, 0.0));
+        let mut pack = Pack::default();
+        let alone = surface(&mut pack, cube.clone());
+        assert_eq!(alone["triangles"]["n"], 3 * cube.triangles.len());
+        let merged = surface(&mut pack, both);
+        let least = 3 * (2 * cube.triangles.len() - 4);
+        assert!(merged["triangles"]["n"].as_u64().unwrap() >= least as u64);
     }
 
     #[test]

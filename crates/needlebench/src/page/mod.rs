@@ -8,6 +8,7 @@
 //!
 //! The same results give the same bytes: wall-clock times are left out.
 
+mod atlas;
 mod document;
 mod mesh;
 mod motion;
@@ -17,4 +18,5 @@ mod run;
 mod scene;
 pub(crate) mod study;
 
+pub(crate) use atlas::atlas_page;
 pub(crate) use run::run_page;

@@ -43,7 +43,8 @@ NB.Canvas = class {
       this.canvas.height = Math.round(height * ratio);
     }
     const started = performance.now();
-    const context = this.canvas.getContext('2d');
+    // Software canvases: the scatter writes pixels itself.
+    const context = this.canvas.getContext('2d', { willReadFrequently: true });
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     context.font = '12px system-ui, sans-serif';
@@ -189,7 +190,7 @@ NB.Curves = class {
     for (const [name, element] of this.values || []) {
       const curve = this.curves.find((each) => each.name === name);
       const y = NB.at(curve.x, curve.y, x);
-      element.textContent = Number.isNaN(y) ? '' : `${NB.fixed(y, 1)} mm`;
+      element.textContent = Number.isNaN(y) ? '' : `${NB.fixed(y, 1)} ${this.options.unit || 'mm'}`;
     }
     this.draw();
   }

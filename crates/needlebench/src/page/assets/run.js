@@ -78,8 +78,8 @@ NB.RunPage = class {
     arm.pose(this.page.scene.chain, this.page.start);
     for (const [name, on] of Object.entries(this.layers)) this.view.show(name, on);
     for (const group of ['collision', 'corridor']) arm.layer(group, false);
-    this.view.frame(this.framed([]), this.direction([0, 0, 0], [0, 0, -1]));
-    app.append(this.view.element, NB.section('ISO 9283', true, NB.el('p', {
+    this.view.frame(this.framed([]), [-0.75, 0.45, -0.55]);
+    app.append(this.view.element, NB.section('ISO 9283', false, NB.el('p', {
       text: 'The table of the test and its curves are in report.json and in the files named there.',
     }), NB.tree(this.report.iso9283)));
   }
@@ -90,17 +90,7 @@ NB.RunPage = class {
     return [[x - 0.2, y - 0.2, z - 0.1], [x + 0.2, y + 0.2, z + 0.55], ...points];
   }
 
-  /** As in the pictures: from the side of the robot that looks across to the goal, from above. */
-  direction(target, axis) {
-    const [x, y] = this.page.scene.chain.base;
-    const ahead = [target[0] - x, target[1] - y];
-    const size = Math.hypot(...ahead) || 1;
-    const forward = [ahead[0] / size, ahead[1] / size];
-    const across = [forward[1], -forward[0]];
-    const along = axis[0] * forward[0] + axis[1] * forward[1] > 0.75 ? 0.45 : -0.45;
-    return [-0.75 * across[0] + along * forward[0], -0.75 * across[1] + along * forward[1], -0.55]
-      .map((value, k) => (k < 2 ? value : value));
-  }
+  direction(target, axis) { return NB.direction(this.page.scene.chain.base, target, axis); }
 
   viewBar() {
     const look = (name, make) => NB.el('button', { type: 'button', onclick: () => this.aim(make()) }, name);
@@ -329,7 +319,7 @@ NB.RunPage = class {
       const [a, b] = found.witness_points_m;
       view.rod('witness', a, b, 0.002, rgba);
       for (const end of [a, b]) view.ball('witness', end, 0.005, rgba);
-      view.label('witness', `${NB.words(name)} ${NB.mm(found.minimum_m)} mm`, a.map((value, k) => (value + b[k]) / 2));
+      view.label('witness', `${NB.words(name)} ${NB.mm(found.minimum_m)} mm${found.time_s === null ? '' : ` at ${found.time_s.toFixed(2)} s`}`, a.map((value, k) => (value + b[k]) / 2));
     }
     view.draw();
   }
@@ -427,7 +417,7 @@ NB.RunPage = class {
       { title: 'Configuration', cell: (c) => c.label },
       { title: 'Status', cell: (c) => this.status(c) },
       { title: 'Tip error', cell: (c) => NB.length(this.tipErrors(c)), numeric: true, help: 'settled tip error, the larger of the engines' },
-      { title: 'Gap', unit: 'mm', cell: (c) => NB.mm(c.clearance.minimum_m), numeric: true, help: 'least clearance' },
+      { title: 'Least gap', unit: 'mm', cell: (c) => NB.mm(c.clearance.minimum_m), numeric: true, help: 'least clearance' },
       { title: 'Ghost', cell: (c) => NB.el('input', {
         type: 'checkbox', 'aria-label': `ghost of ${c.label}`, checked: this.ghosts.has(this.goal.configurations.indexOf(c)), disabled: !c.joints_rad,
         onclick: (event) => event.stopPropagation(),

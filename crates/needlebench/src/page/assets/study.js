@@ -142,7 +142,7 @@ NB.StudyPage = class {
         ? `Share of valid cases in which it is ok, with ${Math.round(100 * (this.page.summary.confidence || 0.95))} % interval; of all cases.`
         : 'Share of the valid cases on this page in which it is ok.', this.strip.element),
       controls, this.shown,
-      NB.el('div', { class: 'grid' },
+      NB.el('div', { class: 'grid cases' },
         NB.el('div', null,
           figure('Cases', 'Each point is a case: click it, or use the arrow keys on the list of cases, to see it at the right.', this.scatter.element, this.scatterLegend),
           figure('Success rate', 'Share of valid cases in each cell that are ok. Click a cell for its cases.', this.map.element, this.mapLegend, this.cellPanel)),
@@ -153,8 +153,8 @@ NB.StudyPage = class {
         figure('Histogram', 'Rows of the configuration chosen above; ok and failed ones.', this.histogram.element)),
       this.tip, ...this.statistics());
     this.redraw();
-    const first = this.numbers === null ? 0 : 0;
-    this.choose(Number.isFinite(this.firstNoted()) ? this.firstNoted() : first);
+    const noted = this.firstNoted();
+    this.choose(Number.isNaN(noted) ? 0 : noted);
   }
 
   /** The first case that the statistics name and that is here. */
@@ -667,8 +667,9 @@ NB.StudyPage = class {
     for (const layer of ['collision', 'corridor']) this.arm.layer(layer, false);
     this.view.show('gantry', false);
     const [x, y, z] = scene.chain.base;
-    const targets = Object.values(this.page.goals || {}).map((goal) => goal.target);
-    this.view.frame([[x - 0.2, y - 0.2, z - 0.1], [x + 0.2, y + 0.2, z + 0.5], ...targets.flatMap((t) => [t.map((v) => v - 0.25), t.map((v) => v + 0.25)])], [-0.75, 0.45, -0.55]);
+    const goals = Object.values(this.page.goals || {});
+    const targets = goals.map((goal) => goal.target);
+    this.view.frame([[x - 0.2, y - 0.2, z - 0.1], [x + 0.2, y + 0.2, z + 0.5], ...targets.flatMap((t) => [t.map((v) => v - 0.25), t.map((v) => v + 0.25)])], goals.length ? NB.direction(scene.chain.base, goals[0].target, goals[0].axis) : [-0.75, 0.45, -0.55]);
   }
 
   /** The posture of a row, where it is on the page; places of robot and phantom as far as they are known. */

@@ -370,6 +370,16 @@ NB.View = class {
   }
 };
 
+/** As in the pictures: from the side of the robot that looks across to the goal, from above. */
+NB.direction = function ([x, y], target, axis) {
+  const ahead = [target[0] - x, target[1] - y];
+  const size = Math.hypot(...ahead) || 1;
+  const forward = [ahead[0] / size, ahead[1] / size];
+  const across = [forward[1], -forward[0]];
+  const along = axis[0] * forward[0] + axis[1] * forward[1] > 0.75 ? 0.45 : -0.45;
+  return [-0.75 * across[0] + along * forward[0], -0.75 * across[1] + along * forward[1], -0.55];
+};
+
 /** A cone with a round cap about -z with its apex at the origin, as the hand's. */
 NB.cone = function (halfAngle, length) {
   // Whole balls narrow down to a cone: a piece of a sphere and the mantle below it.

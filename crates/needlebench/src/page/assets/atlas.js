@@ -1,0 +1,274 @@
+// The page of an atlas: what works at which roll, how much room there is, and why not.
+'use strict';
+
+/** Colours of the rules that reject; hatching and the text under the cursor tell them apart, too. */
+NB.ruleStyle = function (name) {
+  const styles = {
+    unreachable: ['#8a8f96', 0], merged: ['#b8bcc2', 1], nearest_only: ['#b8bcc2', 2], joint_limit: ['#cc79a7', 1], singular: ['#f0e442', 2],
+    collision: ['#d55e00', 1], needle_corridor: ['#e69f00', 2], approach: ['#009e73', 1], no_motion: ['#009e73', 3],
+  };
+  return styles[name] || ['#999999', 3];
+};
+
+NB.AtlasPage = class {
+  constructor(page, app) {
+    this.page = page;
+    this.layers = { robot: true, tool: true, table: true, gantry: true, mount: true, skin: true, bone: true, organ: true, vessel: true, lesion: true, marker: true, corridor: false, collision: false, needle: true };
+    this.view = new NB.View(page.scene, `Cell of ${page.scenario}`);
+    this.arm = this.view.arm('arm');
+    this.curves = new NB.Curves({
+      height: 240, label: 'Clearance of each class over the roll', xTitle: 'roll (deg)', yTitle: 'clearance (mm)', seek: (roll) => this.setRoll(roll),
+    });
+    this.strips = new NB.Canvas(300, 'Which configuration works at which roll', (...all) => this.paint(...all));
+    this.stripLegend = NB.el('div', { class: 'legend' });
+    const pick = (event) => {
+      if (!(event.buttons & 1) || !this.axes) return;
+      const box = this.strips.canvas.getBoundingClientRect();
+      const row = 7 - Math.round(this.axes.yAt(event.clientY - box.top));
+      if (event.type === 'pointerdown' && row >= 0 && row < 8) this.setBranch(row);
+      this.setRoll(this.axes.xAt(event.clientX - box.left));
+    };
+    this.strips.canvas.addEventListener('pointerdown', pick);
+    this.strips.canvas.addEventListener('pointermove', pick);
+    this.goalButtons = page.goals.map((goal, index) => NB.el('button', {
+      type: 'button', role: 'radio', onclick: () => this.setGoal(index),
+      onkeydown: (event) => {
+        const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+        if (!step) return;
+        event.preventDefault();
+        const to = (index + step + page.goals.length) % page.goals.length;
+        this.setGoal(to);
+        this.goalButtons[to].focus();
+      },
+    }, NB.words(goal.name)));
+    this.slider = NB.el('input', { type: 'range', min: '0', max: '360', step: '1', value: '0', 'aria-label': 'Roll, degrees', oninput: (event) => this.setRoll(Number(event.target.value)) });
+    this.clock = NB.el('span', { class: 'clock', role: 'status' });
+    this.side = NB.el('div', { class: 'panel' });
+    this.table = NB.el('div');
+    const present = new Set(page.scene.parts.map((part) => part.group));
+    const names = { robot: 'robot', tool: 'tool', collision: 'collision shapes', table: 'table', gantry: 'gantry', mount: 'mount', skin: 'skin', bone: 'bones', organ: 'organs', vessel: 'vessels', lesion: 'lesions', marker: 'markers', corridor: 'needle corridor', needle: 'needle line' };
+    app.append(
+      NB.el('div', { class: 'bar' }, NB.el('strong', { text: 'Goal' }), NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons)),
+      NB.el('div', { class: 'grid' },
+        NB.el('div', null, this.view.element,
+          NB.el('div', { class: 'replay', role: 'group', 'aria-label': 'Roll' }, NB.el('span', { text: 'Roll' }), this.slider, this.clock),
+          NB.el('section', { class: 'panel curves' }, NB.el('h3', { text: 'What works at which roll' }), this.strips.element, this.stripLegend),
+          NB.el('section', { class: 'panel' }, this.title = NB.el('h3'), this.curves.element)),
+        NB.el('div', null, this.side, NB.el('div', { class: 'panel no-print' }, NB.el('h3', { text: 'Show' }),
+          Object.entries(names).filter(([name]) => present.has(name) || name === 'needle').map(([name, text]) => NB.checkbox(text, this.layers[name], (on) => { this.layers[name] = on; this.applyLayers(); }))))),
+      NB.section('Ranges', true, this.table),
+      NB.section('Where the numbers come from', false, NB.provenance(page.provenance)));
+    this.branchIndex = 0;
+    this.roll = 0;
+    this.setGoal(0);
+    this.applyLayers();
+  }
+
+  applyLayers() {
+    for (const [name, on] of Object.entries(this.layers)) {
+      if (['robot', 'tool', 'collision', 'corridor'].includes(name)) this.arm.layer(name, on);
+      if (name !== 'collision' && name !== 'corridor' && name !== 'tool') this.view.show(name, on);
+    }
+    this.view.draw();
+  }
+
+  get goal() { return this.page.goals[this.goalIndex]; }
+
+  get branch() { return this.decode(this.goal.branches[this.branchIndex]); }
+
+  decode(branch) {
+    if (!branch.decoded) {
+      branch.decoded = {
+        rules: NB.array(branch.rules), joints: branch.joints.map(NB.array), surplus: NB.array(branch.surplus),
+        curves: Object.entries(branch.curves).map(([name, column]) => [name, NB.array(column).map((value) => value * 1e3)]),
+      };
+    }
+    return { ...branch, ...branch.decoded };
+  }
+
+  setGoal(index) {
+    this.goalIndex = index;
+    this.goalButtons.forEach((button, at) => {
+      button.setAttribute('aria-checked', at === index);
+      button.tabIndex = at === index ? 0 : -1;
+    });
+    const { view, goal } = this;
+    view.empty('needle');
+    const [x, y, z] = goal.guideExit;
+    const length = this.page.scene.needleLength * 0.6;
+    view.rod('needle', [x - goal.axis[0] * length, y - goal.axis[1] * length, z - goal.axis[2] * length], goal.target, 0.0012, [0, 0.45, 0.32, 1]);
+    view.ball('needle', goal.target, 0.004, [0.84, 0.37, 0, 1]);
+    view.label('needle', 'target', goal.target);
+    if (goal.entry) { view.ball('needle', goal.entry, 0.0035, [0, 0.45, 0.7, 1]); view.label('needle', 'entry', goal.entry); }
+    const [bx, by, bz] = this.page.scene.chain.base;
+    view.frame([[bx - 0.2, by - 0.2, bz - 0.1], [bx + 0.2, by + 0.2, bz + 0.55], goal.target.map((v) => v - 0.25), goal.target.map((v) => v + 0.25)], NB.direction(this.page.scene.chain.base, goal.target, goal.axis));
+    this.slider.step = String(360 / goal.rolls);
+    this.slider.max = String(360 - 360 / goal.rolls);
+    this.sideTable();
+    this.rangeTable();
+    const best = goal.branches.findIndex((branch) => branch.ranges.length);
+    const range = goal.branches[Math.max(best, 0)].ranges[0];
+    this.setBranch(Math.max(best, 0));
+    this.setRoll(range ? range.best[goal.aim].roll_rad * 180 / Math.PI : 0);
+  }
+
+  setBranch(index) {
+    this.branchIndex = index;
+    NB.mark(this.sideRows, index);
+    const { branch, goal } = this;
+    this.title.textContent = `Clearance over roll: ${branch.label}`;
+    const x = Float32Array.from({ length: goal.rolls }, (_, k) => 360 * k / goal.rolls);
+    const bands = branch.ranges.flatMap((range) => this.pieces(range).map(([from, to]) => ({ from, to, text: 'works', color: '#e3f0f9' })));
+    this.curves.set(branch.curves.map(([name, y]) => ({ name, x, y, ...NB.styleOf(name) })), bands, [0, 360]);
+    this.setRoll(this.roll);
+  }
+
+  /** A range as pieces of 0 to 360 degrees. */
+  pieces(range) {
+    if (range.is_whole_circle) return [[0, 360]];
+    const from = ((range.from_rad * 180 / Math.PI) % 360 + 360) % 360;
+    const to = from + range.width_rad * 180 / Math.PI;
+    return to > 360 ? [[from, 360], [0, to - 360]] : [[from, to]];
+  }
+
+  setRoll(roll) {
+    const { goal, branch } = this;
+    const at = ((Math.round(roll / 360 * goal.rolls) % goal.rolls) + goal.rolls) % goal.rolls;
+    this.roll = 360 * at / goal.rolls;
+    this.slider.value = String(this.roll);
+    const joints = branch.joints.map((column) => column[at]);
+    const has = joints.every((value) => !Number.isNaN(value));
+    this.arm.show(has);
+    if (has) this.arm.pose(this.page.scene.chain, joints);
+    const rule = branch.rules[at];
+    const text = rule === 255 ? '\u2713 works' : `\u2717 ${NB.words(branch.ruleNames[rule])}`;
+    this.clock.textContent = `${NB.fixed(this.roll, 1)}\u00b0 \u00b7 ${branch.label}: ${text}${has ? '' : ', no posture'}`;
+    this.slider.setAttribute('aria-valuetext', this.clock.textContent);
+    this.curves.seek(this.roll);
+    this.strips.draw();
+    this.view.draw();
+    goal.branches.forEach((each, index) => {
+      const decoded = this.decode(each);
+      const code = decoded.rules[at];
+      this.sideCells[index].replaceChildren(code === 255 ? NB.el('span', { class: 'good', text: '\u2713 works' }) : NB.el('span', { class: 'off', text: NB.words(each.ruleNames[code]) }));
+    });
+  }
+
+  sideTable() {
+    const total = (branch) => branch.ranges.reduce((sum, range) => sum + (range.is_whole_circle ? 2 * Math.PI : range.width_rad), 0);
+    const table = NB.table('Choose a configuration', [
+      { title: 'Configuration', cell: (b) => b.label },
+      { title: 'At this roll', cell: () => '' },
+      { title: 'Works over', unit: 'deg', numeric: true, cell: (b) => NB.deg(total(b), 0) },
+    ], this.goal.branches, { class: 'choose small full' });
+    this.sideRows = [...table.querySelectorAll('tbody tr')];
+    this.sideCells = this.sideRows.map((row) => row.cells[1]);
+    NB.rows(this.sideRows, (index) => this.setBranch(index));
+    NB.clear(this.side, table, this.goal.fixedRoll === null ? null : NB.el('p', { class: 'soft small', text: `The goal fixes the roll at ${NB.deg(this.goal.fixedRoll)}\u00b0.` }));
+  }
+
+  rangeTable() {
+    const { goal } = this;
+    const rows = goal.branches.flatMap((branch, index) => (branch.ranges.length ? branch.ranges.map((range) => ({ branch, range, index })) : [{ branch, range: null, index }]));
+    const edge = (found) => (found ? `${NB.words(found.rule)}: ${found.detail}` : '');
+    const table = NB.table(`Goal ${NB.words(goal.name)}: ranges of roll that work, and what ends them; best for ${NB.words(goal.aim)}`, [
+      { title: 'Configuration', cell: ({ branch }) => branch.label },
+      { title: 'From', unit: 'deg', numeric: true, cell: ({ range }) => (range ? (range.is_whole_circle ? 'all round' : NB.deg(range.from_rad, 2)) : 'nowhere') },
+      { title: 'To', unit: 'deg', numeric: true, cell: ({ range }) => (range && !range.is_whole_circle ? NB.deg(range.to_rad, 2) : '') },
+      { title: 'Begins behind', text: true, cell: ({ range }) => edge(range?.before) },
+      { title: 'Ends at', text: true, cell: ({ range }) => edge(range?.after) },
+      { title: 'Best roll', unit: 'deg', numeric: true, cell: ({ range }) => (range ? NB.deg(range.best[goal.aim].roll_rad, 2) : '') },
+      { title: 'Least clearance there', unit: 'mm', numeric: true, cell: ({ range }) => (range ? NB.mm(range.best[goal.aim].least_clearance_m) : '') },
+      { title: 'Between', cell: ({ range }) => (range?.best[goal.aim].pair || []).join(' \u2013 ') },
+    ], rows, { class: 'choose small' });
+    const elements = [...table.querySelectorAll('tbody tr')];
+    NB.rows(elements, (at) => {
+      NB.mark(elements, at);
+      this.setBranch(rows[at].index);
+      if (rows[at].range) this.setRoll(rows[at].range.best[goal.aim].roll_rad * 180 / Math.PI);
+    });
+    NB.mark(elements, 0);
+    NB.clear(this.table, table);
+  }
+
+  paint(context, width, height) {
+    const { goal } = this;
+    const box = { left: 150, top: 8, width: width - 166, height: height - 50 };
+    const axes = new NB.Axes(box, { low: 0, high: 360, title: 'roll (deg)' }, { low: -0.5, high: 7.5, title: '', labels: goal.branches.map((branch) => branch.label).reverse() });
+    this.axes = axes;
+    axes.draw(context);
+    const used = new Map();
+    const h = box.height / 8 * 0.7;
+    goal.branches.forEach((each, row) => {
+      const branch = this.decode(each);
+      const y = axes.py(7 - row) - h / 2;
+      let start = 0;
+      for (let at = 1; at <= goal.rolls; at++) {
+        if (at < goal.rolls && branch.rules[at] === branch.rules[start]) continue;
+        const rule = branch.rules[start];
+        const name = rule === 255 ? 'works' : branch.ruleNames[rule];
+        const style = rule === 255 ? ['#0072b2', 0] : NB.ruleStyle(name);
+        used.set(name, style);
+        // A roll stands for half a step on both sides.
+        const [from, to] = [axes.px(Math.max(0, 360 * (start - 0.5) / goal.rolls)), axes.px(Math.min(360, 360 * (at - 0.5) / goal.rolls))];
+        this.block(context, style, from, y, to - from, h);
+        start = at;
+      }
+      // The exact ends of the ranges.
+      context.strokeStyle = '#000';
+      context.lineWidth = 1.5;
+      for (const range of each.ranges) {
+        for (const [from, to] of this.pieces(range)) context.strokeRect(axes.px(from), y, axes.px(to) - axes.px(from), h);
+        const best = axes.px((range.best[goal.aim].roll_rad * 180 / Math.PI + 360) % 360);
+        context.fillStyle = '#fff';
+        context.beginPath(); context.moveTo(best, y + 3); context.lineTo(best + 5, y + h / 2); context.lineTo(best, y + h - 3); context.lineTo(best - 5, y + h / 2); context.closePath(); context.fill(); context.stroke();
+      }
+      if (row === this.branchIndex) {
+        context.fillStyle = '#0072b2';
+        context.fillRect(box.left - 4, y, 3, h);
+      }
+    });
+    const at = Math.round(axes.px(this.roll)) + 0.5;
+    context.strokeStyle = '#000';
+    context.lineWidth = 1;
+    context.beginPath(); context.moveTo(at, box.top); context.lineTo(at, box.top + box.height); context.stroke();
+    if (this.fixedMark(goal) !== null) {
+      context.setLineDash([4, 3]);
+      const fixed = axes.px(this.fixedMark(goal));
+      context.beginPath(); context.moveTo(fixed, box.top); context.lineTo(fixed, box.top + box.height); context.stroke();
+      context.setLineDash([]);
+    }
+    const names = [...used.keys()].join();
+    if (names !== this.legendNames) {
+      this.legendNames = names;
+      NB.clear(this.stripLegend, [...used].map(([name, style]) => {
+        const canvas = NB.el('canvas', { width: '26', height: '14', 'aria-hidden': 'true' });
+        this.block(canvas.getContext('2d'), style, 0, 0, 26, 14);
+        return NB.el('span', { class: 'key' }, canvas, NB.words(name));
+      }), NB.el('span', { class: 'soft small', text: 'black frame: a range that works; diamond: its best roll; dashed line: the roll that the goal fixes' }));
+    }
+  }
+
+  fixedMark(goal) { return goal.fixedRoll === null ? null : (goal.fixedRoll * 180 / Math.PI % 360 + 360) % 360; }
+
+  block(context, [color, hatch], x, y, width, height) {
+    context.save();
+    context.fillStyle = color;
+    context.fillRect(x, y, width, height);
+    context.beginPath(); context.rect(x, y, width, height); context.clip();
+    context.strokeStyle = 'rgba(255, 255, 255, 0.75)';
+    context.lineWidth = 1.3;
+    const lines = { 1: [1], 2: [-1], 3: [1, -1] }[hatch] || [];
+    for (const side of lines) {
+      for (let from = Math.floor(x / 9) * 9 - height; from < x + width + height; from += 9) {
+        context.beginPath();
+        context.moveTo(from, side > 0 ? y + height : y);
+        context.lineTo(from + height, side > 0 ? y : y + height);
+        context.stroke();
+      }
+    }
+    context.restore();
+  }
+};
+
+NB.start((page, app) => { NB.current = new NB.AtlasPage(page, app); });

@@ -1,0 +1,298 @@
+// Opens report pages in headless Chromium, as a reader would, and uses them:
+//
+//   npm ci && node test.mjs --out SCREENSHOTS PAGE.html...
+//
+// Checks that nothing is blank, no error is logged, nothing is asked of the network, every switch and
+// the replay work, the keyboard reaches everything, and the page still works without WebGL. Takes an
+// installed Chromium (or the one that CHROMIUM names), else the one that comes with the packages.
+import assert from 'node:assert/strict';
+import { existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
+import { resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
+import { chromium } from 'playwright-core';
+
+const FIRST_VIEW_MS = 2000;
+const REDRAW_MS = 100;
+const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6 };
+const SIZE = { width: 1280, height: 900 };
+const SOFTWARE_GL = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+const NO_GL = ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis'];
+
+const words = process.argv.slice(2);
+const at = words.indexOf('--out');
+const out = resolve(at >= 0 ? words.splice(at, 2)[1] : 'screenshots');
+mkdirSync(out, { recursive: true });
+
+async function executable() {
+  const installed = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'];
+  const found = installed.find((path) => path && existsSync(path));
+  if (found) return { path: found, args: [] };
+  const { default: packaged } = await import('@sparticuz/chromium');
+  return { path: await packaged.executablePath(), args: ['--single-process', '--no-zygote'] };
+}
+
+const browser = await executable();
+const launch = (args) => chromium.launch({ executablePath: browser.path, args: ['--no-sandbox', ...browser.args, ...args] });
+
+/** A page that fails on every error and every request that leaves the file. */
+async function open(running, file) {
+  const page = await running.newPage({ viewport: SIZE });
+  const problems = [];
+  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`); });
+  page.on('pageerror', (error) => problems.push(error.message));
+  page.on('request', (request) => { if (!/^(file|data|blob):/.test(request.url())) problems.push(`asked for ${request.url()}`); });
+  await page.goto(pathToFileURL(file).href);
+  await page.waitForSelector('html[data-ready]', { timeout: 60_000 });
+  const timing = await page.evaluate(() => NB.timing.firstView);
+  return { page, problems, timing };
+}
+
+/** Colours of a picture: how many, and the share of the most frequent one. */
+async function colors(judge, png) {
+  return judge.evaluate(async (data) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${data}`;
+    await image.decode();
+    const canvas = document.createElement('canvas');
+    [canvas.width, canvas.height] = [image.width, image.height];
+    const context = canvas.getContext('2d');
+    context.drawImage(image, 0, 0);
+    const pixels = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
+    const counts = new Map();
+    for (const pixel of pixels) counts.set(pixel, (counts.get(pixel) || 0) + 1);
+    return { count: counts.size, most: Math.max(...counts.values()) / pixels.length };
+  }, png.toString('base64'));
+}
+
+async function notBlank(judge, locator, name, least = 12) {
+  const { count, most } = await colors(judge, await locator.screenshot());
+  assert.ok(count >= least && most < 0.97, `${name} is blank: ${count} colours, ${(100 * most).toFixed(1)} % of one`);
+}
+
+const settle = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+const picture = async (page) => { await settle(page); return page.evaluate(() => NB.current.view.renderer.domElement.toDataURL()); };
+
+/** Tab reaches every control, and shows where it is. */
+async function walk(page) {
+  await page.evaluate(() => { window.scrollTo(0, 0); document.activeElement?.blur?.(); });
+  const seen = new Set();
+  for (let step = 0; step < 400; step++) {
+    await page.keyboard.press('Tab');
+    const found = await page.evaluate(() => {
+      const element = document.activeElement;
+      if (!element || element === document.body) return null;
+      element.dataset.walked ||= String(document.querySelectorAll('[data-walked]').length);
+      const style = getComputedStyle(element);
+      return { id: element.dataset.walked, tag: element.tagName, ring: element.matches(':focus-visible') ? style.outlineStyle !== 'none' : false, name: element.getAttribute('aria-label') || element.textContent || element.closest('label')?.textContent || '' };
+    });
+    if (!found) break;
+    if (seen.has(found.id)) break;
+    seen.add(found.id);
+    assert.ok(found.ring, `${found.tag} shows no focus: ${found.name.slice(0, 40)}`);
+    assert.ok(found.name.trim(), `${found.tag} has no name`);
+  }
+  const missed = await page.evaluate(() => [...document.querySelectorAll('button, select, input, summary, [tabindex="0"]')]
+    .filter((element) => element.checkVisibility({ contentVisibilityAuto: true, visibilityProperty: true }) && !element.disabled && element.tabIndex >= 0 && !element.dataset.walked)
+    .map((element) => element.outerHTML.slice(0, 100)));
+  assert.deepEqual(missed, [], 'the keyboard does not reach everything');
+  return seen.size;
+}
+
+/** Switches every checkbox under "Show" there and back: the picture has to change and to come back. */
+async function toggles(page) {
+  const labels = await page.evaluate(() => [...document.querySelectorAll('[aria-label="Parts of the picture"] .check')].map((label) => label.textContent));
+  for (const text of labels) {
+    const box = page.locator('[aria-label="Parts of the picture"] .check', { hasText: new RegExp(`^${text}$`) }).locator('input');
+    const before = await picture(page);
+    await box.click();
+    const changed = await picture(page);
+    assert.notEqual(changed, before, `switching "${text}" changes nothing`);
+    await box.click();
+    assert.equal(await picture(page), before, `switching "${text}" twice is not the same`);
+  }
+  return labels.length;
+}
+
+async function testRun(page, judge, name) {
+  await notBlank(judge, page.locator('.view canvas'), 'the 3D view', 200);
+  // Our own forward kinematics against the program's.
+  const worst = await page.evaluate(() => {
+    const { page: data, report } = NB.current;
+    let most = 0;
+    report.goals.forEach((goal, g) => goal.configurations.forEach((configuration, c) => {
+      const { flange } = data.goals[g].configurations[c];
+      if (!flange) return;
+      const pose = NB.forward(data.scene.chain, configuration.joints_rad)[6].elements;
+      for (let k = 0; k < 3; k++) most = Math.max(most, Math.abs(pose[12 + k] - flange[k]));
+    }));
+    return most;
+  });
+  assert.ok(worst < 1e-9, `flange off by ${worst} m`);
+  const hasGoals = await page.evaluate(() => NB.current.report.goals.length > 0);
+  if (!hasGoals) return;
+  await notBlank(judge, page.locator('.curves .plot canvas'), 'the clearance plot');
+  const count = await toggles(page);
+  console.log(`  ${count} switches work`);
+
+  // Rows: click and arrow keys.
+  const rows = page.locator('.panel .choose').first().locator('tbody tr');
+  await rows.nth(0).click();
+  assert.equal(await page.evaluate(() => NB.current.configurationIndex), 0);
+  await page.keyboard.press('ArrowDown');
+  assert.equal(await page.evaluate(() => NB.current.configurationIndex), 1);
+  const before = await picture(page);
+  await rows.nth(3).locator('input').click();
+  assert.notEqual(await picture(page), before, 'a ghost is not seen');
+  await rows.nth(3).locator('input').click();
+
+  // Replay.
+  const playable = await page.evaluate(() => NB.current.goal.configurations.findIndex((_, c) => NB.current.extra.configurations[c].runs.length > 0));
+  await page.evaluate((index) => NB.current.setConfiguration(index), playable);
+  const end = await page.evaluate(() => NB.current.end);
+  const still = await picture(page);
+  await page.getByRole('button', { name: 'Play' }).click();
+  await page.waitForFunction(() => NB.current.time > 0.5 && NB.current.time < NB.current.end - 0.1, null, { timeout: 30_000 });
+  await page.getByRole('button', { name: 'Pause' }).click();
+  const paused = await page.evaluate(() => NB.current.time);
+  assert.ok(paused > 0.4 && paused < end);
+  assert.notEqual(await picture(page), still, 'the replay moves nothing');
+  await page.screenshot({ path: `${out}/${name}-replay.png` });
+  await page.locator('.replay input[type=range]').focus();
+  await page.keyboard.press('ArrowLeft');
+  assert.ok(await page.evaluate(() => NB.current.time) < paused, 'the arrow key does not move the time');
+  const plot = await page.locator('.curves .plot canvas').boundingBox();
+  await page.mouse.click(plot.x + plot.width / 2, plot.y + plot.height / 2);
+  const sought = await page.evaluate(() => NB.current.time);
+  assert.ok(Math.abs(sought / end - 0.5) < 0.1, `a click in the middle of the plot seeks ${sought} of ${end} s`);
+  // The end of the recorded motion is where the report says.
+  const options = await page.locator('select[aria-label="Engine"] option').count();
+  assert.ok(options >= 1);
+
+  // Every goal and every configuration can be shown.
+  for (const goal of await page.evaluate(() => NB.current.report.goals.map((_, index) => index))) {
+    await page.locator('[aria-label=Goal] button').nth(goal).click();
+    for (let row = 0; row < 8; row++) await rows.nth(row).click();
+  }
+  await page.evaluate(() => { NB.current.view.look([0.4, 0.9, -0.5], 3.2); window.scrollTo(0, 0); });
+  for (const text of ['people and sight', 'free space', 'cone for the hand']) await page.locator('.check', { hasText: text }).locator('input').click();
+  await page.evaluate(() => window.scrollTo(0, 0));
+  await settle(page);
+  await page.screenshot({ path: `${out}/${name}-room.png` });
+}
+
+async function testAtlas(page, judge, name) {
+  await notBlank(judge, page.locator('.view canvas'), 'the 3D view', 200);
+  await notBlank(judge, page.locator('.plot canvas').nth(0), 'the strips');
+  await notBlank(judge, page.locator('.plot canvas').nth(1), 'the curves');
+  const before = await picture(page);
+  const roll = await page.evaluate(() => NB.current.roll);
+  await page.locator('.replay input[type=range]').focus();
+  await page.keyboard.press('ArrowRight');
+  assert.notEqual(await page.evaluate(() => NB.current.roll), roll);
+  assert.notEqual(await picture(page), before, 'the roll moves nothing');
+  await page.locator('.choose').first().locator('tbody tr').nth(4).click();
+  assert.equal(await page.evaluate(() => NB.current.branchIndex), 4);
+  const strips = page.locator('.plot canvas').nth(0);
+  await strips.scrollIntoViewIfNeeded();
+  const box = await strips.boundingBox();
+  await page.mouse.click(box.x + box.width * 0.6, box.y + 30);
+  assert.equal(await page.evaluate(() => NB.current.branchIndex), 0);
+  await page.screenshot({ path: `${out}/${name}-strips.png` });
+}
+
+async function testStudy(page, judge, name) {
+  for (const [which, title] of [['scatter', 'the scatter'], ['map', 'the map'], ['ecdf', 'the shares'], ['histogram', 'the histogram'], ['strip', 'the rates']]) {
+    const handle = page.locator('.plot canvas').nth(['strip', 'scatter', 'map', 'ecdf', 'histogram'].indexOf(which));
+    await handle.scrollIntoViewIfNeeded();
+    await settle(page);
+    await notBlank(judge, handle, title, which === 'histogram' ? 5 : 12);
+  }
+  const times = await page.evaluate(() => ['scatter', 'map', 'ecdf', 'histogram', 'strip'].map((which) => {
+    const canvas = NB.current[which];
+    const runs = [];
+    for (let k = 0; k < 7; k++) { canvas.render(); runs.push(canvas.paintedInMs); }
+    return [which, Math.round(runs.sort((a, b) => a - b)[3] * 10) / 10];
+  }));
+  console.log(`  redraws, ms: ${times.map((each) => each.join(' ')).join(', ')}`);
+  for (const [which, ms] of times) assert.ok(ms < REDRAW_MS, `${which} takes ${ms} ms`);
+  // From a point to its case.
+  const scatter = page.locator('.plot canvas').nth(1);
+  await scatter.scrollIntoViewIfNeeded();
+  const box = await scatter.boundingBox();
+  const first = await page.evaluate(() => NB.current.chosen);
+  for (const [x, y] of [[0.3, 0.3], [0.62, 0.4], [0.5, 0.5], [0.7, 0.25]]) await page.mouse.click(box.x + box.width * x, box.y + box.height * y);
+  const chosen = await page.evaluate(() => NB.current.chosen);
+  assert.notEqual(chosen, first, 'a click on a point chooses no case');
+  const number = await page.evaluate(() => NB.current.caseOf(NB.current.chosen));
+  const command = await page.locator('.cases code').first().textContent();
+  assert.ok(command.startsWith('needlebench study ') && command.endsWith(`--case ${number}`), command);
+  assert.equal(await page.locator('.cases .choose tbody tr').count(), 8);
+  // Every choice of every list draws without errors.
+  for (const select of await page.locator('select').all()) {
+    const values = await select.locator('option').evaluateAll((options) => options.map((option) => option.value));
+    for (const value of values) { await select.selectOption(value); await settle(page); }
+    await select.selectOption(values[0]);
+  }
+  const map = page.locator('.plot canvas').nth(2);
+  await map.scrollIntoViewIfNeeded();
+  const cell = await map.boundingBox();
+  await page.mouse.click(cell.x + cell.width / 2, cell.y + cell.height / 2);
+  assert.ok(await page.locator('.points .legend button').count() > 0, 'a cell of the map lists no cases');
+  await page.locator('.points .legend button').first().focus();
+  await page.keyboard.press('ArrowRight');
+  assert.ok(await page.evaluate(() => NB.current.chosen) >= 0);
+  await page.screenshot({ path: `${out}/${name}-map.png` });
+}
+
+const tests = { run: testRun, atlas: testAtlas, study: testStudy };
+
+for (const given of words) {
+  const file = resolve(given);
+  const html = readFileSync(file, 'utf8');
+  const kind = html.match(/<title>(run|atlas|study): /)[1];
+  const name = `${kind}-${words.indexOf(given)}`;
+  const bytes = statSync(file).size;
+  assert.ok(bytes <= MOST_BYTES[kind], `${given} has ${bytes} bytes`);
+  const running = await launch(SOFTWARE_GL);
+  const judge = await running.newPage();
+  // The best of three: other programs run, too.
+  let best = Infinity;
+  for (let k = 0; k < 3; k++) {
+    const opened = await open(running, file);
+    best = Math.min(best, opened.timing);
+    await opened.page.close();
+  }
+  console.log(`${kind} ${given}: ${(bytes / 1e6).toFixed(2)} MB, first view after ${Math.round(best)} ms`);
+  const { page, problems } = await open(running, file);
+  await page.screenshot({ path: `${out}/${name}-first.png` });
+  await page.screenshot({ path: `${out}/${name}-whole.png`, fullPage: true });
+  assert.equal(await page.evaluate(() => window.attacked), undefined, 'a name became a script');
+  assert.equal(await page.locator('img[src="x"]').count(), 0, 'a name became an element');
+  console.log(`  the keyboard reaches ${await walk(page)} controls`);
+  await tests[kind](page, judge, name);
+  // On paper: the picture in place of the view, no controls.
+  await page.pdf({ path: `${out}/${name}.pdf`, preferCSSPageSize: true, printBackground: true });
+  if (await page.locator('.view').count()) {
+    await page.emulateMedia({ media: 'print' });
+    assert.ok(await page.evaluate(() => document.querySelector('.view-image').src.startsWith('data:image/png')), 'no picture for paper');
+    assert.equal(await page.locator('.view canvas').isVisible(), false);
+    assert.equal(await page.locator('.no-print').first().isVisible(), false);
+    await page.screenshot({ path: `${out}/${name}-paper.png`, fullPage: true });
+  }
+  assert.deepEqual(problems, []);
+  await running.close();
+  assert.ok(best <= FIRST_VIEW_MS, `first view after ${best} ms`);
+
+  const plain = await launch(NO_GL);
+  const without = await open(plain, file);
+  if (await without.page.locator('.view').count()) {
+    assert.ok(await without.page.locator('.no-webgl').isVisible(), 'nothing says that there is no WebGL');
+    const rows = without.page.locator('.choose').first().locator('tbody tr');
+    if (await rows.count()) await rows.nth(1).click();
+  }
+  if (await without.page.locator('.plot canvas').count()) await notBlank(await plain.newPage(), without.page.locator('.plot canvas').first(), 'a plot without WebGL');
+  await without.page.screenshot({ path: `${out}/${name}-no-webgl.png` });
+  assert.deepEqual(without.problems, []);
+  await plain.close();
+}
+console.log('pages: all well');
