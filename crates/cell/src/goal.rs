@@ -1,6 +1,9 @@
 //! Goals: where the guide has to stand, in the world.
 
+mod needle;
+
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_kinematics::ik::Configuration;
@@ -72,13 +75,10 @@ impl Goal {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacedPhantom {
     /// The phantom.
-    pub phantom: Phantom,
+    pub phantom: Arc<Phantom>,
     /// Its place.
     pub world_from_phantom: Pose,
 }
-
-/// Distance from the skin within which an entry point is moved onto it along the needle.
-const ENTRY_TOLERANCE_M: f64 = 5e-3;
 
 /// What resolving goals needs to know.
 pub(crate) struct Surroundings<'a> {
@@ -112,7 +112,7 @@ pub(crate) fn resolve_goal(
     let mut goal = if section.flange_pose.is_some() {
         from_flange_pose(text, &key, section, surroundings)?
     } else {
-        from_entry_and_target(text, &key, section, surroundings, notes)?
+        needle::from_entry_and_target(text, &key, section, surroundings, notes)?
     };
     goal.expected = expectations(text, &key, section)?;
     let by_flange_pose = section.flange_pose.is_some();
@@ -150,7 +150,9 @@ fn from_flange_pose(
 ) -> Result<Goal, Finding> {
     for (name, given) in [
         ("entry_mm", section.entry_mm.is_some()),
+        ("entry_direction_deg", section.entry_direction_deg.is_some()),
         ("target_mm", section.target_mm.is_some()),
+        ("target_offset_mm", section.target_offset_mm.is_some()),
         ("lesion", section.lesion.is_some()),
         ("roll_deg", section.roll_deg.is_some()),
     ] {
@@ -228,182 +230,6 @@ fn from_flange_pose(
         approach_m: section.approach_mm * 1e-3,
         lesion: None,
         target_organ,
-        expected: BTreeMap::new(),
-    })
-}
-
-fn from_entry_and_target(
-    text: &TomlText<'_>,
-    key: &dyn Fn(&str) -> String,
-    section: &GoalSection,
-    surroundings: &Surroundings<'_>,
-    notes: &mut Vec<String>,
-) -> Result<Goal, Finding> {
-    let Some(placed) = surroundings.phantom else {
-        return Err(text
-            .finding(
-                &key("entry_mm"),
-                "a goal by entry and target needs a [phantom]",
-            )
-            .hint("add a [phantom] section, or give `flange_pose`"));
-    };
-    let phantom = &placed.phantom;
-    let point = |mm: [f64; 3]| Point3::from(Vector3::from(mm) * 1e-3);
-    let Some(entry_mm) = section.entry_mm else {
-        return Err(text
-            .finding(
-                &key("entry_mm"),
-                format!("goal `{}` has no `entry_mm`", section.name),
-            )
-            .hint("a goal needs `entry_mm` and `target_mm` or `lesion`, or a `flange_pose`"));
-    };
-    let (target_key, target, lesion) = match (&section.target_mm, &section.lesion) {
-        (Some(_), Some(_)) => {
-            return Err(text.finding(&key("lesion"), "`lesion` contradicts `target_mm`"));
-        }
-        (Some(mm), None) => ("target_mm", point(*mm), None),
-        (None, Some(name)) => {
-            let Some(lesion) = phantom.lesions.iter().find(|lesion| lesion.name == *name) else {
-                let names: Vec<&str> = phantom
-                    .lesions
-                    .iter()
-                    .map(|lesion| lesion.name.as_str())
-                    .collect();
-                return Err(text
-                    .finding(
-                        &key("lesion"),
-                        format!("the phantom has no lesion `{name}`"),
-                    )
-                    .hint(match nearest_name(name, names.iter().copied()) {
-                        Some(near) => format!("did you mean `{near}`?"),
-                        None if names.is_empty() => {
-                            "it has none: give `target_mm`, or a part with the tissue lesion"
-                                .to_owned()
-                        }
-                        None => format!("it has {}", names.join(", ")),
-                    }));
-            };
-            ("lesion", lesion.center_m, Some(name.clone()))
-        }
-        (None, None) => {
-            return Err(text.finding(
-                &key("target_mm"),
-                format!(
-                    "goal `{}` has neither `target_mm` nor `lesion`",
-                    section.name
-                ),
-            ));
-        }
-    };
-    let entry = point(entry_mm);
-    let Some(axis) = UnitVector3::try_new(target - entry, 1e-4) else {
-        return Err(text
-            .finding(&key("entry_mm"), "entry and target are the same point")
-            .hint("the needle's direction is from entry to target"));
-    };
-    let depth_m = phantom.skin_signed_depth(&target);
-    if depth_m <= 0.0 {
-        return Err(text
-            .finding(
-                &key(target_key),
-                format!(
-                    "the target lies {:.1} mm outside the phantom",
-                    -depth_m * 1e3
-                ),
-            )
-            .hint(
-                "points are in the phantom frame: left, posterior, superior, from mid-chest, in mm",
-            ));
-    }
-    // The target is inside, so the line through it crosses the skin.
-    let Some((enters_m, leaves_m)) = phantom.skin_intersection(&entry, &axis) else {
-        return Err(text.finding(
-            &key("entry_mm"),
-            "the line from entry to target misses the skin",
-        ));
-    };
-    if enters_m.abs() > ENTRY_TOLERANCE_M {
-        let skin = (entry + axis.into_inner() * enters_m).coords * 1e3;
-        return Err(text
-            .finding(
-                &key("entry_mm"),
-                format!(
-                    "the entry point is {:.1} mm {} the skin along the needle",
-                    enters_m.abs() * 1e3,
-                    if enters_m > 0.0 { "before" } else { "inside" }
-                ),
-            )
-            .hint(format!(
-                "{}the line meets the skin at [{:.1}, {:.1}, {:.1}]",
-                if entry_mm.iter().all(|value| value.abs() < 1.0) {
-                    "the point is in millimetres, not metres; "
-                } else {
-                    ""
-                },
-                skin.x,
-                skin.y,
-                skin.z
-            )));
-    }
-    let to_target_m = (target - entry).norm();
-    if leaves_m < to_target_m {
-        return Err(text
-            .finding(
-                &key("entry_mm"),
-                format!(
-                    "the needle would leave the skin {:.1} mm after its entry and pierce it again \
-                     before the target",
-                    (leaves_m - enters_m) * 1e3
-                ),
-            )
-            .hint("choose an entry on the target's side of the fold"));
-    }
-    if enters_m.abs() > 1e-6 {
-        notes.push(format!(
-            "goal `{}`: the entry point was moved {:.2} mm along the needle onto the skin",
-            section.name,
-            enters_m * 1e3
-        ));
-    }
-    check_length(text, &key("standoff_mm"), section.standoff_mm, 0.0, 200.0)?;
-    check_length(text, &key("approach_mm"), section.approach_mm, 0.0, 500.0)?;
-    let on_skin = entry + axis.into_inner() * enters_m;
-    let standoff_m = section.standoff_mm * 1e-3;
-    let exit = on_skin - axis.into_inner() * standoff_m;
-    let to_target_m = (target - exit).norm();
-    let insertion_length_m = match section.insertion_length_mm {
-        None => to_target_m,
-        Some(length_mm) => {
-            check_length(text, &key("insertion_length_mm"), length_mm, 1.0, 500.0)?;
-            length_mm * 1e-3
-        }
-    };
-    if insertion_length_m <= standoff_m {
-        return Err(text
-            .finding(
-                &key("insertion_length_mm"),
-                format!(
-                    "the needle would end {:.1} mm before the skin",
-                    (standoff_m - insertion_length_m) * 1e3
-                ),
-            )
-            .hint("the insertion length counts from the guide's exit, stand-off included"));
-    }
-    let world = &placed.world_from_phantom;
-    Ok(Goal {
-        name: section.name.clone(),
-        entry_m: Some(world * on_skin),
-        target_m: world * target,
-        axis: UnitVector3::new_normalize(world.rotation * axis.into_inner()),
-        world_from_guide_exit: world * guide_frame(&exit, &axis),
-        roll: section
-            .roll_deg
-            .map_or(Roll::Free, |deg| Roll::Fixed(deg.to_radians())),
-        insertion_length_m,
-        standoff_m: Some(standoff_m),
-        approach_m: section.approach_mm * 1e-3,
-        target_organ: organ_at(phantom, &target),
-        lesion,
         expected: BTreeMap::new(),
     })
 }

@@ -238,12 +238,20 @@ pub struct GoalSection {
     /// 5 mm of the skin is moved onto it along the needle.
     #[serde(default)]
     pub entry_mm: Option<[f64; 3]>,
+    /// Where the needle comes from, as seen from the target, instead of `entry_mm`: azimuth about the
+    /// phantom's superior axis, from anterior (0) towards the patient's left (90), and elevation towards
+    /// superior, deg. The entry is where the line leaves the skin, whatever the phantom's size.
+    #[serde(default)]
+    pub entry_direction_deg: Option<[f64; 2]>,
     /// Target point, phantom frame, mm.
     #[serde(default)]
     pub target_mm: Option<[f64; 3]>,
     /// Name of a lesion of the phantom whose centre is the target, instead of `target_mm`.
     #[serde(default)]
     pub lesion: Option<String>,
+    /// Added to the target, phantom frame, mm.
+    #[serde(default)]
+    pub target_offset_mm: Option<[f64; 3]>,
     /// Pose of the flange, instead of entry and target. The needle then follows the guide.
     #[serde(default)]
     pub flange_pose: Option<FlangePose>,

@@ -252,6 +252,8 @@ pub(crate) struct Drives<'a> {
     on_the_way: VecDeque<Joints>,
     random: SplitMix64,
     spare_normal: Option<f64>,
+    /// The last reference, and the torque that the model says it needs, N m.
+    fed_forward: Option<(JointState, Joints)>,
 }
 
 impl<'a> Drives<'a> {
@@ -277,20 +279,27 @@ impl<'a> Drives<'a> {
             on_the_way: VecDeque::new(),
             random: SplitMix64::new(actuation.seed),
             spare_normal: None,
+            fed_forward: None,
         }
     }
 
-    /// Torques of the step that starts at `time_s` with the arm at `position`, `velocity`.
+    /// Torques of the step that starts at `time_s` with the arm at `position`, `velocity`; `planned`
+    /// is the trajectory at that time.
     pub(crate) fn torque(
         &mut self,
         trajectory: &JointTrajectory,
         time_s: f64,
+        planned: &JointState,
         position: &Joints,
         velocity: &Joints,
     ) -> ActuatedTorque {
-        let reference = self.reference(trajectory, time_s);
+        let reference = self.reference(trajectory, time_s, planned);
+        let forward_nm = self.forward_nm(&reference);
+        let wanted = self
+            .servo
+            .wanted_nm(forward_nm, &reference, position, velocity);
         if self.ideal {
-            let output = self.servo.torque(&reference, position, velocity);
+            let output = self.servo.limited(&wanted);
             return ActuatedTorque {
                 link_nm: output.torque_nm,
                 drive_nm: output.torque_nm,
@@ -301,7 +310,7 @@ impl<'a> Drives<'a> {
         let compliance = self.actuation.compliance_rad_per_nm;
         let softening = kp.component_mul(&compliance).add_scalar(1.0);
         let friction = self.friction_nm(velocity);
-        let mut wanted = self.servo.wanted_nm(&reference, position, velocity);
+        let mut wanted = wanted;
         if let Some(friction) = &self.actuation.friction {
             wanted += friction.compensation_nm(&reference.velocity);
         }
@@ -332,17 +341,35 @@ impl<'a> Drives<'a> {
     /// positions follow the trajectory to second order, while the velocities belong half a step
     /// earlier (the plant says how old its velocities are). Taking the velocity there removes a bias of `kd * h / 2 * qdd`, which is 0.3 N m at
     /// 10 rad/s^2 and 1 ms.
-    fn reference(&self, trajectory: &JointTrajectory, time_s: f64) -> JointState {
+    fn reference(
+        &self,
+        trajectory: &JointTrajectory,
+        time_s: f64,
+        planned: &JointState,
+    ) -> JointState {
         let velocity_s = (time_s - self.velocity_age_s).max(0.0);
         match self.actuation.commands {
             None => JointState {
                 velocity: trajectory.sample(velocity_s).velocity,
-                ..trajectory.sample(time_s)
+                ..*planned
             },
             Some(timing) => JointState {
                 velocity: timing.at(trajectory, velocity_s).velocity,
                 ..timing.at(trajectory, time_s)
             },
+        }
+    }
+
+    /// Torque that the model says a reference needs, N m. While the arm holds its place, and between
+    /// commands, the reference stays the same.
+    fn forward_nm(&mut self, reference: &JointState) -> Joints {
+        match &self.fed_forward {
+            Some((known, torque_nm)) if known == reference => *torque_nm,
+            _ => {
+                let torque_nm = self.servo.forward_nm(reference);
+                self.fed_forward = Some((*reference, torque_nm));
+                torque_nm
+            }
         }
     }
 

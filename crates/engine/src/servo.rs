@@ -61,31 +61,43 @@ impl Servo {
         position: &Joints,
         velocity: &Joints,
     ) -> ServoOutput {
-        let wanted = self.wanted_nm(reference, position, velocity);
+        let forward_nm = self.forward_nm(reference);
+        self.limited(&self.wanted_nm(forward_nm, reference, position, velocity))
+    }
+
+    /// The torque within the limits.
+    pub(crate) fn limited(&self, wanted_nm: &Joints) -> ServoOutput {
         // NaN passes the clamp unchanged, so that the run loop sees the divergence.
-        let torque_nm = wanted.zip_map(&self.effort_limit_nm, |torque, limit| {
+        let torque_nm = wanted_nm.zip_map(&self.effort_limit_nm, |torque, limit| {
             torque.clamp(-limit, limit)
         });
         ServoOutput {
             torque_nm,
-            saturated: std::array::from_fn(|i| torque_nm[i] != wanted[i]),
+            saturated: std::array::from_fn(|i| torque_nm[i] != wanted_nm[i]),
         }
     }
 
-    /// The same without the clamp, N m.
+    /// Torque that the model says a reference needs, N m.
+    pub(crate) fn forward_nm(&self, reference: &JointState) -> Joints {
+        self.dynamics.inverse_dynamics(
+            &reference.position,
+            &reference.velocity,
+            &reference.acceleration,
+        )
+    }
+
+    /// That torque with what the gains add, without the clamp, N m.
     pub(crate) fn wanted_nm(
         &self,
+        forward_nm: Joints,
         reference: &JointState,
         position: &Joints,
         velocity: &Joints,
     ) -> Joints {
         let kp = Joints::from(self.gains.kp_nm_per_rad);
         let kd = Joints::from(self.gains.kd_nms_per_rad);
-        self.dynamics.inverse_dynamics(
-            &reference.position,
-            &reference.velocity,
-            &reference.acceleration,
-        ) + kp.component_mul(&(reference.position - position))
+        forward_nm
+            + kp.component_mul(&(reference.position - position))
             + kd.component_mul(&(reference.velocity - velocity))
     }
 

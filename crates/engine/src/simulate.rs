@@ -140,9 +140,16 @@ impl<'a> Drive<'a> {
                     saturated: [false; JOINT_COUNT],
                 }
             }
-            None => self
-                .drives
-                .torque(self.trajectory, time_s, &state.position, &state.velocity),
+            None => {
+                let planned = self.recording.reference.last();
+                self.drives.torque(
+                    self.trajectory,
+                    time_s,
+                    planned.expect("recorded with its state"),
+                    &state.position,
+                    &state.velocity,
+                )
+            }
         };
         check_torque(&self.recording.engine.name, time_s, &torque.drive_nm)?;
         self.recording.saturated_steps += usize::from(torque.saturated.contains(&true));

@@ -1,12 +1,11 @@
-//! Clearance along recorded motions, and of the planned needle.
+//! Clearance along recorded motions.
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::phantom::Tissue;
-use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom};
+use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::{
-    CertificateOptions, ClassMinima, ClearanceModel, Motion, ROUNDING_M, RecordedMotion,
-    Separation, certify, segment_clearance,
+    CertificateOptions, ClassMinima, ClearanceModel, Motion, MotionCertificate, RecordedMotion,
+    Separation, certify, certify_sampled,
 };
 use needlebench_engine::Recording;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
@@ -97,6 +96,34 @@ pub fn certify_recording(
     );
 }
 
+/// Least clearances over a recording with their proven lower bounds: those of
+/// [`measure_clearance`] and [`certify_recording`] together, but for the rounding of the distances
+/// (`1e-12 m`), at a small part of the cost.
+pub fn recorded_clearance(
+    cell: &Cell,
+    model: &ClearanceModel,
+    trajectory: &JointTrajectory,
+    recording: &Recording,
+    period_s: f64,
+    tolerance_m: f64,
+) -> BTreeMap<ClearanceClass, ClassClearance> {
+    let position = recording.state.iter().map(|state| state.position);
+    let motion = RecordedMotion::new(recording.time_s.clone(), position.collect(), trajectory);
+    let samples_s: Vec<f64> = sample_indices(recording, period_s)
+        .into_iter()
+        .map(|index| recording.time_s[index])
+        .collect();
+    let options = CertificateOptions {
+        tolerance_m,
+        ..CertificateOptions::default()
+    };
+    let engine = Some(recording.engine.name.as_str());
+    let mut minima = BTreeMap::new();
+    let certificate = certify_sampled(model, &motion, &options, &samples_s);
+    take_minima(&mut minima, cell, &certificate, engine);
+    minima
+}
+
 /// Least clearances of a planned motion with their proven lower bounds.
 pub fn planned_clearance(
     cell: &Cell,
@@ -121,7 +148,16 @@ fn certify_minima(
         tolerance_m,
         ..CertificateOptions::default()
     };
-    for (class, found) in certify(model, motion, &options).iter() {
+    take_minima(minima, cell, &certify(model, motion, &options), engine);
+}
+
+fn take_minima(
+    minima: &mut BTreeMap<ClearanceClass, ClassClearance>,
+    cell: &Cell,
+    certificate: &MotionCertificate,
+    engine: Option<&str>,
+) {
+    for (class, found) in certificate.iter() {
         let attained = &found.attained;
         let nearer = minima
             .get(&class)
@@ -178,7 +214,7 @@ pub fn posture_clearance(
         .collect()
 }
 
-fn class_clearance(
+pub(crate) fn class_clearance(
     (solid_a, solid_b): (&str, &str),
     separation: &Separation,
     phase: &'static str,
@@ -197,38 +233,4 @@ fn class_clearance(
         time_s,
         engine: engine.map(str::to_owned),
     }
-}
-
-/// Clearance of the planned needle, from skin to target, from bone, vessels and organs.
-///
-/// The organ that contains the target is left out: the needle has to enter it. Lesions and the
-/// skin do not count.
-pub fn needle_route(cell: &Cell, placed: &PlacedPhantom, goal: &Goal) -> Option<ClassClearance> {
-    let entry = goal.entry_m?;
-    let parts: Vec<_> = placed
-        .phantom
-        .parts
-        .iter()
-        .filter(|part| matches!(part.tissue, Tissue::Bone | Tissue::Vessel | Tissue::Organ))
-        .filter(|part| goal.target_organ.is_none() || part.organ != goal.target_organ)
-        .map(|part| part.solid.clone())
-        .collect();
-    segment_clearance(
-        &entry,
-        &goal.target_m,
-        0.5 * cell.tool.needle.outer_diameter_m,
-        &parts,
-        &placed.world_from_phantom,
-    )
-    .into_iter()
-    .zip(&parts)
-    .min_by(|(a, _), (b, _)| a.distance_m.total_cmp(&b.distance_m))
-    .map(|(separation, solid)| {
-        let pair = ("needle", solid.name.as_str());
-        ClassClearance {
-            // One exact distance that is never optimistic, but for rounding.
-            certified_lower_bound_m: Some(separation.distance_m - ROUNDING_M),
-            ..class_clearance(pair, &separation, "insertion", None, None)
-        }
-    })
 }

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 pub use key_path::KeyPath;
 pub use setting::{Change, Setting};
 
+use crate::parts::Library;
 use crate::resolve::resolve;
 use crate::toml_text::TomlText;
 use crate::{Finding, Overrides, ResolvedScenario, load_scenario, nearest_name};
@@ -27,6 +28,7 @@ pub struct ScenarioFamily {
     keys: Keys,
     folder: PathBuf,
     overrides: Overrides,
+    library: Library,
 }
 
 impl ScenarioFamily {
@@ -44,6 +46,7 @@ impl ScenarioFamily {
             keys: Keys::new(),
             folder: path.parent().unwrap_or(Path::new("")).to_owned(),
             overrides: overrides.clone(),
+            library: Library::default(),
         })
     }
 
@@ -81,7 +84,14 @@ impl ScenarioFamily {
         })?;
         let toml = TomlText::without_text(file);
         let source = self.base.source.clone();
-        resolve(&toml, scenario, source, &self.folder, &self.overrides)
+        resolve(
+            &toml,
+            scenario,
+            source,
+            &self.folder,
+            &self.overrides,
+            &self.library,
+        )
     }
 
     /// Whether the scenario has such a key, and the change fits its type, for every goal.

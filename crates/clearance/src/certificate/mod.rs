@@ -206,5 +206,19 @@ pub fn certify(
     motion: &impl Motion,
     options: &CertificateOptions,
 ) -> MotionCertificate {
-    search::certify(model, motion, options, 1.0)
+    search::certify(model, motion, options, &[], 1.0)
+}
+
+/// [`certify`], whose attained clearances are at most those at any of the given times (s, in
+/// ascending order): the least of a whole series without making the series.
+///
+/// A couple is looked at only at those times at which its proven bound leaves it open whether it is
+/// the nearest of its class. The bounds are those of [`certify`].
+pub fn certify_sampled(
+    model: &ClearanceModel,
+    motion: &impl Motion,
+    options: &CertificateOptions,
+    samples_s: &[f64],
+) -> MotionCertificate {
+    search::certify(model, motion, options, samples_s, 1.0)
 }

@@ -154,6 +154,17 @@ struct Interval {
     open: Vec<Open>,
 }
 
+/// A couple that was closed in an interval although it may come nearer there than what had been
+/// attained until then.
+#[derive(Debug, Clone, Copy)]
+struct Closed {
+    couple: usize,
+    bound_m: f64,
+    start_s: f64,
+    end_s: f64,
+    phase: Phase,
+}
+
 struct Search<'m, M> {
     model: &'m ClearanceModel,
     motion: &'m M,
@@ -163,14 +174,17 @@ struct Search<'m, M> {
     couples: Vec<Couple<'m>>,
     postures: Vec<Posture>,
     classes: [Option<ClassCertificate>; CLASS_COUNT],
+    will_sample: bool,
+    closed: Vec<Closed>,
     effort: Effort,
 }
 
-/// `length_scale` is 1 for a proof; tests take less, to see that they notice.
+/// `samples_s` are in ascending order. `length_scale` is 1 for a proof; tests take less, to see that they notice.
 pub(super) fn certify<M: Motion>(
     model: &ClearanceModel,
     motion: &M,
     options: &CertificateOptions,
+    samples_s: &[f64],
     length_scale: f64,
 ) -> MotionCertificate {
     let mut search = Search {
@@ -182,6 +196,8 @@ pub(super) fn certify<M: Motion>(
         couples: couples(model),
         postures: Vec::new(),
         classes: [None; CLASS_COUNT],
+        will_sample: !samples_s.is_empty(),
+        closed: Vec::new(),
         effort: Effort::default(),
     };
     let spans = motion.spans();
@@ -193,6 +209,7 @@ pub(super) fn certify<M: Motion>(
             .flatten()
             .collect();
     }
+    search.look_at_samples(samples_s);
     MotionCertificate {
         classes: search.classes,
         effort: search.effort,
@@ -335,6 +352,16 @@ impl<M: Motion> Search<'_, M> {
                     && bound_m < 0.0);
             if is_closed || !may_halve {
                 self.count(class, bound_m);
+                let may_be_nearest = bound_m < self.attained_m(class) || bound_m.is_nan();
+                if self.will_sample && may_be_nearest {
+                    self.closed.push(Closed {
+                        couple: each.couple,
+                        bound_m,
+                        start_s: left_s,
+                        end_s: right_s,
+                        phase: interval.phase,
+                    });
+                }
             } else {
                 open.push(Open {
                     couple: each.couple,
@@ -346,6 +373,32 @@ impl<M: Motion> Search<'_, M> {
             return None;
         }
         Some(self.halved(interval, &open))
+    }
+
+    /// Looks at the couples at the sampled times at which they may be the nearest of their class: in
+    /// all other intervals their bounds say that they are not.
+    fn look_at_samples(&mut self, samples_s: &[f64]) {
+        let mut postures: Vec<Option<usize>> = vec![None; samples_s.len()];
+        for closed in std::mem::take(&mut self.closed) {
+            let class = self.couples[closed.couple].class;
+            let first = samples_s.partition_point(|&each| each < closed.start_s);
+            let end = samples_s.partition_point(|&each| each <= closed.end_s);
+            for sample in first..end {
+                if closed.bound_m >= self.attained_m(class) {
+                    break;
+                }
+                let posture = match postures[sample] {
+                    Some(known) => known,
+                    None => self.posture(samples_s[sample]),
+                };
+                postures[sample] = Some(posture);
+                let couple = &self.couples[closed.couple];
+                let placement = couple.inner_from_outer(&self.postures[posture]);
+                if couple.capsules_m(&placement) < self.attained_m(class) {
+                    self.distance(closed.couple, posture, &placement, closed.phase);
+                }
+            }
+        }
     }
 
     /// Lower bound of a couple's clearance over an interval, and its way in it, m.

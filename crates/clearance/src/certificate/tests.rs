@@ -217,7 +217,7 @@ fn lengths_that_are_too_short_are_refuted() {
         swings
             .iter()
             .map(|motion| {
-                let certificate = search::certify(&model, motion, &options, length_scale);
+                let certificate = search::certify(&model, motion, &options, &[], length_scale);
                 refutation_m(&sampled(&model, motion, &certificate, 60, 4))
             })
             .fold(f64::NEG_INFINITY, f64::max)

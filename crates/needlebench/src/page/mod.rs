@@ -15,5 +15,6 @@ mod pack;
 mod room;
 mod run;
 mod scene;
+pub(crate) mod study;
 
 pub(crate) use run::run_page;

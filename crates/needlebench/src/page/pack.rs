@@ -13,10 +13,10 @@ const NONE: u16 = u16::MAX;
 
 /// Arrays of numbers, and how the document refers to them.
 ///
-/// An array is referred to as `{"at": byte, "n": count, "t": "u8" | "u16" | "u32" | "f32"}`, a
+/// An array is referred to as `{"at": byte, "n": count, "t": "u8" | "u16" | "u32" | "f32" | "f64"}`, a
 /// quantised column also has `"low"` and `"step"`: value = low + step * code, and code 65535 stands
 /// for none. Columns with `"d": 1` hold differences of successive codes, modulo 2^16, which deflates
-/// better. Everything is little-endian and starts at a multiple of four bytes.
+/// better; those with `"p": 1` all low bytes first, then all high ones. Everything is little-endian and starts at a multiple of four bytes.
 #[derive(Debug, Default)]
 pub(super) struct Pack {
     bytes: Vec<u8>,
@@ -47,6 +47,19 @@ impl Pack {
         reference
     }
 
+    /// Whole numbers below 2^53, in ascending order, as differences in double precision; the script
+    /// adds them up.
+    pub fn numbers(&mut self, ascending: &[u64]) -> Value {
+        let reference = self.place("f64", ascending.len());
+        let mut last = 0;
+        for &number in ascending {
+            let step = (number - last) as f64;
+            self.bytes.extend_from_slice(&step.to_le_bytes());
+            last = number;
+        }
+        reference
+    }
+
     /// Codes.
     pub fn u16s(&mut self, values: &[u16]) -> Value {
         let reference = self.place("u16", values.len());
@@ -65,21 +78,31 @@ impl Pack {
         reference
     }
 
+    /// A column of numbers in no order, in at most 65534 `steps` of its range: values are off by half a
+    /// step at most, and what is not finite is none. All low bytes come first, then all high ones
+    /// (`"p": 1`), which deflates better; fewer than 255 steps take one byte, and 255 is none.
+    pub fn coarse_column(&mut self, values: &[f32], steps: u16) -> Value {
+        let wide: Vec<f64> = values.iter().map(|&value| f64::from(value)).collect();
+        let (low, step, codes) = quantised(&wide, steps);
+        let narrow = steps < 255;
+        let mut reference = self.place(if narrow { "u8" } else { "u16" }, codes.len());
+        // None is the largest code of either width: its low byte is 255 too.
+        self.bytes
+            .extend(codes.iter().map(|code| code.to_le_bytes()[0]));
+        if !narrow {
+            self.bytes
+                .extend(codes.iter().map(|code| code.to_le_bytes()[1]));
+            reference["p"] = json!(1);
+        }
+        reference["low"] = json!(low);
+        reference["step"] = json!(step);
+        reference
+    }
+
     /// A column in steps of 1 / 65534 of its range: values are off by half a step at most. What is
     /// not finite is none. `smooth` columns are stored as differences.
     pub fn column(&mut self, values: &[f64], smooth: bool) -> Value {
-        let finite = || values.iter().copied().filter(|value| value.is_finite());
-        let low = finite().fold(f64::INFINITY, f64::min);
-        let high = finite().fold(f64::NEG_INFINITY, f64::max);
-        let (low, step) = if low < high {
-            (low, (high - low) / f64::from(NONE - 1))
-        } else {
-            (if low.is_finite() { low } else { 0.0 }, 1.0)
-        };
-        let mut codes: Vec<u16> = values
-            .iter()
-            .map(|value| code_of((value - low) / step))
-            .collect();
+        let (low, step, mut codes) = quantised(values, NONE - 1);
         if smooth {
             let mut last = 0_u16;
             for code in &mut codes {
@@ -112,6 +135,20 @@ impl Pack {
         let compressed = encoder.write_all(&raw).and_then(|()| encoder.finish());
         STANDARD.encode(compressed.expect("writing to memory does not fail"))
     }
+}
+
+/// Lowest value, step and codes; the code of what is not finite is [`NONE`].
+fn quantised(values: &[f64], steps: u16) -> (f64, f64, Vec<u16>) {
+    let finite = || values.iter().copied().filter(|value| value.is_finite());
+    let low = finite().fold(f64::INFINITY, f64::min);
+    let high = finite().fold(f64::NEG_INFINITY, f64::max);
+    let (low, step) = if low < high {
+        (low, (high - low) / f64::from(steps))
+    } else {
+        (if low.is_finite() { low } else { 0.0 }, 1.0)
+    };
+    let code = |value: &f64| code_of((value - low) / step);
+    (low, step, values.iter().map(code).collect())
 }
 
 #[expect(
@@ -171,16 +208,24 @@ pub(super) mod unpack {
             let mut last = 0_u16;
             (0..count)
                 .map(|k| match reference["t"].as_str().unwrap() {
-                    "u8" => f64::from(bytes[k]),
+                    "u8" => match step.as_f64() {
+                        Some(_) if bytes[k] == u8::MAX => f64::NAN,
+                        Some(step) => low.as_f64().unwrap() + step * f64::from(bytes[k]),
+                        None => f64::from(bytes[k]),
+                    },
                     "u32" => f64::from(u32::from_le_bytes(
                         bytes[4 * k..4 * k + 4].try_into().unwrap(),
                     )),
+                    "f64" => f64::from_le_bytes(bytes[8 * k..8 * k + 8].try_into().unwrap()),
                     "f32" => f64::from(f32::from_le_bytes(
                         bytes[4 * k..4 * k + 4].try_into().unwrap(),
                     )),
                     _ => {
-                        let mut code =
-                            u16::from_le_bytes(bytes[2 * k..2 * k + 2].try_into().unwrap());
+                        let mut code = if reference["p"] == 1 {
+                            u16::from_le_bytes([bytes[k], bytes[count + k]])
+                        } else {
+                            u16::from_le_bytes(bytes[2 * k..2 * k + 2].try_into().unwrap())
+                        };
                         if reference["d"] == 1 {
                             code = code.wrapping_add(last);
                             last = code;
@@ -202,17 +247,29 @@ mod tests {
     use super::*;
 
     #[test]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "columns of single precision"
+    )]
     fn arrays_come_back_within_half_a_step() {
         let mut pack = Pack::default();
         let wave: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.01).sin()).collect();
         let mut gaps = wave.clone();
         gaps[3] = f64::NAN;
         gaps[999] = f64::INFINITY;
+        let single = |values: &[f64]| {
+            values
+                .iter()
+                .map(|&value| value as f32)
+                .collect::<Vec<f32>>()
+        };
         let document = json!({
             "bytes": pack.u8s(&[1, 2, 3]),
             "smooth": pack.column(&wave, true),
             "gaps": pack.column(&gaps, true),
             "rough": pack.column(&wave, false),
+            "planes": pack.coarse_column(&single(&gaps), 4094),
+            "bytes_of_values": pack.coarse_column(&single(&gaps), 254),
             "one": pack.column(&[5.25; 4], false),
             "none": pack.column(&[f64::NAN; 2], false),
             "narrow": pack.indices(&[7, 65_535]),
@@ -235,6 +292,17 @@ mod tests {
         assert!(read[3].is_nan() && read[999].is_nan());
         assert!((read[500] - wave[500]).abs() <= half_step);
         assert_eq!(column("bytes"), [1.0, 2.0, 3.0]);
+        for (name, steps) in [("planes", 4094.0), ("bytes_of_values", 254.0)] {
+            let read = column(name);
+            assert!(read[3].is_nan() && read[999].is_nan(), "{name}");
+            for (a, b) in read.iter().zip(&gaps).filter(|(_, b)| b.is_finite()) {
+                // Single precision, too.
+                assert!(
+                    (a - b).abs() <= 1.0 / steps * (1.0 + 1e-4),
+                    "{name}: {a} for {b}"
+                );
+            }
+        }
         assert_eq!(column("one"), [5.25; 4]);
         assert!(column("none").iter().all(|value| value.is_nan()));
         assert_eq!(column("narrow"), [7.0, 65_535.0]);

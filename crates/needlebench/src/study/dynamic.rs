@@ -1,6 +1,7 @@
 //! A case with its motion in the engines.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -12,8 +13,8 @@ use needlebench_engine::{
     simulate_fleet,
 };
 use needlebench_evaluation::adjudication::judge_differences;
-use needlebench_evaluation::judge;
 use needlebench_evaluation::report::{CriterionResult, Status};
+use needlebench_evaluation::{ClearanceSeries, judge, recorded_clearance};
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::GoalPlan;
 use needlebench_study::{Outcome, Row};
@@ -266,21 +267,18 @@ impl<'a> Case<'a> {
         let (cell, model) = (stage.reality.cell(), stage.reality.model());
         let trajectory = self.trajectory(job);
         let scenario = &stage.resolved.scenario;
-        let mut clearance = needlebench_evaluation::measure_clearance(
-            cell,
-            model,
-            trajectory,
-            &recording,
-            scenario.recording.period_ms * 1e-3,
-        );
-        needlebench_evaluation::certify_recording(
-            &mut clearance,
-            cell,
-            model,
-            trajectory,
-            &recording,
-            scenario.planning.certificate_tolerance_mm * 1e-3,
-        );
+        let mut clearance = ClearanceSeries {
+            minima: recorded_clearance(
+                cell,
+                model,
+                trajectory,
+                &recording,
+                scenario.recording.period_ms * 1e-3,
+                scenario.planning.certificate_tolerance_mm * 1e-3,
+            ),
+            time_s: Vec::new(),
+            distance_m: BTreeMap::new(),
+        };
         stage.reality.allow_for_breath(&mut clearance);
         EngineRun {
             engine,

@@ -1,12 +1,13 @@
 //! The rows of a case, by what the study computes of it.
 
 use needlebench_cell::study::{ResolvedStudy, StudyMode};
-use needlebench_study::{CaseError, CaseEvaluator, CaseResult, CaseWorker, Design, Outcome, Row};
+use needlebench_study::{CaseError, CaseEvaluator, CaseResult, CaseWorker, Design};
 
 use super::case::StudyCase;
 use super::dynamic::dynamic_rows;
 use super::engines::EngineSet;
 use super::planned::planned_rows;
+use super::static_case::{StaticWorker, invalid_rows};
 
 /// Computes the cases of a study.
 pub(crate) struct StudyEvaluator<'a> {
@@ -25,6 +26,7 @@ impl CaseEvaluator for StudyEvaluator<'_> {
         Ok(Box::new(Worker {
             study: self.study,
             design: self.design,
+            postures: StaticWorker::default(),
             engines: EngineSet::default(),
         }))
     }
@@ -33,6 +35,7 @@ impl CaseEvaluator for StudyEvaluator<'_> {
 struct Worker<'a> {
     study: &'a ResolvedStudy,
     design: &'a Design,
+    postures: StaticWorker,
     engines: EngineSet,
 }
 
@@ -40,11 +43,10 @@ impl CaseWorker for Worker<'_> {
     fn evaluate(&mut self, case: u64) -> Result<CaseResult, CaseError> {
         let layout = StudyCase::new(self.study, self.design, case);
         let rows = match layout.scenario(self.study) {
-            Err(findings) => {
-                invalid_rows(findings.first().and_then(|finding| finding.key.as_deref()))
-            }
+            Err(findings) => invalid_rows(&findings),
             Ok(resolved) => match layout.mode {
-                StudyMode::Static | StudyMode::Planned => {
+                StudyMode::Static => self.postures.rows(&resolved),
+                StudyMode::Planned => {
                     planned_rows(&resolved).map_err(|message| CaseError { case, message })?
                 }
                 StudyMode::Dynamic => {
@@ -59,16 +61,4 @@ impl CaseWorker for Worker<'_> {
         };
         Ok(CaseResult { case, rows })
     }
-}
-
-/// Rows of a layout that cannot exist, for the key that is at fault.
-fn invalid_rows(key: Option<&str>) -> [Row; 8] {
-    std::array::from_fn(|configuration| {
-        let configuration = u8::try_from(configuration).expect("eight");
-        Row::new(
-            configuration,
-            Outcome::Invalid,
-            key.unwrap_or_default().to_owned(),
-        )
-    })
 }

@@ -8,8 +8,11 @@ mod evaluator;
 mod identity;
 mod output;
 mod planned;
+mod prediction;
 mod prepare;
+pub mod robustness;
 mod rows;
+mod static_case;
 
 pub(crate) use case::StudyCase;
 pub(crate) use case_report::{CaseReport, case_text};
@@ -19,3 +22,4 @@ pub(crate) use evaluator::StudyEvaluator;
 pub(crate) use output::{StudyOutput, write_study};
 pub use planned::planned_rows;
 pub(crate) use prepare::{PreparedStudy, in_words, time_per_case};
+pub use static_case::{StaticWorker, invalid_rows, static_rows};

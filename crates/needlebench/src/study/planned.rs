@@ -6,7 +6,7 @@ use needlebench_evaluation::check_configuration;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 use needlebench_evaluation::room::RoomModel;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
-use needlebench_study::{Metric, Outcome, Row};
+use needlebench_study::{Outcome, Row};
 
 use crate::assemble::{Context, goal_report};
 use crate::budgets::analytic_budgets;

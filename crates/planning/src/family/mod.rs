@@ -18,7 +18,7 @@ mod aim;
 mod ranges;
 
 use needlebench_cell::{ClearanceClass, Goal};
-use needlebench_kinematics::ik::Configuration;
+use needlebench_kinematics::ik::{Configuration, Solutions};
 
 pub use aim::Aim;
 pub use ranges::{Best, EDGE_RAD, Edge, Family, RollRange};
@@ -58,46 +58,46 @@ impl Planner<'_> {
     /// All eight configurations at one roll, in the order of [`Configuration::ALL`]: postures only,
     /// no motions.
     pub fn members_at(&self, goal: &Goal, roll_rad: f64) -> [Member; 8] {
-        let pose = self.base_link_from_flange(goal, roll_rad);
-        let found = self.kinematics().branches(&pose, Some(self.start()));
-        Configuration::ALL.map(|configuration| {
-            let solution = found
-                .solutions
-                .iter()
-                .find(|each| each.configuration == configuration);
-            if let Some(solution) = solution {
-                let (candidate, rejections) = self.candidate(roll_rad, solution);
-                return Member {
-                    roll_rad,
-                    surplus: self.surplus(&candidate, &rejections),
-                    candidate: Some(candidate),
-                    rejections,
-                };
-            }
-            let rejection = absent(configuration, &found);
-            Member {
-                roll_rad,
-                candidate: None,
-                surplus: if rejection.rule == Rule::Unreachable {
-                    -rejection.value.max(f64::MIN_POSITIVE)
-                } else {
-                    MERGED_SURPLUS
-                },
-                rejections: vec![rejection],
-            }
-        })
+        let found = self.solutions_at(goal, roll_rad);
+        Configuration::ALL.map(|configuration| self.member_of(roll_rad, configuration, &found))
     }
 
     /// One configuration at one roll.
     pub fn member_at(&self, goal: &Goal, configuration: Configuration, roll_rad: f64) -> Member {
-        let mut members = self.members_at(goal, roll_rad);
-        let blank = Member {
+        let found = self.solutions_at(goal, roll_rad);
+        self.member_of(roll_rad, configuration, &found)
+    }
+
+    fn solutions_at(&self, goal: &Goal, roll_rad: f64) -> Solutions {
+        let pose = self.base_link_from_flange(goal, roll_rad);
+        self.kinematics().branches(&pose, Some(self.start()))
+    }
+
+    fn member_of(&self, roll_rad: f64, configuration: Configuration, found: &Solutions) -> Member {
+        let solution = found
+            .solutions
+            .iter()
+            .find(|each| each.configuration == configuration);
+        if let Some(solution) = solution {
+            let (candidate, rejections) = self.candidate(roll_rad, solution);
+            return Member {
+                roll_rad,
+                surplus: self.surplus(&candidate, &rejections),
+                candidate: Some(candidate),
+                rejections,
+            };
+        }
+        let rejection = absent(configuration, found);
+        Member {
             roll_rad,
             candidate: None,
-            rejections: Vec::new(),
-            surplus: 0.0,
-        };
-        std::mem::replace(&mut members[configuration.index()], blank)
+            surplus: if rejection.rule == Rule::Unreachable {
+                -rejection.value.max(f64::MIN_POSITIVE)
+            } else {
+                MERGED_SURPLUS
+            },
+            rejections: vec![rejection],
+        }
     }
 
     /// Least distance of a posture from breaking a rule.

@@ -99,6 +99,17 @@ impl Planner<'_> {
     /// Ranges of one configuration from its members on an even grid of rolls, in ascending order
     /// from 0; or from the one member of a goal with a fixed roll.
     pub fn family(&self, goal: &Goal, configuration: Configuration, grid: &[Member]) -> Family {
+        self.family_for(goal, configuration, grid, &Aim::ALL)
+    }
+
+    /// [`Planner::family`] with the best members for some aims alone.
+    pub(crate) fn family_for(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        grid: &[Member],
+        aims: &[Aim],
+    ) -> Family {
         let at = |roll_rad: f64| self.member_at(goal, configuration, roll_rad);
         let empty = Family {
             configuration,
@@ -110,7 +121,7 @@ impl Planner<'_> {
                 member: only.clone(),
             }];
             let ranges = if only.works() {
-                vec![self.range(goal, configuration, &knots, None, None)]
+                vec![self.range(goal, configuration, &knots, None, None, aims)]
             } else {
                 Vec::new()
             };
@@ -118,7 +129,7 @@ impl Planner<'_> {
         }
         let knots = closer_look(grid, &at);
         if knots.iter().all(|knot| knot.member.works()) {
-            let mut range = self.range(goal, configuration, &knots, None, None);
+            let mut range = self.range(goal, configuration, &knots, None, None, aims);
             range.is_whole_circle = true;
             range.to_rad = range.from_rad + TAU;
             return Family {
@@ -163,6 +174,7 @@ impl Planner<'_> {
                         &inside,
                         Some(before),
                         Some(after),
+                        aims,
                     ));
                 }
                 _ => {}
@@ -185,12 +197,14 @@ impl Planner<'_> {
         knots: &[Knot],
         before: Option<Edge>,
         after: Option<Edge>,
+        aims: &[Aim],
     ) -> RollRange {
         let whole = before.is_none() && knots.len() > 1;
         let (from_rad, to_rad) = (knots[0].roll_rad, knots[knots.len() - 1].roll_rad);
-        let best = Aim::ALL
-            .map(|aim| self.best(goal, configuration, knots, whole, aim))
-            .into();
+        let best = aims
+            .iter()
+            .map(|aim| self.best(goal, configuration, knots, whole, *aim))
+            .collect();
         let (low, high) = joint_extent(knots);
         let limits = &self.cell().robot.limits;
         let fits_joint_limits = (0..JOINT_COUNT).all(|joint| {

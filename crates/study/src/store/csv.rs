@@ -37,7 +37,7 @@ pub fn write_csv(results: &ParquetResults, path: &Path, threads: usize) -> Resul
         threads,
         |index| {
             let index = usize::try_from(index).expect("groups are counted in memory");
-            let (first, cases) = results.group(index, &mut results.file()?)?;
+            let (first, cases) = results.group(index)?;
             Ok(lines(results, first, &cases))
         },
         |lines: String| file.file().write_all(lines.as_bytes()).map_err(failed()),

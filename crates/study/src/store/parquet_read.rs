@@ -1,15 +1,19 @@
 //! `results.parquet`, read again.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
+use bytes::{Buf, Bytes};
 use needlebench_kinematics::ik::Configuration;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::RowGroupMetaData;
-use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::properties::ReaderProperties;
+use parquet::file::reader::{ChunkReader, Length, RowGroupReader};
+use parquet::file::serialized_reader::SerializedRowGroupReader;
 
 use super::columns::{Columns, FactorColumn, ROWS, blank_case};
 use super::manifest::SCHEMA_VERSION;
@@ -23,7 +27,8 @@ use crate::{CaseResult, Factor, FactorKind, FactorValue, Outcome, Results, Resul
 /// that was written with it.
 pub struct ParquetResults {
     path: PathBuf,
-    reader: SerializedFileReader<File>,
+    file: Mutex<File>,
+    metadata: ParquetMetaData,
     id: String,
     name: String,
     provenance: serde_json::Value,
@@ -43,9 +48,10 @@ impl ParquetResults {
         let mut file =
             File::open(path).map_err(|error| fail(format!("cannot be opened: {error}")))?;
         check_ends(&mut file).map_err(fail)?;
-        let reader = SerializedFileReader::new(file)
+        let metadata = ParquetMetaDataReader::new()
+            .parse_and_finish(&file)
             .map_err(|error| fail(format!("is damaged: {}", text_of(&error))))?;
-        let file_metadata = reader.metadata().file_metadata();
+        let file_metadata = metadata.file_metadata();
         let get = |key: &str| {
             let pairs = file_metadata.key_value_metadata();
             pairs?.iter().find(|pair| pair.key == key)?.value.as_deref()
@@ -77,7 +83,8 @@ impl ParquetResults {
             factors,
             cases,
             checks,
-            reader,
+            file: Mutex::new(file),
+            metadata,
         };
         results.check_layout().map_err(fail)?;
         Ok(results)
@@ -103,12 +110,11 @@ impl ParquetResults {
     }
 
     pub(crate) fn groups(&self) -> usize {
-        self.reader.num_row_groups()
+        self.metadata.num_row_groups()
     }
 
     fn check_layout(&self) -> Result<(), String> {
-        let metadata = self.reader.metadata();
-        let found = metadata.file_metadata().schema();
+        let found = self.metadata.file_metadata().schema();
         let expected = schema::parquet_schema(&self.columns);
         if found.get_fields() != expected.get_fields() {
             let names: Vec<&str> = found
@@ -129,7 +135,7 @@ impl ParquetResults {
                 None => "has columns that this program does not know".to_owned(),
             });
         }
-        let groups = metadata.row_groups();
+        let groups = self.metadata.row_groups();
         let rows: u64 = groups.iter().map(rows_of).sum();
         if self.cases.checked_mul(ROWS as u64) != Some(rows) {
             return Err(format!(
@@ -147,37 +153,49 @@ impl ParquetResults {
         Ok(())
     }
 
-    /// A row group, and the number of its first case. `file` is for the check alone.
-    pub(crate) fn group(
-        &self,
-        index: usize,
-        file: &mut File,
-    ) -> Result<(u64, Columns), ResultsError> {
-        let groups = self.reader.metadata().row_groups();
+    /// A row group, and the number of its first case.
+    pub(crate) fn group(&self, index: usize) -> Result<(u64, Columns), ResultsError> {
+        let groups = self.metadata.row_groups();
         let first = groups[..index].iter().map(rows_of).sum::<u64>() / ROWS as u64;
         let fail = |message: String| {
-            failure(
-                &self.path,
-                format!("row group {index} (case {first} on) {message}"),
-            )
+            let place = format!("row group {index} (case {first} on)");
+            failure(&self.path, format!("{place} {message}"))
         };
-        let group = &groups[index];
-        let sound = check_group(group, self.checks[index], file)
-            .map_err(|error| fail(format!("cannot be read: {error}")))?;
-        if !sound {
+        let part = self.part(&groups[index]);
+        let part = part.map_err(|error| fail(format!("cannot be read: {error}")))?;
+        if crc32fast::hash(&part.bytes) != self.checks[index] {
             return Err(fail("is damaged: its CRC32 is another".to_owned()));
         }
-        let reader = self.reader.get_row_group(index);
+        let properties = ReaderProperties::builder().set_read_bloom_filter(false);
+        let reader = SerializedRowGroupReader::new(
+            Arc::new(part),
+            &groups[index],
+            self.metadata.page_index_for_row_group(index),
+            Arc::new(properties.build()),
+        );
         let columns = reader
-            .and_then(|reader| self.decode(reader.as_ref(), first))
+            .and_then(|reader| self.decode(&reader, first))
             .map_err(|error| fail(format!("cannot be read: {}", text_of(&error))))?;
         Ok((first, columns))
     }
 
-    /// Another handle of the file.
-    pub(crate) fn file(&self) -> Result<File, ResultsError> {
-        File::open(&self.path)
-            .map_err(|error| failure(&self.path, format!("cannot be opened: {error}")))
+    /// The bytes of a row group.
+    fn part(&self, group: &RowGroupMetaData) -> io::Result<Part> {
+        let ranges = group.columns().iter().map(|column| column.byte_range());
+        let start = ranges
+            .clone()
+            .map(|(start, _)| start)
+            .min()
+            .unwrap_or_default();
+        let length = ranges.map(|(_, length)| length).sum();
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(start))?;
+        let mut bytes = Vec::new();
+        (&*file).take(length).read_to_end(&mut bytes)?;
+        Ok(Part {
+            start,
+            bytes: bytes.into(),
+        })
     }
 
     fn decode(&self, group: &dyn RowGroupReader, first: u64) -> Result<Columns, ParquetError> {
@@ -308,11 +326,10 @@ impl Results for ParquetResults {
         &self,
         visit: &mut dyn FnMut(&[FactorValue], &CaseResult),
     ) -> Result<(), ResultsError> {
-        let mut file = self.file()?;
         let mut values = Vec::new();
         let mut result = blank_case();
         for index in 0..self.groups() {
-            let (first, cases) = self.group(index, &mut file)?;
+            let (first, cases) = self.group(index)?;
             for place in 0..cases.cases {
                 cases.get(place, &mut values, &mut result);
                 result.case = first + place as u64;
@@ -326,7 +343,7 @@ impl Results for ParquetResults {
 /// A file that is empty, no Parquet, or cut off, told apart before anything is decoded.
 fn check_ends(file: &mut File) -> Result<(), String> {
     const MAGIC: [u8; 4] = *b"PAR1";
-    let unreadable = |error: std::io::Error| format!("cannot be read: {error}");
+    let unreadable = |error: io::Error| format!("cannot be read: {error}");
     let length = file.metadata().map_err(unreadable)?.len();
     if length == 0 {
         return Err("is empty".to_owned());
@@ -347,22 +364,37 @@ fn check_ends(file: &mut File) -> Result<(), String> {
     }
 }
 
-/// Whether the bytes of a row group are those that were written.
-fn check_group(group: &RowGroupMetaData, expected: u32, file: &mut File) -> std::io::Result<bool> {
-    let mut crc = crc32fast::Hasher::new();
-    let mut chunk = [0; 1 << 16];
-    let ranges = group.columns().iter().map(|column| column.byte_range());
-    for (start, length) in ranges {
-        file.seek(SeekFrom::Start(start))?;
-        let mut column = file.take(length);
-        loop {
-            match column.read(&mut chunk)? {
-                0 => break,
-                count => crc.update(&chunk[..count]),
-            }
-        }
+/// A part of a file, at the offsets that it has there.
+struct Part {
+    start: u64,
+    bytes: Bytes,
+}
+
+impl Length for Part {
+    fn len(&self) -> u64 {
+        self.start + self.bytes.len() as u64
     }
-    Ok(crc.finalize() == expected)
+}
+
+impl ChunkReader for Part {
+    type T = bytes::buf::Reader<Bytes>;
+
+    fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
+        let at = start
+            .checked_sub(self.start)
+            .and_then(|at| usize::try_from(at).ok());
+        let at = at.filter(|at| *at <= self.bytes.len());
+        let at = at.ok_or_else(|| bad("a column lies outside its row group"))?;
+        Ok(self.bytes.slice(at..).reader())
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
+        let bytes = self.get_read(start)?.into_inner();
+        if length > bytes.len() {
+            return Err(bad("a column lies outside its row group"));
+        }
+        Ok(bytes.slice(..length))
+    }
 }
 
 fn rows_of(group: &RowGroupMetaData) -> u64 {

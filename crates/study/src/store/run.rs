@@ -168,6 +168,7 @@ impl StudyRun<'_> {
 
     fn check(&self) -> Result<(), StudyError> {
         let manifest = &self.manifest;
+        schema::check(&manifest.factors).map_err(StudyError::Request)?;
         if manifest.factors != self.design.factors() || manifest.cases != self.design.cases() {
             let message = "the manifest is not that of the design";
             return Err(StudyError::Request(message.to_owned()));
@@ -186,7 +187,7 @@ impl StudyRun<'_> {
                 manifest.block_cases
             )));
         }
-        schema::check(&manifest.factors).map_err(StudyError::Request)
+        Ok(())
     }
 
     /// Computes what is missing; returns the number of cases that are there then.

@@ -22,12 +22,12 @@ NB.el = function (tag, attributes, ...children) {
     else if (name === 'value' || name === 'checked' || name === 'disabled' || name === 'selected') element[name] = value;
     else element.setAttribute(name, value === true ? '' : value);
   }
-  element.append(...children.flat().filter((child) => child !== null && child !== undefined));
+  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined));
   return element;
 };
 
 NB.clear = function (element, ...children) {
-  element.replaceChildren(...children.flat().filter((child) => child !== null && child !== undefined));
+  element.replaceChildren(...children.flat(Infinity).filter((child) => child !== null && child !== undefined));
   return element;
 };
 
@@ -48,16 +48,25 @@ NB.read = async function () {
 
 /** The codes of a reference, or its values where it is quantised; NaN stands for none. */
 NB.array = function (reference) {
-  const types = { u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, f32: Float32Array };
-  const codes = new types[reference.t](NB.raw, NB.arrays + reference.at, reference.n);
-  if (reference.step === undefined) return codes;
-  const none = reference.t === 'u8' ? 255 : 65535;
-  const values = new Float32Array(reference.n);
+  const { t, n, at, step, low } = reference;
+  const start = NB.arrays + at;
+  if (t === 'f64') return new Float64Array(NB.raw.slice(start, start + 8 * n));
+  let codes;
+  if (reference.p) {
+    const bytes = new Uint8Array(NB.raw, start, 2 * n);
+    codes = new Uint16Array(n);
+    for (let k = 0; k < n; k++) codes[k] = bytes[k] | bytes[n + k] << 8;
+  } else {
+    codes = new { u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, f32: Float32Array }[t](NB.raw, start, n);
+  }
+  if (step === undefined) return codes;
+  const none = t === 'u8' ? 255 : 65535;
+  const values = new Float32Array(n);
   let last = 0;
-  for (let k = 0; k < reference.n; k++) {
+  for (let k = 0; k < n; k++) {
     const code = reference.d ? (codes[k] + last) & 65535 : codes[k];
     last = code;
-    values[k] = code === none ? NaN : reference.low + reference.step * code;
+    values[k] = code === none ? NaN : low + step * code;
   }
   return values;
 };
@@ -121,7 +130,7 @@ NB.table = function (caption, columns, rows, options = {}) {
   }, column.title, column.unit ? NB.el('span', { class: 'unit', text: ` ${column.unit}` }) : null)));
   const body = rows.map((row) => NB.el('tr', options.row ? options.row(row) : null, columns.map((column, index) => {
     const content = column.cell(row);
-    const attributes = { class: column.numeric ? 'number' : null };
+    const attributes = { class: column.numeric ? 'number' : column.text ? 'text' : null };
     const isNode = content instanceof Node || Array.isArray(content);
     return index === 0
       ? NB.el('th', { scope: 'row' }, isNode ? content : String(content))

@@ -148,10 +148,11 @@ NB.RunPage = class {
     });
     this.clock = NB.el('span', { class: 'clock', role: 'status', 'aria-live': 'off' });
     this.engineSelect = NB.el('select', { 'aria-label': 'Engine', onchange: () => this.showMotion() });
+    this.apart = NB.el('span', { class: 'soft' });
     const speed = NB.select('Speed', [['0.1', '0.1 \u00d7'], ['0.25', '0.25 \u00d7'], ['0.5', '0.5 \u00d7'], ['1', '1 \u00d7'], ['2', '2 \u00d7'], ['4', '4 \u00d7']], '1',
       (value) => { this.speed = Number(value); });
     return NB.el('div', { class: 'replay', role: 'group', 'aria-label': 'Replay' },
-      this.playButton, this.slider, this.clock, speed, this.engineSelect);
+      this.playButton, this.slider, this.clock, speed, this.engineSelect, this.apart);
   }
 
   get goal() { return this.report.goals[this.goalIndex]; }
@@ -203,9 +204,11 @@ NB.RunPage = class {
     NB.mark(this.tableRows, index);
     this.chosenClass = null;
     const { runs } = this.own;
-    NB.clear(this.engineSelect, runs.length > 1 ? NB.el('option', { value: 'both', text: 'both engines (second as ghost)' }) : null,
+    NB.clear(this.engineSelect, runs.length > 1 ? NB.el('option', { value: 'both', text: 'both engines, second as ghost' }) : null,
       runs.map((run, at) => NB.el('option', { value: String(at), text: `${run.engine}${run.stopped ? ' (stopped)' : ''}` })),
       runs.length ? null : NB.el('option', { value: '', text: 'no motion recorded' }));
+    const apart_m = this.configuration.engine_difference?.peak_tip_m;
+    this.apart.textContent = apart_m === undefined ? '' : `tips of the engines at most ${NB.length(apart_m)} apart; the ghost is seen only where they differ`;
     this.showDetails();
     this.drawRoom();
     this.drawBudget();
@@ -423,8 +426,8 @@ NB.RunPage = class {
     const columns = [
       { title: 'Configuration', cell: (c) => c.label },
       { title: 'Status', cell: (c) => this.status(c) },
-      { title: 'Tip', cell: (c) => NB.length(this.tipErrors(c)), numeric: true, help: 'settled tip error, the larger of the engines' },
-      { title: 'Least', unit: 'mm', cell: (c) => NB.mm(c.clearance.minimum_m), numeric: true, help: 'least clearance' },
+      { title: 'Tip error', cell: (c) => NB.length(this.tipErrors(c)), numeric: true, help: 'settled tip error, the larger of the engines' },
+      { title: 'Gap', unit: 'mm', cell: (c) => NB.mm(c.clearance.minimum_m), numeric: true, help: 'least clearance' },
       { title: 'Ghost', cell: (c) => NB.el('input', {
         type: 'checkbox', 'aria-label': `ghost of ${c.label}`, checked: this.ghosts.has(this.goal.configurations.indexOf(c)), disabled: !c.joints_rad,
         onclick: (event) => event.stopPropagation(),
@@ -489,7 +492,7 @@ NB.RunPage = class {
       { title: 'Motion', unit: 's', numeric: true, cell: (c) => NB.fixed(c.motion.length ? c.motion.filter((each) => each.phase !== 'hold').reduce((sum, each) => sum + each.end_s - each.start_s, 0) : NaN, 2) },
       ...classes.map((name) => ({ title: NB.words(name), unit: 'mm', numeric: true, cell: (c) => NB.mm(c.clearance[name]?.minimum_m) })),
       { title: 'Proven least', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.clearance.minimum_certified_m), help: 'proven lower bound over the whole motion' },
-      { title: 'First reason against', cell: (c) => (c.rejections[0] ? `${NB.words(c.rejections[0].rule)}: ${c.rejections[0].detail}` : '') },
+      { title: 'First reason against', text: true, cell: (c) => (c.rejections[0] ? `${NB.words(c.rejections[0].rule)}: ${c.rejections[0].detail}` : '') },
     ];
     const table = NB.table(`Goal ${NB.words(this.goal.name)}: clearances are minima over the motion of all engines`, columns, this.goal.configurations, { class: 'choose small' });
     this.tableRows = [...table.querySelectorAll('tbody tr')];

@@ -177,6 +177,12 @@ NB.View = class {
       if (part.frame < 0 && part.group !== 'collision') return;
       const color = look ? [...(look.color || part.color.slice(0, 3)), look.opacity] : part.color;
       const mesh = this.mesh(index, color);
+      if (look) {
+        // Where a copy coincides with the arm itself, the arm alone is seen.
+        mesh.material.polygonOffset = true;
+        mesh.material.polygonOffsetFactor = 2;
+        mesh.material.polygonOffsetUnits = 8;
+      }
       if (part.frame < 0) root.add(mesh); else links[part.frame].add(mesh);
       if (!layers.has(part.group)) layers.set(part.group, []);
       layers.get(part.group).push(mesh);
@@ -258,7 +264,7 @@ NB.View = class {
     const high = [0, 1, 2].map((k) => Math.max(...points.map((point) => point[k])));
     const middle = low.map((value, k) => (value + high[k]) / 2);
     const size = Math.hypot(...low.map((value, k) => high[k] - value));
-    this.home = { middle, direction, distance: 0.62 * size / Math.tan(this.camera.fov * Math.PI / 360) };
+    this.home = { middle, direction, distance: 0.46 * size / Math.tan(this.camera.fov * Math.PI / 360) };
     this.reset();
   }
 

@@ -42,7 +42,12 @@ impl SyntheticDesign {
                     Role::Circumstance,
                     FactorKind::Levels(sizes.to_vec()),
                 ),
-                factor("tool", "", Role::Choice, labels(&["short", "long, \"thin\"", "bent"])),
+                factor(
+                    "tool",
+                    "",
+                    Role::Choice,
+                    labels(&["short", "long, \"thin\"", "bent"]),
+                ),
                 factor(
                     "tilt_deg",
                     "deg",
@@ -80,8 +85,13 @@ impl CaseDesign for SyntheticDesign {
             FactorValue::Level(usize::try_from(case / step % count).unwrap())
         };
         // The same tilts for all levels, as in a crossed design.
-        let tilt = SplitMix64::new(case / 18).range(-5.0, 5.0);
-        vec![level(2, 1), level(3, 2), level(3, 6), FactorValue::Number(tilt)]
+        let tilt = SplitMix64::new(case / 18).uniform(-5.0, 5.0);
+        vec![
+            level(2, 1),
+            level(3, 2),
+            level(3, 6),
+            FactorValue::Number(tilt),
+        ]
     }
 }
 
@@ -126,7 +136,7 @@ impl CaseWorker for SyntheticWorker<'_> {
 
 fn row(configuration: usize, random: &mut SplitMix64) -> Row {
     let index = u8::try_from(configuration).unwrap();
-    let (outcome, detail) = match random.range(0.0, 6.0) {
+    let (outcome, detail) = match random.uniform(0.0, 6.0) {
         ..1.0 => return Row::new(index, Outcome::Rejected, "unreachable"),
         ..2.0 => (Outcome::Rejected, "collision robot_phantom"),
         ..2.5 => (Outcome::Failed, "max_tip_position_error_mm"),
@@ -139,7 +149,7 @@ fn row(configuration: usize, random: &mut SplitMix64) -> Row {
             || column.metric as usize >= Metric::MotionTime as usize;
         if !dynamic {
             let scale = 10.0 + 5.0 * column.metric as u8 as f64 + configuration as f64;
-            row.set(column.metric, random.range(-0.3, 1.0) * scale);
+            row.set(column.metric, random.uniform(-0.3, 1.0) * scale);
         }
     }
     row
