@@ -9,7 +9,9 @@ use needlebench_study::statistics::{
 };
 use serde::Serialize;
 
+use super::markdown::summary_markdown;
 use super::prepare::PreparedStudy;
+use super::text::summary_text;
 use crate::atomic::write_atomically;
 use crate::progress::Progress;
 
@@ -88,9 +90,12 @@ pub(crate) fn write_study(
             .with_context(|| format!("cannot write {}", path.display()))
     };
     write("summary.json", &serde_json::to_string_pretty(&summary)?)?;
+    let markdown = summary_markdown(&file.name, &summary.statistics, &summary.criteria);
+    write("summary.md", &markdown)?;
+    let text = summary_text(&summary.statistics, &summary.criteria);
     Ok(FinishedStudy {
         summary,
-        text: String::new(),
+        text,
         passed,
     })
 }

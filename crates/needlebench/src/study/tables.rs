@@ -121,7 +121,10 @@ fn overview(summary: &Summary) -> Vec<String> {
         } else {
             "configurations are"
         };
-        let remark = rate.remark.as_ref().map_or(String::new(), |text| format!(", {text}"));
+        let remark = rate
+            .remark
+            .as_ref()
+            .map_or(String::new(), |text| format!(", {text}"));
         lines.push(format!(
             "at least {k} {configurations} ok in {} % of the valid layouts{remark}",
             rate_text(rate)
@@ -255,7 +258,9 @@ fn effects(summary: &Summary, parts: &mut Vec<Part>) {
         row.push(range.unwrap_or("-".to_owned()));
         row
     });
-    parts.push(Part::Heading("share of the variance that each factor explains (%)".to_owned()));
+    parts.push(Part::Heading(
+        "share of the variance that each factor explains (%)".to_owned(),
+    ));
     parts.push(table(
         [
             "factor",
@@ -316,7 +321,9 @@ fn regions(summary: &Summary, parts: &mut Vec<Part>) {
     if rows.is_empty() {
         return;
     }
-    parts.push(Part::Heading("where another configuration is the best".to_owned()));
+    parts.push(Part::Heading(
+        "where another configuration is the best".to_owned(),
+    ));
     parts.push(table(
         [
             "factor",
@@ -335,7 +342,9 @@ fn winners_of(summary: &Summary, map: &RegionMap) -> Vec<Vec<String>> {
     let mut at = 0;
     while at < map.cells.len() {
         let winner = &map.cells[at].winner;
-        let same = map.cells[at..].iter().take_while(|cell| cell.winner == *winner);
+        let same = map.cells[at..]
+            .iter()
+            .take_while(|cell| cell.winner == *winner);
         let run = same.count();
         let cells = &map.cells[at..at + run];
         let layouts: u64 = cells.iter().map(|cell| cell.layouts).sum();
@@ -349,7 +358,11 @@ fn winners_of(summary: &Summary, map: &RegionMap) -> Vec<Vec<String>> {
             format!("{low} .. {high}")
         };
         rows.push(vec![
-            if at == 0 { axis.name.clone() } else { String::new() },
+            if at == 0 {
+                axis.name.clone()
+            } else {
+                String::new()
+            },
             format!("{range} {}", axis.unit).trim_end().to_owned(),
             layouts.to_string(),
             if layouts == 0 {
@@ -387,7 +400,9 @@ fn choices(summary: &Summary, parts: &mut Vec<Part>) {
         ]
     };
     let rows = (1..).zip(&ranking.choices).take(MOST_CHOICES).map(row);
-    parts.push(Part::Heading("what is ours to choose, best first".to_owned()));
+    parts.push(Part::Heading(
+        "what is ours to choose, best first".to_owned(),
+    ));
     let more = format!("{} or more\n(%)", ranking.working_configurations);
     parts.push(Part::Table {
         header: [
@@ -432,10 +447,17 @@ fn evidence(summary: &Summary, parts: &mut Vec<Part>) {
     let mut lines = Vec::new();
     let none = &summary.evidence.fewer_than[0];
     if !none.is_empty() {
-        lines.push(format!("no configuration is ok in cases {}, ...", case_list(none)));
+        lines.push(format!(
+            "no configuration is ok in cases {}, ...",
+            case_list(none)
+        ));
     }
     let mut best = summary.evidence.configurations.iter();
-    for worst in best.find(|each| each.of == BEST).iter().flat_map(|each| &each.worst) {
+    for worst in best
+        .find(|each| each.of == BEST)
+        .iter()
+        .flat_map(|each| &each.worst)
+    {
         let cases: Vec<String> = worst
             .cases
             .iter()
@@ -463,7 +485,10 @@ fn criterion(result: &CriterionResult) -> String {
     let interval = result.interval.map_or(String::new(), |interval| {
         format!(" ({} .. {})", text(interval.low), text(interval.high))
     });
-    let of = result.of.as_ref().map_or(String::new(), |of| format!(" {of}"));
+    let of = result
+        .of
+        .as_ref()
+        .map_or(String::new(), |of| format!(" {of}"));
     let judged = if result.confidence {
         ", judged by the interval"
     } else {

@@ -4,7 +4,7 @@ use comfy_table::{Cell, CellAlignment, ContentArrangement};
 use needlebench_study::statistics::{CriterionResult, Summary};
 
 use super::tables::{Part, parts};
-use crate::output::table::plain_table;
+use crate::output::plain_table;
 
 /// Columns that tables fit into.
 const WIDTH: u16 = 100;
