@@ -509,13 +509,26 @@ hand_cone, preference, needle_angle_error, lateral_error, guide_position_error, 
 tracking_error, contact_force, engine_difference_peak, engine_difference_settled, arm_to_skin, \
 tool_to_skin, guide_to_skin, to_table, to_gantry, to_mount, needle_route
 
+Two studies (folders with results.parquet, or such tables) are compared case by case if they have \
+the same cases, else by 95 % intervals. They exit with 1 if more than chance was lost of the layouts \
+that work or of a configuration's success rate (unless --allow-status-change, or a --max-loss is on \
+it), or if a --max-loss is exceeded. Its metrics are then METRIC[@PERCENT][:CONFIGURATION]: the \
+quantile at PERCENT (default 5, of errors 95) of a configuration, of `every` one, or of the `best` of \
+each layout (default).
+
+Metrics of studies: working_layouts, success_rate (of `every` by default), invalid_layouts, clearance, \
+certified_clearance, self_clearance, tip_error, tip_lateral, tip_rms, tip_sensitivity, surplus
+
+Example: needlebench compare out/before/layouts out/after/layouts --max-loss clearance@5=1mm \
+--max-loss success_rate:Right-Up-Fold=0.02 --max-loss tip_error@95:every=0.1mm
 Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm
 Example: needlebench compare scenarios/table3.toml other_table.toml --max-loss motion_time=10%";
 
 #[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct CompareArguments {
-    /// First result: a report.json, a results folder, or a scenario, which is then run.
+    /// First result: a report.json, a results folder, or a scenario, which is then run; or a study's
+    /// folder or results.parquet.
     #[arg(value_name = "A")]
     pub a: PathBuf,
     /// Second result, likewise.

@@ -5,6 +5,7 @@
 //! [`CaseWorker`]; this crate knows neither arms nor engines.
 
 mod case;
+pub mod compare;
 mod design;
 mod distribution;
 mod results;

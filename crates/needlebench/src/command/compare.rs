@@ -7,6 +7,7 @@ use needlebench_cell::{Finding, Overrides, ThresholdsFile};
 use needlebench_evaluation::compare::{CompareOptions, compare as compare_reports};
 use needlebench_evaluation::{StoredReport, Threshold};
 
+use super::compare_studies::compare_if_studies;
 use super::run::probe_file;
 use super::{load_checked, print_json, print_text};
 use crate::atomic::write_atomically;
@@ -33,6 +34,9 @@ impl From<Finding> for Refused {
 
 /// Compares two results.
 pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus> {
+    if let Some(status) = compare_if_studies(arguments)? {
+        return Ok(status);
+    }
     match compared(arguments) {
         Ok((options, a, b)) => {
             let comparison = match compare_reports(&a, &b, &options) {

@@ -4,6 +4,7 @@ mod atlas;
 mod check;
 mod clearance;
 mod compare;
+mod compare_studies;
 mod doctor;
 mod iso9283;
 mod kinematics;

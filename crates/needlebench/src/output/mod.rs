@@ -13,6 +13,7 @@ mod recording;
 mod referee;
 pub(crate) mod room_pictures;
 mod saturation;
+pub(crate) mod study_comparison;
 mod table;
 
 pub(crate) use budget::budget_picture;

@@ -6,6 +6,7 @@ mod dynamic;
 mod engines;
 mod evaluator;
 mod identity;
+mod markdown;
 mod output;
 mod planned;
 mod prediction;
@@ -13,6 +14,8 @@ mod prepare;
 pub mod robustness;
 mod rows;
 mod static_case;
+mod tables;
+mod text;
 
 pub(crate) use case::StudyCase;
 pub(crate) use case_report::{CaseReport, case_text};

@@ -10,7 +10,9 @@ use needlebench_study::statistics::{
 use serde::Serialize;
 
 use super::case::StudyCase;
+use super::markdown::summary_markdown;
 use super::prepare::PreparedStudy;
+use super::text::summary_text;
 use crate::atomic::write_atomically;
 use crate::page::study::{CasePlaces, StudyPage};
 use crate::progress::Progress;
@@ -93,6 +95,9 @@ pub(crate) fn write_study(
             .with_context(|| format!("cannot write {}", path.display()))
     };
     write("summary.json", &serde_json::to_string_pretty(&summary)?)?;
+    let markdown = summary_markdown(&file.name, &summary.statistics, &summary.criteria);
+    write("summary.md", &markdown)?;
+    let text = summary_text(&summary.statistics, &summary.criteria);
     if output.page {
         progress.message("writing the page");
         let places = |case: u64| {
@@ -119,7 +124,7 @@ pub(crate) fn write_study(
     }
     Ok(FinishedStudy {
         summary,
-        text: String::new(),
+        text,
         passed,
     })
 }

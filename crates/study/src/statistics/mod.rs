@@ -39,6 +39,7 @@ pub use regions::{RegionCell, RegionMap, Regions};
 pub use spread::{BEST, PROBABILITIES, QuantileValue, SPREAD_METRICS, Spread};
 
 pub(crate) use evidence::Largest;
+pub(crate) use interval::about_mean;
 pub(crate) use layout::{CONFIGURATIONS, Layout, has_numbers};
 pub(crate) use moments::{Grouped, Points};
 pub(crate) use selection::{PASSES, Quantiles};

@@ -96,6 +96,14 @@ impl Points {
         }
     }
 
+    /// All factors together.
+    pub(crate) fn of_everything(factors: &[Factor]) -> Self {
+        Self {
+            keys: (0..factors.len()).collect(),
+            repeats: 1,
+        }
+    }
+
     /// Group of a case: the same for all cases of a point.
     pub(crate) fn group(&self, values: &[FactorValue]) -> usize {
         usize::try_from(self.hash(values) % GROUPS as u64).expect("below 64")
