@@ -238,9 +238,10 @@ pub struct GoalSection {
     /// 5 mm of the skin is moved onto it along the needle.
     #[serde(default)]
     pub entry_mm: Option<[f64; 3]>,
-    /// Where the needle comes from, as seen from the target, instead of `entry_mm`: azimuth about the
-    /// phantom's superior axis, from anterior (0) towards the patient's left (90), and elevation towards
-    /// superior, deg. The entry is where the line leaves the skin, whatever the phantom's size.
+    /// Where the needle enters, as seen from the target, instead of `entry_mm`: azimuth and elevation
+    /// in the phantom frame, deg. Azimuth 0 is towards the front of the body, 90 towards the patient's
+    /// left, -90 towards the right; elevation 90 is towards the head. The entry is where the line from
+    /// the target in that direction leaves the skin, so one goal suits phantoms of all sizes.
     #[serde(default)]
     pub entry_direction_deg: Option<[f64; 2]>,
     /// Target point, phantom frame, mm.
@@ -249,7 +250,7 @@ pub struct GoalSection {
     /// Name of a lesion of the phantom whose centre is the target, instead of `target_mm`.
     #[serde(default)]
     pub lesion: Option<String>,
-    /// Added to the target, phantom frame, mm.
+    /// Added to `target_mm` or to the lesion's centre, phantom frame (left, posterior, superior), mm.
     #[serde(default)]
     pub target_offset_mm: Option<[f64; 3]>,
     /// Pose of the flange, instead of entry and target. The needle then follows the guide.
@@ -273,6 +274,26 @@ pub struct GoalSection {
     /// The key `every` stands for all that are not named.
     #[serde(default)]
     pub expected: BTreeMap<String, String>,
+}
+
+impl GoalSection {
+    /// The key that decides the entry.
+    pub(crate) fn entry_key(&self) -> &'static str {
+        if self.entry_direction_deg.is_some() {
+            "entry_direction_deg"
+        } else {
+            "entry_mm"
+        }
+    }
+
+    /// The key that decides the target.
+    pub(crate) fn target_key(&self) -> &'static str {
+        match (&self.target_offset_mm, &self.lesion) {
+            (Some(_), _) => "target_offset_mm",
+            (None, Some(_)) => "lesion",
+            (None, None) => "target_mm",
+        }
+    }
 }
 
 fn default_standoff_mm() -> f64 {

@@ -194,9 +194,26 @@ impl<'a> Planner<'a> {
         let mut grids = self.grids(goal).into_iter();
         Configuration::ALL.map(|configuration| {
             let grid = grids.next().expect("there are eight");
-            let ranked = self.ranked(goal, configuration, &grid);
-            ranked.into_iter().next().unwrap_or_else(|| nearest(grid))
+            self.first(goal, configuration, grid)
         })
+    }
+
+    /// One of [`Planner::postures`].
+    pub fn posture(&self, goal: &Goal, configuration: Configuration) -> Member {
+        if let Roll::Fixed(roll_rad) = goal.roll {
+            return self.member_at(goal, configuration, roll_rad);
+        }
+        let rolls = self.rolls(goal, self.planning().roll_samples);
+        let grid = rolls
+            .into_iter()
+            .map(|roll_rad| self.member_at(goal, configuration, roll_rad))
+            .collect();
+        self.first(goal, configuration, grid)
+    }
+
+    fn first(&self, goal: &Goal, configuration: Configuration, grid: Vec<Member>) -> Member {
+        let ranked = self.ranked(goal, configuration, &grid);
+        ranked.into_iter().next().unwrap_or_else(|| nearest(grid))
     }
 
     /// All members at the rolls that are looked at, by configuration.
@@ -380,7 +397,25 @@ impl<'a> Planner<'a> {
                 });
             }
         }
-        let (clearance, collision) = self.checker.posture(&solution.joints);
+        let (clearance, broken) = self.clearance_rules(&solution.joints);
+        rejections.extend(broken);
+        let candidate = Candidate {
+            joints: solution.joints,
+            roll_rad,
+            wrap: [0; JOINT_COUNT],
+            residual_m: solution.residual_m,
+            residual_rad: solution.residual_rad,
+            wrist_3_is_free: solution.wrist_3_is_free,
+            margins,
+            clearance,
+        };
+        (candidate, rejections)
+    }
+
+    /// Least clearances of a posture, and the rules about them that it breaks.
+    pub fn clearance_rules(&self, q: &Joints) -> (ClassMinima, Vec<Rejection>) {
+        let mut rejections = Vec::new();
+        let (clearance, collision) = self.checker.posture(q);
         if let Some(pair) = collision {
             rejections.push(Rejection {
                 rule: Rule::Collision,
@@ -395,7 +430,7 @@ impl<'a> Planner<'a> {
             });
         }
         if let Some(corridor) = clearance.get(ClearanceClass::NeedleCorridor)
-            && planning.require_needle_corridor
+            && self.planning().require_needle_corridor
             && corridor.separation.distance_m < 0.0
         {
             let (a, b) = corridor.solid_names(&self.resolved.cell);
@@ -412,17 +447,7 @@ impl<'a> Planner<'a> {
                 class: Some(ClearanceClass::NeedleCorridor),
             });
         }
-        let candidate = Candidate {
-            joints: solution.joints,
-            roll_rad,
-            wrap: [0; JOINT_COUNT],
-            residual_m: solution.residual_m,
-            residual_rad: solution.residual_rad,
-            wrist_3_is_free: solution.wrist_3_is_free,
-            margins,
-            clearance,
-        };
-        (candidate, rejections)
+        (clearance, rejections)
     }
 
     pub(crate) fn margins(&self, q: &Joints) -> PostureMargins {

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use needlebench_cell::phantom::Phantom;
 use needlebench_cell::{ClearanceClass, Finding, ResolvedScenario};
-use needlebench_clearance::ClearanceModel;
+use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_evaluation::{RouteObstacles, clearance_limits};
+use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::{Candidate, Member, Planner, Rejection, Rule};
 use needlebench_study::{Metric, Outcome, Row};
@@ -72,23 +73,54 @@ fn rows_of(mut row: impl FnMut(u8) -> Row) -> [Row; 8] {
 impl StaticWorker {
     /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
     pub fn rows(&mut self, resolved: &ResolvedScenario) -> [Row; 8] {
-        let Some(goal) = resolved.goals.first() else {
-            return all_rows(Outcome::Invalid, "goals");
-        };
-        let route_m = self.route_m(resolved);
-        let prediction = match Prediction::new(resolved) {
-            Ok(prediction) => prediction,
-            Err(key) => return all_rows(Outcome::Invalid, key),
-        };
-        let model = self.model(resolved);
-        let Ok(planner) = Planner::new(resolved, model) else {
-            return all_rows(Outcome::Invalid, "robot.urdf");
-        };
-        let mut members = planner.postures(goal).into_iter();
-        rows_of(|index| {
-            let member = members.next().expect("there are eight");
-            row(&planner, &prediction, index, &member, route_m)
+        self.evaluate(resolved, |planner, prediction, route_m| {
+            let mut members = planner.postures(&resolved.goals[0]).into_iter();
+            rows_of(|index| {
+                let member = members.next().expect("there are eight");
+                row(planner, prediction, index, &member, route_m)
+            })
         })
+        .unwrap_or_else(|key| all_rows(Outcome::Invalid, key))
+    }
+
+    /// One of [`StaticWorker::rows`].
+    pub fn row(&mut self, resolved: &ResolvedScenario, configuration: Configuration) -> Row {
+        let index = index_of(configuration);
+        self.evaluate(resolved, |planner, prediction, route_m| {
+            let member = planner.posture(&resolved.goals[0], configuration);
+            row(planner, prediction, index, &member, route_m)
+        })
+        .unwrap_or_else(|key| Row::new(index, Outcome::Invalid, key))
+    }
+
+    /// The first rule or criterion about clearances that a posture breaks in a layout.
+    pub(super) fn clearance_broken(
+        &mut self,
+        resolved: &ResolvedScenario,
+        q: &Joints,
+    ) -> Option<&'static str> {
+        let broken = self.evaluate(resolved, |planner, _, _| {
+            let (clearance, rejections) = planner.clearance_rules(q);
+            let rule = rejections.first().map(rule_detail);
+            rule.or_else(|| missed_clearance(resolved, &clearance, None))
+        });
+        broken.unwrap_or_else(Some)
+    }
+
+    /// Does something with a layout that is ready for it; the key at fault where it cannot be.
+    fn evaluate<T>(
+        &mut self,
+        resolved: &ResolvedScenario,
+        mut with: impl FnMut(&Planner<'_>, &Prediction<'_>, Option<f64>) -> T,
+    ) -> Result<T, &'static str> {
+        if resolved.goals.is_empty() {
+            return Err("goals");
+        }
+        let route_m = self.route_m(resolved);
+        let prediction = Prediction::new(resolved)?;
+        let model = self.model(resolved);
+        let planner = Planner::new(resolved, model).map_err(|_| "robot.urdf")?;
+        Ok(with(&planner, &prediction, route_m))
     }
 
     /// The layout's clearances, prepared from the kept ones.
@@ -282,31 +314,38 @@ fn missed_criterion(
     let is_above = |limit: Option<f64>, value: Option<f64>| {
         limit.zip(value).is_some_and(|(limit, value)| value > limit)
     };
-    if let Some((name, ..)) = at_most
+    let missed = at_most
         .into_iter()
-        .find(|(_, limit, value)| is_above(*limit, *value))
-    {
+        .find(|(_, limit, value)| is_above(*limit, *value));
+    if let Some((name, ..)) = missed {
         return Some(name);
     }
-    clearance_limits(&criteria.min_clearance_mm)
-        .into_iter()
-        .find(|(class, _, limit_mm)| {
-            let measured = candidate
-                .clearance
-                .iter()
-                .find(|pair| pair.class.name() == *class)
-                .map(|pair| pair.separation.distance_m);
-            let value = if *class == ClearanceClass::NeedleRoute.name() {
-                route_m
-            } else {
-                measured
-            };
-            is_above(value, limit_mm.map(|mm| mm / MM))
-        })
-        .map(|(_, key, _)| key)
+    missed_clearance(resolved, &candidate.clearance, route_m)
 }
 
-/// Index of a configuration in the rows of a case.
-pub(crate) fn row_of(rows: &[Row; 8], configuration: Configuration) -> &Row {
-    &rows[configuration.index()]
+/// The first class whose clearance is less than a criterion wants.
+fn missed_clearance(
+    resolved: &ResolvedScenario,
+    clearance: &ClassMinima,
+    route_m: Option<f64>,
+) -> Option<&'static str> {
+    let limits = clearance_limits(&resolved.scenario.criteria.min_clearance_mm);
+    let missed = limits.into_iter().find(|(class, _, limit_mm)| {
+        let found_m = if *class == ClearanceClass::NeedleRoute.name() {
+            route_m
+        } else {
+            let mut measured = clearance.iter();
+            let pair = measured.find(|pair| pair.class.name() == *class);
+            pair.map(|pair| pair.separation.distance_m)
+        };
+        found_m
+            .zip(limit_mm.map(|mm| mm / MM))
+            .is_some_and(|(found_m, limit_m)| found_m < limit_m)
+    });
+    missed.map(|(_, key, _)| key)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "below 8")]
+fn index_of(configuration: Configuration) -> u8 {
+    configuration.index() as u8
 }

@@ -1,0 +1,152 @@
+//! What a goal must not be, and where points lie.
+
+use nalgebra::Point3;
+
+use super::{Goal, Surroundings};
+use crate::Finding;
+use crate::phantom::{Phantom, Tissue};
+use crate::scenario::GoalSection;
+use crate::shape::{Shape, Solid};
+use crate::toml_text::TomlText;
+
+/// Organ that contains a point of the phantom frame.
+pub(super) fn organ_at(phantom: &Phantom, point: &Point3<f64>) -> Option<String> {
+    phantom
+        .lesions
+        .iter()
+        .filter(|lesion| (point - lesion.center_m).norm() <= 0.5 * lesion.diameter_m)
+        .find_map(|lesion| lesion.organ.clone())
+        .or_else(|| {
+            phantom
+                .parts
+                .iter()
+                .filter(|part| part.tissue == Tissue::Organ)
+                .find(|part| solid_contains(&part.solid, point))
+                .and_then(|part| part.organ.clone())
+        })
+}
+
+/// Whether a point of the parent frame lies in a solid.
+pub(crate) fn solid_contains(solid: &Solid, point: &Point3<f64>) -> bool {
+    let local = solid.parent_from_shape.inverse() * point;
+    match &solid.shape {
+        Shape::Sphere { radius_m } => local.coords.norm() <= *radius_m,
+        Shape::Cylinder {
+            radius_m,
+            half_length_m,
+        } => local.z.abs() <= *half_length_m && local.x.hypot(local.y) <= *radius_m,
+        Shape::Capsule {
+            radius_m,
+            half_length_m,
+        } => {
+            let on_axis = local.z.clamp(-half_length_m, *half_length_m);
+            (local - Point3::new(0.0, 0.0, on_axis)).norm() <= *radius_m
+        }
+        Shape::Cuboid { half_extents_m } => {
+            (0..3).all(|axis| local[axis].abs() <= half_extents_m[axis])
+        }
+        Shape::Convex(mesh) => mesh.0.triangles.iter().all(|triangle| {
+            let [a, b, c] = triangle.map(|i| mesh.0.vertices_m[i as usize]);
+            (b - a).cross(&(c - a)).dot(&(local - a)) <= 0.0
+        }),
+        Shape::Mesh(mesh) => mesh.surface.winding_number(&local) > 0.5,
+    }
+}
+
+pub(super) fn check_place(
+    text: &TomlText<'_>,
+    key: &dyn Fn(&str) -> String,
+    goal: &Goal,
+    section: &GoalSection,
+    surroundings: &Surroundings<'_>,
+) -> Result<(), Finding> {
+    let exit = Point3::from(goal.world_from_guide_exit.translation.vector);
+    let points = [
+        ("target", Some(goal.target_m)),
+        ("entry", goal.entry_m),
+        ("guide exit", Some(exit)),
+    ];
+    for (what, point) in points {
+        let Some(point) = point else { continue };
+        for fixture in surroundings.fixtures {
+            if fixture
+                .solids
+                .iter()
+                .any(|solid| solid_contains(solid, &point))
+            {
+                let name = match what {
+                    _ if section.flange_pose.is_some() => "flange_pose",
+                    "target" => section.target_key(),
+                    "entry" => section.entry_key(),
+                    _ => "standoff_mm",
+                };
+                return Err(text
+                    .finding(
+                        &key(name),
+                        format!("the {what} lies inside the {}", fixture.name),
+                    )
+                    .hint("compare the goal with the phantom's posture and place"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a target inside a bone, unless it lies in the lesion that is there.
+pub(super) fn check_target(
+    text: &TomlText<'_>,
+    key: &dyn Fn(&str) -> String,
+    goal: &Goal,
+    section: &GoalSection,
+    surroundings: &Surroundings<'_>,
+) -> Result<(), Finding> {
+    let Some(placed) = surroundings.phantom else {
+        return Ok(());
+    };
+    let target = placed.world_from_phantom.inverse() * goal.target_m;
+    let aimed_at = placed.phantom.lesions.iter().find(|lesion| {
+        // Off its centre by a target offset, or not at all.
+        let beyond_m = (target - lesion.center_m).norm() - 0.5 * lesion.diameter_m;
+        goal.lesion.as_ref() == Some(&lesion.name)
+            && (section.target_offset_mm.is_none() || beyond_m <= 0.0)
+    });
+    if aimed_at.is_some() {
+        return Ok(());
+    }
+    let bone = placed
+        .phantom
+        .parts
+        .iter()
+        .filter(|part| part.tissue == Tissue::Bone)
+        .find(|part| solid_contains(&part.solid, &target));
+    let Some(bone) = bone else { return Ok(()) };
+    let name = if section.flange_pose.is_some() {
+        "flange_pose"
+    } else {
+        section.target_key()
+    };
+    Err(text
+        .finding(
+            &key(name),
+            format!("the target lies inside the bone `{}`", bone.name),
+        )
+        .hint("move the target, or make it a lesion if the bone is to be pierced"))
+}
+
+pub(super) fn check_length(
+    text: &TomlText<'_>,
+    key: &str,
+    value_mm: f64,
+    least_mm: f64,
+    most_mm: f64,
+) -> Result<(), Finding> {
+    if (least_mm..=most_mm).contains(&value_mm) {
+        return Ok(());
+    }
+    Err(text
+        .finding(
+            key,
+            format!("{value_mm} mm is outside {least_mm} to {most_mm} mm"),
+        )
+        .hint("lengths are in millimetres"))
+}
