@@ -38,8 +38,8 @@ fn cases(c: &mut Criterion) {
     group.throughput(Throughput::Elements(CONFIGURATIONS));
     for (name, goal, fix_roll) in CELLS {
         let path = path_of(name);
-        let family =
-            ScenarioFamily::load(&path, &Overrides::default()).expect("shipped scenarios are sound");
+        let family = ScenarioFamily::load(&path, &Overrides::default())
+            .expect("shipped scenarios are sound");
         let key = |text| KeyPath::parse(text).expect("a path");
         let fixed = [(key("goal.roll_deg"), Change::Set(Setting::from(0.0)))];
         let fixed = if fix_roll { &fixed[..] } else { &[] };

@@ -19,7 +19,7 @@ mod table;
 pub(crate) use budget::budget_picture;
 pub(crate) use events::{press_csv, press_picture};
 pub(crate) use format::small_length;
-pub(crate) use junit::junit;
+pub(crate) use junit::{junit, study_junit};
 pub(crate) use markdown::markdown;
 pub(crate) use ranking::ranking_picture;
 pub(crate) use recording::recording_csv;

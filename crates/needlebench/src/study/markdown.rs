@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use needlebench_study::statistics::{CriterionResult, Summary};
+use needlebench_study::statistics::CriterionResult;
 
-use super::tables::{Part, parts};
+use super::tables::Part;
 
 /// Text that breaks no table.
 fn escaped(text: &str) -> String {
@@ -17,21 +17,16 @@ fn escaped(text: &str) -> String {
 /// The summary as Markdown.
 pub(crate) fn summary_markdown(
     title: &str,
-    summary: &Summary,
     criteria: &[CriterionResult],
+    parts: &[Part],
 ) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
-    let _ = write_markdown(&mut text, title, summary, criteria);
+    let _ = write_markdown(&mut text, title, criteria, parts);
     text
 }
 
-fn write_markdown(
-    out: &mut String,
-    title: &str,
-    summary: &Summary,
-    criteria: &[CriterionResult],
-) -> std::fmt::Result {
+fn write_markdown(out: &mut String, title: &str, parts: &[Part]) -> std::fmt::Result {
     let failed = criteria.iter().filter(|each| !each.pass).count();
     let verdict = match (criteria.len(), failed) {
         (0, _) => String::new(),
@@ -39,7 +34,7 @@ fn write_markdown(
         _ => ": **fail**".to_owned(),
     };
     writeln!(out, "# {title}{verdict}\n")?;
-    for part in parts(summary, criteria) {
+    for part in parts {
         match part {
             Part::Heading(heading) => writeln!(out, "## {heading}\n")?,
             Part::Lines(lines) => {

@@ -11,6 +11,7 @@ mod output;
 mod planned;
 mod prediction;
 mod prepare;
+mod robust;
 pub mod robustness;
 mod rows;
 mod static_case;

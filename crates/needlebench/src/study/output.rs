@@ -12,8 +12,11 @@ use serde::Serialize;
 use super::case::StudyCase;
 use super::markdown::summary_markdown;
 use super::prepare::PreparedStudy;
+use super::robust::{RobustnessResult, robustness_of, robustness_parts};
+use super::tables::parts;
 use super::text::summary_text;
 use crate::atomic::write_atomically;
+use crate::output::study_junit;
 use crate::page::study::{CasePlaces, StudyPage};
 use crate::progress::Progress;
 
@@ -35,6 +38,9 @@ pub(crate) struct StudySummary {
     verdict: &'static str,
     /// Criteria of the study.
     criteria: Vec<CriterionResult>,
+    /// How far the base scenario's phantom may move; none unless the study asks for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robustness: Option<Vec<RobustnessResult>>,
     /// Statistics.
     #[serde(flatten)]
     statistics: Summary,
@@ -79,6 +85,15 @@ pub(crate) fn write_study(
     };
     let statistics = summarise(results, &options)?;
     let criteria = judge_study(&statistics, &file.criteria);
+    let robustness = file
+        .robustness
+        .as_ref()
+        .map(|section| robustness_of(&prepared.study, section, output.threads, progress))
+        .transpose()
+        .map_err(|findings| {
+            let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
+            anyhow::anyhow!("robustness: {}", texts.join("; "))
+        })?;
     let passed = criteria.iter().all(|criterion| criterion.pass);
     let summary = StudySummary {
         name: file.name.clone(),
@@ -87,6 +102,7 @@ pub(crate) fn write_study(
         cases: prepared.design.cases(),
         verdict: if passed { "pass" } else { "fail" },
         criteria,
+        robustness,
         statistics,
     };
     let write = |name: &str, text: &str| {
@@ -95,9 +111,24 @@ pub(crate) fn write_study(
             .with_context(|| format!("cannot write {}", path.display()))
     };
     write("summary.json", &serde_json::to_string_pretty(&summary)?)?;
-    let markdown = summary_markdown(&file.name, &summary.statistics, &summary.criteria);
-    write("summary.md", &markdown)?;
-    let text = summary_text(&summary.statistics, &summary.criteria);
+    let more = file
+        .robustness
+        .as_ref()
+        .zip(summary.robustness.as_ref())
+        .map_or_else(Vec::new, |(section, results)| {
+            robustness_parts(section, results)
+        });
+    let parts = parts(&summary.statistics, &summary.criteria, more);
+    write(
+        "summary.md",
+        &summary_markdown(&file.name, &summary.criteria, &parts),
+    )?;
+    let text = summary_text(&parts);
+    if let Some(path) = output.junit {
+        let document = study_junit(&file.name, &summary.criteria)?;
+        write_atomically(path, document.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
     if output.page {
         progress.message("writing the page");
         let places = |case: u64| {

@@ -25,8 +25,8 @@ const MOST_REASONS: usize = 3;
 /// Interactions that are shown of each response.
 const MOST_INTERACTIONS: usize = 3;
 
-/// All parts, the verdict last.
-pub(crate) fn parts(summary: &Summary, criteria: &[CriterionResult]) -> Vec<Part> {
+/// All parts, the verdict last; `more` comes before the notes.
+pub(crate) fn parts(summary: &Summary, criteria: &[CriterionResult], more: Vec<Part>) -> Vec<Part> {
     let mut parts = vec![Part::Lines(overview(summary))];
     if summary.overall.layouts > 0 {
         configurations(summary, &mut parts);
@@ -36,6 +36,7 @@ pub(crate) fn parts(summary: &Summary, criteria: &[CriterionResult]) -> Vec<Part
         choices(summary, &mut parts);
         evidence(summary, &mut parts);
     }
+    parts.extend(more);
     if !summary.notes.is_empty() {
         let notes = summary.notes.iter().map(|note| format!("note: {note}"));
         parts.push(Part::Lines(notes.collect()));
@@ -47,7 +48,7 @@ pub(crate) fn parts(summary: &Summary, criteria: &[CriterionResult]) -> Vec<Part
     parts
 }
 
-fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>) -> Part {
+pub(crate) fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>) -> Part {
     Part::Table {
         header: header.map(str::to_owned).to_vec(),
         rows,

@@ -1,22 +1,21 @@
 //! A study's statistics for a terminal.
 
 use comfy_table::{Cell, CellAlignment, ContentArrangement};
-use needlebench_study::statistics::{CriterionResult, Summary};
 
-use super::tables::{Part, parts};
+use super::tables::Part;
 use crate::output::plain_table;
 
 /// Columns that tables fit into.
 const WIDTH: u16 = 100;
 
-/// The summary as text, 100 columns wide.
-pub(crate) fn summary_text(summary: &Summary, criteria: &[CriterionResult]) -> String {
+/// A summary as text, 100 columns wide.
+pub(crate) fn summary_text(parts: &[Part]) -> String {
     let mut text = String::new();
-    for part in parts(summary, criteria) {
+    for part in parts {
         match part {
             Part::Heading(heading) => {
                 text.push('\n');
-                text.push_str(&heading);
+                text.push_str(heading);
             }
             Part::Lines(lines) => text.push_str(&lines.join("\n")),
             Part::Table { header, rows } => {
@@ -28,16 +27,19 @@ pub(crate) fn summary_text(summary: &Summary, criteria: &[CriterionResult]) -> S
                 table.set_content_arrangement(ContentArrangement::Dynamic);
                 table.set_width(WIDTH);
                 for row in rows {
-                    table.add_row(row.into_iter().zip(&header).enumerate().map(
-                        |(at, (text, name))| {
-                            let alignment = if at == 0 || name.starts_with('<') {
-                                CellAlignment::Left
-                            } else {
-                                CellAlignment::Right
-                            };
-                            Cell::new(text).set_alignment(alignment)
-                        },
-                    ));
+                    table.add_row(
+                        row.iter()
+                            .zip(header)
+                            .enumerate()
+                            .map(|(at, (text, name))| {
+                                let alignment = if at == 0 || name.starts_with('<') {
+                                    CellAlignment::Left
+                                } else {
+                                    CellAlignment::Right
+                                };
+                                Cell::new(text).set_alignment(alignment)
+                            }),
+                    );
                 }
                 text.push_str(&table.to_string());
             }
