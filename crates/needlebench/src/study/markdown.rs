@@ -26,7 +26,12 @@ pub(crate) fn summary_markdown(
     text
 }
 
-fn write_markdown(out: &mut String, title: &str, parts: &[Part]) -> std::fmt::Result {
+fn write_markdown(
+    out: &mut String,
+    title: &str,
+    criteria: &[CriterionResult],
+    parts: &[Part],
+) -> std::fmt::Result {
     let failed = criteria.iter().filter(|each| !each.pass).count();
     let verdict = match (criteria.len(), failed) {
         (0, _) => String::new(),
