@@ -11,7 +11,8 @@ import { resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { chromium } from 'playwright-core';
 
-const FIRST_VIEW_MS = 2000;
+// A study's hundred thousand cases take a moment to unpack.
+const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000 };
 const REDRAW_MS = 100;
 const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6 };
 const SIZE = { width: 1280, height: 900 };
@@ -281,7 +282,7 @@ for (const given of words) {
   }
   assert.deepEqual(problems, []);
   await running.close();
-  assert.ok(best <= FIRST_VIEW_MS, `first view after ${best} ms`);
+  assert.ok(best <= FIRST_VIEW_MS[kind], `first view after ${best} ms`);
 
   const plain = await launch(NO_GL);
   const without = await open(plain, file);

@@ -100,8 +100,10 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
             resolved,
             &mut finished,
             folder,
-            pictures,
-            !arguments.no_page,
+            Extras {
+                pictures,
+                page: !arguments.no_page,
+            },
             jobs,
             &cancel,
             &progress,
@@ -220,12 +222,18 @@ fn probe_folder(folder: &Path) -> std::io::Result<()> {
     std::fs::remove_file(&probe)
 }
 
+/// What is written for people besides the reports.
+#[derive(Debug, Clone, Copy)]
+struct Extras {
+    pictures: bool,
+    page: bool,
+}
+
 fn write_results(
     resolved: &ResolvedScenario,
     finished: &mut ScenarioRun,
     folder: &Path,
-    pictures: bool,
-    page: bool,
+    Extras { pictures, page }: Extras,
     jobs: usize,
     cancel: &AtomicBool,
     progress: &Progress,
