@@ -4,14 +4,16 @@
 //
 // Checks that nothing is blank, no error is logged, nothing is asked of the network, every switch and
 // the replay work, the keyboard reaches everything, and the page still works without WebGL. Takes an
-// installed Chromium (or the one that CHROMIUM names), else the one that comes with the packages.
+// installed Chromium (or the one that CHROMIUM names), else the one that comes with the packages, which
+// CHROMIUM=packaged asks for.
 import assert from 'node:assert/strict';
 import { existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
 import { resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { chromium } from 'playwright-core';
 
-const FIRST_VIEW_MS = 2000;
+// A study's hundred thousand cases take a moment to unpack.
+const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000 };
 const REDRAW_MS = 100;
 const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6 };
 const SIZE = { width: 1280, height: 900 };
@@ -25,10 +27,12 @@ mkdirSync(out, { recursive: true });
 
 async function executable() {
   const installed = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'];
-  const found = installed.find((path) => path && existsSync(path));
+  const found = process.env.CHROMIUM === 'packaged' ? null : installed.find((path) => path && existsSync(path));
   if (found) return { path: found, args: [] };
+  // Makes the package unpack the libraries that a bare machine lacks, too (NSS, expat).
+  process.env.AWS_LAMBDA_JS_RUNTIME ??= 'nodejs22.x';
   const { default: packaged } = await import('@sparticuz/chromium');
-  return { path: await packaged.executablePath(), args: ['--single-process', '--no-zygote'] };
+  return { path: await packaged.executablePath(), args: ['--no-zygote'] };
 }
 
 const browser = await executable();
@@ -160,7 +164,10 @@ async function testRun(page, judge, name) {
   await page.locator('.replay input[type=range]').focus();
   await page.keyboard.press('ArrowLeft');
   assert.ok(await page.evaluate(() => NB.current.time) < paused, 'the arrow key does not move the time');
-  const plot = await page.locator('.curves .plot canvas').boundingBox();
+  const curves = page.locator('.curves .plot canvas');
+  await curves.evaluate((element) => element.scrollIntoView({ block: 'center' }));
+  await settle(page);
+  const plot = await curves.boundingBox();
   await page.mouse.click(plot.x + plot.width / 2, plot.y + plot.height / 2);
   const sought = await page.evaluate(() => NB.current.time);
   assert.ok(Math.abs(sought / end - 0.5) < 0.1, `a click in the middle of the plot seeks ${sought} of ${end} s`);
@@ -281,7 +288,7 @@ for (const given of words) {
   }
   assert.deepEqual(problems, []);
   await running.close();
-  assert.ok(best <= FIRST_VIEW_MS, `first view after ${best} ms`);
+  assert.ok(best <= FIRST_VIEW_MS[kind], `first view after ${best} ms`);
 
   const plain = await launch(NO_GL);
   const without = await open(plain, file);

@@ -152,8 +152,7 @@ pub(super) fn run_into(
         resolved,
         &mut finished,
         folder,
-        resolved.scenario.recording.pictures && outputs.pictures,
-        outputs.page,
+        outputs,
         options.jobs,
         cancel,
         &progress,
@@ -262,13 +261,13 @@ fn write_results(
     resolved: &ResolvedScenario,
     finished: &mut ScenarioRun,
     folder: &Path,
-    pictures: bool,
-    page: bool,
+    outputs: Outputs,
     jobs: usize,
     cancel: &AtomicBool,
     progress: &Progress,
 ) -> Result<()> {
     let started = Instant::now();
+    let pictures = resolved.scenario.recording.pictures && outputs.pictures;
     let mut files: Vec<Vec<Vec<String>>> = Vec::new();
     let period_s = resolved.scenario.recording.period_ms * 1e-3;
     for ((goal, plan), runs) in resolved
@@ -328,7 +327,7 @@ fn write_results(
         report.files = iso9283::write_results(name, report, run, folder, pictures)?;
     }
     let page_path = folder.join("report.html");
-    if page {
+    if outputs.page {
         progress.message("writing the page");
         write_atomically(&page_path, run_page(resolved, finished).as_bytes())?;
     } else if page_path.exists() {

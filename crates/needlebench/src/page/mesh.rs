@@ -28,12 +28,12 @@ pub(super) fn append(to: &mut TriangleMesh, mesh: &TriangleMesh, place: &Pose) {
 }
 
 /// The mesh with at most `most` triangles: vertices within a cube become their mean.
-pub(super) fn thinned(mesh: TriangleMesh, most: usize) -> TriangleMesh {
+pub(super) fn thinned(mesh: &TriangleMesh, most: usize) -> TriangleMesh {
     let mut cube_m = FIRST_CUBE_M;
     // Vertices at one place count as one, whatever the number of triangles.
-    let mut thin = clustered(&mesh, 0.0);
+    let mut thin = clustered(mesh, 0.0);
     while thin.triangles.len() > most {
-        thin = clustered(&mesh, cube_m);
+        thin = clustered(mesh, cube_m);
         cube_m *= NEXT_CUBE;
     }
     thin
@@ -95,7 +95,7 @@ fn key(x: f64, cube_m: f64) -> i64 {
     clippy::cast_sign_loss,
     reason = "within 0 and 65535"
 )]
-pub(super) fn surface(pack: &mut Pack, mesh: TriangleMesh) -> Value {
+pub(super) fn surface(pack: &mut Pack, mesh: &TriangleMesh) -> Value {
     let mesh = thinned(mesh, MOST_TRIANGLES);
     let (mut low, mut high) = (Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN));
     for vertex in &mesh.vertices_m {
@@ -157,7 +157,7 @@ mod tests {
     fn thinning_keeps_the_budget_and_the_shape() {
         let ball = Shape::Sphere { radius_m: 0.1 }.surface(1e-5);
         assert!(ball.triangles.len() > 5000);
-        let thin = thinned(ball, 1000);
+        let thin = thinned(&ball, 1000);
         assert!((200..=1000).contains(&thin.triangles.len()));
         for vertex in &thin.vertices_m {
             assert!((vertex.coords.norm() - 0.1).abs() < BALL_M);
@@ -171,9 +171,9 @@ mod tests {
         let mut both = cube.clone();
         append(&mut both, &cube, &Pose::translation(0.2, 0.0, 0.0));
         let mut pack = Pack::default();
-        let alone = surface(&mut pack, cube.clone());
+        let alone = surface(&mut pack, &cube);
         assert_eq!(alone["triangles"]["n"], 3 * cube.triangles.len());
-        let merged = surface(&mut pack, both);
+        let merged = surface(&mut pack, &both);
         let least = 3 * (2 * cube.triangles.len() - 4);
         assert!(merged["triangles"]["n"].as_u64().unwrap() >= least as u64);
     }
@@ -182,7 +182,7 @@ mod tests {
     fn surfaces_come_back_within_a_step() {
         let ball = Shape::Sphere { radius_m: 0.1 }.surface(1e-3);
         let mut pack = Pack::default();
-        let document = surface(&mut pack, ball.clone());
+        let document = surface(&mut pack, &ball);
         let back = super::super::pack::unpack::of_payload(&pack.payload(&document));
         let codes = back.column(&document["vertices"]);
         let triangles = back.column(&document["triangles"]);

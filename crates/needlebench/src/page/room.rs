@@ -91,7 +91,7 @@ pub(super) fn configuration(
         .collect();
     let surface = set
         .contains(&true)
-        .then(|| surface(pack, voxel_surface(&sector.grid, &set)));
+        .then(|| surface(pack, &voxel_surface(&sector.grid, &set)));
     Some(json!({
         "sight": pack.f32s(lines),
         "taken": surface,

@@ -84,3 +84,59 @@ fn goal(
         "configurations": configurations,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use needlebench_cell::{Overrides, load_scenario};
+
+    use super::*;
+    use crate::page::pack::unpack::of_page;
+    use crate::pipeline::{EngineChoice, RunOptions, run_scenario};
+
+    #[test]
+    fn recorded_motions_and_clearances_come_back() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/small.toml");
+        let resolved = load_scenario(&path, &Overrides::default()).unwrap();
+        let options = RunOptions {
+            engines: Some(EngineChoice::Rapier),
+            jobs: 1,
+            referee: false,
+        };
+        let finished = run_scenario(&resolved, &options).unwrap();
+        let back = of_page(&run_page(&resolved, &finished));
+        assert!(back.document["report"].get("timings").is_none());
+        let mut seen = 0;
+        for (index, runs) in finished.runs[0].iter().enumerate() {
+            let configuration = &back.document["goals"][0]["configurations"][index];
+            for (at, run) in runs.iter().enumerate() {
+                let page = &configuration["runs"][at];
+                assert_eq!(page["engine"], "rapier");
+                let times = back.column(&page["time"]);
+                assert_eq!(
+                    times.last().map(|t| (t * 1e4).round()),
+                    run.recording.time_s.last().map(|t| (t * 1e4).round())
+                );
+                for joint in 0..6 {
+                    let reference = &page["joints"][joint];
+                    let half_step = 0.5001 * reference["step"].as_f64().unwrap();
+                    for (time_s, q) in times.iter().zip(back.column(reference)) {
+                        let state = run.recording.time_s.partition_point(|t| *t < time_s - 1e-4);
+                        let expected = run.recording.state[state].position[joint];
+                        assert!((q - expected).abs() <= half_step, "{q} for {expected}");
+                    }
+                }
+                for (class, distances_m) in &run.clearance.distance_m {
+                    let reference = &page["curves"][class.name()];
+                    let least = |values: &[f64]| values.iter().copied().fold(f64::MAX, f64::min);
+                    // Least values are the ends of ranges, which are kept; JSON rounds the last bit.
+                    let away_m = least(&back.column(reference)) - least(distances_m);
+                    assert!(away_m.abs() < 1e-15, "{away_m}");
+                }
+                seen += 1;
+            }
+        }
+        assert!(seen >= 4, "{seen} motions");
+    }
+}

@@ -195,7 +195,7 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
                 "group": each.group,
                 "frame": each.frame,
                 "color": each.color_rgba,
-                "surface": surface(pack, each.mesh),
+                "surface": surface(pack, &each.mesh),
             })
         })
         .collect();

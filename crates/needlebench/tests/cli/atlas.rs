@@ -72,7 +72,12 @@ fn every_branch_has_every_roll_and_its_ranges() {
     }
     assert!(ranges >= 6);
     let files = bench.tree("out");
-    let expected = ["small/atlas.json", "small/pose.atlas.png"].map(Path::new);
+    let expected = [
+        "small/atlas.html",
+        "small/atlas.json",
+        "small/pose.atlas.png",
+    ]
+    .map(Path::new);
     assert_eq!(files, expected);
     assert_eq!(bench.read_json("out/small/atlas.json"), answer);
 }
@@ -80,7 +85,11 @@ fn every_branch_has_every_roll_and_its_ranges() {
 #[test]
 fn files_are_the_same_for_every_number_of_threads() {
     let (one, two) = (answer("1").0, answer("2").0);
-    for file in ["out/small/atlas.json", "out/small/pose.atlas.png"] {
+    for file in [
+        "out/small/atlas.html",
+        "out/small/atlas.json",
+        "out/small/pose.atlas.png",
+    ] {
         assert_eq!(one.read(file), two.read(file), "{file}");
     }
 }
@@ -99,7 +108,8 @@ fn table_names_ranges_and_the_roll_that_the_goal_fixes() {
     ] {
         assert!(answer.stdout.contains(part), "{}", answer.stdout);
     }
-    assert_eq!(bench.tree("out"), [Path::new("small/atlas.json")]);
+    let expected = ["small/atlas.html", "small/atlas.json"].map(Path::new);
+    assert_eq!(bench.tree("out"), expected);
 }
 
 #[test]

@@ -19,6 +19,7 @@ mod imperfect;
 mod interrupt;
 mod iso9283;
 mod kinematics;
+mod page;
 mod pairs;
 mod paper;
 mod people;

@@ -204,6 +204,7 @@ fn results_folder_holds_what_the_report_lists() {
     let report = bench.read_json("results/small/report.json");
     let mut expected: BTreeSet<String> = [
         "report.json",
+        "report.html",
         "junit.xml",
         "summary.md",
         "pose.png",
@@ -220,7 +221,7 @@ fn results_folder_holds_what_the_report_lists() {
         }
     }
     // Eight pictures of the posture and of the room each, six recordings.
-    assert_eq!(expected.len(), 6 + 16 + 6);
+    assert_eq!(expected.len(), 7 + 16 + 6);
     let found: BTreeSet<String> = bench
         .tree("results/small")
         .iter()

@@ -52,7 +52,8 @@ NB.RunPage = class {
         this.goalButtons[to].focus();
       },
     }, NB.words(goal.name)));
-    this.side = NB.el('div', { class: 'panel' });
+    // On paper, the table below says the same.
+    this.side = NB.el('div', { class: 'panel no-print' });
     this.details = NB.el('div', { class: 'panel' });
     this.table = NB.el('div');
     this.budget = NB.el('div');

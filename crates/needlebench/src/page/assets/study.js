@@ -144,7 +144,7 @@ NB.StudyPage = class {
       controls, this.shown,
       NB.el('div', { class: 'grid cases' },
         NB.el('div', null,
-          figure('Cases', 'Each point is a case: click it, or use the arrow keys on the list of cases, to see it at the right.', this.scatter.element, this.scatterLegend),
+          figure('Cases', 'Each point is a case: click it to see it at the right, or go through the numbers there with the arrow keys.', this.scatter.element, this.scatterLegend),
           figure('Success rate', 'Share of valid cases in each cell that are ok. Click a cell for its cases.', this.map.element, this.mapLegend, this.cellPanel)),
         NB.el('div', null, this.casePanel, this.view ? NB.el('div', { class: 'panel' }, this.view.element, this.viewNote) : null)),
       NB.el('div', { class: 'bar no-print' }, metricSelect),
@@ -263,7 +263,8 @@ NB.StudyPage = class {
   }
 
   paintScatter(context, width, height) {
-    const box = { left: 74, top: 10, width: width - 88, height: height - 52 };
+    const left = this.axesOf[this.state.y].labels ? 150 : 74;
+    const box = { left, top: 10, width: width - left - 14, height: height - 52 };
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
     const axes = new NB.Axes(box, this.padded(xAxis), this.padded(yAxis));
@@ -353,7 +354,8 @@ NB.StudyPage = class {
   }
 
   paintMap(context, width, height) {
-    const box = { left: 74, top: 10, width: width - 88, height: height - 52 };
+    const left = this.axesOf[this.state.y].labels ? 150 : 74;
+    const box = { left, top: 10, width: width - left - 14, height: height - 52 };
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
     const axes = new NB.Axes(box, xAxis, yAxis);

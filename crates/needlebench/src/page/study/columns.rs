@@ -96,7 +96,8 @@ impl Columns {
         // Outcome, two metrics of twelve bits and two of eight in each row; the number of the case.
         let bytes_per_case = factor_bytes + ROWS * (1 + 3 + 2) + 4;
         let chosen = Chosen::new(results.cases(), bytes_per_case, noted);
-        let kept = (results.cases() / chosen.block + 1) as usize + noted.len();
+        let blocks = results.cases().div_ceil(chosen.block);
+        let kept = usize::try_from(blocks).expect("100 000 at most") + noted.len();
         // Noted cases have postures in any case.
         let pose_every = kept.div_ceil(MOST_POSED - MOST_NOTED).max(1);
         let mut reader = Reader {
@@ -111,7 +112,7 @@ impl Columns {
         results.visit(&mut |values, result| {
             if chosen.has(result.case) {
                 let is_noted = chosen.noted.binary_search(&result.case).is_ok();
-                let posed = is_noted || reader.cases.len() % pose_every == 0;
+                let posed = is_noted || reader.cases.len().is_multiple_of(pose_every);
                 reader.push(values, result.case, &result.rows, posed);
             }
         })?;

@@ -103,7 +103,7 @@ impl StudyPage<'_> {
             "joints": pack.coarse_column(&columns.joints_deg, u16::MAX - 1),
             "places": self.case_places(&columns, &mut pack),
         });
-        let labels = Configuration::ALL.map(|each| each.label());
+        let labels = Configuration::ALL.map(Configuration::label);
         let document = json!({
             "kind": "study",
             "name": self.name,

@@ -167,6 +167,15 @@ fn page(results: &Synthetic, summary: &Value) -> String {
     page.html().unwrap()
 }
 
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "small codes"
+)]
+fn code(value: f64) -> usize {
+    value as usize
+}
+
 fn index_of_case(unpacked: &Unpacked, case: u64) -> Option<usize> {
     let numbers = &unpacked.document["numbers"];
     if numbers.is_null() {
@@ -187,7 +196,7 @@ fn columns_come_back_within_half_a_step() {
     assert_eq!(document["kept"], 600);
     let (values, result) = results.case(123);
     let tools = back.column(&document["factors"][1]["column"]);
-    assert_eq!(FactorValue::Level(tools[123] as usize), values[1]);
+    assert_eq!(FactorValue::Level(code(tools[123])), values[1]);
     for metric in document["metrics"].as_array().unwrap() {
         let column = &metric["column"];
         let step = column["step"].as_f64().unwrap();
@@ -204,7 +213,7 @@ fn columns_come_back_within_half_a_step() {
         }
     }
     let outcomes = back.column(&document["outcomes"]);
-    let code = outcomes[3 * 600 + 123] as usize;
+    let code = code(outcomes[3 * 600 + 123]);
     assert_eq!(
         document["outcomeNames"][code][0],
         result.rows[3].outcome.name()
