@@ -28,8 +28,13 @@ fn tables() -> &'static [Vec<u8>; 3] {
         let other_seed = STUDY.replace("seed = 1", "seed = 2");
         [(SMALL, STUDY), (&lower, STUDY), (SMALL, &other_seed)].map(|(scenario, study)| {
             let bench = Bench::with_scenario(scenario);
-            bench.write("study.toml", study.replace("method = \"sobol\"", "method = \"random\""));
-            bench.run(&["study", "study.toml", "--out", "out", "--quiet"]).exits_with(0);
+            bench.write(
+                "study.toml",
+                study.replace("method = \"sobol\"", "method = \"random\""),
+            );
+            bench
+                .run(&["study", "study.toml", "--out", "out", "--quiet"])
+                .exits_with(0);
             bench.read("out/shifted/results.parquet")
         })
     })
@@ -56,10 +61,18 @@ fn compare(bench: &Bench, more: &[&str]) -> Answer {
 #[test]
 fn study_against_itself_passes() {
     let bench = bench();
-    let more = ["--max-loss", "clearance=0mm", "--max-loss", "success_rate=0"];
+    let more = [
+        "--max-loss",
+        "clearance=0mm",
+        "--max-loss",
+        "success_rate=0",
+    ];
     let answer = bench.run(&[&["compare", "a", "a/results.parquet"][..], &more].concat());
     let answer = answer.exits_with(0);
-    assert!(answer.stdout.contains("the same 64 cases in both"), "{answer:#?}");
+    assert!(
+        answer.stdout.contains("the same 64 cases in both"),
+        "{answer:#?}"
+    );
     assert!(answer.stdout.contains("PASS"), "{answer:#?}");
     assert!(!answer.stdout.contains('│'), "{answer:#?}");
     assert_eq!(answer.stderr, "");
@@ -94,7 +107,11 @@ fn a_lower_patient_is_farther_from_the_arm() {
     assert!(mean.abs() > 0.1 && mean.abs() < 8.1, "{mean}");
     let text = compare(&bench, &[]).exits_with(0).stdout;
     assert!(text.contains("B less A") && text.contains("PASS"), "{text}");
-    assert!(text.lines().all(|line| !line.contains('│') || line.chars().count() <= 100), "{text}");
+    assert!(
+        text.lines()
+            .all(|line| !line.contains('│') || line.chars().count() <= 100),
+        "{text}"
+    );
 }
 
 #[test]
@@ -111,29 +128,53 @@ fn loss_beyond_its_threshold_exits_with_1_and_is_written_for_ci() {
     // One of the two ways is a loss.
     let there = bench.run(&[&["compare", "a", "lower"][..], &more].concat());
     let back = bench.run(&[&["compare", "lower", "a"][..], &more].concat());
-    let lost = if there.status == Some(1) { "a" } else { "lower" };
+    let lost = if there.status == Some(1) {
+        "a"
+    } else {
+        "lower"
+    };
     let kept = if lost == "a" { &back } else { &there };
-    assert!(kept.stdout.contains("allowed clearance@5 = 0.1mm"), "{kept:#?}");
+    assert!(
+        kept.stdout.contains("allowed clearance@5 = 0.1mm"),
+        "{kept:#?}"
+    );
     let second = if lost == "a" { "lower" } else { "a" };
-    let answer = bench.run(&[&["compare", lost, second][..], &more].concat()).exits_with(1);
-    assert!(answer.stdout.contains("FAILED 5 % quantile of clearance"), "{answer:#?}");
+    let answer = bench
+        .run(&[&["compare", lost, second][..], &more].concat())
+        .exits_with(1);
+    assert!(
+        answer.stdout.contains("FAILED 5 % quantile of clearance"),
+        "{answer:#?}"
+    );
     let junit = String::from_utf8(bench.read("j.xml")).unwrap();
-    assert!(junit.contains("compare.thresholds") && junit.contains("<failure"), "{junit}");
+    assert!(
+        junit.contains("compare.thresholds") && junit.contains("<failure"),
+        "{junit}"
+    );
     let markdown = String::from_utf8(bench.read("m.md")).unwrap();
-    assert!(markdown.contains("**fail**") && markdown.contains("- **lost** 5 %"), "{markdown}");
+    assert!(
+        markdown.contains("**fail**") && markdown.contains("- **lost** 5 %"),
+        "{markdown}"
+    );
 }
 
 #[test]
 fn other_points_are_compared_by_their_intervals() {
     let bench = bench();
     let answer = bench.run(&["compare", "a", "other.parquet"]).exits_with(0);
-    assert!(answer.stdout.contains("not the same cases (case 0"), "{answer:#?}");
+    assert!(
+        answer.stdout.contains("not the same cases (case 0"),
+        "{answer:#?}"
+    );
 }
 
 #[test]
 fn thresholds_of_studies_come_from_a_file_too() {
     let bench = bench();
-    bench.write("limits.toml", "[max_loss]\n\"clearance@5:every\" = \"1m\"\n");
+    bench.write(
+        "limits.toml",
+        "[max_loss]\n\"clearance@5:every\" = \"1m\"\n",
+    );
     compare(&bench, &["--thresholds", "limits.toml"]).exits_with(0);
     bench.write("limits.toml", "[max_loss]\nclearence = \"1mm\"\n");
     compare(&bench, &["--thresholds", "limits.toml"])
@@ -147,11 +188,18 @@ fn what_cannot_be_compared_is_refused_with_a_hint() {
     for (limit, parts) in [
         ("clearance=1", ["is not a unit", "such as 0.5mm"]),
         ("success_rate@5=0.1", ["has no quantiles", "leave out"]),
-        ("clearance:Right-Up-Fld=1mm", ["`Right-Up-Fld`", "did you mean `Right-Up-Fold`?"]),
+        (
+            "clearance:Right-Up-Fld=1mm",
+            ["`Right-Up-Fld`", "did you mean `Right-Up-Fold`?"],
+        ),
     ] {
-        compare(&bench, &["--max-loss", limit]).exits_with(2).complains(parts);
+        compare(&bench, &["--max-loss", limit])
+            .exits_with(2)
+            .complains(parts);
     }
-    compare(&bench, &["--goal", "a=b"]).exits_with(2).complains(["--goal", "hint"]);
+    compare(&bench, &["--goal", "a=b"])
+        .exits_with(2)
+        .complains(["--goal", "hint"]);
     bench.write("s.toml", SMALL);
     bench
         .run(&["compare", "a", "s.toml"])
@@ -173,8 +221,15 @@ fn what_cannot_be_compared_is_refused_with_a_hint() {
 
 #[test]
 fn help_lists_every_metric_of_studies() {
-    let help = Bench::new().run(&["compare", "--help"]).exits_with(0).stdout;
+    let help = Bench::new()
+        .run(&["compare", "--help"])
+        .exits_with(0)
+        .stdout;
     for metric in needlebench_study::compare::STUDY_METRICS {
-        assert!(help.contains(metric.name), "{} is not in\n{help}", metric.name);
+        assert!(
+            help.contains(metric.name),
+            "{} is not in\n{help}",
+            metric.name
+        );
     }
 }
