@@ -8,10 +8,24 @@ use super::tables::Part;
 
 /// Text that breaks no table.
 fn escaped(text: &str) -> String {
-    text.trim_start_matches('<')
-        .trim()
-        .replace('\n', " ")
-        .replace('|', "\\|")
+    text.trim().replace('\n', " ").replace('|', "\\|")
+}
+
+/// Headings in one line each: one that only has a second line shares the first of those before it.
+fn headings(header: &[String]) -> Vec<String> {
+    let mut first = "";
+    let mut names = Vec::new();
+    for name in header {
+        let name = name.trim_start_matches('<');
+        match name.strip_prefix('\n') {
+            Some(second) => names.push(escaped(&format!("{first} {second}"))),
+            None => {
+                first = name.split('\n').next().unwrap_or_default();
+                names.push(escaped(name));
+            }
+        }
+    }
+    names
 }
 
 /// The summary as Markdown.
@@ -49,8 +63,7 @@ fn write_markdown(
                 writeln!(out)?;
             }
             Part::Table { header, rows } => {
-                let names: Vec<String> = header.iter().map(|name| escaped(name)).collect();
-                writeln!(out, "| {} |", names.join(" | "))?;
+                writeln!(out, "| {} |", headings(&header).join(" | "))?;
                 out.push('|');
                 for (at, name) in header.iter().enumerate() {
                     let text = at == 0 || name.starts_with('<');
@@ -66,4 +79,16 @@ fn write_markdown(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headings_are_whole_and_cells_keep_their_signs() {
+        let header = ["tip\n(mm) 50 %", "\n95 %", "<why"].map(str::to_owned);
+        assert_eq!(headings(&header), ["tip (mm) 50 %", "tip 95 %", "why"]);
+        assert_eq!(escaped("< 0.3 | x"), "< 0.3 \\| x");
+    }
 }

@@ -22,6 +22,8 @@ pub(crate) enum Part {
 const MOST_CHOICES: usize = 12;
 /// Reasons that are shown of each configuration.
 const MOST_REASONS: usize = 3;
+/// Lengths below a nanometre are rounding: an exact posture has no error. mm.
+const ROUNDING_MM: f64 = 1e-6;
 /// Interactions that are shown of each response.
 const MOST_INTERACTIONS: usize = 3;
 
@@ -84,6 +86,8 @@ pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {
         "0".to_owned()
+    } else if size < ROUNDING_MM {
+        "< 1e-6".to_owned()
     } else if size >= 100.0 {
         format!("{value:.0}")
     } else if size >= 10.0 {
@@ -145,7 +149,6 @@ fn configurations(summary: &Summary, parts: &mut Vec<Part>) {
         [
             quantile(of, "clearance_mm", 0.05),
             quantile(of, "clearance_mm", 0.5),
-            quantile(of, "self_mm", 0.05),
             quantile(of, "tip_error_mm", 0.5),
             quantile(of, "tip_error_mm", 0.95),
         ]
@@ -173,19 +176,17 @@ fn configurations(summary: &Summary, parts: &mut Vec<Part>) {
             "configuration",
             "ok, of valid\nlayouts (%)",
             "best\n(%)",
-            "clearance\n5 % (mm)",
+            "clearance\n(mm) 5 %",
             "\n50 %",
-            "self\n5 % (mm)",
-            "tip error\n50 % (mm)",
+            "tip error\n(mm) 50 %",
             "\n95 %",
         ],
         rows,
     ));
     parts.push(Part::Lines(vec![
         "quantiles: of the configurations over layouts in which they are not rejected; of the best, \
-         which is ok"
+         which is ok and has the largest clearance, over layouts that work"
             .to_owned(),
-        "and has the largest clearance, over layouts that work".to_owned(),
     ]));
     let rows: Vec<Vec<String>> = summary
         .overall
@@ -219,7 +220,8 @@ fn goals(summary: &Summary, parts: &mut Vec<Part>) {
             goal.invalid.to_string(),
             rate_text(&goal.at_least[0]),
             best.map_or("none".to_owned(), |each| {
-                format!("{} {}", each.label, rate_text(&each.success))
+                let rate = each.success.rate.map_or(String::new(), percent);
+                format!("{} {rate}", each.label)
             }),
         ]
     });
@@ -251,7 +253,12 @@ fn effects(summary: &Summary, parts: &mut Vec<Part>) {
         let mut row = vec![each.name.clone()];
         for response in responses {
             let main = &response.main[axis];
-            row.push(share(main.share, main.noise));
+            let means_something = response.mean.is_some_and(|mean| mean.abs() >= ROUNDING_MM);
+            row.push(if means_something {
+                share(main.share, main.noise)
+            } else {
+                "-".to_owned()
+            });
         }
         let range = responses
             .first()
@@ -275,6 +282,9 @@ fn effects(summary: &Summary, parts: &mut Vec<Part>) {
     ));
     let mut lines = Vec::new();
     for response in responses {
+        if response.mean.is_none_or(|mean| mean.abs() < ROUNDING_MM) {
+            continue;
+        }
         let found = response.interactions.iter();
         let clear: Vec<String> = found
             .filter(|each| each.share > each.noise && each.share > 0.01)
@@ -459,6 +469,13 @@ fn evidence(summary: &Summary, parts: &mut Vec<Part>) {
         .iter()
         .flat_map(|each| &each.worst)
     {
+        if worst
+            .cases
+            .iter()
+            .all(|each| each.value.abs() < ROUNDING_MM)
+        {
+            continue;
+        }
         let cases: Vec<String> = worst
             .cases
             .iter()

@@ -17,7 +17,10 @@ pub(crate) fn summary_text(parts: &[Part]) -> String {
                 text.push('\n');
                 text.push_str(heading);
             }
-            Part::Lines(lines) => text.push_str(&lines.join("\n")),
+            Part::Lines(lines) => {
+                let lines: Vec<String> = lines.iter().map(|line| wrapped(line)).collect();
+                text.push_str(&lines.join("\n"));
+            }
             Part::Table { header, rows } => {
                 let names: Vec<&str> = header
                     .iter()
@@ -47,4 +50,35 @@ pub(crate) fn summary_text(parts: &[Part]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// A line broken at spaces, its further lines indented.
+fn wrapped(line: &str) -> String {
+    let mut text = String::new();
+    let mut column = 0;
+    for word in line.split_inclusive(' ') {
+        let length = word.trim_end().chars().count();
+        if column > 0 && column + length > usize::from(WIDTH) {
+            text.truncate(text.trim_end().len());
+            text.push_str("\n    ");
+            column = 4;
+        }
+        text.push_str(word);
+        column += word.chars().count();
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_lines_are_broken_at_spaces() {
+        let line = "word ".repeat(50);
+        let text = wrapped(line.trim_end());
+        assert!(text.lines().all(|line| line.len() <= usize::from(WIDTH)));
+        assert_eq!(text.split_whitespace().count(), 50);
+        assert_eq!(wrapped("  short"), "  short");
+    }
 }

@@ -9,6 +9,7 @@ mod calibration;
 mod check;
 mod clearance;
 mod compare;
+mod compare_studies;
 mod determinism;
 #[cfg(target_os = "linux")]
 mod environment;

@@ -105,6 +105,11 @@ impl Axis {
         self.bins.is_empty()
     }
 
+    /// Combinations of the crossed factors that it tells apart.
+    pub(crate) fn crossed(&self) -> u64 {
+        self.levels.max(1) as u64
+    }
+
     /// Whether it is cut from a continuum.
     pub(crate) fn is_continuous(&self) -> bool {
         self.levels == 0

@@ -168,13 +168,17 @@ impl MainEffects {
                 .filter_map(|each| Some((each.count(), each.mean()?)))
                 .collect(),
         };
-        // Crossed levels have the same points each, whose spread cancels between them.
-        let inflation = if self.axes[axis].is_continuous() {
-            effect
+        // Crossed levels have the same points each, whose spread cancels between them, as far as the
+        // points do the same to all levels: at worst, all layouts of a point in a level are one.
+        let (inflation, worst) = if self.axes[axis].is_continuous() {
+            (effect, effect)
         } else {
-            1.0
+            (1.0, alike(self.repeats, &[&self.axes[axis]]))
         };
-        let shares = table.shares(inflation);
+        let shares = table.share(inflation).map(|(share, unit, cells)| {
+            let noise = noise(cells - 1.0, unit, worst / inflation);
+            (share, noise)
+        });
         MainEffect {
             axis,
             share: shares.map(|shares| shares.0),
@@ -212,6 +216,7 @@ impl MainEffects {
                 response,
                 &self.all[response],
                 self.design_effect(response),
+                self.repeats,
             ),
         });
         Effects {
@@ -244,6 +249,18 @@ fn bin_mean(bin: &Moments, response: usize, effect: f64) -> BinMean {
     }
 }
 
+/// Layouts of a sampled point that fall into one cell of crossed factors, at most all alike.
+fn alike(repeats: u64, axes: &[&Axis]) -> f64 {
+    let told_apart: u64 = axes.iter().map(|axis| axis.crossed()).product();
+    (repeats as f64 / told_apart as f64).max(1.0)
+}
+
+/// Largest share that chance makes in 19 of 20 cases: a chi-squared sum in its normal approximation,
+/// of which `unit` per degree of freedom was taken off, and which may be `worst` times as large.
+fn noise(freedom: f64, unit: f64, worst: f64) -> f64 {
+    unit * ((worst - 1.0) * freedom + 1.645 * (2.0 * freedom).sqrt() * worst)
+}
+
 /// Counts and means of cells, with the sum of the squared deviations of all values.
 struct Table {
     total: f64,
@@ -252,14 +269,6 @@ struct Table {
 }
 
 impl Table {
-    /// Epsilon squared of the cells and what chance makes of it; none without deviations or with too
-    /// few values.
-    fn shares(&self, inflation: f64) -> Option<(f64, f64)> {
-        let (share, unit, cells) = self.share(inflation)?;
-        // Chance makes a chi-squared sum of `cells - 1` degrees of freedom: normal approximation.
-        Some((share, 1.645 * (2.0 * (cells - 1.0)).sqrt() * unit))
-    }
-
     /// Epsilon squared, what a degree of freedom adds to it by chance, and the number of cells:
     /// `(SSB - (k - 1) MSW) / SST`.
     fn share(&self, inflation: f64) -> Option<(f64, f64, f64)> {
@@ -351,7 +360,13 @@ impl Interactions {
         }
     }
 
-    fn finish(&self, response: usize, all: &Moments, effect: f64) -> Vec<Interaction> {
+    fn finish(
+        &self,
+        response: usize,
+        all: &Moments,
+        effect: f64,
+        repeats: u64,
+    ) -> Vec<Interaction> {
         let of_pairs = pairs(self.axes.len()).zip(&self.cells);
         let mut found: Vec<Interaction> = of_pairs
             .filter_map(|((a, b), cells)| {
@@ -386,11 +401,16 @@ impl Interactions {
                     table(self.axes[a].1.len(), &row).share(inflation(continuous[0]))?;
                 let (second, _, columns) =
                     table(across, &column).share(inflation(continuous[1]))?;
+                let worst = if continuous == [true, true] {
+                    both
+                } else {
+                    alike(repeats, &[&self.axes[a].1, &self.axes[b].1]).max(both)
+                };
                 let freedom = (count - rows - columns + 1.0).max(1.0);
                 Some(Interaction {
                     axes: [self.axes[a].0, self.axes[b].0],
                     share: share - first - second,
-                    noise: 1.645 * (2.0 * freedom).sqrt() * unit,
+                    noise: noise(freedom, unit, worst / both),
                 })
             })
             .collect();
