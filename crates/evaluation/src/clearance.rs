@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::{
-    CertificateOptions, ClassMinima, ClearanceModel, Motion, RecordedMotion, Separation,
-    certify,
+    CertificateOptions, ClassMinima, ClearanceModel, Motion, RecordedMotion, Separation, certify,
 };
 use needlebench_engine::Recording;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};

@@ -19,10 +19,7 @@ pub(super) fn from_flange_pose(
 ) -> Result<Goal, Finding> {
     for (name, given) in [
         ("entry_mm", section.entry_mm.is_some()),
-        (
-            "entry_direction_deg",
-            section.entry_direction_deg.is_some(),
-        ),
+        ("entry_direction_deg", section.entry_direction_deg.is_some()),
         ("target_mm", section.target_mm.is_some()),
         ("lesion", section.lesion.is_some()),
         ("target_offset_mm", section.target_offset_mm.is_some()),

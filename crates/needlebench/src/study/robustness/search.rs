@@ -101,9 +101,8 @@ fn turned<const N: usize>(direction: &[f64; N], angle_rad: f64) -> Vec<[f64; N]>
     let across = basis.into_iter().skip(1);
     across
         .flat_map(|across| {
-            [sine, -sine].map(|sine| {
-                std::array::from_fn(|i| direction[i] * cosine + across[i] * sine)
-            })
+            [sine, -sine]
+                .map(|sine| std::array::from_fn(|i| direction[i] * cosine + across[i] * sine))
         })
         .collect()
 }
