@@ -3,5 +3,7 @@
 mod prediction;
 pub mod robustness;
 mod static_case;
+#[cfg(test)]
+mod tests;
 
 pub use static_case::{StaticWorker, invalid_rows, static_rows};
