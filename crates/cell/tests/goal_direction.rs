@@ -1,124 +1,125 @@
-//! Goals by the direction that the needle comes from.
+//! Goals by a direction from the target, and targets off a lesion's centre.
 
 use std::path::Path;
 
-use needlebench_cell::{Change, Goal, KeyPath, Overrides, ScenarioFamily, Setting};
+use nalgebra::{Point3, Vector3};
+use needlebench_cell::{Finding, Overrides, ResolvedScenario, resolve_scenario};
 
-const GOAL: &str = "right_pleural_lateral";
+/// Rounding of a metre.
+const ROUNDING_M: f64 = 1e-12;
 
-fn family() -> ScenarioFamily {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/studies/chest.toml");
-    ScenarioFamily::load(&path, &Overrides::default()).unwrap()
+fn resolve(model: &str, goal: &str) -> Result<ResolvedScenario, Vec<Finding>> {
+    let text = format!(
+        "name = \"x\"\n[robot]\nbase_position_mm = [-900, 0, 800]\n[tool]\nneedle_length_mm = 400\n\
+         [phantom]\nmodel = \"{model}\"\nrest_on_table = false\nposition_mm = [0, 0, 1000]\n\
+         [[goals]]\nname = \"g\"\n{goal}\n"
+    );
+    resolve_scenario("x.toml", &text, Path::new(""), &Overrides::default())
 }
 
-fn set(key: &str, setting: impl Into<Setting>) -> (KeyPath, Change) {
-    (KeyPath::parse(key).unwrap(), Change::Set(setting.into()))
-}
-
-/// The goal, with entry and target in the phantom frame, mm.
-fn goal(changes: &[(KeyPath, Change)]) -> (Goal, [nalgebra::Point3<f64>; 2]) {
-    let resolved = family().vary(GOAL, changes).unwrap();
-    let goal = resolved.goals[0].clone();
-    let place = resolved.phantom.as_ref().unwrap().world_from_phantom;
-    let ends = [goal.entry_m.unwrap(), goal.target_m].map(|point| place.inverse() * point * 1e3);
-    (goal, ends)
-}
-
-#[test]
-fn azimuth_turns_from_anterior_to_left_and_elevation_rises_to_superior() {
-    // Phantom frame: left, posterior, superior.
-    for (direction, expected) in [
-        ([0.0, 0.0], [0.0, -1.0, 0.0]),
-        ([90.0, 0.0], [1.0, 0.0, 0.0]),
-        ([-90.0, 0.0], [-1.0, 0.0, 0.0]),
-        ([0.0, 30.0], [0.0, -0.75_f64.sqrt(), 0.5]),
-    ] {
-        let (_, [entry, target]) = goal(&[
-            set("goal.entry_direction_deg", direction),
-            set("tool.needle_length_mm", 400.0),
-        ]);
-        let found = (entry - target).normalize();
-        assert!(
-            (found - nalgebra::Vector3::from(expected)).norm() < 1e-12,
-            "{direction:?}: {found}"
-        );
-    }
-}
-
-/// The same needle by its entry point: the direction's own entry, to rounding.
-#[test]
-fn a_direction_is_the_same_needle_as_its_entry_point() {
-    /// Micrometres: the entry point is written in mm.
-    const TOLERANCE_M: f64 = 1e-12;
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/supine_suite.toml");
-    let suite = ScenarioFamily::load(&path, &Overrides::default()).unwrap();
-    let (by_direction, [entry_mm, _]) = goal(&[]);
-    let by_point = suite
-        .vary(
-            GOAL,
-            &[set("goal.entry_mm", [entry_mm.x, entry_mm.y, entry_mm.z])],
-        )
+/// Entry, target and axis in the phantom frame.
+fn needle(resolved: &ResolvedScenario) -> (Point3<f64>, Point3<f64>, Vector3<f64>) {
+    let to_phantom = resolved
+        .phantom
+        .as_ref()
         .unwrap()
-        .goals[0]
-        .clone();
-    assert!((by_point.entry_m.unwrap() - by_direction.entry_m.unwrap()).norm() < TOLERANCE_M);
-    assert!((by_point.axis.into_inner() - by_direction.axis.into_inner()).norm() < TOLERANCE_M);
-    assert!((by_point.insertion_length_m - by_direction.insertion_length_m).abs() < TOLERANCE_M);
+        .world_from_phantom
+        .inverse();
+    let goal = &resolved.goals[0];
+    (
+        to_phantom * goal.entry_m.unwrap(),
+        to_phantom * goal.target_m,
+        to_phantom.rotation * goal.axis.into_inner(),
+    )
 }
 
 #[test]
-fn every_size_has_an_entry_on_its_skin() {
-    for model in [
-        "female-p5",
-        "female-p50",
-        "female-p95",
-        "male-p5",
+fn azimuth_turns_from_the_front_to_the_left_and_elevation_towards_the_head() {
+    let (left, front, head) = (Vector3::x(), -Vector3::y(), Vector3::z());
+    let half = 0.5_f64.sqrt();
+    for (angles, outwards) in [
+        ("[0, 0]", front),
+        ("[90, 0]", left),
+        ("[-90, 0]", -left),
+        ("[45, 0]", (front + left) * half),
+        ("[0, 30]", front * 0.75_f64.sqrt() + head * 0.5),
+    ] {
+        let goal = format!("lesion = \"pleural_based\"\nentry_direction_deg = {angles}");
+        let resolved = resolve("male-p50", &goal).unwrap();
+        let (entry, target, axis) = needle(&resolved);
+        assert!((axis + outwards).norm() < ROUNDING_M, "{angles}");
+        let way = entry - target;
+        assert!((way - outwards * way.norm()).norm() < ROUNDING_M);
+        let phantom = &resolved.phantom.as_ref().unwrap().phantom;
+        assert!(phantom.skin_signed_depth(&entry).abs() < ROUNDING_M);
+        assert!(resolved.notes.iter().all(|note| !note.contains("moved")));
+    }
+}
+
+#[test]
+fn one_direction_suits_all_sizes() {
+    for model in needlebench_cell::phantom::SIZE_PRESETS {
+        let goal = "lesion = \"pleural_based\"\nentry_direction_deg = [-90, 0]";
+        let resolved = resolve(model, goal).unwrap();
+        let (entry, target, _) = needle(&resolved);
+        assert!(entry.x < target.x, "from the right");
+    }
+}
+
+#[test]
+fn a_direction_is_the_goal_by_its_entry_point() {
+    let by_direction = resolve(
         "male-p50",
-        "male-p95",
-    ] {
-        let family = family();
-        for name in family.goals() {
-            let resolved = family.vary(name, &[set("phantom.model", model)]).unwrap();
-            let placed = resolved.phantom.as_ref().unwrap();
-            let entry = placed.world_from_phantom.inverse() * resolved.goals[0].entry_m.unwrap();
-            assert!(
-                placed.phantom.skin_signed_depth(&entry).abs() < 1e-9,
-                "{model} {name}"
-            );
-        }
-    }
+        "lesion = \"pleural_based\"\nentry_direction_deg = [-80, 10]",
+    )
+    .unwrap();
+    let entry_mm = needle(&by_direction).0.coords * 1e3;
+    let by_point = resolve(
+        "male-p50",
+        &format!(
+            "lesion = \"pleural_based\"\nentry_mm = [{}, {}, {}]",
+            entry_mm.x, entry_mm.y, entry_mm.z
+        ),
+    )
+    .unwrap();
+    let [a, b] = [&by_direction, &by_point].map(|each| each.goals[0].world_from_guide_exit);
+    assert!((a.to_homogeneous() - b.to_homogeneous()).norm() < ROUNDING_M);
 }
 
 #[test]
-fn an_offset_moves_the_target_and_keeps_the_direction() {
-    let (before, [_, target_before]) = goal(&[]);
-    let (after, [_, target_after]) = goal(&[set("goal.target_offset_mm", [3.0, -2.0, 1.5])]);
-    assert!((target_after - target_before - nalgebra::Vector3::new(3.0, -2.0, 1.5)).norm() < 1e-9);
-    assert!((before.axis.into_inner() - after.axis.into_inner()).norm() < 1e-12);
+fn an_offset_moves_the_target() {
+    let goal = "lesion = \"pleural_based\"\nentry_direction_deg = [-90, 0]";
+    let centre = needle(&resolve("male-p50", goal).unwrap()).1;
+    let off = resolve(
+        "male-p50",
+        &format!("{goal}\ntarget_offset_mm = [1, -2, 3]"),
+    )
+    .unwrap();
+    let moved = needle(&off).1 - centre;
+    assert!((moved - Vector3::new(1e-3, -2e-3, 3e-3)).norm() < ROUNDING_M);
+    assert_eq!(off.goals[0].lesion.as_deref(), Some("pleural_based"));
 }
 
 #[test]
-fn directions_and_offsets_that_make_no_needle_are_refused() {
-    let family = family();
-    for (change, key, word) in [
-        (
-            set("goal.entry_mm", [-142.8, 13.4, 15.8]),
-            "goals[0].entry_direction_deg",
-            "contradicts",
-        ),
-        (
-            set("goal.entry_direction_deg", [0.0, 91.0]),
-            "goals[0].entry_direction_deg",
-            "91",
-        ),
-        (
-            set("goal.target_offset_mm", [0.0, 0.0, 900.0]),
-            "goals[0].target_offset_mm",
-            "outside the phantom",
-        ),
-    ] {
-        let found = family.vary(GOAL, &[change]).unwrap_err();
-        assert_eq!(found[0].key.as_deref(), Some(key), "{found:?}");
-        assert!(found[0].message.contains(word), "{found:?}");
-    }
+fn contradictions_and_wild_angles_are_refused_with_a_hint() {
+    let refuse = |goal: &str| resolve("male-p50", goal).unwrap_err().remove(0);
+    let lesion = "lesion = \"pleural_based\"\n";
+    let finding = refuse(&format!(
+        "{lesion}entry_mm = [0, 0, 0]\nentry_direction_deg = [0, 0]"
+    ));
+    assert_eq!(finding.key.as_deref(), Some("goals[0].entry_direction_deg"));
+    assert!(finding.message.contains("contradicts `entry_mm`"));
+    let finding = refuse(&format!("{lesion}entry_direction_deg = [0, 91]"));
+    assert_eq!(
+        finding.key.as_deref(),
+        Some("goals[0].entry_direction_deg[1]")
+    );
+    assert!(finding.hint.unwrap().contains("degrees"));
+    let finding = refuse(&format!(
+        "{lesion}entry_direction_deg = [0, 0]\ntarget_offset_mm = [900, 0, 0]"
+    ));
+    assert_eq!(finding.key.as_deref(), Some("goals[0].target_offset_mm"));
+    assert!(finding.message.contains("outside the phantom"));
+    let finding = refuse(lesion);
+    assert!(finding.hint.unwrap().contains("`entry_direction_deg`"));
 }

@@ -3,9 +3,12 @@
 mod common;
 
 use common::{Variety, cell};
+use nalgebra::{Point3, Vector3};
 use needlebench_cell::{Cell, ClearanceClass};
-use needlebench_clearance::{ClearanceModel, PairClearance, PreparedShape, separation};
-use needlebench_kinematics::Joints;
+use needlebench_clearance::{
+    ClearanceModel, PairClearance, PreparedShape, PreparedSolids, separation,
+};
+use needlebench_kinematics::{Joints, Pose};
 
 /// The solver's certificate of 1e-10 m and rounding, as in `properties.rs`.
 const REPRODUCED_M: f64 = 1e-9;
@@ -167,4 +170,53 @@ fn joint_positions_that_are_no_numbers_do_not_pass_for_free() {
     let minima = model.minimum_per_class(&q);
     let table = minima.get(ClearanceClass::RobotTable).expect("a table");
     assert!(table.separation.distance_m.is_nan());
+}
+
+#[test]
+fn the_model_of_a_like_cell_is_the_one_made_anew() {
+    let first = cell();
+    let known = ClearanceModel::new(&first);
+    let mut moved = first.clone();
+    for body in &mut moved.bodies {
+        // One that stands still, and one on the wrist.
+        if ["phantom", "tool"].contains(&body.name.as_str()) {
+            for solid in &mut body.solids {
+                solid.parent_from_shape.translation.vector.x += 0.017;
+            }
+        }
+    }
+    let mut fewer = first.clone();
+    fewer.bodies.last_mut().unwrap().solids.truncate(1);
+    for cell in [&first, &moved, &fewer] {
+        let [like, anew] = [known.for_cell(cell), ClearanceModel::new(cell)];
+        for q in postures(20) {
+            assert_eq!(like.all_pairs(&q), anew.all_pairs(&q));
+            assert_eq!(like.minimum_per_class(&q), anew.minimum_per_class(&q));
+        }
+    }
+}
+
+#[test]
+fn the_nearest_solid_of_a_segment_is_the_least_of_all() {
+    let cell = cell();
+    let solids: Vec<_> = cell
+        .bodies
+        .iter()
+        .flat_map(|body| body.solids.iter().cloned())
+        .collect();
+    let prepared = PreparedSolids::new(&solids);
+    let mut variety = Variety(5);
+    let mut point = || Point3::from(Vector3::from_fn(|_, _| variety.between(-1.0, 1.0)));
+    let place = Pose::translation(0.1, -0.2, 0.05);
+    for _ in 0..50 {
+        let (from, to) = (point(), point());
+        let all = prepared.segment_clearance(&from, &to, 6e-4, &place);
+        let wanted = |index: usize| index % 3 != 0;
+        let found = prepared.nearest_to_segment(&from, &to, 6e-4, &place, wanted);
+        let least = (0..all.len())
+            .filter(|index| wanted(*index))
+            .map(|index| (index, all[index]))
+            .min_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m));
+        assert_eq!(found, least);
+    }
 }

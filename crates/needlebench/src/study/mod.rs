@@ -17,6 +17,8 @@ mod rows;
 mod static_case;
 mod tables;
 mod text;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use case::StudyCase;
 pub(crate) use case_report::{CaseReport, case_text};
