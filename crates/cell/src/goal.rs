@@ -1,6 +1,7 @@
 //! Goals: where the guide has to stand, in the world.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_kinematics::ik::Configuration;
@@ -72,7 +73,7 @@ impl Goal {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlacedPhantom {
     /// The phantom.
-    pub phantom: Phantom,
+    pub phantom: Arc<Phantom>,
     /// Its place.
     pub world_from_phantom: Pose,
 }

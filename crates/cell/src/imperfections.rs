@@ -10,6 +10,7 @@ use needlebench_kinematics::{JOINT_COUNT, Joints};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::parts::Library;
 use crate::toml_text::TomlText;
 use crate::{Finding, ModelSource};
 
@@ -357,6 +358,7 @@ pub(crate) fn resolve_imperfections(
     toml: &TomlText<'_>,
     section: &ImperfectionsSection,
     folder: &std::path::Path,
+    library: &Library,
     bore_clearance_m: f64,
 ) -> Result<Imperfections, Finding> {
     let joints = Joints::from_column_slice;
@@ -364,8 +366,12 @@ pub(crate) fn resolve_imperfections(
     let calibration = section
         .calibration
         .as_ref()
-        .map(|block| resolve_calibration(toml, block, folder, &mut sources))
-        .transpose()?;
+        .map(|block| library.arms(toml, block, folder))
+        .transpose()?
+        .map(|arms| {
+            sources.extend(arms.1.iter().cloned());
+            arms.0.clone()
+        });
     Ok(Imperfections {
         budget_samples: section.budget_samples.unwrap_or(DEFAULT_BUDGET_SAMPLES) as usize,
         calibration,

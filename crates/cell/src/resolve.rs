@@ -1,43 +1,29 @@
 //! From a scenario file to a resolved cell with goals.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use needlebench_kinematics::trajectory::{MotionLimits, ProfileLimits};
 use needlebench_kinematics::{JOINT_LABELS, Joints, Pose};
 
 use crate::files::{Location, source_of};
-use crate::fixtures::{self, Fixture, FixtureError};
+use crate::fixtures::Fixture;
 use crate::goal::{PlacedPhantom, Surroundings, resolve_goal, solid_contains};
 use crate::imperfections::{Imperfections, resolve_imperfections};
 use crate::iso9283::{Iso9283Protocol, resolve_iso9283};
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
 use crate::people::{People, Room, resolve_people};
+use crate::parts::Library;
 use crate::phantom_place::place_phantom;
 use crate::robot::{MissingInertia, read_robot};
 use crate::scenario::Scenario;
 use crate::toml_text::TomlText;
-use crate::tool::{ToolOverrides, read_tool};
 use crate::values::check_values;
-use crate::{Calibration, Finding, Goal, PackagePaths, Robot, nearest_name};
+use crate::{Calibration, Finding, Goal, PackagePaths, Robot};
 
 /// Standard gravity, m/s^2.
 const GRAVITY_M_S2: f64 = 9.80665;
-
-/// Outer diameters of needles by gauge, mm: the nominal sizes of the needle gauge chart.
-const NEEDLE_OUTER_DIAMETER_MM: [(u32, f64); 11] = [
-    (14, 2.108),
-    (15, 1.829),
-    (16, 1.651),
-    (17, 1.473),
-    (18, 1.270),
-    (19, 1.067),
-    (20, 0.9081),
-    (21, 0.8192),
-    (22, 0.7176),
-    (23, 0.6414),
-    (25, 0.5144),
-];
 
 /// What the command line may replace in a scenario.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -108,7 +94,7 @@ pub fn load_robot(overrides: &Overrides) -> Result<Robot, Finding> {
 }
 
 /// Gives a robot its true joint origins, if the command line names a calibration.
-fn calibrate(robot: &mut Robot, overrides: &Overrides) -> Result<(), Finding> {
+pub(crate) fn calibrate(robot: &mut Robot, overrides: &Overrides) -> Result<(), Finding> {
     match &overrides.calibration {
         Some(path) => Calibration::load(path)?.apply_to(robot),
         None => Ok(()),
@@ -149,106 +135,59 @@ pub fn resolve_scenario(
     base: &Path,
     overrides: &Overrides,
 ) -> Result<ResolvedScenario, Vec<Finding>> {
+    let toml = TomlText::parse(file, text).map_err(|finding| vec![finding])?;
+    let scenario: Scenario = toml.deserialize().map_err(|finding| vec![finding])?;
+    let source = source_of(file.to_owned(), text.as_bytes());
+    resolve(&toml, scenario, source, base, overrides, &Library::default())
+}
+
+/// Resolves a scenario's struct; `toml` says where its values stand, and `library` keeps what is read.
+pub(crate) fn resolve(
+    toml: &TomlText<'_>,
+    scenario: Scenario,
+    source: ModelSource,
+    base: &Path,
+    overrides: &Overrides,
+    library: &Library,
+) -> Result<ResolvedScenario, Vec<Finding>> {
     let one = |finding: Finding| vec![finding];
-    let toml = TomlText::parse(file, text).map_err(one)?;
-    let scenario: Scenario = toml.deserialize().map_err(one)?;
-    let findings = check_values(&toml, &scenario);
+    let findings = check_values(toml, &scenario);
     if !findings.is_empty() {
         return Err(findings);
     }
     let mut notes = Vec::new();
-    let robot_location = match &overrides.robot_urdf {
-        Some(path) => Location::Disk(path.clone()),
-        None => Location::of_model(&scenario.robot.urdf, "ur3", "urdf", base),
-    };
     let world_from_base_link =
         pose_of(scenario.robot.base_position_mm, scenario.robot.base_rpy_deg);
-    let mut robot = read_robot(
-        &robot_location,
-        &overrides.packages,
-        overrides
-            .missing_inertia
-            .unwrap_or(scenario.robot.missing_inertia),
+    let robot = library.robot(toml, &scenario.robot, base, overrides);
+    let robot = Robot {
         world_from_base_link,
-    )
-    .map_err(|finding| {
-        // The command line's robot is not the one that the scenario names.
-        one(if overrides.robot_urdf.is_some() {
-            finding
-        } else {
-            with_model_names(&toml, finding, &robot_location, "robot.urdf", "ur3")
-        })
-    })?;
-    calibrate(&mut robot, overrides).map_err(one)?;
-    // The scenario's calibration is that of the scenario's robot.
-    if let (Some(reference), None, None) = (
-        &scenario.robot.calibration,
-        &overrides.calibration,
-        &overrides.robot_urdf,
-    ) {
-        let path = base.join(reference);
-        if !path.is_file() {
-            return Err(one(toml
-                .finding(
-                    "robot.calibration",
-                    format!("there is no file {}", path.display()),
-                )
-                .hint("the path is relative to the scenario's folder")));
-        }
-        Calibration::load(&path)
-            .and_then(|calibration| calibration.apply_to(&mut robot))
-            .map_err(one)?;
-    }
+        ..Robot::clone(&*robot.map_err(one)?)
+    };
     notes.extend(robot.notes.iter().cloned());
-
-    let tool_location = Location::of_model(&scenario.tool.urdf, "needle_guide", "urdf", base);
-    let tool_overrides = tool_overrides(&toml, &scenario).map_err(one)?;
-    let mut tool = read_tool(
-        &tool_location,
-        &overrides.packages,
-        &tool_overrides,
-        &mut notes,
-    )
-    .map_err(|finding| {
-        // A bore or a gauge of the scenario may not fit the tool's other half.
-        let given = ["tool.bore_mm", "tool.needle_gauge"]
-            .into_iter()
-            .find(|key| toml.span_of(key).is_some());
-        one(match given {
-            Some(key) if finding.key.as_deref() == Some("bore_mm") => Finding {
-                hint: finding.hint,
-                ..toml.finding(key, finding.message)
-            },
-            _ => with_model_names(&toml, finding, &tool_location, "tool.urdf", "needle_guide"),
-        })
-    })?;
-
+    let tool = library.tool(toml, &scenario, base, overrides).map_err(one)?;
+    notes.extend(tool.notes.iter().cloned());
+    let mut tool = tool.tool.clone();
     let iso9283 = scenario
         .iso9283
         .as_ref()
-        .map(|section| resolve_iso9283(&toml, section, &robot, &mut tool, &mut notes))
+        .map(|section| resolve_iso9283(toml, section, &robot, &mut tool, &mut notes))
         .transpose()
         .map_err(one)?;
-    let table = scenario.table.as_ref().map(fixtures::table).transpose();
-    let table = table.map_err(|error| one(fixture_finding(&toml, "table", &error)))?;
-    let gantry = scenario.gantry.as_ref().map(fixtures::gantry).transpose();
-    let gantry = gantry.map_err(|error| one(fixture_finding(&toml, "gantry", &error)))?;
-    let mount = scenario
-        .mount
-        .as_ref()
-        .map(|mount| fixtures::mount(mount, &world_from_base_link))
-        .transpose()
-        .map_err(|error| one(fixture_finding(&toml, "mount", &error)))?;
-    let found = match &scenario.phantom {
-        None => None,
-        Some(section) => {
-            Some(place_phantom(&toml, section, &scenario, base, &mut notes).map_err(one)?)
-        }
-    };
-    let (phantom, phantom_source, phantom_parts) = found
-        .map_or((None, None, Vec::new()), |found| {
-            (Some(found.placed), found.model, found.parts)
+    let [table, gantry, mount] = library
+        .fixtures(toml, &scenario, &world_from_base_link)
+        .map_err(one)?;
+    let (mut phantom, mut phantom_source, mut phantom_parts) = (None, None, Vec::new());
+    if let Some(section) = &scenario.phantom {
+        let part = library.phantom(toml, section, base).map_err(one)?;
+        notes.extend(part.notes.iter().cloned());
+        phantom = Some(PlacedPhantom {
+            world_from_phantom: place_phantom(toml, section, scenario.table.as_ref(), &part)
+                .map_err(one)?,
+            phantom: Arc::clone(&part.phantom),
         });
+        phantom_source.clone_from(&part.model);
+        phantom_parts.clone_from(&part.parts);
+    }
 
     let mut fixtures = Vec::new();
     let mut surroundings = Vec::new();
@@ -264,11 +203,11 @@ pub fn resolve_scenario(
     ] {
         if let Some(fixture) = fixture {
             surroundings.push(static_body(name, kind, fixture.solids.clone()));
-            fixtures.push(fixture);
+            fixtures.push(Fixture::clone(&fixture));
         }
     }
 
-    check_base(&toml, &world_from_base_link, &surroundings).map_err(one)?;
+    check_base(toml, &world_from_base_link, &surroundings).map_err(one)?;
     let goals = {
         let context = Surroundings {
             robot: &robot,
@@ -282,7 +221,7 @@ pub fn resolve_scenario(
         };
         let (mut goals, mut findings) = (Vec::new(), Vec::new());
         for (index, section) in scenario.goals.iter().enumerate() {
-            match resolve_goal(&toml, index, section, &context, &mut notes) {
+            match resolve_goal(toml, index, section, &context, &mut notes) {
                 Ok(goal) => goals.push(goal),
                 Err(finding) => findings.push(finding),
             }
@@ -310,7 +249,7 @@ pub fn resolve_scenario(
             solids: &solids,
             robot_base_m: Point3::from(world_from_base_link.translation.vector),
         };
-        resolve_people(&toml, &scenario.people, &goals, &room).map_err(one)?
+        resolve_people(toml, &scenario.people, &goals, &room).map_err(one)?
     };
     let start = Joints::from_column_slice(&scenario.start.joints_deg.map(f64::to_radians));
     if let Some(joint) = robot.limits.first_violation(&start) {
@@ -340,7 +279,7 @@ pub fn resolve_scenario(
         .as_ref()
         .map(|section| {
             let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
-            resolve_imperfections(&toml, section, base, bore_clearance_m)
+            resolve_imperfections(toml, section, base, library, bore_clearance_m)
         })
         .transpose()
         .map_err(one)?;
@@ -353,7 +292,7 @@ pub fn resolve_scenario(
         Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
     );
     Ok(ResolvedScenario {
-        source: source_of(file.to_owned(), text.as_bytes()),
+        source,
         cell,
         phantom,
         fixtures,
@@ -385,84 +324,6 @@ fn pose_of(position_mm: [f64; 3], rpy_deg: [f64; 3]) -> Pose {
         Translation3::from(Vector3::from(position_mm) * 1e-3),
         UnitQuaternion::from_euler_angles(roll, pitch, yaw),
     )
-}
-
-/// A model that a scenario names but that does not exist: points at the key and lists what does.
-fn with_model_names(
-    toml: &TomlText<'_>,
-    finding: Finding,
-    location: &Location,
-    key: &str,
-    folder: &str,
-) -> Finding {
-    if location.read().is_ok() || finding.file != location.display() {
-        return finding;
-    }
-    let names = Location::builtin_names(folder, "urdf");
-    let given = location.display();
-    let stem = Path::new(&given)
-        .file_stem()
-        .and_then(|stem| stem.to_str())
-        .unwrap_or("");
-    let hint = match nearest_name(stem, names.iter().map(String::as_str)) {
-        Some(near) => format!("did you mean `{near}`? Shipped: {}", names.join(", ")),
-        None => format!(
-            "a path relative to the scenario, or a shipped model: {}",
-            names.join(", ")
-        ),
-    };
-    let mut finding = finding.hint(hint);
-    if toml.span_of(key).is_some() {
-        let placed = toml.finding(key, format!("{}: {}", location.display(), finding.message));
-        finding = Finding {
-            hint: finding.hint,
-            ..placed
-        };
-    }
-    finding
-}
-
-/// What is wrong with a fixture, at the key of its section.
-fn fixture_finding(toml: &TomlText<'_>, section: &str, error: &FixtureError) -> Finding {
-    let Some(name) = error.key() else {
-        return toml
-            .finding(section, error.to_string())
-            .hint("see `base_position_mm` and `base_rpy_deg` under [robot]");
-    };
-    toml.finding(&format!("{section}.{name}"), error.to_string())
-        .hint(if name.ends_with("_mm") {
-            "lengths are in millimetres"
-        } else {
-            "angles are in degrees"
-        })
-}
-
-fn tool_overrides(toml: &TomlText<'_>, scenario: &Scenario) -> Result<ToolOverrides, Finding> {
-    let tool = &scenario.tool;
-    let needle_outer_diameter_m = match tool.needle_gauge {
-        None => None,
-        Some(gauge) => {
-            let known = NEEDLE_OUTER_DIAMETER_MM
-                .iter()
-                .find(|(each, _)| *each == gauge);
-            let Some((_, diameter_mm)) = known else {
-                return Err(toml
-                    .finding(
-                        "tool.needle_gauge",
-                        format!("there is no {gauge} gauge needle here"),
-                    )
-                    .hint("14 to 23, and 25"));
-            };
-            Some(diameter_mm * 1e-3)
-        }
-    };
-    Ok(ToolOverrides {
-        mount_rotation_rad: tool.mount_rotation_deg.to_radians(),
-        bore_m: tool.bore_mm.map(|mm| mm * 1e-3),
-        needle_gauge: tool.needle_gauge,
-        needle_outer_diameter_m,
-        needle_length_m: tool.needle_length_mm.map(|mm| mm * 1e-3),
-    })
 }
 
 /// Refuses a base that stands inside something: the fixed link is in no pair that is checked later.

@@ -121,6 +121,51 @@ pub struct Solid {
     pub parent_from_shape: Pose,
 }
 
+impl Solid {
+    /// Lowest and highest corner of a box along the parent's axes that holds the solid, m. A little
+    /// wider than the tightest, so that rounding leaves no point outside.
+    pub fn bounding_box(&self) -> (Point3<f64>, Point3<f64>) {
+        /// More than the rounding of some metres.
+        const ROUNDING_M: f64 = 1e-9;
+        let rotation = self.parent_from_shape.rotation.to_rotation_matrix();
+        let centre = self.parent_from_shape.translation.vector;
+        let of_vertices = |mesh: &TriangleMesh| {
+            let start = (
+                Vector3::repeat(f64::INFINITY),
+                Vector3::repeat(f64::NEG_INFINITY),
+            );
+            mesh.vertices_m.iter().fold(start, |(low, high), vertex| {
+                let at = rotation * vertex.coords;
+                (low.inf(&at), high.sup(&at))
+            })
+        };
+        let about_centre = |half: Vector3<f64>| (-half, half);
+        // How far the axis of a cylinder, and the disc across it, reach along each axis.
+        let axis = rotation.matrix().column(2).abs();
+        let across = axis.map(|share| (1.0 - share * share).max(0.0).sqrt());
+        let (low, high) = match &self.shape {
+            Shape::Sphere { radius_m } => about_centre(Vector3::repeat(*radius_m)),
+            Shape::Cylinder {
+                radius_m,
+                half_length_m,
+            } => about_centre(axis * *half_length_m + across * *radius_m),
+            Shape::Capsule {
+                radius_m,
+                half_length_m,
+            } => about_centre((axis * *half_length_m).add_scalar(*radius_m)),
+            Shape::Cuboid { half_extents_m } => {
+                about_centre(rotation.matrix().abs() * half_extents_m)
+            }
+            Shape::Convex(mesh) => of_vertices(&mesh.0),
+            Shape::Mesh(mesh) => of_vertices(&mesh.surface),
+        };
+        (
+            (centre + low.add_scalar(-ROUNDING_M)).into(),
+            (centre + high.add_scalar(ROUNDING_M)).into(),
+        )
+    }
+}
+
 /// A coloured surface, for pictures only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Visual {

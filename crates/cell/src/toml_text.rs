@@ -17,6 +17,16 @@ pub(crate) struct TomlText<'a> {
 }
 
 impl<'a> TomlText<'a> {
+    /// Of values that stand in no text: findings have keys but no lines.
+    pub(crate) fn without_text(file: &'a str) -> Self {
+        let table = Spanned::new(0..0, DeTable::new());
+        Self {
+            file,
+            text: "",
+            table,
+        }
+    }
+
     pub(crate) fn parse(file: &'a str, text: &'a str) -> Result<Self, Finding> {
         let table = DeTable::parse(text).map_err(|error| {
             let mut message = error.message().to_owned();
@@ -40,56 +50,27 @@ impl<'a> TomlText<'a> {
         let deserializer = toml::Deserializer::parse(self.text)
             .map_err(|error| Finding::new(self.file, error.message().to_owned()))?;
         serde_path_to_error::deserialize(deserializer).map_err(|error| {
-            let mut key = error.path().to_string();
+            let path = error.path().to_string();
             let inner = error.into_inner();
-            let message = inner.message().to_owned();
-            let mut finding = Finding::new(self.file, &message);
+            let Misfit {
+                key,
+                mut message,
+                hint,
+            } = Misfit::read(path, inner.message());
+            let mut finding = Finding::new(self.file, "");
             if let Some(span) = inner.span() {
                 finding = finding.at(self.text, span);
             }
-            let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-            if message.starts_with("unknown field")
-                && let [unknown, known @ ..] = quoted.as_slice()
+            let value = finding.span.clone().and_then(|span| self.text.get(span));
+            let short = |value: &&str| !value.is_empty() && !value.contains('\n');
+            if Misfit::is_of_type(inner.message())
+                && let Some(value) = value.filter(short)
+                && !message.contains(value)
             {
-                // The path ends at the unknown key or at the table that holds it.
-                if !key.ends_with(unknown) {
-                    key = if key == "." {
-                        (*unknown).to_owned()
-                    } else {
-                        format!("{key}.{unknown}")
-                    };
-                }
-                finding.message = format!("unknown key `{unknown}`");
-                finding.hint = Some(unknown_key_hint(unknown, known));
-            } else if message.starts_with("unknown variant")
-                && let [unknown, known @ ..] = quoted.as_slice()
-            {
-                finding.message = format!("`{unknown}` is not a value that `{key}` can have");
-                finding.hint = Some(match nearest_name(unknown, known.iter().copied()) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("one of {}", known.join(", ")),
-                });
-            } else if message.starts_with("missing field")
-                && let [missing] = quoted.as_slice()
-            {
-                // The path ends at the table that lacks the key; `.` is the file itself.
-                key = if key == "." {
-                    (*missing).to_owned()
-                } else {
-                    format!("{key}.{missing}")
-                };
-                finding.message = format!("the key `{missing}` is missing");
-            } else {
-                finding.message = in_words(&message);
-                let value = finding.span.clone().and_then(|span| self.text.get(span));
-                let short = |value: &&str| !value.is_empty() && !value.contains('\n');
-                if let Some(value) = value.filter(short)
-                    && !message.contains(value)
-                {
-                    finding.message = format!("{}, got `{value}`", finding.message);
-                }
-                finding.hint = unit_hint(&key, &message);
+                message = format!("{message}, got `{value}`");
             }
+            finding.message = message;
+            finding.hint = hint;
             finding.key(key)
         })
     }
@@ -173,7 +154,75 @@ impl<'a> TomlText<'a> {
     }
 }
 
-fn unknown_key_hint(unknown: &str, known: &[&str]) -> String {
+/// What the deserializer dislikes, in words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Misfit {
+    /// The key at fault.
+    pub key: String,
+    pub message: String,
+    pub hint: Option<String>,
+}
+
+impl Misfit {
+    /// Reads the deserializer's message; `path` is how far it came.
+    pub fn read(path: String, message: &str) -> Self {
+        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+        // The path ends at the table that lacks a key; `.` is the file itself.
+        let inside = |name: &str| {
+            if path == "." {
+                name.to_owned()
+            } else {
+                format!("{path}.{name}")
+            }
+        };
+        if message.starts_with("unknown field")
+            && let [unknown, known @ ..] = quoted.as_slice()
+        {
+            // Or it ends at the unknown key.
+            let is_there = path.ends_with(unknown);
+            Self {
+                key: if is_there { path } else { inside(unknown) },
+                message: format!("unknown key `{unknown}`"),
+                hint: Some(unknown_key_hint(unknown, known)),
+            }
+        } else if message.starts_with("unknown variant")
+            && let [unknown, known @ ..] = quoted.as_slice()
+        {
+            Self {
+                message: format!("`{unknown}` is not a value that `{path}` can have"),
+                hint: Some(match nearest_name(unknown, known.iter().copied()) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!("one of {}", known.join(", ")),
+                }),
+                key: path,
+            }
+        } else if message.starts_with("missing field")
+            && let [missing] = quoted.as_slice()
+        {
+            Self {
+                key: inside(missing),
+                message: format!("the key `{missing}` is missing"),
+                hint: None,
+            }
+        } else {
+            Self {
+                message: in_words(message),
+                hint: unit_hint(&path, message),
+                key: path,
+            }
+        }
+    }
+
+    /// Whether the message is about the type of a value.
+    fn is_of_type(message: &str) -> bool {
+        !["unknown field", "unknown variant", "missing field"]
+            .iter()
+            .any(|start| message.starts_with(start))
+    }
+}
+
+/// How to mend a key that is not known; `known` are those that are.
+pub(crate) fn unknown_key_hint(unknown: &str, known: &[&str]) -> String {
     // The same quantity in another unit, or without one.
     let stem = |key: &str| {
         key.rsplit_once('_')

@@ -1,6 +1,9 @@
 //! Clearances of a whole cell.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Vector3};
+use needlebench_cell::shape::Shape;
 use needlebench_cell::{Cell, ClearanceClass, CollisionBody, Frame};
 use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 
@@ -14,7 +17,7 @@ pub(crate) const CLASS_COUNT: usize = ClearanceClass::NeedleRoute as usize + 1;
 
 /// What a lower bound by enclosing volumes has to exceed a distance by before the pair is left
 /// out, m. More than the distances' own error, so that leaving out never changes a result.
-const PRUNING_MARGIN_M: f64 = 3e-7;
+pub(crate) const PRUNING_MARGIN_M: f64 = 3e-7;
 
 /// All classes, each at the index that it is cast to.
 const CLASSES: [ClearanceClass; CLASS_COUNT] = [
@@ -76,7 +79,9 @@ pub(crate) type LinkPlacements = [Placement; JOINT_COUNT];
 
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedShape {
-    pub shape: PreparedShape,
+    /// What it was made of.
+    solid: (Shape, Pose),
+    pub shape: Arc<PreparedShape>,
     pub body_from_shape: Placement,
     /// Encloses the shape, in the body's frame.
     pub bound: Capsule,
@@ -117,16 +122,48 @@ struct SolidPair {
 pub struct ClearanceModel {
     pub(crate) chain: Chain,
     world_from_base_link: Pose,
-    pub(crate) bodies: Vec<PlacedBody>,
+    pub(crate) bodies: Vec<Arc<PlacedBody>>,
     pub(crate) pairs: Vec<PlacedPair>,
 }
 
 impl ClearanceModel {
     /// Prepares the geometry of a cell.
     pub fn new(cell: &Cell) -> Self {
+        Self::made_of(cell, &[])
+    }
+
+    /// The model of another cell: what [`ClearanceModel::new`] gives for it, bit for bit, but the
+    /// bodies and shapes that this model has too are not prepared again. Cheap where little differs,
+    /// as between the layouts of a study.
+    pub fn for_cell(&self, cell: &Cell) -> Self {
+        Self::made_of(cell, &self.bodies)
+    }
+
+    /// Number of bodies that the model of a cell would share with this one.
+    pub fn bodies_in_common(&self, cell: &Cell) -> usize {
+        let pairs = self.bodies.iter().zip(&cell.bodies);
+        pairs
+            .filter(|(placed, body)| placed.is_of(body, placed.first_moving))
+            .count()
+    }
+
+    /// Whether the model of a cell would need no shape that this one lacks.
+    pub fn has_shapes_of(&self, cell: &Cell) -> bool {
+        self.bodies.len() == cell.bodies.len()
+            && self.bodies.iter().zip(&cell.bodies).all(|(placed, body)| {
+                placed.solids.len() == body.solids.len()
+                    && placed
+                        .solids
+                        .iter()
+                        .zip(&body.solids)
+                        .all(|(placed, solid)| same_shape(&placed.solid.0, &solid.shape))
+            })
+    }
+
+    fn made_of(cell: &Cell, known: &[Arc<PlacedBody>]) -> Self {
         let mut moving = 0;
-        let bodies = cell.bodies.iter().map(|body| {
-            let placed = placed_body(body, moving);
+        let bodies = cell.bodies.iter().enumerate().map(|(index, body)| {
+            let placed = placed_body(body, moving, known.get(index));
             if placed.frame != Frame::World {
                 moving += placed.solids.len();
             }
@@ -300,14 +337,33 @@ pub(crate) const IDENTITY: Placement = Placement {
     translation: Vector3::new(0.0, 0.0, 0.0),
 };
 
-fn placed_body(body: &CollisionBody, first_moving: usize) -> PlacedBody {
+/// Prepares a body; `known` is one that may be the same or have the same shapes.
+fn placed_body(
+    body: &CollisionBody,
+    first_moving: usize,
+    known: Option<&Arc<PlacedBody>>,
+) -> Arc<PlacedBody> {
+    if let Some(known) = known
+        && known.is_of(body, first_moving)
+    {
+        return Arc::clone(known);
+    }
+    let known = known.map_or(&[][..], |known| &known.solids);
     let solids: Vec<_> = body
         .solids
         .iter()
-        .map(|solid| {
-            let shape = PreparedShape::new(&solid.shape);
+        .enumerate()
+        .map(|(index, solid)| {
+            let twin = known
+                .get(index)
+                .filter(|known| same_shape(&known.solid.0, &solid.shape));
+            let shape = match twin {
+                Some(known) => Arc::clone(&known.shape),
+                None => Arc::new(PreparedShape::new(&solid.shape)),
+            };
             let body_from_shape = Placement::new(&solid.parent_from_shape);
             PlacedShape {
+                solid: (solid.shape.clone(), solid.parent_from_shape),
                 bound: shape.bound.placed(&body_from_shape),
                 seen: Seen::new(&shape, body_from_shape),
                 body_from_shape,
@@ -315,12 +371,34 @@ fn placed_body(body: &CollisionBody, first_moving: usize) -> PlacedBody {
             }
         })
         .collect();
-    PlacedBody {
+    Arc::new(PlacedBody {
         frame: body.frame,
         bound: Capsule::around_balls(solids.iter().map(|solid| &solid.bound)),
         tree: SolidTree::new(&solids.iter().map(|s| &s.seen.block).collect::<Vec<_>>()),
         first_moving,
         solids,
+    })
+}
+
+impl PlacedBody {
+    /// Whether preparing a body would give this one again.
+    fn is_of(&self, body: &CollisionBody, first_moving: usize) -> bool {
+        self.frame == body.frame
+            && self.first_moving == first_moving
+            && self.solids.len() == body.solids.len()
+            && self.solids.iter().zip(&body.solids).all(|(placed, solid)| {
+                placed.solid.1 == solid.parent_from_shape
+                    && same_shape(&placed.solid.0, &solid.shape)
+            })
+    }
+}
+
+/// Whether two shapes are equal, without looking into meshes that are one and the same.
+fn same_shape(a: &Shape, b: &Shape) -> bool {
+    match (a, b) {
+        (Shape::Convex(a), Shape::Convex(b)) => Arc::ptr_eq(a, b) || a == b,
+        (Shape::Mesh(a), Shape::Mesh(b)) => Arc::ptr_eq(a, b) || a == b,
+        _ => a == b,
     }
 }
 

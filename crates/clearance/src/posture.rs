@@ -5,6 +5,8 @@
 //! axis to the other's turned box, which for a box of a table or a wedge of a ring is mostly the
 //! distance itself.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 use needlebench_cell::Frame;
 
@@ -115,7 +117,7 @@ pub(crate) struct Posture {
 }
 
 impl Posture {
-    pub fn new(bodies: &[PlacedBody], links: &LinkPlacements) -> Self {
+    pub fn new(bodies: &[Arc<PlacedBody>], links: &LinkPlacements) -> Self {
         let mut moving = Vec::with_capacity(32);
         let mut balls = Vec::with_capacity(bodies.len());
         for body in bodies {

@@ -4,13 +4,19 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_cell::shape::Solid;
 use needlebench_kinematics::Pose;
 
+use crate::bounds::Capsule;
 use crate::core::{Placement, PreparedShape};
+use crate::model::PRUNING_MARGIN_M;
 use crate::separation::{Separation, in_frame_of_b};
 
 /// Solids made ready for many segments: the search tree of a mesh takes far longer to build than
 /// to ask (0.3 s for 100 000 triangles).
 #[derive(Debug, Clone)]
-pub struct PreparedSolids(Vec<(PreparedShape, Pose)>);
+pub struct PreparedSolids(
+    Vec<(PreparedShape, Pose)>,
+    /// What encloses each, in the parent's frame.
+    Vec<Capsule>,
+);
 
 impl PreparedSolids {
     /// Prepares the solids, in their order.
@@ -18,7 +24,57 @@ impl PreparedSolids {
         let prepared = solids
             .iter()
             .map(|solid| (PreparedShape::new(&solid.shape), solid.parent_from_shape));
-        Self(prepared.collect())
+        let prepared: Vec<_> = prepared.collect();
+        let bounds = prepared
+            .iter()
+            .map(|(shape, place)| shape.bound.placed(&Placement::new(place)))
+            .collect();
+        Self(prepared, bounds)
+    }
+
+    /// The solid that a segment comes nearest to, of those that are wanted, with the signed distance
+    /// that [`PreparedSolids::segment_clearance`] gives for it. What bounding volumes show to be
+    /// farther away is left out.
+    pub fn nearest_to_segment(
+        &self,
+        from: &Point3<f64>,
+        to: &Point3<f64>,
+        radius_m: f64,
+        world_from_parent: &Pose,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Option<(usize, Separation)> {
+        let segment = Segment::new(from, to, radius_m);
+        let bound = {
+            let parent_from_world = Placement::new(&world_from_parent.inverse());
+            let in_parent = parent_from_world.after(&segment.world_from_segment);
+            segment.shape.bound.placed(&in_parent)
+        };
+        let gaps = self.1.iter().map(|other| bound.gap_m(other));
+        let gaps: Vec<(usize, f64)> = gaps
+            .enumerate()
+            .filter(|(index, _)| wanted(*index))
+            .collect();
+        // The most promising one first: its distance leaves most others out.
+        let &(promising, _) = gaps.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let mut best = (promising, self.to(promising, &segment, world_from_parent));
+        for (index, gap_m) in gaps {
+            let least_m = best.1.distance_m;
+            if index == promising || gap_m > least_m + PRUNING_MARGIN_M {
+                continue;
+            }
+            let here = self.to(index, &segment, world_from_parent);
+            if here.distance_m < least_m || (here.distance_m == least_m && index < best.0) {
+                best = (index, here);
+            }
+        }
+        Some(best)
+    }
+
+    fn to(&self, index: usize, segment: &Segment, world_from_parent: &Pose) -> Separation {
+        let (other, parent_from_shape) = &self.0[index];
+        let world_from_solid = Placement::new(&(world_from_parent * parent_from_shape));
+        let solid_from_segment = world_from_solid.inverse_after(&segment.world_from_segment);
+        in_frame_of_b(&segment.shape, other, &solid_from_segment).placed(&world_from_solid)
     }
 
     /// [`segment_clearance`] from these solids.
@@ -29,20 +85,29 @@ impl PreparedSolids {
         radius_m: f64,
         world_from_parent: &Pose,
     ) -> Vec<Separation> {
-        let along = to - from;
-        let shape = PreparedShape::segment(0.5 * along.norm(), radius_m);
-        let world_from_segment = Placement {
-            rotation: rotation_with_z(&along),
-            translation: nalgebra::center(from, to).coords,
-        };
-        self.0
-            .iter()
-            .map(|(other, parent_from_shape)| {
-                let world_from_solid = Placement::new(&(world_from_parent * parent_from_shape));
-                let solid_from_segment = world_from_solid.inverse_after(&world_from_segment);
-                in_frame_of_b(&shape, other, &solid_from_segment).placed(&world_from_solid)
-            })
+        let segment = Segment::new(from, to, radius_m);
+        (0..self.0.len())
+            .map(|index| self.to(index, &segment, world_from_parent))
             .collect()
+    }
+}
+
+/// All points within a radius of a segment, in the world.
+struct Segment {
+    shape: PreparedShape,
+    world_from_segment: Placement,
+}
+
+impl Segment {
+    fn new(from: &Point3<f64>, to: &Point3<f64>, radius_m: f64) -> Self {
+        let along = to - from;
+        Self {
+            shape: PreparedShape::segment(0.5 * along.norm(), radius_m),
+            world_from_segment: Placement {
+                rotation: rotation_with_z(&along),
+                translation: nalgebra::center(from, to).coords,
+            },
+        }
     }
 }
 

@@ -1,12 +1,11 @@
-//! Clearance along recorded motions, and of the planned needle.
+//! Clearance along recorded motions.
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::phantom::Tissue;
-use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom};
+use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::{
-    CertificateOptions, ClassMinima, ClearanceModel, Motion, MotionCertificate, ROUNDING_M,
-    RecordedMotion, Separation, certify, certify_sampled, segment_clearance,
+    CertificateOptions, ClassMinima, ClearanceModel, Motion, MotionCertificate, RecordedMotion,
+    Separation, certify, certify_sampled,
 };
 use needlebench_engine::Recording;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
@@ -215,7 +214,7 @@ pub fn posture_clearance(
         .collect()
 }
 
-fn class_clearance(
+pub(crate) fn class_clearance(
     (solid_a, solid_b): (&str, &str),
     separation: &Separation,
     phase: &'static str,
@@ -234,38 +233,4 @@ fn class_clearance(
         time_s,
         engine: engine.map(str::to_owned),
     }
-}
-
-/// Clearance of the planned needle, from skin to target, from bone, vessels and organs.
-///
-/// The organ that contains the target is left out: the needle has to enter it. Lesions and the
-/// skin do not count.
-pub fn needle_route(cell: &Cell, placed: &PlacedPhantom, goal: &Goal) -> Option<ClassClearance> {
-    let entry = goal.entry_m?;
-    let parts: Vec<_> = placed
-        .phantom
-        .parts
-        .iter()
-        .filter(|part| matches!(part.tissue, Tissue::Bone | Tissue::Vessel | Tissue::Organ))
-        .filter(|part| goal.target_organ.is_none() || part.organ != goal.target_organ)
-        .map(|part| part.solid.clone())
-        .collect();
-    segment_clearance(
-        &entry,
-        &goal.target_m,
-        0.5 * cell.tool.needle.outer_diameter_m,
-        &parts,
-        &placed.world_from_phantom,
-    )
-    .into_iter()
-    .zip(&parts)
-    .min_by(|(a, _), (b, _)| a.distance_m.total_cmp(&b.distance_m))
-    .map(|(separation, solid)| {
-        let pair = ("needle", solid.name.as_str());
-        ClassClearance {
-            // One exact distance that is never optimistic, but for rounding.
-            certified_lower_bound_m: Some(separation.distance_m - ROUNDING_M),
-            ..class_clearance(pair, &separation, "insertion", None, None)
-        }
-    })
 }

@@ -21,22 +21,24 @@ mod reason;
 pub mod referee;
 pub mod report;
 pub mod room;
+mod route;
 mod sensitivity;
 mod stored;
 mod threshold;
 
 pub use clearance::{
-    ClearanceSeries, certify_recording, measure_clearance, needle_route, planned_clearance,
+    ClearanceSeries, certify_recording, measure_clearance, planned_clearance,
     posture_clearance, recorded_clearance, sample_indices,
 };
 pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balance};
-pub use criteria::{Criterion, check_configuration};
+pub use criteria::{Criterion, check_configuration, clearance_limits};
 pub use judge::judge;
 pub use motion::{
     ContactMeasurement, EngineDifference, MotionMeasurement, SaturatedJoint, engine_difference,
     measure_motion,
 };
-pub use needle::{NeedleMeasurement, measure_needle, tip_of};
+pub use needle::{NeedleMeasurement, measure_guide, measure_needle, tip_of};
+pub use route::{RouteObstacles, needle_route};
 pub use sensitivity::tip_sensitivity;
 pub use stored::StoredReport;
 pub use threshold::{Limit, Threshold, ThresholdError};

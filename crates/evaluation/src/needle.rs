@@ -42,10 +42,19 @@ pub fn measure_needle(
     world_from_flange: &Pose,
 ) -> NeedleMeasurement {
     let exit = world_from_flange * cell.tool.flange_from_guide_exit;
+    measure_guide(phantom, goal, &exit)
+}
+
+/// Measures the needle for a pose of the guide's exit in the world, z along the insertion.
+pub fn measure_guide(
+    phantom: Option<&PlacedPhantom>,
+    goal: &Goal,
+    exit: &Pose,
+) -> NeedleMeasurement {
     let exit_point = Point3::from(exit.translation.vector);
     let actual = exit.rotation * Vector3::z();
     let planned = goal.axis.into_inner();
-    let tip = tip_of(cell, goal, world_from_flange);
+    let tip = exit * Point3::new(0.0, 0.0, goal.insertion_length_m);
     let miss = tip - goal.target_m;
     let to_target = goal.target_m - exit_point;
     let entry_point_error_m = phantom.zip(goal.entry_m).and_then(|(placed, entry)| {

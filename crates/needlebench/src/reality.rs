@@ -40,26 +40,9 @@ impl<'a> Reality<'a> {
         resolved: &'a ResolvedScenario,
         nominal: &'a ClearanceModel,
     ) -> Result<Self, RegistrationError> {
-        let imperfect = resolved
-            .imperfections
-            .as_ref()
-            .map(|imperfections| {
-                let mut random = SplitMix64::new(resolved.scenario.seed ^ STREAM);
-                let layout = Layout::new(imperfections);
-                let draw = layout.draw(&mut random);
-                let place = resolved
-                    .phantom
-                    .as_ref()
-                    .map(|each| &each.world_from_phantom);
-                let noise_seed = random.next_u64();
-                let truth = Truth::new(
-                    &resolved.cell,
-                    place,
-                    imperfections,
-                    &layout,
-                    &draw,
-                    noise_seed,
-                )?;
+        let imperfect = drawn_truth(resolved)
+            .map(|truth| {
+                let truth = truth?;
                 let cell = truth.cell(&resolved.cell);
                 Ok(Imperfect {
                     model: ClearanceModel::new(&cell),
@@ -180,8 +163,8 @@ impl<'a> Reality<'a> {
         Some(truth.needle_points(nominal, &settled.position, [0.0, depth_m])[1])
     }
 
-    /// The needle where it is predicted to come to rest at the end of a motion; none for the nominal
-    /// robot, and where a drive is too weak.
+    /// The needle where it is predicted to come to rest at the end of a motion, but for its place in
+    /// the skin; none for the nominal robot, and where a drive is too weak.
     pub fn predicted_needle(
         &self,
         goal: usize,
@@ -189,7 +172,7 @@ impl<'a> Reality<'a> {
     ) -> Option<NeedleMeasurement> {
         let (_, settled) = self.settled(trajectory)?;
         let flange = self.cell().robot.world_from_flange(&settled.position);
-        let needle = measure_needle(self.cell(), self.phantom(), self.goal(goal), &flange);
+        let needle = measure_needle(self.cell(), None, self.goal(goal), &flange);
         Some(needle)
     }
 
@@ -204,6 +187,31 @@ impl<'a> Reality<'a> {
         let settled = settle(&servo, &dynamics, truth, resting.as_ref(), &target).ok()?;
         Some((truth, settled))
     }
+}
+
+/// One draw of the scenario's imperfections, from its seed; none without any.
+///
+/// # Errors
+/// [`RegistrationError`] for markers that determine no pose.
+pub(crate) fn drawn_truth(resolved: &ResolvedScenario) -> Option<Result<Truth, RegistrationError>> {
+    let imperfections = resolved.imperfections.as_ref()?;
+    let mut random = SplitMix64::new(resolved.scenario.seed ^ STREAM);
+    let layout = Layout::new(imperfections);
+    let draw = layout.draw(&mut random);
+    let place = resolved
+        .phantom
+        .as_ref()
+        .map(|each| &each.world_from_phantom);
+    let noise_seed = random.next_u64();
+    let cell = &resolved.cell;
+    Some(Truth::new(
+        cell,
+        place,
+        imperfections,
+        &layout,
+        &draw,
+        noise_seed,
+    ))
 }
 
 /// The servo as it believes the robot to be.

@@ -18,7 +18,7 @@ const BOTH: [EngineName; 2] = [EngineName::Rapier, EngineName::Mujoco];
 
 const IMPERFECT: &str = "
 [imperfections]
-budget_samples = 0
+budget_samples = 2
 [imperfections.calibration]
 [imperfections.encoder]
 [imperfections.payload]
@@ -164,22 +164,18 @@ fn numbers_of_a_dynamic_case_are_those_of_a_run() {
 }
 
 #[test]
-fn numbers_of_an_imperfect_arm_and_its_events_are_those_of_a_run() {
-    let strict = SMALL.replace(
-        "max_tip_position_error_mm = 1",
-        "max_tip_position_error_mm = 1\nmax_tip_rms_mm = 9",
-    );
-    let (rows, report) = is_that_of_a_run(&format!("{strict}{IMPERFECT}{EVENTS}"));
-    let failed: Vec<&str> = rows
-        .iter()
-        .filter(|row| row.outcome == Outcome::Failed)
-        .map(|row| row.detail.as_ref())
-        .collect();
-    assert!(
-        failed.contains(&"max_tip_position_error_mm"),
-        "{failed:?} {:?}",
-        report.configurations[0].status
-    );
+fn numbers_of_an_imperfect_arm_are_those_of_a_run() {
+    let (rows, _) = is_that_of_a_run(&format!("{SMALL}{IMPERFECT}"));
+    // It misses by more than the millimetre that is allowed.
+    let missed = |row: &&Row| row.detail == "max_tip_position_error_mm";
+    assert!(rows.iter().filter(missed).count() > 0, "{rows:?}");
+}
+
+#[test]
+fn events_of_a_case_are_judged_as_those_of_a_run() {
+    let (rows, _) = is_that_of_a_run(&format!("{SMALL}{EVENTS}"));
+    let missed = |row: &&Row| row.detail.starts_with("events.");
+    assert!(rows.iter().filter(missed).count() > 0, "{rows:?}");
 }
 
 /// Everything in a row, so that two of them are equal where all bits are.

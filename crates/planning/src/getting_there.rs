@@ -142,6 +142,15 @@ impl Planner<'_> {
         plan
     }
 
+    /// The last, straight part of a posture's motion alone: along the needle to its place, without
+    /// the way there. `None` where the line meets a singularity or leaves the workspace. Nothing is
+    /// checked for collisions.
+    pub fn approach(&self, goal: &Goal, candidate: &Candidate) -> Option<JointTrajectory> {
+        let line = self.approach_line(goal, candidate).ok()?;
+        let start = JointTrajectory::starting_at(line.start());
+        Some(start.then_along(Phase::Approach, line, &self.resolved.motion))
+    }
+
     fn approach_line(&self, goal: &Goal, candidate: &Candidate) -> Result<JointPath, LineError> {
         let robot = &self.cell().robot;
         let axis = robot.world_from_base_link.rotation.inverse() * goal.axis.into_inner();

@@ -1,5 +1,7 @@
 //! Clearance along planned motions.
 
+use std::sync::OnceLock;
+
 use needlebench_cell::{BodyKind, Cell, ClearanceClass, Frame};
 use needlebench_clearance::{ClassMinima, ClearanceModel, PairClearance};
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
@@ -9,8 +11,10 @@ use needlebench_kinematics::{JOINT_COUNT, Joints};
 #[derive(Debug)]
 pub struct MotionChecker<'a> {
     model: &'a ClearanceModel,
-    /// Radius about each joint's axis within which everything beyond the joint stays, m.
-    sweep_radius_m: Joints,
+    cell: &'a Cell,
+    /// Radius about each joint's axis within which everything beyond the joint stays, m; found when a
+    /// motion is checked.
+    sweep_radius_m: OnceLock<Joints>,
     /// Clearance from the surroundings below which bodies collide, m.
     min_clearance_m: f64,
     /// Clearance of the arm from itself below which bodies collide, m.
@@ -42,7 +46,8 @@ impl<'a> MotionChecker<'a> {
     ) -> Self {
         Self {
             model,
-            sweep_radius_m: sweep_radii(cell),
+            cell,
+            sweep_radius_m: OnceLock::new(),
             min_clearance_m,
             min_self_clearance_m,
             spacing_m,
@@ -152,7 +157,9 @@ impl<'a> MotionChecker<'a> {
 
     /// Bound on the way of any point of arm and tool between two postures, m.
     pub(crate) fn largest_displacement_m(&self, from: &Joints, to: &Joints) -> f64 {
-        self.sweep_radius_m.dot(&(to - from).abs())
+        self.sweep_radius_m
+            .get_or_init(|| sweep_radii(self.cell))
+            .dot(&(to - from).abs())
     }
 }
 

@@ -176,6 +176,31 @@ impl<'a> Planner<'a> {
 
     /// Plans all eight configurations of a goal.
     pub fn plan(&self, goal: &Goal) -> GoalPlan {
+        let configurations = Configuration::ALL
+            .into_iter()
+            .zip(self.grids(goal))
+            .map(|(configuration, grid)| self.plan_configuration(goal, configuration, grid))
+            .collect();
+        GoalPlan { configurations }
+    }
+
+    /// For each of the eight configurations the posture that a plan tries first: of those that break
+    /// no rule the best by the scenario's `roll_aim`, else the one that comes nearest to working. No
+    /// motions are looked at.
+    pub fn postures(&self, goal: &Goal) -> [Member; 8] {
+        if let Roll::Fixed(roll_rad) = goal.roll {
+            return self.members_at(goal, roll_rad);
+        }
+        let mut grids = self.grids(goal).into_iter();
+        Configuration::ALL.map(|configuration| {
+            let grid = grids.next().expect("there are eight");
+            let ranked = self.ranked(goal, configuration, &grid);
+            ranked.into_iter().next().unwrap_or_else(|| nearest(grid))
+        })
+    }
+
+    /// All members at the rolls that are looked at, by configuration.
+    fn grids(&self, goal: &Goal) -> [Vec<Member>; 8] {
         let rolls = self.rolls(goal, self.planning().roll_samples);
         let mut grids: [Vec<Member>; 8] = std::array::from_fn(|_| Vec::with_capacity(rolls.len()));
         for &roll_rad in &rolls {
@@ -183,24 +208,16 @@ impl<'a> Planner<'a> {
                 grid.push(member);
             }
         }
-        let configurations = Configuration::ALL
-            .into_iter()
-            .zip(grids)
-            .map(|(configuration, grid)| self.plan_configuration(goal, configuration, grid))
-            .collect();
-        GoalPlan { configurations }
+        grids
     }
 
-    fn plan_configuration(
-        &self,
-        goal: &Goal,
-        configuration: Configuration,
-        grid: Vec<Member>,
-    ) -> ConfigurationPlan {
+    /// Members with a posture: those that work, best first, or if none does all, nearest to working
+    /// first.
+    fn ranked(&self, goal: &Goal, configuration: Configuration, grid: &[Member]) -> Vec<Member> {
         let aim = self.planning().roll_aim;
         // The best of each range that works, then the rest of what works.
         let mut members: Vec<Member> = self
-            .family_for(goal, configuration, &grid, &[aim])
+            .family_for(goal, configuration, grid, &[aim])
             .ranges
             .into_iter()
             .map(|range| range.best_for(aim).member.clone())
@@ -210,7 +227,7 @@ impl<'a> Planner<'a> {
             .iter()
             .filter(|member| member.candidate.is_some() && (member.works() || !some_work));
         members.extend(of_grid.cloned());
-        // Best first, or nearest to working first; equal ones stay in the order of roll.
+        // Equal ones stay in the order of roll.
         if some_work {
             members.sort_by(|a, b| {
                 let value = |member: &Member| {
@@ -222,18 +239,22 @@ impl<'a> Planner<'a> {
         } else {
             members.sort_by(|a, b| b.surplus.total_cmp(&a.surplus));
         }
+        members
+    }
+
+    fn plan_configuration(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        grid: Vec<Member>,
+    ) -> ConfigurationPlan {
+        let members = self.ranked(goal, configuration, &grid);
         let candidates: Vec<(Candidate, Vec<Rejection>)> = members
             .into_iter()
             .filter_map(|member| Some((member.candidate?, member.rejections)))
             .collect();
         if candidates.is_empty() {
-            // Of many rolls, the one that comes nearest says most.
-            let rejections = grid
-                .into_iter()
-                .flat_map(|member| member.rejections)
-                .min_by(|a, b| a.value.total_cmp(&b.value))
-                .into_iter()
-                .collect();
+            let rejections = nearest(grid).rejections;
             return ConfigurationPlan {
                 configuration,
                 candidate: None,
@@ -414,6 +435,18 @@ impl<'a> Planner<'a> {
             manipulability: jacobian.determinant().abs(),
         }
     }
+}
+
+/// Of members without a posture the one that comes nearest, which says most, with the rule that it
+/// breaks.
+fn nearest(grid: Vec<Member>) -> Member {
+    let missing = |member: &Member| {
+        let values = member.rejections.iter().map(|rejection| rejection.value);
+        values.fold(f64::INFINITY, f64::min)
+    };
+    grid.into_iter()
+        .min_by(|a, b| missing(a).total_cmp(&missing(b)))
+        .expect("at least one roll is looked at")
 }
 
 /// Angle between two rolls that count as different for a motion, rad.

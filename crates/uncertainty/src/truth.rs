@@ -388,6 +388,14 @@ impl Truth {
         real
     }
 
+    /// Pose of the needle's axis at the guide's exit for a posture of the real arm, world.
+    pub fn world_from_guide_exit(&self, nominal: &Cell, q: &Joints) -> Pose {
+        nominal.robot.world_from_base_link
+            * self.chain.base_link_from_flange(q)
+            * nominal.tool.flange_from_guide_exit
+            * self.needle_in_guide(nominal.tool.guide_length_m())
+    }
+
     /// Entry-depth point and tip of the needle for a posture of the real arm, world; `depths_m`
     /// from the guide's exit along the needle.
     pub fn needle_points(
@@ -396,10 +404,7 @@ impl Truth {
         q: &Joints,
         depths_m: [f64; 2],
     ) -> [Point3<f64>; 2] {
-        let exit = nominal.robot.world_from_base_link
-            * self.chain.base_link_from_flange(q)
-            * nominal.tool.flange_from_guide_exit
-            * self.needle_in_guide(nominal.tool.guide_length_m());
+        let exit = self.world_from_guide_exit(nominal, q);
         depths_m.map(|depth_m| exit * Point3::new(0.0, 0.0, depth_m))
     }
 }

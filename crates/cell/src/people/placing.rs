@@ -124,6 +124,7 @@ pub(crate) fn resolve_people(
     } else {
         &section.persons
     };
+    let obstacles = Obstacles::new(room);
     let mut by_goal = Vec::new();
     for goal in goals {
         let mut placed: Vec<Person> = Vec::new();
@@ -137,7 +138,16 @@ pub(crate) fn resolve_people(
                 earlier => format!("{}_{}", person.role.name(), earlier + 1),
             };
             let given = !section.persons.is_empty();
-            let (side, position_m) = place(toml, index, given, person, goal, sides.as_ref(), room)?;
+            let (side, position_m) = place(
+                toml,
+                index,
+                given,
+                person,
+                goal,
+                sides.as_ref(),
+                &room.robot_base_m,
+                &obstacles,
+            )?;
             placed.push(Person {
                 name,
                 role: person.role,
@@ -176,7 +186,8 @@ fn place(
     person: &PersonSection,
     goal: &Goal,
     sides: Option<&PatientSides>,
-    room: &Room<'_>,
+    robot_base_m: &Point3<f64>,
+    obstacles: &Obstacles<'_>,
 ) -> Result<(Option<Side>, Point3<f64>), Finding> {
     let floor_m = person.step_height_mm * 1e-3;
     let tallest_m = statures_m(person).into_iter().fold(0.0, f64::max);
@@ -205,13 +216,13 @@ fn place(
     };
     if let Some([x_mm, y_mm]) = person.position_mm {
         let position = Point3::new(x_mm * 1e-3, y_mm * 1e-3, floor_m);
-        if let Some(body) = stands_in(&position, tallest_m, room) {
+        if let Some(body) = obstacles.hit(&position, tallest_m) {
             return Err(refuse("position_mm", &position, body));
         }
         let side = sides.and_then(|sides| sides.nearest(&(position - entry)));
         return Ok((side, position));
     }
-    let away = entry - room.robot_base_m;
+    let away = entry - robot_base_m;
     let directions = if let Some(sides) = sides {
         match person.side {
             Some(side) => vec![(
@@ -233,7 +244,7 @@ fn place(
     if let Some(distance_mm) = person.distance_mm {
         let (side, direction) = directions[0];
         let position = at(&direction, distance_mm * 1e-3);
-        return match stands_in(&position, tallest_m, room) {
+        return match obstacles.hit(&position, tallest_m) {
             Some(body) => Err(refuse("distance_mm", &position, body)),
             None => Ok((side, position)),
         };
@@ -241,7 +252,7 @@ fn place(
     for (side, direction) in directions {
         for step in 0..FARTHEST_STEPS {
             let position = at(&direction, BODY_RADIUS_M + f64::from(step) * STEP_M);
-            if stands_in(&position, tallest_m, room).is_none() {
+            if obstacles.hit(&position, tallest_m).is_none() {
                 return Ok((side, position));
             }
         }
@@ -262,30 +273,67 @@ fn place(
 const STEP_M: f64 = 0.01;
 const FARTHEST_STEPS: u32 = 250;
 
-/// What a body that stands here would be in, if anything: axis and rim are tried every 50 mm.
-fn stands_in<'a>(position: &Point3<f64>, stature_m: f64, room: &Room<'a>) -> Option<&'a str> {
-    const SLICE_M: f64 = 0.05;
-    const RIM_POINTS: u32 = 12;
-    let offsets: Vec<Vector3<f64>> = (0..RIM_POINTS)
-        .map(|i| {
-            let angle = std::f64::consts::TAU * f64::from(i) / f64::from(RIM_POINTS);
-            Vector3::new(angle.cos(), angle.sin(), 0.0) * BODY_RADIUS_M
-        })
-        .chain([Vector3::zeros()])
-        .collect();
-    let mut height_m = 0.5 * SLICE_M;
-    while height_m < stature_m {
-        for offset in &offsets {
-            let point = position + offset + Vector3::z() * height_m;
-            let found = room
-                .solids
-                .iter()
-                .find(|(_, solid)| solid_contains(solid, &point));
-            if let Some((name, _)) = found {
-                return Some(name);
+/// A solid of the room with a box around it, along the world's axes, m.
+struct Obstacle<'a> {
+    body: &'a str,
+    solid: &'a Solid,
+    low: Point3<f64>,
+    high: Point3<f64>,
+}
+
+/// What people cannot stand in.
+struct Obstacles<'a>(Vec<Obstacle<'a>>);
+
+impl<'a> Obstacles<'a> {
+    fn new(room: &Room<'a>) -> Self {
+        let obstacles = room.solids.iter().map(|&(body, solid)| {
+            let (low, high) = solid.bounding_box();
+            Obstacle {
+                body,
+                solid,
+                low,
+                high,
             }
-        }
-        height_m += SLICE_M;
+        });
+        Self(obstacles.collect())
     }
-    None
+
+    /// What a body that stands here would be in, if anything: axis and rim are tried every 50 mm.
+    fn hit(&self, position: &Point3<f64>, stature_m: f64) -> Option<&'a str> {
+        const SLICE_M: f64 = 0.05;
+        const RIM_POINTS: u32 = 12;
+        let near: Vec<&Obstacle<'_>> = self
+            .0
+            .iter()
+            .filter(|each| {
+                (0..2).all(|axis| {
+                    each.low[axis] <= position[axis] + BODY_RADIUS_M
+                        && each.high[axis] >= position[axis] - BODY_RADIUS_M
+                })
+            })
+            .collect();
+        let offsets: [Vector3<f64>; RIM_POINTS as usize + 1] = std::array::from_fn(|i| {
+            if i == RIM_POINTS as usize {
+                return Vector3::zeros();
+            }
+            let angle = std::f64::consts::TAU * i as f64 / f64::from(RIM_POINTS);
+            Vector3::new(angle.cos(), angle.sin(), 0.0) * BODY_RADIUS_M
+        });
+        let mut height_m = 0.5 * SLICE_M;
+        while height_m < stature_m {
+            let z_m = position.z + height_m;
+            let at_this_height = |each: &&&Obstacle<'_>| (each.low.z..=each.high.z).contains(&z_m);
+            if near.iter().any(|each| at_this_height(&each)) {
+                for offset in &offsets {
+                    let point = position + offset + Vector3::z() * height_m;
+                    let mut standing = near.iter().filter(at_this_height);
+                    if let Some(found) = standing.find(|each| solid_contains(each.solid, &point)) {
+                        return Some(found.body);
+                    }
+                }
+            }
+            height_m += SLICE_M;
+        }
+        None
+    }
 }

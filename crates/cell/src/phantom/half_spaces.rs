@@ -47,10 +47,18 @@ impl HalfSpaces {
 
     /// Depth of the shallowest point of a solid, m; negative when it sticks out.
     pub fn depth_of_solid_m(&self, solid: &Solid) -> f64 {
-        self.0
-            .iter()
-            .map(|plane| plane.offset_m - reach_m(solid, &plane.normal))
-            .fold(f64::INFINITY, f64::min)
+        /// More than the rounding of a ball's reach.
+        const ROUNDING_M: f64 = 1e-9;
+        // A ball around the solid shows most planes to be farther away than the nearest one.
+        let centre = &solid.parent_from_shape.translation.vector;
+        let radius_m = solid.shape.bounding_radius_m() + ROUNDING_M;
+        self.0.iter().fold(f64::INFINITY, |least_m, plane| {
+            if plane.offset_m - plane.normal.dot(centre) - radius_m > least_m {
+                least_m
+            } else {
+                least_m.min(plane.offset_m - reach_m(solid, &plane.normal))
+            }
+        })
     }
 
     /// Widest gap between this body and a solid across one of this body's face planes, m.
@@ -104,13 +112,12 @@ fn reach_m(solid: &Solid, direction: &UnitVector3<f64>) -> f64 {
         .parent_from_shape
         .rotation
         .inverse_transform_vector(direction);
-    let across = local.x.hypot(local.y);
     let reach = match &solid.shape {
         Shape::Sphere { radius_m } => *radius_m,
         Shape::Cylinder {
             radius_m,
             half_length_m,
-        } => radius_m * across + half_length_m * local.z.abs(),
+        } => radius_m * local.x.hypot(local.y) + half_length_m * local.z.abs(),
         Shape::Capsule {
             radius_m,
             half_length_m,

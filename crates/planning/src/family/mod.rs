@@ -58,20 +58,27 @@ impl Planner<'_> {
     /// All eight configurations at one roll, in the order of [`Configuration::ALL`]: postures only,
     /// no motions.
     pub fn members_at(&self, goal: &Goal, roll_rad: f64) -> [Member; 8] {
-        let pose = self.base_link_from_flange(goal, roll_rad);
-        let found = self.kinematics().branches(&pose, Some(self.start()));
-        Configuration::ALL.map(|configuration| self.member(configuration, roll_rad, &found))
+        let found = self.solutions_at(goal, roll_rad);
+        Configuration::ALL.map(|configuration| self.member_of(roll_rad, configuration, &found))
     }
 
     /// One configuration at one roll.
     pub fn member_at(&self, goal: &Goal, configuration: Configuration, roll_rad: f64) -> Member {
-        let pose = self.base_link_from_flange(goal, roll_rad);
-        let found = self.kinematics().branches(&pose, Some(self.start()));
-        self.member(configuration, roll_rad, &found)
+        let found = self.solutions_at(goal, roll_rad);
+        self.member_of(roll_rad, configuration, &found)
     }
 
-    /// One configuration among the solutions at one roll.
-    fn member(&self, configuration: Configuration, roll_rad: f64, found: &Solutions) -> Member {
+    fn solutions_at(&self, goal: &Goal, roll_rad: f64) -> Solutions {
+        let pose = self.base_link_from_flange(goal, roll_rad);
+        self.kinematics().branches(&pose, Some(self.start()))
+    }
+
+    fn member_of(
+        &self,
+        roll_rad: f64,
+        configuration: Configuration,
+        found: &Solutions,
+    ) -> Member {
         let solution = found
             .solutions
             .iter()

@@ -43,7 +43,7 @@ pub struct RollRange {
     pub before: Option<Edge>,
     /// Why it ends where it does.
     pub after: Option<Edge>,
-    /// The best member for each aim that was asked for, in their order.
+    /// The best member for each aim, in the order of [`Aim::ALL`].
     pub best: Vec<Best>,
     /// How far each joint turns on the way from one end to the other, largest position less
     /// smallest, rad.
@@ -64,14 +64,11 @@ impl RollRange {
     }
 
     /// The best member for an aim.
-    ///
-    /// # Panics
-    /// If the family was not made for that aim.
     pub fn best_for(&self, aim: Aim) -> &Best {
         self.best
             .iter()
             .find(|best| best.aim == aim)
-            .expect("a range has a best member for every aim that was asked for")
+            .expect("a range has a best member for every aim")
     }
 }
 
@@ -100,13 +97,13 @@ struct Knot {
 
 impl Planner<'_> {
     /// Ranges of one configuration from its members on an even grid of rolls, in ascending order
-    /// from 0; or from the one member of a goal with a fixed roll. With the best members for all aims.
+    /// from 0; or from the one member of a goal with a fixed roll.
     pub fn family(&self, goal: &Goal, configuration: Configuration, grid: &[Member]) -> Family {
         self.family_for(goal, configuration, grid, &Aim::ALL)
     }
 
-    /// The same with the best members for some aims alone: searching for them takes most of the time.
-    pub fn family_for(
+    /// [`Planner::family`] with the best members for some aims alone.
+    pub(crate) fn family_for(
         &self,
         goal: &Goal,
         configuration: Configuration,
@@ -124,7 +121,7 @@ impl Planner<'_> {
                 member: only.clone(),
             }];
             let ranges = if only.works() {
-                vec![self.range((goal, configuration, aims), &knots, None, None)]
+                vec![self.range(goal, configuration, &knots, None, None, aims)]
             } else {
                 Vec::new()
             };
@@ -132,7 +129,7 @@ impl Planner<'_> {
         }
         let knots = closer_look(grid, &at);
         if knots.iter().all(|knot| knot.member.works()) {
-            let mut range = self.range((goal, configuration, aims), &knots, None, None);
+            let mut range = self.range(goal, configuration, &knots, None, None, aims);
             range.is_whole_circle = true;
             range.to_rad = range.from_rad + TAU;
             return Family {
@@ -172,10 +169,12 @@ impl Planner<'_> {
                     }));
                     inside.extend(high);
                     ranges.push(self.range(
-                        (goal, configuration, aims),
+                        goal,
+                        configuration,
                         &inside,
                         Some(before),
                         Some(after),
+                        aims,
                     ));
                 }
                 _ => {}
@@ -193,16 +192,18 @@ impl Planner<'_> {
     /// A range from all its members in ascending order, which all work.
     fn range(
         &self,
-        (goal, configuration, aims): (&Goal, Configuration, &[Aim]),
+        goal: &Goal,
+        configuration: Configuration,
         knots: &[Knot],
         before: Option<Edge>,
         after: Option<Edge>,
+        aims: &[Aim],
     ) -> RollRange {
         let whole = before.is_none() && knots.len() > 1;
         let (from_rad, to_rad) = (knots[0].roll_rad, knots[knots.len() - 1].roll_rad);
         let best = aims
             .iter()
-            .map(|&aim| self.best(goal, configuration, knots, whole, aim))
+            .map(|aim| self.best(goal, configuration, knots, whole, *aim))
             .collect();
         let (low, high) = joint_extent(knots);
         let limits = &self.cell().robot.limits;

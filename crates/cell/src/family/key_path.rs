@@ -1,0 +1,144 @@
+//! Keys of a scenario, by their path.
+
+use std::fmt;
+
+/// Name of the case's goal in paths.
+const GOAL: &str = "goal";
+
+/// A step into a table or an array.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Step {
+    Name(String),
+    Index(usize),
+}
+
+/// Path of a key in a scenario: `phantom.position_mm[0]`, `robot.base_position_mm`, `tool.urdf`,
+/// `seed`. The case's goal, whichever it is, is `goal`: `goal.roll_deg`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct KeyPath(pub(super) Vec<Step>);
+
+impl KeyPath {
+    /// Reads a path.
+    ///
+    /// # Errors
+    /// A message for people, where the text is no path.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let mut steps = Vec::new();
+        for part in text.split('.') {
+            let (name, mut indices) = part.split_at(part.find('[').unwrap_or(part.len()));
+            let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+            if name.is_empty() || !name.chars().all(is_name) {
+                return Err(format!(
+                    "`{text}` is not the path of a key: names joined by dots, as in \
+                     `phantom.position_mm[0]`"
+                ));
+            }
+            steps.push(Step::Name(name.to_owned()));
+            while !indices.is_empty() {
+                let index = indices
+                    .strip_prefix('[')
+                    .and_then(|rest| rest.split_once(']'))
+                    .and_then(|(index, rest)| Some((index.parse::<usize>().ok()?, rest)));
+                let Some((index, rest)) = index else {
+                    return Err(format!(
+                        "`{text}` is not the path of a key: an index is a whole number in \
+                         brackets after a name, as in `phantom.position_mm[0]`"
+                    ));
+                };
+                steps.push(Step::Index(index));
+                indices = rest;
+            }
+        }
+        Ok(Self(steps))
+    }
+
+    /// Whether it is a key of the case's goal.
+    pub fn is_of_goal(&self) -> bool {
+        self.0.first() == Some(&Step::Name(GOAL.to_owned()))
+    }
+
+    /// Unit that the last name ends with, such as `mm` or `deg`; empty if it has none.
+    pub fn unit(&self) -> &'static str {
+        /// Endings of names, and how they are written.
+        const UNITS: [(&str, &str); 15] = [
+            ("_mm_s3", "mm/s^3"),
+            ("_mm_s2", "mm/s^2"),
+            ("_mm_s", "mm/s"),
+            ("_deg_s3", "deg/s^3"),
+            ("_deg_s2", "deg/s^2"),
+            ("_deg_s", "deg/s"),
+            ("_nms_rad", "N m s/rad"),
+            ("_nm_rad", "N m/rad"),
+            ("_kgm2", "kg m^2"),
+            ("_mm", "mm"),
+            ("_deg", "deg"),
+            ("_rad", "rad"),
+            ("_ms", "ms"),
+            ("_kg", "kg"),
+            ("_s", "s"),
+        ];
+        let name = self.0.iter().rev().find_map(|step| match step {
+            Step::Name(name) => Some(name.as_str()),
+            Step::Index(_) => None,
+        });
+        UNITS
+            .iter()
+            .find(|(ending, _)| name.is_some_and(|name| name.ends_with(ending)))
+            .map_or("", |(_, unit)| unit)
+    }
+}
+
+impl fmt::Display for KeyPath {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, step) in self.0.iter().enumerate() {
+            match step {
+                Step::Name(name) if index == 0 => write!(formatter, "{name}")?,
+                Step::Name(name) => write!(formatter, ".{name}")?,
+                Step::Index(index) => write!(formatter, "[{index}]")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_written_as_it_was_read() {
+        for text in [
+            "seed",
+            "phantom.position_mm[0]",
+            "goal.roll_deg",
+            "imperfections.registration.markers_mm[2][1]",
+            "phantom.parts[0].position_mm",
+        ] {
+            assert_eq!(KeyPath::parse(text).unwrap().to_string(), text);
+        }
+        assert!(KeyPath::parse("goal.roll_deg").unwrap().is_of_goal());
+        assert!(!KeyPath::parse("goals[0].roll_deg").unwrap().is_of_goal());
+    }
+
+    #[test]
+    fn what_is_no_path_is_refused() {
+        for text in ["", ".", "a.", "a..b", "[0]", "a[", "a[x]", "a[-1]", "a[0]b", "a b"] {
+            let message = KeyPath::parse(text).unwrap_err();
+            assert!(message.contains("path of a key"), "{message}");
+        }
+    }
+
+    #[test]
+    fn the_unit_is_the_last_names() {
+        for (text, unit) in [
+            ("phantom.position_mm[0]", "mm"),
+            ("phantom.head_yaw_deg", "deg"),
+            ("motion.joint_velocity_deg_s", "deg/s"),
+            ("tool.urdf", ""),
+            ("imperfections.breathing.phase", ""),
+            ("imperfections.breathing.period_s", "s"),
+        ] {
+            assert_eq!(KeyPath::parse(text).unwrap().unit(), unit);
+        }
+    }
+}

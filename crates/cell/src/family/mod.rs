@@ -1,0 +1,132 @@
+//! One scenario, varied: many layouts of which each differs in a few keys.
+
+mod edit;
+mod key_path;
+mod schema;
+mod setting;
+
+use std::path::{Path, PathBuf};
+
+pub use key_path::KeyPath;
+pub use setting::{Change, Setting};
+
+use crate::parts::Library;
+use crate::resolve::resolve;
+use crate::toml_text::TomlText;
+use crate::{Finding, Overrides, ResolvedScenario, load_scenario, nearest_name};
+use edit::{EditError, Editable};
+use schema::Keys;
+
+/// A scenario of which layouts are made by changing keys.
+///
+/// What [`ScenarioFamily::vary`] gives is what the scenario's file would give with those keys
+/// changed in it, but for the hash of the file, which stays that of the file as it is.
+#[derive(Debug)]
+pub struct ScenarioFamily {
+    base: ResolvedScenario,
+    editable: Editable,
+    keys: Keys,
+    folder: PathBuf,
+    overrides: Overrides,
+    library: Library,
+}
+
+impl ScenarioFamily {
+    /// Reads and resolves a scenario file.
+    ///
+    /// # Errors
+    /// As [`load_scenario`].
+    pub fn load(path: &Path, overrides: &Overrides) -> Result<Self, Vec<Finding>> {
+        let base = load_scenario(path, overrides)?;
+        let editable = Editable::new(base.scenario.clone())
+            .map_err(|error| vec![Finding::new(&base.source.file, error)])?;
+        Ok(Self {
+            base,
+            editable,
+            keys: Keys::new(),
+            folder: path.parent().unwrap_or(Path::new("")).to_owned(),
+            overrides: overrides.clone(),
+            library: Library::default(),
+        })
+    }
+
+    /// The scenario as it stands in its file, with all its goals.
+    pub fn base(&self) -> &ResolvedScenario {
+        &self.base
+    }
+
+    /// Names of its goals, in the order of the file.
+    pub fn goals(&self) -> impl ExactSizeIterator<Item = &str> {
+        let goals = self.editable.scenario.goals.iter();
+        goals.map(|goal| goal.name.as_str())
+    }
+
+    /// The scenario with one goal alone and some keys changed, one after the other.
+    ///
+    /// # Errors
+    /// What is wrong with the layout, with keys and values; there are no lines, since no text has
+    /// these values.
+    pub fn vary(
+        &self,
+        goal: &str,
+        changes: &[(KeyPath, Change)],
+    ) -> Result<ResolvedScenario, Vec<Finding>> {
+        let file = &self.base.source.file;
+        let index = self.goal(goal).map_err(|message| {
+            vec![Finding::new(file, message).key("goal")]
+        })?;
+        let scenario = self.editable.with(index, changes).map_err(|error| {
+            let EditError { key, message, hint } = error;
+            vec![Finding {
+                hint,
+                ..Finding::new(file, message).key(key)
+            }]
+        })?;
+        let toml = TomlText::without_text(file);
+        let source = self.base.source.clone();
+        resolve(
+            &toml,
+            scenario,
+            source,
+            &self.folder,
+            &self.overrides,
+            &self.library,
+        )
+    }
+
+    /// Whether the scenario has such a key, and the change fits its type, for every goal.
+    ///
+    /// # Errors
+    /// What does not fit, and what would.
+    pub fn check(&self, path: &KeyPath, change: &Change) -> Result<(), String> {
+        self.keys.check(path)?;
+        let goals = if path.is_of_goal() {
+            self.editable.scenario.goals.len()
+        } else {
+            1
+        };
+        let changes = [(path.clone(), change.clone())];
+        for index in 0..goals {
+            self.editable.with(index, &changes).map_err(|error| {
+                let EditError { key, message, hint } = error;
+                let hint = hint.map_or(String::new(), |hint| format!("; {hint}"));
+                if message.contains(&key) {
+                    format!("{message}{hint}")
+                } else {
+                    format!("`{key}`: {message}{hint}")
+                }
+            })?;
+        }
+        Ok(())
+    }
+
+    fn goal(&self, name: &str) -> Result<usize, String> {
+        self.goals().position(|goal| goal == name).ok_or_else(|| {
+            let hint = match nearest_name(name, self.goals()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("it has {}", self.goals().collect::<Vec<_>>().join(", ")),
+            };
+            format!("the scenario has no goal `{name}`; {hint}")
+        })
+    }
+}
