@@ -228,7 +228,9 @@ fn process_that_died_is_replaced() {
     let engines = [EngineName::Mujoco];
     let before = dynamic_rows(&case, &engines, &mut set).unwrap();
     let dead = set.process_id().unwrap();
-    let killed = Command::new("kill").args(["-9", &dead.to_string()]).status();
+    let killed = Command::new("kill")
+        .args(["-9", &dead.to_string()])
+        .status();
     assert!(killed.unwrap().success());
     let after = dynamic_rows(&case, &engines, &mut set).unwrap();
     assert_ne!(set.process_id(), Some(dead));
@@ -237,7 +239,8 @@ fn process_that_died_is_replaced() {
 
 #[test]
 fn motion_that_an_engine_cannot_carry_out_fails_without_numbers() {
-    let text = format!("{SMALL}[controller]\ndamping_nms_rad = [6000, 6000, 6000, 6000, 6000, 6000]\n");
+    let text =
+        format!("{SMALL}[controller]\ndamping_nms_rad = [6000, 6000, 6000, 6000, 6000, 6000]\n");
     let case = resolved(&text);
     let rows = dynamic_rows(&case, &[EngineName::Rapier], &mut EngineSet::new()).unwrap();
     for row in rows.iter().filter(|row| row.outcome != Outcome::Rejected) {
@@ -272,7 +275,10 @@ fn planned_rows_say_what_the_engines_will_confirm() {
 
 #[test]
 fn scenario_of_several_goals_is_no_case() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/supine_suite.toml");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../scenarios/supine_suite.toml"
+    );
     let whole = load_scenario(path.as_ref(), &Overrides::default()).unwrap();
     let message = planned_rows(&whole).unwrap_err();
     assert!(message.contains("has 4"), "{message}");
