@@ -116,6 +116,8 @@ pub fn measure_motion(
     let mut peak_speed_ratio: f64 = 0.0;
     let mut contact = ContactMeasurement::default();
     let velocity_limit = cell.robot.limits.velocities_rad_s();
+    // While the arm holds its place the reference stays.
+    let mut last_reference: Option<(Joints, Point3<f64>)> = None;
     for ((state, reference), &time_s) in recording
         .state
         .iter()
@@ -123,8 +125,12 @@ pub fn measure_motion(
         .zip(&recording.time_s)
     {
         let tip = tip_of(cell, goal, &state.world_from_flange);
-        peak_tracking_error_m =
-            peak_tracking_error_m.max((tip - reference_tip(&reference.position)).norm());
+        let planned_tip = match last_reference {
+            Some((known, planned_tip)) if known == reference.position => planned_tip,
+            _ => reference_tip(&reference.position),
+        };
+        last_reference = Some((reference.position, planned_tip));
+        peak_tracking_error_m = peak_tracking_error_m.max((tip - planned_tip).norm());
         if (tip - rests_at_m).norm() > settling_band_m {
             last_outside_s = Some(time_s);
         }

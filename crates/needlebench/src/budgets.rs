@@ -2,7 +2,9 @@
 
 use needlebench_cell::ResolvedScenario;
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
-use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, analytic_total, budget};
+use needlebench_uncertainty::budget::{
+    BudgetCase, ErrorBudget, PointBudget, SourceBudget, analytic_total, budget,
+};
 
 use crate::pipeline::in_parallel;
 use crate::reality::servo;
@@ -22,11 +24,22 @@ pub(crate) fn budgets(resolved: &ResolvedScenario, plans: &[GoalPlan], threads: 
 /// The same with nothing but the analytic totals: no sources of their own, no draws.
 pub(crate) fn analytic_budgets(resolved: &ResolvedScenario, plans: &[GoalPlan]) -> Budgets {
     of_each(resolved, plans, 1, |case| {
-        let total = analytic_total(case).map_err(|error| error.to_string())?;
+        let moments = analytic_total(case).map_err(|error| error.to_string())?;
+        let [at_skin, at_target] = moments.map(|analytic| PointBudget {
+            analytic,
+            monte_carlo: None,
+            radius_95_m: None,
+            covariance_difference: None,
+            bias_difference_m: None,
+        });
         Ok(ErrorBudget {
             samples: 0,
             sources: Vec::new(),
-            total,
+            total: SourceBudget {
+                source: None,
+                at_skin,
+                at_target,
+            },
             dominant: None,
         })
     })

@@ -163,8 +163,8 @@ impl<'a> Reality<'a> {
         Some(truth.needle_points(nominal, &settled.position, [0.0, depth_m])[1])
     }
 
-    /// The needle where it is predicted to come to rest at the end of a motion; none for the nominal
-    /// robot, and where a drive is too weak.
+    /// The needle where it is predicted to come to rest at the end of a motion, but for its place in
+    /// the skin; none for the nominal robot, and where a drive is too weak.
     pub fn predicted_needle(
         &self,
         goal: usize,
@@ -172,7 +172,7 @@ impl<'a> Reality<'a> {
     ) -> Option<NeedleMeasurement> {
         let (_, settled) = self.settled(trajectory)?;
         let flange = self.cell().robot.world_from_flange(&settled.position);
-        let needle = measure_needle(self.cell(), self.phantom(), self.goal(goal), &flange);
+        let needle = measure_needle(self.cell(), None, self.goal(goal), &flange);
         Some(needle)
     }
 

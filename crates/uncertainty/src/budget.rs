@@ -238,25 +238,13 @@ pub fn budget(
     })
 }
 
-/// The same by Jacobians alone and for all sources together: as [`ErrorBudget::total`] has it, at a
-/// small part of the cost.
+/// Analytic moments of all sources together, at the skin and at the target: those of
+/// [`ErrorBudget::total`], without the sources one by one.
 ///
 /// # Errors
 /// [`BudgetError`].
-pub fn analytic_total(case: &BudgetCase<'_>) -> Result<SourceBudget, BudgetError> {
-    let [at_skin, at_target] =
-        analytic::moments(case, case.imperfections)?.map(|analytic| PointBudget {
-            analytic,
-            monte_carlo: None,
-            radius_95_m: None,
-            covariance_difference: None,
-            bias_difference_m: None,
-        });
-    Ok(SourceBudget {
-        source: None,
-        at_skin,
-        at_target,
-    })
+pub fn analytic_total(case: &BudgetCase<'_>) -> Result<[Moments; 2], BudgetError> {
+    analytic::moments(case, case.imperfections)
 }
 
 /// A variance below this is none, m^2: a nanometre squared.

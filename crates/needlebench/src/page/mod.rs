@@ -16,10 +16,6 @@ mod pack;
 mod room;
 mod run;
 mod scene;
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "the study command is to write it")
-)]
 pub(crate) mod study;
 
 pub(crate) use atlas::atlas_page;

@@ -16,9 +16,9 @@ pub mod robustness;
 mod rows;
 mod static_case;
 mod tables;
-mod text;
 #[cfg(test)]
 mod tests;
+mod text;
 
 pub(crate) use case::StudyCase;
 pub(crate) use case_report::{CaseReport, case_text};

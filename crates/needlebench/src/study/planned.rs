@@ -1,10 +1,13 @@
 //! A case with its motion, without engines.
 
+use std::borrow::Cow;
+
 use needlebench_cell::ResolvedScenario;
+use needlebench_cell::scenario::CriteriaSection;
 use needlebench_clearance::ClearanceModel;
-use needlebench_evaluation::check_configuration;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 use needlebench_evaluation::room::RoomModel;
+use needlebench_evaluation::{NeedleMeasurement, check_configuration};
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 use needlebench_study::{Outcome, Row};
 
@@ -73,24 +76,24 @@ impl<'a> Stage<'a> {
     }
 
     /// Where the needle is predicted to come to rest; where it is commanded to without imperfections.
-    fn set_predicted(&self, row: &mut Row, plan: &ConfigurationPlan, report: &ConfigurationReport) {
-        let needle = if self.reality.is_imperfect() {
-            let trajectory = plan.trajectory.as_ref();
-            trajectory.and_then(|trajectory| self.reality.predicted_needle(0, trajectory))
-        } else {
-            report.commanded
-        };
-        if let Some(needle) = needle {
-            set_needle(row, &needle);
+    fn predicted(
+        &self,
+        plan: &ConfigurationPlan,
+        report: &ConfigurationReport,
+    ) -> Option<NeedleMeasurement> {
+        if !self.reality.is_imperfect() {
+            return report.commanded;
         }
+        let trajectory = plan.trajectory.as_ref()?;
+        self.reality.predicted_needle(0, trajectory)
     }
 }
 
 /// The rows of a case by its planned motions: clearances are the least along the motion, of the
 /// final posture where there is none, and the tip is where the balance of torques predicts it.
 ///
-/// Of the scenario's criteria those are checked that a motion decides: clearances by their proven
-/// bounds, the error budget and the room.
+/// Of the scenario's criteria those are checked that a motion decides: the predicted needle, the error
+/// budget, the room, and clearances by their proven bounds.
 ///
 /// # Errors
 /// If the scenario has not exactly one goal, or cannot be planned at all.
@@ -106,18 +109,58 @@ pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[Row; 8], String> {
     let rows = plan.configurations.iter().zip(&report.configurations);
     Ok(eight(rows.map(|(plan, report)| {
         let mut row = row(&stage.planner, plan, report);
-        stage.set_predicted(&mut row, plan, report);
+        let needle = stage.predicted(plan, report);
+        if let Some(needle) = &needle {
+            set_needle(&mut row, needle);
+        }
         (row.outcome, row.detail) = match broken_rule(plan) {
             Some(rule) => (Outcome::Rejected, rule),
-            None => check_configuration(goal, report, criteria, false)
-                .into_iter()
-                .find(|result| !result.pass)
-                .map_or((Outcome::Ok, "".into()), |missed| {
-                    (Outcome::Failed, missed.criterion.into())
-                }),
+            None => match missed(goal, criteria, report, needle.as_ref()) {
+                Some(criterion) => (Outcome::Failed, criterion),
+                None => (Outcome::Ok, "".into()),
+            },
         };
         row
     })))
+}
+
+/// The first criterion, in the order of a run's, that the motion is known to miss.
+fn missed(
+    goal: &str,
+    criteria: &CriteriaSection,
+    report: &ConfigurationReport,
+    needle: Option<&NeedleMeasurement>,
+) -> Option<Cow<'static, str>> {
+    const MM: f64 = 1e-3;
+    let of_needle = needle.into_iter().flat_map(|needle| {
+        [
+            (
+                "max_tip_position_error_mm",
+                criteria.max_tip_position_error_mm.map(|mm| mm * MM),
+                needle.tip_position_error_m,
+            ),
+            (
+                "max_needle_angle_error_deg",
+                criteria.max_needle_angle_error_deg.map(f64::to_radians),
+                needle.needle_angle_error_rad,
+            ),
+            (
+                "max_guide_position_error_mm",
+                criteria.max_guide_position_error_mm.map(|mm| mm * MM),
+                needle.guide_position_error_m,
+            ),
+        ]
+    });
+    of_needle
+        .filter(|(_, limit, value)| limit.is_some_and(|limit| *value > limit))
+        .map(|(criterion, ..)| criterion.into())
+        .chain(
+            check_configuration(goal, report, criteria, false)
+                .into_iter()
+                .filter(|result| !result.pass)
+                .map(|result| result.criterion.into()),
+        )
+        .next()
 }
 
 /// One row of each configuration.

@@ -124,6 +124,7 @@ impl<'a> Prediction<'a> {
             trajectory: motion,
             timestep_s: self.resolved.scenario.engines.timestep_ms * 1e-3,
         };
-        Some(analytic_total(&case).ok()?.at_target.analytic)
+        let [_, at_target] = analytic_total(&case).ok()?;
+        Some(at_target)
     }
 }

@@ -77,6 +77,11 @@ pub(super) fn row(
         row.set(Metric::Manipulability, margins.manipulability);
         let surplus_m = planner.surplus(candidate, &plan.rejections);
         row.set(Metric::Surplus, surplus_m * MM);
+    } else if let Some(rejection) = plan.rejections.first()
+        && rejection.rule == Rule::Unreachable
+    {
+        // What it misses is how far the worst broken rule is broken.
+        row.set(Metric::Surplus, -rejection.value * MM);
     }
     // m/rad are mm/mrad.
     set(

@@ -210,7 +210,10 @@ fn a_missed_criterion_has_its_name() {
     let family = family("table3");
     let rows = |changes: &[(KeyPath, Change)]| static_rows(&family.vary("pose", changes).unwrap());
     let ok = rows(&[]);
-    let index = ok.iter().position(|row| row.outcome == Outcome::Ok).unwrap();
+    let index = ok
+        .iter()
+        .position(|row| row.outcome == Outcome::Ok)
+        .unwrap();
     let standoff_mm = f64::from(ok[index].get(Metric::GuideStandoff).unwrap());
     let path = "criteria.min_clearance_mm.guide_standoff";
     let missed = &rows(&[set(path, standoff_mm + 0.5)])[index];
@@ -280,7 +283,11 @@ fn an_arm_that_stays_is_met_after_its_clearance() {
 fn the_breaking_case_breaks_and_half_of_it_does_not() {
     let family = family("supine_suite");
     let goal = "right_pleural_lateral";
-    let free = static_rows(&family.vary(goal, &[set("planning.roll_samples", 8.0)]).unwrap());
+    let free = static_rows(
+        &family
+            .vary(goal, &[set("planning.roll_samples", 8.0)])
+            .unwrap(),
+    );
     let index = free
         .iter()
         .position(|row| row.outcome == Outcome::Ok)
