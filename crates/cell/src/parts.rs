@@ -278,22 +278,23 @@ fn scenario_tool(
 ) -> Result<ToolPart, Finding> {
     let location = Location::of_model(&scenario.tool.urdf, "needle_guide", "urdf", base);
     let mut notes = Vec::new();
-    let tool = read_tool(&location, &overrides.packages, wanted, &mut notes).map_err(|finding| {
-        // A bore or a gauge of the scenario may not fit the tool's other half.
-        let given = [
-            ("tool.bore_mm", scenario.tool.bore_mm.is_some()),
-            ("tool.needle_gauge", scenario.tool.needle_gauge.is_some()),
-        ]
-        .into_iter()
-        .find(|(_, is_given)| *is_given);
-        match given {
-            Some((key, _)) if finding.key.as_deref() == Some("bore_mm") => Finding {
-                hint: finding.hint,
-                ..toml.finding(key, finding.message)
-            },
-            _ => with_model_names(toml, finding, &location, "tool.urdf", "needle_guide"),
-        }
-    })?;
+    let tool =
+        read_tool(&location, &overrides.packages, wanted, &mut notes).map_err(|finding| {
+            // A bore or a gauge of the scenario may not fit the tool's other half.
+            let given = [
+                ("tool.bore_mm", scenario.tool.bore_mm.is_some()),
+                ("tool.needle_gauge", scenario.tool.needle_gauge.is_some()),
+            ]
+            .into_iter()
+            .find(|(_, is_given)| *is_given);
+            match given {
+                Some((key, _)) if finding.key.as_deref() == Some("bore_mm") => Finding {
+                    hint: finding.hint,
+                    ..toml.finding(key, finding.message)
+                },
+                _ => with_model_names(toml, finding, &location, "tool.urdf", "needle_guide"),
+            }
+        })?;
     Ok(ToolPart { tool, notes })
 }
 

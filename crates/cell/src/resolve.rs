@@ -13,8 +13,8 @@ use crate::goal::{PlacedPhantom, Surroundings, resolve_goal, solid_contains};
 use crate::imperfections::{Imperfections, resolve_imperfections};
 use crate::iso9283::{Iso9283Protocol, resolve_iso9283};
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, ModelSource, NeedleCorridor};
-use crate::people::{People, Room, resolve_people};
 use crate::parts::Library;
+use crate::people::{People, Room, resolve_people};
 use crate::phantom_place::place_phantom;
 use crate::robot::{MissingInertia, read_robot};
 use crate::scenario::Scenario;
@@ -138,7 +138,14 @@ pub fn resolve_scenario(
     let toml = TomlText::parse(file, text).map_err(|finding| vec![finding])?;
     let scenario: Scenario = toml.deserialize().map_err(|finding| vec![finding])?;
     let source = source_of(file.to_owned(), text.as_bytes());
-    resolve(&toml, scenario, source, base, overrides, &Library::default())
+    resolve(
+        &toml,
+        scenario,
+        source,
+        base,
+        overrides,
+        &Library::default(),
+    )
 }
 
 /// Resolves a scenario's struct; `toml` says where its values stand, and `library` keeps what is read.
@@ -164,7 +171,9 @@ pub(crate) fn resolve(
         ..Robot::clone(&*robot.map_err(one)?)
     };
     notes.extend(robot.notes.iter().cloned());
-    let tool = library.tool(toml, &scenario, base, overrides).map_err(one)?;
+    let tool = library
+        .tool(toml, &scenario, base, overrides)
+        .map_err(one)?;
     notes.extend(tool.notes.iter().cloned());
     let mut tool = tool.tool.clone();
     let iso9283 = scenario

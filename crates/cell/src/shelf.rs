@@ -94,6 +94,9 @@ mod tests {
     fn what_cannot_be_made_is_tried_again() {
         let shelf: Shelf<usize, usize> = Shelf::default();
         assert_eq!(shelf.get(|_| true, || Err("no")), Err("no"));
-        assert_eq!(shelf.get(|_| true, || Ok::<_, ()>((1, 2))).as_deref(), Ok(&2));
+        assert_eq!(
+            shelf.get(|_| true, || Ok::<_, ()>((1, 2))).as_deref(),
+            Ok(&2)
+        );
     }
 }

@@ -277,7 +277,9 @@ pub fn check_configuration(
 }
 
 /// Class, key of the scenario's `[criteria]`, and limit in mm.
-pub fn clearance_limits(limits: &ClearanceCriteria) -> [(&'static str, &'static str, Option<f64>); 9] {
+pub fn clearance_limits(
+    limits: &ClearanceCriteria,
+) -> [(&'static str, &'static str, Option<f64>); 9] {
     macro_rules! limit {
         ($class:literal, $limit:expr) => {
             ($class, concat!("min_clearance_mm.", $class), $limit)

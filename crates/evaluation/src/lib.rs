@@ -27,8 +27,8 @@ mod stored;
 mod threshold;
 
 pub use clearance::{
-    ClearanceSeries, certify_recording, measure_clearance, planned_clearance,
-    posture_clearance, recorded_clearance, sample_indices,
+    ClearanceSeries, certify_recording, measure_clearance, planned_clearance, posture_clearance,
+    recorded_clearance, sample_indices,
 };
 pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balance};
 pub use criteria::{Criterion, check_configuration, clearance_limits};

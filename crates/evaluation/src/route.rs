@@ -44,9 +44,8 @@ impl RouteObstacles {
         goal: &Goal,
     ) -> Option<(&str, Separation)> {
         let entry = goal.entry_m?;
-        let counts = |index: usize| {
-            goal.target_organ.is_none() || self.parts[index].1 != goal.target_organ
-        };
+        let counts =
+            |index: usize| goal.target_organ.is_none() || self.parts[index].1 != goal.target_organ;
         let (index, separation) = self.solids.nearest_to_segment(
             &entry,
             &goal.target_m,

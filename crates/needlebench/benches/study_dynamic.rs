@@ -1,48 +1,81 @@
-//! What dynamic cases of a study cost over the bare engines' steps of the same cases.
+//! What dynamic cases of a study cost over the bare engines' steps of the same cases, and what a
+//! second core brings.
 //!
-//! `cargo bench -p needlebench --bench study_dynamic`, or on one core `taskset -c 0 cargo bench ...`.
-//! Bare are the same steps of the same plants under the recorded torques, without servo, recording
-//! or measurements: rapier's own step in a loop, and `mj_step` in a loop inside one Python process,
-//! as it is (with its collision detection) and with that switched off, as it is here wherever nothing
-//! is near. All sides are timed in turn; figures are minima over the repetitions.
+//! `cargo bench -p needlebench --bench study_dynamic` (Linux). Bare are the same steps of the same
+//! plants from the same starts under the recorded torques, without servo, recording or measurements:
+//! rapier's own step in a loop, and `mj_step` in a loop inside one Python process, once as it is
+//! (with its collision detection) and once with that switched off, as a case has it wherever nothing is
+//! near. Costs are times on the processor, of the thread and of its MuJoCo process, which other
+//! programs disturb less than wall-clock times; all sides are taken in turn, and figures are the
+//! least of the repetitions. Planning is measured by itself.
 
+use std::fs;
 use std::path::Path;
+use std::process::Command;
+use std::sync::Barrier;
 use std::time::{Duration, Instant};
 
-use needlebench::study::{CaseCost, EngineSet, dynamic_case};
+use needlebench::study::{EngineSet, dynamic_rows};
 use needlebench::{EngineChoice, RunOptions, run_scenario};
 use needlebench_cell::scenario::EngineName;
-use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
+use needlebench_cell::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily};
+use needlebench_clearance::ClearanceModel;
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{MujocoPlant, MujocoSettings, Plant, RapierPlant, RapierSettings};
 use needlebench_kinematics::Joints;
+use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_planning::Planner;
 
 const REPETITIONS: usize = 5;
 
+/// How far the patient lies from where the scenario has him, mm, at most.
+const SHIFT_MM: f64 = 30.0;
+
+const BOTH: [EngineName; 2] = [EngineName::Rapier, EngineName::Mujoco];
+
 /// The motions of a case: where each starts, and its torques.
 type Motions = Vec<(Joints, Vec<Joints>)>;
+
+/// The goals of two shipped scenarios, those of the second with the patient elsewhere.
+fn cases() -> Vec<ResolvedScenario> {
+    let mut cases = Vec::new();
+    let mut random = SplitMix64::new(5);
+    for (name, shift_mm) in [("table3", 0.0), ("supine_suite", SHIFT_MM)] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+        let path = folder.join(name).with_extension("toml");
+        let family = ScenarioFamily::load(&path, &Overrides::default()).expect("shipped");
+        for goal in family.goals() {
+            let changes = [0, 1].map(|axis| {
+                let key = KeyPath::parse(&format!("phantom.position_mm[{axis}]"));
+                let by_mm = random.uniform(-shift_mm, shift_mm);
+                (key.expect("a path"), Change::Add(by_mm))
+            });
+            cases.push(family.vary(goal, &changes).expect("a layout that exists"));
+        }
+    }
+    cases
+}
+
+/// Time that a thread has been on a processor.
+fn processor_time(schedstat: &str) -> Duration {
+    // A call that gives way brings the account of the running thread up to date.
+    std::thread::yield_now();
+    let text = fs::read_to_string(schedstat).expect("Linux keeps account");
+    let ns = text.split(' ').next().and_then(|ns| ns.parse().ok());
+    Duration::from_nanos(ns.expect("nanoseconds come first"))
+}
+
+/// Time of this thread and of a process of one thread.
+fn times(process: Option<u32>) -> Duration {
+    let of_process = process.map(|id| processor_time(&format!("/proc/{id}/schedstat")));
+    processor_time("/proc/thread-self/schedstat") + of_process.unwrap_or_default()
+}
 
 struct Bare {
     case: ResolvedScenario,
     timestep_s: f64,
     rapier: Motions,
     mujoco: Motions,
-}
-
-fn cases() -> Vec<ResolvedScenario> {
-    let mut cases = Vec::new();
-    for name in ["table3", "supine_suite"] {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
-        let path = folder.join(name).with_extension("toml");
-        let whole = load_scenario(&path, &Overrides::default()).expect("a shipped scenario");
-        for index in 0..whole.goals.len() {
-            let mut case = whole.clone();
-            case.goals = vec![whole.goals[index].clone()];
-            case.people.by_goal = vec![whole.people.by_goal[index].clone()];
-            cases.push(case);
-        }
-    }
-    cases
 }
 
 impl Bare {
@@ -71,119 +104,214 @@ impl Bare {
     }
 
     fn rapier(&self) -> Duration {
-        let cell = &self.case.cell;
         let settings = RapierSettings::default();
-        let mut plant = RapierPlant::new(cell, self.timestep_s, &settings).expect("sound");
+        let plant = RapierPlant::new(&self.case.cell, self.timestep_s, &settings);
+        let mut plant = plant.expect("a sound cell");
         let mut total = Duration::ZERO;
         for (start, torques_nm) in &self.rapier {
             plant.reset(start).expect("a sound posture");
-            let started = Instant::now();
+            let started = times(None);
             for torque_nm in torques_nm {
                 plant.advance(torque_nm).expect("stable before");
             }
-            total += started.elapsed();
+            total += times(None) - started;
         }
         total
     }
 
+    /// Without the messages: the time of the process alone.
     fn mujoco(&self, process: &mut HarnessProcess, look: bool) -> Duration {
-        let cell = &self.case.cell;
         let settings = MujocoSettings::default();
         process.clear().expect("a sound process");
-        let mut plant =
-            MujocoPlant::new(process, cell, self.timestep_s, &settings).expect("sound");
-        let elapsed_s = self.mujoco.iter().map(|(start, torques_nm)| {
-            let replay = plant.replay(start, look, torques_nm);
-            replay.expect("stable before").elapsed_s
-        });
-        Duration::from_secs_f64(elapsed_s.sum())
+        let account = format!("/proc/{}/schedstat", process.process_id());
+        let plant = MujocoPlant::new(process, &self.case.cell, self.timestep_s, &settings);
+        let mut plant = plant.expect("a sound cell");
+        let mut total = Duration::ZERO;
+        for (start, torques_nm) in &self.mujoco {
+            plant.reset(start).expect("a sound posture");
+            let started = processor_time(&account);
+            plant
+                .replay(start, look, torques_nm)
+                .expect("stable before");
+            total += processor_time(&account) - started;
+        }
+        total
+    }
+
+    fn planning(&self) -> Duration {
+        let started = times(None);
+        let model = ClearanceModel::new(&self.case.cell);
+        let planner = Planner::new(&self.case, &model).expect("a UR arm");
+        std::hint::black_box(planner.plan(&self.case.goals[0]));
+        times(None) - started
+    }
+
+    fn case(&self, engine: EngineName, set: &mut EngineSet) -> Duration {
+        let process = set.process_id().filter(|_| engine == EngineName::Mujoco);
+        let started = times(process);
+        dynamic_rows(&self.case, &[engine], set).expect("a sound case");
+        times(process) - started
     }
 }
 
-fn ms(duration: Duration) -> f64 {
-    duration.as_secs_f64() * 1e3
+/// A line of the table: least times in ms.
+#[derive(Default)]
+struct Line {
+    steps: usize,
+    planning: f64,
+    rapier: [f64; 2],
+    mujoco: [f64; 3],
 }
 
-fn least(known: &mut CaseCost, next: CaseCost) {
-    known.planning = known.planning.min(next.planning);
-    known.rapier = known.rapier.min(next.rapier);
-    known.mujoco = known.mujoco.min(next.mujoco);
-    known.other = known.other.min(next.other);
+impl Line {
+    fn print(&self, name: &str) {
+        let us = |ms: f64| ms * 1e3 / self.steps as f64;
+        let [rapier_bare, rapier] = self.rapier;
+        let [looking, blind, mujoco] = self.mujoco;
+        println!(
+            "{name:42} {:6} {:8.1} | {:5.2} {:5.2} {:6.3} {:6.3} | {:5.2} {:5.2} {:5.2} {:6.3} {:6.3} {:6.3}",
+            self.steps,
+            self.planning,
+            us(rapier_bare),
+            us(rapier - self.planning),
+            (rapier - self.planning) / rapier_bare,
+            rapier / rapier_bare,
+            us(looking),
+            us(blind),
+            us(mujoco - self.planning),
+            (mujoco - self.planning) / looking,
+            (mujoco - self.planning) / blind,
+            mujoco / blind,
+        );
+    }
+}
+
+fn costs(cases: &[ResolvedScenario]) {
+    let environment = ensure(&mut |stage| eprintln!("{stage}")).expect("an environment");
+    let process = HarnessProcess::start(&environment, Duration::from_mins(1));
+    let mut process = process.expect("it starts");
+    let mut set = EngineSet::new();
+    // The process starts, so that its time is counted from the first case on.
+    dynamic_rows(&cases[0], &BOTH, &mut set).expect("a sound case");
+    println!(
+        "{:42} {:6} {:8} | rapier: bare, case, ratio, with planning | MuJoCo: bare looking, bare not, \
+         case, ratio to either, with planning",
+        "us a step", "steps", "plan ms"
+    );
+    let mut sum = Line::default();
+    for case in cases {
+        let bare = Bare::new(case.clone());
+        let mut least = [Duration::MAX; 6];
+        for _ in 0..REPETITIONS {
+            let now = [
+                bare.planning(),
+                bare.rapier(),
+                bare.case(EngineName::Rapier, &mut set),
+                bare.mujoco(&mut process, true),
+                bare.mujoco(&mut process, false),
+                bare.case(EngineName::Mujoco, &mut set),
+            ];
+            for (least, now) in least.iter_mut().zip(now) {
+                *least = now.min(*least);
+            }
+        }
+        let [planning, rapier_bare, rapier, looking, blind, mujoco] =
+            least.map(|time| time.as_secs_f64() * 1e3);
+        let line = Line {
+            steps: bare.rapier.iter().map(|(_, torques)| torques.len()).sum(),
+            planning,
+            rapier: [rapier_bare, rapier],
+            mujoco: [looking, blind, mujoco],
+        };
+        let (scenario, goal) = (&case.scenario.name, &case.goals[0].name);
+        line.print(&format!("{scenario} {goal} ({})", bare.rapier.len()));
+        sum.steps += line.steps;
+        sum.planning += line.planning;
+        for (sum, value) in sum.rapier.iter_mut().zip(line.rapier) {
+            *sum += value;
+        }
+        for (sum, value) in sum.mujoco.iter_mut().zip(line.mujoco) {
+            *sum += value;
+        }
+    }
+    sum.print("all");
+}
+
+/// Some workers, each tied to a core with its MuJoCo process, do all cases: wall-clock time from the
+/// start of the first to the end of the last, and processor time of all.
+fn workers(cores: &[usize], cases: &[ResolvedScenario]) -> [f64; 2] {
+    let ready = Barrier::new(cores.len());
+    let spans: Vec<(Instant, Instant, Duration)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = cores
+            .iter()
+            .map(|core| {
+                let ready = &ready;
+                scope.spawn(move || {
+                    let thread = fs::read_link("/proc/thread-self").expect("Linux has it");
+                    let id = thread.file_name().expect("a thread has an id");
+                    // What the thread starts is tied with it.
+                    let tied = Command::new("taskset")
+                        .args(["-pc", &core.to_string()])
+                        .arg(id)
+                        .output();
+                    assert!(tied.is_ok_and(|done| done.status.success()), "taskset");
+                    let mut set = EngineSet::new();
+                    dynamic_rows(&cases[0], &BOTH, &mut set).expect("a sound case");
+                    ready.wait();
+                    let (started, before) = (Instant::now(), times(set.process_id()));
+                    for case in cases {
+                        dynamic_rows(case, &BOTH, &mut set).expect("a sound case");
+                    }
+                    let spent = times(set.process_id()) - before;
+                    (started, Instant::now(), spent)
+                })
+            })
+            .collect();
+        workers
+            .into_iter()
+            .map(|worker| worker.join().expect("workers do not panic"))
+            .collect()
+    });
+    let first = spans.iter().map(|span| span.0).min().expect("some");
+    let last = spans.iter().map(|span| span.1).max().expect("some");
+    let spent: Duration = spans.iter().map(|span| span.2).sum();
+    [last - first, spent].map(|time| time.as_secs_f64())
+}
+
+fn throughput(cases: &[ResolvedScenario]) {
+    let mut one = [f64::INFINITY; 2];
+    let mut two = [f64::INFINITY; 2];
+    for repetition in 0..REPETITIONS {
+        let alone = workers(&[repetition % 2], cases);
+        let together = workers(&[0, 1], cases);
+        for k in 0..2 {
+            one[k] = one[k].min(alone[k]);
+            two[k] = two[k].min(together[k]);
+        }
+    }
+    let count = cases.len() as f64;
+    println!(
+        "both engines, one worker on one core: {:.3} cases/s, {:.3} s of processor a case",
+        count / one[0],
+        one[1] / count
+    );
+    println!(
+        "two workers on two cores: {:.3} cases/s, {:.3} s of processor a case",
+        2.0 * count / two[0],
+        0.5 * two[1] / count
+    );
+    println!(
+        "two against one: {:.3} by the clock, {:.3} by processor time",
+        2.0 * one[0] / two[0],
+        4.0 * one[1] / two[1]
+    );
 }
 
 fn main() {
     // `cargo test --benches` only asks whether it builds.
-    if !std::env::args().any(|argument| argument == "--bench") {
-        return;
+    if std::env::args().any(|argument| argument == "--bench") {
+        let cases = cases();
+        costs(&cases);
+        throughput(&cases);
     }
-    let environment = ensure(&mut |stage| eprintln!("{stage}")).expect("an environment");
-    let mut process =
-        HarnessProcess::start(&environment, Duration::from_mins(1)).expect("it starts");
-    let mut set = EngineSet::new();
-    println!("times in ms; ratios are over the bare steps, with and without planning");
-    let mut sums = [0.0; 8];
-    for case in cases() {
-        let bare = Bare::new(case);
-        let most = CaseCost {
-            planning: Duration::MAX,
-            rapier: Duration::MAX,
-            mujoco: Duration::MAX,
-            other: Duration::MAX,
-        };
-        let mut costs = [most; 2];
-        let mut bares = [Duration::MAX; 3];
-        for _ in 0..REPETITIONS {
-            for (engine, cost) in [EngineName::Rapier, EngineName::Mujoco].into_iter().zip(&mut costs) {
-                let done = dynamic_case(&bare.case, &[engine], &mut set).expect("a sound case");
-                least(cost, done.cost);
-            }
-            bares[0] = bares[0].min(bare.rapier());
-            bares[1] = bares[1].min(bare.mujoco(&mut process, true));
-            bares[2] = bares[2].min(bare.mujoco(&mut process, false));
-        }
-        let [rapier, looking, blind] = bares.map(ms);
-        let steps: usize = bare.rapier.iter().map(|(_, torques)| torques.len()).sum();
-        println!(
-            "{} {}: {} motions, {steps} steps",
-            bare.case.scenario.name,
-            bare.case.goals[0].name,
-            bare.rapier.len()
-        );
-        let [r, m] = costs;
-        let engines = [ms(r.rapier + r.other), ms(m.mujoco + m.other)];
-        let planning = ms(r.planning.min(m.planning));
-        println!("  planning {planning:.1}");
-        println!(
-            "  rapier   bare {rapier:7.1} ({:.2} us a step)  engine {:7.1}  other {:5.1}  ratio {:.3}  with planning {:.3}",
-            rapier * 1e3 / steps as f64,
-            ms(r.rapier),
-            ms(r.other),
-            engines[0] / rapier,
-            (engines[0] + planning) / rapier,
-        );
-        println!(
-            "  MuJoCo   bare {looking:7.1} looking, {blind:.1} not ({:.2} us a step)  engine {:7.1}  other {:5.1}  ratio {:.3} and {:.3}  with planning {:.3} and {:.3}",
-            blind * 1e3 / steps as f64,
-            ms(m.mujoco),
-            ms(m.other),
-            engines[1] / looking,
-            engines[1] / blind,
-            (engines[1] + planning) / looking,
-            (engines[1] + planning) / blind,
-        );
-        let values = [rapier, looking, blind, engines[0], engines[1], planning];
-        for (sum, value) in sums.iter_mut().zip(values) {
-            *sum += value;
-        }
-    }
-    let [rapier, looking, blind, r, m, planning, ..] = sums;
-    println!(
-        "all: rapier {:.3}, with planning {:.3}; MuJoCo {:.3} and {:.3}, with planning {:.3} and {:.3}",
-        r / rapier,
-        (r + planning) / rapier,
-        m / looking,
-        m / blind,
-        (m + planning) / looking,
-        (m + planning) / blind,
-    );
 }

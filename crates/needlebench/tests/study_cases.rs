@@ -1,14 +1,21 @@
 //! Planned and dynamic cases of a study: their numbers are those of a run, whatever ran before.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use needlebench::study::{EngineSet, dynamic_rows, planned_rows};
 use needlebench::{RunOptions, run_scenario};
 use needlebench_cell::scenario::EngineName;
 use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
+use needlebench_clearance::ClearanceModel;
+use needlebench_engine::{
+    Actuation, Hooks, RapierPlant, RapierSettings, Servo, ServoGains, simulate,
+};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
+use needlebench_evaluation::{certify_recording, measure_clearance, recorded_clearance};
+use needlebench_kinematics::Joints;
+use needlebench_planning::Planner;
 use needlebench_study::{Metric, Outcome, Row};
 use tempfile::TempDir;
 
@@ -228,7 +235,9 @@ fn process_that_died_is_replaced() {
     let engines = [EngineName::Mujoco];
     let before = dynamic_rows(&case, &engines, &mut set).unwrap();
     let dead = set.process_id().unwrap();
-    let killed = Command::new("kill").args(["-9", &dead.to_string()]).status();
+    let killed = Command::new("kill")
+        .args(["-9", &dead.to_string()])
+        .status();
     assert!(killed.unwrap().success());
     let after = dynamic_rows(&case, &engines, &mut set).unwrap();
     assert_ne!(set.process_id(), Some(dead));
@@ -237,7 +246,8 @@ fn process_that_died_is_replaced() {
 
 #[test]
 fn motion_that_an_engine_cannot_carry_out_fails_without_numbers() {
-    let text = format!("{SMALL}[controller]\ndamping_nms_rad = [6000, 6000, 6000, 6000, 6000, 6000]\n");
+    let text =
+        format!("{SMALL}[controller]\ndamping_nms_rad = [6000, 6000, 6000, 6000, 6000, 6000]\n");
     let case = resolved(&text);
     let rows = dynamic_rows(&case, &[EngineName::Rapier], &mut EngineSet::new()).unwrap();
     for row in rows.iter().filter(|row| row.outcome != Outcome::Rejected) {
@@ -272,8 +282,66 @@ fn planned_rows_say_what_the_engines_will_confirm() {
 
 #[test]
 fn scenario_of_several_goals_is_no_case() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/supine_suite.toml");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../scenarios/supine_suite.toml"
+    );
     let whole = load_scenario(path.as_ref(), &Overrides::default()).unwrap();
     let message = planned_rows(&whole).unwrap_err();
     assert!(message.contains("has 4"), "{message}");
+}
+
+/// The distances' own error: the two ways place the solids in different frames. Seen: 2e-11 m.
+const DISTANCE_M: f64 = 1e-9;
+
+#[test]
+fn least_over_a_recording_is_that_of_its_series_and_its_certificate() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/table3.toml");
+    let resolved = load_scenario(&path, &Overrides::default()).unwrap();
+    let (cell, model) = (&resolved.cell, ClearanceModel::new(&resolved.cell));
+    let plan = Planner::new(&resolved, &model)
+        .unwrap()
+        .plan(&resolved.goals[0]);
+    // Soft enough to sway and to come nearer than planned.
+    let servo = Servo {
+        dynamics: cell.dynamics(),
+        gains: ServoGains {
+            kp_nm_per_rad: [150.0; 6],
+            kd_nms_per_rad: [1.0; 6],
+        },
+        effort_limit_nm: Joints::repeat(1e3),
+    };
+    let mut plant = RapierPlant::new(cell, 2e-3, &RapierSettings::default()).unwrap();
+    let mut between = 0;
+    for configuration in &plan.configurations[..3] {
+        let trajectory = configuration.trajectory.as_ref().unwrap();
+        let actuation = Actuation::default();
+        let hooks = Hooks::default();
+        let recording = simulate(&mut plant, &servo, &actuation, trajectory, hooks).unwrap();
+        for (period_s, tolerance_m) in [(0.01, 1e-4), (0.1, 1e-2), (0.002, 1e-4)] {
+            let mut series = measure_clearance(cell, &model, trajectory, &recording, period_s);
+            let sampled = series.minima.clone();
+            certify_recording(
+                &mut series,
+                cell,
+                &model,
+                trajectory,
+                &recording,
+                tolerance_m,
+            );
+            let found =
+                recorded_clearance(cell, &model, trajectory, &recording, period_s, tolerance_m);
+            assert!(found.keys().eq(series.minima.keys()));
+            for (class, least) in &series.minima {
+                let found = &found[class];
+                let apart_m = (found.minimum_m - least.minimum_m).abs();
+                assert!(apart_m < DISTANCE_M, "{class:?} {apart_m}");
+                let bounds = [found, least].map(|each| each.certified_lower_bound_m.unwrap());
+                assert!((bounds[0] - bounds[1]).abs() < DISTANCE_M);
+                // The series alone undercuts what the certificate attains, or the other way.
+                between += usize::from(sampled[class].minimum_m < least.minimum_m + 1e-15);
+            }
+        }
+    }
+    assert!(between > 5, "{between}");
 }

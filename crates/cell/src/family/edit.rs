@@ -59,11 +59,7 @@ impl Editable {
     }
 
     /// The scenario with one of its goals and some keys changed, one after the other.
-    pub fn with(
-        &self,
-        goal: usize,
-        changes: &[(KeyPath, Change)],
-    ) -> Result<Scenario, EditError> {
+    pub fn with(&self, goal: usize, changes: &[(KeyPath, Change)]) -> Result<Scenario, EditError> {
         let mut edited: Vec<(&str, Option<Value>)> = Vec::with_capacity(changes.len());
         for (path, change) in changes {
             let section = path.section();
@@ -92,9 +88,27 @@ impl Editable {
                 name,
                 value,
                 [
-                    name, description, seed, robot, mount, tool, phantom, table, gantry, iso9283,
-                    start, motion, planning, controller, engines, criteria, ranking, recording,
-                    people, imperfections, events
+                    name,
+                    description,
+                    seed,
+                    robot,
+                    mount,
+                    tool,
+                    phantom,
+                    table,
+                    gantry,
+                    iso9283,
+                    start,
+                    motion,
+                    planning,
+                    controller,
+                    engines,
+                    criteria,
+                    ranking,
+                    recording,
+                    people,
+                    imperfections,
+                    events
                 ]
             );
         }

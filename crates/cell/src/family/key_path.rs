@@ -122,7 +122,9 @@ mod tests {
 
     #[test]
     fn what_is_no_path_is_refused() {
-        for text in ["", ".", "a.", "a..b", "[0]", "a[", "a[x]", "a[-1]", "a[0]b", "a b"] {
+        for text in [
+            "", ".", "a.", "a..b", "[0]", "a[", "a[x]", "a[-1]", "a[0]b", "a b",
+        ] {
             let message = KeyPath::parse(text).unwrap_err();
             assert!(message.contains("path of a key"), "{message}");
         }

@@ -72,9 +72,9 @@ impl ScenarioFamily {
         changes: &[(KeyPath, Change)],
     ) -> Result<ResolvedScenario, Vec<Finding>> {
         let file = &self.base.source.file;
-        let index = self.goal(goal).map_err(|message| {
-            vec![Finding::new(file, message).key("goal")]
-        })?;
+        let index = self
+            .goal(goal)
+            .map_err(|message| vec![Finding::new(file, message).key("goal")])?;
         let scenario = self.editable.with(index, changes).map_err(|error| {
             let EditError { key, message, hint } = error;
             vec![Finding {

@@ -25,7 +25,8 @@ impl Keys {
             here = if index == 0 && path.is_of_goal() {
                 &self.0["properties"]["goals"]["items"]
             } else {
-                self.step(here, step).map_err(|why| format!("`{path}`: {why}"))?
+                self.step(here, step)
+                    .map_err(|why| format!("`{path}`: {why}"))?
             };
             if index == 0 && path.section() == "goals" {
                 return Err(format!(

@@ -222,6 +222,25 @@ mod tests {
     }
 
     #[test]
+    fn cleared_process_serves_as_a_new_one() {
+        let mut harness = harness();
+        let fresh = fleet_states(&mut harness);
+        let settings = MujocoSettings::default();
+        let other = ur3(Vec::new());
+        MujocoFleet::new(&mut harness, &other, TIMESTEP_S, &settings, 2).unwrap();
+        harness.clear().unwrap();
+        assert_eq!(fleet_states(&mut harness), fresh);
+        // What was loaded before is gone: plants are counted from 0 again.
+        harness.clear().unwrap();
+        let fleet = MujocoFleet::new(&mut harness, &other, TIMESTEP_S, &settings, 1).unwrap();
+        let handle = fleet.members[0].handle.clone();
+        harness.clear().unwrap();
+        let still = [0.0; needlebench_kinematics::JOINT_COUNT];
+        let error = harness.step(&handle, &still).unwrap_err();
+        assert!(error.to_string().contains("plant 0 of 0"), "{error}");
+    }
+
+    #[test]
     fn arm_that_becomes_unstable_does_not_concern_the_others() {
         let mut harness = harness();
         let settings = MujocoSettings::default();

@@ -118,6 +118,8 @@ struct Case<'a> {
     servo: Servo,
     /// Configurations that are simulated.
     jobs: Vec<usize>,
+    /// Those of them whose servo is stable: the engines are asked about no others.
+    stable: Vec<usize>,
     /// By configuration.
     runs: Vec<Vec<EngineRun>>,
     /// By configuration: the first engine that failed it.
@@ -130,11 +132,12 @@ impl<'a> Case<'a> {
     fn new(stage: &'a Stage<'a>, plan: GoalPlan) -> Self {
         let plans = [plan];
         let count = plans[0].configurations.len();
-        Self {
+        let mut case = Self {
             jobs: jobs(stage.resolved, &plans)
                 .into_iter()
                 .map(|job| job.configuration)
                 .collect(),
+            stable: Vec::new(),
             events: events::stage(stage.resolved, &stage.reality, &plans, 1),
             plans,
             servo: servo(stage.resolved),
@@ -142,7 +145,16 @@ impl<'a> Case<'a> {
             runs: vec![Vec::new(); count],
             failed: vec![None; count],
             engines: 0,
-        }
+        };
+        let reality = &stage.reality;
+        let dynamics = reality.cell().dynamics();
+        let is_stable = |&job: &usize| {
+            let mass = dynamics.mass_matrix(&case.trajectory(job).end());
+            let (servo, actuation) = (&case.servo, reality.actuation());
+            ClosedLoop::instability(&mass, servo, actuation, case.timestep_s()).is_none()
+        };
+        case.stable = case.jobs.iter().copied().filter(is_stable).collect();
+        case
     }
 
     fn trajectory(&self, configuration: usize) -> &JointTrajectory {
@@ -152,18 +164,6 @@ impl<'a> Case<'a> {
 
     fn timestep_s(&self) -> f64 {
         self.stage.resolved.scenario.engines.timestep_ms * 1e-3
-    }
-
-    /// Configurations whose servo is stable: those that an engine is to be asked about.
-    fn stable(&self) -> Vec<usize> {
-        let reality = &self.stage.reality;
-        let dynamics = reality.cell().dynamics();
-        let stable = |&job: &usize| {
-            let mass = dynamics.mass_matrix(&self.trajectory(job).end());
-            let timestep_s = self.timestep_s();
-            ClosedLoop::instability(&mass, &self.servo, reality.actuation(), timestep_s).is_none()
-        };
-        self.jobs.iter().copied().filter(stable).collect()
     }
 
     fn motion(&self, configuration: usize) -> Motion<'_> {
@@ -179,7 +179,7 @@ impl<'a> Case<'a> {
         let settings = rapier_settings(&self.stage.resolved.scenario.engines);
         let mut done = Vec::new();
         if let Ok(mut plant) = RapierPlant::new(cell, self.timestep_s(), &settings) {
-            for job in self.stable() {
+            for &job in &self.stable {
                 let Motion {
                     servo,
                     actuation,
@@ -225,7 +225,7 @@ impl<'a> Case<'a> {
             return Vec::new();
         };
         let mut process = process.lock().expect("one thread uses it");
-        let stable = self.stable();
+        let stable = &self.stable;
         let motions: Vec<Motion<'_>> = stable.iter().map(|&job| self.motion(job)).collect();
         if motions.is_empty() || process.clear().is_err() {
             return Vec::new();

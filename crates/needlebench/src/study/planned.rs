@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use needlebench_cell::ResolvedScenario;
 use needlebench_cell::scenario::CriteriaSection;
 use needlebench_clearance::ClearanceModel;
-use needlebench_evaluation::{NeedleMeasurement, check_configuration};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 use needlebench_evaluation::room::RoomModel;
+use needlebench_evaluation::{NeedleMeasurement, check_configuration};
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner};
 use needlebench_study::{Outcome, Row};
 

@@ -50,7 +50,10 @@ pub fn static_rows(resolved: &ResolvedScenario) -> [Row; 8] {
 /// Rows of a layout that cannot exist; the key at fault is the detail.
 pub fn invalid_rows(findings: &[Finding]) -> [Row; 8] {
     let key = findings.iter().find_map(|finding| finding.key.clone());
-    all_rows(Outcome::Invalid, &key.unwrap_or_else(|| "scenario".to_owned()))
+    all_rows(
+        Outcome::Invalid,
+        &key.unwrap_or_else(|| "scenario".to_owned()),
+    )
 }
 
 fn all_rows(outcome: Outcome, detail: &str) -> [Row; 8] {

@@ -73,12 +73,7 @@ impl Planner<'_> {
         self.kinematics().branches(&pose, Some(self.start()))
     }
 
-    fn member_of(
-        &self,
-        roll_rad: f64,
-        configuration: Configuration,
-        found: &Solutions,
-    ) -> Member {
+    fn member_of(&self, roll_rad: f64, configuration: Configuration, found: &Solutions) -> Member {
         let solution = found
             .solutions
             .iter()
