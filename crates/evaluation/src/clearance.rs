@@ -97,8 +97,8 @@ pub fn certify_recording(
 }
 
 /// Least clearances over a recording with their proven lower bounds: those of
-/// [`measure_clearance`] and [`certify_recording`] together, but for the rounding of the distances
-/// (`1e-12 m`), at a small part of the cost.
+/// [`measure_clearance`] and [`certify_recording`] together, but for the error of the distances
+/// (`1e-9 m`), at a small part of the cost.
 pub fn recorded_clearance(
     cell: &Cell,
     model: &ClearanceModel,

