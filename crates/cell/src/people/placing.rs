@@ -138,16 +138,8 @@ pub(crate) fn resolve_people(
                 earlier => format!("{}_{}", person.role.name(), earlier + 1),
             };
             let given = !section.persons.is_empty();
-            let (side, position_m) = place(
-                toml,
-                index,
-                given,
-                person,
-                goal,
-                sides.as_ref(),
-                &room.robot_base_m,
-                &obstacles,
-            )?;
+            let (side, position_m) =
+                place(toml, index, given, person, goal, sides.as_ref(), &obstacles)?;
             placed.push(Person {
                 name,
                 role: person.role,
@@ -186,7 +178,6 @@ fn place(
     person: &PersonSection,
     goal: &Goal,
     sides: Option<&PatientSides>,
-    robot_base_m: &Point3<f64>,
     obstacles: &Obstacles<'_>,
 ) -> Result<(Option<Side>, Point3<f64>), Finding> {
     let floor_m = person.step_height_mm * 1e-3;
@@ -222,7 +213,7 @@ fn place(
         let side = sides.and_then(|sides| sides.nearest(&(position - entry)));
         return Ok((side, position));
     }
-    let away = entry - robot_base_m;
+    let away = entry - obstacles.robot_base_m;
     let directions = if let Some(sides) = sides {
         match person.side {
             Some(side) => vec![(
@@ -282,11 +273,14 @@ struct Obstacle<'a> {
 }
 
 /// What people cannot stand in.
-struct Obstacles<'a>(Vec<Obstacle<'a>>);
+struct Obstacles<'a> {
+    solids: Vec<Obstacle<'a>>,
+    robot_base_m: Point3<f64>,
+}
 
 impl<'a> Obstacles<'a> {
     fn new(room: &Room<'a>) -> Self {
-        let obstacles = room.solids.iter().map(|&(body, solid)| {
+        let solids = room.solids.iter().map(|&(body, solid)| {
             let (low, high) = solid.bounding_box();
             Obstacle {
                 body,
@@ -295,15 +289,18 @@ impl<'a> Obstacles<'a> {
                 high,
             }
         });
-        Self(obstacles.collect())
+        Self {
+            solids: solids.collect(),
+            robot_base_m: room.robot_base_m,
+        }
     }
 
     /// What a body that stands here would be in, if anything: axis and rim are tried every 50 mm.
     fn hit(&self, position: &Point3<f64>, stature_m: f64) -> Option<&'a str> {
         const SLICE_M: f64 = 0.05;
-        const RIM_POINTS: u32 = 12;
+        const RIM_POINTS: usize = 12;
         let near: Vec<&Obstacle<'_>> = self
-            .0
+            .solids
             .iter()
             .filter(|each| {
                 (0..2).all(|axis| {
@@ -312,11 +309,11 @@ impl<'a> Obstacles<'a> {
                 })
             })
             .collect();
-        let offsets: [Vector3<f64>; RIM_POINTS as usize + 1] = std::array::from_fn(|i| {
-            if i == RIM_POINTS as usize {
+        let offsets: [Vector3<f64>; RIM_POINTS + 1] = std::array::from_fn(|i| {
+            if i == RIM_POINTS {
                 return Vector3::zeros();
             }
-            let angle = std::f64::consts::TAU * i as f64 / f64::from(RIM_POINTS);
+            let angle = std::f64::consts::TAU * i as f64 / RIM_POINTS as f64;
             Vector3::new(angle.cos(), angle.sin(), 0.0) * BODY_RADIUS_M
         });
         let mut height_m = 0.5 * SLICE_M;
