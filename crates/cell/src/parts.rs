@@ -164,14 +164,14 @@ impl Library {
         scenario: &Scenario,
         world_from_base_link: &Pose,
     ) -> Result<[Option<Arc<Fixture>>; 3], Finding> {
-        fn made<K: Clone>(
+        fn made<K>(
             shelf: &Shelf<K, Fixture>,
             key: Option<K>,
             make: impl Fn(&K) -> Result<Fixture, FixtureError>,
             finding: impl Fn(&FixtureError) -> Finding,
         ) -> Result<Option<Arc<Fixture>>, Finding>
         where
-            K: PartialEq,
+            K: Clone + PartialEq,
         {
             key.map(|key| {
                 shelf.get(

@@ -301,6 +301,7 @@ pub(crate) fn resolve(
         Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
     );
     Ok(ResolvedScenario {
+        scenario,
         source,
         cell,
         phantom,
@@ -314,7 +315,6 @@ pub(crate) fn resolve(
         notes,
         people,
         imperfections,
-        scenario,
     })
 }
 

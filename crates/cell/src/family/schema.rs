@@ -25,8 +25,7 @@ impl Keys {
             here = if index == 0 && path.is_of_goal() {
                 &self.0["properties"]["goals"]["items"]
             } else {
-                self.step(here, step)
-                    .map_err(|why| format!("`{path}`: {why}"))?
+                Self::step(here, step).map_err(|why| format!("`{path}`: {why}"))?
             };
             if index == 0 && path.section() == "goals" {
                 return Err(format!(
@@ -39,7 +38,7 @@ impl Keys {
         Ok(())
     }
 
-    fn step<'s>(&'s self, here: &'s Value, step: &Step) -> Result<&'s Value, String> {
+    fn step<'s>(here: &'s Value, step: &Step) -> Result<&'s Value, String> {
         match step {
             Step::Name(name) => {
                 let known = here["properties"].as_object();
