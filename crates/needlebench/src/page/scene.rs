@@ -7,7 +7,7 @@ use needlebench_cell::{BodyKind, Frame, ResolvedScenario};
 use needlebench_kinematics::{Chain, Pose};
 use serde_json::{Value, json};
 
-use super::mesh::{append, surface};
+use super::mesh::{append, joined, surface};
 use super::pack::Pack;
 
 /// Fineness of curved surfaces, m.
@@ -155,7 +155,18 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
         };
         let mut color_rgba = fixture.color_rgba;
         color_rgba[3] = 1.0;
-        surfaces.add_solids(group, WORLD, color_rgba, &fixture.solids, &here);
+        let solids: Vec<TriangleMesh> = fixture
+            .solids
+            .iter()
+            .map(|solid| {
+                let mut placed = solid.shape.surface(CHORD_ERROR_M);
+                for vertex in &mut placed.vertices_m {
+                    *vertex = solid.parent_from_shape * *vertex;
+                }
+                placed
+            })
+            .collect();
+        surfaces.add(group, WORLD, color_rgba, &joined(&solids), &here);
     }
     if let Some(placed) = &resolved.phantom {
         for part in &placed.phantom.parts {

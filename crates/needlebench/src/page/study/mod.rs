@@ -15,7 +15,11 @@ use super::pack::Pack;
 use super::scene::{pose, surroundings};
 use columns::{Columns, LABELLED};
 
-const SCRIPT: &str = include_str!("../assets/study.js");
+const SCRIPT: &str = concat!(
+    include_str!("../assets/statistics.js"),
+    include_str!("../assets/study_plots.js"),
+    include_str!("../assets/study.js")
+);
 
 /// What a study's page is made of.
 pub(crate) struct StudyPage<'a> {
