@@ -128,28 +128,26 @@ impl<'a> Drive<'a> {
         let braking = self
             .braking
             .filter(|braking| time_s >= braking.from_s - STEP_SLACK * self.recording.timestep_s);
-        let torque = match braking {
-            Some(Braking {
-                brakes, dynamics, ..
-            }) => {
-                let h = self.recording.timestep_s;
-                let torque_nm = brakes.torque(dynamics, &state.position, &state.velocity, h);
-                ActuatedTorque {
-                    link_nm: torque_nm,
-                    drive_nm: Joints::zeros(),
-                    saturated: [false; JOINT_COUNT],
-                }
+        let torque = if let Some(Braking {
+            brakes, dynamics, ..
+        }) = braking
+        {
+            let h = self.recording.timestep_s;
+            let torque_nm = brakes.torque(dynamics, &state.position, &state.velocity, h);
+            ActuatedTorque {
+                link_nm: torque_nm,
+                drive_nm: Joints::zeros(),
+                saturated: [false; JOINT_COUNT],
             }
-            None => {
-                let planned = self.recording.reference.last();
-                self.drives.torque(
-                    self.trajectory,
-                    time_s,
-                    planned.expect("recorded with its state"),
-                    &state.position,
-                    &state.velocity,
-                )
-            }
+        } else {
+            let planned = self.recording.reference.last();
+            self.drives.torque(
+                self.trajectory,
+                time_s,
+                planned.expect("recorded with its state"),
+                &state.position,
+                &state.velocity,
+            )
         };
         check_torque(&self.recording.engine.name, time_s, &torque.drive_nm)?;
         self.recording.saturated_steps += usize::from(torque.saturated.contains(&true));
