@@ -128,13 +128,14 @@ impl<'a> Drive<'a> {
         let braking = self
             .braking
             .filter(|braking| time_s >= braking.from_s - STEP_SLACK * self.recording.timestep_s);
-        let torque = if let Some(braking) = braking {
+        let torque = if let Some(Braking {
+            brakes, dynamics, ..
+        }) = braking
+        {
             let h = self.recording.timestep_s;
-            let Braking {
-                brakes, dynamics, ..
-            } = braking;
+            let torque_nm = brakes.torque(dynamics, &state.position, &state.velocity, h);
             ActuatedTorque {
-                link_nm: brakes.torque(dynamics, &state.position, &state.velocity, h),
+                link_nm: torque_nm,
                 drive_nm: Joints::zeros(),
                 saturated: [false; JOINT_COUNT],
             }

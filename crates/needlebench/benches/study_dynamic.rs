@@ -114,7 +114,7 @@ impl Bare {
             for torque_nm in torques_nm {
                 plant.advance(torque_nm).expect("stable before");
             }
-            total += times(None) - started;
+            total += times(None).saturating_sub(started);
         }
         total
     }
@@ -133,7 +133,7 @@ impl Bare {
             plant
                 .replay(start, look, torques_nm)
                 .expect("stable before");
-            total += processor_time(&account) - started;
+            total += processor_time(&account).saturating_sub(started);
         }
         total
     }
@@ -143,14 +143,14 @@ impl Bare {
         let model = ClearanceModel::new(&self.case.cell);
         let planner = Planner::new(&self.case, &model).expect("a UR arm");
         std::hint::black_box(planner.plan(&self.case.goals[0]));
-        times(None) - started
+        times(None).saturating_sub(started)
     }
 
     fn case(&self, engine: EngineName, set: &mut EngineSet) -> Duration {
         let process = set.process_id().filter(|_| engine == EngineName::Mujoco);
         let started = times(process);
         dynamic_rows(&self.case, &[engine], set).expect("a sound case");
-        times(process) - started
+        times(process).saturating_sub(started)
     }
 }
 
@@ -262,7 +262,7 @@ fn workers(cores: &[usize], cases: &[ResolvedScenario]) -> [f64; 2] {
                     for case in cases {
                         dynamic_rows(case, &BOTH, &mut set).expect("a sound case");
                     }
-                    let spent = times(set.process_id()) - before;
+                    let spent = times(set.process_id()).saturating_sub(before);
                     (started, Instant::now(), spent)
                 })
             })

@@ -214,10 +214,7 @@ impl HarnessProcess {
     /// growing. Handles from before name plants that are gone, or others.
     pub fn clear(&mut self) -> Result<(), HarnessError> {
         let sealed = Frame::begin(&mut self.outbox, Request::Clear).finish();
-        self.ask(Request::Clear, sealed, |payload| {
-            payload.finish()?;
-            Ok(())
-        })
+        self.ask(Request::Clear, sealed, answers::nothing)
     }
 
     /// Compiles an MJCF model, whose site `observed_site` every state will report.

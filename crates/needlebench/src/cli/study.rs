@@ -68,6 +68,7 @@ pub(crate) struct StudyArguments {
 
 /// Arguments of `merge`.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct MergeArguments {
     /// Study file.
     #[arg(value_name = "STUDY")]

@@ -26,7 +26,7 @@ use crate::study::{
 };
 
 /// Longest time that a study is expected to take and starts without `--yes`.
-const WITHOUT_ASKING: Duration = Duration::from_secs(20 * 60);
+const WITHOUT_ASKING: Duration = Duration::from_mins(20);
 /// Cases of the costs of which nothing is measured before: they are few, whatever they cost.
 const FEW_CASES: u64 = 200;
 
@@ -246,6 +246,7 @@ fn failed(error: &StudyError) -> ExitStatus {
     }
 }
 
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 struct FinishOptions<'a> {
     csv: bool,
     json: bool,

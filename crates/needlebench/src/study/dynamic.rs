@@ -100,7 +100,7 @@ pub fn dynamic_case(
         timed(&mut cost.mujoco, || case.run_mujoco(set))?;
     }
     let rows = case.rows();
-    cost.other = started.elapsed() - cost.total();
+    cost.other = started.elapsed().saturating_sub(cost.total());
     Ok(DynamicCase { rows, cost })
 }
 

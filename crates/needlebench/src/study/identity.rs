@@ -36,10 +36,10 @@ impl Identity {
                     format!("{role} {name} ({k})")
                 }
             };
-            let free = (1..)
+            let free = (1..=inputs.len() + 1)
                 .map(named)
                 .find(|name| inputs.get(name).is_none_or(|known| known == sha256))
-                .expect("there are few files");
+                .expect("one name more than there are");
             inputs.insert(free, sha256.to_owned());
         };
         add("study", file_name(&study.source), &study.source.sha256);
@@ -93,10 +93,11 @@ impl Identity {
                 }
             }
         }
-        let text: String = inputs
+        let lines: Vec<String> = inputs
             .iter()
             .map(|(name, hash)| format!("{name} {hash}\n"))
             .collect();
+        let text = lines.concat();
         Ok(Self {
             id: sha256_hex(text.as_bytes()),
             inputs,

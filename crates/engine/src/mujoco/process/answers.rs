@@ -123,6 +123,11 @@ pub(super) fn versions(mut payload: Payload<'_>) -> Result<HarnessVersions, Malf
     })
 }
 
+/// An answer that says no more than that it is done.
+pub(super) fn nothing(payload: Payload<'_>) -> Result<(), Malformed> {
+    payload.finish()
+}
+
 pub(super) fn plant(mut payload: Payload<'_>) -> Result<PlantHandle, Malformed> {
     let index = payload.u32()?;
     let qpos_count = payload.u32()? as usize;
