@@ -211,7 +211,7 @@ fn the_nearest_solid_of_a_segment_is_the_least_of_all() {
     for _ in 0..50 {
         let (from, to) = (point(), point());
         let all = prepared.segment_clearance(&from, &to, 6e-4, &place);
-        let wanted = |index: usize| index % 3 != 0;
+        let wanted = |index: usize| !index.is_multiple_of(3);
         let found = prepared.nearest_to_segment(&from, &to, 6e-4, &place, wanted);
         let least = (0..all.len())
             .filter(|index| wanted(*index))

@@ -17,12 +17,11 @@ fn headings(header: &[String]) -> Vec<String> {
     let mut names = Vec::new();
     for name in header {
         let name = name.trim_start_matches('<');
-        match name.strip_prefix('\n') {
-            Some(second) => names.push(escaped(&format!("{first} {second}"))),
-            None => {
-                first = name.split('\n').next().unwrap_or_default();
-                names.push(escaped(name));
-            }
+        if let Some(second) = name.strip_prefix('\n') {
+            names.push(escaped(&format!("{first} {second}")));
+        } else {
+            first = name.split('\n').next().unwrap_or_default();
+            names.push(escaped(name));
         }
     }
     names
@@ -63,7 +62,7 @@ fn write_markdown(
                 writeln!(out)?;
             }
             Part::Table { header, rows } => {
-                writeln!(out, "| {} |", headings(&header).join(" | "))?;
+                writeln!(out, "| {} |", headings(header).join(" | "))?;
                 out.push('|');
                 for (at, name) in header.iter().enumerate() {
                     let text = at == 0 || name.starts_with('<');

@@ -36,8 +36,8 @@ fn add(path: &str, by: f64) -> (KeyPath, Change) {
 
 /// As a row holds it.
 #[expect(clippy::cast_possible_truncation, reason = "what rows do")]
-fn as_column(value: f64) -> Option<f32> {
-    Some(value as f32)
+fn as_column(value: f64) -> f32 {
+    value as f32
 }
 
 const CLASSES: [(ClearanceClass, Metric); 8] = [
@@ -60,7 +60,7 @@ fn agrees(resolved: &ResolvedScenario, row: &Row, configuration: Configuration) 
     let planned = &plan.configurations[configuration.index()];
     let roll_deg = row.get(Metric::Roll).unwrap();
     let member = planner.posture(goal, configuration);
-    assert_eq!(as_column(member.roll_rad.to_degrees()), Some(roll_deg));
+    assert_eq!(as_column(member.roll_rad.to_degrees()), roll_deg);
     let Some(candidate) = member.candidate else {
         assert_eq!(row.get(Metric::Joint1), None);
         assert_eq!(row.outcome, Outcome::Rejected);
@@ -73,7 +73,7 @@ fn agrees(resolved: &ResolvedScenario, row: &Row, configuration: Configuration) 
         let found = minima.get(class);
         assert_eq!(
             row.get(metric),
-            found.and_then(|pair| as_column(pair.separation.distance_m * 1e3)),
+            found.map(|pair| as_column(pair.separation.distance_m * 1e3)),
             "{class:?}"
         );
     }
@@ -83,16 +83,16 @@ fn agrees(resolved: &ResolvedScenario, row: &Row, configuration: Configuration) 
         .filter_map(|(class, _)| minima.get(*class))
         .map(|pair| pair.separation.distance_m)
         .fold(f64::INFINITY, f64::min);
-    assert_eq!(row.get(Metric::Clearance), as_column(least_m * 1e3));
+    assert_eq!(row.get(Metric::Clearance), Some(as_column(least_m * 1e3)));
     let placed = resolved.phantom.as_ref().unwrap();
     let route = needle_route(&resolved.cell, placed, goal);
     assert_eq!(
         row.get(Metric::NeedleRoute),
-        route.and_then(|route| as_column(route.minimum_m * 1e3))
+        route.map(|route| as_column(route.minimum_m * 1e3))
     );
     assert_eq!(
         row.get(Metric::WristSine),
-        as_column(candidate.margins.wrist_sine)
+        Some(as_column(candidate.margins.wrist_sine))
     );
     // What rejects the posture rejects the plan, unless a motion does; what works is tried first.
     match member.rejections.first() {
@@ -195,7 +195,7 @@ fn a_settled_tip_without_friction_is_that_of_a_run() {
         };
         let error_m = (tip - reality.goal(0).target_m).norm();
         let row = &rows[configuration.index()];
-        assert_eq!(row.get(Metric::TipError), as_column(error_m * 1e3));
+        assert_eq!(row.get(Metric::TipError), Some(as_column(error_m * 1e3)));
         let [lateral, axial] = [Metric::TipLateral, Metric::TipAxial].map(|m| row.get(m).unwrap());
         // Across and along are not of the same axis, but milliradians apart.
         let both = lateral.hypot(axial);
