@@ -259,7 +259,6 @@ fn an_arm_that_stays_is_met_after_its_clearance() {
         Metric::RobotPhantom,
         Metric::ToolPhantom,
         Metric::GuideStandoff,
-        Metric::NeedleCorridor,
     ]
     .map(|metric| f64::from(rows[index].get(metric).unwrap_or(f32::INFINITY)))
     .into_iter()
