@@ -29,4 +29,5 @@ mod process;
 mod referee;
 mod run;
 mod schema;
+mod study;
 mod support;

@@ -1,4 +1,4 @@
-//! The schema of scenario files.
+//! The schemas of scenario and study files.
 
 use std::fs;
 
@@ -6,21 +6,27 @@ use serde_json::Value;
 
 use crate::support::{Bench, workspace};
 
-const FILE: &str = "scenarios/scenario.schema.json";
+/// Formats and their committed schemas.
+const FILES: [(&str, &str); 2] = [
+    ("scenario", "scenarios/scenario.schema.json"),
+    ("study", "scenarios/studies/study.schema.json"),
+];
 
-fn printed() -> String {
-    let answer = Bench::new().run(&["schema", "scenario"]);
+fn printed(format: &str) -> String {
+    let answer = Bench::new().run(&["schema", format]);
     answer.exits_with(0).stdout
 }
 
 #[test]
-fn committed_schema_is_the_one_of_this_program() {
-    let committed = fs::read_to_string(workspace().join(FILE)).unwrap_or_default();
-    assert!(
-        committed.replace("\r\n", "\n") == printed(),
-        "{FILE} is out of date; make it again with\n  \
-         cargo run -- schema scenario > {FILE}"
-    );
+fn committed_schemas_are_those_of_this_program() {
+    for (format, file) in FILES {
+        let committed = fs::read_to_string(workspace().join(file)).unwrap_or_default();
+        assert!(
+            committed.replace("\r\n", "\n") == printed(format),
+            "{file} is out of date; make it again with\n  \
+             cargo run -- schema {format} > {file}"
+        );
+    }
 }
 
 /// Objects with `properties`, with their path.
@@ -38,16 +44,18 @@ fn structs<'a>(path: &str, value: &'a Value, found: &mut Vec<(String, &'a Value)
 
 #[test]
 fn every_key_has_a_description_and_no_struct_takes_unknown_keys() {
-    let schema: Value = serde_json::from_str(&printed()).unwrap();
-    let mut found = Vec::new();
-    structs("", &schema, &mut found);
-    // The file, its sections, and their parts.
-    assert!(found.len() > 15, "{}", found.len());
-    for (path, each) in found {
-        assert_eq!(each["additionalProperties"], false, "{path}");
-        for (key, property) in each["properties"].as_object().unwrap() {
-            let description = property["description"].as_str().unwrap_or_default();
-            assert!(!description.is_empty(), "{path}: {key} is not described");
+    for (format, _) in FILES {
+        let schema: Value = serde_json::from_str(&printed(format)).unwrap();
+        let mut found = Vec::new();
+        structs("", &schema, &mut found);
+        // The file, its sections, and their parts.
+        assert!(found.len() > 8, "{}", found.len());
+        for (path, each) in found {
+            assert_eq!(each["additionalProperties"], false, "{path}");
+            for (key, property) in each["properties"].as_object().unwrap() {
+                let description = property["description"].as_str().unwrap_or_default();
+                assert!(!description.is_empty(), "{path}: {key} is not described");
+            }
         }
     }
 }

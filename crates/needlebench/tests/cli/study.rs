@@ -1,0 +1,256 @@
+//! `study` and `merge`: from a study file to a folder of results.
+
+use serde_json::Value;
+
+use crate::support::{Bench, SMALL, has_keys, workspace};
+
+/// 96 static cases.
+const STUDY: &str = r#"
+name = "moved"
+scenario = "s.toml"
+seed = 1
+[sampling]
+samples = 16
+[[factors]]
+name = "along"
+key = "phantom.position_mm[0]"
+range = [-20, 20]
+relative = true
+[[factors]]
+name = "height"
+key = "robot.base_position_mm[2]"
+role = "choice"
+values = [790, 800, 810]
+[[factors]]
+name = "tool"
+key = "tool.mount_rotation_deg"
+values = [90, 180]
+"#;
+
+/// A bench with a study of the small scenario.
+fn bench(study: &str) -> Bench {
+    let bench = Bench::with_scenario(SMALL);
+    bench.write("study.toml", study);
+    bench
+}
+
+fn run(bench: &Bench, more: &[&str]) -> crate::support::Answer {
+    let mut arguments = vec!["study", "study.toml", "--quiet"];
+    arguments.extend(more);
+    bench.run(&arguments)
+}
+
+#[test]
+fn a_study_leaves_a_table_a_summary_and_a_page() {
+    let bench = bench(STUDY);
+    let answer = run(&bench, &["--csv", "--junit", "junit.xml"]).exits_with(0);
+    for word in ["96 cases", "Right-Up-Fold", "height"] {
+        assert!(answer.stdout.contains(word), "{}", answer.stdout);
+    }
+    for file in [
+        "results.parquet",
+        "results.csv",
+        "summary.json",
+        "summary.md",
+        "report.html",
+        "study.json",
+    ] {
+        assert!(bench.path(&format!("out/moved/{file}")).is_file(), "{file}");
+    }
+    assert!(!bench.path("out/moved/journal.nbj").exists());
+    let summary: Value = serde_json::from_slice(&bench.read("out/moved/summary.json")).unwrap();
+    has_keys(
+        &summary,
+        &[
+            "name", "cases", "verdict", "criteria", "overall", "effects", "choices", "study_id",
+        ],
+    );
+    assert_eq!(summary["cases"], 96);
+}
+
+#[test]
+fn a_case_alone_has_the_numbers_of_its_rows() {
+    let bench = bench(STUDY);
+    run(&bench, &["--csv", "--no-page"]).exits_with(0);
+    let table = String::from_utf8(bench.read("out/moved/results.csv")).unwrap();
+    let mut lines = table.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 8 * 96);
+    let mut compared = 0;
+    for case in [0, 41, 95] {
+        let alone = run(&bench, &["--case", &case.to_string(), "--json"])
+            .exits_with(0)
+            .json();
+        let of_case: Vec<_> = rows
+            .iter()
+            .filter(|row| row[0] == case.to_string())
+            .collect();
+        assert_eq!(of_case.len(), 8);
+        for (row, alone) in of_case.iter().zip(alone["rows"].as_array().unwrap()) {
+            let cell = |name: &str| row[names.iter().position(|each| *each == name).unwrap()];
+            assert_eq!(cell("configuration"), alone["configuration"]);
+            assert_eq!(cell("outcome"), alone["outcome"]);
+            let metrics = alone["metrics"].as_object().unwrap();
+            compared += metrics.len();
+            for (name, value) in metrics {
+                // Both are the shortest digits of the same 24-bit number.
+                let value = value.as_f64().unwrap();
+                #[expect(clippy::cast_possible_truncation, reason = "as columns have it")]
+                let value = value as f32;
+                assert_eq!(
+                    cell(name).parse::<f32>().unwrap().to_bits(),
+                    value.to_bits(),
+                    "{name}"
+                );
+            }
+        }
+    }
+    assert!(compared > 200, "{compared}");
+}
+
+#[test]
+fn shards_on_any_number_of_threads_merge_into_the_same_bytes() {
+    let bench = bench(STUDY);
+    run(&bench, &["--jobs", "2"]).exits_with(0);
+    let whole: Vec<Vec<u8>> = ["results.parquet", "summary.json", "report.html"]
+        .map(|file| bench.read(&format!("out/moved/{file}")))
+        .into();
+    let mut arguments = vec![
+        "merge".to_owned(),
+        "study.toml".to_owned(),
+        "--out".to_owned(),
+        "merged".to_owned(),
+    ];
+    for k in 1..=3 {
+        let (shard, out) = (format!("{k}/3"), format!("shard{k}"));
+        run(&bench, &["--shard", &shard, "--out", &out, "--jobs", "1"]).exits_with(0);
+        if k == 3 {
+            // Not all of it is there yet.
+            let early: Vec<&str> = arguments.iter().map(String::as_str).collect();
+            bench.run(&early).exits_with(2).complains(["missing"]);
+        }
+        arguments.push(format!("{out}/moved"));
+    }
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    bench.run(&arguments).exits_with(0);
+    for (file, bytes) in ["results.parquet", "summary.json", "report.html"]
+        .into_iter()
+        .zip(&whole)
+    {
+        assert!(
+            bench.read(&format!("merged/moved/{file}")) == *bytes,
+            "{file}"
+        );
+    }
+}
+
+#[test]
+fn a_folder_with_results_is_neither_overwritten_nor_mixed() {
+    let bench = bench(STUDY);
+    run(&bench, &["--no-page"]).exits_with(0);
+    let table = bench.read("out/moved/results.parquet");
+    run(&bench, &[]).exits_with(2).complains(["--resume"]);
+    run(&bench, &["--resume"]).exits_with(0);
+    bench.write("study.toml", STUDY.replace("samples = 16", "samples = 8"));
+    run(&bench, &["--resume"])
+        .exits_with(2)
+        .complains(["another study", "different"]);
+    assert!(bench.read("out/moved/results.parquet") == table);
+    // A table that is cut off is found.
+    bench.write("study.toml", STUDY);
+    bench.write("out/moved/results.parquet", &table[..table.len() / 2]);
+    let answer = run(&bench, &["--resume"]);
+    assert_eq!(answer.status, Some(2), "{answer:#?}");
+    answer.complains(["results.parquet"]);
+}
+
+#[test]
+fn what_a_study_cannot_be_is_refused_at_its_line() {
+    for (edit, parts) in [
+        (
+            ("values = [790, 800, 810]", "values = []"),
+            ["study.toml:16", "factors[1].values", "no values"],
+        ),
+        (
+            ("range = [-20, 20]", "range = [20, -20]"),
+            ["study.toml:10", "factors[0].range", "empty"],
+        ),
+        (
+            ("position_mm[0]", "positon_mm[0]"),
+            ["study.toml:10", "positon_mm", "position_mm"],
+        ),
+        (
+            ("s.toml", "missing.toml"),
+            ["study.toml:3", "scenario", "missing.toml"],
+        ),
+        (
+            ("seed = 1", "seeds = 1"),
+            ["study.toml:4", "seeds", "did you mean `seed`"],
+        ),
+        (
+            ("seed = 1", "mode = \"dynamik\""),
+            ["study.toml:4", "dynamik", "dynamic"],
+        ),
+    ] {
+        let bench = bench(&STUDY.replacen(edit.0, edit.1, 1));
+        run(&bench, &[]).exits_with(2).complains(parts);
+    }
+}
+
+#[test]
+fn a_study_that_takes_long_says_how_long_and_asks() {
+    let bench = bench(&STUDY.replace("samples = 16", "samples = 1000000000"));
+    run(&bench, &[])
+        .exits_with(2)
+        .complains(["6000000000 cases", "will take about", "--yes"]);
+    run(&bench, &["--case", "6000000000"])
+        .exits_with(2)
+        .complains(["--case", "no case"]);
+}
+
+#[test]
+fn a_missed_criterion_of_a_study_is_a_failure() {
+    let bench = bench(&format!(
+        "{STUDY}[criteria]\nmin_layouts_working = 1.0\nmin_clearance_mm = {{ at_least = 500 }}\n"
+    ));
+    let answer = run(&bench, &["--junit", "junit.xml", "--json", "--no-page"]).exits_with(1);
+    assert_eq!(answer.json()["verdict"], "fail");
+    let junit = String::from_utf8(bench.read("junit.xml")).unwrap();
+    assert!(
+        junit.contains("min_clearance_mm") && junit.contains("<failure"),
+        "{junit}"
+    );
+}
+
+#[test]
+fn a_case_is_run_with_everything_that_a_run_leaves() {
+    let bench = bench(STUDY);
+    run(&bench, &["--case", "7", "--run", "--engine-free"]).exits_with(2);
+    let study = STUDY.replace(
+        "[sampling]",
+        "mode = \"dynamic\"\nengines = [\"rapier\"]\n[sampling]",
+    );
+    bench.write("study.toml", study);
+    let answer = run(&bench, &["--case", "7", "--run"]);
+    assert!(matches!(answer.status, Some(0 | 1)), "{answer:#?}");
+    for file in ["report.json", "report.html"] {
+        assert!(
+            bench.path(&format!("out/moved/cases/7/{file}")).is_file(),
+            "{file}"
+        );
+    }
+}
+
+#[test]
+fn shipped_studies_are_understood() {
+    for name in ["layouts", "base_placement", "accuracy_budget", "tools"] {
+        let file = workspace().join(format!("scenarios/studies/{name}.toml"));
+        let bench = Bench::new();
+        let answer = bench
+            .run(&["study", file.to_str().unwrap(), "--case", "0", "--json"])
+            .exits_with(0)
+            .json();
+        assert_eq!(answer["rows"].as_array().unwrap().len(), 8, "{name}");
+    }
+}
