@@ -93,7 +93,7 @@ NB.start = async function (build) {
 
 // Numbers. Minus signs are minus signs; what is missing is a dash.
 NB.minus = (text) => text.replace('-', '\u2212');
-NB.fixed = (value, digits) => (value === null || value === undefined || Number.isNaN(value) ? '\u2013' : NB.minus(value.toFixed(digits)));
+NB.fixed = (value, digits) => (value === null || value === undefined || Number.isNaN(value) ? '\u2013' : NB.minus((Number(value.toFixed(digits)) || 0).toFixed(digits)));
 NB.mm = (metres, digits = 1) => NB.fixed(metres === null || metres === undefined ? NaN : metres * 1e3, digits);
 NB.deg = (radians, digits = 1) => NB.fixed(radians === null || radians === undefined ? NaN : radians * 180 / Math.PI, digits);
 NB.percent = (share) => NB.fixed(share === null || share === undefined ? NaN : share * 100, 0);

@@ -311,7 +311,7 @@ NB.StudyPage = class extends NB.StudyPlots {
     const columns = [
       { title: 'Configuration', cell: (c) => this.page.configurations[c] },
       { title: 'Outcome', cell: (c) => this.outcomeText(index, c) },
-      ...this.metrics.map((metric) => ({ title: this.titleOf(metric), numeric: true, help: metric.description, cell: (c) => NB.fixed(metric.values[c * this.count + index], Math.min(Math.max(0, Math.ceil(-Math.log10(metric.column.step))), 3)) })),
+      ...this.metrics.map((metric) => ({ title: this.titleOf(metric), numeric: true, help: metric.description, cell: (c) => NB.fixed(metric.values[c * this.count + index], Math.min(Math.max(0, Math.floor(-Math.log10(metric.column.step))), 3)) })),
     ];
     const table = NB.table('Row: show its posture', columns, [0, 1, 2, 3, 4, 5, 6, 7], { class: 'choose small full' });
     const rows = [...table.querySelectorAll('tbody tr')];
