@@ -70,6 +70,19 @@ fn a_study_knows_its_factors() {
 }
 
 #[test]
+fn a_grid_has_round_numbers_where_its_steps_are_round() {
+    let study = load(&format!(
+        "{SHIFT}grid = {{ from = -480, to = 0, steps = 7 }}\n"
+    ))
+    .unwrap();
+    let FactorValues::Levels(levels) = &study.factors[0].values else {
+        panic!("a grid has levels");
+    };
+    let labels: Vec<&str> = levels.iter().map(|level| level.label.as_str()).collect();
+    assert_eq!(labels, ["-480", "-400", "-320", "-240", "-160", "-80", "0"]);
+}
+
+#[test]
 fn empty_and_contradictory_factors_are_refused() {
     for (lines, key, word) in [
         (

@@ -377,9 +377,12 @@ impl FactorContext<'_> {
         }
         (0..steps)
             .map(|step| {
-                // Exact at both ends.
-                let share = f64::from(step) / f64::from(steps - 1);
-                let number = from * (1.0 - share) + to * share;
+                // Exact at both ends, and in between wherever the steps are whole numbers.
+                let number = if step + 1 == steps {
+                    to
+                } else {
+                    from + (to - from) * f64::from(step) / f64::from(steps - 1)
+                };
                 let value = Setting::from(number);
                 let change =
                     change_of(section, &value).map_err(|message| self.finding("grid", message))?;
