@@ -197,11 +197,11 @@ class Port:
         self._out_rotation = out[SITE_ROTATION:JOINTS]
         self._out_qpos = out[JOINTS : JOINTS + model.nq]
         self._out_qvel = out[JOINTS + model.nq :]
-        self._applied = memoryview(plant.applied)
-        self._position = memoryview(plant.site_xpos)
-        self._rotation = memoryview(plant.site_xmat)
-        self._qpos = memoryview(plant.qpos)
-        self._qvel = memoryview(plant.qvel)
+        self._applied = plant.applied.data
+        self._position = plant.site_xpos.data
+        self._rotation = plant.site_xmat.data
+        self._qpos = plant.qpos.data
+        self._qvel = plant.qvel.data
         self._shows_contacts = False
 
     def reset(self, *, qpos: Floats, qvel: Floats) -> None:
