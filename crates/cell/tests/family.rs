@@ -157,8 +157,12 @@ fn sizes_tools_and_imperfections_are_those_of_their_texts() {
             let calibration = calibration.or_insert_with(|| toml::Table::new().into());
             let calibration = calibration.as_table_mut().unwrap();
             calibration.insert("scale".into(), scale.into());
-            table["tool"]["urdf"] = (*tool).into();
-            table["phantom"]["length_mm"] = 421.5.into();
+            let section = table.entry("tool");
+            let section = section.or_insert_with(|| toml::Table::new().into());
+            let section = section.as_table_mut().unwrap();
+            section.insert("urdf".into(), (*tool).into());
+            let phantom = table["phantom"].as_table_mut().unwrap();
+            phantom.insert("length_mm".into(), 421.5.into());
         });
         match (varied, text) {
             (Ok(varied), Ok(text)) => same(&varied, text),
