@@ -12,7 +12,7 @@ use crate::support::{Bench, SMALL, with_edit};
 const PATIENCE: Duration = Duration::from_mins(1);
 
 /// Context switches of a harness that has certainly answered many steps: it waits for each.
-const SWITCHES_IN_MID_RUN: u64 = 1500;
+const SWITCHES_IN_MID_RUN: u64 = 1000;
 
 /// `SMALL` with so many steps that a run takes seconds.
 pub fn long_scenario() -> String {
@@ -20,7 +20,7 @@ pub fn long_scenario() -> String {
     with_edit(
         &text,
         "[recording]",
-        "[engines]\ntimestep_ms = 0.1\nharness_timeout_s = 5\n[recording]",
+        "[engines]\ntimestep_ms = 0.05\nharness_timeout_s = 5\n[recording]",
     )
 }
 
