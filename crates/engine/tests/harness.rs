@@ -342,7 +342,7 @@ import struct, sys, time
 source, sink = sys.stdin.buffer.raw, sys.stdout.buffer.raw
 source.read(12)
 text = lambda s: struct.pack('<I', len(s)) + s
-answer = struct.pack('<II', 2, 3) + text(b'4.0.0') + text(b'3') + text(b'2')
+answer = struct.pack('<II', 3, 3) + text(b'4.0.0') + text(b'3') + text(b'2')
 sink.write(struct.pack('<II', 0x81, len(answer)) + answer)
 ";
 
