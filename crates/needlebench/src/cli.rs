@@ -10,7 +10,7 @@ use nalgebra::Matrix3x4;
 use needlebench_kinematics::UrModel;
 
 use study::STUDY_HELP;
-pub(crate) use study::{MergeArguments, StudyArguments};
+pub(crate) use study::{MergeArguments, StudyArguments, StudyResultArguments};
 
 use crate::command;
 use crate::exit::ExitStatus;

@@ -21,7 +21,6 @@ Example: needlebench merge scenarios/studies/layouts.toml shard1/layouts shard2/
 
 /// Arguments of `study`.
 #[derive(Debug, Args)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct StudyArguments {
     /// Study file.
     #[arg(value_name = "STUDY")]
@@ -44,31 +43,14 @@ pub(crate) struct StudyArguments {
     /// With --case: run it with engines, pictures and a page, as `run` does, into the study's folder.
     #[arg(long, requires = "case")]
     pub run: bool,
-    /// Write results.csv too.
-    #[arg(long)]
-    pub csv: bool,
-    /// Print one JSON document instead of the tables.
-    #[arg(long)]
-    pub json: bool,
-    /// Write JUnit XML of the study's criteria to this file.
-    #[arg(long, value_name = "FILE")]
-    pub junit: Option<PathBuf>,
-    /// Threads; the number of cores if left out. Results do not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
-    pub jobs: Option<u16>,
-    /// Write no page.
-    #[arg(long)]
-    pub no_page: bool,
-    /// Show no progress.
-    #[arg(long)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub results: StudyResultArguments,
     #[command(flatten)]
     pub robot: RobotArguments,
 }
 
 /// Arguments of `merge`.
 #[derive(Debug, Args)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct MergeArguments {
     /// Study file.
     #[arg(value_name = "STUDY")]
@@ -79,6 +61,16 @@ pub(crate) struct MergeArguments {
     /// Folder for results; the study gets a folder of its name in it.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
+    #[command(flatten)]
+    pub results: StudyResultArguments,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+/// What is made of a complete table, and how.
+#[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub(crate) struct StudyResultArguments {
     /// Write results.csv too.
     #[arg(long)]
     pub csv: bool,
@@ -97,6 +89,4 @@ pub(crate) struct MergeArguments {
     /// Show no progress.
     #[arg(long)]
     pub quiet: bool,
-    #[command(flatten)]
-    pub robot: RobotArguments,
 }

@@ -15,7 +15,7 @@ use needlebench_study::{
 
 use super::run::{Outputs, prepare_folder, probe_file, run_into};
 use super::{overrides, print_json, print_text};
-use crate::cli::{MergeArguments, RobotArguments, StudyArguments};
+use crate::cli::{MergeArguments, RobotArguments, StudyArguments, StudyResultArguments};
 use crate::exit::ExitStatus;
 use crate::output::findings::print_findings;
 use crate::pipeline::RunOptions;
@@ -39,12 +39,12 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
         return cases(arguments, &prepared);
     }
     let folder = arguments.out.join(&prepared.study.file.name);
-    if let Err(finding) = prepare_outputs(&folder, arguments.junit.as_deref()) {
+    if let Err(finding) = prepare_outputs(&folder, arguments.results.junit.as_deref()) {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
     let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design);
-    let threads = threads(arguments.jobs);
+    let threads = threads(arguments.results.jobs);
     let manifest = prepared.manifest(arguments.shard);
     if !arguments.yes && !arguments.resume {
         match too_long(&prepared, &evaluator, manifest.own_cases(), threads) {
@@ -57,7 +57,7 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
         }
     }
     let cancel = watch_interrupts()?;
-    let progress = Progress::new(arguments.quiet);
+    let progress = Progress::new(arguments.results.quiet);
     let run = StudyRun {
         design: &prepared.design,
         manifest,
@@ -90,17 +90,7 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
         Ok(RunEnd::Finished {
             results: Some(results),
             ..
-        }) => {
-            let options = FinishOptions {
-                csv: arguments.csv,
-                json: arguments.json,
-                junit: arguments.junit.as_deref(),
-                page: !arguments.no_page,
-                quiet: arguments.quiet,
-                threads,
-            };
-            finish(&prepared, &folder, &results, &options)
-        }
+        }) => finish(&prepared, &folder, &results, &arguments.results),
     }
 }
 
@@ -110,12 +100,12 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
         return Ok(ExitStatus::BadInput);
     };
     let folder = arguments.out.join(&prepared.study.file.name);
-    if let Err(finding) = prepare_outputs(&folder, arguments.junit.as_deref()) {
+    if let Err(finding) = prepare_outputs(&folder, arguments.results.junit.as_deref()) {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
-    let threads = threads(arguments.jobs);
-    let progress = Progress::new(arguments.quiet);
+    let threads = threads(arguments.results.jobs);
+    let progress = Progress::new(arguments.results.quiet);
     if let Some(error) = foreign_shard(&prepared, &arguments.shards) {
         return Ok(failed(&error));
     }
@@ -128,17 +118,7 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
         Ok(RunEnd::Finished {
             results: Some(results),
             ..
-        }) => {
-            let options = FinishOptions {
-                csv: arguments.csv,
-                json: arguments.json,
-                junit: arguments.junit.as_deref(),
-                page: !arguments.no_page,
-                quiet: arguments.quiet,
-                threads,
-            };
-            finish(&prepared, &folder, &results, &options)
-        }
+        }) => finish(&prepared, &folder, &results, &arguments.results),
         Ok(_) => unreachable!("a merge writes a table or fails"),
     }
 }
@@ -246,45 +226,36 @@ fn failed(error: &StudyError) -> ExitStatus {
     }
 }
 
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
-struct FinishOptions<'a> {
-    csv: bool,
-    json: bool,
-    junit: Option<&'a Path>,
-    page: bool,
-    quiet: bool,
-    threads: usize,
-}
-
 /// Statistics, page and verdict of a table that is there.
 fn finish(
     prepared: &PreparedStudy,
     folder: &Path,
     results: &Path,
-    options: &FinishOptions<'_>,
+    arguments: &StudyResultArguments,
 ) -> Result<ExitStatus> {
-    let progress = Progress::new(options.quiet);
+    let threads = threads(arguments.jobs);
+    let progress = Progress::new(arguments.quiet);
     let results = match ParquetResults::open(results) {
         Ok(results) => results,
         Err(error) => return Ok(failed(&error.into())),
     };
-    if options.csv {
+    if arguments.csv {
         progress.message("csv");
-        if let Err(error) = write_csv(&results, &folder.join(CSV_FILE), options.threads) {
+        if let Err(error) = write_csv(&results, &folder.join(CSV_FILE), threads) {
             return Ok(failed(&error));
         }
     }
     let output = StudyOutput {
         folder,
-        junit: options.junit,
-        page: options.page,
-        threads: options.threads,
+        junit: arguments.junit.as_deref(),
+        page: !arguments.no_page,
+        threads,
     };
     let written = write_study(prepared, &results, &output, &progress);
     progress.finish();
     let finished =
         written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
-    if options.json {
+    if arguments.json {
         print_json(&finished.summary)?;
     } else {
         print_text(&format!("{}results: {}", finished.text, folder.display()))?;
@@ -322,7 +293,7 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
     for &number in &arguments.case {
         let layout = StudyCase::new(&prepared.study, &prepared.design, number);
         let result = worker.evaluate(number)?;
-        if arguments.json {
+        if arguments.results.json {
             reports.push(CaseReport::new(&prepared.design, &layout, &result));
             continue;
         }
@@ -331,7 +302,7 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
             print_findings(&findings);
         }
     }
-    if arguments.json {
+    if arguments.results.json {
         match reports.as_slice() {
             [report] => print_json(report)?,
             reports => print_json(&reports)?,
@@ -356,7 +327,7 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
                 }
                 let options = RunOptions {
                     engines: None,
-                    jobs: threads(arguments.jobs),
+                    jobs: threads(arguments.results.jobs),
                     referee: false,
                 };
                 runs.push((resolved, folder.join(number.to_string()), options));
@@ -373,9 +344,9 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
     let mut reports = Vec::new();
     let outputs = Outputs {
         pictures: true,
-        page: !arguments.no_page,
-        text: !arguments.json,
-        quiet: arguments.quiet,
+        page: !arguments.results.no_page,
+        text: !arguments.results.json,
+        quiet: arguments.results.quiet,
     };
     for (resolved, folder, options) in &runs {
         if let Err(finding) = prepare_folder(folder) {
@@ -386,7 +357,7 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
         status = status.max(outcome);
         reports.push(report);
     }
-    if arguments.json {
+    if arguments.results.json {
         print_json(&reports)?;
     }
     Ok(status)

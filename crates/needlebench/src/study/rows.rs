@@ -6,7 +6,7 @@ use needlebench_cell::ClearanceClass;
 use needlebench_evaluation::NeedleMeasurement;
 use needlebench_evaluation::report::{ClassClearance, ConfigurationReport};
 use needlebench_kinematics::trajectory::Phase;
-use needlebench_planning::{ConfigurationPlan, Planner, Rule};
+use needlebench_planning::{Candidate, ConfigurationPlan, Planner, Rule};
 use needlebench_study::{Metric, Outcome, Row};
 
 const MM: f64 = 1e3;
@@ -66,15 +66,7 @@ pub(super) fn row(
     let mut row = Row::new(index, Outcome::Rejected, "");
     if let Some(candidate) = &plan.candidate {
         row.set(Metric::Roll, candidate.roll_rad.to_degrees());
-        for (metric, &position) in JOINTS.into_iter().zip(&candidate.joints) {
-            row.set(metric, position.to_degrees());
-        }
-        let margins = &candidate.margins;
-        row.set(Metric::JointMargin, margins.joint_limit);
-        row.set(Metric::WristSine, margins.wrist_sine);
-        row.set(Metric::ElbowSine, margins.elbow_sine);
-        row.set(Metric::ShoulderMargin, margins.shoulder_m * MM);
-        row.set(Metric::Manipulability, margins.manipulability);
+        set_posture(&mut row, candidate);
         let surplus_m = planner.surplus(candidate, &plan.rejections);
         row.set(Metric::Surplus, surplus_m * MM);
     } else if let Some(rejection) = plan.rejections.first()
@@ -120,6 +112,19 @@ pub(super) fn row(
     });
     set(&mut row, Metric::MotionTime, arrival_s);
     row
+}
+
+/// Where the joints are, and how far from their limits and singularities.
+pub(super) fn set_posture(row: &mut Row, candidate: &Candidate) {
+    for (metric, &position_rad) in JOINTS.into_iter().zip(&candidate.joints) {
+        row.set(metric, position_rad.to_degrees());
+    }
+    let margins = &candidate.margins;
+    row.set(Metric::JointMargin, margins.joint_limit);
+    row.set(Metric::WristSine, margins.wrist_sine);
+    row.set(Metric::ElbowSine, margins.elbow_sine);
+    row.set(Metric::ShoulderMargin, margins.shoulder_m * MM);
+    row.set(Metric::Manipulability, margins.manipulability);
 }
 
 /// Where the needle is.

@@ -12,6 +12,7 @@ use needlebench_planning::{Candidate, Member, Planner, Rejection, Rule};
 use needlebench_study::{Metric, Outcome, Row};
 
 use super::prediction::{Predicted, Prediction};
+use super::rows::{set_needle, set_posture};
 
 /// Millimetres in a metre.
 const MM: f64 = 1e3;
@@ -188,6 +189,7 @@ fn row(
         return row;
     };
     set_posture(&mut row, candidate);
+    set_clearances(&mut row, candidate);
     let goal = &resolved.goals[0];
     // The same number in m/rad and in mm/mrad.
     row.set(
@@ -196,13 +198,7 @@ fn row(
     );
     let predicted = prediction.of(planner, candidate);
     if let Some(needle) = &predicted.needle {
-        row.set(Metric::TipError, needle.tip_position_error_m * MM);
-        row.set(Metric::TipLateral, needle.lateral_error_m * MM);
-        row.set(Metric::TipAxial, needle.depth_error_m * MM);
-        row.set(
-            Metric::NeedleAngle,
-            needle.needle_angle_error_rad.to_degrees(),
-        );
+        set_needle(&mut row, needle);
     }
     if let Some(moments) = &predicted.spread {
         row.set(Metric::TipRms, moments.rms_m * MM);
@@ -216,24 +212,8 @@ fn row(
     row
 }
 
-fn set_posture(row: &mut Row, candidate: &Candidate) {
-    const JOINTS: [Metric; 6] = [
-        Metric::Joint1,
-        Metric::Joint2,
-        Metric::Joint3,
-        Metric::Joint4,
-        Metric::Joint5,
-        Metric::Joint6,
-    ];
-    for (metric, position_rad) in JOINTS.into_iter().zip(&candidate.joints) {
-        row.set(metric, position_rad.to_degrees());
-    }
-    let margins = &candidate.margins;
-    row.set(Metric::JointMargin, margins.joint_limit);
-    row.set(Metric::WristSine, margins.wrist_sine);
-    row.set(Metric::ElbowSine, margins.elbow_sine);
-    row.set(Metric::ShoulderMargin, margins.shoulder_m * MM);
-    row.set(Metric::Manipulability, margins.manipulability);
+/// The least clearance of each class, and of all surroundings.
+fn set_clearances(row: &mut Row, candidate: &Candidate) {
     let mut least_m = f64::INFINITY;
     for pair in candidate.clearance.iter() {
         let distance_m = pair.separation.distance_m;
