@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use needlebench_engine::{Plant, PlantState};
 use needlebench_kinematics::Joints;
 
-use crate::mechanism::{GRAVITY_M_S2, Mechanism, RESTING_KGM2};
-use crate::with_engines;
+use super::mechanism::{GRAVITY_M_S2, Mechanism, RESTING_KGM2};
+use super::with_engines;
 
 pub const STEPS_PER_S: u32 = 1000;
 pub const TIMESTEP_S: f64 = 1.0 / STEPS_PER_S as f64;

@@ -8,9 +8,9 @@ use needlebench_engine::{
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
 
-use crate::contact::{BALL_KG, LEVER_M, STEPS_PER_S, TIMESTEP_S, mechanism, run};
-use crate::mechanism::GRAVITY_M_S2;
-use crate::{harness, ur3, with_engines};
+use super::contact::{BALL_KG, LEVER_M, STEPS_PER_S, TIMESTEP_S, mechanism, run};
+use super::mechanism::GRAVITY_M_S2;
+use super::{harness, ur3, with_engines};
 
 /// Every test below, by its key.
 const TESTED: [&str; 6] = [
@@ -43,7 +43,7 @@ fn every_known_deviation_has_its_test() {
 
 #[test]
 fn engines_run_half_a_step_early() {
-    let cell = crate::free_motion::lever(0.4).cell();
+    let cell = super::free_motion::lever(0.4).cell();
     with_engines(&cell, TIMESTEP_S, 0.0, |_, plant| {
         plant.reset(&Joints::zeros()).unwrap();
         // One step from rest: a h^2 instead of a h^2 / 2. Later ones keep the lead of h / 2.

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use needlebench_engine::Plant;
 use needlebench_kinematics::Joints;
 
-use crate::elliptic::pendulum_rad;
-use crate::mechanism::{GRAVITY_M_S2, Mechanism, RESTING_KGM2};
-use crate::{referee, with_engines};
+use super::elliptic::pendulum_rad;
+use super::mechanism::{GRAVITY_M_S2, Mechanism, RESTING_KGM2};
+use super::{referee, with_engines};
 
 const STEPS_PER_S: u32 = 1000;
 const TIMESTEP_S: f64 = 1.0 / STEPS_PER_S as f64;

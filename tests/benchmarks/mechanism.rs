@@ -6,10 +6,10 @@
 //! rest without being locked.
 
 use nalgebra::{Matrix3, UnitVector3, Vector3};
-use needlebench_cell::shape::{Shape, Solid};
 use needlebench_cell::{
     BodyKind, Cell, CollisionBody, Frame, Link, ModelSource, Needle, NeedleCorridor, Robot, Tool,
 };
+use needlebench_geometry::{Shape, Solid};
 use needlebench_kinematics::{
     Body, Chain, ChainJoint, JOINT_COUNT, JOINT_LABELS, JointLimit, JointLimits, Joints, Pose,
 };
@@ -110,6 +110,7 @@ impl Mechanism {
                 velocity_rad_s: 100.0,
                 effort_nm: 1e3,
             })),
+            arm: None,
             source: source(),
             calibration: None,
             meshes: Vec::new(),

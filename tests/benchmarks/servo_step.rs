@@ -4,8 +4,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use needlebench_engine::Plant;
 use needlebench_kinematics::Joints;
 
-use crate::mechanism::{Mechanism, RESTING_KGM2};
-use crate::{referee, with_engines};
+use super::mechanism::{Mechanism, RESTING_KGM2};
+use super::{referee, with_engines};
 
 const TIMESTEP_S: f64 = 1e-3;
 const DURATION_S: f64 = 1.0;

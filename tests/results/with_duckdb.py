@@ -2,6 +2,7 @@
 
     python with_duckdb.py STUDY/results.parquet
 
+The clearance is that of static cases; dynamic ones have clearance_attained_mm and, proven, clearance_mm.
 The file may be results.csv as well. DuckDB reads it piece by piece: it may be larger than memory.
 """
 
@@ -12,7 +13,7 @@ import duckdb
 QUERY = """
     SELECT configuration,
            avg(CASE WHEN outcome = 'ok' THEN 1 ELSE 0 END),
-           quantile_cont(clearance_mm::DOUBLE, 0.05)
+           quantile_cont(clearance_static_mm::DOUBLE, 0.05)
     FROM read_{kind}(?)
     GROUP BY configuration
     ORDER BY configuration

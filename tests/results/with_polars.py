@@ -2,6 +2,7 @@
 
     python with_polars.py STUDY/results.parquet
 
+The clearance is that of static cases; dynamic ones have clearance_attained_mm and, proven, clearance_mm.
 The file may be results.csv as well. Only the columns that are used are read.
 """
 
@@ -15,7 +16,7 @@ table = (
     rows.group_by("configuration")
     .agg(
         success=(pl.col("outcome") == "ok").mean(),
-        clearance=pl.col("clearance_mm").cast(pl.Float64).quantile(0.05, "linear"),
+        clearance=pl.col("clearance_static_mm").cast(pl.Float64).quantile(0.05, "linear"),
     )
     .sort("configuration")
     .collect()

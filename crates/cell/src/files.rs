@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
 
 use include_dir::{Dir, include_dir};
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::{Finding, ModelSource};
+use crate::finding::Finding;
 
 static BUILTIN: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/../../models");
 
@@ -67,6 +68,17 @@ impl Location {
         Self::Disk(base.join(reference))
     }
 
+    /// Names of the shipped folders that hold a file of this name.
+    pub(crate) fn builtin_folders_with(file: &str) -> Vec<String> {
+        let mut names: Vec<String> = BUILTIN
+            .dirs()
+            .filter(|folder| BUILTIN.get_file(folder.path().join(file)).is_some())
+            .filter_map(|folder| Some(folder.path().to_str()?.to_owned()))
+            .collect();
+        names.sort();
+        names
+    }
+
     /// Names of the shipped models in a folder.
     pub(crate) fn builtin_names(folder: &str, extension: &str) -> Vec<String> {
         let mut names: Vec<String> = BUILTIN
@@ -102,6 +114,43 @@ impl Location {
         }
     }
 
+    /// Whether there is such a file.
+    pub(crate) fn is_there(&self) -> bool {
+        match self {
+            Self::Builtin(path) => BUILTIN.get_file(path).is_some(),
+            Self::Disk(path) => path.is_file(),
+        }
+    }
+
+    /// Whether both are the same file, by whatever path.
+    pub(crate) fn is_same_file(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Disk(a), Self::Disk(b)) => {
+                a == b
+                    || matches!(
+                        (a.canonicalize(), b.canonicalize()),
+                        (Ok(a), Ok(b)) if a == b
+                    )
+            }
+            _ => self == other,
+        }
+    }
+
+    /// Name of the folder that the file is in; none in the working directory.
+    pub(crate) fn folder_name(&self) -> Option<String> {
+        let (Self::Builtin(path) | Self::Disk(path)) = self;
+        Some(path.parent()?.file_name()?.to_str()?.to_owned())
+    }
+
+    /// A file by its path relative to this one's folder.
+    pub(crate) fn beside(&self, name: &str) -> Self {
+        let sibling = |path: &Path| path.parent().unwrap_or(Path::new("")).join(name);
+        match self {
+            Self::Builtin(path) => Self::Builtin(normalized(&sibling(path))),
+            Self::Disk(path) => Self::Disk(sibling(path)),
+        }
+    }
+
     /// A mesh file that a URDF at `self` names.
     pub(crate) fn mesh(&self, name: &str, packages: &PackagePaths) -> Result<Self, String> {
         if let Some(rest) = name.strip_prefix("package://") {
@@ -115,12 +164,7 @@ impl Location {
                     format!("package `{package}` is not known: give --package-path {package}=DIR")
                 });
         }
-        let name = name.strip_prefix("file://").unwrap_or(name);
-        let sibling = |path: &Path| path.parent().unwrap_or(Path::new("")).join(name);
-        Ok(match self {
-            Self::Builtin(path) => Self::Builtin(normalized(&sibling(path))),
-            Self::Disk(path) => Self::Disk(sibling(path)),
-        })
+        Ok(self.beside(name.strip_prefix("file://").unwrap_or(name)))
     }
 }
 
@@ -137,6 +181,15 @@ fn normalized(path: &Path) -> PathBuf {
         }
     }
     parts
+}
+
+/// Where a model came from, for the provenance of a result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ModelSource {
+    /// File as the scenario names it, or `builtin:` and the model's name.
+    pub file: String,
+    /// SHA-256 of the file's bytes, lower-case hex.
+    pub sha256: String,
 }
 
 /// Name and SHA-256 of a file.

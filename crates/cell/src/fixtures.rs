@@ -6,11 +6,11 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Translation3, UnitQuaternion, Vector3};
+use needlebench_geometry::{ConvexMesh, Shape, Solid, TriangleMesh};
 use needlebench_kinematics::Pose;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::shape::{ConvexMesh, Shape, Solid, TriangleMesh};
+use crate::scenario::{GantrySection, MountSection, TableSection};
 
 /// Which fixture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -38,28 +38,6 @@ pub struct Fixture {
 /// Why a fixture cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FixtureError {
-    /// A value is NaN or infinite.
-    #[error("{key} is {value}: not a finite number")]
-    NotFinite {
-        /// Key, with its unit.
-        key: &'static str,
-        /// The value given.
-        value: f64,
-    },
-    /// A value is outside what such a fixture can have.
-    #[error("{key} is {value}, outside [{lower}, {upper}]{hint}")]
-    OutOfRange {
-        /// Key, with its unit.
-        key: &'static str,
-        /// The value given.
-        value: f64,
-        /// Smallest value allowed, in the key's unit.
-        lower: f64,
-        /// Largest value allowed, in the key's unit.
-        upper: f64,
-        /// Empty, or a question about the unit that may have been meant.
-        hint: &'static str,
-    },
     /// The housing does not enclose the bore.
     #[error(
         "{key} is {size_mm} mm, which leaves less than {least_mm} mm of housing beside a bore of \
@@ -101,127 +79,18 @@ impl FixtureError {
     /// The key it is about, without its section; none if it is about the robot's base.
     pub(crate) fn key(&self) -> Option<&'static str> {
         match self {
-            Self::NotFinite { key, .. }
-            | Self::OutOfRange { key, .. }
-            | Self::HousingTooSmall { key, .. } => Some(key),
+            Self::HousingTooSmall { key, .. } => Some(key),
             Self::BaseTilted { .. } | Self::BaseTooLow { .. } => None,
         }
     }
 }
 
-/// The CT table: one box.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct TableParameters {
-    /// Width across the long axis, mm. Default 420 (assumed; 400 to 430 is typical).
-    pub width_mm: f64,
-    /// Length along the long axis, mm. Default 2000 (assumed).
-    pub length_mm: f64,
-    /// Thickness, mm. Default 60 (assumed).
-    pub thickness_mm: f64,
-    /// Height of the upper face in the world, mm. Default 800 (assumed).
-    pub top_height_mm: f64,
-    /// Centre of the upper face in the world (x, y), mm. Default the origin.
-    pub center_mm: [f64; 2],
-    /// Direction of the long axis about world z; 0 is world x, deg. Default 0.
-    pub yaw_deg: f64,
-}
-
-impl Default for TableParameters {
-    fn default() -> Self {
-        Self {
-            width_mm: 420.0,
-            length_mm: 2000.0,
-            thickness_mm: 60.0,
-            top_height_mm: 800.0,
-            center_mm: [0.0, 0.0],
-            yaw_deg: 0.0,
-        }
-    }
-}
-
-/// The CT gantry: a box with a cylindrical bore through it, centred on the isocentre.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct GantryParameters {
-    /// Diameter of the bore, mm. Default 700, the standard bore (wide bores: 800 and more).
-    pub bore_diameter_mm: f64,
-    /// Width of the housing, horizontal and across the bore, mm. Default 2300.
-    pub outer_width_mm: f64,
-    /// Height of the housing, mm. Default 1800.
-    pub outer_height_mm: f64,
-    /// Depth of the housing along the bore, mm. Default 800.
-    pub depth_mm: f64,
-    /// Centre of the bore in the world, mm. Default 900 above the floor (assumed: half the
-    /// housing's height).
-    pub isocentre_mm: [f64; 3],
-    /// Direction of the bore's axis about world z; 0 is world x, deg. Default 0.
-    pub axis_yaw_deg: f64,
-    /// Tilt about the horizontal axis across the bore, deg; positive moves the top towards the
-    /// direction of the bore's axis. Scanners tilt by up to 30. Default 0.
-    pub tilt_deg: f64,
-}
-
-impl Default for GantryParameters {
-    fn default() -> Self {
-        Self {
-            bore_diameter_mm: 700.0,
-            outer_width_mm: 2300.0,
-            outer_height_mm: 1800.0,
-            depth_mm: 800.0,
-            isocentre_mm: [0.0, 0.0, 900.0],
-            axis_yaw_deg: 0.0,
-            tilt_deg: 0.0,
-        }
-    }
-}
-
-/// The robot's mount: a column on the floor with a base plate, aligned with `base_link`.
-///
-/// The plate's upper face is the plane z = 0 of `base_link`, so robot and mount touch.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct MountParameters {
-    /// Size of the column along `base_link` x, mm. Default 120 (assumed).
-    pub width_mm: f64,
-    /// Size of the column along `base_link` y, mm. Default 120 (assumed).
-    pub depth_mm: f64,
-    /// Edge of the square base plate, mm. Default 160 (assumed; the base's foot is 128 wide).
-    pub plate_width_mm: f64,
-    /// Thickness of the base plate, mm. Default 15 (assumed).
-    pub plate_thickness_mm: f64,
-}
-
-impl Default for MountParameters {
-    fn default() -> Self {
-        Self {
-            width_mm: 120.0,
-            depth_mm: 120.0,
-            plate_width_mm: 160.0,
-            plate_thickness_mm: 15.0,
-        }
-    }
-}
-
 const MILLI: f64 = 1e-3;
-/// Largest coordinate of a fixture in the world: a large room.
-const ROOM_MM: f64 = 20_000.0;
-
 /// Builds the table.
-pub fn table(parameters: &TableParameters) -> Result<Fixture, FixtureError> {
-    let [x_mm, y_mm] = parameters.center_mm;
-    check(&[
-        ("width_mm", parameters.width_mm, 100.0, 2000.0),
-        ("length_mm", parameters.length_mm, 300.0, 5000.0),
-        ("thickness_mm", parameters.thickness_mm, 5.0, 500.0),
-        ("top_height_mm", parameters.top_height_mm, -ROOM_MM, ROOM_MM),
-        ("center_mm", x_mm, -ROOM_MM, ROOM_MM),
-        ("center_mm", y_mm, -ROOM_MM, ROOM_MM),
-        ("yaw_deg", parameters.yaw_deg, -360.0, 360.0),
-    ])?;
+pub(crate) fn table(parameters: &TableSection) -> Fixture {
     let center_mm = Vector3::new(
-        x_mm,
-        y_mm,
+        parameters.center_mm[0],
+        parameters.center_mm[1],
         parameters.top_height_mm - 0.5 * parameters.thickness_mm,
     );
     let size_mm = Vector3::new(
@@ -229,7 +98,7 @@ pub fn table(parameters: &TableParameters) -> Result<Fixture, FixtureError> {
         parameters.width_mm,
         parameters.thickness_mm,
     );
-    Ok(Fixture {
+    Fixture {
         kind: FixtureKind::Table,
         solids: vec![Solid {
             name: "table".to_owned(),
@@ -242,7 +111,7 @@ pub fn table(parameters: &TableParameters) -> Result<Fixture, FixtureError> {
             ),
         }],
         color_rgba: [0.75, 0.78, 0.82, 1.0],
-    })
+    }
 }
 
 /// Pieces of the gantry per full turn, at least.
@@ -253,41 +122,10 @@ pub fn table(parameters: &TableParameters) -> Result<Fixture, FixtureError> {
 const PIECES_PER_TURN: f64 = 48.0;
 
 /// Builds the gantry: convex wedges around the bore, each with its outer face on the housing.
-pub fn gantry(parameters: &GantryParameters) -> Result<Fixture, FixtureError> {
+pub(crate) fn gantry(parameters: &GantrySection) -> Result<Fixture, FixtureError> {
     /// Thinnest housing beside the bore, mm.
     const LEAST_MM: f64 = 20.0;
 
-    check(&[
-        (
-            "bore_diameter_mm",
-            parameters.bore_diameter_mm,
-            300.0,
-            2000.0,
-        ),
-        ("outer_width_mm", parameters.outer_width_mm, 300.0, 5000.0),
-        ("outer_height_mm", parameters.outer_height_mm, 300.0, 5000.0),
-        ("depth_mm", parameters.depth_mm, 50.0, 3000.0),
-        (
-            "isocentre_mm",
-            parameters.isocentre_mm[0],
-            -ROOM_MM,
-            ROOM_MM,
-        ),
-        (
-            "isocentre_mm",
-            parameters.isocentre_mm[1],
-            -ROOM_MM,
-            ROOM_MM,
-        ),
-        (
-            "isocentre_mm",
-            parameters.isocentre_mm[2],
-            -ROOM_MM,
-            ROOM_MM,
-        ),
-        ("axis_yaw_deg", parameters.axis_yaw_deg, -360.0, 360.0),
-        ("tilt_deg", parameters.tilt_deg, -45.0, 45.0),
-    ])?;
     let bore_mm = parameters.bore_diameter_mm;
     for (key, size_mm) in [
         ("outer_width_mm", parameters.outer_width_mm),
@@ -402,8 +240,8 @@ fn prism(quadrilateral: &[Point2<f64>; 4], half_length_m: f64) -> (ConvexMesh, P
 }
 
 /// Builds the mount under a robot whose base is at `world_from_base_link`.
-pub fn mount(
-    parameters: &MountParameters,
+pub(crate) fn mount(
+    parameters: &MountSection,
     world_from_base_link: &Pose,
 ) -> Result<Fixture, FixtureError> {
     /// Tilt of a base that counts as upright: rounding of a pose given in degrees.
@@ -411,17 +249,6 @@ pub fn mount(
     /// A column shorter than this is left out.
     const SHORTEST_COLUMN_M: f64 = 1e-3;
 
-    check(&[
-        ("width_mm", parameters.width_mm, 20.0, 3000.0),
-        ("depth_mm", parameters.depth_mm, 20.0, 3000.0),
-        ("plate_width_mm", parameters.plate_width_mm, 20.0, 3000.0),
-        (
-            "plate_thickness_mm",
-            parameters.plate_thickness_mm,
-            1.0,
-            200.0,
-        ),
-    ])?;
     let up = world_from_base_link.rotation * Vector3::z();
     let tilt_rad = up.x.hypot(up.y).atan2(up.z);
     if tilt_rad > UPRIGHT_RAD {
@@ -469,35 +296,6 @@ pub fn mount(
 
 fn turn_about_z(angle_deg: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_deg.to_radians())
-}
-
-/// Checks keys with their values and bounds, in order.
-fn check(values: &[(&'static str, f64, f64, f64)]) -> Result<(), FixtureError> {
-    for &(key, value, lower, upper) in values {
-        if !value.is_finite() {
-            return Err(FixtureError::NotFinite { key, value });
-        }
-        if !(lower..=upper).contains(&value) {
-            let fits = |factor: f64| {
-                key.ends_with("_mm") && lower > 0.0 && (lower..=upper).contains(&(value * factor))
-            };
-            let hint = if fits(1000.0) {
-                ": did you give metres?"
-            } else if fits(10.0) {
-                ": did you give centimetres?"
-            } else {
-                ""
-            };
-            return Err(FixtureError::OutOfRange {
-                key,
-                value,
-                lower,
-                upper,
-                hint,
-            });
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -2,57 +2,56 @@
 //!
 //! [`load_scenario`] is the way in: it reads a scenario and all that it names and gives a
 //! [`ResolvedScenario`], or [`Finding`]s that say what to mend and where.
+//!
+//! Modules, from the bottom up; each knows those above it in this list alone:
+//!
+//! | Modules | What they are |
+//! |---|---|
+//! | `finding`, `files`, `limit` | what is wrong with an input; shipped files and files on disk |
+//! | `schema`, `toml_text` | what a file may hold: one source of its JSON schema and of the reader's checks; texts with places |
+//! | [`arm`] | what is known of an arm besides its URDF |
+//! | `model` | the resolved cell: robot, tool, bodies, pairs |
+//! | `robot` | robots and tools from URDFs, calibrations, enclosures |
+//! | [`scenario`], `engine_name` | the sections of a scenario file: plain structs, ranges at their fields |
+//! | [`phantom`], [`fixtures`] | chests and furniture as solids |
+//! | `resolve` with [`imperfections`], [`people`], [`iso9283`] | from sections to a [`Cell`] with goals in the world |
+//! | [`family`], [`study`], `thresholds` | many scenarios from one, and what is asked of them |
 
-mod calibration;
-mod enclosure;
-pub mod envelope;
-mod events;
+pub mod arm;
+mod engine_name;
 pub mod family;
 mod files;
 mod finding;
 pub mod fixtures;
-mod goal;
-pub mod imperfections;
-pub mod iso9283;
-mod mesh;
+mod limit;
 mod model;
-mod nominal;
-mod pairs;
-mod parts;
-pub mod people;
 pub mod phantom;
-mod phantom_place;
-pub mod ranking;
 mod resolve;
 mod robot;
 pub mod scenario;
-pub mod shape;
-mod shelf;
-mod srdf;
+mod schema;
 pub mod study;
-pub mod study_criteria;
-mod tessellate;
 mod thresholds;
 mod toml_text;
-mod tool;
-mod urdf;
-mod user_parts;
-mod values;
-mod yaml_text;
 
-pub use calibration::{AppliedCalibration, Calibration, OriginDeviation};
-pub use enclosure::{LinkEnclosure, enclosures};
+pub use arm::{Arm, Recognition};
 pub use family::{Change, KeyPath, ScenarioFamily, Setting};
-pub use files::{PackagePaths, sha256_hex};
+pub use files::{ModelSource, PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};
-pub use goal::{Expectation, Goal, PlacedPhantom, REJECTION_RULES, Roll};
-pub use mesh::convex_hull;
+pub use limit::Limit;
 pub use model::{
-    BodyKind, BodyPair, Cell, ClearanceClass, CollisionBody, Frame, Link, LinkMember, ModelSource,
-    Needle, NeedleCorridor, Robot, Tool,
+    AppliedCalibration, ArmInUse, ArmReport, BodyKind, BodyPair, Cell, ClearanceClass,
+    CollisionBody, Frame, LeftOut, Link, LinkMember, Needle, NeedleCorridor, PairRule, Robot, Tool,
+    pair_rule, place_in_chain,
 };
-pub use pairs::{LeftOut, PairRule, pair_rule, place_in_chain};
-pub use resolve::{Overrides, ResolvedScenario, load_robot, load_scenario, resolve_scenario};
-pub use robot::MissingInertia;
-pub use srdf::{DisabledPair, Srdf};
+pub use resolve::{
+    Expectation, Goal, Overrides, PlacedPhantom, ResolvedScenario, Roll, ServoSettings,
+    imperfections, iso9283, load_robot, load_scenario, people, resolve_scenario,
+};
+pub use robot::{
+    Calibration, DisabledPair, LinkEnclosure, MOVING_LINK_LABELS, MissingInertia, OriginDeviation,
+    Srdf, enclosures,
+};
+pub use scenario::{REJECTION_RULES, envelope, ranking};
+pub use study::criteria as study_criteria;
 pub use thresholds::ThresholdsFile;

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::Finding;
+use crate::schema::FileSchema;
 use crate::toml_text::TomlText;
 
 /// A file of thresholds: how much worse each metric may get.
@@ -16,7 +18,7 @@ pub struct ThresholdsFile {
     content: Content,
 }
 
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Content {
     /// A configuration that no longer works does not fail the comparison.
@@ -41,7 +43,9 @@ impl ThresholdsFile {
     }
 
     fn parse(file: String, text: String) -> Result<Self, Finding> {
-        let content = TomlText::parse(&file, &text)?.deserialize()?;
+        let content = TomlText::parse(&file, &text)?
+            .read(&FileSchema::of::<Content>())
+            .map_err(|mut findings| findings.swap_remove(0))?;
         Ok(Self {
             file,
             text,

@@ -3,32 +3,35 @@
 use std::ops::Range;
 
 use serde::de::DeserializeOwned;
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml::{Spanned, Table, Value};
 
-use crate::{Finding, nearest_name};
+use crate::Finding;
+use crate::schema::{FileSchema, Misfit, MisfitKind, Path};
 
 /// A parsed file together with where everything stands in it.
 #[derive(Debug)]
 pub(crate) struct TomlText<'a> {
     pub file: &'a str,
     pub text: &'a str,
-    table: Spanned<DeTable<'a>>,
+    /// Values with their places.
+    places: Spanned<DeTable<'a>>,
+    values: Table,
 }
 
 impl<'a> TomlText<'a> {
     /// Of values that stand in no text: findings have keys but no lines.
     pub(crate) fn without_text(file: &'a str) -> Self {
-        let table = Spanned::new(0..0, DeTable::new());
         Self {
             file,
             text: "",
-            table,
+            places: Spanned::new(0..0, DeTable::new()),
+            values: Table::new(),
         }
     }
 
     pub(crate) fn parse(file: &'a str, text: &'a str) -> Result<Self, Finding> {
-        let table = DeTable::parse(text).map_err(|error| {
+        let places = DeTable::parse(text).map_err(|error| {
             let mut message = error.message().to_owned();
             let Some(span) = error.span() else {
                 return Finding::new(file, message);
@@ -40,65 +43,77 @@ impl<'a> TomlText<'a> {
             }
             Finding::new(file, message).at(text, span)
         })?;
-        let parsed = Self { file, text, table };
-        parsed.refuse_non_finite()?;
-        Ok(parsed)
+        let values = table(Path::Top, places.get_ref()).map_err(|beyond| {
+            Finding::new(file, beyond.message)
+                .key(beyond.key)
+                .hint(beyond.hint)
+                .at(text, beyond.span)
+        })?;
+        Ok(Self {
+            file,
+            text,
+            places,
+            values,
+        })
     }
 
     /// The whole file as a struct.
-    pub(crate) fn deserialize<T: DeserializeOwned>(&self) -> Result<T, Finding> {
-        let deserializer = toml::Deserializer::parse(self.text)
-            .map_err(|error| Finding::new(self.file, error.message().to_owned()))?;
-        serde_path_to_error::deserialize(deserializer).map_err(|error| {
-            let path = error.path().to_string();
-            let inner = error.into_inner();
-            let Misfit {
-                key,
-                mut message,
-                hint,
-            } = Misfit::read(path, inner.message());
-            let mut finding = Finding::new(self.file, "");
-            if let Some(span) = inner.span() {
-                finding = finding.at(self.text, span);
-            }
-            let value = finding.span.clone().and_then(|span| self.text.get(span));
-            let short = |value: &&str| !value.is_empty() && !value.contains('\n');
-            if Misfit::is_of_type(inner.message())
-                && let Some(value) = value.filter(short)
-                && !message.contains(value)
-            {
-                message = format!("{message}, got `{value}`");
-            }
-            finding.message = message;
-            finding.hint = hint;
-            finding.key(key)
-        })
+    ///
+    /// # Errors
+    /// All that its schema refuses.
+    pub(crate) fn read<T: DeserializeOwned>(&self, schema: &FileSchema) -> Result<T, Vec<Finding>> {
+        let misfits = schema.check(&self.values);
+        if !misfits.is_empty() {
+            let mut findings: Vec<Finding> = misfits
+                .into_iter()
+                .map(|misfit| self.misfit(misfit))
+                .collect();
+            findings.sort_by_key(|finding| finding.span.as_ref().map(|span| span.start));
+            return Err(findings);
+        }
+        // The schema is that of the struct, so this can fail by a mistake of ours alone.
+        T::deserialize(Value::Table(self.values.clone()))
+            .map_err(|error| vec![Finding::new(self.file, error.message())])
+    }
+
+    fn misfit(&self, misfit: Misfit) -> Finding {
+        let mut finding = self.finding(&misfit.key, misfit.message);
+        // What is unknown is the key, not its value.
+        if misfit.kind == MisfitKind::Unknown
+            && let Some((key, _)) = self.place_of(&misfit.key)
+        {
+            finding = finding.at(self.text, key);
+        }
+        finding.hint = misfit.hint;
+        finding
     }
 
     /// Where the value of a key stands: `goals[0].entry_mm` and so on.
     pub(crate) fn span_of(&self, path: &str) -> Option<Range<usize>> {
-        let mut at: Option<(&DeValue<'_>, Range<usize>)> = None;
-        for part in path.split('.') {
-            let (name, indices) = part
-                .split_once('[')
-                .map_or((part, ""), |(n, rest)| (n, rest));
+        self.place_of(path).map(|(_, value)| value)
+    }
+
+    /// Where a key and its value stand.
+    fn place_of(&self, path: &str) -> Option<(Range<usize>, Range<usize>)> {
+        let mut at: Option<(&DeValue<'_>, Range<usize>, Range<usize>)> = None;
+        for (name, indices) in steps(path) {
             let table = match at {
-                None => self.table.get_ref(),
-                Some((DeValue::Table(table), _)) => table,
-                Some(_) => return at.map(|(_, span)| span),
+                None => self.places.get_ref(),
+                Some((DeValue::Table(table), ..)) => table,
+                Some((_, key, value)) => return Some((key, value)),
             };
-            let found = table.get(name)?;
-            at = Some((found.get_ref(), found.span()));
+            let (key, value) = table.get_key_value(name)?;
+            at = Some((value.get_ref(), key.span(), value.span()));
             for index in indices.split('[').filter(|text| !text.is_empty()) {
                 let index: usize = index.trim_end_matches(']').parse().ok()?;
-                let Some((DeValue::Array(array), _)) = at else {
+                let Some((DeValue::Array(array), ..)) = at else {
                     return None;
                 };
-                let found = array.get(index)?;
-                at = Some((found.get_ref(), found.span()));
+                let item = array.get(index)?;
+                at = Some((item.get_ref(), item.span(), item.span()));
             }
         }
-        at.map(|(_, span)| span)
+        at.map(|(_, key, value)| (key, value))
     }
 
     /// A finding about a key of this file; a missing key's is placed at the table that lacks it.
@@ -115,163 +130,76 @@ impl<'a> TomlText<'a> {
             }
         }
     }
-
-    fn refuse_non_finite(&self) -> Result<(), Finding> {
-        fn walk(
-            path: &str,
-            value: &Spanned<DeValue<'_>>,
-        ) -> Option<(String, Range<usize>, String)> {
-            match value.get_ref() {
-                DeValue::Float(number) => {
-                    let text = number.as_str().replace('_', "");
-                    let finite = text.parse::<f64>().is_ok_and(f64::is_finite);
-                    (!finite).then(|| (path.to_owned(), value.span(), text))
-                }
-                DeValue::Array(array) => array
-                    .iter()
-                    .enumerate()
-                    .find_map(|(i, item)| walk(&format!("{path}[{i}]"), item)),
-                DeValue::Table(table) => table
-                    .iter()
-                    .find_map(|(key, item)| walk(&format!("{path}.{}", key.get_ref()), item)),
-                _ => None,
-            }
-        }
-        let table = self.table.get_ref();
-        let found = table
-            .iter()
-            .find_map(|(key, item)| walk(key.get_ref(), item));
-        match found {
-            None => Ok(()),
-            Some((key, span, text)) => Err(Finding::new(
-                self.file,
-                format!("`{key}` is {text}, which is not a finite number"),
-            )
-            .key(key)
-            .hint("give a finite number")
-            .at(self.text, span)),
-        }
-    }
 }
 
-/// What the deserializer dislikes, in words.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Misfit {
-    /// The key at fault.
-    pub key: String,
-    pub message: String,
-    pub hint: Option<String>,
-}
-
-impl Misfit {
-    /// Reads the deserializer's message; `path` is how far it came.
-    pub fn read(path: String, message: &str) -> Self {
-        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-        // The path ends at the table that lacks a key; `.` is the file itself.
-        let inside = |name: &str| {
-            if path == "." {
-                name.to_owned()
-            } else {
-                format!("{path}.{name}")
-            }
+/// Names of a path, each with the indices after it. A name with other characters than those of bare
+/// keys stands in quotes.
+fn steps(path: &str) -> impl Iterator<Item = (&str, &str)> {
+    let mut rest = path;
+    std::iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        let (name, after) = match rest.strip_prefix('"').and_then(|rest| rest.split_once('"')) {
+            Some(quoted) => quoted,
+            None => rest.split_at(rest.find(['.', '[']).unwrap_or(rest.len())),
         };
-        if message.starts_with("unknown field")
-            && let [unknown, known @ ..] = quoted.as_slice()
-        {
-            // Or it ends at the unknown key.
-            let is_there = path.ends_with(unknown);
-            Self {
-                key: if is_there { path } else { inside(unknown) },
-                message: format!("unknown key `{unknown}`"),
-                hint: Some(unknown_key_hint(unknown, known)),
-            }
-        } else if message.starts_with("unknown variant")
-            && let [unknown, known @ ..] = quoted.as_slice()
-        {
-            Self {
-                message: format!("`{unknown}` is not a value that `{path}` can have"),
-                hint: Some(match nearest_name(unknown, known.iter().copied()) {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => format!("one of {}", known.join(", ")),
-                }),
-                key: path,
-            }
-        } else if message.starts_with("missing field")
-            && let [missing] = quoted.as_slice()
-        {
-            Self {
-                key: inside(missing),
-                message: format!("the key `{missing}` is missing"),
-                hint: None,
-            }
-        } else {
-            Self {
-                message: in_words(message),
-                hint: unit_hint(&path, message),
-                key: path,
-            }
-        }
-    }
-
-    /// Whether the message is about the type of a value.
-    fn is_of_type(message: &str) -> bool {
-        !["unknown field", "unknown variant", "missing field"]
-            .iter()
-            .any(|start| message.starts_with(start))
-    }
-}
-
-/// How to mend a key that is not known; `known` are those that are.
-pub(crate) fn unknown_key_hint(unknown: &str, known: &[&str]) -> String {
-    // The same quantity in another unit, or without one.
-    let stem = |key: &str| {
-        key.rsplit_once('_')
-            .filter(|(_, unit)| {
-                matches!(
-                    *unit,
-                    "m" | "mm" | "cm" | "deg" | "rad" | "s" | "ms" | "kg" | "nm" | "um"
-                )
-            })
-            .map_or(key.to_owned(), |(stem, _)| stem.to_owned())
-    };
-    if let Some(same) = known.iter().find(|key| stem(key) == stem(unknown)) {
-        return format!("did you mean `{same}`? The key says the unit");
-    }
-    match nearest_name(unknown, known.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None if known.is_empty() => "it takes no keys".to_owned(),
-        None => format!("known keys: {}", known.join(", ")),
-    }
-}
-
-/// A message of the deserializer without the names of Rust's types.
-fn in_words(message: &str) -> String {
-    [
-        ("expected f64", "expected a number"),
-        ("expected u64", "expected a whole number, not negative"),
-        ("expected u32", "expected a whole number, not negative"),
-    ]
-    .iter()
-    .fold(message.to_owned(), |text, (from, to)| {
-        text.replace(from, to)
+        let (indices, next) = after.split_once('.').unwrap_or((after, ""));
+        rest = next;
+        Some((name, indices))
     })
 }
 
-fn unit_hint(key: &str, message: &str) -> Option<String> {
-    let wants_number = message.contains("expected f64") || message.contains("expected a float");
-    if !wants_number {
-        return None;
-    }
-    // `goals[0].entry_mm[2]`: the unit is at the end of the last name.
-    let key = key.rsplit('.').next().unwrap_or(key);
-    let key = key.split('[').next().unwrap_or(key);
-    let unit = match key.rsplit('_').next()? {
-        "mm" => "millimetres",
-        "deg" => "degrees",
-        "s" => "seconds",
-        "ms" => "milliseconds",
-        "rad" => "radians",
-        _ => "the unit in its name",
+/// A number that TOML can write but no file of ours can have.
+struct Beyond {
+    key: String,
+    span: Range<usize>,
+    message: String,
+    hint: String,
+}
+
+fn table(at: Path<'_>, table: &DeTable<'_>) -> Result<Table, Beyond> {
+    let entries = table.iter().map(|(key, inner)| {
+        let name: &str = key.get_ref();
+        Ok((name.to_owned(), value(Path::Key(&at, name), inner)?))
+    });
+    entries.collect()
+}
+
+fn value(at: Path<'_>, spanned: &Spanned<DeValue<'_>>) -> Result<Value, Beyond> {
+    let beyond = |message: String, hint: &str| Beyond {
+        key: at.to_string(),
+        span: spanned.span(),
+        message,
+        hint: hint.to_owned(),
     };
-    Some(format!("give a plain number, in {unit}"))
+    Ok(match spanned.get_ref() {
+        DeValue::String(text) => Value::String(text.clone().into_owned()),
+        DeValue::Integer(number) => {
+            let parsed = i64::from_str_radix(number.as_str(), number.radix());
+            Value::Integer(parsed.map_err(|_| {
+                beyond(
+                    format!("`{at}` is {number}, which has more than 64 bits"),
+                    "whole numbers of TOML lie within 2^63 of 0",
+                )
+            })?)
+        }
+        DeValue::Float(number) => {
+            let parsed = number.as_str().parse().ok().filter(|n: &f64| n.is_finite());
+            Value::Float(parsed.ok_or_else(|| {
+                beyond(
+                    format!("`{at}` is {number}, which is not a finite number"),
+                    "give a finite number",
+                )
+            })?)
+        }
+        DeValue::Boolean(truth) => Value::Boolean(*truth),
+        DeValue::Datetime(time) => Value::Datetime(*time),
+        DeValue::Array(items) => {
+            let items = items.iter().enumerate();
+            let items = items.map(|(index, item)| value(Path::Index(&at, index), item));
+            Value::Array(items.collect::<Result<_, _>>()?)
+        }
+        DeValue::Table(inner) => Value::Table(table(at, inner)?),
+    })
 }

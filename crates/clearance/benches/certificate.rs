@@ -10,7 +10,7 @@ use needlebench_clearance::{
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 
-#[path = "../tests/common/motions.rs"]
+#[path = "../tests/clearance/common/motions.rs"]
 mod motions;
 
 /// Runs of each certificate; the fastest counts.

@@ -2,22 +2,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector3};
-use needlebench_cell::shape::Shape;
-use needlebench_cell::{Cell, ClearanceClass, CollisionBody, Frame};
+use needlebench_cell::{Cell, ClearanceClass, Frame};
+use needlebench_geometry::{PRUNING_MARGIN_M, Placement, Separation, separation_within};
 use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 
-use crate::bounds::Capsule;
-use crate::core::{Placement, PreparedShape};
-use crate::posture::{Posture, Seen, SolidTree};
-use crate::separation::{Separation, closer_than};
+use crate::body::{LinkPlacements, PlacedBody, placed_body};
+use crate::posture::Posture;
 
 /// Number of classes; `NeedleRoute` is the last.
 pub(crate) const CLASS_COUNT: usize = ClearanceClass::NeedleRoute as usize + 1;
-
-/// What a lower bound by enclosing volumes has to exceed a distance by before the pair is left
-/// out, m. More than the distances' own error, so that leaving out never changes a result.
-pub(crate) const PRUNING_MARGIN_M: f64 = 3e-7;
 
 /// All classes, each at the index that it is cast to.
 const CLASSES: [ClearanceClass; CLASS_COUNT] = [
@@ -74,33 +67,6 @@ impl ClassMinima {
     }
 }
 
-/// Poses of the moving links, as the bodies need them.
-pub(crate) type LinkPlacements = [Placement; JOINT_COUNT];
-
-#[derive(Debug, Clone)]
-pub(crate) struct PlacedShape {
-    /// What it was made of.
-    solid: (Shape, Pose),
-    pub shape: Arc<PreparedShape>,
-    pub body_from_shape: Placement,
-    /// Encloses the shape, in the body's frame.
-    pub bound: Capsule,
-    /// Place and what encloses the shape, in the body's frame.
-    pub seen: Seen,
-}
-
-#[derive(Debug, Clone)]
-pub(crate) struct PlacedBody {
-    pub frame: Frame,
-    pub solids: Vec<PlacedShape>,
-    /// Ball around all solids, in the body's frame.
-    pub bound: Capsule,
-    /// In the body's frame.
-    pub tree: Option<SolidTree>,
-    /// Solids of the moving bodies before this one.
-    pub first_moving: usize,
-}
-
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlacedPair {
     pub a: usize,
@@ -117,7 +83,7 @@ struct SolidPair {
 
 /// Clearance queries of one cell, prepared once.
 ///
-/// Distances are as accurate as [`separation`](crate::separation).
+/// Distances are as accurate as [`separation`](needlebench_geometry::separation).
 #[derive(Debug, Clone)]
 pub struct ClearanceModel {
     pub(crate) chain: Chain,
@@ -156,7 +122,7 @@ impl ClearanceModel {
                         .solids
                         .iter()
                         .zip(&body.solids)
-                        .all(|(placed, solid)| same_shape(&placed.solid.0, &solid.shape))
+                        .all(|(placed, solid)| placed.has_shape(&solid.shape))
             })
     }
 
@@ -332,76 +298,6 @@ fn beyond_m(best: Option<&PairClearance>) -> f64 {
     best.map_or(f64::INFINITY, |best| best.separation.distance_m) + PRUNING_MARGIN_M
 }
 
-pub(crate) const IDENTITY: Placement = Placement {
-    rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
-    translation: Vector3::new(0.0, 0.0, 0.0),
-};
-
-/// Prepares a body; `known` is one that may be the same or have the same shapes.
-fn placed_body(
-    body: &CollisionBody,
-    first_moving: usize,
-    known: Option<&Arc<PlacedBody>>,
-) -> Arc<PlacedBody> {
-    if let Some(known) = known
-        && known.is_of(body, first_moving)
-    {
-        return Arc::clone(known);
-    }
-    let known = known.map_or(&[][..], |known| &known.solids);
-    let solids: Vec<_> = body
-        .solids
-        .iter()
-        .enumerate()
-        .map(|(index, solid)| {
-            let twin = known
-                .get(index)
-                .filter(|known| same_shape(&known.solid.0, &solid.shape));
-            let shape = match twin {
-                Some(known) => Arc::clone(&known.shape),
-                None => Arc::new(PreparedShape::new(&solid.shape)),
-            };
-            let body_from_shape = Placement::new(&solid.parent_from_shape);
-            PlacedShape {
-                solid: (solid.shape.clone(), solid.parent_from_shape),
-                bound: shape.bound.placed(&body_from_shape),
-                seen: Seen::new(&shape, body_from_shape),
-                body_from_shape,
-                shape,
-            }
-        })
-        .collect();
-    Arc::new(PlacedBody {
-        frame: body.frame,
-        bound: Capsule::around_balls(solids.iter().map(|solid| &solid.bound)),
-        tree: SolidTree::new(&solids.iter().map(|s| &s.seen.block).collect::<Vec<_>>()),
-        first_moving,
-        solids,
-    })
-}
-
-impl PlacedBody {
-    /// Whether preparing a body would give this one again.
-    fn is_of(&self, body: &CollisionBody, first_moving: usize) -> bool {
-        self.frame == body.frame
-            && self.first_moving == first_moving
-            && self.solids.len() == body.solids.len()
-            && self.solids.iter().zip(&body.solids).all(|(placed, solid)| {
-                placed.solid.1 == solid.parent_from_shape
-                    && same_shape(&placed.solid.0, &solid.shape)
-            })
-    }
-}
-
-/// Whether two shapes are equal, without looking into meshes that are one and the same.
-fn same_shape(a: &Shape, b: &Shape) -> bool {
-    match (a, b) {
-        (Shape::Convex(a), Shape::Convex(b)) => Arc::ptr_eq(a, b) || a == b,
-        (Shape::Mesh(a), Shape::Mesh(b)) => Arc::ptr_eq(a, b) || a == b,
-        _ => a == b,
-    }
-}
-
 /// Whether the distance is below the limit, or is not a number: joint positions that are not
 /// finite must not pass for free.
 fn is_closer(separation: &Separation, limit_m: f64) -> bool {
@@ -498,7 +394,7 @@ impl PairQuery<'_> {
         let [world_from_a, world_from_b] =
             [(body_a, solids.a), (body_b, solids.b)].map(|(body, i)| self.posture.place(body, i));
         let solid_b_from_solid_a = world_from_b.inverse_after(world_from_a);
-        closer_than(&a.shape, &b.shape, &solid_b_from_solid_a, cutoff_m)
+        separation_within(&a.shape, &b.shape, &solid_b_from_solid_a, cutoff_m)
     }
 
     fn clearance(&self, solids: SolidPair, in_solid_b: &Separation) -> PairClearance {

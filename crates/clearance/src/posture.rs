@@ -7,113 +7,17 @@
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
 use needlebench_cell::Frame;
+use needlebench_geometry::{BoundingCapsule, Placement};
 
-use crate::bounds::Capsule;
-use crate::core::{Placement, PreparedShape};
-use crate::mesh::Node;
-use crate::model::{IDENTITY, LinkPlacements, PlacedBody};
-
-/// From this number on the solids of a body are searched by a tree of boxes.
-const TREE_SOLIDS: usize = 6;
-
-/// A solid's place and what encloses it.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Seen {
-    pub placement: Placement,
-    pub bound: Capsule,
-    pub block: Node,
-}
-
-impl Seen {
-    pub fn new(shape: &PreparedShape, placement: Placement) -> Self {
-        Self {
-            bound: shape.bound.placed(&placement),
-            block: shape.block.placed(&placement),
-            placement,
-        }
-    }
-
-    fn placed(&self, placement: &Placement) -> Self {
-        Self {
-            placement: placement.after(&self.placement),
-            bound: self.bound.placed(placement),
-            block: self.block.placed(placement),
-        }
-    }
-
-    /// How far the plane across the way from A's axis to a box keeps A from the box.
-    #[inline]
-    fn gap_to_box_m(&self, shape: &PreparedShape, other: &Node) -> f64 {
-        let mut from = self.bound.centre;
-        let axis = &self.bound.half_axis;
-        let length_squared = axis.norm_squared();
-        if length_squared > 0.0 {
-            let along = (other.centre - from).dot(axis) / length_squared;
-            from += axis * along.clamp(-1.0, 1.0);
-        }
-        let way = other.nearest(&from) - from;
-        let length = way.norm();
-        if length > 0.0 {
-            let across = way / length;
-            let in_shape = self.placement.rotation.tr_mul(&across);
-            let mut hint = usize::MAX;
-            let reach = in_shape.dot(&shape.core.support(&in_shape, &mut hint))
-                + across.dot(&self.placement.translation)
-                + shape.radius_m;
-            other.low(&across) - reach
-        } else {
-            f64::NEG_INFINITY
-        }
-    }
-}
-
-/// The solids of a body in a tree of boxes, for bodies of many.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SolidTree(Vec<Node>);
-
-impl SolidTree {
-    pub fn new(solids: &[&Node]) -> Option<Self> {
-        if solids.len() < TREE_SOLIDS {
-            return None;
-        }
-        let mut nodes = Vec::with_capacity(2 * solids.len());
-        let mut order: Vec<usize> = (0..solids.len()).collect();
-        split(&mut nodes, solids, &mut order);
-        Some(Self(nodes))
-    }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a body has fewer than 2^32 solids"
-)]
-fn split(nodes: &mut Vec<Node>, solids: &[&Node], order: &mut [usize]) {
-    if let [only] = order {
-        nodes.push(solids[*only].clone().leaf(*only as u32, 1));
-        return;
-    }
-    let corners: Vec<Vector3<f64>> = order.iter().flat_map(|&i| solids[i].corners()).collect();
-    let (node, axis) = Node::around(&corners.iter());
-    let middle = order.len() / 2;
-    let key = |i: usize| axis.dot(&solids[i].centre);
-    order.sort_unstable_by(|&i, &j| key(i).total_cmp(&key(j)).then(i.cmp(&j)));
-    let index = nodes.len();
-    nodes.push(node);
-    let (left, right) = order.split_at_mut(middle);
-    split(nodes, solids, left);
-    let second = nodes.len() as u32;
-    nodes[index].open_at(second);
-    split(nodes, solids, right);
-}
+use crate::body::{LinkPlacements, Part, PlacedBody, Seen, SolidTree};
 
 /// All solids at one posture, in the world.
 pub(crate) struct Posture {
     /// Of the bodies that move, one body after the other.
     moving: Vec<Seen>,
     /// Balls around the bodies.
-    balls: Vec<Capsule>,
+    balls: Vec<BoundingCapsule>,
 }
 
 impl Posture {
@@ -189,17 +93,17 @@ impl Posture {
                 continue;
             };
             let to_world = match b.frame {
-                Frame::World => IDENTITY,
+                Frame::World => Placement::IDENTITY,
                 Frame::Link(_) => {
                     let solid = &b.solids[0].seen.placement;
                     self.seen(b, 0)
                         .placement
-                        .after(&solid.inverse_after(&IDENTITY))
+                        .after(&solid.inverse_after(&Placement::IDENTITY))
                 }
             };
             stack.clear();
             let gap_m = |node: u32| {
-                let node = &nodes[node as usize];
+                let node = &nodes[node as usize].block;
                 match b.frame {
                     Frame::World => seen.gap_to_box_m(shape, node),
                     Frame::Link(_) => seen.gap_to_box_m(shape, &node.placed(&to_world)),
@@ -210,9 +114,10 @@ impl Posture {
                 if lower_m >= limit_m {
                     continue;
                 }
-                match nodes[index as usize].children(index) {
-                    Ok([one, other]) => {
-                        let (one, other) = ((gap_m(one), one), (gap_m(other), other));
+                match nodes[index as usize].part {
+                    Part::Halves { second } => {
+                        let first = index + 1;
+                        let (one, other) = ((gap_m(first), first), (gap_m(second), second));
                         // The nearer one is on top.
                         if one.0 <= other.0 {
                             stack.extend([other, one]);
@@ -220,7 +125,7 @@ impl Posture {
                             stack.extend([one, other]);
                         }
                     }
-                    Err(solid) => match try_one(solid as usize, limit_m) {
+                    Part::Solid(solid) => match try_one(solid as usize, limit_m) {
                         Some(next_m) => limit_m = next_m,
                         None => return,
                     },

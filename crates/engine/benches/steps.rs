@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use needlebench_cell::{Cell, Overrides, load_scenario};
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
-    Actuation, Hooks, Motion, MujocoFleet, MujocoPlant, MujocoSettings, Plant, RapierPlant,
+    Actuation, Fleet, Hooks, Motion, MujocoFleet, MujocoPlant, MujocoSettings, Plant, RapierPlant,
     RapierSettings, Recording, Servo, ServoGains, simulate, simulate_fleet,
 };
 use needlebench_kinematics::Joints;
@@ -128,6 +128,7 @@ impl Bench {
             servo: &self.servo,
             actuation: &self.actuation,
             trajectory: &self.trajectory,
+            braking: None,
         }; ARMS];
         let bare = std::cell::RefCell::new(&mut bare);
         let replay = |look| {
@@ -177,7 +178,9 @@ impl Bench {
                 },
                 &mut || {
                     timed(|| {
-                        simulate_fleet(&mut fleet.borrow_mut(), &motions, None, |_, ended| {
+                        let mut fleet = fleet.borrow_mut();
+                        let mut hooks = Hooks::default();
+                        simulate_fleet(&mut **fleet, &motions, &mut hooks, &mut |_, ended| {
                             assert_eq!(ended.expect("stable before").state, recording.state);
                         })
                         .expect("stable before");

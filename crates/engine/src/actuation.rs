@@ -20,7 +20,7 @@
 
 use std::collections::VecDeque;
 
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::NormalPairs;
 use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
@@ -250,8 +250,7 @@ pub(crate) struct Drives<'a> {
     bristles_rad: Joints,
     /// Torques that were asked for and have not yet reached the motors, oldest first.
     on_the_way: VecDeque<Joints>,
-    random: SplitMix64,
-    spare_normal: Option<f64>,
+    noise: NormalPairs,
     /// The last reference, and the torque that the model says it needs, N m.
     fed_forward: Option<(JointState, Joints)>,
 }
@@ -277,8 +276,7 @@ impl<'a> Drives<'a> {
                 }),
             bristles_rad: Joints::zeros(),
             on_the_way: VecDeque::new(),
-            random: SplitMix64::new(actuation.seed),
-            spare_normal: None,
+            noise: NormalPairs::new(actuation.seed),
             fed_forward: None,
         }
     }
@@ -404,33 +402,14 @@ impl<'a> Drives<'a> {
         };
         // Drawn for every joint in every step, so that one does not depend on another's motion.
         Joints::from_fn(|i, _| {
-            let passing = 0.5 * encoder.resolution_rad[i] * self.random.uniform(-1.0, 1.0);
+            let passing = 0.5 * encoder.resolution_rad[i] * self.noise.uniform(-1.0, 1.0);
             let rounding = if reference_rad_s[i] == 0.0 {
                 encoder.resting_rounding_rad[i]
             } else {
                 passing
             };
-            encoder.offset_rad[i] + rounding + encoder.noise_rad[i] * self.normal()
+            encoder.offset_rad[i] + rounding + encoder.noise_rad[i] * self.noise.next_normal()
         })
-    }
-
-    /// Standard normal by the polar method of Marsaglia.
-    fn normal(&mut self) -> f64 {
-        if let Some(spare) = self.spare_normal.take() {
-            return spare;
-        }
-        loop {
-            let (x, y) = (
-                self.random.uniform(-1.0, 1.0),
-                self.random.uniform(-1.0, 1.0),
-            );
-            let square = x * x + y * y;
-            if square > 0.0 && square < 1.0 {
-                let factor = (-2.0 * square.ln() / square).sqrt();
-                self.spare_normal = Some(y * factor);
-                return x * factor;
-            }
-        }
     }
 }
 

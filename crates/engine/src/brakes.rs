@@ -8,11 +8,10 @@
 //!
 //! # The numbers
 //!
-//! UR3 (CB3) user manual 3.10, appendix A.1 gives stopping distance and time of stops of category 0 at
-//! full extension, 183 deg/s and 3 kg: base 0.18 rad in 159 ms, shoulder 0.20 rad in 154 ms, elbow
-//! 0.15 rad in 92 ms. Under a constant torque the distance would be half of speed times time: 0.254,
-//! 0.246 and 0.147 rad. That is the elbow's, rounded; base and shoulder brake harder while they are
-//! fast. Of one joint with the inertia `M`, from the speed `w`,
+//! Makers publish distance and time of stops of category 0 at full extension, from a speed and with a
+//! load; an arm's data have them ([`BrakeFigures`]). Under a constant torque the distance would be half
+//! of speed times time; a brake that goes less far is harder while it is fast. Of one joint with the
+//! inertia `M`, from the speed `w`,
 //!
 //! ```text
 //! M dw/dt = -(c + b w)     x = b w / c
@@ -21,52 +20,14 @@
 //! ```
 //!
 //! so `distance / (w time)` gives `x` and the time then `c`. `M` and gravity's torque are those of the
-//! dynamics that is given, stretched out level, with 3 kg at the flange. The manual does not say which
-//! way the joint moves; *assumed* is the worse one, downwards, so the constant torque is `c` plus
-//! gravity's half way down. There are no figures for the wrists; *assumed* is the elbow's brake by the
-//! ratio of the torque limits. A brake that stands holds [`STANDING_RATIO`] times what it has while it
-//! slips (*assumed*): with no more than that the elbow slips at the start of the shoulder's published
-//! stop, which then ends after 0.184 rad.
+//! dynamics that is given, stretched out level, with the load at the flange. Where the maker does not say
+//! which way the joint moves, *assumed* is the worse one, downwards, so the constant torque is `c` plus
+//! gravity's half way down. A joint without figures has another one's brake by the ratio of their torque
+//! limits. A brake that stands holds a multiple of what it has while it slips; the data say which.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
+use needlebench_cell::arm::{BrakeFigure, BrakeFigures};
 use needlebench_kinematics::{Body, Dynamics, JOINT_COUNT, Joints};
-
-/// Speed of the published stops, rad/s: 183 deg/s.
-pub const PUBLISHED_SPEED_RAD_S: f64 = 183.0 * std::f64::consts::PI / 180.0;
-
-/// Load of the published stops, kg.
-pub const PUBLISHED_LOAD_KG: f64 = 3.0;
-
-/// A published stop of category 0 at full extension.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PublishedStop {
-    /// Angle travelled, rad.
-    pub distance_rad: f64,
-    /// Time taken, s.
-    pub time_s: f64,
-}
-
-/// Stops of base, shoulder and elbow: UR3 (CB3) user manual 3.10, appendix A.1.
-pub const PUBLISHED_STOPS: [PublishedStop; 3] = [
-    PublishedStop {
-        distance_rad: 0.18,
-        time_s: 0.159,
-    },
-    PublishedStop {
-        distance_rad: 0.20,
-        time_s: 0.154,
-    },
-    PublishedStop {
-        distance_rad: 0.15,
-        time_s: 0.092,
-    },
-];
-
-/// Elbow's torque limit over those of wrists 1 to 3: 28 N m, 12 N m.
-const WRIST_SHARE: f64 = 12.0 / 28.0;
-
-/// Torque of a brake that stands over that of one that slips. Assumed, see above.
-pub const STANDING_RATIO: f64 = 2.0;
 
 /// Speed below which a joint counts as standing, rad/s: a few millimetres a second at the end of the arm,
 /// and ten times what a step of 1 ms leaves of a joint that is held while others stop from full speed.
@@ -85,35 +46,53 @@ pub struct Brakes {
     pub coulomb_nm: Joints,
     /// Torque by speed, N m s/rad.
     pub viscous_nms_per_rad: Joints,
+    /// Torque of a brake that stands over that of one that slips.
+    pub standing_ratio: f64,
 }
 
 impl Brakes {
-    /// The brakes of a UR3 with this dynamics, whose tool is replaced by the load of the published
-    /// stops.
-    pub fn of_ur3(dynamics: &Dynamics) -> Self {
-        let loaded = loaded(dynamics);
+    /// The brakes of an arm with this dynamics, to which the load of the published stops is added.
+    pub fn of_figures(figures: &BrakeFigures, dynamics: &Dynamics) -> Self {
+        let loaded = loaded(dynamics, figures.load_kg);
         let stretched = stretched();
         let mass = loaded.mass_matrix(&stretched);
         let level = loaded.gravity_torque(&stretched);
         let mut brakes = Self {
             coulomb_nm: Joints::zeros(),
             viscous_nms_per_rad: Joints::zeros(),
+            standing_ratio: figures.standing_ratio,
         };
-        for (joint, stop) in PUBLISHED_STOPS.iter().enumerate() {
-            let speed = PUBLISHED_SPEED_RAD_S;
-            let x = viscous_share(stop.distance_rad / (speed * stop.time_s));
+        for (joint, figure) in figures.joints.iter().enumerate() {
+            let &BrakeFigure::Published {
+                distance_rad,
+                time_s,
+                ..
+            } = figure
+            else {
+                continue;
+            };
+            let speed = figures.speed_rad_s;
+            let x = viscous_share(distance_rad / (speed * time_s));
             let slowing = if x > 0.0 { x.ln_1p() / x } else { 1.0 };
-            let net_nm = mass[(joint, joint)] * speed / stop.time_s * slowing;
+            let net_nm = mass[(joint, joint)] * speed / time_s * slowing;
             brakes.viscous_nms_per_rad[joint] = x * net_nm / speed;
-            // Half way down: it falls off by 4 % over the stop of the shoulder.
+            // Half way down: it falls off by a few percent over a stop.
             let mut half_way = stretched;
-            half_way[joint] -= 0.5 * stop.distance_rad * level[joint].signum();
+            half_way[joint] -= 0.5 * distance_rad * level[joint].signum();
             let gravity_nm = loaded.gravity_torque(&half_way)[joint].abs();
             brakes.coulomb_nm[joint] = net_nm + gravity_nm;
         }
-        for joint in PUBLISHED_STOPS.len()..JOINT_COUNT {
-            brakes.coulomb_nm[joint] = WRIST_SHARE * brakes.coulomb_nm[2];
-            brakes.viscous_nms_per_rad[joint] = WRIST_SHARE * brakes.viscous_nms_per_rad[2];
+        for (joint, figure) in figures.joints.iter().enumerate() {
+            let &BrakeFigure::Like {
+                joint: model,
+                torque_ratio,
+                ..
+            } = figure
+            else {
+                continue;
+            };
+            brakes.coulomb_nm[joint] = torque_ratio * brakes.coulomb_nm[model];
+            brakes.viscous_nms_per_rad[joint] = torque_ratio * brakes.viscous_nms_per_rad[model];
         }
         brakes
     }
@@ -122,7 +101,7 @@ impl Brakes {
     fn friction_nm(&self, velocity: &Joints) -> Joints {
         self.coulomb_nm.zip_map(velocity, |coulomb, speed| {
             if speed.abs() < STANDING_RAD_S {
-                STANDING_RATIO * coulomb
+                self.standing_ratio * coulomb
             } else {
                 coulomb
             }
@@ -173,12 +152,12 @@ impl Brakes {
 
 /// The arm with the load of the published stops at its flange, level.
 ///
-/// The mass and the inertia of a tool that is part of the last body stay: a guide weighs a twentieth of
-/// the load.
-pub fn loaded(dynamics: &Dynamics) -> Dynamics {
+/// The mass and the inertia of a tool that is part of the last body stay: a needle guide weighs little
+/// beside the load.
+pub fn loaded(dynamics: &Dynamics, load_kg: f64) -> Dynamics {
     let mut loaded = *dynamics;
     let load = Body {
-        mass_kg: PUBLISHED_LOAD_KG,
+        mass_kg: load_kg,
         com_m: dynamics.chain.wrist_3_from_flange.translation.vector,
         inertia_kgm2: Matrix3::zeros(),
     };
@@ -219,6 +198,10 @@ mod tests {
         crate::test_cell::ur3(Vec::new()).dynamics()
     }
 
+    fn figures() -> BrakeFigures {
+        crate::test_cell::brake_figures("ur3")
+    }
+
     #[test]
     fn a_ratio_of_distance_gives_its_share() {
         for x in [0.1_f64, 1.0, 5.2, 40.0] {
@@ -234,7 +217,7 @@ mod tests {
         const SOLVED_RAD_S: f64 = 1e-9;
         const SOLVED_NM_SEEN: f64 = 1e-8;
         let dynamics = dynamics();
-        let brakes = Brakes::of_ur3(&dynamics);
+        let brakes = Brakes::of_figures(&figures(), &dynamics);
         let mut random = crate::test_cell::Random(3);
         let mut slipping = 0;
         for case in 0..500 {
@@ -261,12 +244,14 @@ mod tests {
 
     #[test]
     fn published_figures_give_these_brakes() {
-        let brakes = Brakes::of_ur3(&dynamics());
+        let brakes = Brakes::of_figures(&figures(), &dynamics());
         println!("{brakes:?}");
         // None is stronger at full speed than thrice the joint's torque limit, and all of them hold
         // the stretched arm with its load.
-        let full = brakes.coulomb_nm + brakes.viscous_nms_per_rad * PUBLISHED_SPEED_RAD_S;
-        let gravity = loaded(&dynamics()).gravity_torque(&stretched()).abs();
+        let full = brakes.coulomb_nm + brakes.viscous_nms_per_rad * figures().speed_rad_s;
+        let gravity = loaded(&dynamics(), figures().load_kg)
+            .gravity_torque(&stretched())
+            .abs();
         for (i, limit) in [56.0, 56.0, 28.0, 12.0, 12.0, 12.0].into_iter().enumerate() {
             assert!(full[i] < 3.0 * limit, "{i}: {}", full[i]);
             assert!(brakes.coulomb_nm[i] > gravity[i], "{i}");

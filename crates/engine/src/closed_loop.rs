@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, Matrix6};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 
-use crate::{Actuation, Servo};
+use crate::{Actuation, Servo, UnstableServo};
 
 /// Spectral radius below which motions die out; 1 with a margin for its rounding.
 const STABLE: f64 = 1.0 - 1e-7;
@@ -29,19 +29,6 @@ pub struct ClosedLoop {
     transition: DMatrix<f64>,
     /// Response of the state to the encoders' errors, rad.
     from_noise: DMatrix<f64>,
-}
-
-/// Gains that a plant cannot follow.
-#[derive(Debug, Clone, PartialEq)]
-pub struct UnstableServo {
-    /// Growth of the worst motion per step.
-    pub growth: f64,
-    /// Joint that moves most in it.
-    pub joint: &'static str,
-    /// Factor on all gains up to which the loop is stable at this step; none if no gain is.
-    pub stable_factor: Option<f64>,
-    /// Time step, s, up to which the loop is stable with these gains; none if none is.
-    pub stable_timestep_s: Option<f64>,
 }
 
 impl ClosedLoop {
@@ -239,38 +226,11 @@ impl ClosedLoop {
     }
 }
 
-impl std::fmt::Display for UnstableServo {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            formatter,
-            "the servo is unstable: kp, kd, armature and time step make {} swing up by a factor {:.3} \
-             in every step",
-            self.joint, self.growth
-        )?;
-        match (self.stable_factor, self.stable_timestep_s) {
-            (None, None) => write!(formatter, "; no gain and no shorter step mends it"),
-            (factor, step) => {
-                if let Some(factor) = factor {
-                    write!(formatter, "; stable below {factor:.3} of these gains")?;
-                }
-                if let Some(step_s) = step {
-                    write!(
-                        formatter,
-                        "; stable with these gains below steps of {:.3} ms",
-                        step_s * 1e3
-                    )?;
-                }
-                Ok(())
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{JointFriction, ServoGains};
-    use needlebench_kinematics::pose_sets::SplitMix64;
+    use needlebench_kinematics::random::SplitMix64;
 
     const POSTURE: Joints = Joints::new(0.3, -1.2, 1.4, -0.3, 0.7, 0.2);
 

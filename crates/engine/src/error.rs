@@ -1,20 +1,34 @@
 //! What can go wrong in a simulation.
 
 use needlebench_cell::Cell;
-use needlebench_cell::shape::{ConvexMesh, Solid, SolidMesh};
+use needlebench_geometry::{ConvexMesh, Solid, SolidMesh};
 use needlebench_kinematics::JOINT_LABELS;
 
-use crate::Recording;
-use crate::mujoco::HarnessError;
+use crate::{Recording, UnstableServo};
 
 /// Errors of the engines and of the run loop.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum EngineError {
+    /// What the engine needs could not be started.
+    #[error("{reason}")]
+    NotStarted {
+        /// Why, and how to mend it.
+        reason: String,
+    },
+    /// The engine could not make an arm of the cell.
+    #[error("{error}")]
+    NotMade {
+        /// What it says of the cell or the settings.
+        error: Box<EngineError>,
+    },
+    /// The servo would shake the arm to pieces; nothing was simulated.
+    #[error("{0}")]
+    UnstableServo(UnstableServo),
     /// The state left every sensible range: the simulation is unstable.
     #[error("{engine} diverged at {time_s:.4} s: {quantity} of {joint} is {value}")]
     Diverged {
         /// Name of the engine.
-        engine: String,
+        engine: &'static str,
         /// Simulated time, s.
         time_s: f64,
         /// Label of the first joint concerned.
@@ -40,14 +54,17 @@ pub enum EngineError {
         /// The states until then, all of them sensible.
         recording: Box<Recording>,
     },
-    /// The process that runs MuJoCo failed.
-    #[error(transparent)]
-    Harness(#[from] HarnessError),
-    /// The harness has another model than the one it was given.
-    #[error("the MuJoCo harness reports other {missing} than its model has")]
-    ModelMismatch {
-        /// What does not match.
-        missing: &'static str,
+    /// The process that the engine runs in is of no further use.
+    #[error("{reason}")]
+    Lost {
+        /// What happened to it.
+        reason: String,
+    },
+    /// The engine did not do what it was asked, and is well.
+    #[error("{reason}")]
+    Refused {
+        /// Its own words.
+        reason: String,
     },
     /// The caller asked to stop.
     #[error("cancelled")]
@@ -98,6 +115,13 @@ pub enum EngineError {
         /// Groups that there are.
         limit: usize,
     },
+}
+
+impl EngineError {
+    /// Whether the engine itself is gone: it can make no further motion until it is started anew.
+    pub fn is_fatal(&self) -> bool {
+        matches!(self, Self::NotStarted { .. } | Self::Lost { .. })
+    }
 }
 
 /// The convex pieces of a mesh, which an engine needs.

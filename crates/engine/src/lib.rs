@@ -1,42 +1,55 @@
 //! Physics engines behind one interface: the same robot, the same geometry, the same servo.
 //!
-//! A [`Plant`] is the arm in an engine: it advances one step under joint torques. [`simulate`]
-//! drives any plant along a trajectory with the [`Servo`] and returns a [`Recording`]. Both plants
-//! are built from the one [`Cell`](needlebench_cell::Cell), so that what differs between their
-//! recordings is the engines' doing.
+//! An [`Engine`] is a module of this crate and a line of [`ENGINES`]. Started, it makes [`Plant`]s: the
+//! arm in an engine, which advances one step under joint torques. [`run_motions`] drives motions in
+//! any engine with the [`Servo`], one after the other or several at a time, and hands over a
+//! [`Recording`] of each. All plants are built from the one [`Cell`](needlebench_cell::Cell), so that
+//! what differs between their recordings is the engines' doing.
 
 mod actuation;
 mod brakes;
+mod broad_phase;
 mod closed_loop;
 mod contact_groups;
+mod convert;
 mod deviations;
+mod drive;
+mod engine;
 mod error;
-mod fleet_run;
+mod fleet;
+mod motions;
 pub mod mujoco;
-mod nearness;
 mod plant;
+mod pool;
 mod rapier;
 mod recording;
 mod referee;
+mod registry;
 mod servo;
 mod simulate;
+mod state;
 #[cfg(test)]
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/engine/common/mod.rs"]
 mod test_cell;
+mod unstable_servo;
 
 pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFriction};
-pub use brakes::{
-    Brakes, PUBLISHED_LOAD_KG, PUBLISHED_SPEED_RAD_S, PUBLISHED_STOPS, PublishedStop, loaded,
-    stretched,
-};
-pub use closed_loop::{ClosedLoop, UnstableServo};
+pub use brakes::{Brakes, loaded, stretched};
+pub use closed_loop::ClosedLoop;
 pub use deviations::{KNOWN_DEVIATIONS, KnownDeviation};
+pub use drive::{Braking, Motion};
+pub use engine::{ArmSpec, Engine, EngineCheck, EngineSession};
 pub use error::EngineError;
-pub use fleet_run::{Motion, simulate_fleet};
+pub use fleet::Fleet;
+pub use motions::{MotionJob, MotionSettings, MotionsDone, run_motions};
 pub use mujoco::{MujocoFleet, MujocoIntegrator, MujocoPlant, MujocoSettings};
-pub use plant::{Contact, EngineIdentity, Plant, PlantState};
+pub use plant::Plant;
+pub use pool::EnginePool;
 pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording, Saturation};
-pub use referee::{RefereePlant, RefereeSettings, TorqueHold, retrace};
+pub use referee::{REFEREE, RefereePlant, RefereeSettings, TorqueHold, retrace};
+pub use registry::{ENGINES, UnknownEngine, choose_engines, engine_names};
 pub use servo::{Servo, ServoGains, ServoOutput};
-pub use simulate::{Braking, Drive, Hooks, simulate, simulate_with_stop};
+pub use simulate::{Hooks, simulate, simulate_fleet, simulate_motion};
+pub use state::{Contact, EngineIdentity, PlantState};
+pub use unstable_servo::UnstableServo;

@@ -19,7 +19,7 @@ pub struct ServoGains {
 impl Default for ServoGains {
     /// 2000 N m/rad and 60 N m s/rad at every joint.
     ///
-    /// A stretched UR3 has 1 to 1.5 kg m^2 about its shoulder: 6 Hz, damped at 0.6. At a wrist the
+    /// With 1 to 1.5 kg m^2 about the shoulder that is 6 Hz, damped at 0.6. At a wrist the
     /// armature of 0.05 kg m^2 or more is nearly the whole inertia, and the explicit servo is
     /// stable up to steps of 1.6 ms (see [`Servo::stability_ratio`]).
     fn default() -> Self {

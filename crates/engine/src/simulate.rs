@@ -1,212 +1,22 @@
-//! The run loop: one servo, one trajectory, any plant.
+//! The run loop: motions on arms that are stepped together, or on one.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_kinematics::{Dynamics, JOINT_COUNT, JOINT_LABELS, Joints};
 
-use crate::actuation::Drives;
-use crate::{
-    ActuatedTorque, Actuation, Brakes, Cost, EngineError, EngineIdentity, Plant, PlantState,
-    Recording, Servo,
-};
-
-/// Speed that no arm reaches, rad/s: 16 times the fastest joint of a UR3.
-const ABSURD_SPEED_RAD_S: f64 = 100.0;
-
-/// Position that no joint reaches, rad: 16 turns.
-const ABSURD_POSITION_RAD: f64 = 100.0;
-
-/// A trajectory whose end lies this fraction of a step behind a step's end needs no further step.
-const STEP_SLACK: f64 = 1e-6;
+use crate::drive::{Drive, Motion};
+use crate::fleet::{Fleet, Lone};
+use crate::{Actuation, EngineError, Plant, Recording, Servo};
 
 /// How the caller takes part in a run.
 #[derive(Default)]
 pub struct Hooks<'a> {
     /// Read before every step; once it is set the run ends with [`EngineError::Cancelled`].
     pub cancel: Option<&'a AtomicBool>,
-    /// Called after every step with the simulated time, s.
+    /// Called after every step with the time that has been simulated, over all motions, s.
     pub progress: Option<&'a mut dyn FnMut(f64)>,
-}
-
-/// One run: it says what torque the plant gets next, and keeps what the plant did.
-///
-/// Plants are stepped by the caller, so that several of them can go in turn:
-///
-/// ```text
-/// drive.record(plant.reset(&drive.start()))
-/// while let Some(torque) = drive.torque()? { drive.record(plant.step(&torque)?)? }
-/// drive.finish()
-/// ```
-#[derive(Debug)]
-pub struct Drive<'a> {
-    trajectory: &'a JointTrajectory,
-    drives: Drives<'a>,
-    steps: usize,
-    braking: Option<Braking<'a>>,
-    recording: Recording,
-}
-
-/// From a moment on the drives are off and the brakes act.
-#[derive(Debug, Clone, Copy)]
-pub struct Braking<'a> {
-    /// The moment, s.
-    pub from_s: f64,
-    /// The brakes.
-    pub brakes: Brakes,
-    /// The arm that they brake: the plant's own.
-    pub dynamics: &'a Dynamics,
-}
-
-impl<'a> Drive<'a> {
-    /// Prepares a run of `trajectory` from its start to its end on a plant with steps of
-    /// `timestep_s` whose velocities are `velocity_age_s` old (see [`Plant::velocity_age_s`]).
-    ///
-    /// The servo is sampled once per step and its torque held over it. The last state is the first
-    /// one at or after the trajectory's end.
-    ///
-    /// # Errors
-    /// [`EngineError::BadSetting`] for gains, limits and imperfections out of range.
-    pub fn new(
-        servo: &'a Servo,
-        actuation: &'a Actuation,
-        trajectory: &'a JointTrajectory,
-        engine: EngineIdentity,
-        timestep_s: f64,
-        velocity_age_s: f64,
-    ) -> Result<Self, EngineError> {
-        servo.check()?;
-        actuation.check()?;
-        let steps = step_count(trajectory.duration_s(), timestep_s);
-        Ok(Self {
-            trajectory,
-            drives: Drives::new(servo, actuation, timestep_s, velocity_age_s),
-            steps,
-            braking: None,
-            recording: Recording {
-                engine,
-                timestep_s,
-                time_s: Vec::with_capacity(steps + 1),
-                state: Vec::with_capacity(steps + 1),
-                reference: Vec::with_capacity(steps + 1),
-                torque_nm: Vec::with_capacity(steps),
-                drive_nm: Vec::with_capacity(steps),
-                saturated_steps: 0,
-                saturation: Default::default(),
-                cost: Cost::default(),
-            },
-        })
-    }
-
-    /// Brakes the arm from a moment on.
-    #[must_use]
-    pub fn braked(mut self, braking: Option<Braking<'a>>) -> Self {
-        self.braking = braking;
-        self
-    }
-
-    /// Where the plant is to be reset to, rad.
-    pub fn start(&self) -> Joints {
-        self.trajectory.sample(0.0).position
-    }
-
-    /// Torque of the next step, N m; none after the last one.
-    ///
-    /// # Errors
-    /// [`EngineError::Diverged`] if it is not a number.
-    ///
-    /// # Panics
-    /// If no state was recorded yet.
-    pub fn torque(&mut self) -> Result<Option<Joints>, EngineError> {
-        let step = self.recording.torque_nm.len();
-        if step >= self.steps {
-            return Ok(None);
-        }
-        let state = self.recording.state.last().expect("recorded after reset");
-        let time_s = step as f64 * self.recording.timestep_s;
-        let braking = self
-            .braking
-            .filter(|braking| time_s >= braking.from_s - STEP_SLACK * self.recording.timestep_s);
-        let torque = if let Some(Braking {
-            brakes, dynamics, ..
-        }) = braking
-        {
-            let h = self.recording.timestep_s;
-            let torque_nm = brakes.torque(dynamics, &state.position, &state.velocity, h);
-            ActuatedTorque {
-                link_nm: torque_nm,
-                drive_nm: Joints::zeros(),
-                saturated: [false; JOINT_COUNT],
-            }
-        } else {
-            let planned = self.recording.reference.last();
-            self.drives.torque(
-                self.trajectory,
-                time_s,
-                planned.expect("recorded with its state"),
-                &state.position,
-                &state.velocity,
-            )
-        };
-        check_torque(&self.recording.engine.name, time_s, &torque.drive_nm)?;
-        self.recording.saturated_steps += usize::from(torque.saturated.contains(&true));
-        for (joint, cut) in self.recording.saturation.iter_mut().zip(torque.saturated) {
-            if cut {
-                joint.steps += 1;
-                joint.first_time_s.get_or_insert(time_s);
-            }
-        }
-        self.recording.torque_nm.push(torque.link_nm);
-        self.recording.drive_nm.push(torque.drive_nm);
-        Ok(Some(torque.link_nm))
-    }
-
-    /// Keeps the state after the reset or after a step.
-    ///
-    /// # Errors
-    /// [`EngineError::Diverged`] if it left every sensible range; it is kept all the same.
-    pub fn record(&mut self, state: PlantState) -> Result<(), EngineError> {
-        let recording = &mut self.recording;
-        let time_s = recording.state.len() as f64 * recording.timestep_s;
-        recording.time_s.push(time_s);
-        recording.state.push(state);
-        recording.reference.push(self.trajectory.sample(time_s));
-        check_state(&recording.engine.name, time_s, &state)
-    }
-
-    /// Simulated time so far, s.
-    pub fn time_s(&self) -> f64 {
-        self.recording.time_s.last().copied().unwrap_or(0.0)
-    }
-
-    /// The recording; its cost is the caller's to fill in.
-    pub fn finish(self) -> Recording {
-        self.recording
-    }
-
-    /// The error with what was recorded until it came: [`EngineError::Stopped`]. Errors that are
-    /// not the motion's own stay as they are.
-    pub fn stopped_by(self, error: EngineError) -> EngineError {
-        if !matches!(
-            error,
-            EngineError::Diverged { .. } | EngineError::Unstable { .. }
-        ) {
-            return error;
-        }
-        let mut recording = self.recording;
-        let sensible = |state: &PlantState| check_state("", 0.0, state).is_ok();
-        let count = recording.state.iter().take_while(|s| sensible(s)).count();
-        recording.time_s.truncate(count);
-        recording.state.truncate(count);
-        recording.reference.truncate(count);
-        recording.torque_nm.truncate(count.saturating_sub(1));
-        recording.drive_nm.truncate(count.saturating_sub(1));
-        EngineError::Stopped {
-            error: Box::new(error),
-            recording: Box::new(recording),
-        }
-    }
 }
 
 /// Runs `trajectory` from its start to its end on `plant`, through drives as they are.
@@ -220,124 +30,152 @@ pub fn simulate(
     trajectory: &JointTrajectory,
     hooks: Hooks<'_>,
 ) -> Result<Recording, EngineError> {
-    simulate_with_stop(plant, servo, actuation, trajectory, None, hooks)
-}
-
-/// [`simulate`] with brakes that act from a moment on.
-///
-/// # Errors
-/// As [`simulate`].
-pub fn simulate_with_stop(
-    plant: &mut dyn Plant,
-    servo: &Servo,
-    actuation: &Actuation,
-    trajectory: &JointTrajectory,
-    braking: Option<Braking<'_>>,
-    mut hooks: Hooks<'_>,
-) -> Result<Recording, EngineError> {
-    let started = Instant::now();
-    let mut drive = Drive::new(
+    let motion = Motion {
         servo,
         actuation,
         trajectory,
-        plant.identity(),
-        plant.timestep_s(),
-        plant.velocity_age_s(),
-    )?
-    .braked(braking);
-    if let Err(error) = follow(plant, &mut drive, &mut hooks) {
-        return Err(drive.stopped_by(error));
-    }
-    let mut recording = drive.finish();
-    recording.cost.wall = started.elapsed();
-    Ok(recording)
+        braking: None,
+    };
+    simulate_motion(plant, &motion, hooks)
 }
 
-/// Steps a plant until the drive has no more torque for it.
-fn follow(
+/// Runs one motion on one plant.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_motion(
     plant: &mut dyn Plant,
-    drive: &mut Drive<'_>,
+    motion: &Motion<'_>,
+    mut hooks: Hooks<'_>,
+) -> Result<Recording, EngineError> {
+    let mut ended = None;
+    let motions = std::slice::from_ref(motion);
+    simulate_fleet(&mut Lone(plant), motions, &mut hooks, &mut |_, result| {
+        ended = Some(result);
+    })?;
+    ended.expect("the only motion has ended")
+}
+
+/// A motion under way.
+struct Active<'a> {
+    motion: usize,
+    arm: usize,
+    drive: Drive<'a>,
+    wall: Duration,
+}
+
+/// Runs all motions on a fleet, as many at a time as it has arms; an arm that is done begins the
+/// next motion.
+///
+/// `finished` is called with the index of each motion that ends, in the order in which they end,
+/// and with its recording, which does not depend on the other motions. A motion whose arm becomes
+/// unstable ends with [`EngineError::Stopped`]; the others go on. The cost of a motion is its share
+/// of the steps that it took part in.
+///
+/// # Errors
+/// What ends the engine, and [`EngineError::Cancelled`]; motions that have not ended are lost.
+pub fn simulate_fleet(
+    fleet: &mut dyn Fleet,
+    motions: &[Motion<'_>],
     hooks: &mut Hooks<'_>,
+    finished: &mut dyn FnMut(usize, Result<Recording, EngineError>),
 ) -> Result<(), EngineError> {
-    drive.record(plant.reset(&drive.start())?)?;
+    let mut waiting = motions.iter().enumerate();
+    let mut idle: Vec<usize> = (0..fleet.arms()).rev().collect();
+    let mut active: Vec<Active<'_>> = Vec::new();
+    let mut torques: Vec<(usize, Joints)> = Vec::new();
+    let mut steps = 0;
     loop {
-        if hooks
-            .cancel
-            .is_some_and(|cancel| cancel.load(Ordering::Relaxed))
+        while !idle.is_empty()
+            && let Some((index, motion)) = waiting.next()
         {
+            let arm = idle.pop().expect("just looked");
+            match begin(fleet, index, arm, motion) {
+                Ok(begun) => active.push(begun),
+                Err(error) if error.is_fatal() => return Err(error),
+                Err(error) => {
+                    finished(index, Err(error));
+                    idle.push(arm);
+                }
+            }
+        }
+        let cancel = hooks.cancel;
+        if cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed)) {
             return Err(EngineError::Cancelled);
         }
-        let Some(torque_nm) = drive.torque()? else {
+        if active.is_empty() {
             return Ok(());
+        }
+        let started = Instant::now();
+        torques.clear();
+        let mut ended: Vec<(usize, Option<EngineError>)> = Vec::new();
+        for (place, each) in active.iter_mut().enumerate() {
+            match each.drive.torque() {
+                Ok(Some(torque_nm)) => torques.push((each.arm, torque_nm)),
+                Ok(None) => ended.push((place, None)),
+                Err(error) => ended.push((place, Some(error))),
+            }
+        }
+        let any_ended = !ended.is_empty();
+        for (place, error) in ended.into_iter().rev() {
+            let done = active.remove(place);
+            idle.push(done.arm);
+            let result = if let Some(error) = error {
+                Err(done.drive.stopped_by(error))
+            } else {
+                let mut recording = done.drive.finish();
+                recording.cost.wall = done.wall;
+                Ok(recording)
+            };
+            finished(done.motion, result);
+        }
+        if any_ended && torques.is_empty() {
+            continue;
+        }
+        let states = match fleet.step(&torques) {
+            Ok(states) => states,
+            Err(error) if error.is_fatal() => return Err(error),
+            Err(error) => torques.iter().map(|_| Err(error.clone())).collect(),
         };
-        drive.record(plant.step(&torque_nm)?)?;
+        let mut failed = Vec::new();
+        for (place, (each, state)) in active.iter_mut().zip(states).enumerate() {
+            if let Err(error) = state.and_then(|state| each.drive.record(state)) {
+                failed.push((place, error));
+            }
+        }
+        let share = started.elapsed() / u32::try_from(torques.len()).unwrap_or(u32::MAX);
+        for each in &mut active {
+            each.wall += share;
+        }
+        for (place, error) in failed.into_iter().rev() {
+            let done = active.remove(place);
+            idle.push(done.arm);
+            finished(done.motion, Err(done.drive.stopped_by(error)));
+        }
+        steps += torques.len();
         if let Some(progress) = hooks.progress.as_mut() {
-            progress(drive.time_s());
+            progress(steps as f64 * fleet.timestep_s());
         }
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "durations are not negative and far below 2^52 steps"
-)]
-fn step_count(duration_s: f64, timestep_s: f64) -> usize {
-    (duration_s / timestep_s - STEP_SLACK).ceil().max(0.0) as usize
-}
-
-fn check_torque(engine: &str, time_s: f64, torque_nm: &Joints) -> Result<(), EngineError> {
-    check(engine, time_s, "torque", torque_nm, f64::MAX)
-}
-
-fn check_state(engine: &str, time_s: f64, state: &PlantState) -> Result<(), EngineError> {
-    check(
-        engine,
-        time_s,
-        "position",
-        &state.position,
-        ABSURD_POSITION_RAD,
-    )?;
-    check(
-        engine,
-        time_s,
-        "velocity",
-        &state.velocity,
-        ABSURD_SPEED_RAD_S,
-    )
-}
-
-fn check(
-    engine: &str,
-    time_s: f64,
-    quantity: &'static str,
-    values: &Joints,
-    limit: f64,
-) -> Result<(), EngineError> {
-    for (&value, joint) in values.iter().zip(JOINT_LABELS) {
-        if value.abs() > limit || value.is_nan() {
-            let engine = engine.to_owned();
-            return Err(EngineError::Diverged {
-                engine,
-                time_s,
-                joint,
-                quantity,
-                value,
-            });
-        }
+fn begin<'a>(
+    fleet: &mut dyn Fleet,
+    index: usize,
+    arm: usize,
+    motion: &Motion<'a>,
+) -> Result<Active<'a>, EngineError> {
+    let started = Instant::now();
+    let (identity, timestep_s) = (fleet.identity(), fleet.timestep_s());
+    let mut drive = Drive::new(motion, identity, timestep_s, fleet.velocity_age_s())?;
+    let begun = fleet.begin(arm, motion.trajectory);
+    if let Err(error) = begun.and_then(|state| drive.record(state)) {
+        return Err(drive.stopped_by(error));
     }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn steps_cover_the_trajectory_and_no_more() {
-        assert_eq!(step_count(0.0, 1e-3), 0);
-        assert_eq!(step_count(2.0, 1e-3), 2000);
-        assert_eq!(step_count(0.3, 0.1), 3);
-        assert_eq!(step_count(2.0004, 1e-3), 2001);
-    }
+    Ok(Active {
+        motion: index,
+        arm,
+        drive,
+        wall: started.elapsed(),
+    })
 }

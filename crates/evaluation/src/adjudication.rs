@@ -6,6 +6,7 @@ use needlebench_engine::{PlantState, Recording};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 use serde::Serialize;
 
+use crate::engine_pairs::pairs;
 use crate::needle::tip_of;
 use crate::referee::{RefereeReport, StepDifference, measured_order};
 
@@ -19,7 +20,8 @@ const SHRINKS_WITH_STEP: f64 = 0.75;
 /// Contacts that begin this many steps apart are no longer one and the same event.
 const ONSET_STEPS: f64 = 1.5;
 
-/// The engines' differences in one configuration, held against the scenario's envelope.
+/// The engines' differences in one configuration, held against the scenario's envelope; of more than
+/// two engines, those of the pair that differs most in a quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Adjudication {
     /// Every quantity that could be judged.
@@ -55,6 +57,9 @@ pub struct JudgedQuantity {
     pub time_s: f64,
     /// Joint that it is of.
     pub joint: Option<&'static str>,
+    /// Engines that differ by it; left out where there are but two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub engines: Option<[&'static str; 2]>,
     /// Kept or not.
     pub pass: bool,
     /// Who is right and why; none where the limit is kept.
@@ -103,27 +108,36 @@ impl Cause {
     }
 }
 
-/// What an inquiry may know besides the two recordings.
+/// What an inquiry may know besides the recordings.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Evidence<'a> {
-    /// Both engines beside the referee.
+    /// The engines beside the referee.
     pub referee: Option<&'a RefereeReport>,
-    /// The engines' peak difference from each other, at the scenario's step and smaller ones.
-    pub convergence: &'a [StepDifference],
+    /// How pairs of engines differ at the scenario's step and smaller ones.
+    pub convergence: &'a [PairConvergence],
 }
 
-/// The engines' differences and the envelope, without an inquiry.
+/// The peak difference of two engines from each other by the step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairConvergence {
+    /// The engines, in the order of their recordings.
+    pub engines: [&'static str; 2],
+    /// Their difference, the first entry at the scenario's own step.
+    pub steps: Vec<StepDifference>,
+}
+
+/// The engines' differences and the envelope, without an inquiry; none unless there are two engines.
 pub fn judge_differences(
     cell: &Cell,
     goal: &Goal,
     envelope: &EnvelopeSection,
-    runs: [&Recording; 2],
-) -> Adjudication {
-    let quantities = measured(cell, goal, envelope, runs)
+    runs: &[&Recording],
+) -> Option<Adjudication> {
+    let quantities = measured_over_pairs(cell, goal, envelope, runs)
         .into_iter()
-        .map(|quantity| quantity.judged)
+        .map(|(quantity, _)| quantity.judged)
         .collect();
-    Adjudication { quantities }
+    (runs.len() > 1).then_some(Adjudication { quantities })
 }
 
 /// The same, and for every limit that is exceeded who is nearer to the referee and why.
@@ -132,21 +146,24 @@ pub fn adjudicate(
     goal: &Goal,
     envelope: &EnvelopeSection,
     effort_limit_nm: &Joints,
-    runs: [&Recording; 2],
+    runs: &[&Recording],
     evidence: Evidence<'_>,
-) -> Adjudication {
-    let quantities = measured(cell, goal, envelope, runs)
+) -> Option<Adjudication> {
+    let quantities = measured_over_pairs(cell, goal, envelope, runs)
         .into_iter()
         .map(
-            |Measured {
-                 mut judged,
-                 first_s,
-             }| {
+            |(
+                Measured {
+                    mut judged,
+                    first_s,
+                },
+                pair,
+            )| {
                 judged.ruling = first_s.map(|first_s| {
-                    let (cause, words) = cause(&judged, first_s, effort_limit_nm, runs, evidence);
+                    let (cause, words) = cause(&judged, first_s, effort_limit_nm, pair, evidence);
                     Ruling {
                         first_time_s: first_s,
-                        nearer: nearer(cause, evidence),
+                        nearer: nearer(cause, pair, evidence),
                         cause,
                         evidence: words,
                     }
@@ -155,7 +172,7 @@ pub fn adjudicate(
             },
         )
         .collect();
-    Adjudication { quantities }
+    (runs.len() > 1).then_some(Adjudication { quantities })
 }
 
 struct Measured {
@@ -179,6 +196,7 @@ impl Measured {
             unit,
             time_s: 0.0,
             joint: None,
+            engines: None,
             pass: true,
             ruling: None,
         };
@@ -201,6 +219,36 @@ fn first_contact(recording: &Recording) -> Option<usize> {
         .state
         .iter()
         .position(|state| state.contact.count > 0)
+}
+
+/// Every quantity with the pair of engines that differs most in it.
+fn measured_over_pairs<'a>(
+    cell: &Cell,
+    goal: &Goal,
+    envelope: &EnvelopeSection,
+    runs: &[&'a Recording],
+) -> Vec<(Measured, [&'a Recording; 2])> {
+    let mut found: Vec<(Measured, [&Recording; 2])> = Vec::new();
+    for [a, b] in pairs(runs) {
+        let pair = [*a, *b];
+        for mut measured in measured(cell, goal, envelope, pair) {
+            if runs.len() > 2 {
+                measured.judged.engines = Some(pair.map(|each| each.engine.name));
+            }
+            let quantity = measured.judged.quantity;
+            let known = found
+                .iter_mut()
+                .find(|(each, _)| each.judged.quantity == quantity);
+            match known {
+                Some(known) if measured.judged.value > known.0.judged.value => {
+                    *known = (measured, pair);
+                }
+                Some(_) => {}
+                None => found.push((measured, pair)),
+            }
+        }
+    }
+    found
 }
 
 fn measured(
@@ -295,7 +343,7 @@ fn cause(
     runs: [&Recording; 2],
     evidence: Evidence<'_>,
 ) -> (Cause, String) {
-    let names = runs.map(|each| each.engine.name.as_str());
+    let names = runs.map(|each| each.engine.name);
     let onsets = runs.map(|each| first_contact(each).map(|index| each.time_s[index]));
     if onsets.iter().flatten().any(|onset_s| *onset_s <= first_s) {
         return contact_cause(judged, names, onsets, runs);
@@ -311,7 +359,12 @@ fn cause(
             format!("the torque of {joint} is at its limit in {engine} at {time_s:.3} s"),
         );
     }
-    let [whole, half, ..] = evidence.convergence else {
+    let of_pair = evidence
+        .convergence
+        .iter()
+        .find(|each| each.engines == names);
+    let convergence = of_pair.map_or(&[][..], |each| &each.steps);
+    let [whole, half, ..] = convergence else {
         return (
             Cause::ModelsDiffer,
             "no contact, no torque at its limit, and no run at a smaller step".to_owned(),
@@ -324,8 +377,7 @@ fn cause(
         whole.timestep_s * 1e3,
         half.peak_tip_m * 1e6,
         half.timestep_s * 1e3,
-        measured_order(evidence.convergence)
-            .map_or(String::new(), |order| format!(", order {order:.2}")),
+        measured_order(convergence).map_or(String::new(), |order| format!(", order {order:.2}")),
     );
     if shrunk < SHRINKS_WITH_STEP {
         (Cause::StepTooLong, words)
@@ -400,8 +452,8 @@ fn first_saturation(
         })
 }
 
-/// The engine whose closed loop stays nearer to the referee's.
-fn nearer(cause: Cause, evidence: Evidence<'_>) -> Option<String> {
+/// The engine of a pair whose closed loop stays nearer to the referee's.
+fn nearer(cause: Cause, pair: [&Recording; 2], evidence: Evidence<'_>) -> Option<String> {
     if matches!(cause, Cause::ContactOnset | Cause::ContactSoftness) {
         return None;
     }
@@ -409,6 +461,7 @@ fn nearer(cause: Cause, evidence: Evidence<'_>) -> Option<String> {
         .referee?
         .engines
         .iter()
+        .filter(|(name, _)| pair.iter().any(|each| each.engine.name == name.as_str()))
         .min_by(|(_, a), (_, b)| {
             a.closed_loop
                 .peak_tip_m
@@ -426,8 +479,11 @@ pub fn sentence(judged: &JudgedQuantity) -> Option<String> {
     let nearer = ruling.nearer.as_ref().map_or(String::new(), |engine| {
         format!(" {engine} is nearer to the referee;")
     });
+    let engines = judged
+        .engines
+        .map_or("engines".to_owned(), |engines| engines.join(" and "));
     Some(format!(
-        "engines differ{joint} from {:.3} s on, most at {:.3} s;{nearer} likely cause: {} ({})",
+        "{engines} differ{joint} from {:.3} s on, most at {:.3} s;{nearer} likely cause: {} ({})",
         ruling.first_time_s,
         judged.time_s,
         ruling.cause.words(),

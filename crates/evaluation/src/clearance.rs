@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::{
     CertificateOptions, ClassMinima, ClearanceModel, Motion, MotionCertificate, RecordedMotion,
-    Separation, certify, certify_sampled,
+    certify, certify_sampled,
 };
 use needlebench_engine::Recording;
+use needlebench_geometry::Separation;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 
 use crate::report::ClassClearance;
@@ -61,7 +62,7 @@ pub fn measure_clearance(
                     &pair.separation,
                     phase.name(),
                     Some(time_s),
-                    Some(&recording.engine.name),
+                    Some(recording.engine.name),
                 );
                 series.minima.insert(pair.class, found);
             }
@@ -85,7 +86,7 @@ pub fn certify_recording(
 ) {
     let position = recording.state.iter().map(|state| state.position);
     let motion = RecordedMotion::new(recording.time_s.clone(), position.collect(), trajectory);
-    let engine = Some(recording.engine.name.as_str());
+    let engine = Some(recording.engine.name);
     certify_minima(
         &mut series.minima,
         cell,
@@ -117,7 +118,7 @@ pub fn recorded_clearance(
         tolerance_m,
         ..CertificateOptions::default()
     };
-    let engine = Some(recording.engine.name.as_str());
+    let engine = Some(recording.engine.name);
     let mut minima = BTreeMap::new();
     let certificate = certify_sampled(model, &motion, &options, &samples_s);
     take_minima(&mut minima, cell, &certificate, engine);

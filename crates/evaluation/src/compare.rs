@@ -1,15 +1,17 @@
 //! Two results side by side.
 
 use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::metric::{ConfigurationFacts, METRICS, Metric};
+use crate::metric::{MetricKey, resolve};
+pub use crate::provenance::ProvenanceDifference;
 use crate::provenance::provenance_differences;
 use crate::report::SCHEMA_VERSION;
 use crate::stored::StoredReport;
-use crate::threshold::Threshold;
+use crate::threshold::{EVERY, Subject, Threshold};
 
 /// What to compare and what to allow.
 #[derive(Debug, Clone, Default)]
@@ -37,6 +39,8 @@ pub struct Comparison {
     pub b: Side,
     /// What else differs between the two: versions, inputs, settings.
     pub provenance_differences: Vec<ProvenanceDifference>,
+    /// Where something is compared by another name than it was asked for or written by.
+    pub notes: Vec<String>,
     /// Goals of either.
     pub goals: Vec<GoalComparison>,
 }
@@ -63,21 +67,10 @@ pub struct ComparisonFailure {
     pub goal: Option<String>,
     /// Configuration.
     pub label: Option<String>,
-    /// Metric; none where a status changed.
-    pub metric: Option<&'static str>,
+    /// Key of the metric; none where a status changed.
+    pub metric: Option<String>,
     /// In words.
     pub detail: String,
-}
-
-/// A difference between the two that is no result.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct ProvenanceDifference {
-    /// What it is of.
-    pub what: String,
-    /// In the first result.
-    pub a: Option<String>,
-    /// In the second.
-    pub b: Option<String>,
 }
 
 /// One goal of either result.
@@ -139,6 +132,22 @@ pub struct ConfigurationComparison {
 }
 
 impl ConfigurationComparison {
+    /// The metrics that say most: of each family the last that is in both, and all that are in one.
+    pub fn telling_metrics(&self) -> impl Iterator<Item = &MetricComparison> {
+        let is_in_both = |found: &MetricComparison| found.a.is_some() && found.b.is_some();
+        let family = |found: &MetricComparison| found.key.metric().family;
+        self.metrics
+            .iter()
+            .enumerate()
+            .filter_map(move |(at, found)| {
+                let mut later = self.metrics[at + 1..].iter();
+                let outdone = later.any(|other| {
+                    family(other) == family(found) && is_in_both(other) && !other.key.is_of_engine()
+                });
+                (!outdone || found.key.is_of_engine() || !is_in_both(found)).then_some(found)
+            })
+    }
+
     /// Whether it was not rejected in either.
     pub fn works_in_either(&self) -> bool {
         [&self.status_a, &self.status_b]
@@ -149,10 +158,13 @@ impl ConfigurationComparison {
 }
 
 /// One metric of a configuration.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MetricComparison {
-    /// Its name.
-    pub metric: &'static str,
+    /// Its key.
+    pub metric: String,
+    /// The metric itself.
+    #[serde(skip)]
+    pub key: MetricKey,
     /// Unit of the values.
     pub unit: &'static str,
     /// First value; none if it was not measured.
@@ -212,16 +224,24 @@ pub fn compare(
     b: &StoredReport,
     options: &CompareOptions,
 ) -> Result<Comparison, CompareError> {
-    let mut goals = Vec::new();
-    for (in_a, in_b) in matched_goals(a, b, &options.renamed_goals)? {
-        goals.push(compare_goal(in_a, in_b));
-    }
+    let matched = matched_goals(a, b, &options.renamed_goals)?;
+    let engines = engines(&matched);
+    let engines: Vec<&str> = engines.iter().map(String::as_str).collect();
+    let keys: Vec<MetricKey> = MetricKey::all(&engines).collect();
+    let goals: Vec<GoalComparison> = matched
+        .into_iter()
+        .map(|(in_a, in_b)| compare_goal(in_a, in_b, &keys))
+        .collect();
     let mut failures = Vec::new();
     if !options.allow_status_change {
         failures.extend(status_failures(&goals));
     }
+    let mut notes = former_notes(a, b);
     for threshold in &options.thresholds {
-        failures.extend(threshold_failures(&goals, threshold));
+        let found = threshold_failures(&goals, threshold);
+        failures.extend(found.failures);
+        notes.extend(threshold.note.clone());
+        notes.extend(found.note);
     }
     Ok(Comparison {
         schema_version: SCHEMA_VERSION,
@@ -230,8 +250,33 @@ pub fn compare(
         a: side(a),
         b: side(b),
         provenance_differences: provenance_differences(a, b),
+        notes,
         goals,
     })
+}
+
+/// Engines that measured anything.
+fn engines(goals: &[MatchedGoals<'_>]) -> BTreeSet<String> {
+    let goals = goals.iter().flat_map(|(a, b)| [*a, *b]).flatten();
+    goals
+        .filter_map(|(_, goal)| goal.get("configurations")?.as_array())
+        .flatten()
+        .filter_map(|configuration| configuration.get("engines")?.as_object())
+        .flat_map(|engines| engines.keys().cloned())
+        .collect()
+}
+
+fn former_notes(a: &StoredReport, b: &StoredReport) -> Vec<String> {
+    let former = [a, b].into_iter().filter(|report| report.is_former());
+    former
+        .map(|report| {
+            format!(
+                "{} is of an older version: its numbers are compared by the keys that they have today; \
+                 what it ranked by as `tip_error` with a budget was `tip_rms`",
+                report.source()
+            )
+        })
+        .collect()
 }
 
 fn side(report: &StoredReport) -> Side {
@@ -304,7 +349,11 @@ fn matched_goals<'a>(
     Ok(matched)
 }
 
-fn compare_goal(a: Option<NamedGoal<'_>>, b: Option<NamedGoal<'_>>) -> GoalComparison {
+fn compare_goal(
+    a: Option<NamedGoal<'_>>,
+    b: Option<NamedGoal<'_>>,
+    keys: &[MetricKey],
+) -> GoalComparison {
     let recommended = |goal: Option<NamedGoal<'_>>| {
         let label = goal?.1.pointer("/recommended/label")?.as_str()?;
         Some(label.to_owned())
@@ -314,7 +363,7 @@ fn compare_goal(a: Option<NamedGoal<'_>>, b: Option<NamedGoal<'_>>) -> GoalCompa
         list.cloned().unwrap_or_default()
     };
     let (of_a, of_b) = (configurations(a), configurations(b));
-    let label = |each: &Value| ConfigurationFacts::new(each).label().map(str::to_owned);
+    let label = |each: &Value| text(each, "/label").map(str::to_owned);
     let mut pairs: Vec<(Option<&Value>, Option<&Value>)> = of_a
         .iter()
         .map(|each| {
@@ -333,7 +382,7 @@ fn compare_goal(a: Option<NamedGoal<'_>>, b: Option<NamedGoal<'_>>) -> GoalCompa
         recommended_b: recommended(b),
         configurations: pairs
             .into_iter()
-            .map(|(a, b)| compare_configuration(a, b))
+            .map(|(a, b)| compare_configuration(a, b, keys))
             .collect(),
     }
 }
@@ -347,11 +396,19 @@ fn standing(status: &str) -> u8 {
     }
 }
 
-fn compare_configuration(a: Option<&Value>, b: Option<&Value>) -> ConfigurationComparison {
-    let [a, b] = [a, b].map(|value| value.map(ConfigurationFacts::new));
-    let status = |facts: Option<ConfigurationFacts<'_>>| facts?.status().map(str::to_owned);
-    let rejection = |facts: Option<ConfigurationFacts<'_>>| {
-        let (rule, detail) = facts?.rejection()?;
+fn text<'a>(value: &'a Value, pointer: &str) -> Option<&'a str> {
+    value.pointer(pointer)?.as_str()
+}
+
+fn compare_configuration(
+    a: Option<&Value>,
+    b: Option<&Value>,
+    keys: &[MetricKey],
+) -> ConfigurationComparison {
+    let status = |each: Option<&Value>| text(each?, "/status").map(str::to_owned);
+    let rejection = |each: Option<&Value>| {
+        let rule = text(each?, "/rejections/0/rule")?;
+        let detail = text(each?, "/rejections/0/detail").unwrap_or_default();
         let text = format!("{rule}: {detail}");
         Some(text.trim_end_matches(": ").to_owned())
     };
@@ -365,29 +422,28 @@ fn compare_configuration(a: Option<&Value>, b: Option<&Value>) -> ConfigurationC
         (Some(_), None) => Change::Lost,
         _ => Change::New,
     };
-    let label = a.or(b).and_then(ConfigurationFacts::label);
+    let label = a.or(b).and_then(|each| text(each, "/label"));
+    let measured = |each: Option<&Value>| each.map(StoredReport::measured).unwrap_or_default();
+    let (in_a, in_b) = (measured(a), measured(b));
     ConfigurationComparison {
         label: label.unwrap_or_default().to_owned(),
-        status_a,
-        status_b,
         rejection_a: rejection(a),
         rejection_b: rejection(b),
+        status_a,
+        status_b,
         status: change,
-        metrics: METRICS
+        metrics: keys
             .iter()
-            .filter_map(|metric| {
-                let read = |facts: Option<ConfigurationFacts<'_>>| metric.read(facts?);
-                compare_metric(metric, read(a), read(b))
+            .filter_map(|key| {
+                let read = |from: &BTreeMap<String, f64>| from.get(&*key.key()).copied();
+                compare_metric(key, read(&in_a), read(&in_b))
             })
             .collect(),
     }
 }
 
-fn compare_metric(
-    metric: &'static Metric,
-    a: Option<f64>,
-    b: Option<f64>,
-) -> Option<MetricComparison> {
+fn compare_metric(key: &MetricKey, a: Option<f64>, b: Option<f64>) -> Option<MetricComparison> {
+    let metric = key.metric();
     let outcome = match (a, b) {
         (None, None) => return None,
         (Some(_), None) => Change::Lost,
@@ -400,7 +456,8 @@ fn compare_metric(
     };
     let change = a.zip(b).map(|(a, b)| b - a);
     Some(MetricComparison {
-        metric: metric.name,
+        metric: key.key().into_owned(),
+        key: key.clone(),
         unit: metric.quantity.unit(),
         a,
         b,
@@ -449,69 +506,91 @@ fn status_failures(goals: &[GoalComparison]) -> Vec<ComparisonFailure> {
     failures
 }
 
-fn threshold_failures(goals: &[GoalComparison], threshold: &Threshold) -> Vec<ComparisonFailure> {
-    let metric = threshold.metric;
-    let mut failures = Vec::new();
-    let mut measured = false;
-    for goal in goals
+/// What a threshold found.
+struct Held {
+    failures: Vec<ComparisonFailure>,
+    note: Option<String>,
+}
+
+fn threshold_failures(goals: &[GoalComparison], threshold: &Threshold) -> Held {
+    let Subject::Metric(wanted, _) = &threshold.subject else {
+        unreachable!("runs have no rates");
+    };
+    let compared: Vec<(&GoalComparison, &ConfigurationComparison)> = goals
         .iter()
         .filter(|goal| goal.a.is_some() && goal.b.is_some())
-    {
-        let compared = goal.configurations.iter().filter(|each| {
+        .flat_map(|goal| goal.configurations.iter().map(move |each| (goal, each)))
+        .filter(|(_, each)| {
             let status = |status: &Option<String>| status.as_deref().map_or(0, standing);
             status(&each.status_a) == 2 && status(&each.status_b) > 0
-        });
-        for each in compared {
-            let found = each
-                .metrics
-                .iter()
-                .find(|found| found.metric == metric.name);
-            let Some((first, second)) = found.and_then(|found| Some((found.a?, found.b))) else {
-                continue;
-            };
-            measured = true;
-            let text = |value: f64| metric.quantity.text(value);
-            let detail = match second {
-                None => format!(
-                    "{}: was {}, is no longer measured",
-                    metric.words,
-                    text(first)
-                ),
-                Some(second) => {
-                    let loss = -metric.gain(first, second);
-                    if !threshold.is_exceeded_by(loss, first) {
-                        continue;
-                    }
-                    format!(
-                        "{}: {} to {}, worse by {}, allowed {}",
-                        metric.words,
-                        text(first),
-                        text(second),
-                        text(loss),
-                        threshold.text
-                    )
+        })
+        .filter(|(_, each)| {
+            let of = threshold.of.as_deref().unwrap_or(EVERY);
+            of == EVERY || of == each.label
+        })
+        .collect();
+    let has = |key: &str, value: fn(&MetricComparison) -> Option<f64>| {
+        let mut all = compared.iter().flat_map(|(_, each)| &each.metrics);
+        all.any(|found| found.metric == key && value(found).is_some())
+    };
+    let resolved = resolve(
+        wanted,
+        |key| has(key, |found| found.a),
+        |key| has(key, |found| found.b),
+    );
+    let (key, metric, words) = (
+        resolved.key.key(),
+        resolved.key.metric(),
+        resolved.key.words(),
+    );
+    let mut failures = Vec::new();
+    let mut measured = false;
+    for (goal, each) in &compared {
+        let found = each.metrics.iter().find(|found| found.metric == key);
+        let Some((first, second)) = found.and_then(|found| Some((found.a?, found.b))) else {
+            continue;
+        };
+        measured = true;
+        let text = |value: f64| metric.quantity.text(value);
+        let detail = match second {
+            None => format!("{words}: was {}, is no longer measured", text(first)),
+            Some(second) => {
+                let loss = -metric.gain(first, second);
+                if !threshold.limit.is_exceeded_by(loss, first) {
+                    continue;
                 }
-            };
-            failures.push(ComparisonFailure {
-                goal: Some(goal.name().to_owned()),
-                label: Some(each.label.clone()),
-                metric: Some(metric.name),
-                detail,
-            });
-        }
+                format!(
+                    "{words}: {} to {}, worse by {}, allowed {}",
+                    text(first),
+                    text(second),
+                    text(loss),
+                    threshold.text
+                )
+            }
+        };
+        failures.push(ComparisonFailure {
+            goal: Some(goal.name().to_owned()),
+            label: Some(each.label.clone()),
+            metric: Some(key.clone().into_owned()),
+            detail,
+        });
     }
     if !measured {
         // A threshold that nothing is held against would pass for ever.
         failures.push(ComparisonFailure {
             goal: None,
             label: None,
-            metric: Some(metric.name),
+            metric: Some(key.into_owned()),
             detail: format!(
-                "{}: the first result has it for no configuration that works in both, so its \
-                 threshold checks nothing",
-                metric.words
+                "{words}: the first result has it for no configuration that works in both, so its \
+                 threshold checks nothing"
             ),
         });
     }
-    failures
+    Held {
+        failures,
+        note: resolved
+            .note
+            .map(|note| format!("threshold {}: {note}", threshold.key)),
+    }
 }

@@ -1,299 +1,174 @@
 //! Criteria of a scenario on the values of a configuration.
 
-use needlebench_cell::scenario::{ClearanceCriteria, CriteriaSection};
+use needlebench_cell::Limit;
+use needlebench_cell::scenario::CriteriaSection;
+use needlebench_cell::study::StudyMode;
 
 use crate::adjudication::sentence;
-use crate::report::{ConfigurationReport, CriterionResult};
+use crate::metric::{Better, Criterion, Metric, Missing, Source, metrics};
+use crate::report::{ConfigurationReport, CriterionResult, EngineReport};
 
-/// A limit that a value has to keep.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Criterion {
-    /// Key of the scenario's `[criteria]`.
-    pub key: &'static str,
-    /// Limit, in SI units.
-    pub limit: f64,
-    /// Unit.
-    pub unit: &'static str,
-    /// The value has to be at least the limit instead of at most.
-    pub at_least: bool,
+/// A criterion on a value.
+struct Checked<'a> {
+    metric: &'static Metric,
+    criterion: &'static Criterion,
+    engine: Option<(&'a str, &'a EngineReport)>,
+    value: Option<f64>,
+    limit: Limit,
 }
 
-impl Criterion {
-    fn at_most(
-        key: &'static str,
-        limit: Option<f64>,
-        scale: f64,
-        unit: &'static str,
-    ) -> Option<Self> {
-        limit.map(|limit| Self {
-            key,
-            limit: limit * scale,
-            unit,
-            at_least: false,
-        })
+impl Checked<'_> {
+    fn is_met(&self) -> bool {
+        self.limit.is_met_by(self.value)
     }
+}
 
-    /// Whether a value meets it; a value that is missing does not.
-    fn met_by(&self, value: Option<f64>) -> bool {
-        value.is_some_and(|value| {
-            if self.at_least {
-                value >= self.limit
-            } else {
-                value <= self.limit
+/// The criteria that there are in such cases, as far as the scenario has a limit.
+fn limits(
+    criteria: &CriteriaSection,
+    mode: StudyMode,
+) -> impl Iterator<Item = (&'static Metric, &'static Criterion, Limit)> {
+    metrics().filter_map(move |metric| {
+        let criterion = metric.criterion.as_ref()?;
+        if !criterion.modes.contains(&mode) {
+            return None;
+        }
+        let limit = Limit {
+            value: (criterion.limit)(criteria)?,
+            at_least: metric.better == Some(Better::More),
+        };
+        Some((metric, criterion, limit))
+    })
+}
+
+/// The criteria on what each engine measured, engine by engine.
+fn of_engines<'a>(
+    configuration: &'a ConfigurationReport,
+    criteria: &'a CriteriaSection,
+    mode: StudyMode,
+) -> impl Iterator<Item = Checked<'a>> {
+    configuration
+        .engines
+        .iter()
+        .flat_map(move |(name, report)| {
+            limits(criteria, mode).filter_map(move |(metric, criterion, limit)| {
+                let Source::Engines(read) = metric.source else {
+                    return None;
+                };
+                Some(Checked {
+                    metric,
+                    criterion,
+                    engine: Some((name.as_str(), report)),
+                    value: read(report),
+                    limit,
+                })
+            })
+        })
+}
+
+/// The criteria on a configuration as a whole; each by the last of its metrics that was measured.
+fn of_configuration<'a>(
+    configuration: &'a ConfigurationReport,
+    criteria: &'a CriteriaSection,
+    mode: StudyMode,
+) -> impl Iterator<Item = Checked<'a>> {
+    let mut all = limits(criteria, mode)
+        .filter(|(metric, ..)| matches!(metric.source, Source::Configuration(_)))
+        .map(|(metric, criterion, limit)| Checked {
+            metric,
+            criterion,
+            engine: None,
+            value: metric.read(configuration),
+            limit,
+        })
+        .peekable();
+    std::iter::from_fn(move || {
+        let mut chosen = all.next()?;
+        while let Some(next) = all.next_if(|next| next.criterion.key == chosen.criterion.key) {
+            if next.value.is_some() {
+                chosen = next;
             }
-        })
-    }
+        }
+        Some(chosen)
+    })
+    .filter(|checked| checked.value.is_some() || checked.criterion.missing != Missing::Skips)
 }
 
-const MM: f64 = 1e-3;
-
-/// Checks a configuration that works against all criteria.
+/// Checks a configuration that works against all criteria; a run's are those of a dynamic case.
 ///
 /// Values of the engines are checked for each engine that ran, clearances over all of them and by
-/// their proven lower bounds.
+/// their proven lower bounds. What engines differ by is checked where `compared` says that all of them
+/// ran.
 pub fn check_configuration(
     goal: &str,
     configuration: &ConfigurationReport,
     criteria: &CriteriaSection,
-    both_engines_ran: bool,
+    mode: StudyMode,
+    compared: bool,
 ) -> Vec<CriterionResult> {
-    let mut results = Vec::new();
-    let mut check =
-        |criterion: Option<Criterion>, engine: Option<&str>, value: Option<f64>, detail: String| {
-            let Some(criterion) = criterion else { return };
-            results.push(CriterionResult {
-                goal: goal.to_owned(),
-                label: Some(configuration.label.to_owned()),
-                engine: engine.map(str::to_owned),
-                criterion: criterion.key.to_owned(),
-                value,
-                limit: Some(criterion.limit),
-                unit: criterion.unit,
-                pass: criterion.met_by(value),
-                detail,
-            });
-        };
-    let most = Criterion::at_most;
-    for (engine, report) in &configuration.engines {
-        let (needle, motion) = (&report.needle, &report.motion);
-        let engine = Some(engine.as_str());
-        check(
-            most(
-                "max_tip_position_error_mm",
-                criteria.max_tip_position_error_mm,
-                MM,
-                "m",
-            ),
-            engine,
-            Some(needle.tip_position_error_m),
-            String::new(),
-        );
-        check(
-            most(
-                "max_needle_angle_error_deg",
-                criteria.max_needle_angle_error_deg.map(f64::to_radians),
-                1.0,
-                "rad",
-            ),
-            engine,
-            Some(needle.needle_angle_error_rad),
-            String::new(),
-        );
-        check(
-            most(
-                "max_guide_position_error_mm",
-                criteria.max_guide_position_error_mm,
-                MM,
-                "m",
-            ),
-            engine,
-            Some(needle.guide_position_error_m),
-            String::new(),
-        );
-        check(
-            most(
-                "max_settling_time_s",
-                criteria.max_settling_time_s,
-                1.0,
-                "s",
-            ),
-            engine,
-            motion.settling_time_s,
-            format!("into a band of {:.4} mm", criteria.settling_band_mm),
-        );
-        check(
-            most(
-                "max_peak_torque_ratio",
-                criteria.max_peak_torque_ratio,
-                1.0,
-                "1",
-            ),
-            engine,
-            Some(motion.peak_torque_ratio),
-            String::new(),
-        );
-        if !criteria.allow_contact {
-            let contact = &motion.contact;
-            check(
-                Some(Criterion {
-                    key: "allow_contact",
-                    limit: 0.0,
-                    unit: "N",
-                    at_least: false,
-                }),
-                engine,
-                Some(if contact.occurred {
-                    contact.peak_force_n.max(f64::MIN_POSITIVE)
-                } else {
-                    0.0
-                }),
-                contact.first_pair.as_ref().map_or(String::new(), |[a, b]| {
-                    format!(
-                        "{a} touches {b} at {:.2} s",
-                        contact.first_time_s.unwrap_or(0.0)
-                    )
-                }),
-            );
-        }
-    }
-    if both_engines_ran {
-        let difference = configuration.engine_difference;
-        check(
-            most(
-                "max_engine_difference_peak_mm",
-                criteria.max_engine_difference_peak_mm,
-                MM,
-                "m",
-            ),
-            None,
-            difference.map(|difference| difference.peak_tip_m),
-            String::new(),
-        );
-        check(
-            most(
-                "max_engine_difference_settled_mm",
-                criteria.max_engine_difference_settled_mm,
-                MM,
-                "m",
-            ),
-            None,
-            difference.map(|difference| difference.settled_tip_m),
-            String::new(),
-        );
-        for judged in configuration
-            .adjudication
-            .iter()
-            .flat_map(|each| &each.quantities)
-        {
-            check(
-                Some(Criterion {
-                    key: judged.quantity,
-                    limit: judged.limit,
-                    unit: judged.unit,
-                    at_least: false,
-                }),
-                None,
-                Some(judged.value),
-                sentence(judged).unwrap_or_default(),
-            );
-        }
-    }
-    let budget = configuration
-        .budget
-        .as_ref()
-        .map(|budget| &budget.total.at_target.analytic);
-    for (key, limit_mm, value) in [
-        (
-            "max_tip_rms_mm",
-            criteria.max_tip_rms_mm,
-            budget.map(|moments| moments.rms_m),
+    let result = |checked: Checked<'_>| CriterionResult {
+        goal: goal.to_owned(),
+        label: Some(configuration.label.to_owned()),
+        engine: checked.engine.map(|(name, _)| name.to_owned()),
+        criterion: checked.criterion.key.to_owned(),
+        value: checked.value,
+        limit: Some(checked.limit.value),
+        unit: checked.metric.quantity.unit(),
+        pass: checked.is_met(),
+        detail: (checked.criterion.detail)(
+            configuration,
+            checked.engine.map(|(_, report)| report),
+            criteria,
         ),
-        (
-            "max_tip_lateral_rms_mm",
-            criteria.max_tip_lateral_rms_mm,
-            budget.map(|moments| moments.lateral_rms_m),
-        ),
-    ] {
-        let detail = configuration.budget_failure.clone().unwrap_or_default();
-        check(most(key, limit_mm, MM, "m"), None, value, detail);
-    }
-    let room = configuration.room.as_ref();
-    let mut at_least = |key, limit: Option<f64>, unit, value: Option<f64>, detail: String| {
-        let criterion = limit.map(|limit| Criterion {
-            key,
-            limit,
-            unit,
-            at_least: true,
-        });
-        check(criterion, None, value, detail);
     };
-    at_least(
-        "min_free_fraction",
-        criteria.min_free_fraction,
-        "1",
-        room.map(|room| room.free_fraction),
-        String::new(),
-    );
-    at_least(
-        "min_sight_fraction",
-        criteria.min_sight_fraction,
-        "1",
-        room.map(|room| room.sight_fraction),
-        String::new(),
-    );
-    at_least(
-        "min_hand_cone_deg",
-        criteria.min_hand_cone_deg.map(f64::to_radians),
-        "rad",
-        room.map(|room| room.hand_cone_half_angle_rad),
-        room.and_then(|room| room.hand_cone_blocker.as_ref())
-            .map_or(String::new(), |blocker| format!("blocked by {blocker}")),
-    );
-    for (class, key, limit_mm) in clearance_limits(&criteria.min_clearance_mm) {
-        // A class that the cell has no part for cannot be violated.
-        let Some(found) = configuration.clearance.classes.get(class) else {
-            continue;
-        };
-        check(
-            limit_mm.map(|mm| Criterion {
-                key,
-                limit: mm * MM,
-                unit: "m",
-                at_least: true,
-            }),
-            None,
-            // What was merely sampled is no proof.
-            Some(found.certified_lower_bound_m.unwrap_or(found.minimum_m)),
-            format!(
-                "{} and {} in the {}",
-                found.pair[0], found.pair[1], found.phase
-            ),
-        );
+    let of_engines = of_engines(configuration, criteria, mode).map(result);
+    let mut results: Vec<CriterionResult> = of_engines.collect();
+    let (of_both, others): (Vec<_>, Vec<_>) = of_configuration(configuration, criteria, mode)
+        .partition(|checked| checked.criterion.missing == Missing::FailsIfCompared);
+    if compared {
+        results.extend(of_both.into_iter().map(result));
+        results.extend(within_envelope(goal, configuration));
     }
+    results.extend(others.into_iter().map(result));
     if let Some(events) = &configuration.events {
         results.extend(events.checks.iter().cloned());
     }
     results
 }
 
-/// Class, key of the scenario's `[criteria]`, and limit in mm.
-pub fn clearance_limits(
-    limits: &ClearanceCriteria,
-) -> [(&'static str, &'static str, Option<f64>); 9] {
-    macro_rules! limit {
-        ($class:literal, $limit:expr) => {
-            ($class, concat!("min_clearance_mm.", $class), $limit)
+/// The envelope that the scenario sets for the engines' difference.
+fn within_envelope<'a>(
+    goal: &'a str,
+    configuration: &'a ConfigurationReport,
+) -> impl Iterator<Item = CriterionResult> + 'a {
+    let adjudication = configuration.adjudication.iter();
+    let judged = adjudication.flat_map(|each| &each.quantities);
+    judged.map(move |judged| {
+        let limit = Limit {
+            value: judged.limit,
+            at_least: false,
         };
-    }
-    [
-        limit!("robot_phantom", limits.robot_phantom),
-        limit!("robot_table", limits.robot_table),
-        limit!("robot_gantry", limits.robot_gantry),
-        limit!("robot_mount", limits.robot_mount),
-        limit!("self", limits.self_collision),
-        limit!("tool_phantom", limits.tool_phantom),
-        limit!("guide_standoff", limits.guide_standoff),
-        limit!("needle_corridor", limits.needle_corridor),
-        limit!("needle_route", limits.needle_route),
-    ]
+        CriterionResult {
+            goal: goal.to_owned(),
+            label: Some(configuration.label.to_owned()),
+            engine: None,
+            criterion: judged.quantity.to_owned(),
+            value: Some(judged.value),
+            limit: Some(judged.limit),
+            unit: judged.unit,
+            pass: limit.is_met_by(Some(judged.value)),
+            detail: sentence(judged).unwrap_or_default(),
+        }
+    })
+}
+
+/// Key of the first criterion, in the order of [`check_configuration`], that a static case's posture is
+/// known to miss: what was not measured says nothing.
+pub fn first_missed_by_posture(
+    posture: &ConfigurationReport,
+    criteria: &CriteriaSection,
+) -> Option<&'static str> {
+    let mut all = of_configuration(posture, criteria, StudyMode::Static);
+    let missed = all.find(|checked| checked.value.is_some() && !checked.is_met());
+    missed.map(|checked| checked.criterion.key)
 }

@@ -7,6 +7,7 @@ mod stop;
 
 use std::collections::BTreeMap;
 
+use needlebench_cell::arm::BrakeFigures;
 use serde::Serialize;
 
 pub use envelope::{StopEnvelope, stopping_envelope};
@@ -45,4 +46,19 @@ pub struct StopReport {
     pub tip_difference_m: Option<f64>,
     /// How far a stop at any moment of the way in would go, by our own dynamics.
     pub envelope: StopEnvelope,
+    /// The brakes and what they are derived from; none in category 2, where the servo goes on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub brakes: Option<StopBrakes>,
+}
+
+/// Brakes of the joints, derived from an arm's published stops.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StopBrakes {
+    /// The published stops, whose they are and where they are from.
+    #[serde(flatten)]
+    pub figures: BrakeFigures,
+    /// Torque of each slipping brake at no speed, N m.
+    pub coulomb_nm: [f64; 6],
+    /// Torque of each by speed, N m s/rad.
+    pub viscous_nms_per_rad: [f64; 6],
 }

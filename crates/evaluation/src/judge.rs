@@ -1,6 +1,7 @@
 //! Verdict.
 
 use needlebench_cell::scenario::CriteriaSection;
+use needlebench_cell::study::StudyMode;
 use needlebench_cell::{Expectation, Goal};
 use needlebench_kinematics::ik::Configuration;
 
@@ -26,8 +27,13 @@ pub fn judge(
             let expected = Configuration::from_label(configuration.label)
                 .and_then(|each| goal.expected.get(&each));
             if configuration.rejections.is_empty() {
-                let checked =
-                    check_configuration(&goal.name, configuration, criteria, both_engines_ran);
+                let checked = check_configuration(
+                    &goal.name,
+                    configuration,
+                    criteria,
+                    StudyMode::Dynamic,
+                    both_engines_ran,
+                );
                 let met = checked.iter().all(|result| result.pass);
                 let measured = !configuration.engines.is_empty();
                 configuration.status = if met && measured {

@@ -3,12 +3,13 @@
 //! Definitions are those of the field: see each field's documentation. SI units and radians.
 
 pub mod adjudication;
+mod class_clearance;
 mod clearance;
 pub mod compare;
 mod contact;
 mod criteria;
+mod engine_pairs;
 pub mod events;
-mod facts;
 pub mod iso9283;
 mod judge;
 pub mod metric;
@@ -17,6 +18,7 @@ mod needle;
 pub mod pareto;
 mod provenance;
 pub mod ranking;
+mod ranking_report;
 mod reason;
 pub mod referee;
 pub mod report;
@@ -25,13 +27,15 @@ mod route;
 mod sensitivity;
 mod stored;
 mod threshold;
+mod verdict;
 
 pub use clearance::{
     ClearanceSeries, certify_recording, measure_clearance, planned_clearance, posture_clearance,
     recorded_clearance, sample_indices,
 };
 pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balance};
-pub use criteria::{Criterion, check_configuration, clearance_limits};
+pub use criteria::{check_configuration, first_missed_by_posture};
+pub use engine_pairs::{largest_over_pairs, pairs};
 pub use judge::judge;
 pub use motion::{
     ContactMeasurement, EngineDifference, MotionMeasurement, SaturatedJoint, engine_difference,
@@ -41,4 +45,4 @@ pub use needle::{NeedleMeasurement, measure_guide, measure_needle, tip_of};
 pub use route::{RouteObstacles, needle_route};
 pub use sensitivity::tip_sensitivity;
 pub use stored::StoredReport;
-pub use threshold::{Limit, Threshold, ThresholdError};
+pub use threshold::{BEST, Compared, EVERY, Loss, Rate, Subject, Threshold, ThresholdError};

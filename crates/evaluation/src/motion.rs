@@ -8,6 +8,7 @@ use needlebench_kinematics::{JOINT_LABELS, Joints};
 use serde::Serialize;
 
 use crate::contact::{ContactEpisode, episodes};
+use crate::engine_pairs::pairs;
 use crate::needle::tip_of;
 
 /// Contact of arm or tool during a motion.
@@ -32,7 +33,7 @@ pub struct ContactMeasurement {
 }
 
 /// Time and effort of one simulated motion.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct MotionMeasurement {
     /// Time from the end of the planned motion until the needle's tip stays within the band about
     /// its commanded place, s; none if it never does. For an imperfect arm, which never comes to
@@ -84,13 +85,47 @@ fn saturated_joints(recording: &Recording) -> Vec<SaturatedJoint> {
         .collect()
 }
 
-/// Difference of two engines that followed the same trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+/// Difference of engines that followed the same trajectory: the largest over all pairs of them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct EngineDifference {
-    /// Largest distance of the two tips at the same time, m.
+    /// Largest distance of two tips at the same time, m.
     pub peak_tip_m: f64,
-    /// Distance of the two tips at the end, m.
+    /// Largest distance of two tips at the end, m.
     pub settled_tip_m: f64,
+    /// Engines with that peak; left out where there are but two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_engines: Option<[&'static str; 2]>,
+    /// Engines that settled that far apart; left out where there are but two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub settled_engines: Option<[&'static str; 2]>,
+}
+
+impl EngineDifference {
+    /// The largest over pairs of engines, each with its peak and settled distance, m; none without any
+    /// pair.
+    pub fn largest(pairs: impl IntoIterator<Item = ([&'static str; 2], [f64; 2])>) -> Option<Self> {
+        let mut pairs = pairs.into_iter();
+        let (engines, [peak_tip_m, settled_tip_m]) = pairs.next()?;
+        let mut found = Self {
+            peak_tip_m,
+            settled_tip_m,
+            ..Self::default()
+        };
+        let (mut peak, mut settled, mut count) = (engines, engines, 1);
+        for (engines, [peak_tip_m, settled_tip_m]) in pairs {
+            count += 1;
+            if peak_tip_m > found.peak_tip_m {
+                (found.peak_tip_m, peak) = (peak_tip_m, engines);
+            }
+            if settled_tip_m > found.settled_tip_m {
+                (found.settled_tip_m, settled) = (settled_tip_m, engines);
+            }
+        }
+        if count > 1 {
+            (found.peak_engines, found.settled_engines) = (Some(peak), Some(settled));
+        }
+        Some(found)
+    }
 }
 
 /// Measures a recording. `rests_at_m` is where the needle's tip is to settle, world; its commanded
@@ -186,23 +221,22 @@ pub fn measure_motion(
     }
 }
 
-/// Compares the tips of two recordings of one trajectory, step by step.
+/// Compares the tips of recordings of one trajectory, step by step; none unless there are two.
 pub fn engine_difference(
     cell: &Cell,
     goal: &Goal,
-    a: &Recording,
-    b: &Recording,
-) -> EngineDifference {
-    let distances = a.state.iter().zip(&b.state).map(|(a, b)| {
-        (tip_of(cell, goal, &a.world_from_flange) - tip_of(cell, goal, &b.world_from_flange)).norm()
-    });
-    let (mut peak_tip_m, mut settled_tip_m): (f64, f64) = (0.0, 0.0);
-    for distance_m in distances {
-        peak_tip_m = peak_tip_m.max(distance_m);
-        settled_tip_m = distance_m;
-    }
-    EngineDifference {
-        peak_tip_m,
-        settled_tip_m,
-    }
+    recordings: &[&Recording],
+) -> Option<EngineDifference> {
+    EngineDifference::largest(pairs(recordings).map(|[a, b]| {
+        let distances = a.state.iter().zip(&b.state).map(|(a, b)| {
+            let tips = [a, b].map(|state| tip_of(cell, goal, &state.world_from_flange));
+            (tips[0] - tips[1]).norm()
+        });
+        let (mut peak_tip_m, mut settled_tip_m): (f64, f64) = (0.0, 0.0);
+        for distance_m in distances {
+            peak_tip_m = peak_tip_m.max(distance_m);
+            settled_tip_m = distance_m;
+        }
+        ([a.engine.name, b.engine.name], [peak_tip_m, settled_tip_m])
+    }))
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 /// The needle's tip is the point that it reaches when it is pushed through the guide, as it
 /// stands, by the planned insertion length. With planned axis `u`, actual axis `v` through the
 /// guide's exit `g`, target `t`:
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct NeedleMeasurement {
     /// `|p_tip - t|`, m.
     pub tip_position_error_m: f64,

@@ -2,10 +2,21 @@
 
 use std::collections::BTreeMap;
 
+use serde::Serialize;
 use serde_json::Value;
 
-use crate::compare::ProvenanceDifference;
 use crate::stored::StoredReport;
+
+/// A difference between the two that is no result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ProvenanceDifference {
+    /// What it is of.
+    pub what: String,
+    /// In the first result.
+    pub a: Option<String>,
+    /// In the second.
+    pub b: Option<String>,
+}
 
 /// What differs between the provenance of two results, by name.
 pub(crate) fn provenance_differences(

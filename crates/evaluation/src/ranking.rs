@@ -8,105 +8,14 @@
 //! same metrics.
 
 use needlebench_cell::ranking::{Aim, RankingSection};
-use serde::Serialize;
 
-use crate::metric::{Better, ConfigurationFacts, METRICS, Metric};
+use crate::metric::{Better, Metric, metrics};
 use crate::pareto::{dominates, levels, pareto_set};
+pub use crate::ranking_report::{
+    Dominance, GoalRanking, RankedMetric, RankingReport, Term, WeightChange,
+};
 use crate::reason::reason;
 use crate::report::{ConfigurationReport, GoalReport, Recommendation, Status};
-
-/// Score of a configuration that works.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RankingReport {
-    /// 1 is the first choice.
-    pub rank: usize,
-    /// Sum of the contributions: 0 to 1.
-    pub score: f64,
-    /// What makes it up.
-    pub terms: Vec<Term>,
-}
-
-/// One metric's share in a score.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Term {
-    /// Name of the metric.
-    pub metric: &'static str,
-    /// Value of the configuration.
-    pub value: f64,
-    /// Best value that is tied with it.
-    pub counted_as: f64,
-    /// Unit of both.
-    pub unit: &'static str,
-    /// Utility of `counted_as`, 0 to 1.
-    pub utility: f64,
-    /// Weight of the metric.
-    pub weight: f64,
-    /// Weight over the sum of weights, times utility.
-    pub contribution: f64,
-}
-
-/// A configuration that is at least as good in every metric of the Pareto set and better in some.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Dominance {
-    /// Its label; of several the one with the best score.
-    pub label: String,
-    /// Metrics in which it is better, beyond their resolution.
-    pub better_in: Vec<&'static str>,
-}
-
-/// How the configurations of a goal compare.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GoalRanking {
-    /// Configurations that work, first choice first.
-    pub order: Vec<String>,
-    /// Those that no other one beats, in the order of the report.
-    pub pareto_set: Vec<String>,
-    /// The metrics and how each counts.
-    pub metrics: Vec<RankedMetric>,
-    /// Second choice.
-    pub runner_up: Option<String>,
-    /// Smallest change of one weight that makes another configuration the first choice; none if no
-    /// single weight can.
-    pub smallest_weight_change: Option<WeightChange>,
-}
-
-/// How a metric counts.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RankedMetric {
-    /// Its name.
-    pub name: &'static str,
-    /// Unit of resolution and anchors.
-    pub unit: &'static str,
-    /// `more` or `less`.
-    pub better: &'static str,
-    /// Differences up to this are none.
-    pub resolution: f64,
-    /// Weight.
-    pub weight: f64,
-    /// Value of utility 0.
-    pub worst: f64,
-    /// Value of utility 0.5.
-    pub half: f64,
-    /// Value of utility 1: what is better still counts no more.
-    pub best: f64,
-    /// Whether it decides on the Pareto set.
-    pub in_pareto_set: bool,
-    /// Configurations that work and for which it was not measured: then it counts for none.
-    pub not_measured_for: Vec<String>,
-}
-
-/// A change of one weight that changes the first choice.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct WeightChange {
-    /// The metric.
-    pub metric: &'static str,
-    /// Its weight.
-    pub weight: f64,
-    /// Weight at which the two are even.
-    pub even_at: f64,
-    /// The first choice beyond that.
-    pub then_first: String,
-}
 
 /// A metric that counts, with the values of all configurations that work.
 struct Column {
@@ -159,14 +68,14 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
                     .iter()
                     .filter(|column| column.metric.in_pareto_set)
                     .filter(|column| column.levels[other] < column.levels[at])
-                    .map(|column| column.metric.name)
+                    .map(|column| column.metric.key)
                     .collect(),
             })
         })
         .collect();
     let change =
         smallest_weight_change(&columns, &order).map(|(column, even_at, other)| WeightChange {
-            metric: columns[column].metric.name,
+            metric: columns[column].metric.key,
             weight: columns[column].aim.weight,
             even_at,
             then_first: label(other).to_owned(),
@@ -208,36 +117,41 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
     goal.ranking = Some(summary);
 }
 
-/// The metrics that can be ranked by, and the columns of those that every configuration has.
+/// The metrics that can be ranked by, one for each key of the scenario's `[ranking]`, and the columns of
+/// those that every configuration has.
+///
+/// Of several metrics with one key the last counts that any configuration has: the tip error over all
+/// arms and patients where there is a budget, a proven clearance where there is one.
 fn columns(
     configurations: &[ConfigurationReport],
     working: &[usize],
     ranking: &RankingSection,
 ) -> (Vec<RankedMetric>, Vec<Column>) {
-    let json: Vec<serde_json::Value> = working
-        .iter()
-        .map(|&index| ConfigurationFacts::json(&configurations[index]))
-        .collect();
-    let aims = ranking.aims();
     let mut described = Vec::new();
     let mut columns = Vec::new();
-    for metric in METRICS {
-        let Some((key, scale)) = metric.ranking_key else {
-            continue;
+    for (key, aim) in ranking.aims() {
+        let values = |metric: &Metric| -> Vec<Option<f64>> {
+            let working = working.iter();
+            working
+                .map(|&index| metric.read(&configurations[index]))
+                .collect()
         };
-        let aim = aims.iter().find(|(name, _)| *name == key);
-        let aim = aim.expect("every metric's key exists").1.scaled(scale);
-        let measured: Vec<Option<f64>> = json
-            .iter()
-            .map(|each| metric.read(ConfigurationFacts::new(each)))
-            .collect();
+        let of_key = || metrics().filter(|metric| metric.ranking_key == Some(key));
+        let is_measured = |metric: &&Metric| values(metric).iter().any(Option::is_some);
+        let found = of_key().rev().find(is_measured);
+        let metric = found
+            .or_else(|| of_key().next())
+            .expect("every key has a metric");
+        let measured = values(metric);
+        let aim = aim.scaled(metric.unit.si);
         let missing = measured.iter().zip(working).filter(|(v, _)| v.is_none());
         described.push(RankedMetric {
-            name: metric.name,
+            name: metric.key,
             unit: metric.quantity.unit(),
-            better: match metric.better {
-                Better::More => "more",
-                Better::Less => "less",
+            better: if metric.better == Some(Better::More) {
+                "more"
+            } else {
+                "less"
             },
             resolution: metric.resolution,
             weight: aim.weight,
@@ -257,7 +171,7 @@ fn columns(
 }
 
 fn column(metric: &'static Metric, aim: Aim, values: Vec<f64>) -> Column {
-    let more = metric.better == Better::More;
+    let more = metric.better == Some(Better::More);
     // What is better than the best anchor counts no more, here as in the utility.
     let enough: Vec<f64> = values
         .iter()
@@ -304,7 +218,7 @@ fn scores(columns: &[Column], count: usize) -> Option<Vec<RankingReport>> {
         let terms: Vec<Term> = columns
             .iter()
             .map(|column| Term {
-                metric: column.metric.name,
+                metric: column.metric.key,
                 value: column.values[at],
                 counted_as: column.counted_as[at],
                 unit: column.metric.quantity.unit(),

@@ -1,7 +1,7 @@
 //! Why a configuration is recommended, in words.
 
 use crate::metric::Metric;
-use crate::ranking::{GoalRanking, RankingReport, Term};
+use crate::ranking_report::{GoalRanking, RankingReport, Term};
 use crate::report::ConfigurationReport;
 
 /// Terms that are named for the first choice and, of the runner-up's leads, against it.
@@ -64,7 +64,7 @@ fn against(
     }
     clauses.push(robustness(ranking));
     if let Some(dominance) = &first.dominated_by {
-        let better: Vec<&str> = dominance.better_in.iter().map(|name| words(name)).collect();
+        let better: Vec<&str> = dominance.better_in.iter().map(|key| words(key)).collect();
         clauses.push(format!(
             "not in the Pareto set: leaving effort and preferences aside {} is better in {} and \
              as good in everything else",
@@ -75,8 +75,8 @@ fn against(
     clauses
 }
 
-fn words(metric: &'static str) -> &'static str {
-    Metric::named(metric).map_or(metric, |metric| metric.words)
+fn words(key: &'static str) -> &'static str {
+    Metric::of_key(key).map_or(key, |metric| metric.words)
 }
 
 /// Contributions that differ, of one metric.
@@ -89,7 +89,7 @@ struct Difference<'a> {
 impl Difference<'_> {
     fn text(&self) -> String {
         let text = |value: f64| {
-            Metric::named(self.mine.metric)
+            Metric::of_key(self.mine.metric)
                 .map_or(value.to_string(), |metric| metric.quantity.text(value))
         };
         format!(

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Point3;
 use needlebench_cell::{Cell, Goal};
 use needlebench_engine::{PlantState, Recording};
 use serde::Serialize;
@@ -78,20 +79,55 @@ pub struct StepDifference {
 /// Distance of the tips at which a motion that is not held back counts as lost, m.
 const LOST_M: f64 = 1e-3;
 
+/// Where the needle's tip was in every state of a motion, world: all that is compared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TipPath {
+    /// Length of a step, s.
+    pub timestep_s: f64,
+    /// The tip in every state, the starting one included.
+    pub tip_m: Vec<Point3<f64>>,
+    /// Number of steps before the first contact; all of them without one.
+    pub steps_before_contact: usize,
+}
+
+impl TipPath {
+    /// The tip of a recording.
+    pub fn of(cell: &Cell, goal: &Goal, recording: &Recording) -> Self {
+        Self {
+            steps_before_contact: steps_before_contact(recording),
+            ..Self::of_states(cell, goal, recording.timestep_s, &recording.state)
+        }
+    }
+
+    /// The tip of a motion without contacts.
+    pub fn of_states(cell: &Cell, goal: &Goal, timestep_s: f64, states: &[PlantState]) -> Self {
+        let tips = states
+            .iter()
+            .map(|state| tip_of(cell, goal, &state.world_from_flange));
+        Self {
+            timestep_s,
+            tip_m: tips.collect(),
+            steps_before_contact: states.len().saturating_sub(1),
+        }
+    }
+
+    /// Distances to the tip of another motion at the same times, over the states that both have.
+    fn distances_m(&self, other: &Self) -> impl Iterator<Item = f64> {
+        let both = self.tip_m.iter().zip(&other.tip_m);
+        both.map(|(one, other)| (one - other).norm())
+    }
+
+    fn time_s(&self, state: usize) -> f64 {
+        state as f64 * self.timestep_s
+    }
+}
+
 /// When the tips are first a millimetre apart, s.
-pub fn time_until_lost(
-    cell: &Cell,
-    goal: &Goal,
-    recording: &Recording,
-    states: &[PlantState],
-) -> Option<f64> {
-    let tip = |state: &PlantState| tip_of(cell, goal, &state.world_from_flange);
-    let index = recording
-        .state
-        .iter()
-        .zip(states)
-        .position(|(a, b)| (tip(a) - tip(b)).norm() > LOST_M)?;
-    Some(recording.time_s[index])
+pub fn time_until_lost(engine: &TipPath, referee: &TipPath) -> Option<f64> {
+    let state = engine
+        .distances_m(referee)
+        .position(|apart_m| apart_m > LOST_M)?;
+    Some(engine.time_s(state))
 }
 
 /// Number of steps before the first contact of a recording; all of them without one.
@@ -103,25 +139,20 @@ pub fn steps_before_contact(recording: &Recording) -> usize {
         .map_or(recording.steps(), |index| index.saturating_sub(1))
 }
 
-/// Distance of the needle's tips, state by state, over the states that both have.
-pub fn tip_difference(
-    cell: &Cell,
-    goal: &Goal,
-    recording: &Recording,
-    states: &[PlantState],
-) -> TipDifference {
-    let tip = |state: &PlantState| tip_of(cell, goal, &state.world_from_flange);
+/// Distance of the needle's tips, state by state, over the first `steps` that both have.
+pub fn tip_difference(engine: &TipPath, other: &TipPath, steps: usize) -> TipDifference {
     let mut difference = TipDifference::default();
-    let mut last = 0.0;
-    for ((a, b), &time_s) in recording.state.iter().zip(states).zip(&recording.time_s) {
-        last = (tip(a) - tip(b)).norm();
-        if last > difference.peak_tip_m {
-            difference.peak_tip_m = last;
-            difference.peak_time_s = time_s;
+    let (mut last_m, mut states) = (0.0, 0);
+    for apart_m in engine.distances_m(other).take(steps + 1) {
+        last_m = apart_m;
+        if apart_m > difference.peak_tip_m {
+            difference.peak_tip_m = apart_m;
+            difference.peak_time_s = engine.time_s(states);
         }
+        states += 1;
     }
-    let to_the_end = states.len() >= recording.state.len();
-    difference.settled_tip_m = to_the_end.then_some(last);
+    let to_the_end = states >= engine.tip_m.len();
+    difference.settled_tip_m = to_the_end.then_some(last_m);
     difference
 }
 

@@ -2,19 +2,21 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::{ClearanceClass, LinkEnclosure};
+use needlebench_cell::{ArmReport, LinkEnclosure};
 use needlebench_engine::EngineIdentity;
 use needlebench_uncertainty::budget::ErrorBudget;
 use serde::Serialize;
 
 use crate::adjudication::Adjudication;
+pub use crate::class_clearance::{ClassClearance, ClearanceReport};
 use crate::events::EventsReport;
 use crate::iso9283::Iso9283Report;
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
-use crate::ranking::{Dominance, GoalRanking, RankingReport};
+use crate::ranking_report::{Dominance, GoalRanking, RankingReport};
 use crate::referee::RefereeReport;
 use crate::room::RoomReport;
+pub use crate::verdict::{CriterionResult, Verdict};
 
 /// Version of the report's keys.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -37,8 +39,10 @@ pub struct Report {
     pub iso9283: Option<Iso9283Report>,
     /// Engines that failed, and how; their results are missing.
     pub engine_failures: Vec<EngineFailure>,
-    /// What the shipped arm's enclosing primitives would cost beside the meshes of the robot in
-    /// use; empty unless that robot is a UR3 with meshes of its own.
+    /// The arm whose data the robot has; none if its lengths are those of no arm that is known.
+    pub arm: Option<ArmReport>,
+    /// What the enclosing primitives of that arm's own URDF would cost beside the meshes of the robot
+    /// in use; empty unless that robot has meshes of its own.
     pub enclosure: Vec<LinkEnclosure>,
     /// What was assumed or adjusted.
     pub notes: Vec<String>,
@@ -91,39 +95,6 @@ pub struct ScenarioSummary {
     pub description: String,
     /// Its file, as given.
     pub file: String,
-}
-
-/// Whether all criteria were met.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Verdict {
-    /// All were met.
-    Pass,
-    /// One was not.
-    Fail,
-}
-
-/// One criterion on one value.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CriterionResult {
-    /// Goal.
-    pub goal: String,
-    /// Configuration; none for criteria on the goal as a whole.
-    pub label: Option<String>,
-    /// Engine; none for criteria on both or on the plan.
-    pub engine: Option<String>,
-    /// Key of the scenario's `[criteria]`, or `expected`.
-    pub criterion: String,
-    /// The value; none where there is none to measure.
-    pub value: Option<f64>,
-    /// The limit.
-    pub limit: Option<f64>,
-    /// Unit of both.
-    pub unit: &'static str,
-    /// Met or not.
-    pub pass: bool,
-    /// What it is about, in words.
-    pub detail: String,
 }
 
 /// An engine that failed.
@@ -294,6 +265,15 @@ pub struct ConfigurationReport {
     /// Contacts, stop and way back, where the scenario asks for them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub events: Option<EventsReport>,
+    /// Signed clearances by class of the final posture of the nominal arm, with the needle's route;
+    /// empty without a posture.
+    pub posture_clearance_m: BTreeMap<&'static str, f64>,
+    /// Distance of the posture from breaking a rule of the plan, negative where it breaks one; sines
+    /// and radians count 0.1 m.
+    pub surplus_m: Option<f64>,
+    /// The needle where the balance of torques lets it come to rest, without any engine; where it is
+    /// commanded to without imperfections.
+    pub predicted: Option<NeedleMeasurement>,
     /// Room that it leaves to the people around it.
     pub room: Option<RoomReport>,
     /// How far the needle's tip moves, root mean square, when every joint has an independent error.
@@ -309,8 +289,51 @@ pub struct ConfigurationReport {
     pub budget: Option<ErrorBudget>,
     /// Why there is no budget, where there should be one.
     pub budget_failure: Option<String>,
+    /// Everything that was measured, by the keys of the [metrics](crate::metric), in SI units. The same
+    /// key is the same number in a study.
+    pub metrics: BTreeMap<String, f64>,
     /// Files written for it, relative to the results folder.
     pub files: Vec<String>,
+}
+
+impl ConfigurationReport {
+    /// A configuration of which nothing is known.
+    pub fn new(label: &'static str) -> Self {
+        Self {
+            label,
+            status: Status::Rejected,
+            rejections: Vec::new(),
+            joints_rad: None,
+            roll_rad: None,
+            wrap: None,
+            ik_residual_m: None,
+            ik_residual_rad: None,
+            free_joint: None,
+            margins: None,
+            motion: Vec::new(),
+            retreat: Vec::new(),
+            search: None,
+            commanded: None,
+            engines: BTreeMap::new(),
+            engine_difference: None,
+            adjudication: None,
+            referee: None,
+            clearance: ClearanceReport::default(),
+            events: None,
+            posture_clearance_m: BTreeMap::new(),
+            surplus_m: None,
+            predicted: None,
+            room: None,
+            tip_sensitivity_m_per_rad: None,
+            pareto: false,
+            dominated_by: None,
+            ranking: None,
+            budget: None,
+            budget_failure: None,
+            metrics: BTreeMap::new(),
+            files: Vec::new(),
+        }
+    }
 }
 
 /// What one engine measured.
@@ -327,82 +350,6 @@ pub struct EngineReport {
     pub motion: MotionMeasurement,
     /// Least clearances over the recorded motion.
     pub clearance: ClearanceReport,
-}
-
-/// Least clearance of a class.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ClassClearance {
-    /// Signed distance: positive apart, negative the penetration depth.
-    pub minimum_m: f64,
-    /// Proven lower bound over the whole motion; none where there is no motion.
-    pub certified_lower_bound_m: Option<f64>,
-    /// The two solids.
-    pub pair: [String; 2],
-    /// Nearest (or deepest) points of the two, in the world.
-    pub witness_points_m: [[f64; 3]; 2],
-    /// Phase of the motion; `final_posture` without one, `insertion` for the needle's route.
-    pub phase: &'static str,
-    /// Time in the motion.
-    pub time_s: Option<f64>,
-    /// Engine whose motion it is.
-    pub engine: Option<String>,
-}
-
-/// Clearances by class; a class that the cell has no part for is absent.
-#[derive(Debug, Clone, PartialEq, Serialize, Default)]
-pub struct ClearanceReport {
-    /// By class name.
-    #[serde(flatten)]
-    pub classes: BTreeMap<&'static str, ClassClearance>,
-    /// Least over the classes of physical bodies, the guide's intended stand-off left out.
-    pub minimum_m: Option<f64>,
-    /// Least proven lower bound over the same classes; none unless all of them have one.
-    pub minimum_certified_m: Option<f64>,
-}
-
-impl ClearanceReport {
-    /// The least clearances of a motion.
-    pub fn of(minima: &BTreeMap<ClearanceClass, ClassClearance>) -> Self {
-        let named = minima
-            .iter()
-            .map(|(class, found)| (class.name(), found.clone()));
-        Self::new(named.collect())
-    }
-
-    /// Clearances by class with the least of those that count.
-    pub fn new(classes: BTreeMap<&'static str, ClassClearance>) -> Self {
-        let mut made = Self {
-            classes,
-            minimum_m: None,
-            minimum_certified_m: None,
-        };
-        made.minimum_m = made.least().map(|found| found.minimum_m);
-        made.minimum_certified_m = made
-            .physical()
-            .map(|found| found.certified_lower_bound_m)
-            .reduce(|least, next| Some(least?.min(next?)))
-            .flatten();
-        made
-    }
-
-    /// The least clearance of physical bodies from each other, the guide's intended stand-off left
-    /// out.
-    pub fn least(&self) -> Option<&ClassClearance> {
-        self.physical()
-            .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
-    }
-
-    fn physical(&self) -> impl Iterator<Item = &ClassClearance> {
-        self.classes
-            .iter()
-            .filter(|(class, _)| {
-                !matches!(
-                    **class,
-                    "guide_standoff" | "needle_corridor" | "needle_route"
-                )
-            })
-            .map(|(_, found)| found)
-    }
 }
 
 /// Where a report's numbers come from.

@@ -2,7 +2,8 @@
 
 use needlebench_cell::phantom::{Phantom, Tissue};
 use needlebench_cell::{Cell, Goal, PlacedPhantom};
-use needlebench_clearance::{PreparedSolids, ROUNDING_M, Separation};
+use needlebench_clearance::ROUNDING_M;
+use needlebench_geometry::{PreparedSolids, Separation};
 
 use crate::clearance::class_clearance;
 use crate::report::ClassClearance;

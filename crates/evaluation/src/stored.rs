@@ -1,8 +1,11 @@
 //! Reports that were stored, by this version or another one.
 
+use std::collections::BTreeMap;
+
 use needlebench_cell::Finding;
 use serde_json::Value;
 
+use crate::metric::former_report;
 use crate::report::{Report, SCHEMA_VERSION};
 
 /// A report as its documented keys, with where it comes from.
@@ -146,6 +149,27 @@ impl StoredReport {
     /// Value at a JSON pointer.
     pub fn value(&self, pointer: &str) -> Option<&Value> {
         self.report.pointer(pointer)
+    }
+
+    /// What was measured of a configuration of its goals, by metrics' keys; of reports before those had
+    /// keys as they are today's.
+    pub(crate) fn measured(configuration: &Value) -> BTreeMap<String, f64> {
+        let Some(metrics) = configuration.get("metrics").and_then(Value::as_object) else {
+            return former_report(configuration);
+        };
+        let numbers = metrics.iter();
+        numbers
+            .filter_map(|(key, value)| Some((key.clone(), value.as_f64()?)))
+            .collect()
+    }
+
+    /// Whether it was written before metrics had keys.
+    pub(crate) fn is_former(&self) -> bool {
+        let mut configurations = self
+            .goals()
+            .filter_map(|(_, goal)| goal.get("configurations")?.as_array())
+            .flatten();
+        configurations.any(|each| each.get("metrics").is_none())
     }
 
     /// Goals with their names, in the report's order.

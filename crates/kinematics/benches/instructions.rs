@@ -9,7 +9,8 @@ use needlebench_kinematics::ik::{
     ClosedForm, DampedOptions, GaussNewtonOptions, Numerical, Preference, closed_form_batch,
     closed_form_into,
 };
-use needlebench_kinematics::pose_sets::{PoseSet, SplitMix64};
+use needlebench_kinematics::pose_sets::PoseSet;
+use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
 
 fn main() {

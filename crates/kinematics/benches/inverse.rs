@@ -14,7 +14,8 @@ use needlebench_kinematics::ik::{
     ClosedForm, GaussNewtonOptions, Kinematics, Preference, closed_form, closed_form_batch,
     closed_form_into, gauss_newton,
 };
-use needlebench_kinematics::pose_sets::{PoseSet, SplitMix64};
+use needlebench_kinematics::pose_sets::PoseSet;
+use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
 
 fn inverse(c: &mut Criterion) {

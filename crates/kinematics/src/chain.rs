@@ -194,7 +194,8 @@ fn stacked(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
 mod tests {
     use super::*;
     use crate::UrGeometry;
-    use crate::pose_sets::{PoseSet, SplitMix64};
+    use crate::pose_sets::PoseSet;
+    use crate::random::SplitMix64;
 
     /// Step of the central differences, rad: the cube root of the rounding of a double.
     const STEP_RAD: f64 = 6e-6;

@@ -60,7 +60,7 @@ impl Body {
 /// The arm as rigid bodies: inverse dynamics, mass matrix and gravity torque.
 ///
 /// Agrees with MuJoCo's `mj_inverse` and `mj_fullM` to 1e-10 relative at random states; see
-/// `tests/validation/engines/main.rs`; and with Pinocchio to 3e-15: `tests/validation/dynamics/main.rs`.
+/// `tests/validation/engines/mod.rs`; and with Pinocchio to 3e-15: `tests/validation/dynamics/mod.rs`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dynamics {
     /// The joints.

@@ -216,7 +216,7 @@ mod tests {
     use nalgebra::{Rotation3, SVector};
 
     use super::*;
-    use crate::pose_sets::SplitMix64;
+    use crate::random::SplitMix64;
     use crate::{Body, UrGeometry, integrate};
 
     /// Ten times the worst that is seen over the states below, without armature.

@@ -18,6 +18,7 @@ mod manipulability;
 mod models;
 pub mod normal;
 pub mod pose_sets;
+pub mod random;
 pub mod registration;
 mod rotation;
 pub mod trajectory;

@@ -169,7 +169,8 @@ fn from_half_turns(angle_rad: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::UrModel;
-    use crate::pose_sets::{PoseSet, SplitMix64};
+    use crate::pose_sets::PoseSet;
+    use crate::random::SplitMix64;
 
     /// Twenty times the rounding of a determinant below 0.03 m^3 from entries of about 1.
     const DETERMINANT_M3: f64 = 1e-15;

@@ -78,7 +78,7 @@ impl UrModel {
     /// A factory calibration moves a length by up to about 1 mm; the two arms most like each other,
     /// UR3 and UR3e, are 18.7 mm apart. A difference between says that it is none of these arms.
     pub fn nearest(geometry: &UrGeometry) -> (Self, f64) {
-        let deviation_m = |model: Self| largest_difference_m(geometry, &model.geometry());
+        let deviation_m = |model: Self| geometry.largest_difference_m(&model.geometry());
         Self::ALL
             .map(|model| (model, deviation_m(model)))
             .into_iter()
@@ -87,21 +87,23 @@ impl UrModel {
     }
 }
 
-/// Largest difference of any length, m; NaN if one is.
-fn largest_difference_m(a: &UrGeometry, b: &UrGeometry) -> f64 {
-    [
-        a.d1 - b.d1,
-        a.a2 - b.a2,
-        a.a3 - b.a3,
-        a.d4 - b.d4,
-        a.d5 - b.d5,
-        a.d6 - b.d6,
-    ]
-    .map(f64::abs)
-    .into_iter()
-    // Its order puts NaN last, where `f64::max` would drop it.
-    .max_by(f64::total_cmp)
-    .expect("there are six")
+impl UrGeometry {
+    /// Largest difference of any length, m; NaN if one is.
+    pub fn largest_difference_m(&self, other: &Self) -> f64 {
+        [
+            self.d1 - other.d1,
+            self.a2 - other.a2,
+            self.a3 - other.a3,
+            self.d4 - other.d4,
+            self.d5 - other.d5,
+            self.d6 - other.d6,
+        ]
+        .map(f64::abs)
+        .into_iter()
+        // Its order puts NaN last, where `f64::max` would drop it.
+        .max_by(f64::total_cmp)
+        .expect("there are six")
+    }
 }
 
 impl fmt::Display for UrModel {
@@ -149,7 +151,7 @@ mod tests {
         for model in UrModel::ALL {
             assert_eq!(UrModel::nearest(&model.geometry()), (model, 0.0));
             for other in UrModel::ALL {
-                let apart_m = largest_difference_m(&model.geometry(), &other.geometry());
+                let apart_m = model.geometry().largest_difference_m(&other.geometry());
                 assert!(model == other || apart_m > 0.018, "{model} {other}");
             }
         }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
 use super::*;
-use crate::pose_sets::SplitMix64;
+use crate::random::SplitMix64;
 use crate::rotation_angle_between;
 
 /// Rounding of some hundred operations on coordinates below 1 m.
@@ -286,10 +286,7 @@ fn random_pose(random: &mut SplitMix64) -> Pose {
     )
 }
 
-/// Three standard normal numbers (Box and Muller).
+/// Three standard normal numbers.
 fn normal(random: &mut SplitMix64) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| {
-        let radius = (-2.0 * (1.0 - random.uniform(0.0, 1.0)).ln()).sqrt();
-        radius * (TAU * random.uniform(0.0, 1.0)).cos()
-    })
+    Vector3::from_fn(|_, _| random.standard_normal())
 }

@@ -1,30 +1,12 @@
-//! The testbench: pipeline, command line and output formats.
+//! The command line of the testbench.
 //!
 //! Data goes to standard output, logs and progress to standard error.
 
-mod assemble;
-mod atlas;
-mod atomic;
-mod budgets;
+mod arguments;
 mod cli;
 mod command;
-mod events;
 pub mod exit;
-mod iso9283;
-mod output;
-mod page;
-mod paper;
-pub mod picture;
-mod pipeline;
-mod plants;
+mod findings;
 mod progress;
-mod provenance;
-mod reality;
-mod servo;
-pub mod study;
-mod trial;
 
-pub use atlas::{GoalAtlas, goal_atlas};
 pub use cli::{command_line, main};
-pub use iso9283::ProtocolRun;
-pub use pipeline::{EngineChoice, RunOptions, ScenarioRun, run_scenario};

@@ -3,12 +3,13 @@
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use needlebench_bench::progress::Progress;
 
 /// A progress bar on standard error, if that is a terminal.
 #[derive(Debug, Clone)]
-pub(crate) struct Progress(ProgressBar);
+pub(crate) struct TerminalProgress(ProgressBar);
 
-impl Progress {
+impl TerminalProgress {
     /// `quiet` hides it everywhere.
     pub(crate) fn new(quiet: bool) -> Self {
         let bar = ProgressBar::new(0);
@@ -28,25 +29,26 @@ impl Progress {
         Self(bar)
     }
 
-    pub(crate) fn message(&self, text: &str) {
+    pub(crate) fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
+impl Progress for TerminalProgress {
+    fn message(&self, text: &str) {
         self.0.set_message(text.to_owned());
     }
 
-    pub(crate) fn expect(&self, steps: u64) {
+    fn expect(&self, steps: u64) {
         self.0.inc_length(steps);
     }
 
-    /// So many steps of all are done.
-    pub(crate) fn at(&self, done: u64, total: u64) {
+    fn at(&self, done: u64, total: u64) {
         self.0.set_length(total);
         self.0.set_position(done);
     }
 
-    pub(crate) fn step(&self) {
+    fn step(&self) {
         self.0.inc(1);
-    }
-
-    pub(crate) fn finish(&self) {
-        self.0.finish_and_clear();
     }
 }

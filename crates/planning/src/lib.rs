@@ -4,16 +4,19 @@
 //! cannot work carries the rules that reject it, the first failing one first.
 
 mod family;
-mod getting_there;
 pub mod iso9283;
 mod motion;
+mod motion_plan;
 mod plan;
+mod planner;
 mod press;
 mod rejection;
 mod transfer;
 
 pub use family::{Aim, Best, EDGE_RAD, Edge, Family, Member, RollRange};
 pub use motion::MotionChecker;
-pub use plan::{Candidate, ConfigurationPlan, GoalPlan, Planner, PostureMargins, SearchEffort};
+pub use motion_plan::{ConfigurationPlan, SearchEffort};
+pub use plan::GoalPlan;
+pub use planner::{Candidate, Planner, PostureMargins};
 pub use press::{PressError, PressPlan, stage_press};
 pub use rejection::{Rejection, Rule};

@@ -6,7 +6,7 @@
 //! seed, and effort is counted in postures looked at, not in seconds: the same input gives the same
 //! motion on any machine.
 
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{JOINT_COUNT, JointLimits, Joints};
 
 use crate::motion::MotionChecker;

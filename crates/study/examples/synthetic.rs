@@ -11,14 +11,14 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 use needlebench_study::{
     CSV_FILE, CaseError, CaseEvaluator, CaseResult, CaseWorker, ParquetResults, Progress,
     RESULTS_FILE, Results, StudyRun, write_csv,
 };
 use synthetic::{SyntheticDesign, SyntheticEvaluator};
 
-#[path = "../tests/store/synthetic.rs"]
+#[path = "../tests/study/store/synthetic.rs"]
 mod synthetic;
 
 /// Works for its rows.

@@ -1,10 +1,12 @@
 //! Studies: many cases of one scenario, from a design to a table of results.
 //!
 //! A *case* is one layout with one goal; its number decides everything about it, so that it can be
-//! rerun alone. Each case gives one [`Row`] per configuration. What computes the rows is a
-//! [`CaseWorker`]; this crate knows neither arms nor engines.
+//! rerun alone. Each case gives one [`Row`] per configuration, with a value for each of the study's
+//! [columns](MetricColumn). What computes the rows is a [`CaseWorker`], and what the columns are is
+//! said when a study is opened; this crate knows neither arms nor engines.
 
 mod case;
+mod column;
 pub mod compare;
 mod design;
 mod distribution;
@@ -16,9 +18,10 @@ pub mod statistics;
 mod store;
 
 pub use case::{CaseError, CaseEvaluator, CaseWorker};
+pub use column::{Measure, MetricColumn};
 pub use design::{Design, DesignError, Factor, FactorKind, FactorValue, Level, Role};
 pub use results::{Results, ResultsError};
-pub use row::{CaseResult, METRIC_COUNT, METRICS, Metric, MetricColumn, Outcome, Row};
+pub use row::{CaseResult, Outcome, Row};
 pub use store::{
     CSV_FILE, CaseDesign, JOURNAL_FILE, MANIFEST_FILE, Manifest, ParquetResults, Progress,
     RESULTS_FILE, RunEnd, SCHEMA_VERSION, Shard, Status, StudyError, StudyRun, merge, write_csv,

@@ -1,12 +1,15 @@
 //! Where the rows of a study are read from.
 
-use crate::{CaseResult, Factor, FactorValue};
+use crate::{CaseResult, Factor, FactorValue, MetricColumn};
 
 /// A complete table of results. It may be larger than memory: it is read from the first case to the
 /// last, as often as needed.
 pub trait Results {
     /// The factors, in the order of their columns; `goal` is the first.
     fn factors(&self) -> &[Factor];
+
+    /// What the values of rows are of, in their order.
+    fn columns(&self) -> &[MetricColumn];
 
     /// Number of cases.
     fn cases(&self) -> u64;

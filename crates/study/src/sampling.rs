@@ -1,7 +1,7 @@
 //! Points of the unit cube for the factors that are sampled.
 
 use needlebench_cell::study::SamplingMethod;
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 
 use crate::sobol::{DIMENSIONS, SobolDimension};
 

@@ -5,7 +5,7 @@
 //! (Gray code). Scrambling: Owen, "Randomly permuted (t,m,s)-nets and (t,s)-sequences", 1995: each bit is
 //! flipped or not by a hash of the bits above it, so every prefix of 2^k points keeps its balance.
 
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 
 /// Number of dimensions that the table goes to.
 pub(crate) const DIMENSIONS: usize = 40;

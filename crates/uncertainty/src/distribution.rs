@@ -1,7 +1,7 @@
 //! Standard variables: normal and uniform ones, drawn one by one or as a Latin hypercube.
 
 use needlebench_kinematics::normal;
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 
 /// Distribution of a standard variable; both are symmetric about 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,14 +23,7 @@ impl Variable {
 
     /// One value.
     pub(crate) fn draw(self, random: &mut SplitMix64) -> f64 {
-        // (0, 1): the quantile of 0 is minus infinity.
-        let p = loop {
-            let p = random.uniform(0.0, 1.0);
-            if p > 0.0 {
-                break p;
-            }
-        };
-        self.quantile(p)
+        self.quantile(random.open_unit())
     }
 }
 

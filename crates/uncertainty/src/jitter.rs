@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix6;
 use needlebench_engine::{ClosedLoop, Servo};
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Dynamics, Joints};
 
 use crate::Truth;

@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
-use needlebench_cell::imperfections::{ArmPopulation, Breathing, FrictionBlock, Imperfections};
+use needlebench_cell::imperfections::{self, ArmPopulation, Breathing, Imperfections};
 use needlebench_cell::{BodyKind, Cell, Goal, PlacedPhantom};
 use needlebench_engine::{Actuation, CommandTiming, Encoder, JointFriction};
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::registration::{RegistrationError, register};
 use needlebench_kinematics::{Body, Chain, Dynamics, JOINT_COUNT, Joints, Pose};
 use serde::Serialize;
@@ -410,7 +410,10 @@ impl Truth {
 }
 
 /// Friction of the joints, SI; `true_over_nominal` is how much more there is than believed.
-pub(crate) fn joint_friction(block: &FrictionBlock, true_over_nominal: Joints) -> JointFriction {
+pub(crate) fn joint_friction(
+    block: &imperfections::JointFriction,
+    true_over_nominal: Joints,
+) -> JointFriction {
     JointFriction {
         coulomb_nm: Joints::from(block.coulomb_nm),
         stiction_nm: Joints::from(block.stiction_nm),

@@ -19,10 +19,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use needlebench_cell::shape::{ConvexMesh, Shape, SolidMesh, TriangleMesh};
 use needlebench_cell::{BodyKind, Cell, Frame, Overrides, ResolvedScenario, load_scenario};
 use needlebench_clearance::ClearanceModel;
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_geometry::{ConvexMesh, Shape, SolidMesh, TriangleMesh};
+use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose};
 use needlebench_planning::Planner;
 use serde_json::{Value, json};

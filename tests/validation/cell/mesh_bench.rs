@@ -6,11 +6,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
-use needlebench_cell::convex_hull;
-use needlebench_cell::shape::{Shape, SolidMesh, TriangleMesh};
-use needlebench_clearance::{PreparedShape, separation};
+use needlebench_geometry::mesh::convex_hull;
+use needlebench_geometry::{PreparedShape, Shape, SolidMesh, TriangleMesh, separation};
 use needlebench_kinematics::Pose;
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 use serde_json::{Value, json};
 
 /// Poses of each pair of shapes.

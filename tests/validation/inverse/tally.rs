@@ -2,7 +2,7 @@
 
 use needlebench_kinematics::{Joints, Pose, UrGeometry, ik::wrap_angle};
 
-use crate::tracking::miss;
+use super::tracking::miss;
 
 /// A row this near to a posture, rad, is that posture.
 const SAME_RAD: f64 = 1e-6;

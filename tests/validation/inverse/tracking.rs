@@ -8,10 +8,10 @@
 //! As `make_reference.py`, but in 106 bits and along another path.
 
 use nalgebra::{Matrix6, Vector6};
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
 
-use crate::double_double::{Complex, Real};
+use super::double_double::{Complex, Real};
 
 /// The least singular value of a Jacobian below which a posture is nearly singular.
 const FLAT: f64 = 1e-3;

@@ -3,21 +3,11 @@
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-use super::key_path::{KeyPath, Step};
+use super::key_path::{KeyPath, Step, section};
 use super::setting::{Change, Setting, number_value};
+use crate::ArmInUse;
 use crate::scenario::{GoalSection, Scenario};
-use crate::toml_text::Misfit;
-
-/// Why a change cannot be made.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct EditError {
-    /// The key at fault.
-    pub key: String,
-    /// What is wrong with its value.
-    pub message: String,
-    /// How to mend it.
-    pub hint: Option<String>,
-}
+use crate::schema::{Misfit, MisfitKind, Path};
 
 /// A scenario's struct, and all of it that has a value as a table, defaults included.
 #[derive(Debug, Clone)]
@@ -25,6 +15,17 @@ pub(super) struct Editable {
     pub scenario: Scenario,
     table: Table,
     goals: Vec<Value>,
+    /// What the scenario leaves to its arm, with the arm's values: there to be added to and changed in
+    /// part.
+    of_arm: Value,
+}
+
+/// A scenario with some keys changed.
+#[derive(Debug)]
+pub(super) struct Edited {
+    pub scenario: Scenario,
+    /// Values of the right type outside their ranges.
+    pub out_of_range: Vec<Misfit>,
 }
 
 /// Deserialises the sections of a scenario that have been edited, by their names.
@@ -32,13 +33,7 @@ macro_rules! put_sections {
     ($scenario:ident, $name:ident, $value:ident, [$($section:ident),*]) => {
         match $name {
             $(stringify!($section) => $scenario.$section = read($name, $value)?,)*
-            _ => {
-                return Err(EditError {
-                    key: $name.to_owned(),
-                    message: format!("unknown key `{}`", $name),
-                    hint: None,
-                });
-            }
+            _ => return Err(unknown($name, format!("`{}` cannot be changed", $name))),
         }
     };
 }
@@ -46,21 +41,33 @@ macro_rules! put_sections {
 impl Editable {
     /// # Errors
     /// Where the struct is no table: a bug, but one to be told of.
-    pub fn new(scenario: Scenario) -> Result<Self, String> {
+    pub fn new(scenario: Scenario, arm: Option<&ArmInUse>) -> Result<Self, String> {
         let as_value = |error: toml::ser::Error| error.to_string();
         let goals = scenario.goals.iter().map(Value::try_from);
         let goals = goals.collect::<Result<_, _>>().map_err(as_value)?;
         let table = Table::try_from(&scenario).map_err(as_value)?;
+        let of_arm = match arm {
+            Some(used) => used.arm.data.by_scenario_keys().map_err(as_value)?,
+            None => Value::Table(Table::new()),
+        };
         Ok(Self {
             scenario,
             table,
             goals,
+            of_arm,
         })
     }
 
     /// The scenario with one of its goals and some keys changed, one after the other.
-    pub fn with(&self, goal: usize, changes: &[(KeyPath, Change)]) -> Result<Scenario, EditError> {
+    /// The sections that are changed are checked like those of a file.
+    ///
+    /// # Errors
+    /// What is no such key, or of another type than its key.
+    pub fn with(&self, goal: usize, changes: &[(KeyPath, Change)]) -> Result<Edited, Misfit> {
         let mut edited: Vec<(&str, Option<Value>)> = Vec::with_capacity(changes.len());
+        // Another robot has another arm's values, and not this one's.
+        let is_other = changes.iter().any(|(path, _)| path.is_of_robot_model());
+        let of_arm = Some(&self.of_arm).filter(|_| !is_other);
         for (path, change) in changes {
             let section = path.section();
             let index = edited.iter().position(|(name, _)| *name == section);
@@ -74,11 +81,20 @@ impl Editable {
                 edited.len() - 1
             });
             let place = &mut edited[index].1;
-            *place = Some(changed(place.take(), path, &path.0[1..], change)?);
+            let of_arm = of_arm.and_then(|values| values.get(section));
+            *place = Some(changed(place.take(), of_arm, path, &path.0[1..], change)?);
         }
         let mut scenario = self.scenario.with_goal(goal);
+        let mut out_of_range = Vec::new();
         for (name, value) in edited {
             let Some(value) = value else { continue };
+            let node = section(name).map_err(|why| unknown(name, why))?;
+            let first = out_of_range.len();
+            node.check(Path::Key(&Path::Top, name), &value, &mut out_of_range);
+            let wrong = |misfit: &Misfit| misfit.kind != MisfitKind::Range;
+            if let Some(at) = out_of_range[first..].iter().position(wrong) {
+                return Err(out_of_range.swap_remove(first + at));
+            }
             if name == "goal" {
                 scenario.goals = vec![read::<GoalSection>(name, value)?];
                 continue;
@@ -112,7 +128,19 @@ impl Editable {
                 ]
             );
         }
-        Ok(scenario)
+        Ok(Edited {
+            scenario,
+            out_of_range,
+        })
+    }
+}
+
+fn unknown(section: &str, message: String) -> Misfit {
+    Misfit {
+        key: section.to_owned(),
+        kind: MisfitKind::Unknown,
+        message,
+        hint: None,
     }
 }
 
@@ -147,27 +175,36 @@ impl Scenario {
 }
 
 impl KeyPath {
-    /// The first name: a section of the scenario, or the goal.
-    pub(super) fn section(&self) -> &str {
-        match self.0.first() {
-            Some(Step::Name(name)) => name,
-            _ => "",
-        }
+    /// Whether it decides whose data the robot has.
+    fn is_of_robot_model(&self) -> bool {
+        self.section() == "robot"
+            && self.0.get(1).is_none_or(
+                |key| matches!(key, Step::Name(name) if name == "urdf" || name == "arm"),
+            )
     }
 }
 
-/// A value with one key inside changed; tables that are not there are made.
+/// A value with one key inside changed; tables that are not there are made. What is not there and is
+/// changed in part is `of_arm`.
 fn changed(
     value: Option<Value>,
+    of_arm: Option<&Value>,
     path: &KeyPath,
     steps: &[Step],
     change: &Change,
-) -> Result<Value, EditError> {
-    let error = |message: String, hint: Option<String>| EditError {
+) -> Result<Value, Misfit> {
+    let error = |message: String, hint: Option<String>| Misfit {
         key: path.to_string(),
+        kind: MisfitKind::Type,
         message,
         hint,
     };
+    let in_part = match steps {
+        [] => matches!(change, Change::Add(_)),
+        [Step::Index(_), ..] => true,
+        [Step::Name(_), ..] => false,
+    };
+    let value = value.or_else(|| of_arm.filter(|_| in_part).cloned());
     match steps {
         [] => match change {
             Change::Set(Setting(setting)) => Ok(setting.clone()),
@@ -186,6 +223,7 @@ fn changed(
             },
         },
         [Step::Name(name), rest @ ..] => {
+            let of_arm = of_arm.and_then(|values| values.get(name));
             let mut table = match value {
                 None => Table::new(),
                 Some(Value::Table(table)) => table,
@@ -197,10 +235,10 @@ fn changed(
             match table.entry(name.clone()) {
                 toml::map::Entry::Occupied(mut entry) => {
                     let inner = std::mem::replace(entry.get_mut(), Value::Boolean(false));
-                    entry.insert(changed(Some(inner), path, rest, change)?);
+                    entry.insert(changed(Some(inner), of_arm, path, rest, change)?);
                 }
                 toml::map::Entry::Vacant(entry) => {
-                    entry.insert(changed(None, path, rest, change)?);
+                    entry.insert(changed(None, of_arm, path, rest, change)?);
                 }
             }
             Ok(Value::Table(table))
@@ -220,21 +258,18 @@ fn changed(
                 ));
             };
             let inner = std::mem::replace(place, Value::Boolean(false));
-            *place = changed(Some(inner), path, rest, change)?;
+            *place = changed(Some(inner), None, path, rest, change)?;
             Ok(Value::Array(array))
         }
     }
 }
 
-fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, EditError> {
-    serde_path_to_error::deserialize(value).map_err(|error| {
-        let path = error.path().to_string();
-        let joined = match path.as_str() {
-            "." => section.to_owned(),
-            rest if rest.starts_with('[') => format!("{section}{rest}"),
-            rest => format!("{section}.{rest}"),
-        };
-        let Misfit { key, message, hint } = Misfit::read(joined, error.inner().message());
-        EditError { key, message, hint }
+/// The schema holds, so this fails by a mistake of ours alone.
+fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, Misfit> {
+    T::deserialize(value).map_err(|error| Misfit {
+        key: section.to_owned(),
+        kind: MisfitKind::Type,
+        message: error.message().to_owned(),
+        hint: None,
     })
 }

@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+use crate::scenario;
+use crate::schema::{Node, unit_of};
+
 /// Name of the case's goal in paths.
 const GOAL: &str = "goal";
 
@@ -57,34 +60,56 @@ impl KeyPath {
         self.0.first() == Some(&Step::Name(GOAL.to_owned()))
     }
 
+    /// The first name: a section of the scenario, or the goal.
+    pub(super) fn section(&self) -> &str {
+        match self.0.first() {
+            Some(Step::Name(name)) => name,
+            _ => "",
+        }
+    }
+
     /// Unit that the last name ends with, such as `mm` or `deg`; empty if it has none.
     pub fn unit(&self) -> &'static str {
-        /// Endings of names, and how they are written.
-        const UNITS: [(&str, &str); 15] = [
-            ("_mm_s3", "mm/s^3"),
-            ("_mm_s2", "mm/s^2"),
-            ("_mm_s", "mm/s"),
-            ("_deg_s3", "deg/s^3"),
-            ("_deg_s2", "deg/s^2"),
-            ("_deg_s", "deg/s"),
-            ("_nms_rad", "N m s/rad"),
-            ("_nm_rad", "N m/rad"),
-            ("_kgm2", "kg m^2"),
-            ("_mm", "mm"),
-            ("_deg", "deg"),
-            ("_rad", "rad"),
-            ("_ms", "ms"),
-            ("_kg", "kg"),
-            ("_s", "s"),
-        ];
         let name = self.0.iter().rev().find_map(|step| match step {
             Step::Name(name) => Some(name.as_str()),
             Step::Index(_) => None,
         });
-        UNITS
-            .iter()
-            .find(|(ending, _)| name.is_some_and(|name| name.ends_with(ending)))
-            .map_or("", |(_, unit)| unit)
+        name.map_or("", unit_of)
+    }
+
+    /// Whether scenarios have such a key, or may have it.
+    ///
+    /// # Errors
+    /// A message that says which part of the path is not known, and what is.
+    pub(super) fn check(&self) -> Result<(), String> {
+        if self.section() == "goals" {
+            return Err(format!(
+                "`{self}`: the goal is a factor of its own; `goal.` stands for that of each case, as \
+                 in `goal.roll_deg`"
+            ));
+        }
+        let mut here = section(self.section()).map_err(|why| format!("`{self}`: {why}"))?;
+        for step in &self.0[1..] {
+            let next = match step {
+                Step::Name(name) => here.key(name),
+                Step::Index(index) => here.item(*index),
+            };
+            here = next.map_err(|why| format!("`{self}`: {why}"))?;
+        }
+        Ok(())
+    }
+}
+
+/// What a section may hold; `goal` is any of the goals.
+///
+/// # Errors
+/// That there is no such section, and which ones there are.
+pub(super) fn section(name: &str) -> Result<&'static Node, String> {
+    let file = scenario::FILE.root();
+    if name == GOAL {
+        file.key("goals")?.item(0)
+    } else {
+        file.key(name)
     }
 }
 

@@ -2,7 +2,6 @@
 
 mod edit;
 mod key_path;
-mod schema;
 mod setting;
 
 use std::path::{Path, PathBuf};
@@ -10,12 +9,11 @@ use std::path::{Path, PathBuf};
 pub use key_path::KeyPath;
 pub use setting::{Change, Setting};
 
-use crate::parts::Library;
-use crate::resolve::resolve;
+use crate::resolve::{ModelLibrary, resolve};
+use crate::schema::Misfit;
 use crate::toml_text::TomlText;
 use crate::{Finding, Overrides, ResolvedScenario, load_scenario, nearest_name};
-use edit::{EditError, Editable};
-use schema::Keys;
+use edit::{Editable, Edited};
 
 /// A scenario of which layouts are made by changing keys.
 ///
@@ -25,10 +23,9 @@ use schema::Keys;
 pub struct ScenarioFamily {
     base: ResolvedScenario,
     editable: Editable,
-    keys: Keys,
     folder: PathBuf,
     overrides: Overrides,
-    library: Library,
+    library: ModelLibrary,
 }
 
 impl ScenarioFamily {
@@ -38,15 +35,15 @@ impl ScenarioFamily {
     /// As [`load_scenario`].
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self, Vec<Finding>> {
         let base = load_scenario(path, overrides)?;
-        let editable = Editable::new(base.scenario.clone())
+        let arm = base.cell.robot.arm.as_ref();
+        let editable = Editable::new(base.scenario.clone(), arm)
             .map_err(|error| vec![Finding::new(&base.source.file, error)])?;
         Ok(Self {
             base,
             editable,
-            keys: Keys::new(),
             folder: path.parent().unwrap_or(Path::new("")).to_owned(),
             overrides: overrides.clone(),
-            library: Library::default(),
+            library: ModelLibrary::default(),
         })
     }
 
@@ -75,13 +72,20 @@ impl ScenarioFamily {
         let index = self
             .goal(goal)
             .map_err(|message| vec![Finding::new(file, message).key("goal")])?;
-        let scenario = self.editable.with(index, changes).map_err(|error| {
-            let EditError { key, message, hint } = error;
-            vec![Finding {
-                hint,
-                ..Finding::new(file, message).key(key)
-            }]
-        })?;
+        let finding = |misfit: Misfit| Finding {
+            hint: misfit.hint,
+            ..Finding::new(file, misfit.message).key(misfit.key)
+        };
+        let Edited {
+            scenario,
+            out_of_range,
+        } = self
+            .editable
+            .with(index, changes)
+            .map_err(|misfit| vec![finding(misfit)])?;
+        if !out_of_range.is_empty() {
+            return Err(out_of_range.into_iter().map(finding).collect());
+        }
         let toml = TomlText::without_text(file);
         let source = self.base.source.clone();
         resolve(
@@ -94,12 +98,13 @@ impl ScenarioFamily {
         )
     }
 
-    /// Whether the scenario has such a key, and the change fits its type, for every goal.
+    /// Whether the scenario has such a key, and the change fits its type, for every goal. A value out of
+    /// its range fits here: with it a layout is impossible.
     ///
     /// # Errors
     /// What does not fit, and what would.
     pub fn check(&self, path: &KeyPath, change: &Change) -> Result<(), String> {
-        self.keys.check(path)?;
+        path.check()?;
         let goals = if path.is_of_goal() {
             self.editable.scenario.goals.len()
         } else {
@@ -107,8 +112,10 @@ impl ScenarioFamily {
         };
         let changes = [(path.clone(), change.clone())];
         for index in 0..goals {
-            self.editable.with(index, &changes).map_err(|error| {
-                let EditError { key, message, hint } = error;
+            self.editable.with(index, &changes).map_err(|misfit| {
+                let Misfit {
+                    key, message, hint, ..
+                } = misfit;
                 let hint = hint.map_or(String::new(), |hint| format!("; {hint}"));
                 if message.contains(&key) {
                     format!("{message}{hint}")

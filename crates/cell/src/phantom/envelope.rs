@@ -1,10 +1,10 @@
 //! The two nested surfaces that everything is laid out by: the skin and the rib cage.
 
 use nalgebra::{Point2, Point3, Vector3};
+use needlebench_geometry::ConvexMesh;
 
 use super::loft::{Level, loft, superellipse};
 use super::{PhantomError, PhantomParameters};
-use crate::shape::ConvexMesh;
 
 /// Superellipse exponent of the skin's cross-sections: fuller than an ellipse, as the pectoral and
 /// latissimus muscles make it (assumed).

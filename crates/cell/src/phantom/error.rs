@@ -1,5 +1,7 @@
 //! What can be wrong with phantom parameters.
 
+use crate::schema::Misfit;
+
 /// Why a phantom cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PhantomError {
@@ -17,35 +19,16 @@ pub enum PhantomError {
         /// The names there are.
         known: Vec<&'static str>,
     },
-    /// A value is NaN or infinite.
-    #[error("phantom {key} is {value}: not a finite number")]
-    NotFinite {
-        /// Key, e.g. `breadth_mm` or `lesions.a.center_mm`.
+    /// A value is outside the range of human anatomy (or of the phantom's construction), no number, or
+    /// no usable name.
+    #[error("phantom: {message}{}", hint.as_ref().map_or(String::new(), |hint| format!(" ({hint})")))]
+    Value {
+        /// Key, e.g. `breadth_mm` or `lesions[0].center_mm[1]`.
         key: String,
-        /// The value given.
-        value: f64,
-    },
-    /// A value is outside the range of human anatomy (or of the phantom's construction).
-    #[error("phantom {key} is {value}, outside [{lower}, {upper}]{hint}")]
-    OutOfRange {
-        /// Key, with its unit.
-        key: String,
-        /// The value given.
-        value: f64,
-        /// Smallest value allowed, in the key's unit.
-        lower: f64,
-        /// Largest value allowed, in the key's unit.
-        upper: f64,
-        /// Empty, or a question about the unit that may have been meant.
-        hint: &'static str,
-    },
-    /// A name is empty or has characters that identifiers of the engines cannot carry.
-    #[error("phantom {kind} name `{name}` must consist of letters, digits, `_` and `-`")]
-    BadName {
-        /// `lesion` or `marker`.
-        kind: &'static str,
-        /// The name given.
-        name: String,
+        /// What is wrong with its value.
+        message: String,
+        /// How to mend it.
+        hint: Option<String>,
     },
     /// Two lesions or two markers share a name.
     #[error("phantom has two {kind}s named `{name}`")]
@@ -102,4 +85,13 @@ pub enum PhantomError {
         /// Largest height, mm.
         limit_mm: f64,
     },
+}
+
+impl From<Misfit> for PhantomError {
+    fn from(misfit: Misfit) -> Self {
+        let Misfit {
+            key, message, hint, ..
+        } = misfit;
+        Self::Value { key, message, hint }
+    }
 }

@@ -1,8 +1,7 @@
 //! Convex bodies as an intersection of half-spaces: exact inside tests and line clipping.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
-
-use crate::shape::{ConvexMesh, Shape, Solid};
+use needlebench_geometry::{ConvexMesh, Shape, Solid};
 
 /// Points `p` with `normal . p <= offset_m`.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,8 +9,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Point2, Point3, Vector3};
-
-use crate::shape::{ConvexMesh, TriangleMesh};
+use needlebench_geometry::{ConvexMesh, TriangleMesh};
 
 /// Height (m) and scale of one copy of the polygon. Scale 0 is a single vertex (a pole).
 #[derive(Debug, Clone, Copy)]

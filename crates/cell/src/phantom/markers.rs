@@ -42,7 +42,7 @@ pub(super) fn marker(
 
     let radius_m = 0.5e-3 * parameters.marker_diameter_mm;
     let face = on_skin + 1e-3 * parameters.marker_thickness_mm * normal.into_inner();
-    let part = |solid: crate::shape::Solid, color_rgba| PhantomPart {
+    let part = |solid: needlebench_geometry::Solid, color_rgba| PhantomPart {
         name: solid.name.clone(),
         tissue: Tissue::Marker,
         organ: Some(placement.name.clone()),

@@ -23,15 +23,16 @@ mod tests;
 use std::fmt;
 
 use nalgebra::{Point3, UnitQuaternion, UnitVector3};
+use needlebench_geometry::{Shape, Solid};
 use serde::{Deserialize, Serialize};
 
 pub use error::PhantomError;
+pub(crate) use parameters::PARAMETERS;
 pub use parameters::{LesionParameters, MarkerParameters, PhantomParameters};
 
 #[cfg(test)]
 pub(crate) use loft::assert_convex_and_closed;
 
-use crate::shape::{Shape, Solid};
 use envelope::Envelope;
 pub(crate) use half_spaces::HalfSpaces;
 pub(crate) use skin::SkinSurface;

@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Point2, Point3, UnitQuaternion};
+use needlebench_geometry::Solid;
 
 use super::envelope::{Envelope, Frame};
 use super::loft::{Level, ellipsoid, loft};
 use super::solids::{capsule, convex, pose, z_towards};
 use super::{PhantomPart, Tissue};
-use crate::shape::Solid;
 
 const LUNG_RGBA: [f32; 4] = [0.86, 0.60, 0.62, 0.55];
 const HEART_RGBA: [f32; 4] = [0.72, 0.18, 0.20, 1.0];

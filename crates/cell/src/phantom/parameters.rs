@@ -1,11 +1,18 @@
 //! Parameters of the chest phantom, their ranges and the shipped presets.
 
 use std::collections::BTreeSet;
+use std::sync::LazyLock;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::PhantomError;
+use crate::scenario::ChestSize;
+use crate::schema::{FileSchema, NAME};
+
+/// What a parameter file may hold.
+pub(crate) static PARAMETERS: LazyLock<FileSchema> =
+    LazyLock::new(FileSchema::of::<PhantomParameters>);
 
 /// Size and contents of a chest phantom.
 ///
@@ -15,39 +22,51 @@ use super::PhantomError;
 #[serde(deny_unknown_fields)]
 pub struct PhantomParameters {
     /// Breadth of the chest over the skin at its widest level, left to right, without arms, mm.
+    #[schemars(range(min = ChestSize::BREADTH_MM[0], max = ChestSize::BREADTH_MM[1]))]
     pub breadth_mm: f64,
     /// Depth of the chest over the skin at its widest level, front to back, mm.
+    #[schemars(range(min = ChestSize::DEPTH_MM[0], max = ChestSize::DEPTH_MM[1]))]
     pub depth_mm: f64,
     /// Length of the phantom along the body, mm. The suprasternal notch lies 60 mm (of 408) below
     /// its upper end and the lowest point of the tenth rib 30 mm above its lower end.
+    #[schemars(range(min = ChestSize::LENGTH_MM[0], max = ChestSize::LENGTH_MM[1]))]
     pub length_mm: f64,
     /// Skin to pleura in the second intercostal space on the mid-clavicular line, along the
     /// front-to-back direction, mm.
     #[serde(default = "default_chest_wall_mm")]
+    #[schemars(range(min = 15.0, max = 150.0))]
     pub chest_wall_mm: f64,
     /// Skin to pleura at the side, mm.
     #[serde(default = "default_lateral_wall_mm")]
+    #[schemars(range(min = 15.0, max = 150.0))]
     pub lateral_wall_mm: f64,
     /// Skin to pleura at the back, beside the spine, mm.
     #[serde(default = "default_posterior_wall_mm")]
+    #[schemars(range(min = 15.0, max = 150.0))]
     pub posterior_wall_mm: f64,
     /// Diameter of a rib (a chain of capsules), mm.
     #[serde(default = "default_rib_diameter_mm")]
+    #[schemars(range(min = 3.0, max = 16.0))]
     pub rib_diameter_mm: f64,
     /// Width of the body of the sternum, mm.
     #[serde(default = "default_sternum_width_mm")]
+    #[schemars(range(min = 15.0, max = 70.0))]
     pub sternum_width_mm: f64,
     /// Thickness of the sternum, mm.
     #[serde(default = "default_sternum_thickness_mm")]
+    #[schemars(range(min = 4.0, max = 20.0))]
     pub sternum_thickness_mm: f64,
     /// Diameter of a thoracic vertebral body, mm.
     #[serde(default = "default_vertebra_diameter_mm")]
+    #[schemars(range(min = 15.0, max = 50.0))]
     pub vertebra_diameter_mm: f64,
     /// Diameter of a marker disc, mm.
     #[serde(default = "default_marker_diameter_mm")]
+    #[schemars(range(min = 5.0, max = 40.0))]
     pub marker_diameter_mm: f64,
     /// Thickness of a marker disc, mm.
     #[serde(default = "default_marker_thickness_mm")]
+    #[schemars(range(min = 0.2, max = 5.0))]
     pub marker_thickness_mm: f64,
     /// Lesions; none when the key is left out.
     #[serde(default)]
@@ -62,10 +81,13 @@ pub struct PhantomParameters {
 #[serde(deny_unknown_fields)]
 pub struct LesionParameters {
     /// Name, unique among lesions: letters, digits, `_` and `-`.
+    #[schemars(regex(pattern = NAME))]
     pub name: String,
     /// Centre in the phantom frame (left, posterior, superior), mm.
+    #[schemars(inner(range(min = -500.0, max = 500.0)))]
     pub center_mm: [f64; 3],
     /// Diameter, mm.
+    #[schemars(range(min = 1.0, max = 150.0))]
     pub diameter_mm: f64,
 }
 
@@ -74,10 +96,13 @@ pub struct LesionParameters {
 #[serde(deny_unknown_fields)]
 pub struct MarkerParameters {
     /// Name, unique among markers: letters, digits, `_` and `-`.
+    #[schemars(regex(pattern = NAME))]
     pub name: String,
     /// Direction about z: 0 is anterior, 90 the patient's left, -90 the patient's right, deg.
+    #[schemars(range(min = -180.0, max = 180.0))]
     pub azimuth_deg: f64,
     /// Height in the phantom frame (z), mm.
+    #[schemars(range(min = -500.0, max = 500.0))]
     pub height_mm: f64,
 }
 
@@ -135,11 +160,6 @@ pub(super) const PRESETS: [(&str, &str); 6] = [
     preset!("female-p95"),
 ];
 
-/// Largest angle about z that a marker may be given, deg.
-const AZIMUTH_LIMIT_DEG: f64 = 180.0;
-/// Largest coordinate that a lesion centre may be given, mm; finer checks need the skin.
-const COORDINATE_LIMIT_MM: f64 = 500.0;
-
 impl PhantomParameters {
     /// Parses a parameter file. Ranges are checked by [`super::Phantom::build`].
     pub fn from_toml(text: &str) -> Result<Self, PhantomError> {
@@ -161,57 +181,11 @@ impl PhantomParameters {
 
     /// Checks every value that can be judged without the geometry.
     pub(super) fn validate(&self) -> Result<(), PhantomError> {
-        // Bounds: beyond the smallest and largest adults on record, with room for children's and
-        // obese phantoms; they are there to catch unit mistakes.
-        for (key, value, lower, upper) in [
-            ("breadth_mm", self.breadth_mm, 150.0, 600.0),
-            ("depth_mm", self.depth_mm, 120.0, 600.0),
-            ("length_mm", self.length_mm, 200.0, 700.0),
-            ("chest_wall_mm", self.chest_wall_mm, 15.0, 150.0),
-            ("lateral_wall_mm", self.lateral_wall_mm, 15.0, 150.0),
-            ("posterior_wall_mm", self.posterior_wall_mm, 15.0, 150.0),
-            ("rib_diameter_mm", self.rib_diameter_mm, 3.0, 16.0),
-            ("sternum_width_mm", self.sternum_width_mm, 15.0, 70.0),
-            ("sternum_thickness_mm", self.sternum_thickness_mm, 4.0, 20.0),
-            (
-                "vertebra_diameter_mm",
-                self.vertebra_diameter_mm,
-                15.0,
-                50.0,
-            ),
-            ("marker_diameter_mm", self.marker_diameter_mm, 5.0, 40.0),
-            ("marker_thickness_mm", self.marker_thickness_mm, 0.2, 5.0),
-        ] {
-            in_range(key, value, lower, upper)?;
-        }
-        for lesion in &self.lesions {
-            let key = |field: &str| format!("lesions.{}.{field}", lesion.name);
-            good_name("lesion", &lesion.name)?;
-            in_range(key("diameter_mm"), lesion.diameter_mm, 1.0, 150.0)?;
-            for coordinate in lesion.center_mm {
-                in_range(
-                    key("center_mm"),
-                    coordinate,
-                    -COORDINATE_LIMIT_MM,
-                    COORDINATE_LIMIT_MM,
-                )?;
-            }
-        }
-        for marker in &self.markers {
-            let key = |field: &str| format!("markers.{}.{field}", marker.name);
-            good_name("marker", &marker.name)?;
-            in_range(
-                key("azimuth_deg"),
-                marker.azimuth_deg,
-                -AZIMUTH_LIMIT_DEG,
-                AZIMUTH_LIMIT_DEG,
-            )?;
-            in_range(
-                key("height_mm"),
-                marker.height_mm,
-                -COORDINATE_LIMIT_MM,
-                COORDINATE_LIMIT_MM,
-            )?;
+        let values = toml::Table::try_from(self).map_err(|error| PhantomError::Parse {
+            message: error.to_string(),
+        })?;
+        if let Some(misfit) = PARAMETERS.check(&values).into_iter().next() {
+            return Err(misfit.into());
         }
         unique("lesion", self.lesions.iter().map(|lesion| &lesion.name))?;
         unique("marker", self.markers.iter().map(|marker| &marker.name))
@@ -223,49 +197,6 @@ impl Default for PhantomParameters {
     fn default() -> Self {
         Self::preset("male-p50").expect("the shipped preset is parsed by a test")
     }
-}
-
-fn in_range(
-    key: impl Into<String>,
-    value: f64,
-    lower: f64,
-    upper: f64,
-) -> Result<(), PhantomError> {
-    let key = key.into();
-    if !value.is_finite() {
-        return Err(PhantomError::NotFinite { key, value });
-    }
-    if (lower..=upper).contains(&value) {
-        return Ok(());
-    }
-    let fits = |factor: f64| value > 0.0 && (lower..=upper).contains(&(value * factor));
-    let hint = if !key.ends_with("_mm") {
-        ""
-    } else if fits(10.0) {
-        ": did you give centimetres?"
-    } else if fits(1000.0) {
-        ": did you give metres?"
-    } else {
-        ""
-    };
-    Err(PhantomError::OutOfRange {
-        key,
-        value,
-        lower,
-        upper,
-        hint,
-    })
-}
-
-fn good_name(kind: &'static str, name: &str) -> Result<(), PhantomError> {
-    let good = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if name.is_empty() || !name.chars().all(good) {
-        return Err(PhantomError::BadName {
-            kind,
-            name: name.to_owned(),
-        });
-    }
-    Ok(())
 }
 
 fn unique<'a>(
@@ -308,22 +239,24 @@ mod tests {
         }
     }
 
+    /// Key of the value that is refused.
+    fn refused(parameters: &PhantomParameters) -> String {
+        match parameters.validate() {
+            Err(PhantomError::Value { key, .. }) => key,
+            other => panic!("{other:?}"),
+        }
+    }
+
     #[test]
     fn non_finite_and_negative_values_are_refused() {
         let parameters = PhantomParameters {
             depth_mm: f64::NAN,
             ..PhantomParameters::default()
         };
-        assert!(matches!(
-            parameters.validate(),
-            Err(PhantomError::NotFinite { key, .. }) if key == "depth_mm"
-        ));
+        assert_eq!(refused(&parameters), "depth_mm");
         let mut parameters = PhantomParameters::default();
         parameters.lesions[0].diameter_mm = -5.0;
-        assert!(matches!(
-            parameters.validate(),
-            Err(PhantomError::OutOfRange { hint: "", .. })
-        ));
+        assert_eq!(refused(&parameters), "lesions[0].diameter_mm");
     }
 
     #[test]
@@ -335,10 +268,7 @@ mod tests {
             Err(PhantomError::DuplicateName { kind: "lesion", .. })
         ));
         parameters.lesions[1].name = "upper lobe".to_owned();
-        assert!(matches!(
-            parameters.validate(),
-            Err(PhantomError::BadName { kind: "lesion", .. })
-        ));
+        assert_eq!(refused(&parameters), "lesions[1].name");
     }
 
     #[test]

@@ -97,7 +97,7 @@ pub(super) fn bones(
     parts
 }
 
-fn bone(solid: crate::shape::Solid, organ: &str) -> PhantomPart {
+fn bone(solid: needlebench_geometry::Solid, organ: &str) -> PhantomPart {
     PhantomPart {
         name: solid.name.clone(),
         tissue: Tissue::Bone,

@@ -1,9 +1,9 @@
 //! The skin as what lines pierce and points are under.
 
 use nalgebra::{Point3, UnitVector3};
+use needlebench_geometry::mesh::SurfaceIndex;
 
 use super::half_spaces::HalfSpaces;
-use crate::mesh::SurfaceIndex;
 
 /// The outer surface, in the phantom frame.
 #[derive(Debug, Clone, PartialEq)]

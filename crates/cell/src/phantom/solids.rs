@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use needlebench_geometry::{ConvexMesh, Shape, Solid};
 use needlebench_kinematics::Pose;
-
-use crate::shape::{ConvexMesh, Shape, Solid};
 
 /// Capsule around the segment between two points.
 pub(super) fn capsule(name: String, from: Point3<f64>, to: Point3<f64>, radius_m: f64) -> Solid {

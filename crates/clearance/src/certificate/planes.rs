@@ -1,10 +1,9 @@
 //! Gaps between two solids along a fixed direction, and what they prove between two postures.
 
 use nalgebra::Vector3;
+use needlebench_geometry::{BoundingCapsule, Placement, PreparedShape};
 
-use crate::bounds::Capsule;
-use crate::core::{Placement, PreparedShape};
-use crate::model::PlacedShape;
+use crate::body::PlacedShape;
 
 /// A direction fixed to the inner body, from the inner solid to the outer one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +17,7 @@ pub(super) struct Plane {
 
 /// Largest coordinate of a shape along a direction in its own frame, m.
 fn extent_m(shape: &PreparedShape, direction: &Vector3<f64>, hint: &mut usize) -> f64 {
-    shape.core.support(direction, hint).dot(direction) + shape.radius_m * direction.norm()
+    shape.core_support(direction, hint).dot(direction) + shape.radius_m() * direction.norm()
 }
 
 impl Plane {
@@ -45,7 +44,11 @@ impl Plane {
 }
 
 /// Gap between two capsules along a unit vector from the second to the first, m.
-pub(super) fn capsule_gap_m(normal: &Vector3<f64>, outer: &Capsule, inner: &Capsule) -> f64 {
+pub(super) fn capsule_gap_m(
+    normal: &Vector3<f64>,
+    outer: &BoundingCapsule,
+    inner: &BoundingCapsule,
+) -> f64 {
     normal.dot(&(outer.centre - inner.centre))
         - normal.dot(&outer.half_axis).abs()
         - normal.dot(&inner.half_axis).abs()
@@ -110,7 +113,7 @@ impl Gaps {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::pose_sets::SplitMix64;
+    use needlebench_kinematics::random::SplitMix64;
 
     use super::*;
 

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use needlebench_cell::{ClearanceClass, Frame};
+use needlebench_geometry::{Placement, Separation, separation_within};
 use needlebench_kinematics::trajectory::Phase;
 
 use super::motion::{Motion, Span};
@@ -11,9 +12,8 @@ use super::{
     CertificateOptions, ClassCertificate, Effort, LEAST_INTERVAL_S, MOST_INTERVALS, MotionBound,
     MotionCertificate, ROUNDING_M,
 };
-use crate::core::Placement;
-use crate::model::{CLASS_COUNT, ClearanceModel, PairClearance, PlacedShape};
-use crate::separation::{Separation, closer_than};
+use crate::body::PlacedShape;
+use crate::model::{CLASS_COUNT, ClearanceModel, PairClearance};
 
 /// Two solids of a pair, by who moves relative to whom.
 #[derive(Debug)]
@@ -59,7 +59,7 @@ impl Couple<'_> {
     fn separation(&self, inner_from_outer: &Placement) -> Separation {
         let outer = inner_from_outer.after(&self.outer.body_from_shape);
         let inner_solid_from_outer_solid = self.inner.body_from_shape.inverse_after(&outer);
-        closer_than(
+        separation_within(
             &self.outer.shape,
             &self.inner.shape,
             &inner_solid_from_outer_solid,

@@ -1,10 +1,10 @@
 //! How far and how crookedly the points of a solid move between two postures.
 
 use nalgebra::Vector3;
+use needlebench_geometry::Placement;
 use needlebench_kinematics::{Chain, JOINT_COUNT, Joints};
 
-use crate::core::Placement;
-use crate::model::{LinkPlacements, PlacedShape};
+use crate::body::{LinkPlacements, PlacedShape};
 
 /// A posture of the motion.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use needlebench_cell::ClearanceClass;
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 
 use super::motion::{Motion, RecordedMotion, Span};
@@ -10,7 +10,7 @@ use super::search;
 use super::{CertificateOptions, ClassCertificate, MotionBound, MotionCertificate, certify};
 use crate::model::ClearanceModel;
 
-#[path = "../../tests/common/motions.rs"]
+#[path = "../../tests/clearance/common/motions.rs"]
 mod motions;
 
 use motions::{motions, shipped};

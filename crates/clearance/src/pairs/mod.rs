@@ -14,7 +14,7 @@ use needlebench_cell::{
     BodyPair, Cell, ClearanceClass, LeftOut, PairRule, pair_rule, place_in_chain,
 };
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 use serde::Serialize;
 
 use crate::ClearanceModel;

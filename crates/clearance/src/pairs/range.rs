@@ -21,8 +21,8 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_cell::shape::{Shape, Solid, TriangleMesh};
 use needlebench_cell::{BodyPair, Cell};
+use needlebench_geometry::{Shape, Solid, TriangleMesh};
 use needlebench_kinematics::{Chain, JOINT_COUNT, JointLimit, Joints};
 
 use super::PairSettings;

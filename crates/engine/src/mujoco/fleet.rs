@@ -2,11 +2,12 @@
 
 use needlebench_cell::Cell;
 use needlebench_kinematics::Joints;
+use needlebench_kinematics::trajectory::JointTrajectory;
 
 use super::member::{Member, Model, unstable};
 use super::process::GroupStep;
 use super::{HarnessProcess, HarnessState, MujocoSettings};
-use crate::{EngineError, EngineIdentity, PlantState};
+use crate::{EngineError, EngineIdentity, Fleet, PlantState};
 
 /// Arms of one cell that share a compiled model, each with a state of its own.
 ///
@@ -44,22 +45,6 @@ impl<'h> MujocoFleet<'h> {
         })
     }
 
-    /// Name, version and settings, the same for all arms.
-    pub fn identity(&self) -> EngineIdentity {
-        self.model.identity(self.harness.versions())
-    }
-
-    /// Length of a step, s.
-    pub fn timestep_s(&self) -> f64 {
-        self.model.timestep_s
-    }
-
-    /// Number of arms: at least one.
-    #[expect(clippy::len_without_is_empty, reason = "it is never empty")]
-    pub fn len(&self) -> usize {
-        self.members.len()
-    }
-
     /// Places one arm at rest at `position`, rad, and forgets everything that it did before.
     ///
     /// # Panics
@@ -67,19 +52,26 @@ impl<'h> MujocoFleet<'h> {
     pub fn reset(&mut self, arm: usize, position: &Joints) -> Result<PlantState, EngineError> {
         self.members[arm].reset(self.harness, &self.model, position)
     }
+}
 
-    /// Advances some of the arms by one step under constant joint torques, N m; states are in the
-    /// order of `torques_nm`.
-    ///
-    /// An arm that became unstable has an error in place of its state until it is reset; the others
-    /// are not concerned.
-    ///
-    /// # Errors
-    /// If the harness failed, for all of them.
-    ///
-    /// # Panics
-    /// If there is no such arm.
-    pub fn step(
+impl Fleet for MujocoFleet<'_> {
+    fn identity(&self) -> EngineIdentity {
+        self.model.identity(self.harness.versions())
+    }
+
+    fn arms(&self) -> usize {
+        self.members.len()
+    }
+
+    fn timestep_s(&self) -> f64 {
+        self.model.timestep_s
+    }
+
+    fn begin(&mut self, arm: usize, motion: &JointTrajectory) -> Result<PlantState, EngineError> {
+        self.reset(arm, &motion.sample(0.0).position)
+    }
+
+    fn step(
         &mut self,
         torques_nm: &[(usize, Joints)],
     ) -> Result<Vec<Result<PlantState, EngineError>>, EngineError> {

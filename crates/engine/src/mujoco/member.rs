@@ -8,7 +8,7 @@ use needlebench_kinematics::{JOINT_COUNT, Joints};
 use super::mjcf::{FLANGE_SITE, geoms_of, joint_name, link_name, mjcf};
 use super::process::GroupStep;
 use super::{HarnessProcess, HarnessState, HarnessVersions, MujocoSettings, PlantHandle};
-use crate::nearness::Nearness;
+use crate::broad_phase::BroadPhase;
 use crate::plant::checked_timestep_s;
 use crate::{Contact, EngineError, EngineIdentity, PlantState};
 
@@ -26,7 +26,7 @@ pub(super) struct Model {
 pub(super) struct Member {
     pub handle: PlantHandle,
     pub position: Joints,
-    nearness: Nearness,
+    broad_phase: BroadPhase,
     /// Something may touch in the next step.
     look: bool,
 }
@@ -45,7 +45,7 @@ impl Model {
         let handle = harness.load(&text, FLANGE_SITE)?;
         let joints = (0..JOINT_COUNT).map(joint_name);
         if !joints.eq(handle.joint_names.iter().cloned()) {
-            return Err(EngineError::ModelMismatch { missing: "joints" });
+            return Err(mismatch("joints"));
         }
         let mut bodies = BTreeMap::new();
         for (body, each) in cell.bodies.iter().enumerate() {
@@ -59,14 +59,14 @@ impl Model {
             .iter()
             .map(|name| bodies.get(name).and_then(|&body| u32::try_from(body).ok()))
             .collect::<Option<Vec<u32>>>()
-            .ok_or(EngineError::ModelMismatch { missing: "geoms" })?;
+            .ok_or_else(|| mismatch("geoms"))?;
         let mut link_bodies = [0; JOINT_COUNT];
         for (i, index) in link_bodies.iter_mut().enumerate() {
             *index = handle
                 .body_names
                 .iter()
                 .position(|name| *name == link_name(i))
-                .ok_or(EngineError::ModelMismatch { missing: "links" })?;
+                .ok_or_else(|| mismatch("links"))?;
         }
         let model = Self {
             settings: *settings,
@@ -77,7 +77,7 @@ impl Model {
         let member = Member {
             handle,
             position: Joints::zeros(),
-            nearness: Nearness::new(cell)?,
+            broad_phase: BroadPhase::new(cell)?,
             look: true,
         };
         Ok((model, member))
@@ -93,7 +93,7 @@ impl Model {
         let (stiffness_per_s2, damping_per_s) = self.settings.contact_spring(self.timestep_s);
         let setting = |key: &str, value: String| (key.to_owned(), value);
         EngineIdentity {
-            name: "mujoco".into(),
+            name: "mujoco",
             version: versions.mujoco.clone(),
             settings: vec![
                 setting("timestep_s", self.timestep_s.to_string()),
@@ -110,7 +110,7 @@ impl Model {
 
     fn body(&self, geom: u32) -> Result<u32, EngineError> {
         let body = self.body_of_geom.get(geom as usize).copied();
-        body.ok_or(EngineError::ModelMismatch { missing: "geoms" })
+        body.ok_or_else(|| mismatch("geoms"))
     }
 }
 
@@ -119,7 +119,7 @@ impl Member {
     pub(super) fn copy(&self, harness: &mut HarnessProcess) -> Result<Self, EngineError> {
         Ok(Self {
             handle: harness.copy(&self.handle)?,
-            nearness: self.nearness.clone(),
+            broad_phase: self.broad_phase.clone(),
             ..*self
         })
     }
@@ -131,7 +131,7 @@ impl Member {
         model: &Model,
         position: &Joints,
     ) -> Result<PlantState, EngineError> {
-        self.nearness.reset(position);
+        self.broad_phase.reset(position);
         let state = harness.reset(&self.handle, position.as_slice(), &[0.0; JOINT_COUNT])?;
         let mut state = self.observed(model, &state)?;
         // MuJoCo solves the forces of the posture at once; no step has borne them yet.
@@ -164,7 +164,7 @@ impl Member {
         };
         // The handle's counts were held against the six joints.
         self.position = Joints::from_column_slice(&state.qpos);
-        self.look = self.nearness.move_to(&self.position);
+        self.look = self.broad_phase.move_to(&self.position);
         Ok(PlantState {
             position: self.position,
             velocity: Joints::from_column_slice(&state.qvel),
@@ -176,6 +176,13 @@ impl Member {
                 pair,
             },
         })
+    }
+}
+
+/// The harness has another model than the one it was given.
+fn mismatch(missing: &str) -> EngineError {
+    EngineError::Refused {
+        reason: format!("the MuJoCo harness reports other {missing} than its model has"),
     }
 }
 

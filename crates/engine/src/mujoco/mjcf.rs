@@ -3,11 +3,12 @@
 use std::fmt::Write as _;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use needlebench_cell::shape::{Shape, Solid, TriangleMesh};
 use needlebench_cell::{Cell, Frame};
+use needlebench_geometry::{Shape, Solid, TriangleMesh};
 use needlebench_kinematics::{JOINT_COUNT, Pose};
+use quick_xml::escape::escape;
 
-use super::plant::MujocoSettings;
+use super::settings::MujocoSettings;
 use crate::EngineError;
 use crate::contact_groups::{ContactBits, contact_bits};
 use crate::error::{check_bodies, convex_pieces};
@@ -187,7 +188,7 @@ impl Writer<'_> {
                 }
                 self.leaf(&format!(
                     "mesh name=\"{}\" inertia=\"convex\" vertex=\"{}\"",
-                    escaped(&name),
+                    escape(&*name),
                     vertices.trim_end()
                 ));
             }
@@ -202,7 +203,7 @@ impl Writer<'_> {
                 let ContactBits { member, mask } = self.bits[body];
                 let solid = &self.cell.bodies[body].solids[k];
                 for (name, _) in geoms_of(self.cell, body, k)? {
-                    let name = escaped(&name);
+                    let name = escape(&*name);
                     self.leaf(&format!(
                         "geom name=\"{name}\" {} {} contype=\"{member}\" conaffinity=\"{mask}\"",
                         shape(solid, &name),
@@ -270,13 +271,6 @@ fn quat_wxyz(q: &UnitQuaternion<f64>) -> String {
 /// 17 significant digits: every f64 comes back as it was.
 fn number(value: f64) -> String {
     format!("{value:.16e}")
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -1,17 +1,21 @@
 //! MuJoCo, stepped in lock-step by a Python process at the other end of a pipe.
 
+mod engine;
 mod environment;
 mod fleet;
 mod member;
 mod mjcf;
 mod plant;
 mod process;
+mod settings;
 mod tail;
 
+pub(crate) use engine::Mujoco;
 pub use environment::{Environment, EnvironmentError, EnvironmentOptions, ensure, ensure_with};
 pub use fleet::MujocoFleet;
-pub use plant::{MujocoIntegrator, MujocoPlant, MujocoSettings};
+pub use plant::MujocoPlant;
 pub use process::{
     ContactSummary, GeomDistance, HarnessError, HarnessProcess, HarnessState, HarnessVersions,
     InverseDynamics, PlantHandle, Replay,
 };
+pub use settings::{MujocoIntegrator, MujocoSettings};

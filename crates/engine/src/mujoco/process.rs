@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use super::environment::{Environment, harness_override};
 use super::tail::Tail;
+use crate::EngineError;
 pub use answers::{
     ContactSummary, GeomDistance, HarnessState, HarnessVersions, InverseDynamics, PlantHandle,
     Replay,
@@ -101,6 +102,27 @@ pub enum HarnessError {
         /// Largest size allowed.
         limit: usize,
     },
+}
+
+impl HarnessError {
+    /// Whether the process is of no further use.
+    pub fn ends_the_process(&self) -> bool {
+        !matches!(
+            self,
+            Self::Engine { .. } | Self::Length { .. } | Self::TooLarge { .. }
+        )
+    }
+}
+
+impl From<HarnessError> for EngineError {
+    fn from(error: HarnessError) -> Self {
+        let reason = error.to_string();
+        if error.ends_the_process() {
+            Self::Lost { reason }
+        } else {
+            Self::Refused { reason }
+        }
+    }
 }
 
 fn quoted(stderr_tail: &str) -> String {

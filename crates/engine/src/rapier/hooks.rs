@@ -5,7 +5,7 @@ use rapier3d_f64::dynamics::{RigidBodyHandle, RigidBodySet};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::pipeline::{ContactModificationContext, PhysicsHooks};
 
-use super::convert::UNITS_PER_M;
+use crate::convert::UNITS_PER_M;
 
 /// Contacts with a shorter lever about every joint are not solved, m.
 ///

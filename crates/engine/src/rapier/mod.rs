@@ -1,6 +1,6 @@
 //! The arm in rapier, as a reduced-coordinate multibody.
 
-pub(crate) mod convert;
+mod engine;
 mod hooks;
 mod world;
 
@@ -9,9 +9,10 @@ use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
 use rapier3d_f64::geometry::ContactPair;
 use serde::{Deserialize, Serialize};
 
+use crate::convert::UNITS_PER_M;
 use crate::plant::checked_timestep_s;
 use crate::{Contact, EngineError, EngineIdentity, Plant, PlantState};
-use convert::UNITS_PER_M;
+pub(crate) use engine::Rapier;
 use world::{Blueprint, World};
 
 /// Version of the `rapier3d-f64` crate that is linked; held against `Cargo.lock` by a test.
@@ -189,7 +190,7 @@ impl Plant for RapierPlant {
         } = self.settings;
         let setting = |key: &str, value: String| (key.to_owned(), value);
         EngineIdentity {
-            name: "rapier".into(),
+            name: "rapier",
             version: RAPIER_VERSION.into(),
             settings: vec![
                 setting("timestep_s", self.timestep_s.to_string()),

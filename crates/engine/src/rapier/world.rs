@@ -15,11 +15,11 @@ use rapier3d_f64::parry::mass_properties::MassProperties;
 use rapier3d_f64::pipeline::{ActiveHooks, PhysicsWorld};
 
 use super::RapierSettings;
-use super::convert::{UNITS_PER_M, mass_properties, pose, pose_m, rotation_from_x, vector};
 use super::hooks::Hooks;
 use crate::EngineError;
+use crate::broad_phase::{BroadPhase, Part};
+use crate::convert::{UNITS_PER_M, mass_properties, pose, pose_m, rotation_from_x, vector};
 use crate::error::check_bodies;
-use crate::nearness::{Nearness, Part};
 
 /// Index of a revolute joint's angle among a joint's six coordinates.
 const ANGLE: usize = 3;
@@ -37,7 +37,7 @@ pub(super) struct Blueprint {
     joints: [GenericJoint; JOINT_COUNT],
     masses: [MassProperties; JOINT_COUNT],
     armature_kgm2: Joints,
-    nearness: Nearness,
+    broad_phase: BroadPhase,
     /// Colliders of the parts that may touch.
     colliders: Vec<Collider>,
     gravity: Vector,
@@ -51,8 +51,8 @@ impl Blueprint {
         settings: &RapierSettings,
     ) -> Result<Self, EngineError> {
         check_bodies(cell)?;
-        let nearness = Nearness::new(cell)?;
-        let parts = nearness.parts().iter();
+        let broad_phase = BroadPhase::new(cell)?;
+        let parts = broad_phase.parts().iter();
         let colliders = parts.map(|part| collider(part, settings)).collect();
         let dynamics = cell.dynamics();
         Ok(Self {
@@ -67,7 +67,7 @@ impl Blueprint {
             }),
             masses: dynamics.bodies.map(|body| mass_properties(&body)),
             armature_kgm2: dynamics.armature_kgm2,
-            nearness,
+            broad_phase,
             colliders,
             gravity: vector(&cell.gravity_m_s2),
             parameters: parameters(timestep_s, settings),
@@ -122,7 +122,7 @@ fn parameters(timestep_s: f64, settings: &RapierSettings) -> IntegrationParamete
 /// never do, and moving the colliders of all of them would take longer than moving the arm.
 pub(super) struct World {
     physics: PhysicsWorld,
-    nearness: Nearness,
+    broad_phase: BroadPhase,
     /// Colliders of the parts that have not come near yet.
     colliders: Vec<Option<Collider>>,
     links: [RigidBodyHandle; JOINT_COUNT],
@@ -170,7 +170,7 @@ impl World {
         };
         let mut world = Self {
             physics,
-            nearness: blueprint.nearness.clone(),
+            broad_phase: blueprint.broad_phase.clone(),
             colliders: blueprint.colliders.iter().cloned().map(Some).collect(),
             links,
             joints,
@@ -192,7 +192,7 @@ impl World {
         arm.apply_displacements(position.as_slice());
         arm.forward_kinematics(bodies, false);
         arm.update_rigid_bodies(bodies, true);
-        world.nearness.reset(position);
+        world.broad_phase.reset(position);
         world.insert_near_colliders();
         // A step without duration: only user changes and collision detection.
         world.physics.integration_parameters.dt = 0.0;
@@ -214,17 +214,17 @@ impl World {
             beyond = torque;
         }
         let (position, _) = self.joint_state();
-        self.nearness.move_to(&position);
-        if self.nearness.has_news() {
+        self.broad_phase.move_to(&position);
+        if self.broad_phase.has_news() {
             self.insert_near_colliders();
         }
         self.physics.step_with_events(&self.hooks, &());
     }
 
     fn insert_near_colliders(&mut self) {
-        for part in self.nearness.near_pairs().flatten() {
+        for part in self.broad_phase.near_pairs().flatten() {
             if let Some(collider) = self.colliders[part].take() {
-                let link = self.nearness.parts()[part].link;
+                let link = self.broad_phase.parts()[part].link;
                 let body = link.map(|link| self.links[link]);
                 self.physics.insert_collider(collider, body);
             }

@@ -1,5 +1,6 @@
 //! The arm by our own equations of motion, integrated to rounding: the referee of the engines.
 
+mod engine;
 mod retrace;
 
 use nalgebra::SVector;
@@ -7,6 +8,7 @@ use needlebench_cell::Cell;
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, JOINT_LABELS, Joints, Pose, integrate};
 use serde::{Deserialize, Serialize};
 
+pub use engine::REFEREE;
 pub use retrace::retrace;
 
 use crate::error::check_bodies;
@@ -211,7 +213,7 @@ fn halves(phase: &Phase) -> (Joints, Joints) {
 impl Plant for RefereePlant {
     fn identity(&self) -> EngineIdentity {
         EngineIdentity {
-            name: "referee".into(),
+            name: "referee",
             version: env!("CARGO_PKG_VERSION").into(),
             settings: vec![
                 ("timestep_s".to_owned(), self.timestep_s.to_string()),
@@ -230,7 +232,7 @@ impl Plant for RefereePlant {
         for (&value, joint) in torque_nm.iter().zip(JOINT_LABELS) {
             if !value.is_finite() {
                 return Err(EngineError::Diverged {
-                    engine: "referee".into(),
+                    engine: "referee",
                     time_s: self.time_s,
                     joint,
                     quantity: "torque",

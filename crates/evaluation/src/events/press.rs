@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::contact::{
     ContactEpisode, ForceBalance, add_approach_speeds, episodes, force_balance, settled_index,
 };
+use crate::engine_pairs::largest_over_pairs;
 use crate::needle::tip_of;
 
 /// Time before the settled force in which its ripple is taken, s.
@@ -33,11 +34,12 @@ pub struct PressReport {
     pub not_staged: Option<String>,
     /// What the engines measured.
     pub engines: BTreeMap<String, PressEngineReport>,
-    /// Difference of the settled forces as a share of the larger; none unless both settled.
+    /// Difference of the settled forces as a share of the larger, the largest over all pairs of
+    /// engines; none unless all settled.
     pub force_difference: Option<f64>,
-    /// Distance of the engines' tips when settled, m.
+    /// Distance of the engines' tips when settled, likewise, m.
     pub tip_difference_settled_m: Option<f64>,
-    /// Largest distance of the engines' tips, m.
+    /// Largest distance of the engines' tips, likewise, m.
     pub tip_difference_peak_m: Option<f64>,
 }
 
@@ -129,24 +131,29 @@ fn settled_contact(recording: &Recording) -> Option<usize> {
     settled_index(recording, 0, last + 1).filter(|k| recording.state[*k].contact.count > 0)
 }
 
-/// Adds how the engines differ.
+/// Adds how the engines differ: the largest over all pairs of them.
 pub fn press_difference(
     report: &mut PressReport,
     cell: &needlebench_cell::Cell,
     goal: &Goal,
-    a: &Recording,
-    b: &Recording,
+    recordings: &[&Recording],
 ) {
-    let tips_m = |k: usize| {
+    let tips_m = |a: &Recording, b: &Recording, k: usize| {
         let [a, b] = [a, b].map(|each| tip_of(cell, goal, &each.state[k].world_from_flange));
         (a - b).norm()
     };
-    let steps = a.state.len().min(b.state.len());
-    report.tip_difference_peak_m = (0..steps).map(tips_m).reduce(f64::max);
-    if let Some((ka, kb)) = settled_contact(a).zip(settled_contact(b)) {
-        report.tip_difference_settled_m = Some(tips_m(ka.min(kb)));
+    let settled = |a: &Recording, b: &Recording| settled_contact(a).zip(settled_contact(b));
+    report.tip_difference_peak_m = largest_over_pairs(recordings, |a, b| {
+        let steps = a.state.len().min(b.state.len());
+        (0..steps).map(|k| tips_m(a, b, k)).reduce(f64::max)
+    });
+    report.tip_difference_settled_m = largest_over_pairs(recordings, |a, b| {
+        settled(a, b).map(|(ka, kb)| tips_m(a, b, ka.min(kb)))
+    });
+    report.force_difference = largest_over_pairs(recordings, |a, b| {
+        let (ka, kb) = settled(a, b)?;
         let forces = [&a.state[ka], &b.state[kb]].map(|state| state.contact.normal_force_n);
         let larger = forces[0].max(forces[1]);
-        report.force_difference = (larger > 0.0).then(|| (forces[0] - forces[1]).abs() / larger);
-    }
+        (larger > 0.0).then(|| (forces[0] - forces[1]).abs() / larger)
+    });
 }

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 use needlebench_cell::{Finding, nearest_name};
 
 use super::Commanded;
-use super::log::{LogUnits, RotationColumns};
+use super::log_units::{LogUnits, RotationColumns};
 use super::number::parse_shifted;
 use super::table::{HEADER_HINT, Heading, Table};
 use super::timestamp::seconds_of;

@@ -8,31 +8,12 @@ use std::collections::BTreeMap;
 use needlebench_cell::Finding;
 
 use super::columns::Columns;
+use super::log_units::LogUnits;
 use super::table::Table;
 use super::{Attained, Commanded};
 
 /// Findings of a file beyond this many help nobody.
 const MOST_FINDINGS: usize = 20;
-
-/// Units of columns whose names do not say them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct LogUnits {
-    /// Unit of lengths.
-    pub length: Option<&'static str>,
-    /// Unit of angles.
-    pub angle: Option<&'static str>,
-    /// What columns `rx`, `ry`, `rz` mean.
-    pub rotation: Option<RotationColumns>,
-}
-
-/// What columns `rx`, `ry`, `rz` mean: the same names are in use for different things.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RotationColumns {
-    /// Axis times angle, as a UR controller shows poses.
-    RotationVector,
-    /// Turns about the fixed axes x, then y, then z, as SpatialAnalyzer shows frames.
-    FixedXyz,
-}
 
 /// What a log says.
 #[derive(Debug, Clone, PartialEq)]

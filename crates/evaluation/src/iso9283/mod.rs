@@ -11,6 +11,7 @@ mod columns;
 mod drift;
 mod judge;
 mod log;
+mod log_units;
 mod measure;
 mod number;
 mod report;
@@ -22,7 +23,8 @@ mod written;
 pub use arrival::{Arrival, Stabilisation, stabilisation};
 pub use drift::{Drift, DriftBlock, drift};
 pub use judge::{SUBJECT, judge};
-pub use log::{LogUnits, RotationColumns, TrackerLog, read_commanded, read_log};
+pub use log::{TrackerLog, read_commanded, read_log};
+pub use log_units::{LogUnits, RotationColumns};
 pub use measure::{CycleMeasurement, Effort, measure_cycle};
 pub use report::{
     EngineMeasurement, FrameFit, Iso9283Report, MeasuredError, MeasuredReport, ProtocolSummary,

@@ -14,6 +14,9 @@ use super::{
 };
 use crate::motion::EngineDifference;
 
+/// Version of the keys of a measured report.
+const SCHEMA_VERSION: u32 = 1;
+
 /// Cycles over which the standard takes stabilisation time and overshoot.
 const STABILISATION_CYCLES: u32 = 3;
 
@@ -234,7 +237,7 @@ pub fn measured_report(
         .iter()
         .find(|each| each.pose == statistics.poses[0].pose);
     let report = MeasuredReport {
-        schema_version: crate::report::SCHEMA_VERSION,
+        schema_version: SCHEMA_VERSION,
         log: log_file.to_owned(),
         commanded: commanded_file.to_owned(),
         drift: first.and_then(|first| drift(first, &attained)),

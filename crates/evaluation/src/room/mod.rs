@@ -7,8 +7,6 @@
 mod grid;
 mod hand_cone;
 mod obstacles;
-mod ray;
-mod ray_tree;
 mod sector;
 mod sight;
 
@@ -16,9 +14,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 use needlebench_cell::people::{ElbowPreference, Handedness, PatientSides, Person, Side};
-use needlebench_cell::shape::Shape;
 use needlebench_cell::{BodyKind, Goal, ResolvedScenario};
-use needlebench_clearance::{PreparedShape, separation};
+use needlebench_geometry::{PreparedShape, Shape, separation};
 use needlebench_kinematics::{Joints, Pose};
 use serde::Serialize;
 
@@ -40,7 +37,7 @@ pub const FREE_MARGIN_M: f64 = 0.05;
 pub const VOXEL_M: f64 = 0.02;
 
 /// What one configuration leaves to the people in the room, in its final posture.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct RoomReport {
     /// Share of the half ball of 0.35 m on the outer side of the skin at the entry point that is
     /// farther than 0.05 m from arm and tool; what phantom, table, gantry and mount fill does not
@@ -361,7 +358,7 @@ fn elbow_is_up(links: &[Pose; 6]) -> bool {
 
 /// Points on all edges of a surface, no farther apart than [`SURFACE_SPACING_M`].
 fn edge_points(
-    mesh: &needlebench_cell::shape::TriangleMesh,
+    mesh: &needlebench_geometry::TriangleMesh,
     body_from_shape: &Pose,
 ) -> Vec<Point3<f64>> {
     let mut points = Vec::new();

@@ -1,14 +1,11 @@
 //! What stands between people and the entry point, placed for one posture.
 
 use nalgebra::Point3;
-use needlebench_cell::shape::Shape;
 use needlebench_cell::{BodyKind, Cell, Frame};
-use needlebench_clearance::{PreparedShape, separation};
+use needlebench_geometry::{PreparedShape, Shape, first_hit, separation};
 use needlebench_kinematics::{Joints, Pose};
 
 use super::grid::VoxelGrid;
-use super::ray::first_hit;
-use super::ray_tree::RayTree;
 
 /// Solids of a cell, ready for distances from points and for lines of sight.
 #[derive(Debug)]
@@ -25,8 +22,6 @@ struct Obstacle<'c> {
     is_robot: bool,
     shape: &'c Shape,
     prepared: PreparedShape,
-    /// Of a mesh.
-    tree: Option<RayTree>,
     body_from_shape: Pose,
     /// Ball around the shape, in its frame.
     ball_center_m: Point3<f64>,
@@ -60,10 +55,6 @@ impl<'c> Obstacles<'c> {
                     is_robot,
                     shape: &solid.shape,
                     prepared,
-                    tree: match &solid.shape {
-                        Shape::Mesh(mesh) => Some(RayTree::new(&mesh.surface)),
-                        _ => None,
-                    },
                     body_from_shape: solid.parent_from_shape,
                     ball_center_m,
                     ball_radius_m,
@@ -187,8 +178,8 @@ impl PlacedObstacles<'_> {
             }
             let from = placed.shape_from_world * from;
             let to = placed.shape_from_world * to;
-            let hit = match &placed.solid.tree {
-                Some(tree) => tree.first_hit(&from, &(to - from)),
+            let hit = match placed.solid.prepared.surface() {
+                Some(surface) => surface.first_hit(&from, &(to - from)),
                 None => first_hit(placed.solid.shape, &from, &to),
             };
             if let Some(t) = hit

@@ -16,7 +16,7 @@ use super::{
     wrap_angle,
 };
 use crate::geometry::{Mismatch, base_from_base_link};
-use crate::pose_sets::SplitMix64;
+use crate::random::SplitMix64;
 use crate::{Chain, Joints, Pose, UrGeometry};
 
 /// A posture with less residual solves the pose: m and rad.

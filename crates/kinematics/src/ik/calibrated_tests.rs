@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
 use super::numerical::pose_error;
 use super::*;
-use crate::pose_sets::{PoseSet, SplitMix64};
+use crate::pose_sets::PoseSet;
+use crate::random::SplitMix64;
 use crate::{Chain, Joints, Pose, UrGeometry};
 
 /// Share of branches that must be found; 99.93 % were over 9 calibrations and 9000 poses.

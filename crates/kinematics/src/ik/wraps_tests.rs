@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 use proptest::prelude::*;
 
 use super::{Wrap, WrapOrder, WrapSearch, closed_form, nearest_within_limits};
-use crate::pose_sets::{PoseSet, SplitMix64};
+use crate::pose_sets::PoseSet;
+use crate::random::SplitMix64;
 use crate::{JOINT_COUNT, JointLimits, Joints, LimitPolicy, UrGeometry, UrModel};
 
 fn limits(policy: LimitPolicy) -> JointLimits {

@@ -207,7 +207,7 @@ mod tests {
 
     use super::super::{MotionLimits, Phase, ProfileLimits};
     use super::*;
-    use crate::pose_sets::SplitMix64;
+    use crate::random::SplitMix64;
     use crate::{JOINT_COUNT, UrGeometry};
 
     /// A bound may be this much longer than the way, relatively: what is left of the coefficients'

@@ -1,19 +1,72 @@
 //! `needlebench atlas`.
 
-use std::path::Path;
+use crate::arguments::RobotArguments;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use needlebench_cell::{Finding, Goal, ResolvedScenario, nearest_name};
 use needlebench_clearance::ClearanceModel;
 use needlebench_planning::Aim;
 
+use super::run::prepare_folder;
 use super::{load, overrides, print_json, print_text};
-use crate::atlas::{AtlasReport, GoalAtlas, GoalAtlasReport, goal_atlas, picture, text};
-use crate::atomic::write_atomically;
-use crate::cli::{AimArgument, AtlasArguments};
+
 use crate::exit::ExitStatus;
-use crate::output::findings::print_findings;
-use crate::page::atlas_page;
+use crate::findings::print_findings;
+use needlebench_bench::atlas::{AtlasReport, GoalAtlas, GoalAtlasReport, goal_atlas};
+use needlebench_report::files::{Folder, write_atlas};
+use needlebench_report::table::atlas::text;
+
+#[derive(Debug, Args)]
+pub(crate) struct AtlasArguments {
+    /// Scenario whose goals are looked at.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// One goal; all of them if left out.
+    #[arg(long, value_name = "NAME")]
+    pub goal: Option<String>,
+    /// Rolls all round.
+    #[arg(long, value_name = "N", default_value_t = 360, value_parser = clap::value_parser!(u32).range(3..=36_000))]
+    pub rolls: u32,
+    /// What the marked roll of each range is best at; the scenario's `planning.roll_aim` if left out.
+    /// The report has all aims.
+    #[arg(long, value_enum)]
+    pub aim: Option<AimArgument>,
+    /// Folder for results; the scenario gets a folder of its name in it.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Print the atlas as one JSON document instead of the table.
+    #[arg(long)]
+    pub json: bool,
+    /// Draw no pictures.
+    #[arg(long)]
+    pub no_pictures: bool,
+    /// Write no page.
+    #[arg(long)]
+    pub no_page: bool,
+    /// Threads; the number of cores if left out. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: Option<u16>,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+/// What a roll is best at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub(crate) enum AimArgument {
+    /// Soft least clearance over all classes.
+    Clearance,
+    /// Margin to the joint limits.
+    JointMargin,
+    /// Distance from singularities.
+    Singularity,
+    /// Least motion of the needle's tip under errors of the joints.
+    TipAccuracy,
+    /// Weighted mean of the utilities of all these.
+    Balanced,
+}
 
 /// Computes and writes the atlas of one or all goals.
 pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
@@ -40,15 +93,8 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
         usize::from,
     );
     let folder = arguments.out.join(&resolved.scenario.name);
-    if let Err(error) = std::fs::create_dir_all(&folder) {
-        return refuse(
-            Finding::new(
-                folder.display().to_string(),
-                format!("the results folder cannot be written: {error}"),
-            )
-            .key("--out")
-            .hint("choose another folder with --out DIR"),
-        );
+    if let Err(finding) = prepare_folder(&folder) {
+        return refuse(finding);
     }
     let model = ClearanceModel::new(&resolved.cell);
     let mut atlases: Vec<(&Goal, GoalAtlas)> = Vec::new();
@@ -68,13 +114,12 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
         .map(|(goal, atlas)| GoalAtlasReport::new(&resolved.cell, goal, atlas))
         .collect();
     let report = AtlasReport::new(&resolved, reports);
-    write(
+    write_atlas(
         &resolved,
-        &folder,
         &atlases,
         &report,
-        !arguments.no_pictures,
-        !arguments.no_page,
+        Folder(&folder),
+        [!arguments.no_pictures, !arguments.no_page],
     )?;
     if arguments.json {
         print_json(&report)?;
@@ -135,34 +180,4 @@ fn aim_of(argument: AimArgument) -> Aim {
         AimArgument::TipAccuracy => Aim::TipAccuracy,
         AimArgument::Balanced => Aim::Balanced,
     }
-}
-
-fn write(
-    resolved: &ResolvedScenario,
-    folder: &Path,
-    atlases: &[(&Goal, GoalAtlas)],
-    report: &AtlasReport,
-    pictures: bool,
-    page: bool,
-) -> Result<()> {
-    let path = folder.join("atlas.json");
-    let mut json = serde_json::to_vec(report)?;
-    json.push(b'\n');
-    write_atomically(&path, &json).with_context(|| format!("cannot write {}", path.display()))?;
-    let path = folder.join("atlas.html");
-    if page {
-        let html = atlas_page(resolved, atlases, report);
-        write_atomically(&path, html.as_bytes())
-            .with_context(|| format!("cannot write {}", path.display()))?;
-    } else if path.exists() {
-        // Nobody should take an earlier atlas's for this one's.
-        std::fs::remove_file(&path)?;
-    }
-    if pictures {
-        for (goal, atlas) in atlases {
-            picture(&resolved.scenario.name, goal, atlas)
-                .write_png(&folder.join(format!("{}.atlas.png", goal.name)))?;
-        }
-    }
-    Ok(())
 }

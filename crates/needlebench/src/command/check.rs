@@ -1,13 +1,28 @@
 //! `needlebench check`.
 
+use crate::arguments::RobotArguments;
 use anyhow::Result;
+use clap::Args;
 use needlebench_cell::Finding;
 use serde::Serialize;
+use std::path::PathBuf;
 
 use super::{load_checked, overrides, print_json, print_text};
-use crate::cli::CheckArguments;
+
 use crate::exit::ExitStatus;
-use crate::output::findings::print_findings;
+use crate::findings::print_findings;
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckArguments {
+    /// Scenario files.
+    #[arg(required = true, value_name = "SCENARIO")]
+    pub scenarios: Vec<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
 
 #[derive(Serialize)]
 struct CheckAnswer {
@@ -26,7 +41,8 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
         Ok(overrides) => {
             for path in &arguments.scenarios {
                 match load_checked(path, &overrides) {
-                    Ok(resolved) => {
+                    Ok(runnable) => {
+                        let resolved = runnable.into_scenario();
                         if !arguments.json {
                             let purpose = match resolved.iso9283 {
                                 Some(_) => "test by ISO 9283".to_owned(),

@@ -1,6 +1,9 @@
 //! `needlebench clearance`.
 
+use crate::arguments::{RobotArguments, Six};
+use clap::Args;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use anyhow::Result;
 use needlebench_cell::Cell;
@@ -9,9 +12,24 @@ use needlebench_kinematics::Joints;
 use serde::Serialize;
 
 use super::{load, overrides, print_json, print_text};
-use crate::cli::ClearanceArguments;
+
 use crate::exit::ExitStatus;
-use crate::output::findings::print_findings;
+use crate::findings::print_findings;
+
+#[derive(Debug, Args)]
+pub(crate) struct ClearanceArguments {
+    /// Scenario whose cell is used.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// Joint positions, shoulder pan to wrist 3, rad.
+    #[arg(long, value_name = "q1,..,q6", allow_hyphen_values = true)]
+    pub joints: Six,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
 
 #[derive(Serialize)]
 struct ClearanceAnswer {
@@ -97,7 +115,7 @@ pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus> {
         })?;
         return Ok(ExitStatus::Success);
     }
-    let mut table = crate::output::plain_table(&["class", "clearance (mm)", "between", "and"]);
+    let mut table = needlebench_report::plain_table(&["class", "clearance (mm)", "between", "and"]);
     for (class, answer) in &classes {
         table.add_row([
             (*class).to_owned(),

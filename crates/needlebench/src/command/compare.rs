@@ -1,22 +1,97 @@
 //! `needlebench compare`.
 
+mod help;
+mod studies;
+mod thresholds;
+
+pub(crate) use help::compare_help;
+
+use crate::arguments::{EngineArgument, EngineParser};
+use clap::Args;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use needlebench_cell::{Finding, Overrides, ThresholdsFile};
+use needlebench_cell::{Finding, Overrides};
+use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::compare::{CompareOptions, compare as compare_reports};
-use needlebench_evaluation::{StoredReport, Threshold};
+use needlebench_evaluation::{Compared, StoredReport};
 
-use super::compare_studies::compare_if_studies;
 use super::run::probe_file;
 use super::{load_checked, print_json, print_text};
-use crate::atomic::write_atomically;
-use crate::cli::{CompareArguments, Pair};
+use studies::compare_if_studies;
+use thresholds::thresholds;
+
 use crate::exit::ExitStatus;
-use crate::output::comparison::{comparison_junit, comparison_markdown, comparison_text};
-use crate::output::findings::print_findings;
-use crate::pipeline::{self, RunOptions};
-use crate::progress::Progress;
+use crate::findings::print_findings;
+use crate::progress::TerminalProgress;
+use needlebench_bench::{RunOptions, Runnable};
+use needlebench_report::table::comparison::comparison_text;
+use needlebench_report::{comparison_junit, comparison_markdown, write_atomically};
+
+#[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub(crate) struct CompareArguments {
+    /// First result: a report.json, a results folder, or a scenario, which is then run; or a study's
+    /// folder or results.parquet.
+    #[arg(value_name = "A")]
+    pub a: PathBuf,
+    /// Second result, likewise.
+    #[arg(value_name = "B")]
+    pub b: PathBuf,
+    /// Engine for scenarios that have to be run first.
+    #[arg(
+        long,
+        value_name = "ENGINE[,ENGINE]",
+        value_parser = EngineParser,
+        default_value = "rapier"
+    )]
+    pub engine: EngineArgument,
+    /// A goal of A that is called otherwise in B; may be given several times.
+    #[arg(long, value_name = "A=B")]
+    pub goal: Vec<Pair>,
+    /// Largest loss of a metric that is allowed, with its unit: clearance=0.5mm, tip_error=5%; may be
+    /// given several times. `--help` lists the metrics. 0 allows no loss at all, not even rounding.
+    #[arg(long, value_name = "METRIC=VALUE")]
+    pub max_loss: Vec<Pair>,
+    /// TOML file with such losses under [max_loss]; those of the command line go before it.
+    #[arg(long, value_name = "TOML")]
+    pub thresholds: Option<PathBuf>,
+    /// Do not fail where a configuration no longer works.
+    #[arg(long)]
+    pub allow_status_change: bool,
+    /// List values that did not change too.
+    #[arg(long)]
+    pub all: bool,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    /// Write JUnit XML to this file.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+    /// Write a Markdown summary to this file.
+    #[arg(long, value_name = "FILE")]
+    pub markdown: Option<PathBuf>,
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Two texts with `=` between.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Pair(pub (String, String));
+
+impl std::str::FromStr for Pair {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.split_once('=') {
+            Some((a, b)) if !a.trim().is_empty() && !b.trim().is_empty() => {
+                Ok(Self((a.trim().to_owned(), b.trim().to_owned())))
+            }
+            _ => Err("needs a name, `=` and what it stands for".to_owned()),
+        }
+    }
+}
 
 /// Why there is nothing to compare.
 enum Refused {
@@ -99,44 +174,12 @@ fn compared(
 }
 
 fn options(arguments: &CompareArguments) -> Result<CompareOptions, Refused> {
-    let mut options = CompareOptions {
+    let given = thresholds(arguments, Compared::Runs).map_err(Refused::Input)?;
+    Ok(CompareOptions {
         renamed_goals: arguments.goal.iter().map(|pair| pair.0.clone()).collect(),
-        allow_status_change: arguments.allow_status_change,
-        ..CompareOptions::default()
-    };
-    let mut findings = Vec::new();
-    if let Some(path) = &arguments.thresholds {
-        let file = ThresholdsFile::load(path)?;
-        options.allow_status_change |= file.allow_status_change();
-        for (metric, limit) in file.max_loss() {
-            match Threshold::parse(metric, limit) {
-                Ok(threshold) => options.thresholds.push(threshold),
-                Err(error) => {
-                    findings.push(file.finding(metric, error.to_string()).hint(error.hint()));
-                }
-            }
-        }
-    }
-    for Pair((metric, limit)) in &arguments.max_loss {
-        match Threshold::parse(metric, limit) {
-            Ok(threshold) => {
-                // The command line goes before the file; of several of one metric the last counts.
-                let name = threshold.metric.name;
-                options.thresholds.retain(|known| known.metric.name != name);
-                options.thresholds.push(threshold);
-            }
-            Err(error) => findings.push(
-                Finding::new(format!("{metric}={limit}"), error.to_string())
-                    .key("--max-loss")
-                    .hint(error.hint()),
-            ),
-        }
-    }
-    if findings.is_empty() {
-        Ok(options)
-    } else {
-        Err(Refused::Input(findings))
-    }
+        thresholds: given.thresholds,
+        allow_status_change: given.allow_status_change,
+    })
 }
 
 /// One side of the comparison, before anything long starts.
@@ -144,7 +187,7 @@ enum Input {
     /// A report that was stored.
     Stored(StoredReport),
     /// A scenario that has to be run first.
-    Scenario(PathBuf, Box<needlebench_cell::ResolvedScenario>),
+    Scenario(PathBuf, Box<Runnable>),
 }
 
 fn input(path: &Path) -> Result<Input, Refused> {
@@ -153,8 +196,12 @@ fn input(path: &Path) -> Result<Input, Refused> {
         .extension()
         .is_some_and(|extension| extension == "toml")
     {
-        let resolved = load_checked(path, &Overrides::default()).map_err(Refused::Input)?;
-        return Ok(Input::Scenario(path.to_owned(), Box::new(resolved)));
+        let overrides = Overrides {
+            engines: engine_names(ENGINES),
+            ..Overrides::default()
+        };
+        let runnable = load_checked(path, &overrides).map_err(Refused::Input)?;
+        return Ok(Input::Scenario(path.to_owned(), Box::new(runnable)));
     }
     let file = if path.is_dir() {
         path.join("report.json")
@@ -189,19 +236,19 @@ fn results_below(folder: &Path) -> Option<String> {
 
 impl Input {
     fn report(self, arguments: &CompareArguments) -> Result<StoredReport, Refused> {
-        let (path, resolved) = match self {
+        let (path, runnable) = match self {
             Self::Stored(stored) => return Ok(stored),
-            Self::Scenario(path, resolved) => (path, resolved),
+            Self::Scenario(path, runnable) => (path, runnable),
         };
         let name = path.display().to_string();
         let options = RunOptions {
-            engines: Some(arguments.engine),
+            engines: Some(arguments.engine.names()),
             jobs: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-            referee: false,
+            ..RunOptions::default()
         };
-        let progress = Progress::new(arguments.quiet);
+        let progress = TerminalProgress::new(arguments.quiet);
         let cancel = std::sync::atomic::AtomicBool::new(false);
-        let finished = pipeline::run(&resolved, &options, &cancel, &progress);
+        let finished = needlebench_bench::run(&runnable, &options, &cancel, &progress);
         progress.finish();
         let report = finished
             .map_err(|error| Finding::new(&name, error.to_string()))?

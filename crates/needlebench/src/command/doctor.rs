@@ -1,12 +1,12 @@
 //! `needlebench doctor`.
 
 use anyhow::Result;
-use needlebench_engine::mujoco::{HarnessProcess, ensure};
+use needlebench_engine::ENGINES;
 use serde::Serialize;
 
 use super::{print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::provenance::GIT_REVISION;
+use needlebench_bench::provenance::GIT_REVISION;
 
 #[derive(Serialize)]
 struct DoctorAnswer {
@@ -22,7 +22,7 @@ struct Check {
     detail: String,
 }
 
-/// Checks what both engines need.
+/// Checks what the engines need.
 pub(crate) fn doctor(json: bool) -> Result<ExitStatus> {
     let mut checks = vec![
         Check {
@@ -37,45 +37,17 @@ pub(crate) fn doctor(json: bool) -> Result<ExitStatus> {
                 .map_or_else(|error| error.to_string(), |count| count.to_string()),
         },
     ];
-    let environment = ensure(&mut |text| {
-        if !json {
-            anstream::eprintln!("{text}");
-        }
-    });
-    match environment {
-        Err(error) => {
-            checks.push(Check {
-                name: "mujoco environment",
-                ok: false,
-                detail: error.to_string(),
-            });
-        }
-        Ok(environment) => {
-            checks.push(Check {
-                name: "mujoco environment",
-                ok: true,
-                detail: environment.python.display().to_string(),
-            });
-            let timeout = std::time::Duration::from_secs(30);
-            let (ok, detail) = match HarnessProcess::start(&environment, timeout) {
-                Ok(process) => {
-                    let versions = process.versions();
-                    (
-                        true,
-                        format!(
-                            "MuJoCo {}, Python {}, numpy {}",
-                            versions.mujoco, versions.python, versions.numpy
-                        ),
-                    )
-                }
-                Err(error) => (false, error.to_string()),
-            };
-            checks.push(Check {
-                name: "mujoco harness",
-                ok,
-                detail,
-            });
-        }
+    for engine in ENGINES {
+        let found = engine.check(&mut |text| {
+            if !json {
+                anstream::eprintln!("{text}");
+            }
+        });
+        checks.extend(found.into_iter().map(|each| Check {
+            name: each.name,
+            ok: each.found.is_ok(),
+            detail: each.found.unwrap_or_else(|missing| missing),
+        }));
     }
     let ok = checks.iter().all(|check| check.ok);
     if json {

@@ -1,23 +1,136 @@
 //! `needlebench iso9283`.
 
+use clap::{Args, ValueEnum};
 use std::fmt::Write;
 use std::path::Path;
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use needlebench_cell::Finding;
 use needlebench_evaluation::iso9283::{
     Attained, LogUnits, MeasuredReport, RotationColumns, measured_report, read_commanded, read_log,
-    write_log,
 };
 use needlebench_evaluation::report::Verdict;
 use serde::Serialize;
 
 use super::{print_json, print_text};
-use crate::atomic::write_atomically;
-use crate::cli::{AngleUnit, Iso9283Arguments, LengthUnit, RotationArgument};
+
 use crate::exit::ExitStatus;
-use crate::iso9283::{attained_picture, measured_text};
-use crate::output::findings::print_findings;
+use crate::findings::print_findings;
+use needlebench_report::files::{Folder, write_measured};
+use needlebench_report::table::iso9283::measured_text;
+
+pub(crate) const ISO9283_HELP: &str = "\
+Both files are tables whose first line names the columns and their units; comma, semicolon (with \
+decimal commas) or tab between them; lines that start with #, // or % are comments. `needlebench \
+run` of a scenario with [iso9283] writes both as an example.
+
+  pose         P1 to P5 or 1 to 5; P3_07 is pose 3 in cycle 7
+  x_mm y_mm z_mm   or x [mm], X (m) and so on: m, mm, um or in
+  cycle        1, 2, 3 ...; counted if there is none
+  direction    x, y or z where a pose was approached along an axis (for vAP), else empty
+  qw qx qy qz  orientation, or rx_deg ry_deg rz_deg with --rotation
+  time_s       seconds, or dates like 2026-01-31T12:00:00
+
+Positions are in the robot's base frame; --fit-frame finds the tracker's own frame first.
+
+Example: needlebench iso9283 --csv robot.csv --commanded commanded.csv --max-rp 0.1
+Example: needlebench iso9283 --csv export.txt --commanded poses.csv --length-unit mm --fit-frame";
+
+#[derive(Debug, Args)]
+pub(crate) struct Iso9283Arguments {
+    /// The tracker's log: a row for each measured pose.
+    #[arg(long, value_name = "CSV")]
+    pub csv: PathBuf,
+    /// Commanded poses: a row for each pose.
+    #[arg(long, value_name = "CSV")]
+    pub commanded: PathBuf,
+    /// The log is in the tracker's own frame: find it by the best fit of the mean positions to the
+    /// commanded ones. AP is then without the error of the base's place.
+    #[arg(long)]
+    pub fit_frame: bool,
+    /// Unit of lengths where the header does not say it.
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub length_unit: Option<LengthUnit>,
+    /// Unit of angles where the header does not say it.
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub angle_unit: Option<AngleUnit>,
+    /// What columns rx, ry, rz mean.
+    #[arg(long, value_enum, value_name = "MEANING")]
+    pub rotation: Option<RotationArgument>,
+    /// Largest pose accuracy AP of any pose, mm.
+    #[arg(long, value_name = "MM")]
+    pub max_ap: Option<f64>,
+    /// Largest pose repeatability RP of any pose, mm.
+    #[arg(long, value_name = "MM")]
+    pub max_rp: Option<f64>,
+    /// Largest multi-directional variation vAP of any pose, mm.
+    #[arg(long, value_name = "MM")]
+    pub max_vap: Option<f64>,
+    /// Folder for report.json, the measurements in the base frame, and a picture.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    /// Draw no picture.
+    #[arg(long)]
+    pub no_pictures: bool,
+}
+
+/// Units of length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LengthUnit {
+    /// Metres.
+    M,
+    /// Millimetres.
+    Mm,
+    /// Micrometres.
+    Um,
+    /// Inches.
+    In,
+}
+
+impl LengthUnit {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::M => "m",
+            Self::Mm => "mm",
+            Self::Um => "um",
+            Self::In => "in",
+        }
+    }
+}
+
+/// Units of angle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AngleUnit {
+    /// Degrees.
+    Deg,
+    /// Radians.
+    Rad,
+    /// Milliradians.
+    Mrad,
+}
+
+impl AngleUnit {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Deg => "deg",
+            Self::Rad => "rad",
+            Self::Mrad => "mrad",
+        }
+    }
+}
+
+/// What three columns of a rotation mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RotationArgument {
+    /// Axis times angle, as a UR controller shows poses.
+    RotationVector,
+    /// Turns about the fixed axes x, then y, then z, as SpatialAnalyzer shows frames.
+    FixedXyz,
+}
 
 /// The report with its verdict on the command line's limits.
 #[derive(Serialize)]
@@ -154,25 +267,10 @@ fn write_results(
     attained: &[Attained],
 ) -> Result<()> {
     std::fs::create_dir_all(folder)?;
-    let mut json = serde_json::to_vec_pretty(judged)?;
-    json.push(b'\n');
-    write_atomically(&folder.join("report.json"), &json)?;
-    let title = format!(
-        "needlebench: attained poses of {}\nPositions (mm) in the robot's base frame",
-        judged.report.log
-    );
-    write_atomically(
-        &folder.join("attained.csv"),
-        write_log(&title, attained).as_bytes(),
-    )?;
-    if !arguments.no_pictures {
-        let heading = arguments
-            .csv
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy();
-        attained_picture(&heading, &judged.report.statistics, attained)
-            .write_png(&folder.join("attained.png"))?;
-    }
+    let files = Folder(folder);
+    files.write_json("report.json", judged)?;
+    let report = judged.report;
+    let pictures = !arguments.no_pictures;
+    write_measured(&report.log, &report.statistics, attained, files, pictures)?;
     Ok(())
 }

@@ -4,6 +4,9 @@ mod answer;
 mod arm;
 mod target;
 
+use crate::arguments::{ArmArguments, PoseMatrix, Six};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -18,9 +21,88 @@ use self::answer::{ArmAnswer, FkAnswer, IkAnswer, SolutionAnswer, UnreachableAns
 use self::arm::Arm;
 use self::target::target;
 use super::{print_json, print_text};
-use crate::cli::{FkArguments, IkArguments, IkMethod};
+
 use crate::exit::ExitStatus;
-use crate::output::findings::print_findings;
+use crate::findings::print_findings;
+
+/// Methods of inverse kinematics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum IkMethod {
+    /// All configurations.
+    ClosedForm,
+    /// One, near the seed.
+    GaussNewton,
+    /// One, from any seed: damped, and started again until it converges.
+    Damped,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct IkArguments {
+    /// Scenario, of which `--goal` is solved.
+    #[arg(
+        value_name = "SCENARIO",
+        conflicts_with_all = ["pose", "matrix", "arm"],
+        requires = "goal"
+    )]
+    pub scenario: Option<PathBuf>,
+    /// Goal of the scenario.
+    #[arg(long, requires = "scenario")]
+    pub goal: Option<String>,
+    /// Pose of the flange in the controller's base frame: x,y,z (m) and rotation vector (rad).
+    #[arg(
+        long,
+        value_name = "x,y,z,rx,ry,rz",
+        allow_hyphen_values = true,
+        required_unless_present_any = ["scenario", "matrix"]
+    )]
+    pub pose: Option<Six>,
+    /// The same as a matrix: 12 or 16 numbers, row by row, rotation and position (m).
+    #[arg(
+        long,
+        value_name = "NUMBERS",
+        allow_hyphen_values = true,
+        conflicts_with = "pose"
+    )]
+    pub matrix: Option<PoseMatrix>,
+    /// Take the rotation that is nearest to the matrix if it is not exactly one, such as after
+    /// rounding.
+    #[arg(long, requires = "matrix")]
+    pub nearest_rotation: bool,
+    /// Method.
+    #[arg(long, value_enum, default_value = "closed-form")]
+    pub method: IkMethod,
+    /// Joint positions to start from or to be near to, rad.
+    #[arg(long, value_name = "q1,..,q6", allow_hyphen_values = true)]
+    pub seed: Option<Six>,
+    /// Steps after which a numerical method gives up.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_iterations: Option<u32>,
+    /// Time after which a numerical method gives up, ms. What it has found by then depends on the
+    /// machine.
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub time_limit_ms: Option<u32>,
+    /// List whole turns within the joint limits too, nearest to the seed (or to zero) first; at most
+    /// one turn more or less of a joint without limits.
+    #[arg(long)]
+    pub wraps: bool,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub arm: ArmArguments,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct FkArguments {
+    /// Joint positions, shoulder pan to wrist 3, rad.
+    #[arg(long, value_name = "q1,..,q6", allow_hyphen_values = true)]
+    pub joints: Six,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub arm: ArmArguments,
+}
 
 /// Solves the inverse kinematics of a pose or a goal.
 pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus> {

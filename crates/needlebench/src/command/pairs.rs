@@ -1,7 +1,10 @@
 //! `needlebench pairs`.
 
+use crate::arguments::RobotArguments;
+use clap::Args;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use needlebench_cell::{Cell, ClearanceClass, Finding, Srdf, load_scenario};
@@ -12,11 +15,40 @@ use needlebench_clearance::{
 use serde::Serialize;
 
 use super::{overrides, print_json, print_text};
-use crate::atomic::write_atomically;
-use crate::cli::PairsArguments;
+
 use crate::exit::ExitStatus;
-use crate::output::findings::print_findings;
-use crate::output::plain_table;
+use crate::findings::print_findings;
+use needlebench_report::plain_table;
+use needlebench_report::write_atomically;
+use quick_xml::escape::escape;
+
+#[derive(Debug, Args)]
+pub(crate) struct PairsArguments {
+    /// Scenario whose cell is looked at.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// SRDF whose disabled pairs are checked against the model. needlebench measures every pair
+    /// that can move, whatever an SRDF says.
+    #[arg(long, value_name = "FILE")]
+    pub srdf: Option<PathBuf>,
+    /// Write the arm's pairs that cannot collide as an SRDF.
+    #[arg(long, value_name = "FILE")]
+    pub write_srdf: Option<PathBuf>,
+    /// Random postures that the collision rates are taken from.
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub samples: u32,
+    /// Boxes of joint positions after which the proof that a pair never touches gives up.
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
+    pub proof_boxes: u32,
+    /// Seed of the postures.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    pub seed: u64,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
 
 #[derive(Serialize)]
 struct PairsAnswer {
@@ -304,9 +336,9 @@ fn write_srdf(
         "<?xml version=\"1.0\"?>\n<!-- Pairs that cannot collide, derived by needlebench from {}.\n     \
          Adjacent: they share a joint. Never: proven over the whole joint ranges, to {} mm. -->\n\
          <robot name=\"{}\">\n",
-        escaped(&robot.source.file.replace("--", "-")),
+        escape(robot.source.file.replace("--", "-")),
         settings.tolerance_m * 1e3,
-        escaped(&robot.name),
+        escape(&*robot.name),
     );
     for pair in examined {
         let reason = match pair.state {
@@ -319,8 +351,8 @@ fn write_srdf(
                 let _ = writeln!(
                     text,
                     "  <disable_collisions link1=\"{}\" link2=\"{}\" reason=\"{reason}\"/>",
-                    escaped(first),
-                    escaped(second),
+                    escape(first),
+                    escape(second),
                 );
             }
         }
@@ -328,10 +360,4 @@ fn write_srdf(
     text.push_str("</robot>\n");
     write_atomically(path, text.as_bytes())
         .with_context(|| format!("cannot write {}", path.display()))
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('"', "&quot;")
 }

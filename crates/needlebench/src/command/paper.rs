@@ -1,23 +1,36 @@
 //! `needlebench paper`.
 
-use std::path::Path;
+use clap::Args;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
-use needlebench_cell::Finding;
 
+use super::run::prepare_folder;
 use super::{print_json, print_text};
-use crate::atomic::write_atomically;
-use crate::cli::PaperArguments;
-use crate::exit::ExitStatus;
-use crate::output::findings::print_findings;
-use crate::paper::{PaperError, Reproduction, Watch, page, reproduce, text};
-use crate::picture::tile;
-use crate::progress::Progress;
 
-/// Columns of the sheet with all configurations.
-const SHEET_COLUMNS: usize = 4;
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::progress::TerminalProgress;
+use needlebench_paper::{PaperError, Watch, reproduce, text, write_paper};
+use needlebench_report::files::Folder;
+
+#[derive(Debug, Args)]
+pub(crate) struct PaperArguments {
+    /// Folder for `paper.json`, `paper.html` and the pictures.
+    #[arg(long, value_name = "DIR", default_value = "out/paper")]
+    pub out: PathBuf,
+    /// Print the results as one JSON document instead of the tables.
+    #[arg(long)]
+    pub json: bool,
+    /// Draw no pictures.
+    #[arg(long)]
+    pub no_pictures: bool,
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
 
 /// Reproduces the paper, writes the results and prints them.
 pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
@@ -25,17 +38,11 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
     let requested = Arc::clone(&cancel);
     ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
         .context("cannot watch for interrupts")?;
-    if let Err(error) = prepare(&arguments.out) {
-        let finding = Finding::new(
-            arguments.out.display().to_string(),
-            format!("the results folder cannot be written: {error}"),
-        );
-        print_findings(&[finding
-            .key("--out")
-            .hint("choose another folder with --out DIR")]);
+    if let Err(finding) = prepare_folder(&arguments.out) {
+        print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
-    let progress = Progress::new(arguments.quiet);
+    let progress = TerminalProgress::new(arguments.quiet);
     let watch = Watch {
         cancel: &cancel,
         progress: &progress,
@@ -50,7 +57,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
         }
         Err(error) => return Err(error.into()),
     };
-    write(&mut found, &arguments.out)
+    write_paper(&mut found, Folder(&arguments.out))
         .with_context(|| format!("cannot write the results to {}", arguments.out.display()))?;
     if arguments.json {
         print_json(&found.report)?;
@@ -63,39 +70,4 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
     } else {
         ExitStatus::CriterionFailed
     })
-}
-
-/// Makes the folder and proves that it can be written, before a run of many seconds.
-fn prepare(folder: &Path) -> std::io::Result<()> {
-    std::fs::create_dir_all(folder)?;
-    let probe = folder.join(format!(".probe-{}", std::process::id()));
-    std::fs::write(&probe, [])?;
-    std::fs::remove_file(&probe)
-}
-
-fn write(found: &mut Reproduction, folder: &Path) -> Result<()> {
-    let mut encoded = Vec::new();
-    for (name, image) in &found.pictures {
-        let bytes = image.to_png()?;
-        write_atomically(&folder.join(name), &bytes)?;
-        found.report.files.push(name.clone());
-        encoded.push((name.clone(), bytes));
-    }
-    if !found.pictures.is_empty() {
-        let captioned: Vec<_> = found
-            .pictures
-            .iter()
-            .map(|(name, image)| (image.clone(), name.trim_end_matches(".png").to_owned()))
-            .collect();
-        let name = "figure_6.png";
-        tile(&captioned, SHEET_COLUMNS).write_png(&folder.join(name))?;
-        found.report.files.push(name.to_owned());
-    }
-    found.report.files.push("paper.html".to_owned());
-    let html = page(&found.report, &encoded);
-    write_atomically(&folder.join("paper.html"), html.as_bytes())?;
-    let mut json = serde_json::to_vec_pretty(&found.report)?;
-    json.push(b'\n');
-    write_atomically(&folder.join("paper.json"), &json)?;
-    Ok(())
 }

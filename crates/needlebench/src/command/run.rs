@@ -1,36 +1,64 @@
 //! `needlebench run`.
 
+use crate::arguments::{EngineArgument, EngineParser, RobotArguments};
+use clap::Args;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
-use std::time::Instant;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
-use needlebench_cell::{Finding, ResolvedScenario};
+use needlebench_cell::Finding;
+use needlebench_engine::ENGINES;
 use needlebench_evaluation::report::{Report, Verdict};
-use needlebench_evaluation::room::RoomModel;
-use needlebench_planning::GoalPlan;
 use serde::Serialize;
 
-use super::{load, overrides, print_json, print_text};
-use crate::atomic::write_atomically;
-use crate::cli::RunArguments;
-use crate::events::EventRun;
+use super::{load_runnable, overrides, print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::iso9283;
-use crate::output::findings::print_findings;
-use crate::output::pictures::{Backdrop, configuration_picture, goal_camera, sheet_caption};
-use crate::output::room_pictures::{RoomPictures, room_caption};
-use crate::output::{
-    budget_picture, junit, markdown, press_csv, press_picture, ranking_picture, recording_csv,
-    report_text,
-};
-use crate::page::run_page;
-use crate::picture::{Image, tile};
-use crate::pipeline::{self, RunOptions, ScenarioRun};
-use crate::progress::Progress;
+use crate::findings::print_findings;
+use crate::progress::TerminalProgress;
+use needlebench_bench::{RunOptions, Runnable, ScenarioRun};
+use needlebench_report::files::{Folder, RunFiles, write_run};
+use needlebench_report::{junit, markdown, report_text, write_atomically};
+
+#[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub(crate) struct RunArguments {
+    /// Scenario files.
+    #[arg(required = true, value_name = "SCENARIO")]
+    pub scenarios: Vec<PathBuf>,
+    /// Engines, instead of the scenario's own choice.
+    #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser)]
+    pub engine: Option<EngineArgument>,
+    /// Hold every simulated motion against the referee, our own dynamics integrated to rounding, at
+    /// the scenario's time step, its half and its quarter; three to ten times as long.
+    #[arg(long)]
+    pub referee: bool,
+    /// Folder for results; each scenario gets a folder of its name in it.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Print the report as one JSON document instead of the table.
+    #[arg(long)]
+    pub json: bool,
+    /// Write JUnit XML of all scenarios to this file besides the one in the results folder.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+    /// Threads; the number of cores if left out. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: Option<u16>,
+    /// Draw no pictures.
+    #[arg(long)]
+    pub no_pictures: bool,
+    /// Write no report page.
+    #[arg(long)]
+    pub no_page: bool,
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
 
 #[derive(Serialize)]
 struct SeveralReports<'a> {
@@ -50,12 +78,9 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     // All inputs are read before anything long starts.
     let mut scenarios = Vec::new();
     for path in &arguments.scenarios {
-        scenarios.push(load(path, &overrides));
+        scenarios.push(load_runnable(path, &overrides));
     }
-    let Some(scenarios) = scenarios
-        .into_iter()
-        .collect::<Option<Vec<ResolvedScenario>>>()
-    else {
+    let Some(scenarios) = scenarios.into_iter().collect::<Option<Vec<Runnable>>>() else {
         return Ok(ExitStatus::BadInput);
     };
     if let Some(finding) = repeated_name(&scenarios) {
@@ -84,9 +109,10 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
         usize::from,
     );
     let options = RunOptions {
-        engines: arguments.engine,
+        engines: arguments.engine.as_ref().map(EngineArgument::names),
         jobs,
         referee: arguments.referee,
+        ..RunOptions::default()
     };
 
     let mut status = ExitStatus::Success;
@@ -97,8 +123,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
         text: !arguments.json,
         quiet: arguments.quiet,
     };
-    for (resolved, folder) in scenarios.iter().zip(&folders) {
-        let (outcome, report) = run_into(resolved, &options, folder, outputs, &cancel)?;
+    for (runnable, folder) in scenarios.iter().zip(&folders) {
+        let (outcome, report) = run_into(runnable, &options, folder, outputs, &cancel)?;
         status = status.max(outcome);
         reports.push(report);
         if outcome == ExitStatus::Interrupted {
@@ -139,29 +165,29 @@ pub(super) struct Outputs {
 
 /// Runs one scenario and writes its results into a folder that is there.
 pub(super) fn run_into(
-    resolved: &ResolvedScenario,
+    runnable: &Runnable,
     options: &RunOptions,
     folder: &Path,
     outputs: Outputs,
     cancel: &AtomicBool,
 ) -> Result<(ExitStatus, Report)> {
-    let progress = Progress::new(outputs.quiet);
+    let progress = TerminalProgress::new(outputs.quiet);
     // A robot that is not a UR arm was refused while the scenario was read.
-    let mut finished = pipeline::run(resolved, options, cancel, &progress)?;
-    let written = write_results(
-        resolved,
-        &mut finished,
-        folder,
-        outputs,
-        options.jobs,
+    let mut finished = needlebench_bench::run(runnable, options, cancel, &progress)?;
+    let resolved = runnable.scenario();
+    let files = RunFiles {
+        pictures: outputs.pictures,
+        page: outputs.page,
+        jobs: options.jobs,
         cancel,
-        &progress,
-    );
+        engines: ENGINES,
+    };
+    let written = write_run(resolved, &mut finished, Folder(folder), files, &progress);
     progress.finish();
     written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
     if outputs.text {
         let name = &resolved.scenario.name;
-        let text = report_text(&finished.report);
+        let text = report_text(&finished.report, ENGINES);
         print_text(&format!("{name}\n{text}results: {}", folder.display()))?;
     }
     if finished.interrupted {
@@ -185,12 +211,12 @@ fn outcome(finished: &ScenarioRun) -> ExitStatus {
     }
 }
 
-fn repeated_name(scenarios: &[ResolvedScenario]) -> Option<Finding> {
+fn repeated_name(scenarios: &[Runnable]) -> Option<Finding> {
     scenarios.iter().enumerate().find_map(|(index, each)| {
+        let each = each.scenario();
         let name = &each.scenario.name;
-        let earlier = scenarios[..index]
-            .iter()
-            .find(|other| other.scenario.name == *name)?;
+        let mut others = scenarios[..index].iter().map(Runnable::scenario);
+        let earlier = others.find(|other| other.scenario.name == *name)?;
         Some(
             Finding::new(
                 &each.source.file,
@@ -205,11 +231,12 @@ fn repeated_name(scenarios: &[ResolvedScenario]) -> Option<Finding> {
 /// Makes each scenario's results folder and proves that it can be written, before a long run.
 fn prepare_folders(
     arguments: &RunArguments,
-    scenarios: &[ResolvedScenario],
+    scenarios: &[Runnable],
 ) -> Result<Vec<PathBuf>, Finding> {
     let mut folders = Vec::new();
-    for resolved in scenarios {
-        let folder = arguments.out.join(&resolved.scenario.name);
+    for runnable in scenarios {
+        let name = &runnable.scenario().scenario.name;
+        let folder = arguments.out.join(name);
         prepare_folder(&folder)?;
         folders.push(folder);
     }
@@ -257,226 +284,6 @@ fn probe_folder(folder: &Path) -> std::io::Result<()> {
     std::fs::remove_file(&probe)
 }
 
-fn write_results(
-    resolved: &ResolvedScenario,
-    finished: &mut ScenarioRun,
-    folder: &Path,
-    outputs: Outputs,
-    jobs: usize,
-    cancel: &AtomicBool,
-    progress: &Progress,
-) -> Result<()> {
-    let started = Instant::now();
-    let pictures = resolved.scenario.recording.pictures && outputs.pictures;
-    let mut files: Vec<Vec<Vec<String>>> = Vec::new();
-    let period_s = resolved.scenario.recording.period_ms * 1e-3;
-    for ((goal, plan), runs) in resolved
-        .goals
-        .iter()
-        .zip(&finished.plans)
-        .zip(&finished.runs)
-    {
-        let goal_folder = folder.join(&goal.name);
-        std::fs::create_dir_all(&goal_folder)?;
-        let mut of_goal = Vec::new();
-        for (plan, runs) in plan.configurations.iter().zip(runs) {
-            let mut names = Vec::new();
-            for run in runs {
-                let name = format!("{}.{}.csv", plan.configuration, run.engine.name());
-                let trajectory = plan.trajectory.as_ref().context("a run has a trajectory")?;
-                let csv = recording_csv(run, trajectory, period_s);
-                write_atomically(&goal_folder.join(&name), csv.as_bytes())?;
-                names.push(format!("{}/{name}", goal.name));
-            }
-            of_goal.push(names);
-        }
-        files.push(of_goal);
-    }
-    for stopped in &finished.stopped {
-        let (goal, run) = (&resolved.goals[stopped.goal], &stopped.run);
-        let plan = &finished.plans[stopped.goal].configurations[stopped.configuration];
-        let trajectory = plan.trajectory.as_ref().context("a run has a trajectory")?;
-        let name = format!(
-            "{}/{}.{}.stopped.csv",
-            goal.name,
-            plan.configuration,
-            run.engine.name()
-        );
-        let csv = recording_csv(run, trajectory, period_s);
-        write_atomically(&folder.join(&name), csv.as_bytes())?;
-        files[stopped.goal][stopped.configuration].push(name);
-    }
-    for run in &finished.events {
-        let names = write_events(resolved, run, &finished.plans, folder, pictures)?;
-        files[run.goal][run.configuration].extend(names);
-    }
-    if pictures && !cancel.load(Ordering::Relaxed) {
-        progress.message("drawing");
-        write_pictures(resolved, &finished.report, folder, jobs, &mut files)?;
-    }
-    for (goal, names) in resolved.goals.iter().zip(&files) {
-        remove_stale(folder, &goal.name, &names.concat())?;
-    }
-    for (goal, names) in finished.report.goals.iter_mut().zip(files) {
-        for (configuration, names) in goal.configurations.iter_mut().zip(names) {
-            configuration.files = names;
-        }
-    }
-    if let (Some(run), Some(report)) = (&finished.iso9283, &mut finished.report.iso9283) {
-        let name = &resolved.scenario.name;
-        report.files = iso9283::write_results(name, report, run, folder, pictures)?;
-    }
-    let page_path = folder.join("report.html");
-    if outputs.page {
-        progress.message("writing the page");
-        write_atomically(&page_path, run_page(resolved, finished).as_bytes())?;
-    } else if page_path.exists() {
-        // Nobody should take an earlier run's for this one's.
-        std::fs::remove_file(&page_path)?;
-    }
-    finished
-        .report
-        .timings
-        .insert("writing_s".to_owned(), started.elapsed().as_secs_f64());
-    let report = &finished.report;
-    let mut json = serde_json::to_vec_pretty(report)?;
-    json.push(b'\n');
-    write_atomically(&folder.join("report.json"), &json)?;
-    write_atomically(&folder.join("junit.xml"), junit(&[report])?.as_bytes())?;
-    write_atomically(&folder.join("summary.md"), markdown(report).as_bytes())?;
-    Ok(())
-}
-
-/// Recordings of the contacts that were asked for, and a picture of each.
-fn write_events(
-    resolved: &ResolvedScenario,
-    run: &EventRun,
-    plans: &[GoalPlan],
-    folder: &Path,
-    pictures: bool,
-) -> Result<Vec<String>> {
-    let goal = &resolved.goals[run.goal];
-    let label = plans[run.goal].configurations[run.configuration].configuration;
-    let mut names = Vec::new();
-    for (index, press) in run.press.iter().enumerate() {
-        let Ok(press) = press else { continue };
-        let number = index + 1;
-        for (engine, events) in &run.engines {
-            let Some(Some(recording)) = events.press.get(index) else {
-                continue;
-            };
-            let name = format!("{}/{label}.press-{number}.{}.csv", goal.name, engine.name());
-            let csv = press_csv(goal, press, recording);
-            write_atomically(&folder.join(&name), csv.as_bytes())?;
-            names.push(name);
-        }
-        if pictures {
-            let name = format!("{}/{label}.press-{number}.png", goal.name);
-            let title = format!("{}, {label}", goal.name);
-            let png = press_picture(&title, press, run, index).to_png()?;
-            write_atomically(&folder.join(&name), &png)?;
-            names.push(name);
-        }
-    }
-    Ok(names)
-}
-
-/// Removes recordings and pictures that an earlier run left in a goal's folder: nobody should
-/// take them for results of this one.
-fn remove_stale(folder: &Path, goal: &str, written: &[String]) -> Result<()> {
-    for entry in std::fs::read_dir(folder.join(goal))? {
-        let path = entry?.path();
-        let ours = path
-            .extension()
-            .is_some_and(|extension| extension == "csv" || extension == "png");
-        let current = written.iter().any(|name| folder.join(name) == path);
-        if ours && !current {
-            std::fs::remove_file(&path)?;
-        }
-    }
-    Ok(())
-}
-
-/// What is added to the names of pictures: those of the posture, those of the room.
-const PICTURE_KINDS: [&str; 2] = ["", ".room"];
-
-fn write_pictures(
-    resolved: &ResolvedScenario,
-    report: &Report,
-    folder: &Path,
-    jobs: usize,
-    files: &mut [Vec<Vec<String>>],
-) -> Result<()> {
-    let backdrop = Backdrop::new(resolved);
-    let room = RoomModel::new(resolved);
-    for (index, (goal, goal_report)) in resolved.goals.iter().zip(&report.goals).enumerate() {
-        let camera = goal_camera(resolved, goal);
-        let room_pictures = RoomPictures::new(resolved, &backdrop, &room, index);
-        let next = AtomicUsize::new(0);
-        let drawn: Mutex<Vec<(usize, [Option<Image>; 2])>> = Mutex::new(Vec::new());
-        std::thread::scope(|scope| {
-            for _ in 0..jobs.clamp(1, goal_report.configurations.len()) {
-                scope.spawn(|| {
-                    loop {
-                        let at = next.fetch_add(1, Ordering::Relaxed);
-                        let Some(configuration) = goal_report.configurations.get(at) else {
-                            break;
-                        };
-                        let pictures = [
-                            configuration_picture(
-                                resolved,
-                                &backdrop,
-                                &camera,
-                                goal,
-                                configuration,
-                            ),
-                            room_pictures.draw(configuration),
-                        ];
-                        drawn.lock().expect("no thread panics").push((at, pictures));
-                    }
-                });
-            }
-        });
-        let mut drawn = drawn.into_inner().expect("no thread panics");
-        drawn.sort_by_key(|(at, _)| *at);
-        let mut sheets = [Vec::new(), Vec::new()];
-        for (at, pictures) in drawn {
-            let configuration = &goal_report.configurations[at];
-            let captions = [
-                sheet_caption(goal_report, configuration),
-                room_caption(goal_report, configuration),
-            ];
-            let kinds = PICTURE_KINDS.iter().zip(&mut sheets).zip(captions);
-            for (picture, ((kind, sheet), caption)) in pictures.into_iter().zip(kinds) {
-                let Some(image) = picture else { continue };
-                let name = format!("{}/{}{kind}.png", goal.name, configuration.label);
-                image.write_png(&folder.join(&name))?;
-                files[index][at].push(name);
-                sheet.push((image, caption));
-            }
-        }
-        for (kind, sheet) in PICTURE_KINDS.iter().zip(&sheets) {
-            if !sheet.is_empty() {
-                let name = format!("{}{kind}.png", goal.name);
-                tile(sheet, 4).write_png(&folder.join(name))?;
-            }
-        }
-        for (kind, picture) in [
-            ("ranking", ranking_picture(goal_report)),
-            ("budget", budget_picture(goal_report)),
-        ] {
-            let path = folder.join(format!("{}.{kind}.png", goal.name));
-            match picture {
-                Some(image) => image.write_png(&path)?,
-                // Nobody should take an earlier run's for this one's.
-                None if path.exists() => std::fs::remove_file(&path)?,
-                None => {}
-            }
-        }
-    }
-    Ok(())
-}
-
 /// Adds the summaries to the page that GitHub Actions shows for a step.
 fn append_to_step_summary(reports: &[&Report]) -> Result<()> {
     let Some(path) = std::env::var_os("GITHUB_STEP_SUMMARY") else {
@@ -488,7 +295,7 @@ fn append_to_step_summary(reports: &[&Report]) -> Result<()> {
         .open(&path)
         .with_context(|| format!("cannot write {}", Path::new(&path).display()))?;
     for report in reports {
-        writeln!(file, "{}", markdown(report))?;
+        writeln!(file, "{}", markdown(report, ENGINES))?;
     }
     Ok(())
 }

@@ -1,25 +1,50 @@
 //! `needlebench servo`.
 
+use crate::arguments::{EngineArgument, EngineParser, RobotArguments};
 use anyhow::{Context, Result};
-use needlebench_cell::scenario::EngineName;
+use clap::Args;
 use needlebench_cell::{Finding, ResolvedScenario, nearest_name};
 use needlebench_clearance::ClearanceModel;
+use needlebench_engine::{ArmSpec, Engine, EngineError, EnginePool, Servo};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_planning::Planner;
+use std::path::PathBuf;
 
+use super::run::prepare_folder;
 use super::{load, overrides, print_json, print_text};
-use crate::atomic::write_atomically;
-use crate::cli::ServoArguments;
+
 use crate::exit::ExitStatus;
-use crate::output::findings::print_findings;
-use crate::pipeline::EngineChoice;
-use crate::plants::{plant, start_harness};
-use crate::progress::Progress;
-use crate::reality;
-use crate::servo::linear::{Linear, Margins};
-use crate::servo::settings::settings;
-use crate::servo::text::{course_csv, frequency_csv, text};
-use crate::servo::{ServoReport, joints, measure, picture};
+use crate::findings::print_findings;
+use needlebench_bench::RunOptions;
+use needlebench_bench::servo::linear::{Linear, Margins};
+use needlebench_bench::servo::settings::settings;
+use needlebench_bench::servo::{ServoReport, joints, measure};
+use needlebench_report::files::{Folder, write_servo};
+use needlebench_report::table::servo::text;
+
+#[derive(Debug, Args)]
+pub(crate) struct ServoArguments {
+    /// Scenario whose robot and servo are looked at, at the first goal that is reached.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// One joint, such as `wrist_1`; all of them if left out.
+    #[arg(long, value_name = "JOINT")]
+    pub joint: Option<String>,
+    /// Engines; the scenario's own choice if left out.
+    #[arg(long, value_name = "ENGINE[,ENGINE]", value_parser = EngineParser)]
+    pub engine: Option<EngineArgument>,
+    /// Folder for results; the scenario gets a folder of its name in it.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Print one JSON document instead of the tables.
+    #[arg(long)]
+    pub json: bool,
+    /// Draw no pictures.
+    #[arg(long)]
+    pub no_pictures: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
 
 /// Measures the servo and writes its data sheet.
 pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus> {
@@ -39,21 +64,14 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus> {
         return Ok(ExitStatus::BadInput);
     };
     let folder = arguments.out.join(&resolved.scenario.name).join("servo");
-    if let Err(error) = std::fs::create_dir_all(&folder) {
-        return refuse(
-            Finding::new(
-                folder.display().to_string(),
-                format!("the results folder cannot be written: {error}"),
-            )
-            .key("--out")
-            .hint("choose another folder with --out DIR"),
-        );
+    if let Err(finding) = prepare_folder(&folder) {
+        return refuse(finding);
     }
     let (described, posture) = match posture(&resolved) {
         Ok(found) => found,
         Err(finding) => return refuse(finding),
     };
-    let servo = reality::servo(&resolved);
+    let servo = needlebench_bench::servo_of(&resolved);
     let timestep_s = resolved.scenario.engines.timestep_ms * 1e-3;
     let linear = Linear::new(&servo, &posture, timestep_s);
     let margins = Margins::new(&servo, &posture, timestep_s);
@@ -70,11 +88,15 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus> {
     // An unstable loop has no response; its data sheet says how far it is from stability.
     let mut status = ExitStatus::Success;
     if margins.spectral_radius < 1.0 {
-        for engine in EngineChoice::engines(arguments.engine, &resolved) {
+        let options = RunOptions {
+            engines: arguments.engine.as_ref().map(EngineArgument::names),
+            ..RunOptions::default()
+        };
+        for engine in options.chosen_engines(&resolved)? {
             if let Err(error) =
                 measure_in(&resolved, engine, &mut report, &servo, &linear, &posture)
             {
-                anstream::eprintln!("error: {}: {error:#}", engine.name());
+                anstream::eprintln!("error: {}: {error}", engine.name());
                 status = ExitStatus::EnvironmentFailed;
             }
         }
@@ -84,7 +106,7 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus> {
         );
         status = ExitStatus::CriterionFailed;
     }
-    write(&report, &folder, !arguments.no_pictures)
+    write_servo(&report, Folder(&folder), !arguments.no_pictures)
         .with_context(|| format!("cannot write the results to {}", folder.display()))?;
     if arguments.json {
         print_json(&report)?;
@@ -135,64 +157,15 @@ fn posture(resolved: &ResolvedScenario) -> Result<(String, Joints), Finding> {
 
 fn measure_in(
     resolved: &ResolvedScenario,
-    engine: EngineName,
+    engine: &'static dyn Engine,
     report: &mut ServoReport,
-    servo: &needlebench_engine::Servo,
+    servo: &Servo,
     linear: &Linear,
     posture: &Joints,
-) -> Result<()> {
-    let harness = (engine == EngineName::Mujoco)
-        .then(|| start_harness(resolved, &Progress::new(true)).map_err(anyhow::Error::msg))
-        .transpose()?;
-    let mut process = harness
-        .as_ref()
-        .map(|harness| harness.lock().expect("nobody else uses it"));
-    let (cell, engines) = (&resolved.cell, &resolved.scenario.engines);
-    let mut plant = plant(
-        engine,
-        cell,
-        engines,
-        report.timestep_s,
-        process.as_deref_mut(),
-    )?;
-    measure(report, plant.as_mut(), servo, linear, posture)?;
-    Ok(())
-}
-
-fn write(report: &ServoReport, folder: &std::path::Path, pictures: bool) -> Result<()> {
-    let mut json = serde_json::to_vec_pretty(report)?;
-    json.push(b'\n');
-    write_atomically(&folder.join("servo.json"), &json)?;
-    write_atomically(
-        &folder.join("frequency.csv"),
-        frequency_csv(report).as_bytes(),
-    )?;
-    for joint in &report.joints {
-        if joint.responses.is_empty() {
-            continue;
-        }
-        let csv = |name: &str, text: String| {
-            let path = folder.join(format!("{}.{name}.csv", joint.joint));
-            write_atomically(&path, text.as_bytes())
-        };
-        let timestep_s = report.timestep_s;
-        csv(
-            "small_step",
-            course_csv(joint, timestep_s, |each| &each.small),
-        )?;
-        csv(
-            "large_step",
-            course_csv(joint, timestep_s, |each| &each.large),
-        )?;
-        csv("sine", course_csv(joint, timestep_s, |each| &each.sine))?;
-        csv(
-            "tracked_sine",
-            course_csv(joint, timestep_s, |each| &each.tracked),
-        )?;
-        if pictures {
-            let path = folder.join(format!("{}.png", joint.joint));
-            picture::page(report, joint).write_png(&path)?;
-        }
-    }
-    Ok(())
+) -> Result<(), EngineError> {
+    let settings = &resolved.scenario.engines;
+    EnginePool::new(&[engine]).lend(engine, settings, |session| {
+        let mut plant = session.make_plant(&ArmSpec::new(&resolved.cell, settings))?;
+        measure(report, plant.as_mut(), servo, linear, posture)
+    })
 }

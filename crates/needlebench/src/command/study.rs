@@ -1,13 +1,15 @@
 //! `needlebench study` and `needlebench merge`.
 
+mod arguments;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
+use needlebench_cell::Finding;
 use needlebench_cell::study::load_study;
-use needlebench_cell::{Finding, ResolvedScenario};
 use needlebench_study::{
     CSV_FILE, CaseEvaluator, Manifest, ParquetResults, Progress as Event, RunEnd, StudyError,
     StudyRun, merge as merge_shards, write_csv,
@@ -15,15 +17,17 @@ use needlebench_study::{
 
 use super::run::{Outputs, prepare_folder, probe_file, run_into};
 use super::{overrides, print_json, print_text};
-use crate::cli::{MergeArguments, RobotArguments, StudyArguments, StudyResultArguments};
+use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
-use crate::output::findings::print_findings;
-use crate::pipeline::RunOptions;
-use crate::progress::Progress;
-use crate::study::{
-    CaseReport, PreparedStudy, StudyCase, StudyEvaluator, StudyOutput, case_text, in_words,
-    time_per_case, write_study,
-};
+use crate::findings::print_findings;
+use crate::progress::TerminalProgress;
+use arguments::StudyResultArguments;
+pub(crate) use arguments::{MergeArguments, STUDY_HELP, StudyArguments};
+use needlebench_bench::progress::Progress as _;
+use needlebench_bench::study::{PreparedStudy, StudyCase, StudyEvaluator, in_words, time_per_case};
+use needlebench_bench::{RunOptions, Runnable};
+use needlebench_report::files::{StudyOutput, write_study};
+use needlebench_report::table::study::{CaseReport, case_text};
 
 /// Longest time that a study is expected to take and starts without `--yes`.
 const WITHOUT_ASKING: Duration = Duration::from_mins(20);
@@ -43,7 +47,7 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
-    let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design);
+    let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design, &prepared.columns);
     let threads = threads(arguments.results.jobs);
     let manifest = prepared.manifest(arguments.shard);
     if !arguments.yes && !arguments.resume {
@@ -57,7 +61,7 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
         }
     }
     let cancel = watch_interrupts()?;
-    let progress = Progress::new(arguments.results.quiet);
+    let progress = TerminalProgress::new(arguments.results.quiet);
     let run = StudyRun {
         design: &prepared.design,
         manifest,
@@ -105,7 +109,7 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
         return Ok(ExitStatus::BadInput);
     }
     let threads = threads(arguments.results.jobs);
-    let progress = Progress::new(arguments.results.quiet);
+    let progress = TerminalProgress::new(arguments.results.quiet);
     if let Some(error) = foreign_shard(&prepared, &arguments.shards) {
         return Ok(failed(&error));
     }
@@ -199,7 +203,7 @@ fn too_long(
     )))
 }
 
-fn show(progress: &Progress, event: Event<'_>) {
+fn show(progress: &TerminalProgress, event: Event<'_>) {
     match event {
         Event::CutOff { .. } | Event::Damage { .. } => anstream::eprintln!("{event}"),
         Event::Begin { kept, total } => {
@@ -234,7 +238,7 @@ fn finish(
     arguments: &StudyResultArguments,
 ) -> Result<ExitStatus> {
     let threads = threads(arguments.jobs);
-    let progress = Progress::new(arguments.quiet);
+    let progress = TerminalProgress::new(arguments.quiet);
     let results = match ParquetResults::open(results) {
         Ok(results) => results,
         Err(error) => return Ok(failed(&error.into())),
@@ -287,17 +291,27 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
     if arguments.run {
         return run_cases(arguments, prepared);
     }
-    let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design);
+    let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design, &prepared.columns);
     let mut worker = evaluator.worker().map_err(anyhow::Error::msg)?;
     let mut reports = Vec::new();
     for &number in &arguments.case {
         let layout = StudyCase::new(&prepared.study, &prepared.design, number);
         let result = worker.evaluate(number)?;
         if arguments.results.json {
-            reports.push(CaseReport::new(&prepared.design, &layout, &result));
+            reports.push(CaseReport::new(
+                &prepared.design,
+                &prepared.columns,
+                &layout,
+                &result,
+            ));
             continue;
         }
-        print_text(&case_text(&prepared.design, &layout, &result))?;
+        print_text(&case_text(
+            &prepared.design,
+            &prepared.columns,
+            &layout,
+            &result,
+        ))?;
         if let Err(findings) = layout.scenario(&prepared.study) {
             print_findings(&findings);
         }
@@ -313,7 +327,7 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
 
 /// Runs cases as `run` does.
 fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus> {
-    let mut runs: Vec<(ResolvedScenario, PathBuf, RunOptions)> = Vec::new();
+    let mut runs: Vec<(Runnable, PathBuf, RunOptions)> = Vec::new();
     let folder = arguments.out.join(&prepared.study.file.name).join("cases");
     for &number in &arguments.case {
         let layout = StudyCase::new(&prepared.study, &prepared.design, number);
@@ -323,14 +337,14 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
                 resolved.scenario.description =
                     format!("Case {number} of the study {}.", prepared.study.file.name);
                 if let Some(engines) = layout.engines {
-                    resolved.scenario.engines.run = engines;
+                    resolved.scenario.engines.run = Some(engines);
                 }
                 let options = RunOptions {
-                    engines: None,
                     jobs: threads(arguments.results.jobs),
-                    referee: false,
+                    ..RunOptions::default()
                 };
-                runs.push((resolved, folder.join(number.to_string()), options));
+                let runnable = Runnable::new(resolved);
+                runs.push((runnable, folder.join(number.to_string()), options));
             }
             Err(findings) => {
                 anstream::eprintln!("case {number} cannot exist:");
@@ -348,12 +362,12 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
         text: !arguments.results.json,
         quiet: arguments.results.quiet,
     };
-    for (resolved, folder, options) in &runs {
+    for (runnable, folder, options) in &runs {
         if let Err(finding) = prepare_folder(folder) {
             print_findings(&[finding]);
             return Ok(ExitStatus::BadInput);
         }
-        let (outcome, report) = run_into(resolved, options, folder, outputs, &cancel)?;
+        let (outcome, report) = run_into(runnable, options, folder, outputs, &cancel)?;
         status = status.max(outcome);
         reports.push(report);
     }

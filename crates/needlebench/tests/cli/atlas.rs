@@ -76,6 +76,7 @@ fn every_branch_has_every_roll_and_its_ranges() {
         "small/atlas.html",
         "small/atlas.json",
         "small/pose.atlas.png",
+        "small/pose.atlas.svg",
     ]
     .map(Path::new);
     assert_eq!(files, expected);
@@ -89,6 +90,7 @@ fn files_are_the_same_for_every_number_of_threads() {
         "out/small/atlas.html",
         "out/small/atlas.json",
         "out/small/pose.atlas.png",
+        "out/small/pose.atlas.svg",
     ] {
         assert_eq!(one.read(file), two.read(file), "{file}");
     }

@@ -125,12 +125,12 @@ fn value_outside_its_range_is_refused_with_range_and_unit() {
     refused_with("top_height_mm = 739.5", "length_mm = 2.0")
         .key("table.length_mm")
         .at("length_mm = 2.0")
-        .says("length_mm is 2, outside [300, 5000]")
+        .says("`table.length_mm` is 2 mm, outside 300 to 5000")
         .hints("millimetres");
     refused_with("[phantom]", "[phantom]\nbreadth_mm = 0.3")
         .key("phantom.breadth_mm")
         .at("breadth_mm")
-        .says("breadth_mm is 0.3")
+        .says("`phantom.breadth_mm` is 0.3 mm, outside 150 to 600")
         .hints("millimetres");
     refused_with("[recording]", "[engines]\nfriction = -1\n[recording]")
         .at("friction")
@@ -365,7 +365,7 @@ fn unknown_configuration_or_outcome_is_refused() {
     refused_with("[motion]", &expected("every = \"colision\""))
         .at("every")
         .key("goals[0].expected.every")
-        .says("`colision` is not an outcome")
+        .says("`colision` is not a value that `goals[0].expected.every` can have")
         .hints("collision");
 }
 

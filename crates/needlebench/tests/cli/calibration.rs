@@ -7,10 +7,10 @@ use crate::support::{
 };
 
 /// A real UR3.
-const UR3: &str = include_str!("../../../cell/tests/calibration/ur3_half_turns.yaml");
+const UR3: &str = include_str!("../../../cell/tests/cell/calibration/ur3_half_turns.yaml");
 
 /// A real UR3e.
-const UR3E: &str = include_str!("../../../cell/tests/calibration/ur3e.yaml");
+const UR3E: &str = include_str!("../../../cell/tests/cell/calibration/ur3e.yaml");
 
 /// What the inverse kinematics promises, m and rad.
 const RESIDUAL: f64 = 1e-12;

@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use needlebench_evaluation::metric::{Metric, MetricKey};
 use serde_json::{Value, json};
 
 use crate::support::{Answer, Bench, SMALL, has_keys, with_edit};
@@ -37,8 +38,9 @@ fn nearer(report: &mut Value, clearance_m: f64) {
     let configuration = &mut report["goals"][0]["configurations"][0];
     let found = &mut configuration["clearance"]["robot_phantom"];
     found["minimum_m"] = json!(clearance_m);
-    // What is compared is the proven bound.
     found["certified_lower_bound_m"] = json!(clearance_m);
+    // What is compared, by its key: the proven bound.
+    configuration["metrics"]["arm_to_skin"] = json!(clearance_m);
 }
 
 #[test]
@@ -289,6 +291,7 @@ fn report_of_a_version_before_rankings_is_read() {
                 "room",
                 "tip_sensitivity_m_per_rad",
                 "motion",
+                "metrics",
             ] {
                 keys.remove(key);
             }
@@ -305,11 +308,11 @@ fn help_lists_every_metric() {
         .run(&["compare", "--help"])
         .exits_with(0)
         .stdout;
-    for metric in needlebench_evaluation::metric::METRICS {
+    for metric in MetricKey::all(&["rapier", "mujoco"]) {
         let listed = help
             .split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
-            .any(|word| word == metric.name);
-        assert!(listed, "{} is not in\n{help}", metric.name);
+            .any(|word| word == metric.key());
+        assert!(listed, "{metric:?} is not in\n{help}");
     }
 }
 
@@ -376,8 +379,7 @@ fn weights_of_the_scenario_change_the_choice_and_wrong_ones_are_refused() {
     ];
     for metric in report["goals"][0]["ranking"]["metrics"].as_array().unwrap() {
         let name = metric["name"].as_str().unwrap();
-        let key = needlebench_evaluation::metric::Metric::named(name).unwrap();
-        let (key, _) = key.ranking_key.unwrap();
+        let key = Metric::of_key(name).unwrap().ranking_key.unwrap();
         if key != "motion_time_s" {
             others.push(format!("{key}.weight = 0"));
         }

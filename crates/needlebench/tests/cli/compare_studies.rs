@@ -101,7 +101,7 @@ fn a_lower_patient_is_farther_from_the_arm() {
         .as_array()
         .unwrap()
         .iter()
-        .find(|each| each["of"] == "best" && each["metric"] == "clearance_mm")
+        .find(|each| each["of"] == "best" && each["metric"] == "clearance_static_mm")
         .unwrap();
     let mean = clearance["mean"].as_f64().unwrap();
     assert!(mean.abs() > 0.1 && mean.abs() < 8.1, "{mean}");
@@ -220,16 +220,12 @@ fn what_cannot_be_compared_is_refused_with_a_hint() {
 }
 
 #[test]
-fn help_lists_every_metric_of_studies() {
+fn help_lists_every_rate_of_studies() {
     let help = Bench::new()
         .run(&["compare", "--help"])
         .exits_with(0)
         .stdout;
-    for metric in needlebench_study::compare::STUDY_METRICS {
-        assert!(
-            help.contains(metric.name),
-            "{} is not in\n{help}",
-            metric.name
-        );
+    for rate in needlebench_study::compare::STUDY_RATES {
+        assert!(help.contains(rate.name), "{} is not in\n{help}", rate.name);
     }
 }

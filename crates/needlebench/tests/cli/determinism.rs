@@ -22,7 +22,7 @@ fn repeated_runs_write_identical_files_apart_from_the_timings() {
         answer.exits_with(0);
     }
     let files = bench.tree("a");
-    for extension in ["json", "html", "csv", "png", "xml", "md"] {
+    for extension in ["json", "html", "csv", "png", "svg", "xml", "md"] {
         let has = |file: &&std::path::PathBuf| file.extension().is_some_and(|e| e == extension);
         assert!(files.iter().any(|file| has(&file)), "no .{extension} file");
     }

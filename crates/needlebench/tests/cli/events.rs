@@ -149,6 +149,12 @@ fn stop_goes_as_far_as_predicted_and_is_certified() {
     for events in events(report()) {
         let stop = &events["stop"];
         assert_eq!(stop["category"], 0);
+        let brakes = &stop["brakes"];
+        assert_eq!(
+            (&brakes["arm"], &brakes["file"]),
+            (&"UR3".into(), &"builtin:ur3/arm.toml".into())
+        );
+        assert!(brakes["source"].as_str().unwrap().contains("appendix A.1"));
         let predicted_m = number(&stop["envelope"]["worst_tip_distance_m"]);
         assert!(predicted_m > 1e-3);
         for engine in engines(stop) {

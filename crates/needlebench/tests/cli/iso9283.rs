@@ -65,7 +65,9 @@ fn shipped_test_passes_in_both_engines() {
         "attained.rapier.csv",
         "attained.mujoco.csv",
         "attained.rapier.png",
+        "attained.mujoco.svg",
         "stabilisation.mujoco.png",
+        "stabilisation.rapier.svg",
         "report.json",
         "junit.xml",
         "summary.md",
@@ -187,7 +189,9 @@ fn the_log_of_a_run_is_analysed_to_the_same_numbers() {
         comments_apart("again/attained.csv"),
         comments_apart("out/small/attained.rapier.csv")
     );
-    assert!(!bench.read("again/attained.png").is_empty());
+    for name in ["again/attained.png", "again/attained.svg"] {
+        assert!(!bench.read(name).is_empty(), "{name}");
+    }
 }
 
 #[test]
@@ -206,7 +210,12 @@ fn results_do_not_depend_on_the_number_of_threads() {
         without_timings("1/small/report.json"),
         without_timings("3/small/report.json")
     );
-    for name in ["attained.rapier.csv", "attained.rapier.png", "junit.xml"] {
+    for name in [
+        "attained.rapier.csv",
+        "attained.rapier.png",
+        "stabilisation.rapier.svg",
+        "junit.xml",
+    ] {
         assert_eq!(
             bench.read(&format!("1/small/{name}")),
             bench.read(&format!("3/small/{name}"))
@@ -264,7 +273,7 @@ fn protocols_that_cannot_be_carried_out_are_refused_before_anything_runs() {
         ("configuration = \"Right-Up-Unfold\"", "Right-Up-Fold"),
         (
             "configuration = \"Right-Up\"",
-            "there is no configuration `Right-Up`",
+            "`Right-Up` is not a value that `iso9283.configuration` can have",
         ),
         (
             "cube_centre_mm = [0, -300, 0.15]\napproach_mm = 500",

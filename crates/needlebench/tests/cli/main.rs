@@ -1,6 +1,7 @@
 //! The program from outside: what it prints, writes, refuses, and how it ends.
 
 mod arguments;
+mod arms;
 mod atlas;
 mod bad_mesh;
 mod bad_robot;
@@ -20,6 +21,7 @@ mod imperfect;
 mod interrupt;
 mod iso9283;
 mod kinematics;
+mod names_of_metrics;
 mod page;
 mod pairs;
 mod paper;

@@ -209,6 +209,7 @@ fn results_folder_holds_what_the_report_lists() {
         "summary.md",
         "pose.png",
         "pose.ranking.png",
+        "pose.ranking.svg",
         "pose.room.png",
     ]
     .map(str::to_owned)
@@ -221,7 +222,7 @@ fn results_folder_holds_what_the_report_lists() {
         }
     }
     // Eight pictures of the posture and of the room each, six recordings.
-    assert_eq!(expected.len(), 7 + 16 + 6);
+    assert_eq!(expected.len(), 8 + 16 + 6);
     let found: BTreeSet<String> = bench
         .tree("results/small")
         .iter()
@@ -237,6 +238,8 @@ fn results_folder_holds_what_the_report_lists() {
             "{}",
             path.display()
         );
+        let is_svg = path.extension().is_some_and(|extension| extension == "svg");
+        assert_eq!(bytes.starts_with(b"<svg xmlns="), is_svg);
     }
 }
 

@@ -5,7 +5,7 @@ use needlebench_cell::scenario::RollAim;
 use needlebench_cell::{ClearanceClass, Goal};
 
 use super::Member;
-use crate::plan::{Candidate, Planner};
+use crate::planner::{Candidate, Planner};
 
 /// What a roll is chosen for.
 pub type Aim = RollAim;
@@ -57,15 +57,7 @@ impl Planner<'_> {
         let (mut sum, mut weights) = (0.0, 0.0);
         for (key, aim) in self.ranking_aims() {
             let value = match *key {
-                "clearance_mm" => {
-                    MM * least(|class| {
-                        class.is_physical()
-                            && !matches!(
-                                class,
-                                ClearanceClass::SelfCollision | ClearanceClass::GuideStandoff
-                            )
-                    })
-                }
+                "clearance_mm" => MM * least(ClearanceClass::is_surroundings),
                 "self_clearance_mm" => MM * least(|class| class == ClearanceClass::SelfCollision),
                 "needle_corridor_mm" => MM * least(|class| class == ClearanceClass::NeedleCorridor),
                 // The same number in m/rad and in mm/mrad.

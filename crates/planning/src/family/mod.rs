@@ -23,7 +23,7 @@ use needlebench_kinematics::ik::{Configuration, Solutions};
 pub use aim::Aim;
 pub use ranges::{Best, EDGE_RAD, Edge, Family, RollRange};
 
-use crate::plan::{Candidate, Planner, absent};
+use crate::planner::{Candidate, Planner, absent};
 use crate::{Rejection, Rule};
 
 /// One configuration at one angle of the guide about the needle.

@@ -8,7 +8,7 @@ use needlebench_kinematics::{JOINT_COUNT, Joints};
 
 use super::{Aim, Member};
 use crate::Rejection;
-use crate::plan::Planner;
+use crate::planner::Planner;
 
 /// Where a range ends.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,22 +3,20 @@
 //! Studies of the same design are compared case by case; others by their rates and quantiles. What is
 //! compared is read from the tables alone, in a few passes and without keeping cases.
 
+mod metric;
 mod paired;
 #[cfg(test)]
 mod tests;
-mod threshold;
 
 use needlebench_kinematics::ik::Configuration;
 use serde::Serialize;
 
+pub use metric::{EVERY, STUDY_RATES, StudyLimit, StudyRate, StudySubject, StudyThreshold};
 pub use paired::{ConfigurationTransition, Paired, PairedDifference, Transition};
-pub use threshold::{
-    EVERY, STUDY_METRICS, StudyLimit, StudyMetric, StudyThreshold, StudyThresholdError,
-};
 
 use crate::statistics::{BEST, Interval, Rate, Summary, SummaryOptions, summarise};
-use crate::{METRICS, Results, ResultsError};
-use threshold::{INVALID_LAYOUTS, SUCCESS_RATE, WORKING_LAYOUTS};
+use crate::{MetricColumn, Results, ResultsError};
+use metric::{Compared, INVALID_LAYOUTS, SUCCESS_RATE, WORKING_LAYOUTS, bad_tail};
 
 /// Version of the keys of a [`StudyComparison`].
 pub const COMPARISON_VERSION: u32 = 1;
@@ -36,6 +34,8 @@ pub struct StudyComparison {
     pub a: StudySide,
     /// The second study.
     pub b: StudySide,
+    /// Where something is compared by another name than it was asked for or written by.
+    pub notes: Vec<String>,
     /// Case by case; none where the two have other cases.
     pub paired: Option<Paired>,
     /// Why they are not compared case by case.
@@ -64,8 +64,8 @@ pub struct StudySide {
 /// What a failed comparison lost.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct StudyFailure {
-    /// Name of the metric.
-    pub metric: &'static str,
+    /// Key of the metric, or name of the rate.
+    pub metric: String,
     /// Configuration, or `best`; none of layouts.
     pub of: Option<String>,
     /// Threshold that was exceeded; none where more than chance was lost without one.
@@ -79,14 +79,16 @@ pub struct StudyFailure {
 /// A rate or quantile in both studies.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
-    /// Name of the metric.
-    pub metric: &'static str,
+    /// Key of the metric, or name of the rate.
+    pub metric: String,
+    /// The same in words.
+    pub words: String,
     /// Share of the quantile; none of a rate.
     pub quantile: Option<f64>,
     /// Configuration, or `best`; none of layouts.
     pub of: Option<String>,
     /// Unit of the values; `1` of a rate.
-    pub unit: &'static str,
+    pub unit: String,
     /// In the first study; none where it has none.
     pub a: Option<f64>,
     /// Its 95 % interval.
@@ -116,7 +118,7 @@ pub struct ThresholdResult {
     /// By how much the second is worse, in the metric's unit; none where there is nothing to compare.
     pub loss: Option<f64>,
     /// Unit of the loss.
-    pub unit: &'static str,
+    pub unit: String,
     /// Whether the loss is allowed.
     pub pass: bool,
     /// In words.
@@ -130,6 +132,8 @@ pub struct StudyCompareOptions {
     pub thresholds: Vec<StudyThreshold>,
     /// A rate that fell by more than chance does not fail the comparison unless a threshold says so.
     pub allow_status_change: bool,
+    /// What there is to say of the names of metrics.
+    pub notes: Vec<String>,
 }
 
 /// A study to compare.
@@ -145,90 +149,143 @@ pub struct ComparedStudy<'a> {
     pub results: &'a (dyn Results + Sync),
 }
 
-/// Compares two studies.
-///
-/// The comparison fails where a loss is more than a threshold allows, and, unless that is allowed,
-/// where the share of layouts that work or the success rate of a configuration is less by more than
-/// chance and no threshold is on it.
-///
-/// # Errors
-/// If a table cannot be read.
-pub fn compare_studies(
-    a: ComparedStudy<'_>,
-    b: ComparedStudy<'_>,
+/// Two studies, read and summed up.
+pub struct StudyPair<'a> {
+    studies: [ComparedStudy<'a>; 2],
+    summaries: [Summary; 2],
+    /// Case by case, or why not.
+    paired: Result<Paired, String>,
+}
+
+impl<'a> StudyPair<'a> {
+    /// Reads both, with quantiles at such shares beside those that are always given.
+    ///
+    /// # Errors
+    /// If a table cannot be read.
+    pub fn read(
+        a: ComparedStudy<'a>,
+        b: ComparedStudy<'a>,
+        quantiles: &[f64],
+    ) -> Result<Self, ResultsError> {
+        let options = SummaryOptions {
+            factors: false,
+            more_quantiles: quantiles.to_vec(),
+            ..SummaryOptions::default()
+        };
+        Ok(Self {
+            summaries: [
+                summarise(a.results, &options)?,
+                summarise(b.results, &options)?,
+            ],
+            paired: paired::paired(a.results, b.results)?,
+            studies: [a, b],
+        })
+    }
+
+    /// Whether each of the two has any value of a metric, by its key.
+    pub fn have(&self, key: &str) -> [bool; 2] {
+        self.summaries.each_ref().map(|summary| {
+            let mut columns = summary.metrics.iter();
+            columns.any(|column| {
+                let mut spreads = summary.spreads.iter();
+                column.key == key && spreads.any(|spread| spread.metric == column.name)
+            })
+        })
+    }
+
+    /// Compares the two.
+    ///
+    /// The comparison fails where a loss is more than a threshold allows, and, unless that is allowed,
+    /// where the share of layouts that work or the success rate of a configuration is less by more
+    /// than chance and no threshold is on it.
+    pub fn compare(self, options: &StudyCompareOptions) -> StudyComparison {
+        let [a, b] = self.studies;
+        let [summary_a, summary_b] = &self.summaries;
+        let (paired, unpaired_because) = match self.paired {
+            Ok(paired) => (Some(paired), None),
+            Err(reason) => (None, Some(reason)),
+        };
+        let both = Both {
+            a: summary_a,
+            b: summary_b,
+            paired: paired.as_ref(),
+        };
+        let (thresholds, mut failures) = held(&both, options);
+        let changes = both.changes();
+        if !options.allow_status_change {
+            failures.extend(lost_rates(&both, options, &changes));
+        }
+        StudyComparison {
+            schema_version: COMPARISON_VERSION,
+            pass: failures.is_empty(),
+            failures,
+            a: side(a, summary_a),
+            b: side(b, summary_b),
+            notes: options.notes.clone(),
+            unpaired_because,
+            changes,
+            thresholds,
+            paired,
+        }
+    }
+}
+
+/// The thresholds with what they were held against, and those that were exceeded.
+fn held(
+    both: &Both<'_>,
     options: &StudyCompareOptions,
-) -> Result<StudyComparison, ResultsError> {
-    let wanted = options.thresholds.iter();
-    let summary_options = SummaryOptions {
-        factors: false,
-        more_quantiles: wanted.filter_map(|each| each.quantile).collect(),
-        ..SummaryOptions::default()
-    };
-    let summary_a = summarise(a.results, &summary_options)?;
-    let summary_b = summarise(b.results, &summary_options)?;
-    let (paired, unpaired_because) = match paired::paired(a.results, b.results)? {
-        Ok(paired) => (Some(paired), None),
-        Err(reason) => (None, Some(reason)),
-    };
-    let both = Both {
-        a: &summary_a,
-        b: &summary_b,
-        paired: paired.as_ref(),
-    };
+) -> (Vec<ThresholdResult>, Vec<StudyFailure>) {
     let mut failures = Vec::new();
     let mut thresholds = Vec::new();
     for threshold in &options.thresholds {
-        for of in subjects(&both, threshold) {
-            let change = both.change(threshold.metric, threshold.quantile, of.as_deref());
+        let compared = both.compared(&threshold.subject);
+        for of in subjects(both, compared, threshold) {
+            let change = both.change(compared, of.as_deref());
             let result = judged(threshold, &change);
             if !result.pass {
                 failures.push(StudyFailure {
-                    metric: threshold.metric.name,
+                    metric: change.metric,
                     of: of.clone(),
                     threshold: Some(threshold.key.clone()),
                     detail: result.detail.clone(),
-                    cases: both.cases(threshold.metric, of.as_deref()),
+                    cases: both.cases(compared, of.as_deref()),
                 });
             }
             thresholds.push(result);
         }
     }
-    let changes = both.changes();
-    if !options.allow_status_change {
-        for change in &changes {
-            let metric = StudyMetric::named(change.metric);
-            let has_threshold = options.thresholds.iter().any(|each| {
-                let of = each.of.as_deref();
-                each.metric.name == change.metric
-                    && (of == Some(EVERY) || of == change.of.as_deref())
+    (thresholds, failures)
+}
+
+/// Rates that fell by more than chance and have no threshold.
+fn lost_rates(
+    both: &Both<'_>,
+    options: &StudyCompareOptions,
+    changes: &[Change],
+) -> Vec<StudyFailure> {
+    let mut failures = Vec::new();
+    for change in changes {
+        let mut counting = [WORKING_LAYOUTS, SUCCESS_RATE].into_iter();
+        let Some(rate) = counting.find(|rate| rate.name == change.metric) else {
+            continue;
+        };
+        let has_threshold = options.thresholds.iter().any(|each| {
+            let of = each.of.as_deref();
+            each.subject == StudySubject::Rate(rate)
+                && (of == Some(EVERY) || of == change.of.as_deref())
+        });
+        let worse = change.loss.is_some_and(|loss| loss > 0.0) && change.beyond_chance;
+        if worse && !has_threshold {
+            failures.push(StudyFailure {
+                metric: change.metric.clone(),
+                of: change.of.clone(),
+                threshold: None,
+                detail: format!("{}, more than by chance", in_words(change)),
+                cases: both.cases(Compared::Rate(rate), change.of.as_deref()),
             });
-            let worse = change.loss.is_some_and(|loss| loss > 0.0) && change.beyond_chance;
-            let counts =
-                change.metric == WORKING_LAYOUTS.name || change.metric == SUCCESS_RATE.name;
-            if counts && worse && !has_threshold {
-                failures.push(StudyFailure {
-                    metric: change.metric,
-                    of: change.of.clone(),
-                    threshold: None,
-                    detail: format!("{}, more than by chance", in_words(change)),
-                    cases: metric
-                        .map(|metric| both.cases(metric, change.of.as_deref()))
-                        .unwrap_or_default(),
-                });
-            }
         }
     }
-    Ok(StudyComparison {
-        schema_version: COMPARISON_VERSION,
-        pass: failures.is_empty(),
-        failures,
-        a: side(a, &summary_a),
-        b: side(b, &summary_b),
-        unpaired_because,
-        changes,
-        thresholds,
-        paired,
-    })
+    failures
 }
 
 fn side(study: ComparedStudy<'_>, summary: &Summary) -> StudySide {
@@ -246,13 +303,17 @@ fn labels() -> impl Iterator<Item = &'static str> {
 }
 
 /// What a threshold is about; of `every` those that the first or the second study has.
-fn subjects(both: &Both<'_>, threshold: &StudyThreshold) -> Vec<Option<String>> {
+fn subjects(
+    both: &Both<'_>,
+    compared: Compared<'_>,
+    threshold: &StudyThreshold,
+) -> Vec<Option<String>> {
     if threshold.of.as_deref() != Some(EVERY) {
         return vec![threshold.of.clone()];
     }
     let found: Vec<Option<String>> = labels()
         .filter(|label| {
-            let change = both.change(threshold.metric, threshold.quantile, Some(label));
+            let change = both.change(compared, Some(label));
             change.a.is_some() || change.b.is_some()
         })
         .map(|label| Some(label.to_owned()))
@@ -266,7 +327,7 @@ fn subjects(both: &Both<'_>, threshold: &StudyThreshold) -> Vec<Option<String>> 
 
 fn judged(threshold: &StudyThreshold, change: &Change) -> ThresholdResult {
     let pass = match (change.loss, change.a) {
-        (Some(loss), Some(first)) => !threshold.is_exceeded_by(loss, first),
+        (Some(loss), Some(first)) => !threshold.limit.is_exceeded_by(loss, first),
         _ => false,
     };
     let allowed = if pass { "" } else { ", more than" };
@@ -275,7 +336,7 @@ fn judged(threshold: &StudyThreshold, change: &Change) -> ThresholdResult {
         limit: threshold.text.clone(),
         of: change.of.clone(),
         loss: change.loss,
-        unit: change.unit,
+        unit: change.unit.clone(),
         pass,
         detail: match (change.a, change.b) {
             (Some(_), Some(_)) if pass => in_words(change),
@@ -289,7 +350,6 @@ fn judged(threshold: &StudyThreshold, change: &Change) -> ThresholdResult {
 
 /// `5 % quantile of clearance of best`.
 pub fn what(change: &Change) -> String {
-    let words = StudyMetric::named(change.metric).map_or(change.metric, |metric| metric.words);
     let quantile = change.quantile.map_or(String::new(), |p| {
         format!("{} % quantile of ", short(100.0 * p))
     });
@@ -298,7 +358,7 @@ pub fn what(change: &Change) -> String {
         Some(BEST) => " of the best configuration".to_owned(),
         Some(of) => format!(" of {of}"),
     };
-    format!("{quantile}{words}{of}")
+    format!("{quantile}{}{of}", change.words)
 }
 
 fn short(value: f64) -> String {
@@ -317,7 +377,7 @@ pub fn value_text(value: f64, unit: &str) -> String {
 
 fn in_words(change: &Change) -> String {
     let text = |value: Option<f64>| {
-        value.map_or("none".to_owned(), |value| value_text(value, change.unit))
+        value.map_or("none".to_owned(), |value| value_text(value, &change.unit))
     };
     let loss = change.loss.unwrap_or_default();
     let way = if loss > 0.0 { "worse" } else { "better" };
@@ -325,7 +385,7 @@ fn in_words(change: &Change) -> String {
         "the same".to_owned()
     } else {
         let points = if change.unit == "1" { "points " } else { "" };
-        format!("{} {points}{way}", value_text(loss.abs(), change.unit))
+        format!("{} {points}{way}", value_text(loss.abs(), &change.unit))
     };
     format!(
         "{}: {} -> {}, {by}",
@@ -342,26 +402,57 @@ struct Both<'a> {
     paired: Option<&'a Paired>,
 }
 
-impl Both<'_> {
-    fn transition(&self, metric: StudyMetric, of: Option<&str>) -> Option<&Transition> {
+impl<'a> Both<'a> {
+    /// Columns that either study sums up, those of the first before those that only the second has.
+    fn columns(&self) -> Vec<&'a MetricColumn> {
+        let first = &self.a.metrics;
+        let more = self.b.metrics.iter();
+        let more = more.filter(|column| first.iter().all(|known| known.key != column.key));
+        first.iter().chain(more).collect()
+    }
+
+    fn compared<'b>(&self, subject: &'b StudySubject) -> Compared<'b>
+    where
+        'a: 'b,
+    {
+        match subject {
+            StudySubject::Rate(rate) => Compared::Rate(*rate),
+            StudySubject::Metric(key, quantile) => {
+                let mut columns = self.columns().into_iter();
+                match columns.find(|column| column.key == *key) {
+                    Some(column) => Compared::Quantile(column, *quantile),
+                    None => Compared::Unknown(key, *quantile),
+                }
+            }
+        }
+    }
+
+    fn transition(&self, compared: Compared<'_>, of: Option<&str>) -> Option<&Transition> {
         let paired = self.paired?;
-        if metric == WORKING_LAYOUTS {
+        let Compared::Rate(rate) = compared else {
+            return None;
+        };
+        if rate == WORKING_LAYOUTS {
             return Some(&paired.working);
         }
         let mut all = paired.configurations.iter();
-        let found = all.find(|each| metric == SUCCESS_RATE && Some(each.label.as_str()) == of);
+        let found = all.find(|each| rate == SUCCESS_RATE && Some(each.label.as_str()) == of);
         found.map(|each| &each.success)
     }
 
     /// Cases that show a loss.
-    fn cases(&self, metric: StudyMetric, of: Option<&str>) -> Vec<u64> {
-        if let Some(transition) = self.transition(metric, of) {
+    fn cases(&self, compared: Compared<'_>, of: Option<&str>) -> Vec<u64> {
+        if let Some(transition) = self.transition(compared, of) {
             return transition.lost_cases.clone();
         }
-        if metric == INVALID_LAYOUTS {
-            return self.b.evidence.invalid.clone();
-        }
-        let name = metric.column.map(|column| METRICS[column as usize].name);
+        let name = match compared {
+            Compared::Rate(rate) if rate == INVALID_LAYOUTS => {
+                return self.b.evidence.invalid.clone();
+            }
+            Compared::Rate(_) => None,
+            Compared::Quantile(column, _) => Some(column.name.as_str()),
+            Compared::Unknown(..) => return Vec::new(),
+        };
         if let Some(paired) = self.paired {
             let mut all = paired.differences.iter();
             let found =
@@ -384,25 +475,26 @@ impl Both<'_> {
         }
     }
 
-    fn change(&self, metric: StudyMetric, quantile: Option<f64>, of: Option<&str>) -> Change {
-        let (a, a_interval) = value(self.a, metric, quantile, of);
-        let (b, b_interval) = value(self.b, metric, quantile, of);
+    fn change(&self, compared: Compared<'_>, of: Option<&str>) -> Change {
+        let (a, a_interval) = value(self.a, compared, of);
+        let (b, b_interval) = value(self.b, compared, of);
         let apart = a_interval
             .zip(b_interval)
             .is_some_and(|(a, b): (Interval, Interval)| !a.overlaps(b));
         Change {
-            metric: metric.name,
-            quantile,
+            metric: compared.name().to_owned(),
+            words: compared.words().to_owned(),
+            quantile: compared.quantile(),
             of: of.map(str::to_owned),
-            unit: metric.unit(),
+            unit: compared.unit().to_owned(),
             a,
             a_interval,
             b,
             b_interval,
             change: a.zip(b).map(|(a, b)| b - a),
-            loss: a.zip(b).map(|(a, b)| metric.loss(a, b)),
+            loss: a.zip(b).map(|(a, b)| compared.loss(a, b)),
             beyond_chance: self
-                .transition(metric, of)
+                .transition(compared, of)
                 .map_or(apart, |found| found.worse || found.better),
         }
     }
@@ -411,16 +503,18 @@ impl Both<'_> {
     /// of each.
     fn changes(&self) -> Vec<Change> {
         let mut changes = Vec::new();
-        for metric in STUDY_METRICS {
-            if metric == SUCCESS_RATE {
-                changes.extend(labels().map(|label| self.change(metric, None, Some(label))));
-            } else if metric.column.is_none() {
-                changes.push(self.change(metric, None, None));
+        for rate in STUDY_RATES {
+            let compared = Compared::Rate(rate);
+            if rate.of_configurations {
+                changes.extend(labels().map(|label| self.change(compared, Some(label))));
             } else {
-                for of in [BEST].into_iter().chain(labels()) {
-                    for p in [metric.default_quantile(), 0.5] {
-                        changes.push(self.change(metric, Some(p), Some(of)));
-                    }
+                changes.push(self.change(compared, None));
+            }
+        }
+        for column in self.columns() {
+            for of in [BEST].into_iter().chain(labels()) {
+                for p in [bad_tail(column), 0.5] {
+                    changes.push(self.change(Compared::Quantile(column, p), Some(of)));
                 }
             }
         }
@@ -432,28 +526,30 @@ impl Both<'_> {
 /// A rate or quantile of a study, with its interval.
 fn value(
     summary: &Summary,
-    metric: StudyMetric,
-    quantile: Option<f64>,
+    compared: Compared<'_>,
     of: Option<&str>,
 ) -> (Option<f64>, Option<Interval>) {
     let overall = &summary.overall;
     let of_rate = |rate: &Rate| (rate.rate, rate.interval);
-    let Some(column) = metric.column else {
-        if metric == INVALID_LAYOUTS {
+    match compared {
+        Compared::Unknown(..) => (None, None),
+        Compared::Rate(rate) if rate == INVALID_LAYOUTS => {
             let repeats = summary.repeats as f64;
-            return of_rate(&Rate::new(overall.invalid, overall.cases, repeats));
+            of_rate(&Rate::new(overall.invalid, overall.cases, repeats))
         }
-        if metric == WORKING_LAYOUTS {
-            return of_rate(&overall.at_least[0]);
+        Compared::Rate(rate) if rate == WORKING_LAYOUTS => of_rate(&overall.at_least[0]),
+        Compared::Rate(_) => {
+            let mut all = overall.configurations.iter();
+            all.find(|each| Some(each.label.as_str()) == of)
+                .map_or((None, None), |each| of_rate(&each.success))
         }
-        let mut all = overall.configurations.iter();
-        return all
-            .find(|each| Some(each.label.as_str()) == of)
-            .map_or((None, None), |each| of_rate(&each.success));
-    };
-    let spread = summary.spread(of.unwrap_or(BEST), METRICS[column as usize].name);
-    let p = quantile.unwrap_or(metric.default_quantile());
-    spread
-        .and_then(|spread| spread.quantile(p))
-        .map_or((None, None), |found| (Some(found.value), found.interval))
+        Compared::Quantile(column, p) => {
+            // The same key in another unit would be another number.
+            let mut columns = summary.metrics.iter();
+            let own = columns.find(|own| own.key == column.key && own.unit == column.unit);
+            own.and_then(|own| summary.spread(of.unwrap_or(BEST), &own.name))
+                .and_then(|spread| spread.quantile(p))
+                .map_or((None, None), |found| (Some(found.value), found.interval))
+        }
+    }
 }

@@ -6,21 +6,12 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use needlebench_kinematics::ik::Configuration;
 use serde::Serialize;
 
+use crate::column::{Measures, indices};
 use crate::statistics::{
     BEST, CONFIGURATIONS, CaseValue, Grouped, Interval, Largest, Layout, MOST_CASES, PASSES,
     Points, QuantileValue, Quantiles, about_mean, has_numbers, mcnemar,
 };
-use crate::{CaseResult, FactorValue, METRICS, Metric, Results, ResultsError};
-
-/// Metrics whose differences are looked at.
-const PAIRED_METRICS: [Metric; 6] = [
-    Metric::Clearance,
-    Metric::CertifiedClearance,
-    Metric::SelfClearance,
-    Metric::TipError,
-    Metric::TipLateral,
-    Metric::TipRms,
-];
+use crate::{CaseResult, FactorValue, MetricColumn, Results, ResultsError};
 
 /// Shares of which the quantiles of the differences are given.
 const PROBABILITIES: [f64; 7] = [0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0];
@@ -95,6 +86,10 @@ pub struct PairedDifference {
     pub of: String,
     /// Name of the metric's column, with the unit.
     pub metric: String,
+    /// The metric in words.
+    pub words: String,
+    /// Unit of the differences.
+    pub unit: String,
     /// Layouts in which both studies have it and neither rejects the configuration.
     pub count: u64,
     /// Mean of second less first.
@@ -109,26 +104,51 @@ pub struct PairedDifference {
     pub gains: Vec<CaseValue>,
 }
 
+/// Metrics that both studies compare case by case: indices of their columns in each.
+fn shared(a: &[MetricColumn], b: &[MetricColumn]) -> [Vec<usize>; 2] {
+    let in_b = |column: &MetricColumn| {
+        let mut found = b.iter();
+        found.position(|other| other.key == column.key && other.unit == column.unit)
+    };
+    let pairs = indices(a, |column| column.by_case)
+        .into_iter()
+        .filter_map(|index| Some((index, in_b(&a[index])?)));
+    let (a, b) = pairs.unzip();
+    [a, b]
+}
+
+/// What is taken of the cases of a study.
+struct Taken {
+    identities: Points,
+    measures: Measures,
+    /// Indices of the columns that are compared.
+    columns: Vec<usize>,
+}
+
 /// What is compared of a case.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Brief {
     identity: u64,
     layout: Option<Layout>,
-    values: [[f32; PAIRED_METRICS.len()]; CONFIGURATIONS],
+    /// Values of the compared columns, configuration by configuration.
+    values: Vec<f32>,
 }
 
 impl Brief {
-    fn new(identity: u64, result: &CaseResult) -> Self {
-        let mut values = [[f32::NAN; PAIRED_METRICS.len()]; CONFIGURATIONS];
-        for (row, values) in result.rows.iter().zip(&mut values) {
-            if has_numbers(row) {
-                *values = PAIRED_METRICS.map(|metric| row.metrics[metric as usize]);
-            }
-        }
+    fn new(taken: &Taken, values: &[FactorValue], result: &CaseResult) -> Self {
+        let of_row = |row: &crate::Row| {
+            let known = has_numbers(row);
+            let value = |column: usize| row.get(column).filter(|_| known).unwrap_or(f32::NAN);
+            taken
+                .columns
+                .iter()
+                .map(|&column| value(column))
+                .collect::<Vec<f32>>()
+        };
         Self {
-            identity,
-            layout: Layout::of(result),
-            values,
+            identity: taken.identities.hash(values),
+            layout: Layout::of(result, &taken.measures),
+            values: result.rows.iter().flat_map(of_row).collect(),
         }
     }
 
@@ -138,7 +158,8 @@ impl Brief {
         } else {
             Some(configuration)
         };
-        index.map_or(f32::NAN, |index| self.values[index][metric])
+        let width = self.values.len() / CONFIGURATIONS;
+        index.map_or(f32::NAN, |index| self.values[index * width + metric])
     }
 }
 
@@ -213,7 +234,9 @@ pub(super) fn paired(
     let mut working = Successes::default();
     let mut success = vec![Successes::default(); CONFIGURATIONS];
     let (mut layouts, mut became_invalid, mut became_valid) = (0, 0, 0);
-    let width = PAIRED_METRICS.len();
+    let [in_a, in_b] = shared(a.columns(), b.columns());
+    let width = in_a.len();
+    let compared: Vec<&MetricColumn> = in_a.iter().map(|&index| &a.columns()[index]).collect();
     let stream = || Stream {
         sum: 0.0,
         groups: Grouped::default(),
@@ -225,7 +248,7 @@ pub(super) fn paired(
         .take((CONFIGURATIONS + 1) * width)
         .collect();
     for pass in 0..PASSES {
-        let different = zipped(a, b, |case, group, a, b| {
+        let different = zipped(a, b, [&in_a, &in_b], |case, group, a, b| {
             let (layout_a, layout_b) = match (a.layout, b.layout) {
                 (Some(a), Some(b)) => (a, b),
                 (Some(_), None) if pass == 0 => return became_invalid += 1,
@@ -247,11 +270,10 @@ pub(super) fn paired(
                 }
                 stream.quantiles.push(difference);
                 if pass == 0 {
-                    let column = METRICS[PAIRED_METRICS[metric] as usize];
                     let difference = f64::from(difference);
                     stream.sum += difference;
                     stream.groups.push(group, difference);
-                    let gain = if column.more_is_better == Some(true) {
+                    let gain = if compared[metric].more_is_better == Some(true) {
                         difference
                     } else {
                         -difference
@@ -292,14 +314,14 @@ pub(super) fn paired(
             .filter(|(_, stream)| stream.quantiles.count() > 0)
             .map(|(at, stream)| {
                 let of = labels.get(at / width).copied().unwrap_or(BEST);
-                stream.finish(of, PAIRED_METRICS[at % width])
+                stream.finish(of, compared[at % width])
             })
             .collect(),
     }))
 }
 
 impl Stream {
-    fn finish(&self, of: &str, metric: Metric) -> PairedDifference {
+    fn finish(&self, of: &str, column: &MetricColumn) -> PairedDifference {
         let count = self.quantiles.count();
         let mean = self.sum / count as f64;
         let error = self.groups.squared_error();
@@ -316,7 +338,9 @@ impl Stream {
         };
         PairedDifference {
             of: of.to_owned(),
-            metric: METRICS[metric as usize].name.to_owned(),
+            metric: column.name.clone(),
+            words: column.words.clone(),
+            unit: column.unit.clone(),
             count,
             mean,
             mean_interval: error.map(|(square, freedom)| about_mean(mean, square.sqrt(), freedom)),
@@ -357,13 +381,20 @@ fn different_design(a: &dyn Results, b: &dyn Results) -> Option<String> {
 fn zipped(
     a: &(dyn Results + Sync),
     b: &(dyn Results + Sync),
+    columns: [&[usize]; 2],
     mut visit: impl FnMut(u64, usize, &Brief, &Brief),
 ) -> Result<Option<u64>, ResultsError> {
-    let (points, all) = (Points::new(a.factors()), Points::of_everything(a.factors()));
+    let points = Points::new(a.factors());
+    let taken = |results: &(dyn Results + Sync), columns: &[usize]| Taken {
+        // Both are of one design.
+        identities: Points::of_everything(a.factors()),
+        measures: Measures::new(results.columns()),
+        columns: columns.to_vec(),
+    };
+    let (of_a, of_b) = (taken(a, columns[0]), taken(b, columns[1]));
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(4);
-        let identities = all.clone();
-        let reader = scope.spawn(move || send(b, &identities, &sender));
+        let reader = scope.spawn(move || send(b, &of_b, &sender));
         let mut blocks = Blocks {
             receiver,
             block: Vec::new(),
@@ -374,7 +405,7 @@ fn zipped(
             if different.is_some() {
                 return;
             }
-            let first = Brief::new(all.hash(values), result);
+            let first = Brief::new(&of_a, values, result);
             match blocks.next() {
                 Some(second) if second.identity == first.identity => {
                     visit(result.case, points.group(values), &first, second);
@@ -398,7 +429,7 @@ fn zipped(
 
 fn send(
     results: &dyn Results,
-    identities: &Points,
+    taken: &Taken,
     sender: &SyncSender<Vec<Brief>>,
 ) -> Result<(), ResultsError> {
     let mut block = Vec::with_capacity(BLOCK);
@@ -407,7 +438,7 @@ fn send(
         if !heard {
             return;
         }
-        block.push(Brief::new(identities.hash(values), result));
+        block.push(Brief::new(taken, values, result));
         if block.len() == BLOCK {
             let full = std::mem::replace(&mut block, Vec::with_capacity(BLOCK));
             heard = sender.send(full).is_ok();

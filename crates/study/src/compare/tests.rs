@@ -1,11 +1,12 @@
 use super::*;
-use crate::statistics::synthetic::{Synthetic, continuous, goal, ok, rejected, uniform};
+use crate::statistics::synthetic::{Synthetic, columns, continuous, goal, ok, rejected, uniform};
 use crate::{FactorValue, Outcome, Role, Row};
 
 /// Layouts in which configuration 3 has a clearance from `shift` to `shift + 100` mm, ok above 20, and
 /// configuration 0 an error of `error` mm; each `unlucky`-th layout has lost both.
 fn study(seed: u64, cases: u64, shift: f64, error: f64, unlucky: u64) -> Synthetic {
     Synthetic {
+        columns: columns().to_vec(),
         factors: vec![goal(), continuous("x", Role::Circumstance, 0.0, 1.0)],
         cases,
         case: Box::new(move |case| {
@@ -29,7 +30,19 @@ fn study(seed: u64, cases: u64, shift: f64, error: f64, unlucky: u64) -> Synthet
     }
 }
 
-fn compared(a: &Synthetic, b: &Synthetic, thresholds: &[(&str, &str)]) -> StudyComparison {
+/// What a threshold is on, by whose quantile, and its limit in the column's unit or in per cent.
+type Limit<'a> = (StudySubject, &'a str, StudyLimit);
+
+fn rate(rate: StudyRate, of: &str, limit: f64) -> Limit<'_> {
+    (StudySubject::Rate(rate), of, StudyLimit::Absolute(limit))
+}
+
+fn quantile<'a>(key: &str, p: f64, of: &'a str, limit_mm: f64) -> Limit<'a> {
+    let subject = StudySubject::Metric(key.to_owned(), p);
+    (subject, of, StudyLimit::Absolute(limit_mm))
+}
+
+fn compared(a: &Synthetic, b: &Synthetic, thresholds: &[Limit<'_>]) -> StudyComparison {
     let side = |source, results| ComparedStudy {
         source,
         name: "study",
@@ -39,11 +52,20 @@ fn compared(a: &Synthetic, b: &Synthetic, thresholds: &[(&str, &str)]) -> StudyC
     let options = StudyCompareOptions {
         thresholds: thresholds
             .iter()
-            .map(|(key, limit)| StudyThreshold::parse(key, limit).unwrap())
+            .map(|(subject, of, limit)| StudyThreshold {
+                subject: subject.clone(),
+                of: (!of.is_empty()).then(|| (*of).to_owned()),
+                limit: *limit,
+                key: "key".to_owned(),
+                text: "limit".to_owned(),
+            })
             .collect(),
-        allow_status_change: false,
+        ..StudyCompareOptions::default()
     };
-    compare_studies(side("a", a), side("b", b), &options).unwrap()
+    let pair = StudyPair::read(side("a", a), side("b", b), &[]).unwrap();
+    assert_eq!(pair.have("clearance"), [true, true]);
+    assert_eq!(pair.have("tip_rms"), [false, false]);
+    pair.compare(&options)
 }
 
 const NEVER: u64 = u64::MAX;
@@ -51,13 +73,12 @@ const NEVER: u64 = u64::MAX;
 #[test]
 fn study_against_itself_passes_whatever_the_thresholds() {
     let a = study(1, 1500, 0.0, 0.1, NEVER);
-    let all: Vec<(&str, &str)> = STUDY_METRICS
-        .iter()
-        .filter(|metric| {
-            ["success_rate", "clearance", "tip_error", "working_layouts"].contains(&metric.name)
-        })
-        .map(|metric| (metric.name, "0%"))
-        .collect();
+    let all = [
+        rate(WORKING_LAYOUTS, "", 0.0),
+        rate(SUCCESS_RATE, EVERY, 0.0),
+        quantile("clearance", 0.05, BEST, 0.0),
+        quantile("tip_error", 0.95, EVERY, 0.0),
+    ];
     let found = compared(&a, &a, &all);
     assert!(found.pass, "{:?}", found.failures);
     let paired = found.paired.unwrap();
@@ -104,7 +125,7 @@ fn same_cases_are_compared_one_by_one() {
     assert!(!found.pass);
     let failure = &found.failures[0];
     assert_eq!(
-        (failure.metric, failure.threshold.as_deref()),
+        (failure.metric.as_str(), failure.threshold.as_deref()),
         ("success_rate", None)
     );
     assert_eq!(failure.of.as_deref(), Some("Right-Up-Unfold"));
@@ -115,23 +136,54 @@ fn same_cases_are_compared_one_by_one() {
 fn thresholds_are_on_quantiles_and_rates() {
     let a = study(1, 1500, 0.0, 0.1, NEVER);
     let b = study(1, 1500, -3.0, 0.3, NEVER);
-    let allowed = ("success_rate", "0.05");
-    let pass = |key, limit| compared(&a, &b, &[allowed, (key, limit)]).pass;
-    assert!(pass("clearance@50:Right-Up-Unfold", "3.01mm"));
-    assert!(!pass("clearance@50:Right-Up-Unfold", "2.99mm"));
-    assert!(!pass("tip_error@95:every", "0.1mm"));
-    assert!(pass("tip_error@95:every", "0.21mm"));
-    assert!(pass("success_rate:Right-Up-Unfold", "0.05"));
-    assert!(!compared(&a, &b, &[("success_rate:Right-Up-Unfold", "0.01")]).pass);
-    // What was not measured fails, and says so.
-    let found = compared(&a, &b, &[allowed, ("tip_rms", "1mm")]);
-    assert!(
-        found.failures[0]
-            .detail
-            .contains("neither study has values")
-    );
+    let allowed = || rate(SUCCESS_RATE, EVERY, 0.05);
+    let pass = |limit| compared(&a, &b, &[allowed(), limit]).pass;
+    assert!(pass(quantile("clearance", 0.5, "Right-Up-Unfold", 3.01)));
+    assert!(!pass(quantile("clearance", 0.5, "Right-Up-Unfold", 2.99)));
+    assert!(!pass(quantile("tip_error", 0.95, EVERY, 0.1)));
+    assert!(pass(quantile("tip_error", 0.95, EVERY, 0.21)));
+    assert!(pass(rate(SUCCESS_RATE, "Right-Up-Unfold", 0.05)));
+    assert!(!compared(&a, &b, &[rate(SUCCESS_RATE, "Right-Up-Unfold", 0.01)]).pass);
+    // What was not measured fails, and says so, whether there is a column of it or not.
+    for key in ["tip_rms", "nothing"] {
+        let found = compared(&a, &b, &[allowed(), quantile(key, 0.95, BEST, 1.0)]);
+        assert!(
+            found.failures[0]
+                .detail
+                .contains("neither study has values")
+        );
+    }
     // Better is no loss.
-    assert!(compared(&b, &a, &[("clearance", "0mm"), ("tip_error", "0mm")]).pass);
+    let better = [
+        quantile("clearance", 0.05, BEST, 0.0),
+        quantile("tip_error", 0.95, BEST, 0.0),
+    ];
+    assert!(compared(&b, &a, &better).pass);
+}
+
+#[test]
+fn metrics_are_matched_by_their_keys_wherever_their_columns_stand() {
+    let a = study(1, 800, 0.0, 0.1, NEVER);
+    let mut b = study(1, 800, 0.0, 0.1, NEVER);
+    let case = b.case;
+    b.columns.swap(0, 2);
+    b.columns[0].unit = "m".to_owned();
+    b.case = Box::new(move |number| {
+        let (values, mut rows) = case(number);
+        for row in &mut rows {
+            row.values.resize(3, f32::NAN);
+            row.values.swap(0, 2);
+        }
+        (values, rows)
+    });
+    let found = compared(&a, &b, &[quantile("clearance", 0.05, BEST, 0.0)]);
+    assert!(found.pass, "{:?}", found.failures);
+    let paired = found.paired.unwrap();
+    let mut compared: Vec<&str> = paired.differences.iter().map(|each| &*each.words).collect();
+    compared.sort_unstable();
+    compared.dedup();
+    assert_eq!(compared, ["clearance", "tip error"]);
+    assert!(paired.differences.iter().all(|each| each.mean == 0.0));
 }
 
 #[test]
@@ -150,6 +202,6 @@ fn other_cases_are_compared_by_their_intervals() {
     );
     // Every fifth layout lost is more than chance without pairs too.
     let found = compared(&a, &study(2, 1500, 0.0, 0.1, 5), &[]);
-    let lost: Vec<&str> = found.failures.iter().map(|each| each.metric).collect();
+    let lost: Vec<&str> = found.failures.iter().map(|each| &*each.metric).collect();
     assert_eq!(lost, ["working_layouts", "success_rate", "success_rate"]);
 }

@@ -11,7 +11,7 @@ use super::layout::Layout;
 use super::moments::{Grouped, Points, combinations};
 use super::selection::Quantiles;
 use super::spread::QuantileValue;
-use crate::{CaseResult, Factor, FactorKind, FactorValue, Metric, Role};
+use crate::{CaseResult, Factor, FactorKind, FactorValue, Role};
 
 /// Combinations of sampled choices, in bins, that are ranked at most.
 const MOST_BINNED: usize = 256;
@@ -218,10 +218,7 @@ impl ChoiceCounter {
         if let Some(clearance) = layout.best_clearance {
             cell.clearance.push(clearance);
         }
-        if let Some(error) = layout
-            .best
-            .and_then(|best| result.rows[best].get(Metric::TipError))
-        {
+        if let Some(error) = layout.best_tip_error {
             cell.tip_error.push(error);
         }
     }

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::layout::{CONFIGURATIONS, Layout, has_numbers};
 use super::spread::BEST;
-use crate::{CaseResult, METRICS, Metric};
+use crate::column::indices;
+use crate::{CaseResult, MetricColumn};
 
 /// Cases that each list has at most.
 pub const MOST_CASES: usize = 5;
@@ -50,16 +51,6 @@ pub struct CaseValue {
     pub value: f64,
 }
 
-/// Metrics whose worst cases are kept.
-const WORST_METRICS: [Metric; 6] = [
-    Metric::Clearance,
-    Metric::CertifiedClearance,
-    Metric::SelfClearance,
-    Metric::TipError,
-    Metric::TipLateral,
-    Metric::TipRms,
-];
-
 /// The largest of a stream, with the cases they are of.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Largest(Vec<CaseValue>);
@@ -92,24 +83,40 @@ pub(crate) fn push_first(cases: &mut Vec<u64>, case: u64) {
 }
 
 /// Collects the evidence.
-#[derive(Debug, Default)]
-pub(crate) struct Collector {
+#[derive(Debug)]
+pub(crate) struct Collector<'a> {
+    columns: &'a [MetricColumn],
+    /// Indices of the columns whose worst cases are kept.
+    kept: Vec<usize>,
     invalid: Vec<u64>,
     fewer_than: [Vec<u64>; CONFIGURATIONS],
     not_ok: [Vec<u64>; CONFIGURATIONS + 1],
-    worst: [[Largest; WORST_METRICS.len()]; CONFIGURATIONS + 1],
+    /// Of each configuration and the best, one for each of the kept columns.
+    worst: [Vec<Largest>; CONFIGURATIONS + 1],
 }
 
 /// -1 where less is worse.
-fn sign(metric: Metric) -> f64 {
-    if METRICS[metric as usize].more_is_better == Some(true) {
+fn sign(column: &MetricColumn) -> f64 {
+    if column.more_is_better == Some(true) {
         -1.0
     } else {
         1.0
     }
 }
 
-impl Collector {
+impl<'a> Collector<'a> {
+    pub(crate) fn new(columns: &'a [MetricColumn]) -> Self {
+        let kept = indices(columns, |column| column.by_case);
+        Self {
+            columns,
+            invalid: Vec::new(),
+            fewer_than: Default::default(),
+            not_ok: Default::default(),
+            worst: std::array::from_fn(|_| vec![Largest::default(); kept.len()]),
+            kept,
+        }
+    }
+
     pub(crate) fn push(&mut self, result: &CaseResult, layout: Option<&Layout>) {
         let case = result.case;
         let Some(layout) = layout else {
@@ -131,14 +138,14 @@ impl Collector {
             if !has_numbers(row) {
                 continue;
             }
-            for (column, metric) in WORST_METRICS.iter().enumerate() {
-                let Some(value) = row.get(*metric) else {
+            for (at, &column) in self.kept.iter().enumerate() {
+                let Some(value) = row.get(column) else {
                     continue;
                 };
-                let value = sign(*metric) * f64::from(value);
-                self.worst[index][column].push(case, value);
+                let value = sign(&self.columns[column]) * f64::from(value);
+                self.worst[index][at].push(case, value);
                 if layout.best == Some(index) {
-                    self.worst[CONFIGURATIONS][column].push(case, value);
+                    self.worst[CONFIGURATIONS][at].push(case, value);
                 }
             }
         }
@@ -147,6 +154,11 @@ impl Collector {
     pub(crate) fn finish(self) -> Evidence {
         let labels = Configuration::ALL.iter().map(|each| each.label());
         let all = labels.chain([BEST]).zip(self.not_ok).zip(&self.worst);
+        let columns: Vec<&MetricColumn> = self
+            .kept
+            .iter()
+            .map(|&index| &self.columns[index])
+            .collect();
         Evidence {
             invalid: self.invalid,
             fewer_than: self.fewer_than.to_vec(),
@@ -154,12 +166,12 @@ impl Collector {
                 .map(|((label, not_ok), worst)| ConfigurationEvidence {
                     of: label.to_owned(),
                     not_ok,
-                    worst: WORST_METRICS
+                    worst: columns
                         .iter()
                         .zip(worst)
-                        .map(|(metric, largest)| WorstCases {
-                            metric: METRICS[*metric as usize].name.to_owned(),
-                            cases: largest.finish(sign(*metric)),
+                        .map(|(column, largest)| WorstCases {
+                            metric: column.name.clone(),
+                            cases: largest.finish(sign(column)),
                         })
                         .filter(|each| !each.cases.is_empty())
                         .collect(),

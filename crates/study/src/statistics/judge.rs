@@ -1,11 +1,13 @@
 //! Whether a study shows what it has to.
 
+use needlebench_cell::Limit;
 use needlebench_cell::study_criteria::{BEST, EVERY, QuantileCriterion, StudyCriteria};
 use needlebench_kinematics::ik::Configuration;
 use serde::{Deserialize, Serialize};
 
 use super::interval::{Interval, Rate};
 use super::{MOST_CASES, Summary};
+use crate::MetricColumn;
 
 /// Verdict of one criterion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,9 +40,8 @@ struct Judged {
     of: Option<String>,
     value: Option<f64>,
     interval: Option<Interval>,
-    limit: f64,
-    at_least: bool,
-    unit: &'static str,
+    limit: Limit,
+    unit: String,
     what: String,
     cases: Vec<u64>,
 }
@@ -48,7 +49,7 @@ struct Judged {
 impl Judged {
     fn verdict(self, confidence: bool) -> CriterionResult {
         let end = |interval: Interval| {
-            if self.at_least {
+            if self.limit.at_least {
                 interval.low
             } else {
                 interval.high
@@ -59,13 +60,6 @@ impl Judged {
         } else {
             self.value
         };
-        let meets = |value: f64| {
-            if self.at_least {
-                value >= self.limit
-            } else {
-                value <= self.limit
-            }
-        };
         let detail = match (self.value, judged) {
             (None, _) => format!("{}: there are no values", self.what),
             (Some(_), None) => format!("{}: the sample is too small for an interval", self.what),
@@ -74,11 +68,11 @@ impl Judged {
         CriterionResult {
             criterion: self.criterion.to_owned(),
             of: self.of,
-            pass: judged.is_some_and(meets),
+            pass: self.limit.is_met_by(judged),
             value: self.value,
             interval: self.interval,
-            limit: self.limit,
-            unit: self.unit.to_owned(),
+            limit: self.limit.value,
+            unit: self.unit,
             confidence,
             detail,
             cases: self.cases,
@@ -127,7 +121,10 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
         let rate = Rate::new(overall.invalid, overall.cases, summary.repeats as f64);
         let what = "layouts that cannot exist".to_owned();
         judged.push(Judged {
-            at_least: false,
+            limit: Limit {
+                value: limit,
+                at_least: false,
+            },
             ..of_rate(
                 "max_invalid_layouts",
                 &rate,
@@ -138,17 +135,25 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
         });
     }
     for criterion in criteria.quantiles() {
-        if criterion.of == EVERY {
-            let labels = Configuration::ALL.iter().map(|each| each.label());
-            // A configuration that is always rejected has no values, and nothing to be judged by.
-            let seen = labels.filter(|label| summary.spread(label, criterion.column).is_some());
-            let before = judged.len();
-            judged.extend(seen.map(|label| of_quantile(summary, &criterion, label)));
-            if judged.len() == before {
-                judged.push(of_quantile(summary, &criterion, EVERY));
-            }
+        let columns = summary.metrics.iter();
+        let mut columns: Vec<&MetricColumn> = columns
+            .filter(|column| column.criterion.as_deref() == Some(criterion.key))
+            .collect();
+        // A study of several kinds of cases has a column of each; those without values are of others.
+        let has_values = |column: &&MetricColumn| {
+            let mut all = summary.spreads.iter();
+            all.any(|spread| spread.metric == column.name)
+        };
+        if columns.iter().any(has_values) {
+            columns.retain(has_values);
         } else {
-            judged.push(of_quantile(summary, &criterion, criterion.of));
+            columns.truncate(1);
+        }
+        if columns.is_empty() {
+            judged.push(of_quantile(summary, &criterion, None, criterion.of));
+        }
+        for column in columns {
+            judged.extend(of_column(summary, &criterion, column));
         }
     }
     judged
@@ -169,9 +174,11 @@ fn of_rate(
         of: None,
         value: rate.rate,
         interval: rate.interval,
-        limit,
-        at_least: true,
-        unit: "1",
+        limit: Limit {
+            value: limit,
+            at_least: true,
+        },
+        unit: "1".to_owned(),
         what: match &rate.remark {
             Some(remark) => format!("{what}; {remark}"),
             None => what,
@@ -180,14 +187,41 @@ fn of_rate(
     }
 }
 
-fn of_quantile(summary: &Summary, criterion: &QuantileCriterion<'_>, of: &str) -> Judged {
-    let spread = summary.spread(of, criterion.column);
+/// A criterion on one column: one verdict, or of `every` one for each configuration that has values.
+fn of_column(
+    summary: &Summary,
+    criterion: &QuantileCriterion<'_>,
+    column: &MetricColumn,
+) -> Vec<Judged> {
+    let one = |of: &str| of_quantile(summary, criterion, Some(column), of);
+    if criterion.of != EVERY {
+        return vec![one(criterion.of)];
+    }
+    let labels = Configuration::ALL.iter().map(|each| each.label());
+    // A configuration that is always rejected has no values, and nothing to be judged by.
+    let seen = labels.filter(|label| summary.spread(label, &column.name).is_some());
+    let all: Vec<Judged> = seen.map(one).collect();
+    if all.is_empty() {
+        vec![one(EVERY)]
+    } else {
+        all
+    }
+}
+
+fn of_quantile(
+    summary: &Summary,
+    criterion: &QuantileCriterion<'_>,
+    column: Option<&MetricColumn>,
+    of: &str,
+) -> Judged {
+    let name = column.map_or("", |column| column.name.as_str());
+    let spread = summary.spread(of, name);
     let quantile = spread.and_then(|spread| spread.quantile(criterion.quantile));
     let worst = summary.evidence.configurations.iter();
     let cases = worst
         .filter(|each| each.of == of)
         .flat_map(|each| &each.worst)
-        .filter(|each| each.metric == criterion.column)
+        .filter(|each| each.metric == name)
         .flat_map(|each| each.cases.iter().map(|each| each.case))
         .take(MOST_CASES);
     let who = if of == BEST {
@@ -196,24 +230,21 @@ fn of_quantile(summary: &Summary, criterion: &QuantileCriterion<'_>, of: &str) -
         of
     };
     let count = spread.map_or(0, |spread| spread.count);
+    let percent = 100.0 * criterion.quantile;
     Judged {
         criterion: criterion.key,
         of: Some(of.to_owned()),
         value: quantile.map(|quantile| quantile.value),
         interval: quantile.and_then(|quantile| quantile.interval),
         limit: criterion.limit,
-        at_least: criterion.at_least,
-        unit: "mm",
-        what: if spread.is_some() && quantile.is_none() {
-            format!(
-                "the summary lacks the {} % quantile",
-                100.0 * criterion.quantile
-            )
-        } else {
-            format!(
-                "{} % quantile of {who} over {count} layouts",
-                100.0 * criterion.quantile
-            )
+        unit: column.map_or_else(|| "mm".to_owned(), |column| column.unit.clone()),
+        what: match (column, spread, quantile) {
+            (_, Some(_), None) => format!("the summary lacks the {percent} % quantile"),
+            (None, ..) => format!("{percent} % quantile of {who}: the study does not measure it"),
+            (Some(column), ..) => format!(
+                "{percent} % quantile of {} of {who} over {count} layouts",
+                column.words
+            ),
         },
         cases: cases.collect(),
     }

@@ -1,6 +1,7 @@
 //! What the statistics need to know of a case.
 
-use crate::{CaseResult, FactorValue, Metric, Outcome, Results, ResultsError, Row};
+use crate::column::Measures;
+use crate::{CaseResult, FactorValue, Outcome, Results, ResultsError, Row};
 
 /// Number of configurations.
 pub(crate) const CONFIGURATIONS: usize = 8;
@@ -14,17 +15,20 @@ pub(crate) struct Layout {
     pub best: Option<usize>,
     /// Its clearance, mm.
     pub best_clearance: Option<f32>,
+    /// Its tip error, mm.
+    pub best_tip_error: Option<f32>,
     /// Least tip error of those that are ok, mm.
     pub least_tip_error: Option<f32>,
 }
 
 impl Layout {
     /// None of a layout that cannot exist.
-    pub(crate) fn of(result: &CaseResult) -> Option<Self> {
+    pub(crate) fn of(result: &CaseResult, measures: &Measures) -> Option<Self> {
         let mut layout = Self {
             ok: 0,
             best: None,
             best_clearance: None,
+            best_tip_error: None,
             least_tip_error: None,
         };
         for (index, row) in result.rows.iter().enumerate() {
@@ -33,13 +37,15 @@ impl Layout {
                 Outcome::Ok => layout.ok |= 1 << index,
                 Outcome::Failed | Outcome::Rejected => continue,
             }
-            if let Some(clearance) = row.get(Metric::Clearance)
+            let tip_error = measures.tip_error(row);
+            if let Some(clearance) = measures.clearance(row)
                 && layout.best_clearance.is_none_or(|best| clearance > best)
             {
                 layout.best = Some(index);
                 layout.best_clearance = Some(clearance);
+                layout.best_tip_error = tip_error;
             }
-            if let Some(error) = row.get(Metric::TipError)
+            if let Some(error) = tip_error
                 && layout.least_tip_error.is_none_or(|least| error < least)
             {
                 layout.least_tip_error = Some(error);

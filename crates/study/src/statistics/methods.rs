@@ -67,7 +67,8 @@ const METHODS: [[&str; 3]; 9] = [
     ],
     [
         "best configuration of a layout",
-        "the largest clearance of those that are ok; the first of equal ones",
+        "the largest clearance of those that are ok, the first of equal ones: the nearest approach along \
+         the simulated motion; of planned cases along the planned one, of static cases in their posture",
         "definition",
     ],
 ];

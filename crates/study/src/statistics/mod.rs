@@ -36,7 +36,7 @@ pub use interval::{CONFIDENCE, Interval, Rate, mcnemar, wilson};
 pub use judge::{CriterionResult, judge_study};
 pub use methods::Method;
 pub use regions::{RegionCell, RegionMap, Regions};
-pub use spread::{BEST, PROBABILITIES, QuantileValue, SPREAD_METRICS, Spread};
+pub use spread::{BEST, PROBABILITIES, QuantileValue, Spread};
 
 pub(crate) use evidence::Largest;
 pub(crate) use interval::about_mean;
@@ -44,7 +44,8 @@ pub(crate) use layout::{CONFIGURATIONS, Layout, has_numbers};
 pub(crate) use moments::{Grouped, Points};
 pub(crate) use selection::{PASSES, Quantiles};
 
-use crate::{Factor, FactorKind, FactorValue, Results, ResultsError};
+use crate::column::Measures;
+use crate::{Factor, FactorKind, FactorValue, Measure, MetricColumn, Results, ResultsError};
 use choices::ChoiceCounter;
 use counts::Counter;
 use effects::{Interactions, MainEffects};
@@ -117,7 +118,9 @@ pub struct Summary {
     pub overall: Counts,
     /// The same by goal.
     pub goals: Vec<Counts>,
-    /// Spread of the metrics, configuration by configuration, the best of each layout last.
+    /// The metrics that are summed up.
+    pub metrics: Vec<MetricColumn>,
+    /// Their spread, configuration by configuration, the best of each layout last.
     pub spreads: Vec<Spread>,
     /// What the factors do.
     pub effects: Effects,
@@ -138,6 +141,15 @@ impl Summary {
     pub fn spread(&self, of: &str, metric: &str) -> Option<&Spread> {
         let mut all = self.spreads.iter();
         all.find(|each| each.of == of && each.metric == metric)
+    }
+
+    /// The metrics that have values and stand for something: one of each kind of cases.
+    pub fn measured(&self, measure: Measure) -> impl Iterator<Item = &MetricColumn> {
+        let of_measure = move |column: &&MetricColumn| column.measure == Some(measure);
+        self.metrics.iter().filter(of_measure).filter(|column| {
+            let mut all = self.spreads.iter();
+            all.any(|spread| spread.metric == column.name)
+        })
     }
 }
 
@@ -185,8 +197,9 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
     probabilities.extend(&options.more_quantiles);
     probabilities.sort_by(f64::total_cmp);
     probabilities.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
-    let mut spreads = Spreads::new(Rc::from(probabilities), points.repeats);
-    let mut evidence = Collector::default();
+    let columns = results.columns();
+    let mut spreads = Spreads::new(Rc::from(probabilities), points.repeats, columns);
+    let mut evidence = Collector::new(columns);
     let considered = if options.factors { factors } else { &[] };
     let mut main = MainEffects::new(
         // Ten layouts or more in a bin, on average.
@@ -263,7 +276,8 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
         goals: goals
             .map(|(goal, counter)| counter.finish(Some(goal), per_goal))
             .collect(),
-        spreads: spreads.finish(),
+        metrics: columns.iter().filter(|each| each.spread).cloned().collect(),
+        spreads: spreads.finish(columns),
         effects: main.finish(&interactions),
         regions: regions.finish(effect),
         choices: choices.map(|choices| choices.finish()),
@@ -281,12 +295,13 @@ fn visit_goals(
     results: &dyn Results,
     mut visit: impl FnMut(usize, &[FactorValue], &crate::CaseResult, Option<&Layout>),
 ) -> Result<(), ResultsError> {
+    let measures = Measures::new(results.columns());
     layout::visit_checked(results, |values, result| {
         let goal = match values.first() {
             Some(FactorValue::Level(level)) => *level,
             _ => 0,
         };
-        let layout = Layout::of(result);
+        let layout = Layout::of(result, &measures);
         visit(goal, values, result, layout.as_ref());
     })
 }

@@ -264,7 +264,7 @@ fn interval_ranks(count: u64, p: f64, repeats: u64) -> (Option<u64>, Option<u64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use needlebench_kinematics::pose_sets::SplitMix64;
+    use needlebench_kinematics::random::SplitMix64;
 
     const PROBABILITIES: [f64; 9] = [0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0];
 

@@ -9,25 +9,14 @@ use super::interval::Interval;
 use super::layout::{CONFIGURATIONS, Layout, has_numbers};
 use super::moments::Moments;
 use super::selection::Quantiles;
-use crate::{CaseResult, METRICS, Metric};
+use crate::column::indices;
+use crate::{CaseResult, MetricColumn};
 
 /// Name of the best configuration of each layout: ok, with the largest clearance of those that are.
 pub const BEST: &str = "best";
 
 /// Shares of which the quantiles are given, from the least to the largest value.
 pub const PROBABILITIES: [f64; 9] = [0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0];
-
-/// Metrics that are summed up.
-pub const SPREAD_METRICS: [Metric; 8] = [
-    Metric::Clearance,
-    Metric::CertifiedClearance,
-    Metric::SelfClearance,
-    Metric::TipError,
-    Metric::TipLateral,
-    Metric::TipRms,
-    Metric::TipSensitivity,
-    Metric::Surplus,
-];
 
 /// How a metric is spread over layouts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -71,29 +60,34 @@ impl Spread {
 /// All metrics of all configurations, and of the best.
 pub(crate) struct Spreads {
     probabilities: Rc<[f64]>,
+    /// Indices of the columns that are summed up.
+    columns: Vec<usize>,
+    /// Of each configuration and the best, one for each of those columns.
     streams: Vec<(Moments, Quantiles)>,
 }
 
 impl Spreads {
-    pub(crate) fn new(probabilities: Rc<[f64]>, repeats: u64) -> Self {
+    pub(crate) fn new(probabilities: Rc<[f64]>, repeats: u64, columns: &[MetricColumn]) -> Self {
+        let columns = indices(columns, |column| column.spread);
         let stream = (
             Moments::default(),
             Quantiles::new(Rc::clone(&probabilities), repeats),
         );
         Self {
             probabilities,
-            streams: vec![stream; (CONFIGURATIONS + 1) * SPREAD_METRICS.len()],
+            streams: vec![stream; (CONFIGURATIONS + 1) * columns.len()],
+            columns,
         }
     }
 
     pub(crate) fn push(&mut self, result: &CaseResult, layout: &Layout, pass: usize) {
-        let width = SPREAD_METRICS.len();
+        let width = self.columns.len();
         for (index, row) in result.rows.iter().enumerate() {
             if !has_numbers(row) {
                 continue;
             }
-            for (column, metric) in SPREAD_METRICS.iter().enumerate() {
-                let Some(value) = row.get(*metric) else {
+            for (column, &index_in_row) in self.columns.iter().enumerate() {
+                let Some(value) = row.get(index_in_row) else {
                     continue;
                 };
                 let mut push = |at: usize| {
@@ -118,12 +112,12 @@ impl Spreads {
     }
 
     /// Those that have any value, configuration by configuration, the best last.
-    pub(crate) fn finish(&self) -> Vec<Spread> {
+    pub(crate) fn finish(&self, columns: &[MetricColumn]) -> Vec<Spread> {
         let labels = Configuration::ALL.iter().map(|each| each.label());
         let mut found = Vec::new();
         for (at, label) in labels.chain([BEST]).enumerate() {
-            for (column, metric) in SPREAD_METRICS.iter().enumerate() {
-                let (moments, quantiles) = &self.streams[at * SPREAD_METRICS.len() + column];
+            for (column, &index_in_row) in self.columns.iter().enumerate() {
+                let (moments, quantiles) = &self.streams[at * self.columns.len() + column];
                 let Some(mean) = moments.mean() else {
                     continue;
                 };
@@ -140,7 +134,7 @@ impl Spreads {
                 });
                 found.push(Spread {
                     of: label.to_owned(),
-                    metric: METRICS[*metric as usize].name.to_owned(),
+                    metric: columns[index_in_row].name.clone(),
                     count: moments.count(),
                     mean,
                     standard_deviation: moments.standard_deviation(),

@@ -1,14 +1,43 @@
 //! Results whose truth is known.
 
 use crate::{
-    CaseResult, Factor, FactorKind, FactorValue, Level, Metric, Outcome, Results, ResultsError,
-    Role, Row,
+    CaseResult, Factor, FactorKind, FactorValue, Level, Measure, MetricColumn, Outcome, Results,
+    ResultsError, Role, Row,
 };
 
 type Case = dyn Fn(u64) -> (Vec<FactorValue>, [Row; 8]) + Send + Sync;
 
+/// The columns of [`ok`]: clearance, tip error, and one that no row has.
+pub(crate) fn columns() -> [MetricColumn; 3] {
+    let column = |key: &str, words: &str, more_is_better, measure, criterion: &str| MetricColumn {
+        name: format!("{key}_mm"),
+        key: key.to_owned(),
+        words: words.to_owned(),
+        description: format!("{words}, mm"),
+        unit: "mm".to_owned(),
+        more_is_better: Some(more_is_better),
+        spread: true,
+        by_case: true,
+        measure,
+        criterion: Some(criterion.to_owned()),
+    };
+    let (clearance, error) = (Some(Measure::Clearance), Some(Measure::TipError));
+    [
+        column(
+            "clearance",
+            "clearance",
+            true,
+            clearance,
+            "min_clearance_mm",
+        ),
+        column("tip_error", "tip error", false, error, "max_tip_error_mm"),
+        column("tip_rms", "rms tip error", false, None, "max_tip_rms_mm"),
+    ]
+}
+
 /// Results that are made when they are read.
 pub(crate) struct Synthetic {
+    pub columns: Vec<MetricColumn>,
     pub factors: Vec<Factor>,
     pub cases: u64,
     pub case: Box<Case>,
@@ -17,6 +46,10 @@ pub(crate) struct Synthetic {
 impl Results for Synthetic {
     fn factors(&self) -> &[Factor] {
         &self.factors
+    }
+
+    fn columns(&self) -> &[MetricColumn] {
+        &self.columns
     }
 
     fn cases(&self) -> u64 {
@@ -71,15 +104,13 @@ pub(crate) fn rejected() -> [Row; 8] {
 
 /// A row that is ok.
 pub(crate) fn ok(index: u8, clearance_mm: f64, tip_error_mm: f64) -> Row {
-    let mut row = Row::new(index, Outcome::Ok, "");
-    row.set(Metric::Clearance, clearance_mm);
-    row.set(Metric::TipError, tip_error_mm);
-    row
+    Row::new(index, Outcome::Ok, "")
+        .with_values([Some(clearance_mm), Some(tip_error_mm)].into_iter())
 }
 
 /// A number in (0, 1) that depends on a seed, a case and a column alone.
 pub(crate) fn uniform(seed: u64, case: u64, column: u64) -> f64 {
-    use needlebench_kinematics::pose_sets::SplitMix64;
+    use needlebench_kinematics::random::SplitMix64;
     let mut random = SplitMix64::new(seed ^ case.wrapping_mul(0x9e37_79b9) ^ column << 48);
     random.next_u64();
     random.uniform(0.0, 1.0)

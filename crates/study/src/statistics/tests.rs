@@ -1,6 +1,6 @@
 use needlebench_cell::study_criteria::{LowerQuantile, StudyCriteria, UpperQuantile};
 
-use super::synthetic::{Synthetic, continuous, goal, levels, ok, rejected, uniform};
+use super::synthetic::{Synthetic, columns, continuous, goal, levels, ok, rejected, uniform};
 use super::*;
 use crate::{Outcome, Role, Row};
 
@@ -12,6 +12,7 @@ fn summary(results: &Synthetic) -> Summary {
 /// with a clearance of the case's number, configuration 2 always fails.
 fn hundred() -> Synthetic {
     Synthetic {
+        columns: columns().to_vec(),
         factors: vec![goal()],
         cases: 100,
         case: Box::new(|case| {
@@ -115,6 +116,7 @@ fn even(case: u64, column: i32) -> f64 {
 fn ishigami(cases: u64) -> Synthetic {
     use std::f64::consts::PI;
     Synthetic {
+        columns: columns().to_vec(),
         factors: vec![
             goal(),
             continuous("x1", Role::Circumstance, -PI, PI),
@@ -166,6 +168,7 @@ fn factors_without_effect_have_none_in_small_samples_too() {
     let (mut sum, mut above) = (0.0, 0);
     for seed in 0..SETS {
         let results = Synthetic {
+            columns: columns().to_vec(),
             factors: vec![
                 goal(),
                 continuous("a", Role::Circumstance, 0.0, 1.0),
@@ -206,6 +209,7 @@ fn repeated_points_do_not_pass_for_independent_layouts() {
     for seed in 0..200 {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let results = Synthetic {
+            columns: columns().to_vec(),
             factors: vec![
                 levels("goal", Role::Circumstance, &names),
                 continuous("x", Role::Circumstance, 0.0, 1.0),
@@ -237,6 +241,7 @@ fn repeated_points_do_not_pass_for_independent_layouts() {
 /// where `y` is above 0.8.
 fn choices() -> Synthetic {
     Synthetic {
+        columns: columns().to_vec(),
         factors: vec![
             goal(),
             levels("tool", Role::Choice, &["c", "a", "b"]),

@@ -1,4 +1,7 @@
 //! Files that are either whole or not there, even after a power failure.
+//!
+//! Not through `tempfile`: what a killed process leaves of a table of gigabytes is overwritten by the next
+//! one under the same name, and file and folder are on the disk before anything relies on them.
 
 use std::fs::File;
 use std::io::{self, Write};

@@ -13,7 +13,7 @@
 //! Bytes of equal significance stand together because the first are much alike and compress well,
 //! while the last are noise, which costs no time where nothing else is between it.
 
-use crate::{Factor, FactorKind, METRIC_COUNT, Outcome};
+use crate::{Factor, FactorKind, Outcome};
 
 use super::columns::{Columns, FactorColumn, ROWS};
 
@@ -59,9 +59,10 @@ pub(crate) fn unpack(
     raw_length: usize,
     cases: usize,
     factors: &[Factor],
+    metrics: usize,
 ) -> Option<Columns> {
     let raw = zstd::bulk::decompress(bytes, raw_length).ok()?;
-    decode(&raw, cases, factors)
+    decode(&raw, cases, factors, metrics)
 }
 
 fn encode(columns: &Columns, raw: &mut Vec<u8>) {
@@ -100,10 +101,10 @@ fn bits(value: f32) -> u32 {
     }
 }
 
-fn decode(raw: &[u8], cases: usize, factors: &[Factor]) -> Option<Columns> {
+fn decode(raw: &[u8], cases: usize, factors: &[Factor], metrics: usize) -> Option<Columns> {
     let rows = cases * ROWS;
     let mut rest = Rest(raw);
-    let mut columns = Columns::new(factors);
+    let mut columns = Columns::new(factors, metrics);
     columns.cases = cases;
     for (column, factor) in columns.factors.iter_mut().zip(factors) {
         match (column, &factor.kind) {
@@ -140,7 +141,7 @@ fn decode(raw: &[u8], cases: usize, factors: &[Factor]) -> Option<Columns> {
             .details
             .push(Some(text).filter(|text| (*text as usize) < columns.texts.len())?);
     }
-    let plane = METRIC_COUNT * rows;
+    let plane = metrics * rows;
     let planes = rest.take(4 * plane)?;
     for (metric, column) in columns.metrics.iter_mut().enumerate() {
         column.extend((metric * rows..(metric + 1) * rows).map(|at| {

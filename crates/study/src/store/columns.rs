@@ -2,7 +2,7 @@
 
 use needlebench_kinematics::ik::Configuration;
 
-use crate::{CaseResult, Factor, FactorKind, FactorValue, METRIC_COUNT, Outcome, Row};
+use crate::{CaseResult, Factor, FactorKind, FactorValue, Outcome, Row};
 
 /// Rows of a case.
 pub(crate) const ROWS: usize = Configuration::ALL.len();
@@ -79,8 +79,8 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// No cases.
-    pub(crate) fn new(factors: &[Factor]) -> Self {
+    /// No cases of a study with so many metrics.
+    pub(crate) fn new(factors: &[Factor], metrics: usize) -> Self {
         Self {
             cases: 0,
             factors: factors
@@ -90,7 +90,7 @@ impl Columns {
             outcomes: Vec::new(),
             details: Vec::new(),
             texts: Vec::new(),
-            metrics: vec![Vec::new(); METRIC_COUNT],
+            metrics: vec![Vec::new(); metrics],
         }
     }
 
@@ -109,8 +109,12 @@ impl Columns {
             self.outcomes.push(row.outcome as u8);
             let text = self.text(&row.detail);
             self.details.push(text);
-            for (column, value) in self.metrics.iter_mut().zip(row.metrics) {
-                column.push(value);
+            assert!(
+                row.values.len() <= self.metrics.len(),
+                "a row has no values beside the study's columns"
+            );
+            for (index, column) in self.metrics.iter_mut().enumerate() {
+                column.push(row.values.get(index).copied().unwrap_or(f32::NAN));
             }
         }
         self.cases += 1;
@@ -184,9 +188,9 @@ impl Columns {
             if row.detail != *detail {
                 row.detail = detail.clone().into();
             }
-            for (value, column) in row.metrics.iter_mut().zip(&self.metrics) {
-                *value = column[at];
-            }
+            row.values.clear();
+            row.values
+                .extend(self.metrics.iter().map(|column| column[at]));
         }
     }
 }

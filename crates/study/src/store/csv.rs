@@ -24,7 +24,7 @@ pub fn write_csv(results: &ParquetResults, path: &Path, threads: usize) -> Resul
     let failed = || StudyError::io("write", path);
     let file = AtomicFile::create(path).map_err(failed())?;
     let mut header = String::new();
-    for (index, column) in results.columns().iter().enumerate() {
+    for (index, column) in results.table_columns().iter().enumerate() {
         if index > 0 {
             header.push(',');
         }
@@ -55,7 +55,7 @@ fn lines(results: &ParquetResults, first: u64, cases: &Columns) -> String {
         }
         for row in 0..ROWS {
             let at = place * ROWS + row;
-            for (index, column) in results.columns().iter().enumerate() {
+            for (index, column) in results.table_columns().iter().enumerate() {
                 if index > 0 {
                     text.push(',');
                 }

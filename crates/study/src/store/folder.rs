@@ -11,7 +11,7 @@ use super::error::StudyError;
 use super::journal::{BlockReader, JOURNAL_FILE, Journal, Places, kept};
 use super::manifest::{MANIFEST_FILE, Manifest, Status};
 use super::parquet_write::{self, WriteError};
-use super::run::Progress;
+use super::progress::Progress;
 
 /// Name of the table in a study's folder.
 pub const RESULTS_FILE: &str = "results.parquet";
@@ -236,7 +236,7 @@ pub(crate) fn write_results(
             Some(readers) => readers,
             None => open()?,
         };
-        let mut columns = Columns::new(&manifest.factors);
+        let mut columns = Columns::new(&manifest.factors, manifest.columns.len());
         let (mut case, end) = (first, first + count);
         while case < end {
             let block = case / u64::from(manifest.block_cases);

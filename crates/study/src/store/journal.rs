@@ -457,6 +457,7 @@ impl BlockReader {
                     record.raw_length as usize,
                     record.cases as usize,
                     &manifest.factors,
+                    manifest.columns.len(),
                 )
             })
             .ok_or_else(|| {

@@ -8,15 +8,15 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::atomic::write_atomically;
+use super::case_design::CaseDesign;
 use super::error::StudyError;
-use super::run::CaseDesign;
-use crate::Factor;
+use crate::{Factor, MetricColumn};
 
 /// Name of the manifest in a study's folder.
 pub const MANIFEST_FILE: &str = "study.json";
 
 /// Version of the files of a folder: manifest, journal and tables.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// What a folder's results are results of. It names no time, no machine and no number of threads:
 /// two folders of one study have the same.
@@ -40,6 +40,8 @@ pub struct Manifest {
     pub status: Status,
     /// The factors, in the order of their columns.
     pub factors: Vec<Factor>,
+    /// What rows have values of, in the order of their columns.
+    pub columns: Vec<MetricColumn>,
     /// Hashes of what goes into `study_id`, by name, to say what differs where it does.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub inputs: BTreeMap<String, String>,
@@ -132,6 +134,7 @@ impl Manifest {
         study_id: impl Into<String>,
         name: impl Into<String>,
         design: &dyn CaseDesign,
+        columns: Vec<MetricColumn>,
         block_cases: u32,
         provenance: serde_json::Value,
     ) -> Self {
@@ -144,6 +147,7 @@ impl Manifest {
             shard: None,
             status: Status::Running,
             factors: design.factors().to_vec(),
+            columns,
             inputs: BTreeMap::new(),
             provenance,
         }
@@ -258,6 +262,9 @@ impl Manifest {
         if self.factors != other.factors {
             differences.push("factors".to_owned());
         }
+        if self.columns != other.columns {
+            differences.push("columns".to_owned());
+        }
         provenance_differences(
             "provenance",
             &self.provenance,
@@ -274,6 +281,7 @@ impl Manifest {
             && self.block_cases == other.block_cases
             && self.cases == other.cases
             && self.factors == other.factors
+            && self.columns == other.columns
             && self.provenance == other.provenance
     }
 }

@@ -8,7 +8,8 @@ use super::folder::{Blocks, Folder, Opened, RESULTS_FILE, write_results};
 use super::journal::{BlockReader, JOURNAL_FILE, scan};
 use super::manifest::{Manifest, Shard, Status};
 use super::parquet_write::WriteError;
-use super::run::{Progress, RunEnd};
+use super::progress::Progress;
+use super::run::RunEnd;
 
 /// Writes the table of a study, the blocks of which are in the journals of shards. Its bytes are those
 /// that the study has without shards.

@@ -5,6 +5,7 @@
 //! the order of their numbers.
 
 mod atomic;
+mod case_design;
 mod codec;
 mod columns;
 mod csv;
@@ -16,9 +17,11 @@ mod merge;
 mod ordered;
 mod parquet_read;
 mod parquet_write;
+mod progress;
 mod run;
 mod schema;
 
+pub use case_design::CaseDesign;
 pub use csv::write_csv;
 pub use error::StudyError;
 pub use folder::{CSV_FILE, RESULTS_FILE};
@@ -26,4 +29,5 @@ pub use journal::JOURNAL_FILE;
 pub use manifest::{MANIFEST_FILE, Manifest, SCHEMA_VERSION, Shard, Status};
 pub use merge::merge;
 pub use parquet_read::ParquetResults;
-pub use run::{CaseDesign, Progress, RunEnd, StudyRun};
+pub use progress::Progress;
+pub use run::{RunEnd, StudyRun};

@@ -20,10 +20,34 @@ use parquet::file::serialized_reader::SerializedRowGroupReader;
 use super::columns::{Columns, FactorColumn, ROWS, blank_case};
 use super::manifest::SCHEMA_VERSION;
 use super::schema::{
-    self, CASES_KEY, CRC_KEY, Column, Content, FACTORS_KEY, ID_KEY, NAME_KEY, PROVENANCE_KEY,
-    VERSION_KEY,
+    self, CASES_KEY, CRC_KEY, Column, Content, FACTORS_KEY, ID_KEY, METRICS_KEY, NAME_KEY,
+    PROVENANCE_KEY, VERSION_KEY,
 };
-use crate::{CaseResult, Factor, FactorKind, FactorValue, Outcome, Results, ResultsError};
+use crate::{
+    CaseResult, Factor, FactorKind, FactorValue, MetricColumn, Outcome, Results, ResultsError,
+};
+
+/// Version of tables whose columns have no keys.
+const FORMER_VERSION: u32 = 1;
+
+/// Columns beside factors and metrics: case, configuration, outcome, detail.
+const FIXED_COLUMNS: usize = 4;
+
+/// A column of which nothing but its name is known.
+fn unknown(name: &str) -> MetricColumn {
+    MetricColumn {
+        name: name.to_owned(),
+        key: name.to_owned(),
+        words: name.to_owned(),
+        description: String::new(),
+        unit: String::new(),
+        more_is_better: None,
+        spread: false,
+        by_case: false,
+        measure: None,
+        criterion: None,
+    }
+}
 
 /// A complete `results.parquet`. Its row groups are read one at a time, each checked against the sum
 /// that was written with it.
@@ -35,6 +59,8 @@ pub struct ParquetResults {
     name: String,
     provenance: serde_json::Value,
     factors: Vec<Factor>,
+    metrics: Vec<MetricColumn>,
+    is_former: bool,
     columns: Vec<Column>,
     cases: u64,
     checks: Vec<u32>,
@@ -61,7 +87,8 @@ impl ParquetResults {
         let version = get(VERSION_KEY).ok_or_else(|| {
             fail("is a Parquet file, but no results of a study of needlebench".to_owned())
         })?;
-        if version != SCHEMA_VERSION.to_string() {
+        let is_former = version == FORMER_VERSION.to_string();
+        if version != SCHEMA_VERSION.to_string() && !is_former {
             return Err(fail(format!(
                 "has schema version {version}; this program reads version {SCHEMA_VERSION}"
             )));
@@ -76,10 +103,19 @@ impl ParquetResults {
             serde_json::from_str(need(CRC_KEY)?).map_err(|_| garbled(CRC_KEY))?;
         let provenance =
             serde_json::from_str(need(PROVENANCE_KEY)?).map_err(|_| garbled(PROVENANCE_KEY))?;
+        let metrics: Vec<MetricColumn> = if is_former {
+            let fields = file_metadata.schema().get_fields();
+            let metrics = fields.get(factors.len() + FIXED_COLUMNS..).unwrap_or(&[]);
+            metrics.iter().map(|field| unknown(field.name())).collect()
+        } else {
+            serde_json::from_str(need(METRICS_KEY)?).map_err(|_| garbled(METRICS_KEY))?
+        };
         let results = Self {
             id: need(ID_KEY)?.to_owned(),
             name: need(NAME_KEY)?.to_owned(),
-            columns: schema::columns(&factors),
+            columns: schema::columns(&factors, &metrics),
+            metrics,
+            is_former,
             path: path.to_owned(),
             provenance,
             factors,
@@ -107,7 +143,12 @@ impl ParquetResults {
         &self.provenance
     }
 
-    pub(crate) fn columns(&self) -> &[Column] {
+    /// Whether it was written before columns had keys: their names are all that is known of them.
+    pub fn is_former(&self) -> bool {
+        self.is_former
+    }
+
+    pub(crate) fn table_columns(&self) -> &[Column] {
         &self.columns
     }
 
@@ -202,7 +243,7 @@ impl ParquetResults {
 
     fn decode(&self, group: &dyn RowGroupReader, first: u64) -> Result<Columns, ParquetError> {
         let rows = usize::try_from(rows_of(group.metadata())).map_err(|_| bad("too many rows"))?;
-        let mut cases = Columns::new(&self.factors);
+        let mut cases = Columns::new(&self.factors, self.metrics.len());
         cases.cases = rows / ROWS;
         for (index, column) in self.columns.iter().enumerate() {
             let reader = group.get_column_reader(index)?;
@@ -319,6 +360,10 @@ impl ParquetResults {
 impl Results for ParquetResults {
     fn factors(&self) -> &[Factor] {
         &self.factors
+    }
+
+    fn columns(&self) -> &[MetricColumn] {
+        &self.metrics
     }
 
     fn cases(&self) -> u64 {

@@ -109,7 +109,7 @@ struct Layout<'a> {
 
 impl<'a> Layout<'a> {
     fn new(manifest: &'a Manifest) -> Self {
-        let columns = schema::columns(&manifest.factors);
+        let columns = schema::columns(&manifest.factors, &manifest.columns);
         let schema = schema::parquet_schema(&columns);
         Self {
             factors: &manifest.factors,

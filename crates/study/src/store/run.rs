@@ -4,92 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use super::case_design::CaseDesign;
 use super::codec::Packer;
 use super::columns::Columns;
 use super::error::StudyError;
 use super::folder::{Folder, Opened, RESULTS_FILE};
 use super::journal::{JOURNAL_FILE, Key, kept};
 use super::manifest::Manifest;
+use super::progress::Progress;
 use super::schema;
-use crate::{CaseError, CaseEvaluator, Design, Factor, FactorValue};
-
-/// What the runner needs of a design.
-pub trait CaseDesign: Sync {
-    /// The factors, in the order of their columns.
-    fn factors(&self) -> &[Factor];
-
-    /// Number of cases.
-    fn cases(&self) -> u64;
-
-    /// Values of all factors in a case.
-    fn values(&self, case: u64) -> Vec<FactorValue>;
-}
-
-impl CaseDesign for Design {
-    fn factors(&self) -> &[Factor] {
-        self.factors()
-    }
-
-    fn cases(&self) -> u64 {
-        self.cases()
-    }
-
-    fn values(&self, case: u64) -> Vec<FactorValue> {
-        self.values(case)
-    }
-}
-
-/// What happens in a run. `Display` gives a line for people.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[expect(missing_docs, reason = "fields are named in the messages")]
-pub enum Progress<'a> {
-    /// The journal ends within a record, as after a kill; its block is computed again.
-    CutOff {
-        journal: &'a Path,
-        offset: u64,
-        bytes: u64,
-    },
-    /// Something else has changed the journal; what was there is computed again.
-    Damage {
-        journal: &'a Path,
-        offset: u64,
-        bytes: u64,
-    },
-    /// So many cases were there at the beginning.
-    Begin { kept: u64, total: u64 },
-    /// So many cases are in the journal.
-    Cases { done: u64, total: u64 },
-    /// So many cases are in the table.
-    Table { done: u64, total: u64 },
-}
-
-impl std::fmt::Display for Progress<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::CutOff {
-                journal,
-                offset,
-                bytes,
-            } => write!(
-                f,
-                "{}: ends within a block; {bytes} bytes from byte {offset} on are cut off",
-                journal.display()
-            ),
-            Self::Damage {
-                journal,
-                offset,
-                bytes,
-            } => write!(
-                f,
-                "{}: {bytes} bytes from byte {offset} on are damaged; what was there is computed again",
-                journal.display()
-            ),
-            Self::Begin { kept, total } => write!(f, "{kept} of {total} cases are there already"),
-            Self::Cases { done, total } => write!(f, "{done} of {total} cases"),
-            Self::Table { done, total } => write!(f, "{done} of {total} cases in the table"),
-        }
-    }
-}
+use crate::{CaseError, CaseEvaluator};
 
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -169,7 +93,7 @@ impl StudyRun<'_> {
 
     fn check(&self) -> Result<(), StudyError> {
         let manifest = &self.manifest;
-        schema::check(&manifest.factors).map_err(StudyError::Request)?;
+        schema::check(&manifest.factors, &manifest.columns).map_err(StudyError::Request)?;
         if manifest.factors != self.design.factors() || manifest.cases != self.design.cases() {
             let message = "the manifest is not that of the design";
             return Err(StudyError::Request(message.to_owned()));
@@ -230,7 +154,7 @@ impl StudyRun<'_> {
             };
             let stopped = || stop.load(Ordering::Relaxed) || cancel.load(Ordering::Relaxed);
             while let Some(block) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let mut columns = Columns::new(&manifest.factors);
+                let mut columns = Columns::new(&manifest.factors, manifest.columns.len());
                 for case in manifest.block(*block) {
                     if stopped() {
                         return;

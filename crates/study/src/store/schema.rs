@@ -8,7 +8,7 @@ use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
 use parquet::schema::types::{Type, TypePtr};
 
 use super::manifest::{Manifest, SCHEMA_VERSION};
-use crate::{Factor, FactorKind, Level, METRICS, Role};
+use crate::{Factor, FactorKind, Level, MetricColumn, Role};
 
 /// Key of the metadata: version of the table's layout.
 pub(crate) const VERSION_KEY: &str = "needlebench.schema_version";
@@ -24,6 +24,8 @@ pub(crate) const FACTORS_KEY: &str = "needlebench.factors";
 pub(crate) const PROVENANCE_KEY: &str = "needlebench.provenance";
 /// Key of the metadata: what each column is, JSON.
 pub(crate) const COLUMNS_KEY: &str = "needlebench.columns";
+/// Key of the metadata: the metrics, in the order of their columns, JSON.
+pub(crate) const METRICS_KEY: &str = "needlebench.metrics";
 /// Key of the metadata: CRC32 of the bytes of each row group, JSON.
 pub(crate) const CRC_KEY: &str = "needlebench.row_group_crc32";
 
@@ -54,7 +56,7 @@ pub(crate) struct Column {
 }
 
 /// The columns of a study's tables, in their order.
-pub(crate) fn columns(factors: &[Factor]) -> Vec<Column> {
+pub(crate) fn columns(factors: &[Factor], metrics: &[MetricColumn]) -> Vec<Column> {
     let column = |name: &str, content| Column {
         name: name.to_owned(),
         content,
@@ -71,8 +73,8 @@ pub(crate) fn columns(factors: &[Factor]) -> Vec<Column> {
     columns.push(column("configuration", Content::Configuration));
     columns.push(column("outcome", Content::Outcome));
     columns.push(column("detail", Content::Detail));
-    for (index, metric) in METRICS.iter().enumerate() {
-        columns.push(column(metric.name, Content::Metric(index)));
+    for (index, metric) in metrics.iter().enumerate() {
+        columns.push(column(&metric.name, Content::Metric(index)));
     }
     columns
 }
@@ -86,12 +88,19 @@ fn is_number(factor: &Factor) -> bool {
 }
 
 /// What is wrong with factors of which no table can be made.
-pub(crate) fn check(factors: &[Factor]) -> Result<(), String> {
+pub(crate) fn check(factors: &[Factor], metrics: &[MetricColumn]) -> Result<(), String> {
     let mut names = BTreeSet::new();
-    for column in columns(factors) {
+    // Factors last: whoever repeats a name of the others is at fault.
+    let mut all = columns(factors, metrics);
+    all.sort_by_key(|column| matches!(column.content, Content::Number(_) | Content::Label(_)));
+    for column in all {
         if !names.insert(column.name.clone()) {
+            let what = match column.content {
+                Content::Number(_) | Content::Label(_) => "factor",
+                _ => "metric",
+            };
             return Err(format!(
-                "factor {}: there is a column of this name already",
+                "{what} {}: there is a column of this name already",
                 column.name
             ));
         }
@@ -165,12 +174,7 @@ pub(crate) fn parquet_schema(columns: &[Column]) -> TypePtr {
 pub(crate) fn metadata(manifest: &Manifest, columns: &[Column]) -> Vec<(&'static str, String)> {
     let descriptions: BTreeMap<&str, String> = columns
         .iter()
-        .map(|column| {
-            (
-                column.name.as_str(),
-                describe(column.content, &manifest.factors),
-            )
-        })
+        .map(|column| (column.name.as_str(), describe(column.content, manifest)))
         .collect();
     let json = |result: serde_json::Result<String>| result.expect("string keys only");
     vec![
@@ -181,16 +185,17 @@ pub(crate) fn metadata(manifest: &Manifest, columns: &[Column]) -> Vec<(&'static
         (FACTORS_KEY, json(serde_json::to_string(&manifest.factors))),
         (PROVENANCE_KEY, manifest.provenance.to_string()),
         (COLUMNS_KEY, json(serde_json::to_string(&descriptions))),
+        (METRICS_KEY, json(serde_json::to_string(&manifest.columns))),
     ]
 }
 
-fn describe(content: Content, factors: &[Factor]) -> String {
+fn describe(content: Content, manifest: &Manifest) -> String {
     match content {
         Content::Case => {
             "number of the case, from 0; every case has one row per configuration".to_owned()
         }
         Content::Number(factor) | Content::Label(factor) => {
-            let factor = &factors[factor];
+            let factor = &manifest.factors[factor];
             let role = match factor.role {
                 Role::Choice => "factor that is ours to choose",
                 Role::Circumstance => "factor that the results are to hold for",
@@ -213,6 +218,6 @@ fn describe(content: Content, factors: &[Factor]) -> String {
         Content::Detail => {
             "rule or criterion that is broken, or the key at fault; empty if ok".to_owned()
         }
-        Content::Metric(metric) => METRICS[metric].description.to_owned(),
+        Content::Metric(metric) => manifest.columns[metric].description.clone(),
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use needlebench_cell::imperfections::Imperfections;
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::pose_sets::SplitMix64;
+use needlebench_kinematics::random::SplitMix64;
 
 use super::{BudgetCase, BudgetError, Moments};
 use crate::jitter::Jitter;

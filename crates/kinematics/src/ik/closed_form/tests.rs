@@ -6,7 +6,8 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 use super::super::{Elbow, wrap_angle};
 use super::*;
-use crate::pose_sets::{PoseSet, SplitMix64, rounded_to_f32};
+use crate::pose_sets::{PoseSet, rounded_to_f32};
+use crate::random::SplitMix64;
 use crate::{JointLimit, rotation_angle_between};
 
 const UR3: UrGeometry = UrGeometry::UR3;

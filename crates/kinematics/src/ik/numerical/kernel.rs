@@ -389,7 +389,8 @@ mod tests {
     use nalgebra::{Matrix6, UnitQuaternion};
 
     use super::*;
-    use crate::pose_sets::{PoseSet, SplitMix64};
+    use crate::pose_sets::PoseSet;
+    use crate::random::SplitMix64;
     use crate::{UrGeometry, rotation_vector};
 
     /// One unit in the last place of one; the worst over 1e6 angles is 1.2e-16.

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Matrix6, Vector6};
 
-use crate::pose_sets::SplitMix64;
+use crate::random::SplitMix64;
 use crate::{Chain, JOINT_COUNT, Joints, Pose, rotation_vector};
 use descent::{End, Steering, descend, least_squares};
 use kernel::{Kernel, Lanes, joints, lanes};

@@ -116,7 +116,7 @@ impl SolutionAnswer {
 
 impl IkAnswer {
     pub(super) fn text(&self) -> String {
-        let mut table = crate::output::plain_table(&[
+        let mut table = needlebench_report::plain_table(&[
             "configuration",
             "q1 (rad)",
             "q2",
@@ -207,7 +207,7 @@ impl FkAnswer {
 
     pub(super) fn text(&self) -> String {
         let mut table =
-            crate::output::plain_table(&["frame", "x (m)", "y", "z", "rx (rad)", "ry", "rz"]);
+            needlebench_report::plain_table(&["frame", "x (m)", "y", "z", "rx (rad)", "ry", "rz"]);
         let mut row = |name: String, pose: &PoseAnswer| {
             let mut cells = vec![name];
             let numbers = pose.position_m.iter().chain(&pose.rotvec_rad);

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
-use needlebench_cell::{AppliedCalibration, Calibration, Finding, Overrides, Robot, load_robot};
+use needlebench_cell::{
+    AppliedCalibration, Calibration, Finding, MOVING_LINK_LABELS, Robot, load_robot,
+};
 use needlebench_kinematics::{Chain, JointLimits, Joints, LimitPolicy, UrModel};
 
-use super::super::overrides;
-use crate::cli::ArmArguments;
+use super::super::urdf_overrides;
+use crate::arguments::ArmArguments;
 
 /// What kinematics need of an arm.
 #[derive(Debug)]
@@ -26,7 +28,9 @@ impl Arm {
     pub(super) fn new(arguments: &ArmArguments) -> Result<Self, Finding> {
         match arguments.arm {
             Some(model) => Self::of_model(model, arguments.robot.calibration.as_deref()),
-            None => Ok(Self::of_robot(&load_robot(&overrides(&arguments.robot)?)?)),
+            None => Ok(Self::of_robot(&load_robot(&urdf_overrides(
+                &arguments.robot,
+            )?)?)),
         }
     }
 
@@ -43,12 +47,14 @@ impl Arm {
 
     fn of_model(model: UrModel, calibration: Option<&Path>) -> Result<Self, Finding> {
         let geometry = model.geometry();
-        // The links are called the same in every UR arm.
-        let mut arm = Self::of_robot(&load_robot(&Overrides::default())?);
-        model.name().clone_into(&mut arm.name);
-        "--arm".clone_into(&mut arm.file);
-        arm.chain = geometry.chain();
-        arm.limits = LimitPolicy::of_ros(model).limits_of(model);
+        let mut arm = Self {
+            name: model.name().to_owned(),
+            file: "--arm".to_owned(),
+            chain: geometry.chain(),
+            limits: LimitPolicy::of_ros(model).limits_of(model),
+            links: MOVING_LINK_LABELS.map(str::to_owned),
+            calibration: None,
+        };
         if let Some(path) = calibration {
             let calibration = Calibration::load(path)?;
             arm.chain = calibration.chain_of(model.name(), &geometry)?;

@@ -11,9 +11,10 @@ use needlebench_kinematics::{
 };
 use needlebench_planning::Planner;
 
-use super::super::overrides;
+use super::super::urdf_overrides;
+use super::IkArguments;
 use super::arm::Arm;
-use crate::cli::{IkArguments, PoseMatrix, Six};
+use crate::arguments::{PoseMatrix, Six};
 
 /// A coordinate beyond this is in another unit.
 const FARTHEST_M: f64 = 10.0;
@@ -96,7 +97,7 @@ fn check_position(argument: &str, position_m: &Vector3<f64>) -> Result<(), Findi
 }
 
 fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(Arm, Pose), Vec<Finding>> {
-    let overrides = overrides(&arguments.arm.robot).map_err(|finding| vec![finding])?;
+    let overrides = urdf_overrides(&arguments.arm.robot).map_err(|finding| vec![finding])?;
     let resolved = needlebench_cell::load_scenario(path, &overrides)?;
     let name = arguments.goal.as_deref().unwrap_or_default();
     let Some(goal) = resolved.goals.iter().find(|goal| goal.name == name) else {

@@ -1,0 +1,408 @@
+//! The fourth stage: engines beside the referee, and their differences inside the envelope.
+
+use needlebench_cell::Goal;
+use needlebench_engine::{
+    Engine, EngineError, EngineIdentity, EnginePool, Hooks, MotionJob, MotionSettings, Plant,
+    REFEREE, Recording, RefereePlant, RefereeSettings, retrace, run_motions,
+};
+use needlebench_evaluation::adjudication::{
+    Adjudication, Evidence, PairConvergence, adjudicate, judge_differences,
+};
+use needlebench_evaluation::pairs;
+use needlebench_evaluation::referee::{
+    RefereeComparison, RefereeReport, StepDifference, TipDifference, TipPath, measured_order,
+    steps_before_contact, time_until_lost, tip_difference,
+};
+use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_planning::GoalPlan;
+
+use crate::control::Control;
+use crate::parallel::in_parallel;
+use crate::setup::Setup;
+use crate::simulate::EngineRun;
+
+/// The scenario's time step is divided by these to see how the differences converge.
+const STEP_DIVISORS: [u32; 3] = [1, 2, 4];
+
+/// What was found out about one configuration.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Adjudicated {
+    /// The engines beside the referee.
+    pub referee: Option<RefereeReport>,
+    /// The engines' differences and the envelope.
+    pub adjudication: Option<Adjudication>,
+}
+
+impl Adjudicated {
+    /// The engines' differences of one configuration, without an inquiry.
+    pub fn without_referee(setup: &Setup<'_>, goal: usize, runs: &[EngineRun]) -> Self {
+        let recordings: Vec<&Recording> = runs.iter().map(|run| &run.recording).collect();
+        let envelope = &setup.resolved.scenario.engines.envelope;
+        let (cell, goal) = (setup.real.cell(), setup.real.goal(goal));
+        Self {
+            referee: None,
+            adjudication: judge_differences(cell, goal, envelope, &recordings),
+        }
+    }
+
+    fn is_disputed(&self) -> bool {
+        let adjudication = self.adjudication.as_ref();
+        adjudication.is_some_and(Adjudication::needs_referee)
+    }
+}
+
+/// What was found out about all configurations.
+pub(crate) struct Adjudications {
+    /// By goal and configuration.
+    pub by_goal: Vec<Vec<Adjudicated>>,
+    /// The referee, if it was called.
+    pub identity: Option<EngineIdentity>,
+    /// What could not be done.
+    pub notes: Vec<String>,
+}
+
+/// What is judged.
+pub(crate) struct Adjudicator<'a> {
+    pub setup: &'a Setup<'a>,
+    pub plans: &'a [GoalPlan],
+    /// Recordings, by goal, configuration and engine.
+    pub runs: &'a [Vec<Vec<EngineRun>>],
+    /// Engines that made them.
+    pub engines: &'a [&'static dyn Engine],
+    pub pool: &'a EnginePool,
+    /// Call the referee for every motion, not only where the envelope is exceeded.
+    pub always: bool,
+}
+
+/// A configuration that is held against the referee.
+#[derive(Clone, Copy)]
+struct Case<'a> {
+    goal_index: usize,
+    configuration: usize,
+    goal: &'a Goal,
+    trajectory: &'a JointTrajectory,
+    runs: &'a [EngineRun],
+}
+
+/// Tips of a case at one step.
+struct AtStep {
+    timestep_s: f64,
+    referee: TipPath,
+    /// By engine, in the order of the case's runs.
+    engines: Vec<TipPath>,
+}
+
+/// What the referee says of a case: of each engine, and of pairs of them.
+type Verdict = (RefereeReport, Vec<PairConvergence>);
+
+/// A run's motion with the referee in the engine's place.
+struct Retraced {
+    /// Held back to the engine's motion.
+    held: TipDifference,
+    /// Until when it stays near it on its own.
+    unaided_until_s: Option<f64>,
+}
+
+impl Adjudicator<'_> {
+    /// Judges every configuration that several engines simulated, and calls the referee where asked
+    /// for or where the engines differ by more than they may.
+    pub fn judge_all(&self, control: &Control<'_>) -> Adjudications {
+        let mut found = Adjudications {
+            by_goal: Vec::new(),
+            identity: None,
+            notes: Vec::new(),
+        };
+        for (goal, runs) in self.runs.iter().enumerate() {
+            let each = |runs: &Vec<EngineRun>| Adjudicated::without_referee(self.setup, goal, runs);
+            found.by_goal.push(runs.iter().map(each).collect());
+        }
+        let cases: Vec<Case<'_>> = self
+            .cases()
+            .filter(|case| {
+                let judged = &found.by_goal[case.goal_index][case.configuration];
+                !case.runs.is_empty() && (self.always || judged.is_disputed())
+            })
+            .collect();
+        if !cases.is_empty() {
+            control.progress.message("refereeing");
+            match self.referee(&cases, control) {
+                Ok((identity, reports)) => {
+                    found.identity = Some(identity);
+                    for (case, (report, convergence)) in cases.iter().zip(reports) {
+                        let judged = &mut found.by_goal[case.goal_index][case.configuration];
+                        judged.adjudication = self.rule(case, Some(&report), &convergence);
+                        judged.referee = Some(report);
+                    }
+                }
+                Err(EngineError::Cancelled) => {}
+                Err(error) => found
+                    .notes
+                    .push(format!("the referee could not be heard: {error}")),
+            }
+        }
+        // What lies beyond the envelope without a referee: contact, or a referee that failed.
+        for case in self.cases() {
+            let judged = &mut found.by_goal[case.goal_index][case.configuration];
+            let adjudication = judged.adjudication.as_ref();
+            if judged.referee.is_none() && adjudication.is_some_and(Adjudication::has_breach) {
+                judged.adjudication = self.rule(&case, None, &[]);
+            }
+        }
+        found
+    }
+
+    /// All configurations with a motion.
+    fn cases(&self) -> impl Iterator<Item = Case<'_>> {
+        let by_goal = self.runs.iter().zip(self.plans).enumerate();
+        by_goal.flat_map(|(goal_index, (runs, plan))| {
+            let goal = self.setup.real.goal(goal_index);
+            let each = runs.iter().zip(&plan.configurations).enumerate();
+            each.filter_map(move |(configuration, (runs, plan))| {
+                Some(Case {
+                    goal_index,
+                    configuration,
+                    goal,
+                    trajectory: plan.trajectory.as_ref()?,
+                    runs,
+                })
+            })
+        })
+    }
+
+    fn rule(
+        &self,
+        case: &Case<'_>,
+        referee: Option<&RefereeReport>,
+        convergence: &[PairConvergence],
+    ) -> Option<Adjudication> {
+        let recordings: Vec<&Recording> = case.runs.iter().map(|run| &run.recording).collect();
+        adjudicate(
+            self.setup.real.cell(),
+            case.goal,
+            &self.setup.resolved.scenario.engines.envelope,
+            &self.setup.servo.effort_limit_nm,
+            &recordings,
+            Evidence {
+                referee,
+                convergence,
+            },
+        )
+    }
+
+    /// All cases beside the referee, with the engines' differences from each other by step.
+    fn referee(
+        &self,
+        cases: &[Case<'_>],
+        control: &Control<'_>,
+    ) -> Result<(EngineIdentity, Vec<Verdict>), EngineError> {
+        let whole_s = self.setup.motion_settings().timestep_s;
+        let mut by_case: Vec<Vec<AtStep>> = cases.iter().map(|_| Vec::new()).collect();
+        for divisor in STEP_DIVISORS {
+            let timestep_s = whole_s / f64::from(divisor);
+            let engines = if divisor == 1 {
+                cases.iter().map(|case| self.recorded(case)).collect()
+            } else {
+                self.at_smaller_step(cases, timestep_s, control)?
+            };
+            let referee = in_parallel(control.threads, cases, |case| {
+                let pool = EnginePool::new(&[REFEREE]);
+                let mut tips = self.tips(&pool, REFEREE, &[*case], timestep_s, control)?;
+                Ok::<_, EngineError>(tips.remove(0))
+            });
+            for ((of_case, engines), referee) in by_case.iter_mut().zip(engines).zip(referee) {
+                of_case.push(AtStep {
+                    timestep_s,
+                    referee: referee?,
+                    engines,
+                });
+            }
+        }
+        let retraced = in_parallel(control.threads, cases, |case| self.retraced(case, whole_s));
+        let mut reports = Vec::new();
+        for ((case, steps), retraced) in cases.iter().zip(&by_case).zip(retraced) {
+            reports.push((
+                self.report(case, steps, retraced?),
+                convergence(case, steps),
+            ));
+        }
+        Ok((self.referee_plant(whole_s)?.identity(), reports))
+    }
+
+    fn report(&self, case: &Case<'_>, steps: &[AtStep], retraced: Vec<Retraced>) -> RefereeReport {
+        let mut report = RefereeReport::default();
+        for (which, (run, retraced)) in case.runs.iter().zip(retraced).enumerate() {
+            let closed_loop = |step: &AtStep| {
+                let engine = &step.engines[which];
+                tip_difference(engine, &step.referee, engine.steps_before_contact)
+            };
+            let convergence: Vec<StepDifference> = steps
+                .iter()
+                .map(|step| StepDifference {
+                    timestep_s: step.timestep_s,
+                    peak_tip_m: closed_loop(step).peak_tip_m,
+                })
+                .collect();
+            let until = steps_before_contact(&run.recording);
+            report.engines.insert(
+                run.engine.to_owned(),
+                RefereeComparison {
+                    until_s: run.recording.time_s[until],
+                    closed_loop: closed_loop(&steps[0]),
+                    same_torques: retraced.held,
+                    unaided_until_s: retraced.unaided_until_s,
+                    order: measured_order(&convergence),
+                    convergence,
+                    documented_order: self.engine(run).documented_order(),
+                },
+            );
+        }
+        report
+    }
+
+    fn engine(&self, run: &EngineRun) -> &'static dyn Engine {
+        let named = self
+            .engines
+            .iter()
+            .find(|engine| engine.name() == run.engine);
+        *named.expect("a run is that of one of the engines")
+    }
+
+    fn referee_plant(&self, timestep_s: f64) -> Result<RefereePlant, EngineError> {
+        RefereePlant::new(
+            self.setup.real.cell(),
+            timestep_s,
+            &RefereeSettings::default(),
+        )
+    }
+
+    /// Tips of the recordings that there are.
+    fn recorded(&self, case: &Case<'_>) -> Vec<TipPath> {
+        let cell = self.setup.real.cell();
+        let tips = case
+            .runs
+            .iter()
+            .map(|run| TipPath::of(cell, case.goal, &run.recording));
+        tips.collect()
+    }
+
+    /// Tips of all cases in all of their engines at another step, by case and in the order of its
+    /// runs.
+    fn at_smaller_step(
+        &self,
+        cases: &[Case<'_>],
+        timestep_s: f64,
+        control: &Control<'_>,
+    ) -> Result<Vec<Vec<TipPath>>, EngineError> {
+        let by_engine = in_parallel(control.threads, self.engines, |engine| {
+            let ran = |case: &&Case<'_>| case.runs.iter().any(|run| run.engine == engine.name());
+            let own: Vec<Case<'_>> = cases.iter().filter(ran).copied().collect();
+            self.tips(self.pool, *engine, &own, timestep_s, control)
+        });
+        let mut by_engine = by_engine
+            .into_iter()
+            .map(|tips| Ok(tips?.into_iter()))
+            .collect::<Result<Vec<_>, EngineError>>()?;
+        let mut next = |run: &EngineRun| {
+            let at = self
+                .engines
+                .iter()
+                .position(|engine| engine.name() == run.engine);
+            by_engine[at?].next()
+        };
+        let of_case = |case: &Case<'_>| {
+            let tips = case.runs.iter().map(&mut next);
+            tips.map(|tips| tips.expect("every run was made again"))
+                .collect()
+        };
+        Ok(cases.iter().map(of_case).collect())
+    }
+
+    /// Tips of motions in one engine.
+    fn tips(
+        &self,
+        pool: &EnginePool,
+        engine: &dyn Engine,
+        cases: &[Case<'_>],
+        timestep_s: f64,
+        control: &Control<'_>,
+    ) -> Result<Vec<TipPath>, EngineError> {
+        let jobs: Vec<MotionJob<'_>> = cases
+            .iter()
+            .map(|case| self.setup.job(case.trajectory))
+            .collect();
+        let settings = MotionSettings {
+            timestep_s,
+            ..self.setup.motion_settings()
+        };
+        let hooks = Hooks {
+            cancel: Some(control.cancel),
+            progress: None,
+        };
+        let cell = self.setup.real.cell();
+        let mut ended: Vec<Option<Result<TipPath, EngineError>>> =
+            cases.iter().map(|_| None).collect();
+        // The recordings themselves would fill the memory.
+        let done = run_motions(
+            pool,
+            engine,
+            &jobs,
+            settings,
+            hooks,
+            &mut |index, result| {
+                let goal = cases[index].goal;
+                ended[index] = Some(result.map(|recording| TipPath::of(cell, goal, &recording)));
+            },
+        );
+        if let Some(error) = done.error {
+            return Err(error);
+        }
+        let each = ended.into_iter();
+        each.map(|ended| ended.expect("the engine went on to the end"))
+            .collect()
+    }
+
+    /// The referee under the torques of each run, held back and not.
+    fn retraced(&self, case: &Case<'_>, timestep_s: f64) -> Result<Vec<Retraced>, EngineError> {
+        let gains = self.setup.servo.gains;
+        let cell = self.setup.real.cell();
+        let mut plant = self.referee_plant(timestep_s)?;
+        case.runs
+            .iter()
+            .map(|run| {
+                let engine = TipPath::of(cell, case.goal, &run.recording);
+                let steps = engine.steps_before_contact;
+                let mut retrace = |hold_back| {
+                    let states = retrace(&mut plant, &run.recording, steps, hold_back)?;
+                    let tips = TipPath::of_states(cell, case.goal, timestep_s, &states);
+                    Ok::<_, EngineError>(tips)
+                };
+                let (held, free) = (retrace(Some(&gains))?, retrace(None)?);
+                Ok(Retraced {
+                    held: tip_difference(&engine, &held, steps),
+                    unaided_until_s: time_until_lost(&engine, &free),
+                })
+            })
+            .collect()
+    }
+}
+
+/// How the engines of a case differ from each other before any contact, by step.
+fn convergence(case: &Case<'_>, steps: &[AtStep]) -> Vec<PairConvergence> {
+    let engines: Vec<usize> = (0..case.runs.len()).collect();
+    pairs(&engines)
+        .map(|[a, b]| PairConvergence {
+            engines: [a, b].map(|each| case.runs[*each].engine),
+            steps: steps
+                .iter()
+                .map(|step| {
+                    let [a, b] = [a, b].map(|each| &step.engines[*each]);
+                    let free = a.steps_before_contact.min(b.steps_before_contact);
+                    StepDifference {
+                        timestep_s: step.timestep_s,
+                        peak_tip_m: tip_difference(a, b, free).peak_tip_m,
+                    }
+                })
+                .collect(),
+        })
+        .collect()
+}

@@ -1,0 +1,365 @@
+//! The last stage: plans, recordings and what was found out about them into the values of the report.
+
+use std::collections::BTreeMap;
+
+use needlebench_cell::{ArmInUse, ClearanceClass, enclosures};
+use needlebench_engine::{EngineIdentity, Recording};
+use needlebench_evaluation::metric::measured;
+use needlebench_evaluation::ranking::rank_goal;
+use needlebench_evaluation::report::{
+    ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
+    MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary,
+    SearchReport, Status,
+};
+use needlebench_evaluation::room::RoomModel;
+use needlebench_evaluation::{
+    add_approach_speeds, engine_difference, judge, measure_motion, measure_needle, needle_route,
+    planned_clearance, posture_clearance, tip_of, tip_sensitivity,
+};
+use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, PostureMargins, Rule};
+
+use crate::adjudication::Adjudicated;
+use crate::budgets::Budgets;
+use crate::events::{EventRun, events_report};
+use crate::provenance::provenance;
+use crate::setup::Setup;
+use crate::simulate::EngineRun;
+
+/// What the stages of a run made.
+pub(crate) struct Results<'a> {
+    pub plans: &'a [GoalPlan],
+    /// By goal, configuration and engine.
+    pub runs: &'a [Vec<Vec<EngineRun>>],
+    pub events: &'a [EventRun],
+    pub budgets: &'a Budgets,
+    /// By goal and configuration.
+    pub adjudicated: &'a [Vec<Adjudicated>],
+    /// Several engines were to run, and none failed: their differences count.
+    pub all_engines_ran: bool,
+    pub failures: Vec<EngineFailure>,
+    pub identities: Vec<EngineIdentity>,
+    pub timings: BTreeMap<String, f64>,
+}
+
+/// What the report of a goal is made with besides its plan and its motions.
+pub(crate) struct Context<'a> {
+    pub setup: &'a Setup<'a>,
+    pub budgets: &'a Budgets,
+    /// None where nobody asks for the room.
+    pub room: Option<RoomModel<'a>>,
+    pub events: &'a [EventRun],
+}
+
+/// The report of a run.
+pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
+    let resolved = setup.resolved;
+    let context = Context {
+        setup,
+        budgets: results.budgets,
+        room: Some(RoomModel::new(resolved)),
+        events: results.events,
+    };
+    let mut goals: Vec<GoalReport> = results
+        .plans
+        .iter()
+        .zip(results.runs)
+        .zip(results.adjudicated)
+        .enumerate()
+        .map(|(index, ((plan, runs), adjudicated))| {
+            goal_report(&context, index, plan, runs, adjudicated)
+        })
+        .collect();
+    let (verdict, criteria) = judge(
+        &mut goals,
+        &resolved.goals,
+        &resolved.scenario.criteria,
+        results.all_engines_ran,
+    );
+    for goal in &mut goals {
+        rank_goal(goal, &resolved.scenario.ranking);
+    }
+    Report {
+        schema_version: SCHEMA_VERSION,
+        scenario: ScenarioSummary {
+            name: resolved.scenario.name.clone(),
+            description: resolved.scenario.description.clone(),
+            file: resolved.source.file.clone(),
+        },
+        verdict,
+        criteria,
+        goals,
+        iso9283: None,
+        engine_failures: results.failures,
+        arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
+        enclosure: enclosures(&resolved.cell.robot),
+        notes: resolved.notes.clone(),
+        truth: setup.real.report(),
+        provenance: provenance(resolved, results.identities),
+        timings: results.timings,
+    }
+}
+
+/// The report of one goal, neither judged nor ranked.
+pub(crate) fn goal_report(
+    context: &Context<'_>,
+    goal_index: usize,
+    plan: &GoalPlan,
+    runs: &[Vec<EngineRun>],
+    adjudicated: &[Adjudicated],
+) -> GoalReport {
+    let resolved = context.setup.resolved;
+    let goal = &resolved.goals[goal_index];
+    let route = resolved
+        .phantom
+        .as_ref()
+        .and_then(|placed| needle_route(&resolved.cell, placed, goal));
+    GoalReport {
+        name: goal.name.clone(),
+        lesion: goal.lesion.clone(),
+        entry_m: goal.entry_m.map(|point| point.coords.into()),
+        target_m: goal.target_m.coords.into(),
+        axis: goal.axis.into_inner().into(),
+        insertion_length_m: goal.insertion_length_m,
+        standoff_m: goal.standoff_m,
+        configurations: plan
+            .configurations
+            .iter()
+            .zip(runs)
+            .zip(&context.budgets[goal_index])
+            .zip(adjudicated)
+            .map(|(((plan, runs), budget), judged)| {
+                let mut report =
+                    configuration_report(context, goal_index, plan, runs, judged, route.as_ref());
+                match budget {
+                    Some(Ok(budget)) => report.budget = Some(budget.clone()),
+                    Some(Err(error)) => report.budget_failure = Some(error.clone()),
+                    None => {}
+                }
+                report.metrics = measured(&report);
+                report
+            })
+            .collect(),
+        recommended: None,
+        ranking: None,
+    }
+}
+
+fn configuration_report(
+    context: &Context<'_>,
+    goal_index: usize,
+    plan: &ConfigurationPlan,
+    runs: &[EngineRun],
+    judged: &Adjudicated,
+    route: Option<&ClassClearance>,
+) -> ConfigurationReport {
+    let Context {
+        setup,
+        room,
+        events,
+        ..
+    } = context;
+    let Setup { resolved, real, .. } = setup;
+    let cell = &resolved.cell;
+    let goal = &resolved.goals[goal_index];
+    let candidate = plan.candidate.as_ref();
+    let engines: BTreeMap<String, EngineReport> = runs
+        .iter()
+        .map(|run| {
+            let mut report = engine_report(setup, goal_index, plan, run);
+            let contacts = &mut report.motion.contact.episodes;
+            add_approach_speeds(contacts, real.cell(), real.model(), &run.recording);
+            (run.engine.to_owned(), report)
+        })
+        .collect();
+    let mut clearance = overall_clearance(setup, plan, &engines);
+    let mut posture_clearance_m = candidate.map_or_else(BTreeMap::new, |each| {
+        let found = each.clearance.iter();
+        found
+            .map(|pair| (pair.class.name(), pair.separation.distance_m))
+            .collect()
+    });
+    if let Some(route) = route {
+        let class = ClearanceClass::NeedleRoute.name();
+        clearance.classes.insert(class, route.clone());
+        posture_clearance_m.insert(class, route.minimum_m);
+    }
+    let commanded = candidate.map(|each| {
+        let kinematics = setup.planner.kinematics();
+        let base_link_from_flange = kinematics.base_link_from_flange(&each.joints);
+        let world_from_flange = cell.robot.world_from_base_link * base_link_from_flange;
+        measure_needle(cell, resolved.phantom.as_ref(), goal, &world_from_flange)
+    });
+    let recordings: Vec<&Recording> = runs.iter().map(|run| &run.recording).collect();
+    let engine_difference = engine_difference(real.cell(), real.goal(goal_index), &recordings);
+    ConfigurationReport {
+        label: plan.configuration.label(),
+        status: Status::Rejected, // `judge` sets it
+        rejections: plan
+            .rejections
+            .iter()
+            .map(|rejection| RejectionReport {
+                rule: rejection.rule.name(),
+                value: rejection.value,
+                limit: rejection.limit,
+                unit: rejection.unit,
+                detail: rejection.detail.clone(),
+            })
+            .collect(),
+        joints_rad: candidate.map(|each| each.joints.into()),
+        roll_rad: candidate.map(|each| each.roll_rad),
+        wrap: candidate.map(|each| each.wrap),
+        ik_residual_m: candidate.map(|each| each.residual_m),
+        ik_residual_rad: candidate.map(|each| each.residual_rad),
+        free_joint: candidate
+            .filter(|each| each.wrist_3_is_free)
+            .map(|_| "wrist_3"),
+        margins: candidate.map(|each| margins_report(&each.margins)),
+        motion: phases(plan.trajectory.as_ref()),
+        retreat: phases(plan.retreat.as_ref()),
+        search: plan.search.map(|effort| SearchReport {
+            waypoints: effort.waypoints,
+            postures_checked: effort.checks,
+            postures_drawn: effort.samples,
+            seed: effort.seed,
+        }),
+        commanded,
+        engines,
+        engine_difference,
+        adjudication: judged.adjudication.clone(),
+        referee: judged.referee.clone(),
+        clearance,
+        posture_clearance_m,
+        surplus_m: surplus_m(&setup.planner, plan),
+        predicted: if real.is_imperfect() {
+            let motion = plan.trajectory.as_ref();
+            motion.and_then(|motion| real.predicted_needle(goal_index, motion))
+        } else {
+            commanded
+        },
+        tip_sensitivity_m_per_rad: candidate.map(|each| tip_sensitivity(cell, goal, &each.joints)),
+        pareto: false,
+        dominated_by: None,
+        ranking: None,
+        events: events
+            .iter()
+            .find(|run| run.goal == goal_index && run.configuration == plan.configuration.index())
+            .map(|run| events_report(setup, plan, run)),
+        room: room
+            .as_ref()
+            .zip(candidate)
+            .map(|(room, each)| room.measure(goal_index, &each.joints)),
+        budget: None,
+        budget_failure: None,
+        metrics: BTreeMap::new(), // measured when the budget is there
+        files: Vec::new(),
+    }
+}
+
+/// Margins of a posture.
+pub(crate) fn margins_report(margins: &PostureMargins) -> MarginsReport {
+    MarginsReport {
+        joint_limit: margins.joint_limit,
+        wrist_sine: margins.wrist_sine,
+        elbow_sine: margins.elbow_sine,
+        shoulder_m: margins.shoulder_m,
+        manipulability_m3: margins.manipulability,
+    }
+}
+
+/// How far the posture is from breaking a rule; of one that is out of reach by how much it misses.
+fn surplus_m(planner: &Planner<'_>, plan: &ConfigurationPlan) -> Option<f64> {
+    match (&plan.candidate, plan.rejections.first()) {
+        (Some(candidate), _) => Some(planner.surplus(candidate, &plan.rejections)),
+        (None, Some(rejection)) if rejection.rule == Rule::Unreachable => Some(-rejection.value),
+        _ => None,
+    }
+}
+
+fn phases(trajectory: Option<&JointTrajectory>) -> Vec<PhaseReport> {
+    trajectory
+        .into_iter()
+        .flat_map(JointTrajectory::phases)
+        .map(|(phase, start_s, end_s)| PhaseReport {
+            phase: phase.name(),
+            start_s,
+            end_s,
+        })
+        .collect()
+}
+
+fn engine_report(
+    setup: &Setup<'_>,
+    goal_index: usize,
+    plan: &ConfigurationPlan,
+    run: &EngineRun,
+) -> EngineReport {
+    let real = &setup.real;
+    let (cell, goal) = (real.cell(), real.goal(goal_index));
+    let trajectory = plan
+        .trajectory
+        .as_ref()
+        .expect("what was simulated has a trajectory");
+    let settled = run
+        .recording
+        .state
+        .last()
+        .expect("a recording has its initial state");
+    let band_m = setup.resolved.scenario.criteria.settling_band_mm * 1e-3;
+    let rested_m = tip_of(cell, goal, &settled.world_from_flange);
+    // An imperfect arm never comes to its commanded place.
+    let rests_at_m = real.is_imperfect().then_some(rested_m);
+    EngineReport {
+        needle: measure_needle(cell, real.phantom(), goal, &settled.world_from_flange),
+        unexplained_tip_m: real
+            .predicted_tip(goal_index, trajectory)
+            .map(|predicted_m| (rested_m - predicted_m).norm()),
+        motion: measure_motion(cell, goal, trajectory, &run.recording, band_m, rests_at_m),
+        clearance: ClearanceReport::of(&run.clearance.minima),
+    }
+}
+
+/// Least clearances over all engines; over the planned motion where nothing was simulated, and of
+/// the final posture where there is no motion.
+fn overall_clearance(
+    setup: &Setup<'_>,
+    plan: &ConfigurationPlan,
+    engines: &BTreeMap<String, EngineReport>,
+) -> ClearanceReport {
+    let Setup {
+        resolved, model, ..
+    } = setup;
+    let cell = &resolved.cell;
+    let mut classes: BTreeMap<&'static str, ClassClearance> = BTreeMap::new();
+    if engines.is_empty() {
+        let tolerance_m = resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
+        let minima = match (&plan.trajectory, &plan.candidate) {
+            (Some(trajectory), _) => planned_clearance(cell, model, trajectory, tolerance_m),
+            (None, Some(candidate)) => posture_clearance(cell, &candidate.clearance),
+            (None, None) => BTreeMap::new(),
+        };
+        classes.extend(
+            minima
+                .into_iter()
+                .map(|(class, found)| (class.name(), found)),
+        );
+    }
+    for report in engines.values() {
+        for (class, found) in &report.clearance.classes {
+            let Some(known) = classes.get_mut(class) else {
+                classes.insert(class, found.clone());
+                continue;
+            };
+            // The bound over all engines, whichever comes nearest.
+            let bound_m = known
+                .certified_lower_bound_m
+                .zip(found.certified_lower_bound_m)
+                .map(|(one, other)| one.min(other));
+            if found.minimum_m < known.minimum_m {
+                *known = found.clone();
+            }
+            known.certified_lower_bound_m = bound_m;
+        }
+    }
+    ClearanceReport::new(classes)
+}

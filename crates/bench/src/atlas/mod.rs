@@ -1,0 +1,74 @@
+//! The atlas of a goal: branch x roll, what works, how much room there is, and why not.
+
+mod report;
+
+use std::f64::consts::TAU;
+
+use needlebench_cell::{Goal, ResolvedScenario};
+use needlebench_clearance::ClearanceModel;
+use needlebench_kinematics::NotUrGeometry;
+use needlebench_kinematics::ik::Configuration;
+use needlebench_planning::{Aim, Family, Member, Planner};
+
+pub use report::{AtlasReport, BranchReport, GoalAtlasReport};
+
+use crate::parallel::in_parallel;
+
+/// All members of a goal's eight families on a grid of rolls, and their ranges.
+#[derive(Debug)]
+pub struct GoalAtlas {
+    /// Rolls, ascending from 0; all round, even where the goal fixes one.
+    pub rolls_rad: Vec<f64>,
+    /// What rolls are chosen for.
+    pub aim: Aim,
+    /// Ranges by configuration, in the order of [`Configuration::ALL`].
+    pub families: Vec<Family>,
+    /// Members by configuration and roll.
+    pub members: Vec<Vec<Member>>,
+}
+
+impl GoalAtlas {
+    /// Some configuration works at some roll.
+    pub fn works(&self) -> bool {
+        self.families.iter().any(|family| !family.ranges.is_empty())
+    }
+}
+
+/// Computes the atlas of a goal: postures only, no motions. The same for any number of threads.
+///
+/// # Errors
+/// [`NotUrGeometry`] if the robot is not a UR arm.
+pub fn goal_atlas(
+    resolved: &ResolvedScenario,
+    model: &ClearanceModel,
+    goal: &Goal,
+    rolls: u32,
+    aim: Aim,
+    threads: usize,
+) -> Result<GoalAtlas, NotUrGeometry> {
+    let planner = Planner::new(resolved, model)?;
+    let rolls_rad: Vec<f64> = (0..rolls)
+        .map(|k| TAU * f64::from(k) / f64::from(rolls))
+        .collect();
+    let by_roll = in_parallel(threads, &rolls_rad, |&roll_rad| {
+        planner.members_at(goal, roll_rad)
+    });
+    let mut members: Vec<Vec<Member>> = Configuration::ALL
+        .iter()
+        .map(|_| Vec::with_capacity(rolls_rad.len()))
+        .collect();
+    for row in by_roll {
+        for (column, member) in members.iter_mut().zip(row) {
+            column.push(member);
+        }
+    }
+    let families = in_parallel(threads, &Configuration::ALL, |&configuration| {
+        planner.family(goal, configuration, &members[configuration.index()])
+    });
+    Ok(GoalAtlas {
+        rolls_rad,
+        aim,
+        families,
+        members,
+    })
+}

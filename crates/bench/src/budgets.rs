@@ -1,0 +1,90 @@
+//! The fifth stage: error budgets.
+
+use needlebench_planning::{ConfigurationPlan, GoalPlan};
+use needlebench_uncertainty::budget::{
+    BudgetCase, ErrorBudget, Moments, PointBudget, SourceBudget, analytic_total, budget,
+};
+
+use crate::parallel::in_parallel;
+use crate::setup::Setup;
+
+/// Error budgets by goal and configuration, for every configuration with a motion; with what went
+/// wrong where there is none.
+pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
+
+/// Budgets of all configurations that have a motion; none at all without imperfections.
+pub(crate) fn budgets(setup: &Setup<'_>, plans: &[GoalPlan], threads: usize) -> Budgets {
+    let seed = setup.resolved.scenario.seed;
+    of_each(setup, plans, threads, |case| {
+        budget(case, case.imperfections.budget_samples, seed).map_err(|error| error.to_string())
+    })
+}
+
+/// The same with nothing but the analytic totals: no sources of their own, no draws.
+pub(crate) fn analytic_budgets(setup: &Setup<'_>, plans: &[GoalPlan]) -> Budgets {
+    of_each(setup, plans, 1, |case| {
+        let moments = analytic_total(case).map_err(|error| error.to_string())?;
+        Ok(analytic_budget(moments))
+    })
+}
+
+/// A budget of nothing but the analytic totals at skin and target.
+pub(crate) fn analytic_budget(moments: [Moments; 2]) -> ErrorBudget {
+    let [at_skin, at_target] = moments.map(|analytic| PointBudget {
+        analytic,
+        monte_carlo: None,
+        radius_95_m: None,
+        covariance_difference: None,
+        bias_difference_m: None,
+    });
+    ErrorBudget {
+        samples: 0,
+        sources: Vec::new(),
+        total: SourceBudget {
+            source: None,
+            at_skin,
+            at_target,
+        },
+        dominant: None,
+    }
+}
+
+fn of_each(
+    setup: &Setup<'_>,
+    plans: &[GoalPlan],
+    threads: usize,
+    budget: impl Fn(&BudgetCase<'_>) -> Result<ErrorBudget, String> + Sync,
+) -> Budgets {
+    let resolved = setup.resolved;
+    let Some(imperfections) = &resolved.imperfections else {
+        return plans
+            .iter()
+            .map(|plan| plan.configurations.iter().map(|_| None).collect())
+            .collect();
+    };
+    let all: Vec<(usize, &ConfigurationPlan)> = plans
+        .iter()
+        .enumerate()
+        .flat_map(|(goal, plan)| plan.configurations.iter().map(move |each| (goal, each)))
+        .collect();
+    let mut found = in_parallel(threads, &all, |(goal, plan)| {
+        let case = BudgetCase {
+            cell: &resolved.cell,
+            goal: &resolved.goals[*goal],
+            place: resolved
+                .phantom
+                .as_ref()
+                .map(|each| &each.world_from_phantom),
+            servo: &setup.servo,
+            imperfections,
+            trajectory: plan.trajectory.as_ref()?,
+            timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
+        };
+        Some(budget(&case))
+    })
+    .into_iter();
+    plans
+        .iter()
+        .map(|plan| found.by_ref().take(plan.configurations.len()).collect())
+        .collect()
+}

@@ -1,0 +1,258 @@
+//! A test by ISO 9283 in place of goals: one cycle, simulated again and again, evaluated.
+
+mod simulate;
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use needlebench_cell::iso9283::Iso9283Protocol;
+use needlebench_cell::{ArmInUse, ResolvedScenario};
+use needlebench_clearance::ClearanceModel;
+use needlebench_engine::{Engine, EngineIdentity, EnginePool};
+use needlebench_evaluation::iso9283::{
+    Commanded, EngineMeasurement, Iso9283Report, ProtocolSummary, SUBJECT, StabilisationReport,
+    drift, evaluate, judge,
+};
+use needlebench_evaluation::report::{
+    CriterionResult, EngineFailure, Report, SCHEMA_VERSION, ScenarioSummary, Verdict,
+};
+use needlebench_evaluation::{EngineDifference, pairs};
+use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan};
+
+use crate::control::Control;
+use crate::parallel::in_parallel;
+use crate::provenance::provenance;
+use crate::scenario_run::{ProtocolRun, RealArm, RunError, ScenarioRun};
+use crate::setup::Setup;
+use simulate::{Cycles, EngineCycles};
+
+/// Runs the protocol of a scenario that has one.
+///
+/// A protocol that cannot be carried out is a missed criterion here; commands find it while they
+/// read the scenario.
+pub(crate) fn run(
+    resolved: &ResolvedScenario,
+    plan: &Result<ProtocolPlan, ProtocolError>,
+    engines: &[&'static dyn Engine],
+    control: &Control<'_>,
+) -> Result<ScenarioRun, RunError> {
+    let started = Instant::now();
+    let mut timings = BTreeMap::new();
+    let protocol = resolved.iso9283.as_ref();
+    let protocol = protocol.expect("what is planned is the scenario's protocol");
+    let model = ClearanceModel::new(&resolved.cell);
+    let setup = Setup::new(resolved, &model)?;
+    timings.insert("planning_s".to_owned(), started.elapsed().as_secs_f64());
+    let plan = match plan {
+        Ok(plan) => plan,
+        Err(error) => return Ok(unplanned(resolved, &error.to_string(), timings)),
+    };
+    let outcomes = simulate_engines(&setup, protocol, plan, engines, control);
+    timings.insert(
+        "simulation_s".to_owned(),
+        started.elapsed().as_secs_f64() - timings["planning_s"],
+    );
+
+    let commanded = commanded(protocol);
+    let mut report = Iso9283Report {
+        protocol: ProtocolSummary::new(
+            protocol,
+            &plan.joints,
+            plan.cycle.trajectory.duration_s(),
+            plan.directional
+                .as_ref()
+                .map(|cycle| cycle.trajectory.duration_s()),
+        ),
+        engines: BTreeMap::new(),
+        engine_difference: difference(&outcomes),
+        files: Vec::new(),
+    };
+    let (mut failures, mut identities, mut engines) = (Vec::new(), Vec::new(), Vec::new());
+    for (engine, outcome) in outcomes {
+        match outcome {
+            Ok(cycles) => {
+                let measured = measurement(protocol, &commanded, &cycles);
+                report.engines.insert(engine.to_owned(), measured);
+                identities.push(cycles.identity);
+                engines.push((engine, cycles.attained, cycles.arrivals));
+            }
+            Err(message) if !control.is_cancelled() => failures.push(EngineFailure {
+                engine: engine.to_owned(),
+                during: Some("ISO 9283".to_owned()),
+                message,
+            }),
+            Err(_) => {}
+        }
+    }
+    let scenario = &resolved.scenario;
+    let own = &scenario
+        .iso9283
+        .as_ref()
+        .expect("a resolved protocol has its section")
+        .criteria;
+    let (verdict, criteria) = judge(&report, own, &scenario.criteria);
+    let interrupted = control.is_cancelled();
+    Ok(ScenarioRun {
+        events: Vec::new(),
+        stopped: Vec::new(),
+        report: Report {
+            verdict,
+            criteria,
+            truth: setup.real.report(),
+            iso9283: Some(report),
+            engine_failures: failures,
+            ..empty_report(resolved, identities, timings)
+        },
+        plans: Vec::new(),
+        runs: Vec::new(),
+        iso9283: Some(ProtocolRun {
+            commanded,
+            engines,
+            limit_band_m: protocol.limit_band_m,
+        }),
+        interrupted,
+        real_arm: RealArm::of(setup.real.cell()),
+    })
+}
+
+/// Every engine's cycles, or why there are none.
+fn simulate_engines(
+    setup: &Setup<'_>,
+    protocol: &Iso9283Protocol,
+    plan: &ProtocolPlan,
+    engines: &[&'static dyn Engine],
+    control: &Control<'_>,
+) -> Vec<(&'static str, Result<EngineCycles, String>)> {
+    let pool = EnginePool::new(engines);
+    let settings = &setup.resolved.scenario.engines;
+    let sequences = 1 + u64::from(plan.directional.is_some());
+    control.progress.message("simulating");
+    let cycles = u64::from(protocol.cycles) * sequences;
+    control.progress.expect(cycles * engines.len() as u64);
+    in_parallel(control.threads, engines, |&engine| {
+        let mut tell = |text: &str| control.progress.message(text);
+        // Why it could not start is told again to whoever asks it for a motion.
+        let _ = pool.start(engine, settings, &mut tell);
+        let cycles = Cycles::new(setup, protocol, &pool, engine, control);
+        (engine.name(), cycles.simulate(plan))
+    })
+}
+
+fn commanded(protocol: &Iso9283Protocol) -> Vec<Commanded> {
+    (1_u32..)
+        .zip(&protocol.base_from_point)
+        .map(|(pose, base_from_point)| Commanded {
+            pose,
+            position_m: base_from_point.translation.vector.into(),
+            orientation: Some(base_from_point.rotation),
+        })
+        .collect()
+}
+
+fn measurement(
+    protocol: &Iso9283Protocol,
+    commanded: &[Commanded],
+    cycles: &EngineCycles,
+) -> EngineMeasurement {
+    let statistics = evaluate(commanded, &cycles.attained)
+        .expect("every pose is commanded and visited at least twice");
+    let remark = if statistics.nothing_random {
+        Some(
+            "RP = 0 because nothing random is switched on: the first two cycles, each with its own \
+             seed, are equal bit for bit"
+                .to_owned(),
+        )
+    } else if cycles.repeats_itself {
+        Some(
+            "the robot repeats itself bit for bit, since nothing random is switched on: the spread \
+             is the tracker's noise alone"
+                .to_owned(),
+        )
+    } else {
+        None
+    };
+    EngineMeasurement {
+        statistics,
+        stabilisation: StabilisationReport::of_arrivals(&cycles.arrivals, protocol.limit_band_m),
+        drift: drift(&commanded[0], &cycles.attained),
+        cycles_simulated: cycles.simulated,
+        effort: cycles.effort.clone(),
+        remark,
+    }
+}
+
+/// Over the first cycles: largest distance at the same time, and between the attained positions.
+fn difference(
+    outcomes: &[(&'static str, Result<EngineCycles, String>)],
+) -> Option<EngineDifference> {
+    let finished = outcomes.iter();
+    let finished: Vec<(&'static str, &EngineCycles)> = finished
+        .filter_map(|(engine, cycles)| Some((*engine, cycles.as_ref().ok()?)))
+        .collect();
+    let largest = |distances: &mut dyn Iterator<Item = f64>| distances.fold(0.0, f64::max);
+    EngineDifference::largest(pairs(&finished).map(|[(first, a), (second, b)]| {
+        let paths = a.path_m.iter().zip(&b.path_m);
+        let attained = a.first_attained_m.iter().zip(&b.first_attained_m);
+        let peak_tip_m = largest(&mut paths.map(|(a, b)| (a - b).norm()));
+        let settled_tip_m = largest(&mut attained.map(|(a, b)| (a - b).norm()));
+        ([*first, *second], [peak_tip_m, settled_tip_m])
+    }))
+}
+
+/// The report of a protocol that cannot be carried out.
+fn unplanned(
+    resolved: &ResolvedScenario,
+    reason: &str,
+    timings: BTreeMap<String, f64>,
+) -> ScenarioRun {
+    let criterion = CriterionResult {
+        goal: SUBJECT.to_owned(),
+        label: None,
+        engine: None,
+        criterion: "planned".to_owned(),
+        value: None,
+        limit: None,
+        unit: "1",
+        pass: false,
+        detail: reason.to_owned(),
+    };
+    ScenarioRun {
+        events: Vec::new(),
+        stopped: Vec::new(),
+        report: Report {
+            criteria: vec![criterion],
+            ..empty_report(resolved, Vec::new(), timings)
+        },
+        plans: Vec::new(),
+        runs: Vec::new(),
+        iso9283: None,
+        interrupted: false,
+        real_arm: RealArm::of(&resolved.cell),
+    }
+}
+
+fn empty_report(
+    resolved: &ResolvedScenario,
+    identities: Vec<EngineIdentity>,
+    timings: BTreeMap<String, f64>,
+) -> Report {
+    Report {
+        truth: None,
+        schema_version: SCHEMA_VERSION,
+        scenario: ScenarioSummary {
+            name: resolved.scenario.name.clone(),
+            description: resolved.scenario.description.clone(),
+            file: resolved.source.file.clone(),
+        },
+        verdict: Verdict::Fail,
+        criteria: Vec::new(),
+        goals: Vec::new(),
+        iso9283: None,
+        engine_failures: Vec::new(),
+        arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
+        enclosure: Vec::new(),
+        notes: resolved.notes.clone(),
+        provenance: provenance(resolved, identities),
+        timings,
+    }
+}

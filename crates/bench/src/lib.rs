@@ -1,0 +1,37 @@
+//! What a run is: a scenario planned, simulated, measured and judged; and likewise its events, a test
+//! by ISO 9283, the engines beside the referee, the atlas of a goal, the servo's data sheet and a case
+//! of a study.
+//!
+//! Gives values only: nothing here prints, draws or writes files.
+//!
+//! A run is a row of stages, each of which takes what those before it made: `plan`, `simulate`,
+//! `events`, `adjudication`, `budgets`, `assemble`. A case of a study goes through the same ones.
+
+mod adjudication;
+mod assemble;
+pub mod atlas;
+mod budgets;
+mod control;
+mod events;
+mod iso9283;
+mod parallel;
+mod plan;
+pub mod progress;
+pub mod provenance;
+mod real_cell;
+mod run;
+mod runnable;
+mod scenario_run;
+pub mod servo;
+mod setup;
+mod simulate;
+pub mod study;
+
+pub use atlas::{GoalAtlas, goal_atlas};
+pub use events::{EngineEvents, EventRun, StagedStop};
+pub use real_cell::servo_of;
+pub use run::{run, run_scenario};
+pub use runnable::Runnable;
+pub use scenario_run::{ProtocolRun, RealArm, RunError, RunOptions, ScenarioRun, StoppedRun};
+pub use setup::SetupError;
+pub use simulate::EngineRun;

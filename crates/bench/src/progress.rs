@@ -1,0 +1,19 @@
+//! How far the work is, for whoever watches it.
+
+/// Watches long work. Every method does nothing unless it is implemented.
+pub trait Progress: Sync {
+    /// What is being done now.
+    fn message(&self, _text: &str) {}
+    /// So many steps more are to be done.
+    fn expect(&self, _steps: u64) {}
+    /// So many steps of all are done.
+    fn at(&self, _done: u64, _total: u64) {}
+    /// One step is done.
+    fn step(&self) {}
+}
+
+/// Nobody watches.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silent;
+
+impl Progress for Silent {}

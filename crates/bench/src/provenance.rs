@@ -1,0 +1,66 @@
+//! Where a result's numbers come from.
+
+use needlebench_cell::{ModelSource, ResolvedScenario, sha256_hex};
+use needlebench_engine::EngineIdentity;
+use needlebench_evaluation::report::{InputFile, Provenance};
+
+/// Lock file of the build.
+const CARGO_LOCK: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.lock"));
+
+/// Version of the program with its git revision.
+pub const PROGRAM_VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (",
+    env!("NEEDLEBENCH_GIT_REVISION"),
+    ")"
+);
+
+/// Git revision of the build.
+pub const GIT_REVISION: &str = env!("NEEDLEBENCH_GIT_REVISION");
+
+/// Everything that went into a result: the program, its engines, all files.
+pub fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentity>) -> Provenance {
+    let input = |role: &'static str, source: &ModelSource| InputFile {
+        role,
+        file: source.file.clone(),
+        sha256: source.sha256.clone(),
+    };
+    let mut inputs = vec![
+        input("scenario", &resolved.source),
+        input("robot", &resolved.cell.robot.source),
+        input("tool", &resolved.cell.tool.source),
+    ];
+    let arm = resolved.cell.robot.arm.as_ref();
+    inputs.extend(arm.map(|used| input("arm data", &used.arm.source)));
+    let calibration = resolved.cell.robot.calibration.as_ref();
+    inputs.extend(calibration.map(|applied| input("calibration", &applied.source)));
+    let meshes = &resolved.cell.robot.meshes;
+    inputs.extend(meshes.iter().map(|source| input("robot mesh", source)));
+    inputs.extend(
+        resolved
+            .phantom_source
+            .iter()
+            .map(|source| input("phantom", source)),
+    );
+    let parts = &resolved.phantom_parts;
+    inputs.extend(parts.iter().map(|source| input("phantom part", source)));
+    let arms = resolved.imperfections.iter().flat_map(|each| &each.sources);
+    inputs.extend(arms.map(|source| input("real arm", source)));
+    Provenance {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        git_revision: GIT_REVISION.to_owned(),
+        cargo_lock_sha256: sha256_hex(CARGO_LOCK),
+        engines,
+        inputs,
+        seed: resolved.scenario.seed,
+        truth: if resolved.imperfections.is_some() {
+            "an imperfect robot and phantom, drawn from the seed: errors are those of the \
+             scenario's imperfections, of control and of simulation"
+        } else if calibration.is_some() {
+            "factory-calibrated robot: errors are those of inverse kinematics, control and \
+             simulation"
+        } else {
+            "nominal robot: errors are those of inverse kinematics, control and simulation"
+        },
+    }
+}

@@ -1,0 +1,253 @@
+//! The whole way of one scenario: plan, simulate, stage events, adjudicate, budget, assemble.
+//!
+//! Each stage is a module that takes what the stages before it made; see [`run`].
+
+use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use needlebench_cell::ResolvedScenario;
+use needlebench_clearance::ClearanceModel;
+use needlebench_engine::{Engine, EngineIdentity, EnginePool};
+use needlebench_evaluation::report::EngineFailure;
+use needlebench_planning::GoalPlan;
+
+use crate::adjudication::Adjudicator;
+use crate::assemble::{Results, assemble};
+use crate::budgets::budgets;
+use crate::control::Control;
+use crate::events::{self, EventRun};
+use crate::iso9283;
+use crate::parallel::in_parallel;
+use crate::plan::{Job, jobs, plan_goals};
+use crate::progress::{Progress, Silent};
+use crate::runnable::Runnable;
+use crate::scenario_run::{RealArm, RunError, RunOptions, ScenarioRun, StoppedRun};
+use crate::setup::Setup;
+use crate::simulate::{Detail, EngineRun, SimulatedMotions, Simulation};
+
+/// Plans, simulates, measures and judges one scenario.
+///
+/// # Errors
+/// [`RunError`]. A failing engine is no error: the report says so and keeps what the others measured.
+pub fn run(
+    runnable: &Runnable,
+    options: &RunOptions,
+    cancel: &AtomicBool,
+    progress: &dyn Progress,
+) -> Result<ScenarioRun, RunError> {
+    let engines = options.chosen_engines(runnable.scenario())?;
+    let control = Control {
+        threads: options.jobs,
+        cancel,
+        progress,
+    };
+    match runnable.protocol() {
+        Some(plan) => iso9283::run(runnable.scenario(), plan, &engines, &control),
+        None => run_goals(runnable.scenario(), options, &engines, &control),
+    }
+}
+
+/// Runs a scenario without progress and without a way to interrupt it.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_scenario(
+    resolved: &ResolvedScenario,
+    options: &RunOptions,
+) -> Result<ScenarioRun, RunError> {
+    let runnable = Runnable::new(resolved.clone());
+    run(&runnable, options, &AtomicBool::new(false), &Silent)
+}
+
+fn run_goals(
+    resolved: &ResolvedScenario,
+    options: &RunOptions,
+    engines: &[&'static dyn Engine],
+    control: &Control<'_>,
+) -> Result<ScenarioRun, RunError> {
+    let mut timings = Timings::start();
+    let model = ClearanceModel::new(&resolved.cell);
+    let setup = Setup::new(resolved, &model)?;
+    let pool = EnginePool::new(engines);
+    let plans = plan_while_engines_start(&setup, &pool, engines, control);
+    timings.lap("planning_s");
+
+    let jobs = jobs(&setup, &plans);
+    let simulation = Simulation {
+        setup: &setup,
+        plans: &plans,
+        jobs: &jobs,
+        detail: Detail::Series,
+        restart: false,
+    };
+    control.progress.message("simulating");
+    control.progress.expect((jobs.len() * engines.len()) as u64);
+    let simulated = in_parallel(control.threads, engines, |engine| {
+        simulation.run_in(&pool, *engine, control)
+    });
+    timings.lap("simulation_s");
+    for made in &simulated {
+        timings.of_engine(made);
+    }
+
+    let (events, event_failures) = run_events(&setup, &plans, &pool, engines, control);
+    let failures = simulated
+        .iter()
+        .filter_map(|made| made.failure(&simulation));
+    let failures: Vec<EngineFailure> = failures.chain(event_failures).collect();
+    let mut identities: Vec<EngineIdentity> = Vec::new();
+    identities.extend(simulated.iter().filter_map(|made| made.identity.clone()));
+    let (runs, stopped) = by_configuration(&plans, simulated);
+
+    let refereed = Instant::now();
+    let adjudicator = Adjudicator {
+        setup: &setup,
+        plans: &plans,
+        runs: &runs,
+        engines,
+        pool: &pool,
+        always: options.referee,
+    };
+    let adjudications = adjudicator.judge_all(control);
+    if adjudications.identity.is_some() {
+        timings.set("referee_s", refereed.elapsed().as_secs_f64());
+    }
+    identities.extend(adjudications.identity);
+
+    let budgets = budgets(&setup, &plans, control.threads);
+    let interrupted = control.is_cancelled();
+    let results = Results {
+        plans: &plans,
+        runs: &runs,
+        events: &events,
+        budgets: &budgets,
+        adjudicated: &adjudications.by_goal,
+        all_engines_ran: engines.len() > 1 && failures.is_empty(),
+        failures,
+        identities,
+        timings: timings.all,
+    };
+    let mut report = assemble(&setup, results);
+    report.notes.extend(adjudications.notes);
+    if interrupted {
+        report.notes.push(
+            "the run was interrupted: motions that had not been simulated by then are missing"
+                .to_owned(),
+        );
+    }
+    let real_arm = RealArm::of(setup.real.cell());
+    Ok(ScenarioRun {
+        report,
+        plans,
+        runs,
+        events,
+        stopped,
+        iso9283: None,
+        interrupted,
+        real_arm,
+    })
+}
+
+/// Plans all goals; what engines need is started meanwhile.
+fn plan_while_engines_start(
+    setup: &Setup<'_>,
+    pool: &EnginePool,
+    engines: &[&'static dyn Engine],
+    control: &Control<'_>,
+) -> Vec<GoalPlan> {
+    let settings = &setup.resolved.scenario.engines;
+    std::thread::scope(|scope| {
+        for engine in engines {
+            scope.spawn(move || {
+                let mut tell = |text: &str| control.progress.message(text);
+                // Whoever asks the engine for something is told why it could not start.
+                let _ = pool.start(*engine, settings, &mut tell);
+            });
+        }
+        plan_goals(setup, control)
+    })
+}
+
+/// Stages the events of all configurations that work, and simulates them in all engines.
+fn run_events(
+    setup: &Setup<'_>,
+    plans: &[GoalPlan],
+    pool: &EnginePool,
+    engines: &[&'static dyn Engine],
+    control: &Control<'_>,
+) -> (Vec<EventRun>, Vec<EngineFailure>) {
+    let mut staged = events::stage(setup, plans, control.threads);
+    let done = in_parallel(control.threads, engines, |engine| {
+        events::simulate(setup, plans, &staged, pool, *engine, false, control)
+    });
+    let mut failures = Vec::new();
+    for (engine, done) in engines.iter().zip(done) {
+        failures.extend(done.failure);
+        for (run, events) in staged.iter_mut().zip(done.by_run) {
+            run.engines
+                .extend(events.map(|events| (engine.name(), events)));
+        }
+    }
+    (staged, failures)
+}
+
+/// Recordings by goal and configuration, and those that broke off.
+fn by_configuration(
+    plans: &[GoalPlan],
+    simulated: Vec<SimulatedMotions>,
+) -> (Vec<Vec<Vec<EngineRun>>>, Vec<StoppedRun>) {
+    let empty = |plan: &GoalPlan| plan.configurations.iter().map(|_| Vec::new()).collect();
+    let mut runs: Vec<Vec<Vec<EngineRun>>> = plans.iter().map(empty).collect();
+    let mut stopped = Vec::new();
+    for made in simulated {
+        for (job, run) in made.runs {
+            runs[job.goal][job.configuration].push(run);
+        }
+        for failed in made.failed {
+            let Job {
+                goal,
+                configuration,
+            } = failed.job;
+            stopped.extend(failed.run.map(|run| StoppedRun {
+                goal,
+                configuration,
+                run,
+            }));
+        }
+    }
+    (runs, stopped)
+}
+
+/// Wall-clock times for the report, s.
+struct Timings {
+    lap: Instant,
+    all: BTreeMap<String, f64>,
+}
+
+impl Timings {
+    fn start() -> Self {
+        Self {
+            lap: Instant::now(),
+            all: BTreeMap::new(),
+        }
+    }
+
+    fn set(&mut self, key: &str, value: f64) {
+        self.all.insert(key.to_owned(), value);
+    }
+
+    /// Time since the last lap.
+    fn lap(&mut self, key: &str) {
+        self.set(key, self.lap.elapsed().as_secs_f64());
+        self.lap = Instant::now();
+    }
+
+    fn of_engine(&mut self, made: &SimulatedMotions) {
+        let name = made.engine.name();
+        self.set(&format!("{name}_s"), made.wall.as_secs_f64());
+        if let Some(factor) = made.real_time_factor() {
+            self.set(&format!("{name}_real_time_factor"), factor);
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! A scenario that is fit to be run, or why it is not.
+
+use needlebench_cell::{Finding, ResolvedScenario};
+use needlebench_clearance::ClearanceModel;
+use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan, plan_protocol};
+
+/// A scenario, with the plan of its test by ISO 9283 if it has one: a plan that cannot be made is found
+/// before anything long begins, and nobody makes it again.
+#[derive(Debug, Clone)]
+pub struct Runnable {
+    resolved: ResolvedScenario,
+    protocol: Option<Result<ProtocolPlan, ProtocolError>>,
+}
+
+impl Runnable {
+    /// Plans the scenario's protocol, if it has one.
+    pub fn new(resolved: ResolvedScenario) -> Self {
+        let protocol = resolved.iso9283.as_ref().map(|protocol| {
+            let model = ClearanceModel::new(&resolved.cell);
+            plan_protocol(&resolved, protocol, &model)
+        });
+        Self { resolved, protocol }
+    }
+
+    /// The same for a scenario of which nothing is wrong.
+    ///
+    /// # Errors
+    /// A start posture that collides, or a protocol that cannot be carried out.
+    pub fn checked(resolved: ResolvedScenario) -> Result<Self, Finding> {
+        let runnable = Self::new(resolved);
+        match runnable.obstacle() {
+            Some(finding) => Err(finding),
+            None => Ok(runnable),
+        }
+    }
+
+    /// The scenario.
+    pub fn scenario(&self) -> &ResolvedScenario {
+        &self.resolved
+    }
+
+    /// The scenario by itself.
+    pub fn into_scenario(self) -> ResolvedScenario {
+        self.resolved
+    }
+
+    /// The plan of its protocol, if it has one.
+    pub(crate) fn protocol(&self) -> Option<&Result<ProtocolPlan, ProtocolError>> {
+        self.protocol.as_ref()
+    }
+
+    fn obstacle(&self) -> Option<Finding> {
+        let file = &self.resolved.source.file;
+        if let Some(protocol) = &self.protocol {
+            // It does not start from the start posture.
+            let error = protocol.as_ref().err()?;
+            let finding = Finding::new(file, error.to_string());
+            return Some(finding.key("iso9283").hint(error.hint()));
+        }
+        let cell = &self.resolved.cell;
+        let model = ClearanceModel::new(cell);
+        let pair = model.first_below(&self.resolved.start, |_| 0.0)?;
+        let (a, b) = pair.solid_names(cell);
+        let depth_mm = -pair.separation.distance_m * 1e3;
+        let finding = Finding::new(
+            file,
+            format!("the start posture collides: {a} is {depth_mm:.1} mm inside {b}"),
+        );
+        Some(
+            finding
+                .key("start.joints_deg")
+                .hint("choose another start posture, or move what it hits"),
+        )
+    }
+}

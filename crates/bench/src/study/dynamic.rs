@@ -1,0 +1,240 @@
+//! A case with its motion in the engines.
+
+use std::borrow::Cow;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use needlebench_cell::ResolvedScenario;
+use needlebench_cell::study::StudyMode;
+use needlebench_clearance::ClearanceModel;
+use needlebench_engine::{Engine, EngineError, EnginePool};
+use needlebench_evaluation::judge;
+use needlebench_evaluation::report::{CriterionResult, Status};
+use needlebench_planning::GoalPlan;
+use needlebench_study::Outcome;
+
+use crate::adjudication::Adjudicated;
+use crate::control::Control;
+use crate::events::{self, EventRun};
+use crate::plan::{Job, jobs, plan_goals};
+use crate::progress::Silent;
+use crate::setup::Setup;
+use crate::simulate::{Detail, EngineRun, Simulation};
+
+use super::planned::{case_report, case_setup, eight};
+use super::rows::{CaseRow, broken_rule};
+
+/// Nobody interrupts a case: a study ends between two of them.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+/// The rows of a case, and where its time went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DynamicCase {
+    /// The rows.
+    pub rows: [CaseRow; 8],
+    /// Wall-clock times.
+    pub cost: CaseCost,
+}
+
+/// Wall-clock times of a dynamic case.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct CaseCost {
+    /// Candidates and motions of all configurations.
+    pub planning: Duration,
+    /// By engine: building its arms, motions under the servo, clearances along them.
+    pub engines: Vec<(&'static str, Duration)>,
+    /// Everything else: the models of the cell before, needles, criteria and rows after.
+    pub other: Duration,
+}
+
+impl CaseCost {
+    /// All together.
+    pub fn total(&self) -> Duration {
+        let engines: Duration = self.engines.iter().map(|(_, time)| *time).sum();
+        self.planning + engines + self.other
+    }
+
+    /// Time of one engine.
+    pub fn of(&self, engine: &str) -> Duration {
+        let own = self.engines.iter().filter(|(name, _)| *name == engine);
+        own.map(|(_, time)| *time).sum()
+    }
+}
+
+/// The rows of a case by the motions in the engines: what [`run_scenario`](crate::run_scenario) would
+/// report of the same scenario, number for number.
+///
+/// A configuration whose motion an engine cannot carry out has [`Outcome::Failed`] with the detail
+/// `engine_failure rapier`, and no measured numbers.
+///
+/// # Errors
+/// If the scenario has not exactly one goal or cannot be planned at all; if an engine cannot be
+/// started, or its process fails twice in this case.
+pub fn dynamic_rows(
+    resolved: &ResolvedScenario,
+    engines: &[&'static dyn Engine],
+    pool: &EnginePool,
+) -> Result<[CaseRow; 8], String> {
+    Ok(dynamic_case(resolved, engines, pool)?.rows)
+}
+
+/// [`dynamic_rows`] with the times that the parts took.
+///
+/// # Errors
+/// As [`dynamic_rows`].
+pub fn dynamic_case(
+    resolved: &ResolvedScenario,
+    engines: &[&'static dyn Engine],
+    pool: &EnginePool,
+) -> Result<DynamicCase, String> {
+    let started = Instant::now();
+    let mut cost = CaseCost::default();
+    let model = ClearanceModel::new(&resolved.cell);
+    let setup = case_setup(resolved, &model)?;
+    let control = Control {
+        threads: 1,
+        cancel: &NEVER,
+        progress: &Silent,
+    };
+    let planning = Instant::now();
+    let plans = plan_goals(&setup, &control);
+    cost.planning = planning.elapsed();
+    let mut case = Case::new(&setup, &plans);
+    for &engine in engines {
+        let begun = Instant::now();
+        if let Err(error) = case.run_in(engine, pool, &control) {
+            // The next case may find it well again.
+            pool.discard(engine);
+            return Err(error.to_string());
+        }
+        cost.engines.push((engine.name(), begun.elapsed()));
+    }
+    let rows = case.rows(engines.len());
+    cost.other = started.elapsed().saturating_sub(cost.total());
+    Ok(DynamicCase { rows, cost })
+}
+
+/// One case under way.
+struct Case<'a> {
+    setup: &'a Setup<'a>,
+    plans: &'a [GoalPlan],
+    jobs: Vec<Job>,
+    /// By configuration.
+    runs: Vec<Vec<EngineRun>>,
+    /// By configuration: the first engine that failed it.
+    failed: Vec<Option<&'static str>>,
+    events: Vec<EventRun>,
+}
+
+impl<'a> Case<'a> {
+    fn new(setup: &'a Setup<'a>, plans: &'a [GoalPlan]) -> Self {
+        let count = plans[0].configurations.len();
+        Self {
+            setup,
+            plans,
+            jobs: jobs(setup, plans),
+            runs: vec![Vec::new(); count],
+            failed: vec![None; count],
+            events: events::stage(setup, plans, 1),
+        }
+    }
+
+    /// Planned motions and events in one engine.
+    ///
+    /// # Errors
+    /// What ended the engine itself.
+    fn run_in(
+        &mut self,
+        engine: &'static dyn Engine,
+        pool: &EnginePool,
+        control: &Control<'_>,
+    ) -> Result<(), EngineError> {
+        let simulation = Simulation {
+            setup: self.setup,
+            plans: self.plans,
+            jobs: &self.jobs,
+            detail: Detail::Least,
+            restart: true,
+        };
+        let made = simulation.run_in(pool, engine, control);
+        if let Some(error) = made.error {
+            return Err(error);
+        }
+        for motion in &made.failed {
+            self.failed[motion.job.configuration].get_or_insert(engine.name());
+        }
+        for (job, run) in made.runs {
+            self.runs[job.configuration].push(run);
+        }
+        let done = events::simulate(
+            self.setup,
+            self.plans,
+            &self.events,
+            pool,
+            engine,
+            true,
+            control,
+        );
+        if let Some(error) = done.error {
+            return Err(error);
+        }
+        for (run, events) in self.events.iter_mut().zip(done.by_run) {
+            match events {
+                Some(events) => run.engines.push((engine.name(), events)),
+                None => {
+                    self.failed[run.configuration].get_or_insert(engine.name());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn rows(mut self, engines: usize) -> [CaseRow; 8] {
+        // What one engine measured where another failed is no result of the configuration.
+        for (runs, failed) in self.runs.iter_mut().zip(&self.failed) {
+            if failed.is_some() {
+                runs.clear();
+            }
+        }
+        let (setup, plan) = (self.setup, &self.plans[0]);
+        let judged = |runs: &Vec<EngineRun>| Adjudicated::without_referee(setup, 0, runs);
+        let adjudicated: Vec<Adjudicated> = self.runs.iter().map(judged).collect();
+        let report = case_report(setup, plan, &self.runs, &adjudicated, &self.events);
+        let mut reports = [report];
+        let resolved = setup.resolved;
+        let criteria = &resolved.scenario.criteria;
+        let (_, checked) = judge(&mut reports, &resolved.goals, criteria, engines > 1);
+        let [report] = reports;
+        let rows = plan
+            .configurations
+            .iter()
+            .zip(report.configurations)
+            .zip(&self.failed);
+        eight(rows.map(|((plan, measured), failed)| {
+            let (outcome, detail) = match (broken_rule(plan), failed, measured.status) {
+                (Some(rule), _, _) => (Outcome::Rejected, rule),
+                (None, Some(engine), _) => {
+                    (Outcome::Failed, format!("engine_failure {engine}").into())
+                }
+                (None, None, Status::Ok) => (Outcome::Ok, "".into()),
+                (None, None, _) => (Outcome::Failed, missed(&checked, measured.label)),
+            };
+            CaseRow {
+                outcome,
+                detail,
+                mode: StudyMode::Dynamic,
+                measured,
+            }
+        }))
+    }
+}
+
+/// The first criterion that a configuration misses.
+fn missed(checked: &[CriterionResult], label: &str) -> Cow<'static, str> {
+    checked
+        .iter()
+        .find(|result| {
+            !result.pass && result.label.as_deref() == Some(label) && result.criterion != "expected"
+        })
+        .map_or("no_engine".into(), |result| result.criterion.clone().into())
+}

@@ -1,0 +1,27 @@
+//! Cases of a study: rows of numbers from one layout with one goal.
+
+mod case;
+mod dynamic;
+mod evaluator;
+mod former;
+mod identity;
+mod planned;
+mod prediction;
+mod prepare;
+mod robust;
+pub mod robustness;
+mod rows;
+mod static_case;
+#[cfg(test)]
+mod tests;
+
+pub use case::StudyCase;
+pub use dynamic::{CaseCost, DynamicCase, dynamic_case, dynamic_rows};
+pub use evaluator::StudyEvaluator;
+pub use former::FormerResults;
+pub use identity::Identity;
+pub use planned::planned_rows;
+pub use prepare::{PreparedStudy, in_words, time_per_case};
+pub use robust::{RobustnessResult, robustness_of};
+pub use rows::{CaseRow, StudyColumns, metric_column};
+pub use static_case::{StaticWorker, invalid_rows, static_rows};

@@ -1,0 +1,110 @@
+//! A case with its motion, without engines.
+
+use std::borrow::Cow;
+
+use needlebench_cell::ResolvedScenario;
+use needlebench_cell::scenario::CriteriaSection;
+use needlebench_cell::study::StudyMode;
+use needlebench_clearance::ClearanceModel;
+use needlebench_evaluation::check_configuration;
+use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
+use needlebench_evaluation::room::RoomModel;
+use needlebench_planning::GoalPlan;
+use needlebench_study::Outcome;
+
+use crate::adjudication::Adjudicated;
+use crate::assemble::{Context, goal_report};
+use crate::budgets::analytic_budgets;
+use crate::events::EventRun;
+use crate::setup::Setup;
+use crate::simulate::EngineRun;
+
+use super::rows::{CaseRow, broken_rule};
+
+/// Prepares a case of a scenario with one goal.
+pub(super) fn case_setup<'a>(
+    resolved: &'a ResolvedScenario,
+    model: &'a ClearanceModel,
+) -> Result<Setup<'a>, String> {
+    if resolved.goals.len() != 1 || resolved.iso9283.is_some() {
+        return Err(format!(
+            "a case has one goal, `{}` has {}",
+            resolved.source.file,
+            resolved.goals.len()
+        ));
+    }
+    Setup::new(resolved, model).map_err(|error| error.to_string())
+}
+
+/// The report of the only goal, without what only pages and pictures show.
+pub(super) fn case_report(
+    setup: &Setup<'_>,
+    plan: &GoalPlan,
+    runs: &[Vec<EngineRun>],
+    adjudicated: &[Adjudicated],
+    events: &[EventRun],
+) -> GoalReport {
+    let criteria = &setup.resolved.scenario.criteria;
+    let room_counts = criteria.min_free_fraction.is_some()
+        || criteria.min_sight_fraction.is_some()
+        || criteria.min_hand_cone_deg.is_some();
+    let context = Context {
+        setup,
+        budgets: &analytic_budgets(setup, std::slice::from_ref(plan)),
+        room: room_counts.then(|| RoomModel::new(setup.resolved)),
+        events,
+    };
+    goal_report(&context, 0, plan, runs, adjudicated)
+}
+
+/// The rows of a case by its planned motions: clearances are the least along the motion, of the
+/// final posture where there is none, and the tip is where the balance of torques predicts it.
+///
+/// Of the scenario's criteria those are checked that a motion decides: the predicted needle, the error
+/// budget, the room, and clearances by their proven bounds.
+///
+/// # Errors
+/// If the scenario has not exactly one goal, or cannot be planned at all.
+pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], String> {
+    let model = ClearanceModel::new(&resolved.cell);
+    let setup = case_setup(resolved, &model)?;
+    let plan = setup.planner.plan(&resolved.goals[0]);
+    let none: Vec<Vec<EngineRun>> = plan.configurations.iter().map(|_| Vec::new()).collect();
+    let adjudicated = vec![Adjudicated::default(); none.len()];
+    let report = case_report(&setup, &plan, &none, &adjudicated, &[]);
+    let goal = &resolved.goals[0].name;
+    let criteria = &resolved.scenario.criteria;
+    let rows = plan.configurations.iter().zip(report.configurations);
+    Ok(eight(rows.map(|(plan, measured)| {
+        let (outcome, detail) = match broken_rule(plan) {
+            Some(rule) => (Outcome::Rejected, rule),
+            None => match missed(goal, criteria, &measured) {
+                Some(criterion) => (Outcome::Failed, criterion),
+                None => (Outcome::Ok, "".into()),
+            },
+        };
+        CaseRow {
+            outcome,
+            detail,
+            mode: StudyMode::Planned,
+            measured,
+        }
+    })))
+}
+
+/// The first criterion, in the order of a run's, that the motion is known to miss.
+fn missed(
+    goal: &str,
+    criteria: &CriteriaSection,
+    report: &ConfigurationReport,
+) -> Option<Cow<'static, str>> {
+    let checked = check_configuration(goal, report, criteria, StudyMode::Planned, false);
+    let missed = checked.into_iter().find(|result| !result.pass)?;
+    Some(missed.criterion.into())
+}
+
+/// One row of each configuration.
+pub(super) fn eight(rows: impl Iterator<Item = CaseRow>) -> [CaseRow; 8] {
+    let rows: Vec<CaseRow> = rows.collect();
+    rows.try_into().expect("a goal has eight configurations")
+}

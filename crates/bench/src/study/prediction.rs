@@ -1,0 +1,130 @@
+//! Where the needle comes to rest in a posture, without any engine.
+
+use needlebench_cell::ResolvedScenario;
+use needlebench_engine::Servo;
+use needlebench_evaluation::{NeedleMeasurement, measure_guide};
+use needlebench_kinematics::Dynamics;
+use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_planning::{Candidate, Planner};
+use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, analytic_total};
+use needlebench_uncertainty::{Truth, resting_friction, settle};
+
+use crate::budgets::analytic_budget;
+use crate::real_cell::{drawn_truth, servo_of};
+
+/// What is known of the needle in one posture.
+pub(super) struct Predicted {
+    /// One arm and one patient; none where a drive is too weak or nothing tells how joints came to
+    /// rest.
+    pub needle: Option<NeedleMeasurement>,
+    /// All arms and patients, where a criterion asks for them.
+    pub budget: Option<ErrorBudget>,
+}
+
+/// Predicts the needle in the postures of one layout.
+pub(super) struct Prediction<'a> {
+    resolved: &'a ResolvedScenario,
+    real: Option<Real>,
+    with_budget: bool,
+}
+
+struct Real {
+    truth: Truth,
+    servo: Servo,
+    dynamics: Dynamics,
+}
+
+impl<'a> Prediction<'a> {
+    /// Draws the layout's imperfections, if it has any.
+    ///
+    /// # Errors
+    /// The key at fault.
+    pub fn new(resolved: &'a ResolvedScenario) -> Result<Self, &'static str> {
+        let real = drawn_truth(resolved)
+            .map(|truth| {
+                let truth = truth.map_err(|_| "imperfections.registration.markers_mm")?;
+                Ok::<_, &'static str>(Real {
+                    dynamics: truth.dynamics(&resolved.cell),
+                    servo: servo_of(resolved),
+                    truth,
+                })
+            })
+            .transpose()?;
+        let criteria = &resolved.scenario.criteria;
+        let asked = criteria.max_tip_rms_mm.is_some() || criteria.max_tip_lateral_rms_mm.is_some();
+        Ok(Self {
+            resolved,
+            with_budget: asked && real.is_some(),
+            real,
+        })
+    }
+
+    pub fn resolved(&self) -> &'a ResolvedScenario {
+        self.resolved
+    }
+
+    pub fn of(&self, planner: &Planner<'_>, candidate: &Candidate) -> Predicted {
+        let goal = &self.resolved.goals[0];
+        let Some(real) = &self.real else {
+            let exit = self.resolved.cell.world_from_guide_exit(&candidate.joints);
+            return Predicted {
+                needle: Some(measure_guide(None, goal, &exit)),
+                budget: None,
+            };
+        };
+        // How the joints came to rest matters for friction alone.
+        let motion = if real.truth.actuation.friction.is_some() {
+            planner.approach(goal, candidate)
+        } else {
+            Some(JointTrajectory::starting_at(candidate.joints))
+        };
+        let Some(motion) = motion else {
+            return Predicted {
+                needle: None,
+                budget: None,
+            };
+        };
+        Predicted {
+            needle: self.needle(real, &motion),
+            budget: self.budget(real, &motion),
+        }
+    }
+
+    fn needle(&self, real: &Real, motion: &JointTrajectory) -> Option<NeedleMeasurement> {
+        let goal = &self.resolved.goals[0];
+        let friction = real.truth.actuation.friction.as_ref();
+        let resting = friction.map(|friction| resting_friction(friction, motion));
+        let settled = settle(
+            &real.servo,
+            &real.dynamics,
+            &real.truth,
+            resting.as_ref(),
+            &motion.end(),
+        )
+        .ok()?;
+        let exit = real
+            .truth
+            .world_from_guide_exit(&self.resolved.cell, &settled.position);
+        Some(measure_guide(None, &real.truth.goal(goal), &exit))
+    }
+
+    fn budget(&self, real: &Real, motion: &JointTrajectory) -> Option<ErrorBudget> {
+        if !self.with_budget {
+            return None;
+        }
+        let case = BudgetCase {
+            cell: &self.resolved.cell,
+            goal: &self.resolved.goals[0],
+            place: self
+                .resolved
+                .phantom
+                .as_ref()
+                .map(|each| &each.world_from_phantom),
+            servo: &real.servo,
+            imperfections: self.resolved.imperfections.as_ref()?,
+            trajectory: motion,
+            timestep_s: self.resolved.scenario.engines.timestep_ms * 1e-3,
+        };
+        analytic_total(&case).ok().map(analytic_budget)
+    }
+}

@@ -1,0 +1,57 @@
+//! How far the base layout of a study may move.
+
+use needlebench_cell::Finding;
+use needlebench_cell::study::{ResolvedStudy, RobustnessSection};
+use needlebench_kinematics::ik::Configuration;
+use serde::Serialize;
+
+use super::robustness::{Robustness, RobustnessSettings, robustness};
+use crate::parallel::in_parallel;
+use crate::progress::Progress;
+
+/// How far the phantom of the base scenario may move before a configuration breaks.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RobustnessResult {
+    /// Name of the goal.
+    pub goal: String,
+    /// Label of the configuration.
+    pub configuration: &'static str,
+    /// Its radii.
+    #[serde(flatten)]
+    pub found: Robustness,
+}
+
+/// Radii of all goals and configurations of the base scenario.
+///
+/// # Errors
+/// What is wrong with the base scenario for one goal alone.
+pub fn robustness_of(
+    study: &ResolvedStudy,
+    section: &RobustnessSection,
+    threads: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<RobustnessResult>, Vec<Finding>> {
+    let settings = RobustnessSettings {
+        max_shift_mm: section.max_shift_mm,
+        max_tilt_deg: section.max_tilt_deg,
+        ..RobustnessSettings::default()
+    };
+    let jobs: Vec<(&String, Configuration)> = study
+        .goals
+        .iter()
+        .flat_map(|goal| Configuration::ALL.map(|configuration| (goal, configuration)))
+        .collect();
+    progress.message("robustness");
+    progress.at(0, jobs.len() as u64);
+    in_parallel(threads, &jobs, |(goal, configuration)| {
+        let found = robustness(&study.family, goal, &[], *configuration, &settings);
+        progress.step();
+        Ok(RobustnessResult {
+            goal: (*goal).clone(),
+            configuration: configuration.label(),
+            found: found?,
+        })
+    })
+    .into_iter()
+    .collect()
+}

@@ -1,0 +1,269 @@
+//! Robustness: how far the phantom may be shifted or turned before a configuration breaks.
+//!
+//! The phantom is moved by the keys that place it in a scenario, so every breaking case can be run by
+//! anyone. Two questions are asked:
+//!
+//! - *aware*: the plan knows of the move. Goals by entry and target go with the phantom, the posture is
+//!   solved anew, and the configuration breaks where its static case is no longer ok. A goal by a flange
+//!   pose stays where it is.
+//! - *unaware*: the arm stands where it was when the patient moved; it breaks where a clearance is less
+//!   than the rules or the criteria want.
+//!
+//! # Method
+//!
+//! Along each of a fixed set of directions the first break is looked for in steps of a stated length,
+//! never beyond the nearest break known, and bisected. Around the direction of the nearest one a pattern
+//! search then looks for nearer ones. Along the directions looked at no break is missed that lasts
+//! longer than a step; between them a break on a narrow cone of directions may be.
+
+mod search;
+
+use std::collections::BTreeMap;
+
+use needlebench_cell::{Change, Finding, KeyPath, ResolvedScenario, ScenarioFamily};
+use needlebench_kinematics::Joints;
+use needlebench_kinematics::ik::Configuration;
+use needlebench_study::Outcome;
+use serde::Serialize;
+
+use super::static_case::StaticWorker;
+use search::{Search, nearest_break};
+
+/// How far and how finely breaks are looked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobustnessSettings {
+    /// Farthest shift, mm.
+    pub max_shift_mm: f64,
+    /// Largest turn, deg.
+    pub max_tilt_deg: f64,
+    /// Longest stretch of a shift that may go unseen, mm.
+    pub step_mm: f64,
+    /// Longest stretch of a turn that may go unseen, deg.
+    pub step_deg: f64,
+    /// Directions of shifts, besides the six along the axes.
+    pub shift_directions: u32,
+    /// Directions of turns.
+    pub tilt_directions: u32,
+}
+
+impl Default for RobustnessSettings {
+    fn default() -> Self {
+        Self {
+            max_shift_mm: 50.0,
+            max_tilt_deg: 20.0,
+            step_mm: 2.0,
+            step_deg: 1.0,
+            shift_directions: 32,
+            tilt_directions: 16,
+        }
+    }
+}
+
+/// Width within which a break is located, mm and deg.
+pub const RESOLUTION: f64 = 0.01;
+
+/// The nearest break that was found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Breaking {
+    /// How far, mm or deg: the first place found broken, at most [`RESOLUTION`] behind the last one
+    /// that was not.
+    pub radius: f64,
+    /// The move: world x, y and z in mm for a shift; head yaw and body roll in deg for a turn.
+    pub offset: Vec<f64>,
+    /// Keys of the breaking case and their values.
+    pub keys: BTreeMap<String, f64>,
+    /// The rule or criterion that is broken there, as in [`Row::detail`](needlebench_study::Row).
+    pub detail: String,
+}
+
+/// How far the phantom may be moved; `None` where nothing breaks within the limits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Robustness {
+    /// Smallest shift that breaks the configuration, posture solved anew; length of the vector.
+    pub shift: Option<Breaking>,
+    /// Smallest turn about the vertical and the body's long axis, `sqrt(yaw^2 + roll^2)`.
+    pub tilt: Option<Breaking>,
+    /// The same with the arm left where it stands; none where it stands in no posture at all.
+    pub unaware: Option<Unaware>,
+    /// Layouts that were looked at.
+    pub evaluations: u64,
+}
+
+/// How far the phantom may be moved beside an arm that stays.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unaware {
+    /// Final positions of the joints, deg.
+    pub joints_deg: [f64; 6],
+    /// Smallest shift.
+    pub shift: Option<Breaking>,
+    /// Smallest turn.
+    pub tilt: Option<Breaking>,
+}
+
+/// Keys of a shift and of a turn.
+const SHIFT_KEYS: [&str; 3] = [
+    "phantom.position_mm[0]",
+    "phantom.position_mm[1]",
+    "phantom.position_mm[2]",
+];
+const TILT_KEYS: [&str; 2] = ["phantom.head_yaw_deg", "phantom.body_roll_deg"];
+
+/// How far the phantom of a layout may be moved before a configuration breaks. Where it is broken as
+/// it stands, the radius is 0. Deterministic.
+///
+/// With `rest_on_table` a turned phantom rests on the table again, and a vertical shift is a change of
+/// its cushion's height.
+///
+/// # Errors
+/// What is wrong with the layout itself.
+pub fn robustness(
+    family: &ScenarioFamily,
+    goal: &str,
+    changes: &[(KeyPath, Change)],
+    configuration: Configuration,
+    settings: &RobustnessSettings,
+) -> Result<Robustness, Vec<Finding>> {
+    let here = family.vary(goal, changes)?;
+    if here.phantom.is_none() {
+        let finding = Finding::new(&here.source.file, "there is no phantom to move");
+        return Err(vec![finding.key("phantom")]);
+    }
+    let mut worker = StaticWorker::default();
+    let row = worker.row(&here, configuration);
+    let joints_rad = row.measured.joints_rad;
+    let mut mover = Mover {
+        family,
+        goal,
+        changes,
+        settings,
+        evaluations: 0,
+    };
+    let mut aware = |resolved: Result<ResolvedScenario, Vec<Finding>>| match resolved {
+        Ok(resolved) => {
+            let row = worker.row(&resolved, configuration);
+            (row.outcome != Outcome::Ok).then(|| row.detail.into_owned())
+        }
+        Err(findings) => Some(impossible(&findings)),
+    };
+    let (shift, tilt) = (mover.shift(&mut aware), mover.tilt(&mut aware));
+    let unaware = joints_rad.map(|joints_rad| {
+        let q = Joints::from_column_slice(&joints_rad);
+        let mut stays = |resolved: Result<ResolvedScenario, Vec<Finding>>| match resolved {
+            Ok(resolved) => worker.clearance_broken(&resolved, &q).map(str::to_owned),
+            Err(findings) => Some(impossible(&findings)),
+        };
+        Unaware {
+            joints_deg: joints_rad.map(f64::to_degrees),
+            shift: mover.shift(&mut stays),
+            tilt: mover.tilt(&mut stays),
+        }
+    });
+    Ok(Robustness {
+        shift,
+        tilt,
+        unaware,
+        evaluations: mover.evaluations,
+    })
+}
+
+/// The key at fault of a layout that cannot exist.
+fn impossible(findings: &[Finding]) -> String {
+    let key = findings.iter().find_map(|finding| finding.key.clone());
+    key.unwrap_or_else(|| "scenario".to_owned())
+}
+
+/// Moves the phantom of a layout.
+struct Mover<'a> {
+    family: &'a ScenarioFamily,
+    goal: &'a str,
+    changes: &'a [(KeyPath, Change)],
+    settings: &'a RobustnessSettings,
+    evaluations: u64,
+}
+
+/// What breaks in a layout, if anything does.
+type Judge<'j> = dyn FnMut(Result<ResolvedScenario, Vec<Finding>>) -> Option<String> + 'j;
+
+impl Mover<'_> {
+    fn shift(&mut self, judge: &mut Judge<'_>) -> Option<Breaking> {
+        let search = Search {
+            limit: self.settings.max_shift_mm,
+            step: self.settings.step_mm,
+            resolution: RESOLUTION,
+        };
+        let directions = search::on_sphere(self.settings.shift_directions);
+        self.nearest(&search, &directions, &SHIFT_KEYS, judge)
+    }
+
+    fn tilt(&mut self, judge: &mut Judge<'_>) -> Option<Breaking> {
+        let search = Search {
+            limit: self.settings.max_tilt_deg,
+            step: self.settings.step_deg,
+            resolution: RESOLUTION,
+        };
+        let directions = search::on_circle(self.settings.tilt_directions);
+        self.nearest(&search, &directions, &TILT_KEYS, judge)
+    }
+
+    fn nearest<const N: usize>(
+        &mut self,
+        search: &Search,
+        directions: &[[f64; N]],
+        keys: &[&str; N],
+        judge: &mut Judge<'_>,
+    ) -> Option<Breaking> {
+        let paths = keys.map(|key| KeyPath::parse(key).expect("a path"));
+        let mut evaluations = 0;
+        let (radius, offset, detail) = nearest_break(search, directions, |offset| {
+            evaluations += 1;
+            judge(self.moved(&paths, offset))
+        })?;
+        self.evaluations += evaluations;
+        let moved = self.moved(&paths, &offset);
+        Some(Breaking {
+            radius,
+            offset: offset.to_vec(),
+            keys: self.values(moved.as_ref().ok(), keys, &offset),
+            detail,
+        })
+    }
+
+    fn moved<const N: usize>(
+        &self,
+        paths: &[KeyPath; N],
+        offset: &[f64; N],
+    ) -> Result<ResolvedScenario, Vec<Finding>> {
+        let mut changes = self.changes.to_vec();
+        let adds = paths.iter().zip(offset);
+        changes.extend(adds.map(|(path, by)| (path.clone(), Change::Add(*by))));
+        self.family.vary(self.goal, &changes)
+    }
+
+    /// Where the phantom then lies; of a layout that cannot exist, what was added.
+    fn values<const N: usize>(
+        &self,
+        resolved: Option<&ResolvedScenario>,
+        keys: &[&str; N],
+        offset: &[f64; N],
+    ) -> BTreeMap<String, f64> {
+        let phantom = resolved.and_then(|resolved| resolved.scenario.phantom.as_ref());
+        let Some(phantom) = phantom else {
+            let base = self.family.vary(self.goal, self.changes).ok();
+            let from = base.map(|base| self.values(Some(&base), keys, offset));
+            let sums = keys.iter().zip(offset).map(|(key, by)| {
+                let start = from.as_ref().and_then(|from| from.get(*key));
+                ((*key).to_owned(), start.copied().unwrap_or(0.0) + by)
+            });
+            return sums.collect();
+        };
+        let [x, y, z] = phantom.position_mm;
+        let all = [
+            (SHIFT_KEYS[0], x),
+            (SHIFT_KEYS[1], y),
+            (SHIFT_KEYS[2], z),
+            (TILT_KEYS[0], phantom.head_yaw_deg),
+            (TILT_KEYS[1], phantom.body_roll_deg),
+        ];
+        all.map(|(key, value)| (key.to_owned(), value)).into()
+    }
+}

@@ -1,0 +1,233 @@
+//! Static cases: the final postures of a layout, without motions and without engines.
+
+use std::sync::Arc;
+
+use needlebench_cell::phantom::Phantom;
+use needlebench_cell::study::StudyMode;
+use needlebench_cell::{ClearanceClass, Finding, ResolvedScenario};
+use needlebench_clearance::{ClassMinima, ClearanceModel};
+use needlebench_evaluation::report::ConfigurationReport;
+use needlebench_evaluation::{RouteObstacles, first_missed_by_posture};
+use needlebench_kinematics::Joints;
+use needlebench_kinematics::ik::Configuration;
+use needlebench_planning::{Member, Planner, Rejection, Rule};
+use needlebench_study::Outcome;
+
+use super::prediction::Prediction;
+use super::rows::CaseRow;
+use crate::assemble::margins_report;
+
+/// Layouts of which the prepared geometry is kept: of phantoms of some sizes, of some tools.
+const KEPT: usize = 8;
+
+/// Evaluates static cases one after the other; what layouts have in common is prepared once.
+///
+/// What it answers depends on the layout alone, not on what was evaluated before. Memory is bounded.
+///
+/// # What a row holds
+///
+/// For a fixed roll the posture is the one of the inverse kinematics, for a free one that which a plan
+/// tries first ([`Planner::postures`]). Clearances, margins and rules are those of the nominal arm in
+/// that posture, as in `needlebench atlas`; joint positions lie in (-180, 180] deg. A configuration
+/// that breaks no rule is then judged by those of the scenario's criteria that a posture decides.
+///
+/// With `[imperfections]` the needle is where one draw of them, made from the scenario's seed as in a
+/// run, settles by the balance of torques. Friction needs to know how the joints came to rest: it is
+/// that of the straight approach along the needle alone, after which nothing remembers the motion
+/// before; where there is no such line there is no prediction.
+#[derive(Debug, Default)]
+pub struct StaticWorker {
+    /// The one used last is the last.
+    models: Vec<ClearanceModel>,
+    routes: Vec<(Arc<Phantom>, RouteObstacles)>,
+}
+
+/// The eight rows of one layout; `resolved` has one goal, or its first one counts.
+///
+/// See [`StaticWorker`], which is faster for many.
+pub fn static_rows(resolved: &ResolvedScenario) -> [CaseRow; 8] {
+    StaticWorker::default().rows(resolved)
+}
+
+/// Rows of a layout that cannot exist; the key at fault is the detail.
+pub fn invalid_rows(findings: &[Finding]) -> [CaseRow; 8] {
+    let key = findings.iter().find_map(|finding| finding.key.clone());
+    invalid(&key.unwrap_or_else(|| "scenario".to_owned()))
+}
+
+fn invalid(key: &str) -> [CaseRow; 8] {
+    Configuration::ALL.map(|configuration| {
+        CaseRow::new(
+            configuration,
+            StudyMode::Static,
+            Outcome::Invalid,
+            key.to_owned(),
+        )
+    })
+}
+
+impl StaticWorker {
+    /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
+    pub fn rows(&mut self, resolved: &ResolvedScenario) -> [CaseRow; 8] {
+        self.evaluate(resolved, |planner, prediction, route_m| {
+            let mut members = planner.postures(&resolved.goals[0]).into_iter();
+            Configuration::ALL.map(|configuration| {
+                let member = members.next().expect("there are eight");
+                row(planner, prediction, configuration, &member, route_m)
+            })
+        })
+        .unwrap_or_else(invalid)
+    }
+
+    /// One of [`StaticWorker::rows`].
+    pub fn row(&mut self, resolved: &ResolvedScenario, configuration: Configuration) -> CaseRow {
+        self.evaluate(resolved, |planner, prediction, route_m| {
+            let member = planner.posture(&resolved.goals[0], configuration);
+            row(planner, prediction, configuration, &member, route_m)
+        })
+        .unwrap_or_else(|key| CaseRow::new(configuration, StudyMode::Static, Outcome::Invalid, key))
+    }
+
+    /// The first rule or criterion about clearances that a posture breaks in a layout.
+    pub(super) fn clearance_broken(
+        &mut self,
+        resolved: &ResolvedScenario,
+        q: &Joints,
+    ) -> Option<&'static str> {
+        let broken = self.evaluate(resolved, |planner, _, _| {
+            let (clearance, rejections) = planner.clearance_rules(q);
+            let rule = rejections.first().map(rule_detail);
+            rule.or_else(|| {
+                let mut posture = ConfigurationReport::new("");
+                set_clearances(&mut posture, &clearance);
+                first_missed_by_posture(&posture, &resolved.scenario.criteria)
+            })
+        });
+        broken.unwrap_or_else(Some)
+    }
+
+    /// Does something with a layout that is ready for it; the key at fault where it cannot be.
+    fn evaluate<T>(
+        &mut self,
+        resolved: &ResolvedScenario,
+        mut with: impl FnMut(&Planner<'_>, &Prediction<'_>, Option<f64>) -> T,
+    ) -> Result<T, &'static str> {
+        if resolved.goals.is_empty() {
+            return Err("goals");
+        }
+        let route_m = self.route_m(resolved);
+        let prediction = Prediction::new(resolved)?;
+        let model = self.model(resolved);
+        let planner = Planner::new(resolved, model).map_err(|_| "robot.urdf")?;
+        Ok(with(&planner, &prediction, route_m))
+    }
+
+    /// The layout's clearances, prepared from the kept ones.
+    fn model(&mut self, resolved: &ResolvedScenario) -> &ClearanceModel {
+        let cell = &resolved.cell;
+        let nearest = (0..self.models.len()).max_by_key(|&index| {
+            // The later of equals.
+            (self.models[index].bodies_in_common(cell), index)
+        });
+        let model = match nearest {
+            Some(index) => {
+                let known = &self.models[index];
+                let model = known.for_cell(cell);
+                // One of each kind is kept: those with the same shapes replace each other.
+                if known.has_shapes_of(cell) || self.models.len() == KEPT {
+                    let oldest = if known.has_shapes_of(cell) { index } else { 0 };
+                    self.models.remove(oldest);
+                }
+                model
+            }
+            None => ClearanceModel::new(cell),
+        };
+        self.models.push(model);
+        &self.models[self.models.len() - 1]
+    }
+
+    /// Clearance of the planned needle on its way, m; none without a phantom.
+    fn route_m(&mut self, resolved: &ResolvedScenario) -> Option<f64> {
+        let placed = resolved.phantom.as_ref()?;
+        let phantom = &placed.phantom;
+        let known = |(each, _): &(Arc<Phantom>, RouteObstacles)| Arc::ptr_eq(each, phantom);
+        let index = self.routes.iter().position(known).unwrap_or_else(|| {
+            if self.routes.len() == KEPT {
+                self.routes.remove(0);
+            }
+            let obstacles = RouteObstacles::new(phantom);
+            self.routes.push((Arc::clone(phantom), obstacles));
+            self.routes.len() - 1
+        });
+        let obstacles = &self.routes[index].1;
+        let (_, separation) = obstacles.nearest(&resolved.cell, placed, &resolved.goals[0])?;
+        Some(separation.distance_m)
+    }
+}
+
+fn row(
+    planner: &Planner<'_>,
+    prediction: &Prediction<'_>,
+    configuration: Configuration,
+    member: &Member,
+    route_m: Option<f64>,
+) -> CaseRow {
+    let resolved = prediction.resolved();
+    let rejection = member.rejections.first();
+    let (outcome, detail) = match rejection {
+        Some(rejection) => (Outcome::Rejected, rule_detail(rejection)),
+        None => (Outcome::Ok, ""),
+    };
+    let mut row = CaseRow::new(configuration, StudyMode::Static, outcome, detail);
+    let posture = &mut row.measured;
+    posture.roll_rad = Some(member.roll_rad);
+    posture.surplus_m = Some(member.surplus);
+    if let Some(route_m) = route_m {
+        let class = ClearanceClass::NeedleRoute.name();
+        posture.posture_clearance_m.insert(class, route_m);
+    }
+    let Some(candidate) = &member.candidate else {
+        return row;
+    };
+    posture.joints_rad = Some(candidate.joints.into());
+    posture.margins = Some(margins_report(&candidate.margins));
+    set_clearances(posture, &candidate.clearance);
+    let goal = &resolved.goals[0];
+    posture.tip_sensitivity_m_per_rad = Some(planner.tip_sensitivity(goal, candidate));
+    let predicted = prediction.of(planner, candidate);
+    posture.predicted = predicted.needle;
+    posture.budget = predicted.budget;
+    if rejection.is_none()
+        && let Some(missed) = first_missed_by_posture(posture, &resolved.scenario.criteria)
+    {
+        row.outcome = Outcome::Failed;
+        row.detail = missed.into();
+    }
+    row
+}
+
+/// The least clearance of each class.
+fn set_clearances(posture: &mut ConfigurationReport, minima: &ClassMinima) {
+    let found = minima.iter();
+    posture
+        .posture_clearance_m
+        .extend(found.map(|pair| (pair.class.name(), pair.separation.distance_m)));
+}
+
+/// The rule, and for collisions the class of the pair.
+fn rule_detail(rejection: &Rejection) -> &'static str {
+    match (rejection.rule, rejection.class) {
+        (Rule::Collision, Some(class)) => match class {
+            ClearanceClass::RobotPhantom => "collision robot_phantom",
+            ClearanceClass::RobotTable => "collision robot_table",
+            ClearanceClass::RobotGantry => "collision robot_gantry",
+            ClearanceClass::RobotMount => "collision robot_mount",
+            ClearanceClass::SelfCollision => "collision self",
+            ClearanceClass::ToolPhantom => "collision tool_phantom",
+            ClearanceClass::GuideStandoff => "collision guide_standoff",
+            ClearanceClass::NeedleCorridor => "collision needle_corridor",
+            ClearanceClass::NeedleRoute => "collision needle_route",
+        },
+        (rule, _) => rule.name(),
+    }
+}

@@ -1,0 +1,102 @@
+//! What a goal must not be, and where points lie.
+
+use nalgebra::Point3;
+
+use super::{Goal, Surroundings};
+use crate::Finding;
+use crate::phantom::{Phantom, Tissue};
+use crate::scenario::GoalSection;
+use crate::toml_text::TomlText;
+
+/// Organ that contains a point of the phantom frame.
+pub(super) fn organ_at(phantom: &Phantom, point: &Point3<f64>) -> Option<String> {
+    phantom
+        .lesions
+        .iter()
+        .filter(|lesion| (point - lesion.center_m).norm() <= 0.5 * lesion.diameter_m)
+        .find_map(|lesion| lesion.organ.clone())
+        .or_else(|| {
+            phantom
+                .parts
+                .iter()
+                .filter(|part| part.tissue == Tissue::Organ)
+                .find(|part| part.solid.contains(point))
+                .and_then(|part| part.organ.clone())
+        })
+}
+
+pub(super) fn check_place(
+    text: &TomlText<'_>,
+    key: &dyn Fn(&str) -> String,
+    goal: &Goal,
+    section: &GoalSection,
+    surroundings: &Surroundings<'_>,
+) -> Result<(), Finding> {
+    let exit = Point3::from(goal.world_from_guide_exit.translation.vector);
+    let points = [
+        ("target", Some(goal.target_m)),
+        ("entry", goal.entry_m),
+        ("guide exit", Some(exit)),
+    ];
+    for (what, point) in points {
+        let Some(point) = point else { continue };
+        for fixture in surroundings.fixtures {
+            if fixture.solids.iter().any(|solid| solid.contains(&point)) {
+                let name = match what {
+                    _ if section.flange_pose.is_some() => "flange_pose",
+                    "target" => section.target_key(),
+                    "entry" => section.entry_key(),
+                    _ => "standoff_mm",
+                };
+                return Err(text
+                    .finding(
+                        &key(name),
+                        format!("the {what} lies inside the {}", fixture.name),
+                    )
+                    .hint("compare the goal with the phantom's posture and place"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a target inside a bone, unless it lies in the lesion that is there.
+pub(super) fn check_target(
+    text: &TomlText<'_>,
+    key: &dyn Fn(&str) -> String,
+    goal: &Goal,
+    section: &GoalSection,
+    surroundings: &Surroundings<'_>,
+) -> Result<(), Finding> {
+    let Some(placed) = surroundings.phantom else {
+        return Ok(());
+    };
+    let target = placed.world_from_phantom.inverse() * goal.target_m;
+    let aimed_at = placed.phantom.lesions.iter().find(|lesion| {
+        // Off its centre by a target offset, or not at all.
+        let beyond_m = (target - lesion.center_m).norm() - 0.5 * lesion.diameter_m;
+        goal.lesion.as_ref() == Some(&lesion.name)
+            && (section.target_offset_mm.is_none() || beyond_m <= 0.0)
+    });
+    if aimed_at.is_some() {
+        return Ok(());
+    }
+    let bone = placed
+        .phantom
+        .parts
+        .iter()
+        .filter(|part| part.tissue == Tissue::Bone)
+        .find(|part| part.solid.contains(&target));
+    let Some(bone) = bone else { return Ok(()) };
+    let name = if section.flange_pose.is_some() {
+        "flange_pose"
+    } else {
+        section.target_key()
+    };
+    Err(text
+        .finding(
+            &key(name),
+            format!("the target lies inside the bone `{}`", bone.name),
+        )
+        .hint("move the target, or make it a lesion if the bone is to be pierced"))
+}

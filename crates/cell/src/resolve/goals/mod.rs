@@ -1,0 +1,141 @@
+//! Goals: where the guide has to stand, in the world.
+
+mod by_flange;
+mod by_points;
+mod checks;
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
+use needlebench_kinematics::Pose;
+use needlebench_kinematics::ik::Configuration;
+
+use super::phantom::PlacedPhantom;
+use crate::scenario::{EVERY_CONFIGURATION, GoalSection};
+use crate::toml_text::TomlText;
+use crate::{CollisionBody, Finding, Robot, Tool};
+use by_flange::from_flange_pose;
+use by_points::from_entry_and_target;
+use checks::{check_place, check_target};
+
+/// Angle of the guide about the needle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Roll {
+    /// Turning the guide changes nothing for the needle; the plan chooses.
+    Free,
+    /// Fixed, rad from [`Goal::world_from_guide_exit`].
+    Fixed(f64),
+}
+
+/// What is expected of a configuration.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Expectation {
+    /// It works and meets all criteria.
+    Ok,
+    /// It works but misses a criterion.
+    Failed,
+    /// It is rejected by this rule.
+    Rejected(String),
+}
+
+/// One needle, in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Goal {
+    /// Name.
+    pub name: String,
+    /// Where the needle enters the skin; `None` without a phantom.
+    pub entry_m: Option<Point3<f64>>,
+    /// Where the needle's tip is to come.
+    pub target_m: Point3<f64>,
+    /// Direction of insertion.
+    pub axis: UnitVector3<f64>,
+    /// Pose of the guide's exit at roll 0; z is [`Goal::axis`].
+    pub world_from_guide_exit: Pose,
+    /// Roll about the needle.
+    pub roll: Roll,
+    /// From the guide's exit to the needle's tip, m.
+    pub insertion_length_m: f64,
+    /// Gap between guide exit and entry point along the needle, m; `None` without a phantom.
+    pub standoff_m: Option<f64>,
+    /// Length of the straight approach, m.
+    pub approach_m: f64,
+    /// Lesion that is aimed at.
+    pub lesion: Option<String>,
+    /// Organ that contains the target, which the needle has to enter.
+    pub target_organ: Option<String>,
+    /// Expected outcomes; `None` where nothing is expected.
+    pub expected: BTreeMap<Configuration, Expectation>,
+}
+
+impl Goal {
+    /// Pose of the guide's exit in the world at a roll, rad.
+    pub fn world_from_guide_exit_at(&self, roll_rad: f64) -> Pose {
+        self.world_from_guide_exit * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll_rad)
+    }
+}
+
+/// What resolving goals needs to know.
+pub(crate) struct Surroundings<'a> {
+    pub robot: &'a Robot,
+    pub tool: &'a Tool,
+    pub phantom: Option<&'a PlacedPhantom>,
+    pub fixtures: &'a [CollisionBody],
+}
+
+pub(crate) fn resolve_goal(
+    text: &TomlText<'_>,
+    index: usize,
+    section: &GoalSection,
+    surroundings: &Surroundings<'_>,
+    notes: &mut Vec<String>,
+) -> Result<Goal, Finding> {
+    let key = |name: &str| format!("goals[{index}].{name}");
+    let mut goal = if section.flange_pose.is_some() {
+        from_flange_pose(text, &key, section, surroundings)?
+    } else {
+        from_entry_and_target(text, &key, section, surroundings, notes)?
+    };
+    goal.expected = expectations(section);
+    check_place(text, &key, &goal, section, surroundings)?;
+    check_target(text, &key, &goal, section, surroundings)?;
+    let needle_m = surroundings.tool.needle.length_m;
+    let needed_m = surroundings.tool.guide_length_m() + goal.insertion_length_m;
+    if needle_m < needed_m {
+        return Err(text
+            .finding(
+                &key(if section.insertion_length_mm.is_some() {
+                    "insertion_length_mm"
+                } else {
+                    section.entry_key()
+                }),
+                format!(
+                    "the needle is {:.1} mm long, but guide and insertion need {:.1} mm",
+                    needle_m * 1e3,
+                    needed_m * 1e3
+                ),
+            )
+            .hint(
+                "a longer needle (`needle_length_mm` under [tool]), a smaller stand-off, or an \
+                 entry on the target's side of the body (x is to the patient's left)",
+            ));
+    }
+    Ok(goal)
+}
+
+/// Outcomes by configuration; the schema knows their words.
+fn expectations(section: &GoalSection) -> BTreeMap<Configuration, Expectation> {
+    let expectation = |outcome: &str| match outcome {
+        "ok" => Expectation::Ok,
+        "failed" => Expectation::Failed,
+        rule => Expectation::Rejected(rule.to_owned()),
+    };
+    let every = section.expected.get(EVERY_CONFIGURATION);
+    Configuration::ALL
+        .into_iter()
+        .filter_map(|configuration| {
+            let named = section.expected.get(configuration.label());
+            let outcome = named.or(every)?;
+            Some((configuration, expectation(outcome)))
+        })
+        .collect()
+}

@@ -1,0 +1,198 @@
+//! The models that scenarios name: read from files, built, and kept for the next scenario that names
+//! the same.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use needlebench_kinematics::Pose;
+
+use super::cache::Cache;
+use super::fixtures::fixture_finding;
+use super::imperfections::{RealArms, resolve_calibration};
+use super::overrides::Overrides;
+use super::phantom::{UnplacedPhantom, scenario_phantom};
+use super::robot::scenario_robot;
+use super::tool::{UnmountedTool, scenario_tool, tool_overrides};
+use crate::files::ModelSource;
+use crate::fixtures::{self, Fixture, FixtureError};
+use crate::robot::MissingInertia;
+use crate::robot::ToolOverrides;
+use crate::scenario::{
+    CalibrationBlock, GantrySection, MountSection, PartSection, PhantomSection, RobotSection,
+    Scenario, TableSection,
+};
+use crate::toml_text::TomlText;
+use crate::{Finding, Robot};
+
+/// What decides a phantom.
+#[derive(Debug)]
+struct PhantomKey {
+    model: String,
+    sizes_mm: [Option<f64>; 3],
+    parts: Vec<PartSection>,
+}
+
+impl PhantomKey {
+    fn is_of(&self, section: &PhantomSection) -> bool {
+        self.model == section.model
+            && self.sizes_mm == sizes_mm(section)
+            && self.parts == section.parts
+    }
+}
+
+fn sizes_mm(section: &PhantomSection) -> [Option<f64>; 3] {
+    [section.breadth_mm, section.depth_mm, section.length_mm]
+}
+
+/// The models of scenarios that lie in one folder and are resolved with the same overrides.
+#[derive(Debug, Default)]
+pub(crate) struct ModelLibrary {
+    robots: Cache<RobotKey, Robot>,
+    tools: Cache<(String, ToolOverrides), UnmountedTool>,
+    phantoms: Cache<PhantomKey, UnplacedPhantom>,
+    tables: Cache<TableSection, Fixture>,
+    gantries: Cache<GantrySection, Fixture>,
+    mounts: Cache<(MountSection, Pose), Fixture>,
+    real_arms: Cache<(CalibrationBlock, Option<ModelSource>), RealArms>,
+}
+
+/// What decides a robot but its place.
+#[derive(Debug, Clone, PartialEq)]
+struct RobotKey {
+    urdf: Option<String>,
+    arm: Option<String>,
+    missing_inertia: MissingInertia,
+    calibration: Option<String>,
+}
+
+impl ModelLibrary {
+    /// The scenario's robot, with its `base_link` at the world's origin.
+    pub fn robot(
+        &self,
+        toml: &TomlText<'_>,
+        section: &RobotSection,
+        base: &Path,
+        overrides: &Overrides,
+    ) -> Result<Arc<Robot>, Finding> {
+        let key = RobotKey {
+            urdf: section.urdf.clone(),
+            arm: section.arm.clone(),
+            missing_inertia: section.missing_inertia.clone(),
+            calibration: section.calibration.clone(),
+        };
+        self.robots.get(
+            |known| *known == key,
+            || {
+                let robot = scenario_robot(toml, section, base, overrides)?;
+                Ok((key.clone(), robot))
+            },
+        )
+    }
+
+    /// The scenario's tool.
+    pub fn tool(
+        &self,
+        toml: &TomlText<'_>,
+        scenario: &Scenario,
+        base: &Path,
+        overrides: &Overrides,
+    ) -> Result<Arc<UnmountedTool>, Finding> {
+        let wanted = tool_overrides(toml, scenario)?;
+        let urdf = &scenario.tool.urdf;
+        self.tools.get(
+            |(known, with)| known == urdf && *with == wanted,
+            || {
+                let part = scenario_tool(toml, scenario, &wanted, base, overrides)?;
+                Ok(((urdf.clone(), wanted), part))
+            },
+        )
+    }
+
+    /// The scenario's phantom.
+    pub fn phantom(
+        &self,
+        toml: &TomlText<'_>,
+        section: &PhantomSection,
+        base: &Path,
+    ) -> Result<Arc<UnplacedPhantom>, Vec<Finding>> {
+        self.phantoms.get(
+            |key| key.is_of(section),
+            || {
+                let key = PhantomKey {
+                    model: section.model.clone(),
+                    sizes_mm: sizes_mm(section),
+                    parts: section.parts.clone(),
+                };
+                Ok((key, scenario_phantom(toml, section, base)?))
+            },
+        )
+    }
+
+    /// The scenario's table, gantry and mount, as far as it has them.
+    pub fn fixtures(
+        &self,
+        toml: &TomlText<'_>,
+        scenario: &Scenario,
+        world_from_base_link: &Pose,
+    ) -> Result<[Option<Arc<Fixture>>; 3], Finding> {
+        fn made<K>(
+            cache: &Cache<K, Fixture>,
+            key: Option<K>,
+            make: impl Fn(&K) -> Result<Fixture, FixtureError>,
+            finding: impl Fn(&FixtureError) -> Finding,
+        ) -> Result<Option<Arc<Fixture>>, Finding>
+        where
+            K: Clone + PartialEq,
+        {
+            key.map(|key| {
+                cache.get(
+                    |known| *known == key,
+                    || make(&key).map(|made| (key.clone(), made)),
+                )
+            })
+            .transpose()
+            .map_err(|error| finding(&error))
+        }
+        let finding = |section| move |error: &FixtureError| fixture_finding(toml, section, error);
+        let mount = scenario.mount.clone();
+        Ok([
+            made(
+                &self.tables,
+                scenario.table.clone(),
+                |table| Ok(fixtures::table(table)),
+                finding("table"),
+            )?,
+            made(
+                &self.gantries,
+                scenario.gantry.clone(),
+                fixtures::gantry,
+                finding("gantry"),
+            )?,
+            made(
+                &self.mounts,
+                mount.map(|mount| (mount, *world_from_base_link)),
+                |(mount, base)| fixtures::mount(mount, base),
+                finding("mount"),
+            )?,
+        ])
+    }
+
+    /// The real arms of a calibration block, for a robot.
+    pub fn real_arms(
+        &self,
+        toml: &TomlText<'_>,
+        block: &CalibrationBlock,
+        robot: &Robot,
+        base: &Path,
+    ) -> Result<Arc<RealArms>, Finding> {
+        let arm = robot.arm.as_ref().map(|used| used.arm.source.clone());
+        let key = (block.clone(), arm);
+        self.real_arms.get(
+            |known| *known == key,
+            || {
+                let arms = resolve_calibration(toml, block, robot, base)?;
+                Ok((key.clone(), arms))
+            },
+        )
+    }
+}

@@ -1,0 +1,395 @@
+//! From a scenario file to a resolved cell with goals.
+
+mod arm_values;
+mod cache;
+mod fixtures;
+mod goals;
+pub mod imperfections;
+pub mod iso9283;
+mod layout;
+mod library;
+mod names;
+mod overrides;
+pub mod people;
+mod phantom;
+mod robot;
+mod servo;
+mod tool;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use needlebench_kinematics::trajectory::{MotionLimits, ProfileLimits};
+use needlebench_kinematics::{JOINT_LABELS, Joints, Pose, UrGeometry};
+
+use crate::engine_name::check_engine_names;
+use crate::files::ModelSource;
+use crate::files::source_of;
+use crate::fixtures::Fixture;
+use crate::model::{BodyKind, Cell, CollisionBody, Frame, NeedleCorridor};
+use crate::scenario::{self, Scenario};
+use crate::toml_text::TomlText;
+use crate::{Finding, Robot};
+use arm_values::check_brakes;
+pub use goals::{Expectation, Goal, Roll};
+use goals::{Surroundings, resolve_goal};
+use imperfections::{Imperfections, resolve_imperfections};
+use iso9283::{Iso9283Protocol, resolve_iso9283};
+use layout::Layout;
+pub(crate) use library::ModelLibrary;
+pub use overrides::Overrides;
+use people::{People, Room, resolve_people};
+pub use phantom::PlacedPhantom;
+use phantom::place_phantom;
+pub use robot::load_robot;
+pub use servo::ServoSettings;
+use servo::servo_settings;
+
+/// Standard gravity, m/s^2.
+const GRAVITY_M_S2: f64 = 9.80665;
+
+/// A scenario with everything that it names read, checked and placed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResolvedScenario {
+    /// The file as it was read.
+    pub scenario: Scenario,
+    /// The file.
+    pub source: ModelSource,
+    /// Robot, tool and all that can be hit.
+    pub cell: Cell,
+    /// The phantom, if there is one.
+    pub phantom: Option<PlacedPhantom>,
+    /// Table, gantry and mount, for pictures.
+    pub fixtures: Vec<Fixture>,
+    /// Where needles are to go.
+    pub goals: Vec<Goal>,
+    /// The test by ISO 9283, in place of goals.
+    pub iso9283: Option<Iso9283Protocol>,
+    /// Where every motion starts.
+    pub start: Joints,
+    /// The joint servo.
+    pub servo: ServoSettings,
+    /// Limits of the motion: the scenario's and the URDF's, whichever are lower.
+    pub motion: MotionLimits,
+    /// Parameter file of the phantom.
+    pub phantom_source: Option<ModelSource>,
+    /// Files of the parts that the user gave the phantom.
+    pub phantom_parts: Vec<ModelSource>,
+    /// What was assumed or adjusted; belongs in every report.
+    pub notes: Vec<String>,
+    /// The people in the room, by goal.
+    pub people: People,
+    /// How the real arm and phantom differ; none if they do not.
+    pub imperfections: Option<Imperfections>,
+}
+
+/// Reads, resolves and validates a scenario file.
+///
+/// # Errors
+/// Every [`Finding`] of the first stage that has any: text, values, models, goals.
+pub fn load_scenario(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
+    let file = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        let finding = Finding::new(&file, format!("cannot read the scenario: {error}"));
+        vec![
+            finding.hint(if error.kind() == std::io::ErrorKind::InvalidData {
+                "save the file as UTF-8 text"
+            } else {
+                "scenarios are TOML files, such as scenarios/table3.toml"
+            }),
+        ]
+    })?;
+    resolve_scenario(
+        &file,
+        &text,
+        path.parent().unwrap_or(Path::new("")),
+        overrides,
+    )
+}
+
+/// Resolves a scenario's text; `base` is the folder that its paths are relative to.
+///
+/// # Errors
+/// As [`load_scenario`].
+pub fn resolve_scenario(
+    file: &str,
+    text: &str,
+    base: &Path,
+    overrides: &Overrides,
+) -> Result<ResolvedScenario, Vec<Finding>> {
+    let toml = TomlText::parse(file, text).map_err(|finding| vec![finding])?;
+    let scenario: Scenario = toml.read(&scenario::FILE)?;
+    let source = source_of(file.to_owned(), text.as_bytes());
+    resolve(
+        &toml,
+        scenario,
+        source,
+        base,
+        overrides,
+        &ModelLibrary::default(),
+    )
+}
+
+/// Resolves a scenario whose values are in their ranges; `toml` says where they stand, and `library`
+/// keeps what is read.
+pub(crate) fn resolve(
+    toml: &TomlText<'_>,
+    scenario: Scenario,
+    source: ModelSource,
+    base: &Path,
+    overrides: &Overrides,
+    library: &ModelLibrary,
+) -> Result<ResolvedScenario, Vec<Finding>> {
+    let one = |finding: Finding| vec![finding];
+    let mut findings = scenario::check_together(toml, &scenario);
+    let engines = scenario.engines.run.as_deref();
+    findings.extend(check_engine_names(
+        toml,
+        "engines.run",
+        engines,
+        &overrides.engines,
+    ));
+    if !findings.is_empty() {
+        return Err(findings);
+    }
+    let mut notes = Vec::new();
+    let robot = library
+        .robot(toml, &scenario.robot, base, overrides)
+        .map_err(one)?;
+    notes.extend(robot.notes.iter().cloned());
+    let Layout {
+        world_from_base_link,
+        start,
+    } = Layout::of(&scenario, &robot, &mut notes);
+    let robot = Robot {
+        world_from_base_link,
+        ..Robot::clone(&robot)
+    };
+    let tool = library
+        .tool(toml, &scenario, base, overrides)
+        .map_err(one)?;
+    notes.extend(tool.notes.iter().cloned());
+    let mut tool = tool.tool.clone();
+    let iso9283 = scenario
+        .iso9283
+        .as_ref()
+        .map(|section| resolve_iso9283(toml, section, &robot, &mut tool, &mut notes))
+        .transpose()
+        .map_err(one)?;
+    let [table, gantry, mount] = library
+        .fixtures(toml, &scenario, &world_from_base_link)
+        .map_err(one)?;
+    let (mut phantom, mut phantom_source, mut phantom_parts) = (None, None, Vec::new());
+    if let Some(section) = &scenario.phantom {
+        let unplaced = library.phantom(toml, section, base)?;
+        notes.extend(unplaced.notes.iter().cloned());
+        phantom = Some(PlacedPhantom {
+            world_from_phantom: place_phantom(toml, section, scenario.table.as_ref(), &unplaced)
+                .map_err(one)?,
+            phantom: Arc::clone(&unplaced.phantom),
+        });
+        phantom_source.clone_from(&unplaced.model);
+        phantom_parts.clone_from(&unplaced.parts);
+    }
+
+    let mut fixtures = Vec::new();
+    let mut surroundings = Vec::new();
+    if let Some(placed) = &phantom {
+        let mut skin = placed.phantom.skin().clone();
+        skin.parent_from_shape = placed.world_from_phantom * skin.parent_from_shape;
+        surroundings.push(static_body("phantom", BodyKind::Phantom, vec![skin]));
+    }
+    for (name, kind, fixture) in [
+        ("table", BodyKind::Table, table),
+        ("gantry", BodyKind::Gantry, gantry),
+        ("mount", BodyKind::Mount, mount),
+    ] {
+        if let Some(fixture) = fixture {
+            surroundings.push(static_body(name, kind, fixture.solids.clone()));
+            fixtures.push(Fixture::clone(&fixture));
+        }
+    }
+
+    check_base(toml, &robot, &surroundings).map_err(one)?;
+    let goals = {
+        let context = Surroundings {
+            robot: &robot,
+            tool: &tool,
+            phantom: phantom.as_ref(),
+            fixtures: &surroundings
+                .iter()
+                .filter(|body| body.kind != BodyKind::Phantom)
+                .cloned()
+                .collect::<Vec<_>>(),
+        };
+        let (mut goals, mut findings) = (Vec::new(), Vec::new());
+        for (index, section) in scenario.goals.iter().enumerate() {
+            match resolve_goal(toml, index, section, &context, &mut notes) {
+                Ok(goal) => goals.push(goal),
+                Err(finding) => findings.push(finding),
+            }
+        }
+        if !findings.is_empty() {
+            return Err(findings);
+        }
+        goals
+    };
+
+    let people = {
+        let base = robot
+            .base
+            .solids
+            .iter()
+            .map(|solid| needlebench_geometry::Solid {
+                parent_from_shape: world_from_base_link * solid.parent_from_shape,
+                ..solid.clone()
+            });
+        let base: Vec<_> = base.collect();
+        let standing = surroundings
+            .iter()
+            .flat_map(|body| body.solids.iter().map(|solid| (body.name.as_str(), solid)));
+        let solids: Vec<_> = standing
+            .chain(base.iter().map(|solid| ("robot's base", solid)))
+            .collect();
+        let room = Room {
+            phantom: phantom.as_ref(),
+            solids: &solids,
+            robot_base_m: Point3::from(world_from_base_link.translation.vector),
+        };
+        resolve_people(toml, &scenario.people, &goals, &room).map_err(one)?
+    };
+    if let Some(joint) = robot.limits.first_violation(&start) {
+        let limit = robot.limits.0[joint];
+        return Err(one(toml.finding(
+            &format!("start.joints_deg[{joint}]"),
+            format!(
+                "{} starts at {:.1} deg, outside {:.1} to {:.1} deg",
+                JOINT_LABELS[joint],
+                start[joint].to_degrees(),
+                limit.lower_rad.to_degrees(),
+                limit.upper_rad.to_degrees()
+            ),
+        )));
+    }
+    let motion = motion_limits(&scenario, &robot.limits.velocities_rad_s());
+    let corridor = NeedleCorridor {
+        radius_m: scenario.tool.corridor_radius_mm * 1e-3,
+        length_m: scenario
+            .tool
+            .corridor_length_mm
+            .map_or(tool.needle.length_m, |mm| mm * 1e-3),
+        hand_cone_half_angle_rad: scenario.tool.hand_cone_half_angle_deg.to_radians(),
+    };
+    let imperfections = match &scenario.imperfections {
+        None => None,
+        Some(section) => {
+            let block = section.calibration.as_ref();
+            let arms = block.map(|block| library.real_arms(toml, block, &robot, base));
+            let arms = arms.transpose().map_err(one)?;
+            notes.extend(arms.iter().flat_map(|arms| arms.notes.iter().cloned()));
+            let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
+            let timestep_ms = scenario.engines.timestep_ms;
+            let resolved = resolve_imperfections(
+                toml,
+                section,
+                &robot,
+                arms.as_deref(),
+                bore_clearance_m,
+                timestep_ms,
+            );
+            Some(resolved.map_err(one)?)
+        }
+    };
+    check_brakes(toml, &scenario, &robot, &mut notes).map_err(one)?;
+    let file = &source.file;
+    let servo = servo_settings(file, &scenario.controller, &robot, &tool, &mut notes);
+    let cell = Cell::assemble(
+        robot,
+        tool,
+        corridor,
+        surroundings,
+        Joints::from_column_slice(&servo.armature_kgm2),
+        Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
+    );
+    Ok(ResolvedScenario {
+        scenario,
+        source,
+        cell,
+        phantom,
+        fixtures,
+        goals,
+        iso9283,
+        start,
+        servo,
+        motion,
+        phantom_source,
+        phantom_parts,
+        notes,
+        people,
+        imperfections,
+    })
+}
+
+fn static_body(
+    name: &str,
+    kind: BodyKind,
+    solids: Vec<needlebench_geometry::Solid>,
+) -> CollisionBody {
+    CollisionBody {
+        name: name.to_owned(),
+        kind,
+        frame: Frame::World,
+        solids,
+    }
+}
+
+fn pose_of(position_mm: [f64; 3], rpy_deg: [f64; 3]) -> Pose {
+    let [roll, pitch, yaw] = rpy_deg.map(f64::to_radians);
+    Pose::from_parts(
+        Translation3::from(Vector3::from(position_mm) * 1e-3),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    )
+}
+
+/// Refuses a base that stands inside something: the fixed link is in no pair that is checked later.
+fn check_base(
+    toml: &TomlText<'_>,
+    robot: &Robot,
+    surroundings: &[CollisionBody],
+) -> Result<(), Finding> {
+    // The base with the shoulder on it.
+    let height_m = UrGeometry::of_chain(&robot.chain).map_or(0.0, |geometry| geometry.d1);
+    let inside = |body: &&CollisionBody| {
+        body.kind != BodyKind::Mount
+            && (0..=5).any(|k| {
+                let height_m = height_m * (f64::from(k) + 0.1) / 5.1;
+                let point = robot.world_from_base_link * Point3::new(0.0, 0.0, height_m);
+                body.solids.iter().any(|solid| solid.contains(&point))
+            })
+    };
+    match surroundings.iter().find(inside) {
+        None => Ok(()),
+        Some(body) => Err(toml
+            .finding(
+                "robot.base_position_mm",
+                format!("the robot's base stands inside the {}", body.name),
+            )
+            .hint("the position is in the world: z up, floor at 0, in millimetres")),
+    }
+}
+
+fn motion_limits(scenario: &Scenario, urdf_velocity: &Joints) -> MotionLimits {
+    let motion = &scenario.motion;
+    let wanted = Joints::repeat(motion.joint_velocity_deg_s.to_radians());
+    MotionLimits {
+        velocity: wanted.zip_map(urdf_velocity, f64::min),
+        acceleration: Joints::repeat(motion.joint_acceleration_deg_s2.to_radians()),
+        jerk: Joints::repeat(motion.joint_jerk_deg_s3.to_radians()),
+        line: ProfileLimits {
+            velocity: motion.line_velocity_mm_s * 1e-3,
+            acceleration: motion.line_acceleration_mm_s2 * 1e-3,
+            jerk: motion.line_jerk_mm_s3 * 1e-3,
+        },
+    }
+}

@@ -1,0 +1,282 @@
+//! Checks people and finds the places where they stand.
+
+use nalgebra::{Point3, Vector3};
+use needlebench_geometry::Solid;
+
+use super::{
+    BODY_RADIUS_M, DEFAULT_STATURES_M, PatientSides, People, PeopleSection, Person, PersonSection,
+    Side,
+};
+use crate::Finding;
+use crate::resolve::goals::Goal;
+use crate::resolve::phantom::PlacedPhantom;
+use crate::toml_text::TomlText;
+
+/// What people have to stand beside.
+pub(crate) struct Room<'a> {
+    pub phantom: Option<&'a PlacedPhantom>,
+    /// Body names with their solids, in the world.
+    pub solids: &'a [(&'a str, &'a Solid)],
+    pub robot_base_m: Point3<f64>,
+}
+
+/// Places everybody, for every goal.
+pub(crate) fn resolve_people(
+    toml: &TomlText<'_>,
+    section: &PeopleSection,
+    goals: &[Goal],
+    room: &Room<'_>,
+) -> Result<People, Finding> {
+    let sides = room
+        .phantom
+        .and_then(|placed| PatientSides::new(&placed.world_from_phantom.rotation));
+    let check_side = |key: &str, side: Option<Side>| {
+        let (Some(side), Some(sides)) = (side, &sides) else {
+            return match side {
+                None => Ok(()),
+                Some(side) => Err(toml
+                    .finding(
+                        key,
+                        format!(
+                            "`{}` is a side of the patient, and there is none",
+                            side.name()
+                        ),
+                    )
+                    .hint("add a [phantom], or give `position_mm`")),
+            };
+        };
+        if sides.direction(side).is_some() {
+            return Ok(());
+        }
+        let names: Vec<&str> = sides.iter().map(|(side, _)| side.name()).collect();
+        Err(toml
+            .finding(
+                key,
+                format!(
+                    "nobody can stand on the patient's {}: as the patient lies, it faces the table \
+                     or the ceiling",
+                    side.name()
+                ),
+            )
+            .hint(format!("one of {}", names.join(", "))))
+    };
+    check_side("people.prefer_side", section.prefer_side)?;
+    for (index, person) in section.persons.iter().enumerate() {
+        check_side(&format!("people.persons[{index}].side"), person.side)?;
+    }
+    let standard = [PersonSection::default()];
+    let persons = if section.persons.is_empty() {
+        &standard[..]
+    } else {
+        &section.persons
+    };
+    let obstacles = Obstacles::new(room);
+    let mut by_goal = Vec::new();
+    for goal in goals {
+        let mut placed: Vec<Person> = Vec::new();
+        for (index, person) in persons.iter().enumerate() {
+            let same = persons[..index]
+                .iter()
+                .filter(|each| each.role == person.role)
+                .count();
+            let name = match same {
+                0 => person.role.name().to_owned(),
+                earlier => format!("{}_{}", person.role.name(), earlier + 1),
+            };
+            let given = !section.persons.is_empty();
+            let (side, position_m) =
+                place(toml, index, given, person, goal, sides.as_ref(), &obstacles)?;
+            placed.push(Person {
+                name,
+                role: person.role,
+                side,
+                position_m,
+                statures_m: statures_m(person),
+                head_movement_m: person.head_movement_mm * 1e-3,
+                handedness: person.handedness,
+            });
+        }
+        by_goal.push(placed);
+    }
+    Ok(People {
+        by_goal,
+        prefer_side: section.prefer_side,
+        prefer_elbow: section.prefer_elbow,
+    })
+}
+
+fn statures_m(person: &PersonSection) -> Vec<f64> {
+    match person.stature {
+        Some(percentile) => vec![percentile.stature_m()],
+        None if person.statures_mm.is_empty() => DEFAULT_STATURES_M.to_vec(),
+        None => person.statures_mm.iter().map(|mm| mm * 1e-3).collect(),
+    }
+}
+
+/// Side and place on the floor.
+///
+/// A person whose side the scenario does not name stands across from the robot, or on the next side
+/// on which there is room.
+fn place(
+    toml: &TomlText<'_>,
+    index: usize,
+    given: bool,
+    person: &PersonSection,
+    goal: &Goal,
+    sides: Option<&PatientSides>,
+    obstacles: &Obstacles<'_>,
+) -> Result<(Option<Side>, Point3<f64>), Finding> {
+    let floor_m = person.step_height_mm * 1e-3;
+    let tallest_m = statures_m(person).into_iter().fold(0.0, f64::max);
+    let entry = goal
+        .entry_m
+        .unwrap_or_else(|| goal.world_from_guide_exit.translation.vector.into());
+    let key = |name: &str| {
+        if given {
+            format!("people.persons[{index}].{name}")
+        } else {
+            "people.persons".to_owned()
+        }
+    };
+    let refuse = |name: &str, position: &Point3<f64>, body: &str| {
+        toml.finding(
+            &key(name),
+            format!(
+                "the {} would stand inside the {body} at [{:.0}, {:.0}] mm for goal `{}`",
+                person.role.name(),
+                position.x * 1e3,
+                position.y * 1e3,
+                goal.name
+            ),
+        )
+        .hint("a body is taken as 300 mm deep; leave the distance out to stand as near as it gets")
+    };
+    if let Some([x_mm, y_mm]) = person.position_mm {
+        let position = Point3::new(x_mm * 1e-3, y_mm * 1e-3, floor_m);
+        if let Some(body) = obstacles.hit(&position, tallest_m) {
+            return Err(refuse("position_mm", &position, body));
+        }
+        let side = sides.and_then(|sides| sides.nearest(&(position - entry)));
+        return Ok((side, position));
+    }
+    let away = entry - obstacles.robot_base_m;
+    let directions = if let Some(sides) = sides {
+        match person.side {
+            Some(side) => vec![(
+                Some(side),
+                sides.direction(side).expect("sides were checked"),
+            )],
+            None => sides.by_preference(&away),
+        }
+    } else {
+        let level = Vector3::new(away.x, away.y, 0.0);
+        let across = level.try_normalize(1e-6).unwrap_or_else(Vector3::x);
+        let turned = Vector3::z().cross(&across);
+        [across, turned, -turned].map(|each| (None, each)).to_vec()
+    };
+    let at = |direction: &Vector3<f64>, distance_m: f64| {
+        let spot = entry + direction * distance_m;
+        Point3::new(spot.x, spot.y, floor_m)
+    };
+    if let Some(distance_mm) = person.distance_mm {
+        let (side, direction) = directions[0];
+        let position = at(&direction, distance_mm * 1e-3);
+        return match obstacles.hit(&position, tallest_m) {
+            Some(body) => Err(refuse("distance_mm", &position, body)),
+            None => Ok((side, position)),
+        };
+    }
+    for (side, direction) in directions {
+        for step in 0..FARTHEST_STEPS {
+            let position = at(&direction, BODY_RADIUS_M + f64::from(step) * STEP_M);
+            if obstacles.hit(&position, tallest_m).is_none() {
+                return Ok((side, position));
+            }
+        }
+    }
+    Err(toml
+        .finding(
+            &key("side"),
+            format!(
+                "nobody can stand within {:.1} m of the entry point of goal `{}` there",
+                BODY_RADIUS_M + f64::from(FARTHEST_STEPS) * STEP_M,
+                goal.name
+            ),
+        )
+        .hint("choose another side, or give `position_mm`"))
+}
+
+/// Steps away from the patient until there is room to stand, and how many are tried.
+const STEP_M: f64 = 0.01;
+const FARTHEST_STEPS: u32 = 250;
+
+/// A solid of the room with a box around it, along the world's axes, m.
+struct Obstacle<'a> {
+    body: &'a str,
+    solid: &'a Solid,
+    low: Point3<f64>,
+    high: Point3<f64>,
+}
+
+/// What people cannot stand in.
+struct Obstacles<'a> {
+    solids: Vec<Obstacle<'a>>,
+    robot_base_m: Point3<f64>,
+}
+
+impl<'a> Obstacles<'a> {
+    fn new(room: &Room<'a>) -> Self {
+        let solids = room.solids.iter().map(|&(body, solid)| {
+            let (low, high) = solid.bounding_box();
+            Obstacle {
+                body,
+                solid,
+                low,
+                high,
+            }
+        });
+        Self {
+            solids: solids.collect(),
+            robot_base_m: room.robot_base_m,
+        }
+    }
+
+    /// What a body that stands here would be in, if anything: axis and rim are tried every 50 mm.
+    fn hit(&self, position: &Point3<f64>, stature_m: f64) -> Option<&'a str> {
+        const SLICE_M: f64 = 0.05;
+        const RIM_POINTS: usize = 12;
+        let near: Vec<&Obstacle<'_>> = self
+            .solids
+            .iter()
+            .filter(|each| {
+                (0..2).all(|axis| {
+                    each.low[axis] <= position[axis] + BODY_RADIUS_M
+                        && each.high[axis] >= position[axis] - BODY_RADIUS_M
+                })
+            })
+            .collect();
+        let offsets: [Vector3<f64>; RIM_POINTS + 1] = std::array::from_fn(|i| {
+            if i == RIM_POINTS {
+                return Vector3::zeros();
+            }
+            let angle = std::f64::consts::TAU * i as f64 / RIM_POINTS as f64;
+            Vector3::new(angle.cos(), angle.sin(), 0.0) * BODY_RADIUS_M
+        });
+        let mut height_m = 0.5 * SLICE_M;
+        while height_m < stature_m {
+            let z_m = position.z + height_m;
+            let at_this_height = |each: &&&Obstacle<'_>| (each.low.z..=each.high.z).contains(&z_m);
+            if near.iter().any(|each| at_this_height(&each)) {
+                for offset in &offsets {
+                    let point = position + offset + Vector3::z() * height_m;
+                    let mut standing = near.iter().filter(at_this_height);
+                    if let Some(found) = standing.find(|each| each.solid.contains(&point)) {
+                        return Some(found.body);
+                    }
+                }
+            }
+            height_m += SLICE_M;
+        }
+        None
+    }
+}

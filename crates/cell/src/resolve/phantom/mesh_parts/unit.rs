@@ -1,0 +1,183 @@
+//! Which unit a file is in: its size says whether the stated one can be right.
+
+use nalgebra::Vector3;
+
+use crate::scenario::{LengthUnit, PartTissue};
+
+impl LengthUnit {
+    const ALL: [Self; 4] = [Self::Mm, Self::Cm, Self::M, Self::In];
+
+    /// Metres per unit.
+    pub(super) fn metres(self) -> f64 {
+        match self {
+            Self::Mm => 1e-3,
+            Self::Cm => 1e-2,
+            Self::M => 1.0,
+            Self::In => 25.4e-3,
+        }
+    }
+
+    /// As in a scenario.
+    fn key(self) -> &'static str {
+        match self {
+            Self::Mm => "mm",
+            Self::Cm => "cm",
+            Self::M => "m",
+            Self::In => "in",
+        }
+    }
+
+    fn words(self) -> &'static str {
+        match self {
+            Self::Mm => "millimetres",
+            Self::Cm => "centimetres",
+            Self::M => "metres",
+            Self::In => "inches",
+        }
+    }
+}
+
+/// Longest edge of the box around such a part: least, usual and most, mm. Wide, as parts may be cut
+/// off or joined; still, one in a wrong unit is mostly outside.
+fn sizes_mm(tissue: PartTissue) -> [f64; 3] {
+    match tissue {
+        // From half a chest of a child to a whole tall person.
+        PartTissue::Skin => [120.0, 400.0, 2200.0],
+        // From one piece of a rib to a spine with its ribs.
+        PartTissue::Bone => [8.0, 250.0, 1200.0],
+        PartTissue::Vessel => [5.0, 150.0, 1000.0],
+        PartTissue::Organ => [15.0, 150.0, 600.0],
+        PartTissue::Lung => [60.0, 250.0, 500.0],
+        PartTissue::Lesion => [1.0, 20.0, 250.0],
+    }
+}
+
+fn noun(tissue: PartTissue) -> &'static str {
+    match tissue {
+        PartTissue::Skin => "a skin",
+        PartTissue::Bone => "a bone",
+        PartTissue::Vessel => "a vessel",
+        PartTissue::Organ => "an organ",
+        PartTissue::Lung => "a lung",
+        PartTissue::Lesion => "a lesion",
+    }
+}
+
+/// Message and hint about a part, if its size cannot be right in the stated unit. `size` is in the
+/// file's numbers.
+pub(super) fn wrong_unit(
+    tissue: PartTissue,
+    stated: LengthUnit,
+    size: &Vector3<f64>,
+) -> Option<(String, String)> {
+    let [least_mm, usual_mm, most_mm] = sizes_mm(tissue);
+    let millimetres = |unit: LengthUnit| size.max() * unit.metres() * 1e3;
+    let fits = |unit: &LengthUnit| (least_mm..=most_mm).contains(&millimetres(*unit));
+    if fits(&stated) {
+        return None;
+    }
+    let box_of = |unit: LengthUnit| {
+        let mm = size * (unit.metres() * 1e3);
+        format!(
+            "{} x {} x {} mm",
+            Rounded(mm.x),
+            Rounded(mm.y),
+            Rounded(mm.z)
+        )
+    };
+    let message = format!(
+        "in {} the part is {}, but {} is {least_mm} to {most_mm} mm",
+        stated.words(),
+        box_of(stated),
+        noun(tissue)
+    );
+    let mut likely: Vec<LengthUnit> = LengthUnit::ALL.into_iter().filter(fits).collect();
+    let unlikeness = |unit: LengthUnit| (millimetres(unit) / usual_mm).ln().abs();
+    likely.sort_by(|a, b| unlikeness(*a).total_cmp(&unlikeness(*b)));
+    Some(match likely.split_first() {
+        None => (
+            message,
+            "no usual unit makes it plausible: is it the right file and tissue?".to_owned(),
+        ),
+        Some((&best, others)) => {
+            let others: Vec<String> = others
+                .iter()
+                .map(|&unit| format!("; {} would make it {}", unit.words(), box_of(unit)))
+                .collect();
+            (
+                format!(
+                    "{message}: it looks like {} ({})",
+                    best.words(),
+                    box_of(best)
+                ),
+                format!("set unit = \"{}\"{}", best.key(), others.concat()),
+            )
+        }
+    })
+}
+
+/// To three digits or so.
+struct Rounded(f64);
+
+impl std::fmt::Display for Rounded {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let digits = if self.0.abs() < 1.0 {
+            3
+        } else {
+            usize::from(self.0.abs() < 100.0)
+        };
+        write!(formatter, "{:.digits$}", self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn guess(tissue: PartTissue, stated: LengthUnit, size: [f64; 3]) -> Option<(String, String)> {
+        wrong_unit(tissue, stated, &Vector3::from(size))
+    }
+
+    #[test]
+    fn plausible_sizes_pass() {
+        for (tissue, size) in [
+            (PartTissue::Skin, [330.0, 230.0, 500.0]),
+            (PartTissue::Bone, [60.0, 9.0, 9.0]),
+            (PartTissue::Lesion, [8.0, 8.0, 9.0]),
+            (PartTissue::Lung, [150.0, 200.0, 260.0]),
+        ] {
+            assert_eq!(guess(tissue, LengthUnit::Mm, size), None);
+        }
+        assert_eq!(
+            guess(PartTissue::Skin, LengthUnit::Cm, [33.0, 23.0, 50.0]),
+            None
+        );
+    }
+
+    #[test]
+    fn centimetres_and_metres_are_guessed_and_not_assumed() {
+        let (message, hint) = guess(PartTissue::Skin, LengthUnit::Mm, [32.0, 21.0, 40.0]).unwrap();
+        assert!(message.contains("is 32.0 x 21.0 x 40.0 mm"), "{message}");
+        assert!(
+            message.contains("looks like centimetres (320 x 210 x 400 mm)"),
+            "{message}"
+        );
+        assert!(
+            hint.starts_with("set unit = \"cm\"; inches would"),
+            "{hint}"
+        );
+        let (_, hint) = guess(PartTissue::Skin, LengthUnit::Mm, [0.32, 0.21, 0.4]).unwrap();
+        assert_eq!(hint, "set unit = \"m\"");
+        let (_, hint) = guess(PartTissue::Skin, LengthUnit::M, [320.0, 210.0, 400.0]).unwrap();
+        assert_eq!(hint, "set unit = \"mm\"");
+        let (_, hint) = guess(PartTissue::Lesion, LengthUnit::Mm, [0.02, 0.018, 0.02]).unwrap();
+        assert_eq!(hint, "set unit = \"m\"");
+    }
+
+    #[test]
+    fn size_that_no_unit_explains_is_told_too() {
+        let (message, hint) = guess(PartTissue::Skin, LengthUnit::Mm, [1e-6; 3]).unwrap();
+        assert!(!message.contains("looks like"), "{message}");
+        assert!(hint.contains("right file"), "{hint}");
+    }
+}

@@ -1,0 +1,138 @@
+//! The phantom of a scenario: a model, parts from meshes, or both, and where it lies.
+
+mod mesh_parts;
+mod place;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use crate::files::ModelSource;
+use crate::files::{Location, source_of};
+use crate::phantom::{PARAMETERS, Phantom, PhantomError, PhantomParameters};
+use crate::scenario::{NO_MODEL, PhantomSection};
+use crate::toml_text::TomlText;
+use crate::{Finding, nearest_name};
+use mesh_parts::with_mesh_parts;
+pub use place::PlacedPhantom;
+pub(super) use place::place_phantom;
+
+/// A phantom before it is placed, and the files that it is made of.
+#[derive(Debug)]
+pub(crate) struct UnplacedPhantom {
+    pub phantom: Arc<Phantom>,
+    /// Vertices of the skin, phantom frame, m.
+    pub skin_m: Vec<Vector3<f64>>,
+    /// Parameter file, unless the phantom is of the user's parts alone.
+    pub model: Option<ModelSource>,
+    /// Files of the user's parts.
+    pub parts: Vec<ModelSource>,
+    pub notes: Vec<String>,
+}
+
+/// The scenario's phantom.
+pub(super) fn scenario_phantom(
+    toml: &TomlText<'_>,
+    section: &PhantomSection,
+    base: &Path,
+) -> Result<UnplacedPhantom, Vec<Finding>> {
+    let one = |finding: Finding| vec![finding];
+    let mut notes = Vec::new();
+    let (shipped, model) = if section.model == NO_MODEL {
+        check_no_model(toml, section).map_err(one)?;
+        (None, None)
+    } else {
+        let (phantom, source) = shipped_phantom(toml, section, base)?;
+        (Some(phantom), Some(source))
+    };
+    let (phantom, parts) = match shipped {
+        Some(phantom) if section.parts.is_empty() => (phantom, Vec::new()),
+        shipped => with_mesh_parts(toml, &section.parts, shipped, base, &mut notes).map_err(one)?,
+    };
+    let skin = phantom.skin();
+    // A polyhedron is its own surface, whatever the fineness.
+    let surface = skin.shape.surface(0.0);
+    let skin_m = surface.vertices_m.iter();
+    let skin_m = skin_m.map(|vertex| (skin.parent_from_shape * vertex).coords);
+    Ok(UnplacedPhantom {
+        skin_m: skin_m.collect(),
+        phantom: Arc::new(phantom),
+        model,
+        parts,
+        notes,
+    })
+}
+
+/// A phantom without a model is what its parts are.
+fn check_no_model(toml: &TomlText<'_>, section: &PhantomSection) -> Result<(), Finding> {
+    for (name, given) in [
+        ("breadth_mm", section.breadth_mm),
+        ("depth_mm", section.depth_mm),
+        ("length_mm", section.length_mm),
+    ] {
+        if given.is_some() {
+            return Err(toml
+                .finding(
+                    &format!("phantom.{name}"),
+                    format!("`{name}` contradicts `model = \"{NO_MODEL}\"`"),
+                )
+                .hint("the parts have the size of their files"));
+        }
+    }
+    Ok(())
+}
+
+/// The phantom that a parameter file describes.
+fn shipped_phantom(
+    toml: &TomlText<'_>,
+    section: &PhantomSection,
+    base: &Path,
+) -> Result<(Phantom, ModelSource), Vec<Finding>> {
+    let one = |finding: Finding| vec![finding];
+    let location = Location::of_model(&section.model, "chest_phantom", "toml", base);
+    let bytes = location.read().map_err(|error| {
+        let names = Location::builtin_names("chest_phantom", "toml");
+        toml.finding("phantom.model", format!("{}: {error}", location.display()))
+            .hint(
+                match nearest_name(&section.model, names.iter().map(String::as_str)) {
+                    Some(near) => format!("did you mean `{near}`?"),
+                    None => format!(
+                        "a path, `{NO_MODEL}` for [[phantom.parts]] alone, or one of {}",
+                        names.join(", ")
+                    ),
+                },
+            )
+    });
+    let bytes = bytes.map_err(one)?;
+    let file = location.display();
+    let text = String::from_utf8(bytes)
+        .map_err(|error| one(Finding::new(&file, format!("not UTF-8 text: {error}"))))?;
+    let parameter_text = TomlText::parse(&file, &text).map_err(one)?;
+    let mut parameters: PhantomParameters = parameter_text.read(&PARAMETERS)?;
+    let sizes = [
+        (&mut parameters.breadth_mm, section.breadth_mm),
+        (&mut parameters.depth_mm, section.depth_mm),
+        (&mut parameters.length_mm, section.length_mm),
+    ];
+    let mut resized = false;
+    for (size, wanted) in sizes {
+        if let Some(wanted) = wanted {
+            *size = wanted;
+            resized = true;
+        }
+    }
+    let phantom = Phantom::build(&parameters).map_err(|error| {
+        one(if resized {
+            let key = match &error {
+                PhantomError::Value { key, .. } => format!("phantom.{key}"),
+                _ => "phantom".to_owned(),
+            };
+            toml.finding(&key, error.to_string())
+                .hint("lengths are in millimetres; leave a size out to take the model's own")
+        } else {
+            Finding::new(&file, error.to_string())
+        })
+    })?;
+    Ok((phantom, source_of(file, text.as_bytes())))
+}

@@ -1,0 +1,162 @@
+//! Gains and rotor inertia: the scenario's, else the arm's, else a general rule's.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Vector3;
+use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints};
+use serde::Serialize;
+
+use crate::scenario::ControllerSection;
+use crate::{Robot, Tool};
+
+/// Frequency at which the rule lets the stretched-out arm swing about its heaviest joint, Hz.
+const NATURAL_FREQUENCY_HZ: f64 = 6.0;
+
+/// Damping ratio of that motion.
+const DAMPING_RATIO: f64 = 0.6;
+
+/// Velocity gain over rotor inertia, 1/s: explicit steps of 1 ms stay stable up to three times as much.
+const DAMPING_PER_INERTIA_PER_S: f64 = 600.0;
+
+/// What the joint servo is set to, and where each comes from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ServoSettings {
+    /// Position gain per joint, N m/rad.
+    pub stiffness_nm_rad: [f64; JOINT_COUNT],
+    /// Velocity gain per joint, N m s/rad.
+    pub damping_nms_rad: [f64; JOINT_COUNT],
+    /// Reflected rotor inertia per joint, kg m^2.
+    pub armature_kgm2: [f64; JOINT_COUNT],
+    /// Source of the position gains.
+    pub stiffness_source: String,
+    /// Source of the velocity gains.
+    pub damping_source: String,
+    /// Source of the rotor inertia.
+    pub armature_source: String,
+}
+
+/// The servo of a scenario in `file`; a note for what nobody gives.
+pub(crate) fn servo_settings(
+    file: &str,
+    section: &ControllerSection,
+    robot: &Robot,
+    tool: &Tool,
+    notes: &mut Vec<String>,
+) -> ServoSettings {
+    let data = robot.arm.as_ref().map(|used| &used.arm.data);
+    let servo = data.and_then(|data| data.servo.as_ref());
+    let rotors = data.and_then(|data| data.rotors.as_ref());
+    let general = General::of(robot, tool);
+    let mut ruled = Vec::new();
+    let mut pick = |given: Option<[f64; JOINT_COUNT]>,
+                    arm: Option<([f64; JOINT_COUNT], &String)>,
+                    rule: f64,
+                    (name, unit): (&str, &str)| match (given, arm) {
+        (Some(given), _) => (given, format!("{file}: controller")),
+        (None, Some((values, source))) => (values, source.clone()),
+        (None, None) => {
+            ruled.push(format!("{name} {rule:.3} {unit}"));
+            ([rule; JOINT_COUNT], RULE.to_owned())
+        }
+    };
+    let (stiffness_nm_rad, stiffness_source) = pick(
+        section.stiffness_nm_rad,
+        servo.map(|servo| (servo.stiffness_nm_rad, &servo.source)),
+        general.stiffness_nm_rad,
+        ("position gain", "N m/rad"),
+    );
+    let (damping_nms_rad, damping_source) = pick(
+        section.damping_nms_rad,
+        servo.map(|servo| (servo.damping_nms_rad, &servo.source)),
+        general.damping_nms_rad,
+        ("velocity gain", "N m s/rad"),
+    );
+    let (armature_kgm2, armature_source) = pick(
+        section.armature_kgm2,
+        rotors.map(|rotors| (rotors.inertia_kgm2, &rotors.source)),
+        general.armature_kgm2,
+        ("rotor inertia", "kg m^2"),
+    );
+    if !ruled.is_empty() {
+        notes.push(format!(
+            "the servo of {} is assumed, for nothing is known of it: {} at every joint ({RULE})",
+            robot.arm_name(),
+            ruled.join(", ")
+        ));
+    }
+    ServoSettings {
+        stiffness_nm_rad,
+        damping_nms_rad,
+        armature_kgm2,
+        stiffness_source,
+        damping_source,
+        armature_source,
+    }
+}
+
+/// The rule in words.
+const RULE: &str = "assumed: the stretched-out arm swings at 6 Hz, damped at 0.6, and rotors are heavy \
+                    enough for steps of 1 ms";
+
+/// What the rule gives for every joint of an arm.
+#[derive(Debug, Clone, Copy)]
+struct General {
+    stiffness_nm_rad: f64,
+    damping_nms_rad: f64,
+    armature_kgm2: f64,
+}
+
+impl General {
+    fn of(robot: &Robot, tool: &Tool) -> Self {
+        let mut bodies = robot.bodies;
+        let last = JOINT_COUNT - 1;
+        let tool = tool.body.transformed(&robot.chain.wrist_3_from_flange);
+        bodies[last] = bodies[last].combined_with(&tool);
+        let dynamics = Dynamics {
+            chain: robot.chain,
+            bodies,
+            armature_kgm2: Joints::zeros(),
+            gravity_m_s2: Vector3::zeros(),
+        };
+        let inertia_kgm2 = dynamics.mass_matrix(&Joints::zeros()).diagonal().max();
+        let frequency_rad_s = TAU * NATURAL_FREQUENCY_HZ;
+        let damping_nms_rad = 2.0 * DAMPING_RATIO * frequency_rad_s * inertia_kgm2;
+        Self {
+            stiffness_nm_rad: inertia_kgm2 * frequency_rad_s.powi(2),
+            damping_nms_rad,
+            armature_kgm2: damping_nms_rad / DAMPING_PER_INERTIA_PER_S,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Overrides, load_scenario};
+
+    /// The rule for arms of which nothing is known, from which the UR3's gains come too.
+    #[test]
+    fn the_general_rule_gives_about_the_gains_of_a_ur3() {
+        /// The rule's 1.4 kg m^2 about the shoulder against the arm's with its tool.
+        const LIKENESS: f64 = 0.25;
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("s.toml");
+        let scenario = "name = \"s\"\n[robot]\nbase_rpy_deg = [0, 0, 180]\n[[goals]]\nname = \"g\"\n\
+                        insertion_length_mm = 100\n[goals.flange_pose]\n\
+                        position_mm = [194.2, -359.3, 170.1]\nrotation_vector_rad = [-0.8567, 2.7197, -1.1407]\n";
+        std::fs::write(&file, scenario).unwrap();
+        let resolved = load_scenario(&file, &Overrides::default()).unwrap();
+        let cell = &resolved.cell;
+        let rule = General::of(&cell.robot, &cell.tool);
+        let servo = &resolved.servo;
+        assert_eq!(servo.stiffness_nm_rad, [2000.0; JOINT_COUNT]);
+        for (ours, arms) in [
+            (rule.stiffness_nm_rad, servo.stiffness_nm_rad[0]),
+            (rule.damping_nms_rad, servo.damping_nms_rad[0]),
+            (rule.armature_kgm2, servo.armature_kgm2[0]),
+        ] {
+            println!("{ours} {arms}");
+            assert!((ours / arms - 1.0).abs() < LIKENESS, "{ours} {arms}");
+        }
+    }
+}

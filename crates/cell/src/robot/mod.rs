@@ -1,0 +1,607 @@
+//! The arm, from any URDF with the UR joint names.
+
+mod calibration;
+mod enclosure;
+mod link_shape;
+mod missing_inertia;
+mod nominal;
+mod srdf;
+mod tool;
+mod urdf;
+mod yaml_text;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use needlebench_geometry::mesh::read_stl;
+use needlebench_geometry::{Shape, Solid, TriangleMesh, Visual};
+use needlebench_kinematics::{
+    Body, Chain, ChainJoint, JOINT_COUNT, JOINT_NAMES, JointLimit, JointLimits, Pose, UrGeometry,
+};
+
+use crate::arm::{Arm, Recognition, choose_arm, note_on_no_arm};
+use crate::files::{Location, ModelSource, source_of};
+use crate::model::{ArmInUse, LinkMember};
+use crate::{Finding, Link, PackagePaths, Robot, nearest_name};
+pub use calibration::{Calibration, OriginDeviation};
+pub use enclosure::{LinkEnclosure, enclosures};
+use link_shape::shape_of_link;
+pub use missing_inertia::MissingInertia;
+use nominal::{body_in_frame_of, nominal_robot, notes_on_limits};
+pub use srdf::{DisabledPair, Srdf};
+pub(crate) use tool::{ToolOverrides, read_tool};
+use urdf::{Element, Geometry, JointKind, Urdf, UrdfJoint, UrdfLink};
+
+/// Short names of the moving links of every UR arm, from the base on.
+pub const MOVING_LINK_LABELS: [&str; JOINT_COUNT] = [
+    "shoulder",
+    "upper_arm",
+    "forearm",
+    "wrist_1",
+    "wrist_2",
+    "wrist_3",
+];
+
+/// Grey of surfaces without a colour.
+const DEFAULT_COLOR: [f32; 4] = [0.7, 0.72, 0.75, 1.0];
+
+/// Reads the arm from a URDF; `named` is the arm whose data it has, if somebody said so.
+pub(crate) fn read_robot(
+    location: &Location,
+    packages: &PackagePaths,
+    missing_inertia: &MissingInertia,
+    world_from_base_link: Pose,
+    named: Option<&Arc<Arm>>,
+) -> Result<Robot, Finding> {
+    let urdf = read_urdf(location)?;
+    let mut notes = urdf.notes.clone();
+    let (joints, tip) = arm_joints(&urdf)?;
+
+    // Fixed joints between two revolute ones are folded into the next joint's origin.
+    let mut chain_joints = Vec::with_capacity(JOINT_COUNT);
+    let mut limits = Vec::with_capacity(JOINT_COUNT);
+    let mut parent = "base_link";
+    for joint in &joints {
+        let between = urdf
+            .joints_between(parent, &joint.child)
+            .expect("the joints were found along this path");
+        let parent_from_joint = between
+            .iter()
+            .fold(Pose::identity(), |pose, each| pose * each.parent_from_joint);
+        chain_joints.push(ChainJoint {
+            parent_from_joint,
+            axis: joint.axis,
+        });
+        limits.push(joint_limit(&urdf, joint)?);
+        parent = &joint.child;
+    }
+    let chain = Chain {
+        joints: chain_joints.try_into().expect("six joints"),
+        wrist_3_from_flange: fixed_pose(&urdf, parent, &tip),
+    };
+    let geometry = UrGeometry::of_chain(&chain).map_err(|error| {
+        Finding::new(&urdf.file, error.to_string())
+            .hint("needlebench works with six-joint UR arms and their factory calibrations")
+    })?;
+
+    let limits = JointLimits(limits.try_into().expect("six limits"));
+    let arm = arm_in_use(named, location, packages, &geometry, &limits)?;
+    match &arm {
+        Some(used) => {
+            notes.push(used.note());
+            if used.has_its_lengths() {
+                let whose = used.arm.possessive();
+                notes.extend(notes_on_limits(&limits, &whose, &used.limits));
+            }
+        }
+        None => notes.push(note_on_no_arm(&geometry)),
+    }
+    notes.extend(note_on_place(&urdf));
+
+    // Every URDF link belongs to the nearest moving link above it.
+    let mut owned: Vec<Vec<(&UrdfLink, Pose)>> = vec![Vec::new(); JOINT_COUNT + 1];
+    for link in &urdf.links {
+        let (owner, owner_from_link) = owner_of(&urdf, &joints, &link.name);
+        owned[owner].push((link, owner_from_link));
+    }
+    let members = urdf
+        .links
+        .iter()
+        .map(|link| LinkMember {
+            name: link.name.clone(),
+            owner: owner_of(&urdf, &joints, &link.name).0,
+            has_geometry: !link.collisions.is_empty(),
+        })
+        .collect();
+    let mut links = Vec::with_capacity(JOINT_COUNT + 1);
+    let mut bodies = Vec::with_capacity(JOINT_COUNT);
+    for (index, members) in owned.iter().enumerate() {
+        let label = match index.checked_sub(1) {
+            None => "base",
+            Some(moving) => MOVING_LINK_LABELS[moving],
+        };
+        links.push(read_link(
+            &urdf, location, packages, label, members, &mut notes,
+        )?);
+        let Some(joint) = index.checked_sub(1) else {
+            continue;
+        };
+        bodies.push(match body_of(members) {
+            Ok(body) => body,
+            Err(what) => {
+                let link = &joints[joint].child;
+                let (arm, nominal) = missing_inertia
+                    .stand_in(arm.as_ref())
+                    .ok_or_else(|| no_inertia(&urdf, link, what, missing_inertia, arm.as_ref()))?;
+                notes.push(format!(
+                    "link '{link}' has {what}: {} {label} is used",
+                    arm.possessive()
+                ));
+                body_in_frame_of(&chain, nominal, joint)
+            }
+        });
+    }
+    let base = links.remove(0);
+    Ok(Robot {
+        name: urdf.name.clone(),
+        world_from_base_link,
+        chain,
+        base,
+        links: links.try_into().expect("six links"),
+        members,
+        bodies: bodies.try_into().expect("six bodies"),
+        limits,
+        arm,
+        source: source_of(location.display(), urdf.text.as_bytes()),
+        calibration: None,
+        meshes: collision_meshes(&urdf, location, packages),
+        notes,
+    })
+}
+
+/// The arm whose data the robot has, by its own URDF too if this is another.
+fn arm_in_use(
+    named: Option<&Arc<Arm>>,
+    location: &Location,
+    packages: &PackagePaths,
+    geometry: &UrGeometry,
+    limits: &JointLimits,
+) -> Result<Option<ArmInUse>, Finding> {
+    let Some((arm, recognition)) = choose_arm(named, location, geometry)? else {
+        return Ok(None);
+    };
+    let nominal = match recognition {
+        Recognition::Own => None,
+        Recognition::Named | Recognition::Lengths => Some(Arc::new(nominal_robot(&arm, packages)?)),
+    };
+    Ok(Some(ArmInUse {
+        deviation_m: arm.deviation_m(geometry),
+        limits: nominal.as_ref().map_or(*limits, |robot| robot.limits),
+        nominal,
+        recognition,
+        arm,
+    }))
+}
+
+/// Reads and parses a URDF; says which shipped ones there are if it does not exist.
+pub(crate) fn read_urdf(location: &Location) -> Result<Urdf, Finding> {
+    let file = location.display();
+    let bytes = location.read().map_err(|error| {
+        Finding::new(&file, format!("cannot read the URDF: {error}"))
+            .hint("the path is relative to the working directory")
+    })?;
+    Urdf::parse(&file, &bytes)
+}
+
+/// The six joints in order, and the link that is the flange.
+fn arm_joints(urdf: &Urdf) -> Result<(Vec<&UrdfJoint>, String), Finding> {
+    let names: Vec<&str> = urdf
+        .joints
+        .iter()
+        .map(|joint| joint.name.as_str())
+        .collect();
+    let mut joints = Vec::with_capacity(JOINT_COUNT);
+    for expected in JOINT_NAMES {
+        let Some(joint) = urdf.joints.iter().find(|joint| joint.name == expected) else {
+            let finding = Finding::new(&urdf.file, format!("it has no joint '{expected}'"))
+                .key(format!("joint '{expected}'"));
+            let prefixed = names.iter().copied().find(|name| name.ends_with(expected));
+            let near = prefixed.or_else(|| nearest_name(expected, names.iter().copied()));
+            return Err(match near {
+                Some(near) => finding.hint(format!(
+                    "joints need ROS's UR names; did you mean to rename '{near}'?"
+                )),
+                None => finding.hint("joints need ROS's UR names, without a prefix"),
+            });
+        };
+        if !matches!(joint.kind, JointKind::Revolute | JointKind::Continuous) {
+            return Err(urdf
+                .finding(&joint.span, format!("joint '{expected}' is not revolute"))
+                .key(format!("joint '{expected}'"))
+                .hint("all six joints of a UR arm turn: type=\"revolute\""));
+        }
+        joints.push(joint);
+    }
+    for link in ["base_link", "tool0"] {
+        if urdf.link(link).is_none() {
+            return Err(Finding::new(&urdf.file, format!("it has no link '{link}'"))
+                .key(format!("link '{link}'"))
+                .hint(if link == "tool0" {
+                    "`tool0` is the flange frame: z out of the flange, joined to wrist 3 by a \
+                     fixed joint"
+                } else {
+                    "`base_link` is ROS's base frame of the arm"
+                }));
+        }
+    }
+    let path = urdf
+        .joints_between("base_link", "tool0")
+        .ok_or_else(|| Finding::new(&urdf.file, "`tool0` is not below `base_link`"))?;
+    let moving: Vec<&str> = path
+        .iter()
+        .filter(|joint| joint.kind != JointKind::Fixed)
+        .map(|joint| joint.name.as_str())
+        .collect();
+    if moving != JOINT_NAMES {
+        return Err(Finding::new(
+            &urdf.file,
+            format!(
+                "the moving joints from base_link to tool0 are {}",
+                moving.join(", ")
+            ),
+        )
+        .hint(format!("expected {}", JOINT_NAMES.join(", "))));
+    }
+    if let Some(other) = urdf
+        .joints
+        .iter()
+        .find(|joint| joint.kind != JointKind::Fixed && !moving.contains(&joint.name.as_str()))
+    {
+        return Err(urdf
+            .finding(
+                &other.span,
+                format!(
+                    "joint '{}' moves but is not one of the arm's six",
+                    other.name
+                ),
+            )
+            .hint("make it fixed: only the arm's joints are driven"));
+    }
+    Ok((joints, "tool0".to_owned()))
+}
+
+fn fixed_pose(urdf: &Urdf, ancestor: &str, link: &str) -> Pose {
+    urdf.joints_between(ancestor, link)
+        .into_iter()
+        .flatten()
+        .fold(Pose::identity(), |pose, joint| {
+            pose * joint.parent_from_joint
+        })
+}
+
+/// Index of the moving link (0 for the base) that a URDF link is fixed to, and its pose there.
+fn owner_of(urdf: &Urdf, joints: &[&UrdfJoint], link: &str) -> (usize, Pose) {
+    let mut owner_from_link = Pose::identity();
+    let mut at = link;
+    loop {
+        if let Some(index) = joints.iter().position(|joint| joint.child == at) {
+            return (index + 1, owner_from_link);
+        }
+        if at == "base_link" {
+            return (0, owner_from_link);
+        }
+        let Some(joint) = urdf.joint_above(at) else {
+            // Above base_link: the robot is placed by its base_link, so that is where it belongs.
+            let root_from_base_link = fixed_pose(urdf, at, "base_link");
+            return (0, root_from_base_link.inverse() * owner_from_link);
+        };
+        owner_from_link = joint.parent_from_joint * owner_from_link;
+        at = &joint.parent;
+    }
+}
+
+fn joint_limit(urdf: &Urdf, joint: &UrdfJoint) -> Result<JointLimit, Finding> {
+    let Some(limit) = joint.limit else {
+        return Err(urdf
+            .finding(
+                &joint.span,
+                format!("joint '{}' has no <limit>", joint.name),
+            )
+            .hint(
+                "it needs effort (N m), velocity (rad/s) and, if revolute, lower and upper (rad)",
+            ));
+    };
+    let (lower_rad, upper_rad) = match joint.kind {
+        JointKind::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
+        _ => (limit.lower, limit.upper),
+    };
+    for (name, value, unit) in [
+        ("velocity", limit.velocity, "rad/s"),
+        ("effort", limit.effort, "N m"),
+    ] {
+        if value <= 0.0 {
+            return Err(urdf.finding(
+                &joint.span,
+                format!(
+                    "the {name} limit of joint '{}' is {value} {unit}",
+                    joint.name
+                ),
+            ));
+        }
+    }
+    if lower_rad >= upper_rad {
+        return Err(urdf.finding(
+            &joint.span,
+            format!(
+                "the limits of joint '{}' leave no range: {lower_rad} to {upper_rad} rad",
+                joint.name
+            ),
+        ));
+    }
+    Ok(JointLimit {
+        lower_rad,
+        upper_rad,
+        velocity_rad_s: limit.velocity,
+        effort_nm: limit.effort,
+    })
+}
+
+/// Mass properties of a moving link and all that is fixed to it; says what it lacks.
+fn body_of(members: &[(&UrdfLink, Pose)]) -> Result<Body, &'static str> {
+    let body = members
+        .iter()
+        .fold(Body::massless(), |sum, (link, owner_from_link)| {
+            let body = link.inertial.unwrap_or(Body::massless());
+            sum.combined_with(&body.transformed(owner_from_link))
+        });
+    if body.mass_kg <= 0.0 {
+        Err("no mass")
+    } else if body.inertia_kgm2.symmetric_eigenvalues().min() <= 0.0 {
+        Err("no moment of inertia")
+    } else {
+        Ok(body)
+    }
+}
+
+fn no_inertia(
+    urdf: &Urdf,
+    link: &str,
+    what: &str,
+    policy: &MissingInertia,
+    arm: Option<&ArmInUse>,
+) -> Finding {
+    let message = format!("link '{link}' has {what}");
+    let finding = match urdf.link(link) {
+        Some(link) => urdf.finding(&link.span, message),
+        None => Finding::new(&urdf.file, message),
+    };
+    finding
+        .key(format!("link '{link}'"))
+        .hint(format!("give it an <inertial>{}", policy.way_out(arm)))
+}
+
+/// Says that what stands above `base_link` in the file does not place the robot.
+fn note_on_place(urdf: &Urdf) -> Option<String> {
+    let root = urdf
+        .links
+        .iter()
+        .find(|link| urdf.joint_above(&link.name).is_none())?;
+    let root_from_base_link = fixed_pose(urdf, &root.name, "base_link");
+    (root_from_base_link != Pose::identity()).then(|| {
+        format!(
+            "the scenario places base_link; where '{}' has it in the URDF does not count",
+            root.name
+        )
+    })
+}
+
+fn read_link(
+    urdf: &Urdf,
+    location: &Location,
+    packages: &PackagePaths,
+    label: &str,
+    members: &[(&UrdfLink, Pose)],
+    notes: &mut Vec<String>,
+) -> Result<Link, Finding> {
+    let mut solids = Vec::new();
+    let mut visuals = Vec::new();
+    for (link, owner_from_link) in members {
+        solids.extend(read_solids(
+            urdf,
+            location,
+            packages,
+            link,
+            owner_from_link,
+            notes,
+        )?);
+        visuals.extend(read_visuals(
+            urdf,
+            location,
+            packages,
+            link,
+            owner_from_link,
+            notes,
+        ));
+    }
+    rename_unique(&mut solids, label);
+    if solids.is_empty() {
+        notes.push(format!(
+            "{label} has no collision geometry: it is never seen to touch anything"
+        ));
+    }
+    if visuals.is_empty() {
+        visuals = solids
+            .iter()
+            .map(|solid| visual_of(solid, DEFAULT_COLOR))
+            .collect();
+    }
+    Ok(Link {
+        name: label.to_owned(),
+        solids,
+        visuals,
+    })
+}
+
+/// Collision geometry of one URDF link, in the frame of its owner.
+pub(crate) fn read_solids(
+    urdf: &Urdf,
+    location: &Location,
+    packages: &PackagePaths,
+    link: &UrdfLink,
+    owner_from_link: &Pose,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Solid>, Finding> {
+    let mut solids = Vec::new();
+    for element in &link.collisions {
+        let shape = if let Some(shape) = shape_of(&element.geometry) {
+            shape
+        } else {
+            let mesh = read_mesh(urdf, location, packages, element)?;
+            let (shape, said) = shape_of_link(&mesh, &link.name).map_err(|why| {
+                urdf.finding(
+                    &element.span,
+                    format!("collision mesh of '{}': {why}", link.name),
+                )
+            })?;
+            notes.extend(said);
+            shape
+        };
+        solids.push(Solid {
+            name: element.name.clone().unwrap_or_default(),
+            shape,
+            parent_from_shape: owner_from_link * element.link_from_geometry,
+        });
+    }
+    Ok(solids)
+}
+
+/// Surfaces of one URDF link, in the frame of its owner. What cannot be read is left out and noted;
+/// a link of which nothing can be read is drawn as the collision geometry that it has.
+pub(crate) fn read_visuals(
+    urdf: &Urdf,
+    location: &Location,
+    packages: &PackagePaths,
+    link: &UrdfLink,
+    owner_from_link: &Pose,
+    notes: &mut Vec<String>,
+) -> Vec<Visual> {
+    let visual = |element: &Element| -> Result<Visual, Finding> {
+        let mesh = match shape_of(&element.geometry) {
+            Some(shape) => shape.surface(PICTURE_CHORD_ERROR_M),
+            None => read_mesh(urdf, location, packages, element)?,
+        };
+        Ok(Visual {
+            mesh: Arc::new(mesh),
+            parent_from_visual: owner_from_link * element.link_from_geometry,
+            color_rgba: element.color_rgba.unwrap_or(DEFAULT_COLOR),
+        })
+    };
+    let (mut visuals, mut unread) = (Vec::new(), Vec::new());
+    for element in &link.visuals {
+        match visual(element) {
+            Ok(visual) => visuals.push(visual),
+            Err(finding) => unread.push(finding.message),
+        }
+    }
+    let instead = if visuals.is_empty() && !unread.is_empty() {
+        visuals.extend(link.collisions.iter().flat_map(visual));
+        ", which show its collision geometry"
+    } else {
+        ""
+    };
+    notes.extend(unread.into_iter().map(|why| {
+        format!(
+            "the visual mesh of '{}' is left out of pictures{instead}: {why}",
+            link.name
+        )
+    }));
+    visuals
+}
+
+/// Fineness of curved surfaces in pictures.
+const PICTURE_CHORD_ERROR_M: f64 = 2e-4;
+
+/// A solid as a coloured surface.
+pub(crate) fn visual_of(solid: &Solid, color_rgba: [f32; 4]) -> Visual {
+    Visual {
+        mesh: Arc::new(solid.shape.surface(PICTURE_CHORD_ERROR_M)),
+        parent_from_visual: solid.parent_from_shape,
+        color_rgba,
+    }
+}
+
+/// Gives solids names that are unique in the cell: `label.index` unless the file names them so.
+pub(crate) fn rename_unique(solids: &mut [Solid], label: &str) {
+    for (index, solid) in solids.iter_mut().enumerate() {
+        if !solid.name.starts_with(&format!("{label}.")) {
+            solid.name = format!("{label}.{index}");
+        }
+    }
+}
+
+fn shape_of(geometry: &Geometry) -> Option<Shape> {
+    Some(match geometry {
+        Geometry::Box { size_m: [x, y, z] } => Shape::Cuboid {
+            half_extents_m: Vector3::new(*x, *y, *z) * 0.5,
+        },
+        Geometry::Cylinder { radius_m, length_m } => Shape::Cylinder {
+            radius_m: *radius_m,
+            half_length_m: 0.5 * length_m,
+        },
+        Geometry::Sphere { radius_m } => Shape::Sphere {
+            radius_m: *radius_m,
+        },
+        Geometry::Mesh { .. } => return None,
+    })
+}
+
+/// Files of the collision meshes with their hashes; those that cannot be read were refused before.
+fn collision_meshes(urdf: &Urdf, location: &Location, packages: &PackagePaths) -> Vec<ModelSource> {
+    let mut sources: Vec<ModelSource> = Vec::new();
+    for element in urdf.links.iter().flat_map(|link| &link.collisions) {
+        let Geometry::Mesh { filename, .. } = &element.geometry else {
+            continue;
+        };
+        let Ok(mesh) = location.mesh(filename, packages) else {
+            continue;
+        };
+        let Ok(bytes) = mesh.read() else { continue };
+        let source = source_of(mesh.display(), &bytes);
+        if !sources.contains(&source) {
+            sources.push(source);
+        }
+    }
+    sources
+}
+
+fn read_mesh(
+    urdf: &Urdf,
+    location: &Location,
+    packages: &PackagePaths,
+    element: &Element,
+) -> Result<TriangleMesh, Finding> {
+    let Geometry::Mesh { filename, scale } = &element.geometry else {
+        unreachable!("only called for meshes")
+    };
+    let span: &Range<usize> = &element.span;
+    let mesh_location = location.mesh(filename, packages).map_err(|why| {
+        urdf.finding(span, format!("mesh `{filename}`: {why}"))
+            .key("filename")
+    })?;
+    if !filename.to_lowercase().ends_with(".stl") {
+        return Err(urdf
+            .finding(span, format!("mesh `{filename}` is not an STL file"))
+            .key("filename")
+            .hint("convert it to STL"));
+    }
+    let bytes = mesh_location.read().map_err(|error| {
+        urdf.finding(span, format!("mesh `{}`: {error}", mesh_location.display()))
+            .key("filename")
+            .hint("mesh files are looked for beside the URDF; package:// needs --package-path")
+    })?;
+    read_stl(&bytes, *scale).map_err(|why| {
+        urdf.finding(span, format!("mesh `{}`: {why}", mesh_location.display()))
+            .key("filename")
+    })
+}

@@ -1,0 +1,173 @@
+//! The scenario file: plain structs with a default, a description and a range for every key.
+//!
+//! A section is one file. Lengths are in mm and angles in degrees here and only here; keys say their
+//! unit. The range of a value stands at its field as a schemars attribute: [`scenario_schema`] shows
+//! it, and the reader checks it. What two keys say together is checked by the `check` beside their
+//! section.
+
+mod controller;
+mod criteria;
+mod engines;
+pub mod envelope;
+mod events;
+mod fixtures;
+mod goals;
+mod imperfections;
+mod iso9283;
+mod models;
+mod motion;
+mod people;
+mod phantom;
+mod planning;
+pub mod ranking;
+mod recording;
+mod robot;
+mod tool;
+
+use std::sync::LazyLock;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::Finding;
+pub use crate::engine_name::EngineName;
+use crate::schema::{FileSchema, NAME};
+use crate::toml_text::TomlText;
+
+pub use controller::ControllerSection;
+pub use criteria::{ClearanceCriteria, CriteriaSection};
+pub use engines::{EnginesSection, MujocoSection, RapierSection};
+pub use envelope::EnvelopeSection;
+pub use events::{EventsSection, PressClass, PressSection, StopSection};
+pub use fixtures::{GantrySection, MountSection, TableSection};
+pub(crate) use goals::EVERY_CONFIGURATION;
+pub use goals::{FlangePose, GoalSection, REJECTION_RULES};
+pub use imperfections::{
+    BreathingBlock, CalibrationBlock, ControlBlock, ElasticityBlock, EncoderBlock, FrictionBlock,
+    GuideBlock, ImperfectionsSection, PayloadBlock, RegistrationBlock, TorqueLimitsBlock,
+};
+pub use iso9283::{
+    Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES, STANDARD_EDGES_MM,
+};
+pub use motion::{MotionSection, StartSection};
+pub use people::{
+    ElbowPreference, Handedness, PeopleSection, PersonSection, Role, Side, StaturePercentile,
+};
+pub(crate) use phantom::{ChestSize, NO_MODEL};
+pub use phantom::{LengthUnit, PartSection, PartTissue, PhantomSection, Posture};
+pub use planning::{PlanningSection, RollAim};
+pub use ranking::RankingSection;
+pub use recording::RecordingSection;
+pub use robot::RobotSection;
+pub(crate) use tool::NEEDLE_OUTER_DIAMETER_MM;
+pub use tool::ToolSection;
+
+/// What a scenario file may hold.
+pub(crate) static FILE: LazyLock<FileSchema> = LazyLock::new(FileSchema::of::<Scenario>);
+
+/// One scenario: a cell, goals, and what is asked of every configuration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Name in reports and of the results folder: letters, digits, `-` and `_`.
+    #[schemars(regex(pattern = NAME), extend("x-hint" = "names become file names"))]
+    pub name: String,
+    /// What the scenario is for, in a sentence or two.
+    #[serde(default)]
+    pub description: String,
+    /// Seed of everything random: searches for motions, and draws of imperfections.
+    #[serde(default)]
+    pub seed: u64,
+    /// The arm and where it stands.
+    #[serde(default)]
+    pub robot: RobotSection,
+    /// Column under the robot; none if left out.
+    #[serde(default)]
+    pub mount: Option<MountSection>,
+    /// The needle guide.
+    #[serde(default)]
+    pub tool: ToolSection,
+    /// The chest phantom; none if left out.
+    #[serde(default)]
+    pub phantom: Option<PhantomSection>,
+    /// CT table; none if left out.
+    #[serde(default)]
+    pub table: Option<TableSection>,
+    /// CT gantry; none if left out.
+    #[serde(default)]
+    pub gantry: Option<GantrySection>,
+    /// Where needles are to go. Needed unless there is an `[iso9283]`.
+    #[serde(default)]
+    pub goals: Vec<GoalSection>,
+    /// The test of the robot by ISO 9283, instead of goals.
+    #[serde(default)]
+    pub iso9283: Option<Iso9283Section>,
+    /// Where every motion starts.
+    #[serde(default)]
+    pub start: StartSection,
+    /// Speed limits of the motion.
+    #[serde(default)]
+    pub motion: MotionSection,
+    /// What makes a configuration unfit before anything is simulated.
+    #[serde(default)]
+    pub planning: PlanningSection,
+    /// The joint servo.
+    #[serde(default)]
+    pub controller: ControllerSection,
+    /// The physics engines.
+    #[serde(default)]
+    pub engines: EnginesSection,
+    /// What every working configuration has to reach.
+    #[serde(default)]
+    pub criteria: CriteriaSection,
+    /// How the configurations that work are ranked.
+    #[serde(default)]
+    pub ranking: RankingSection,
+    /// What is written of each simulated motion.
+    #[serde(default)]
+    pub recording: RecordingSection,
+    /// The people in the room, and what they prefer.
+    #[serde(default)]
+    pub people: PeopleSection,
+    /// How the real arm and the real phantom differ from what the controller believes; not at all
+    /// if left out.
+    #[serde(default)]
+    pub imperfections: Option<ImperfectionsSection>,
+    /// Contacts, stops and the way back, simulated besides the planned motion; none if left out.
+    #[serde(default)]
+    pub events: Option<EventsSection>,
+}
+
+/// The JSON schema (draft-07) of scenario files, for editors.
+pub fn scenario_schema() -> serde_json::Value {
+    FILE.published()
+}
+
+/// A scenario's text as its sections, each value in its range. What its keys say together, and what
+/// they name, is not looked at: [`crate::resolve_scenario`] does.
+///
+/// # Errors
+/// Every [`Finding`] about the text, or about its keys and values.
+pub fn parse_scenario(file: &str, text: &str) -> Result<Scenario, Vec<Finding>> {
+    let toml = TomlText::parse(file, text).map_err(|finding| vec![finding])?;
+    toml.read(&FILE)
+}
+
+/// What several keys say together.
+pub(crate) fn check_together(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
+    let engines = &scenario.engines;
+    let mut findings = recording::check(toml, &scenario.recording, engines);
+    findings.extend(people::check(toml, &scenario.people));
+    findings.extend(goals::check(
+        toml,
+        &scenario.goals,
+        scenario.iso9283.is_none(),
+    ));
+    findings.extend(ranking::check(toml, &scenario.ranking));
+    findings.extend(events::check(toml, scenario));
+    if let Some(section) = &scenario.imperfections {
+        findings.extend(imperfections::check(toml, section));
+    }
+    findings.extend(iso9283::check(toml, scenario));
+    findings
+}

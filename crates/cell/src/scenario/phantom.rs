@@ -1,0 +1,157 @@
+//! The phantom: `[phantom]`, and `[[phantom.parts]]` from the user's STL files.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::{Deserialize, Serialize};
+
+use super::models::reference_schema;
+use crate::schema::NAME;
+
+/// Value of `model` for a phantom of the user's parts alone.
+pub(crate) const NO_MODEL: &str = "none";
+
+/// How the phantom lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Posture {
+    /// On the back.
+    Supine,
+    /// On the belly.
+    Prone,
+    /// On the left side.
+    LeftLateral,
+    /// On the right side.
+    RightLateral,
+}
+
+/// The phantom and where it lies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PhantomSection {
+    /// `male-p5`, `male-p50`, `male-p95`, `female-p5`, `female-p50`, `female-p95`, the path of a
+    /// parameter file relative to this file, or `none` for a phantom of `parts` alone.
+    #[schemars(schema_with = "models")]
+    pub model: String,
+    /// Breadth of the chest, mm; the model's own if left out.
+    #[schemars(range(min = ChestSize::BREADTH_MM[0], max = ChestSize::BREADTH_MM[1]))]
+    pub breadth_mm: Option<f64>,
+    /// Depth of the chest, mm; the model's own if left out.
+    #[schemars(range(min = ChestSize::DEPTH_MM[0], max = ChestSize::DEPTH_MM[1]))]
+    pub depth_mm: Option<f64>,
+    /// Length of the phantom, mm; the model's own if left out.
+    #[schemars(range(min = ChestSize::LENGTH_MM[0], max = ChestSize::LENGTH_MM[1]))]
+    pub length_mm: Option<f64>,
+    /// How it lies.
+    pub posture: Posture,
+    /// Direction from feet to head in the world's horizontal plane: 0 is world x, 90 world y, deg.
+    #[schemars(range(min = -720.0, max = 720.0))]
+    pub head_yaw_deg: f64,
+    /// Turn about the long axis away from the posture, deg.
+    #[schemars(range(min = -720.0, max = 720.0))]
+    pub body_roll_deg: f64,
+    /// Position of the phantom's origin (mid-chest) in the world, mm. With `rest_on_table` the
+    /// third number is the height of a cushion over the table.
+    #[schemars(inner(range(min = -5000.0, max = 5000.0)))]
+    pub position_mm: [f64; 3],
+    /// Lays the lowest point of the skin on the table.
+    pub rest_on_table: bool,
+    /// Parts from STL files, besides the model's or in their place.
+    pub parts: Vec<PartSection>,
+}
+
+impl Default for PhantomSection {
+    fn default() -> Self {
+        Self {
+            model: "male-p50".to_owned(),
+            breadth_mm: None,
+            depth_mm: None,
+            length_mm: None,
+            posture: Posture::Supine,
+            head_yaw_deg: 0.0,
+            body_roll_deg: 0.0,
+            position_mm: [0.0; 3],
+            rest_on_table: true,
+            parts: Vec::new(),
+        }
+    }
+}
+
+fn models(_: &mut SchemaGenerator) -> Schema {
+    reference_schema("chest_phantom", "toml", &[NO_MODEL])
+}
+
+/// Sizes that a chest can have, least and greatest: beyond the smallest and largest adults on record,
+/// with room for children's and obese phantoms; they are there to catch mistakes of the unit.
+pub(crate) struct ChestSize;
+
+impl ChestSize {
+    pub const BREADTH_MM: [f64; 2] = [150.0, 600.0];
+    pub const DEPTH_MM: [f64; 2] = [120.0, 600.0];
+    pub const LENGTH_MM: [f64; 2] = [200.0, 700.0];
+}
+
+/// Unit of a file's coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum LengthUnit {
+    /// Millimetres.
+    #[default]
+    Mm,
+    /// Centimetres.
+    Cm,
+    /// Metres.
+    M,
+    /// Inches.
+    In,
+}
+
+/// What a part from a file is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum PartTissue {
+    /// The outer surface, which the arm must not touch; there is one.
+    Skin,
+    /// Bone: the needle keeps away from it.
+    Bone,
+    /// Artery or vein: the needle keeps away from it.
+    Vessel,
+    /// Organ: the needle keeps away from it, unless its target is inside.
+    Organ,
+    /// Lung: as any organ.
+    Lung,
+    /// A target, which goals name.
+    Lesion,
+}
+
+/// A part of the phantom from an STL file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartSection {
+    /// Name in reports, and of a lesion in goals: letters, digits, `-` and `_`.
+    #[schemars(regex(pattern = NAME))]
+    pub name: String,
+    /// STL file, relative to this file: a closed surface, its triangles counter-clockwise seen
+    /// from outside.
+    pub file: String,
+    /// What it is made of.
+    pub tissue: PartTissue,
+    /// Unit of the file's coordinates: `mm`, `cm`, `m` or `in`. Default mm; a size that such a part
+    /// cannot have is refused.
+    #[serde(default)]
+    pub unit: LengthUnit,
+    /// Where the file's origin is in the phantom frame (left, posterior, superior), mm.
+    #[serde(default)]
+    #[schemars(inner(range(min = -10_000.0, max = 10_000.0)))]
+    pub position_mm: [f64; 3],
+    /// Roll, pitch and yaw of the file's axes in the phantom frame, deg. A file in the axes
+    /// right, anterior, superior needs [0, 0, 180].
+    #[serde(default)]
+    #[schemars(inner(range(min = -720.0, max = 720.0)))]
+    pub rpy_deg: [f64; 3],
+    /// Turns a surface that is inside out round.
+    #[serde(default)]
+    pub flip: bool,
+    /// Parts of the model that it stands for: their names, their structures (`rib_left_4`,
+    /// `spine`), or whole tissues (`skin`, `bone`, `vessel`, `organ`, `lesion`, `marker`).
+    #[serde(default)]
+    pub replaces: Vec<String>,
+}

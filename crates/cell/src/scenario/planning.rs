@@ -1,0 +1,121 @@
+//! What makes a configuration unfit before anything is simulated: `[planning]`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the guide's angle about the needle is chosen for, where it is free.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum RollAim {
+    /// Clearance of the final posture: a soft least over all classes, `-s ln sum exp(-d / s)` with
+    /// `s` = 20 mm, so that a class that no roll changes does not decide.
+    Clearance,
+    /// Margin to the joint limits.
+    JointMargin,
+    /// Distance from singularities: the least of `|sin q5|`, `|sin q3|` and the distance from the
+    /// shoulder's singularity over 100 mm.
+    Singularity,
+    /// Least motion of the needle's tip under errors of the joints.
+    TipAccuracy,
+    /// The weighted mean of the `[ranking]` utilities of all these: what configurations are ranked by,
+    /// as far as the final posture decides it. The default.
+    #[default]
+    Balanced,
+}
+
+impl RollAim {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Clearance,
+        Self::JointMargin,
+        Self::Singularity,
+        Self::TipAccuracy,
+        Self::Balanced,
+    ];
+
+    /// Name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clearance => "clearance",
+            Self::JointMargin => "joint_margin",
+            Self::Singularity => "singularity",
+            Self::TipAccuracy => "tip_accuracy",
+            Self::Balanced => "balanced",
+        }
+    }
+}
+
+/// What makes a configuration unfit before anything is simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PlanningSection {
+    /// Clearance of arm and tool from their surroundings below which a posture or motion is
+    /// rejected, mm.
+    #[schemars(range(min = -10.0, max = 500.0))]
+    pub min_clearance_mm: f64,
+    /// Clearance of arm and tool from themselves below which a posture or motion is rejected, mm.
+    /// Forearm and wrist 2 are about 10 mm apart in most postures.
+    #[schemars(range(min = -10.0, max = 500.0))]
+    pub min_self_clearance_mm: f64,
+    /// `|sin q5|` and `|sin q3|` below which the final posture is rejected as singular.
+    #[schemars(range(min = 0.0, max = 0.9))]
+    pub min_singularity_sine: f64,
+    /// Distance of wrist 2 from the cylinder about the shoulder axis below which the final posture
+    /// is rejected as singular, mm: `sqrt(rho^2 - d4^2)`.
+    #[schemars(range(min = 0.0, max = 300.0))]
+    pub min_shoulder_distance_mm: f64,
+    /// Rejects a final posture in which something stands in the volume behind the guide that
+    /// needle and hand need.
+    pub require_needle_corridor: bool,
+    /// Simulates configurations too that are rejected for collisions or a blocked corridor, to
+    /// see what would happen. They stay rejected.
+    pub simulate_rejected: bool,
+    /// Directions about the needle that are tried where roll is free; between them the edges of the
+    /// ranges that work and the best roll are searched for.
+    #[schemars(range(min = 1, max = 3600))]
+    pub roll_samples: u32,
+    /// What the direction about the needle is chosen for.
+    pub roll_aim: RollAim,
+    /// Largest step of any point of the arm between two collision checks of a motion, mm.
+    #[schemars(range(min = 0.1, max = 100.0))]
+    pub sample_spacing_mm: f64,
+    /// Postures that the search for a motion may look at per configuration, where the straight joint
+    /// motion is blocked; 0 for straight motions only. A count, not a time: results are the same on
+    /// every machine. A posture takes about 10 us.
+    pub motion_checks: u32,
+    /// Distance between the least clearance found along a motion and its proven lower bound that
+    /// is aimed at, mm.
+    #[schemars(range(min = 0.001, max = 100.0))]
+    pub certificate_tolerance_mm: f64,
+}
+
+impl Default for PlanningSection {
+    fn default() -> Self {
+        Self {
+            min_clearance_mm: 0.0,
+            min_self_clearance_mm: 0.0,
+            min_singularity_sine: 0.01,
+            min_shoulder_distance_mm: 5.0,
+            require_needle_corridor: true,
+            simulate_rejected: false,
+            roll_samples: 36,
+            roll_aim: RollAim::default(),
+            sample_spacing_mm: 5.0,
+            motion_checks: 60_000,
+            certificate_tolerance_mm: 0.1,
+        }
+    }
+}

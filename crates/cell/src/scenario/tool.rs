@@ -1,0 +1,79 @@
+//! The needle guide: `[tool]`.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+
+use super::models::reference_schema;
+
+/// Outer diameters of needles by gauge, mm: the nominal sizes of the needle gauge chart.
+pub(crate) const NEEDLE_OUTER_DIAMETER_MM: [(u32, f64); 11] = [
+    (14, 2.108),
+    (15, 1.829),
+    (16, 1.651),
+    (17, 1.473),
+    (18, 1.270),
+    (19, 1.067),
+    (20, 0.9081),
+    (21, 0.8192),
+    (22, 0.7176),
+    (23, 0.6414),
+    (25, 0.5144),
+];
+
+/// The needle guide.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ToolSection {
+    /// `offset`, `perpendicular`, `inline`, or the path of a URDF relative to this file.
+    #[schemars(schema_with = "tools")]
+    pub urdf: String,
+    /// Angle about the flange axis at which the tool is bolted on, deg. The flange's four screws
+    /// allow multiples of 90.
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub mount_rotation_deg: f64,
+    /// Diameter of the bore, mm; the tool's own if left out.
+    #[schemars(range(min = 0.2, max = 10.0))]
+    pub bore_mm: Option<f64>,
+    /// Gauge of the needle, 14 to 25; the tool's own if left out.
+    #[schemars(schema_with = "gauges")]
+    pub needle_gauge: Option<u32>,
+    /// Length of the needle from hub to tip, mm; the tool's own if left out.
+    #[schemars(range(min = 20.0, max = 500.0))]
+    pub needle_length_mm: Option<f64>,
+    /// Radius of the volume behind the guide that needle and hand need, mm. Default assumed: half of a
+    /// hand that holds the hub.
+    #[schemars(range(min = 0.5, max = 200.0))]
+    pub corridor_radius_mm: f64,
+    /// Length of that volume behind the guide's entry, mm; the needle's length if left out.
+    #[schemars(range(min = 1.0, max = 1000.0))]
+    pub corridor_length_mm: Option<f64>,
+    /// Half-angle of the cone that the hand needs on its way to the hub, deg, from the guide's entry
+    /// to the end of that volume; it counts as part of it. 0 leaves the cone out. Default assumed.
+    #[schemars(range(min = 0.0, max = 80.0))]
+    pub hand_cone_half_angle_deg: f64,
+}
+
+impl Default for ToolSection {
+    fn default() -> Self {
+        Self {
+            urdf: "offset".to_owned(),
+            mount_rotation_deg: 0.0,
+            bore_mm: None,
+            needle_gauge: None,
+            needle_length_mm: None,
+            corridor_radius_mm: 25.0,
+            corridor_length_mm: None,
+            hand_cone_half_angle_deg: 12.0,
+        }
+    }
+}
+
+fn tools(_: &mut SchemaGenerator) -> Schema {
+    reference_schema("needle_guide", "urdf", &[])
+}
+
+fn gauges(_: &mut SchemaGenerator) -> Schema {
+    let gauges = NEEDLE_OUTER_DIAMETER_MM.map(|(gauge, _)| gauge);
+    let (least, most) = (gauges[0], gauges[gauges.len() - 1]);
+    json_schema!({ "type": "integer", "minimum": least, "maximum": most, "enum": gauges })
+}

@@ -1,0 +1,101 @@
+//! A derived schema as TOML has it: without nulls and number formats, with the limits of whole
+//! numbers.
+
+use serde_json::{Map, Value, json};
+
+use super::{HINT, UNIT};
+
+/// Of everything in a schema.
+pub(super) fn tidy(schema: &mut Value) {
+    each_object(schema, &mut |object| {
+        remove_null(object);
+        if let Some(format) = object.remove("format") {
+            let limits = match format.as_str() {
+                Some("uint8") => (0, i64::from(u8::MAX)),
+                Some("uint32") => (0, i64::from(u32::MAX)),
+                // Whole numbers of TOML have 64 bits with their sign.
+                Some("uint64") => (0, i64::MAX),
+                _ => return,
+            };
+            let minimum = object.entry("minimum").or_insert(json!(limits.0));
+            if minimum.as_i64().is_none_or(|least| least < limits.0) {
+                *minimum = json!(limits.0);
+            }
+            object.entry("maximum").or_insert(json!(limits.1));
+        }
+    });
+}
+
+/// Takes away the words that only this program knows.
+pub(super) fn without_own_words(schema: &mut Value) {
+    each_object(schema, &mut |object| {
+        object.remove(UNIT);
+        object.remove(HINT);
+    });
+}
+
+/// What may be left out may be null for serde, but there is no null in TOML.
+fn remove_null(object: &mut Map<String, Value>) {
+    if object.get("default").is_some_and(Value::is_null) {
+        object.remove("default");
+    }
+    if let Some(default) = object.get_mut("default") {
+        leave_out_nulls(default);
+    }
+    if let Some(Value::Array(types)) = object.get_mut("type") {
+        types.retain(|each| each != "null");
+        if let [only] = types.as_slice() {
+            let only = only.clone();
+            object.insert("type".to_owned(), only);
+        }
+    }
+    if let Some(Value::Array(values)) = object.get_mut("enum") {
+        values.retain(|each| !each.is_null());
+    }
+    if let Some(Value::Array(choices)) = object.get_mut("anyOf") {
+        choices.retain(|each| each["type"] != "null");
+        if choices.len() == 1 {
+            let only = object.remove("anyOf");
+            object.insert("allOf".to_owned(), only.unwrap_or_default());
+        }
+    }
+}
+
+fn leave_out_nulls(value: &mut Value) {
+    match value {
+        Value::Object(object) => {
+            object.retain(|_, inner| !inner.is_null());
+            object.values_mut().for_each(leave_out_nulls);
+        }
+        Value::Array(values) => values.iter_mut().for_each(leave_out_nulls),
+        _ => {}
+    }
+}
+
+/// Changes a schema and all that are inside.
+fn each_object(value: &mut Value, change: &mut impl FnMut(&mut Map<String, Value>)) {
+    match value {
+        Value::Object(object) => {
+            change(object);
+            for (key, inner) in object {
+                match (key.as_str(), inner) {
+                    // Values, not schemas.
+                    ("default" | "enum" | "const", _) => {}
+                    // Names with their schemas.
+                    ("properties" | "definitions", Value::Object(named)) => {
+                        for inner in named.values_mut() {
+                            each_object(inner, change);
+                        }
+                    }
+                    (_, inner) => each_object(inner, change),
+                }
+            }
+        }
+        Value::Array(values) => {
+            for inner in values {
+                each_object(inner, change);
+            }
+        }
+        _ => {}
+    }
+}

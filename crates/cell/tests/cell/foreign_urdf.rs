@@ -1,0 +1,497 @@
+//! URDF files of other houses: other link frames, packages, meshes and gaps.
+//!
+//! `foreign_urdf/arm.urdf` describes an arm with the lengths of a UR3. Its forward kinematics and
+//! dynamics are held against Pinocchio in `tests/validation/dynamics`; here it is about what a
+//! user is told and what becomes of meshes.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+
+use nalgebra::{Matrix3, Vector3};
+use needlebench_cell::{Finding, MissingInertia, Overrides, PackagePaths, Robot, load_robot};
+use needlebench_geometry::{Shape, TriangleMesh};
+use needlebench_kinematics::{Body, Dynamics, Joints, Pose, UrGeometry, rotation_angle_between};
+
+const ARM: &str = include_str!("foreign_urdf/arm.urdf");
+
+/// A comment in the file in whose place tests put elements of the upper arm.
+const UPPER_ARM: &str = "<!-- more of the upper arm -->";
+
+/// Half edges of the box that the STL files hold, and its centre, m.
+const HALF_M: [f32; 3] = [0.03, 0.02, 0.01];
+const CENTRE_M: [f32; 3] = [0.1, 0.0, -0.05];
+
+/// Half of the last printed digit of the file's origins, some times over.
+const PRINTED_M: f64 = 1e-9;
+
+/// Sums of a few numbers of order one.
+const ROUNDING: f64 = 1e-14;
+
+/// A URDF with a package of meshes beside it.
+struct Files {
+    folder: tempfile::TempDir,
+}
+
+impl Files {
+    fn new(urdf: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir_all(folder.path().join("package/meshes")).unwrap();
+        fs::write(folder.path().join("arm.urdf"), urdf).unwrap();
+        let files = Self { folder };
+        files.add("box.stl", &box_stl(b"a box", 1.0));
+        files
+    }
+
+    fn add(&self, name: &str, bytes: &[u8]) {
+        fs::write(self.package().join("meshes").join(name), bytes).unwrap();
+    }
+
+    fn package(&self) -> PathBuf {
+        self.folder.path().join("package")
+    }
+
+    fn overrides(&self) -> Overrides {
+        let argument = format!("my-robot={}", self.package().display());
+        Overrides {
+            robot_urdf: Some(self.folder.path().join("arm.urdf")),
+            packages: PackagePaths::from_arguments(&[argument]).unwrap(),
+            ..Overrides::default()
+        }
+    }
+
+    fn load(&self) -> Result<Robot, Finding> {
+        load_robot(&self.overrides())
+    }
+}
+
+fn arm() -> Robot {
+    Files::new(ARM).load().unwrap()
+}
+
+/// The arm's file with one place changed.
+#[track_caller]
+fn changed(from: &str, to: &str) -> String {
+    assert_eq!(ARM.matches(from).count(), 1, "{from}");
+    ARM.replace(from, to)
+}
+
+fn with_upper_arm(elements: &str) -> String {
+    changed(UPPER_ARM, elements)
+}
+
+fn collision_mesh(filename: &str, more: &str) -> String {
+    with_upper_arm(&format!(
+        r#"<collision><geometry><mesh filename="{filename}" {more}/></geometry></collision>"#
+    ))
+}
+
+fn corner(index: usize) -> [f32; 3] {
+    std::array::from_fn(|axis| {
+        let side = if index >> axis & 1 == 0 { -1.0 } else { 1.0 };
+        CENTRE_M[axis] + side * HALF_M[axis]
+    })
+}
+
+/// The box's triangles as corner indices, counter-clockwise from outside.
+const BOX: [[usize; 3]; 12] = [
+    [0, 2, 1],
+    [1, 2, 3],
+    [4, 5, 6],
+    [5, 7, 6],
+    [0, 1, 4],
+    [1, 5, 4],
+    [2, 6, 3],
+    [3, 6, 7],
+    [0, 4, 2],
+    [2, 4, 6],
+    [1, 3, 5],
+    [3, 7, 5],
+];
+
+/// The box as a binary STL file, in units of `1 / per_metre` m.
+fn box_stl(header: &[u8], per_metre: f32) -> Vec<u8> {
+    let mut bytes = vec![b' '; 80];
+    bytes[..header.len()].copy_from_slice(header);
+    bytes.extend(12_u32.to_le_bytes());
+    for triangle in BOX {
+        bytes.extend([0; 12]);
+        for number in triangle.map(corner).as_flattened() {
+            bytes.extend((number * per_metre).to_le_bytes());
+        }
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+fn volume_m3(mesh: &TriangleMesh) -> f64 {
+    let corner = |index: u32| mesh.vertices_m[index as usize].coords;
+    mesh.triangles
+        .iter()
+        .map(|triangle| {
+            let [a, b, c] = triangle.map(corner);
+            a.dot(&b.cross(&c)) / 6.0
+        })
+        .sum()
+}
+
+fn box_volume_m3() -> f64 {
+    8.0 * HALF_M.map(f64::from).iter().product::<f64>()
+}
+
+/// The mesh that stands last among the upper arm's collision geometry.
+fn upper_arm_hull(robot: &Robot) -> TriangleMesh {
+    let solid = robot.links[1].solids.last().unwrap();
+    let Shape::Convex(mesh) = &solid.shape else {
+        panic!("{solid:?}")
+    };
+    mesh.0.clone()
+}
+
+#[track_caller]
+fn assert_is_the_box(mesh: &TriangleMesh) {
+    assert_eq!((mesh.vertices_m.len(), mesh.triangles.len()), (8, 12));
+    // Coordinates are single precision in the file.
+    assert!((volume_m3(mesh) / box_volume_m3() - 1.0).abs() < 1e-5);
+    let centre = mesh
+        .vertices_m
+        .iter()
+        .map(|v| v.coords)
+        .sum::<Vector3<f64>>()
+        / 8.0;
+    assert!((centre - Vector3::from(CENTRE_M.map(f64::from))).norm() < 1e-8);
+}
+
+#[track_caller]
+fn assert_noted(robot: &Robot, text: &str) {
+    let notes = &robot.notes;
+    assert!(notes.iter().any(|note| note.contains(text)), "{notes:?}");
+}
+
+#[test]
+fn link_frames_do_not_matter_to_the_flange() {
+    let (foreign, ur3) = (arm().chain, UrGeometry::UR3.chain());
+    for i in 0..20 {
+        let q = Joints::from_fn(|joint, _| (f64::from(i) * 1.7 + joint as f64).sin() * 3.0);
+        let [a, b] = [foreign, ur3].map(|chain| chain.base_link_from_flange(&q));
+        assert!((a.translation.vector - b.translation.vector).norm() < PRINTED_M);
+        assert!(rotation_angle_between(&a.rotation, &b.rotation) < PRINTED_M);
+    }
+}
+
+#[test]
+fn an_inertia_is_turned_with_its_frame() {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let text = changed(
+        r#"<origin xyz="0.011 0.023 -0.007" rpy="0.4 -0.3 1.1"/>"#,
+        &format!(r#"<origin xyz="0.011 0.023 -0.007" rpy="0 0 {quarter}"/>"#),
+    );
+    let body = Files::new(&text).load().unwrap().bodies[0];
+    // x of the inertial frame is y of the link, y is -x.
+    let expected = Matrix3::new(
+        0.0052, -0.0002, -0.0001, //
+        -0.0002, 0.0041, -0.0003, //
+        -0.0001, -0.0003, 0.0029,
+    );
+    assert!((body.inertia_kgm2 - expected).amax() < ROUNDING);
+    assert!((body.com_m - Vector3::new(0.011, 0.023, -0.007)).norm() < ROUNDING);
+}
+
+#[test]
+fn fixed_links_add_their_mass_to_the_link_that_carries_them() {
+    let bodies = arm().bodies;
+    for (body, mass_kg) in bodies.iter().zip([2.3, 3.1, 1.31, 0.75, 0.85, 0.33]) {
+        assert!((body.mass_kg - mass_kg).abs() < ROUNDING);
+    }
+    // The adapter between elbow and wrist 1 belongs to the forearm.
+    let rotation = |[r, p, y]: [f64; 3]| nalgebra::Rotation3::from_euler_angles(r, p, y);
+    let adapter = Vector3::new(0.05, -0.02, 0.03)
+        + rotation([0.2, -0.4, 1.0]) * Vector3::new(-0.1, 0.05, -0.03);
+    let com_m = (Vector3::new(-0.09, -0.01, 0.004) * 1.1 + adapter * 0.21) / 1.31;
+    assert!((bodies[2].com_m - com_m).norm() < ROUNDING);
+}
+
+#[test]
+fn a_joint_without_end_has_no_position_limits() {
+    let limits = arm().limits;
+    let wrist_3 = limits.0[5];
+    assert_eq!(
+        (wrist_3.lower_rad, wrist_3.upper_rad),
+        (f64::NEG_INFINITY, f64::INFINITY)
+    );
+    assert_eq!((wrist_3.effort_nm, wrist_3.velocity_rad_s), (12.5, 5.9));
+    let far = Joints::new(0.0, 0.0, 0.0, 0.0, 0.0, 50.0);
+    assert_eq!(limits.first_violation(&far), None);
+    assert!(limits.margin(&far) > 0.9);
+}
+
+#[test]
+fn what_stands_above_base_link_stays_beside_it() {
+    let robot = arm();
+    assert_eq!(robot.world_from_base_link, Pose::identity());
+    assert_noted(&robot, "where 'world' has it in the URDF does not count");
+    // The plate is not turned in the file's world, in which base_link is, by 0.6 rad.
+    let plate = robot.base.solids.iter().find(
+        |solid| matches!(&solid.shape, Shape::Cuboid { half_extents_m } if half_extents_m.x == 0.1),
+    );
+    let pose = plate.unwrap().parent_from_shape;
+    assert!((pose.translation.vector - Vector3::new(0.0, 0.0, -0.01)).norm() < ROUNDING);
+    let turned = Pose::rotation(Vector3::z() * -0.6).rotation;
+    assert!(rotation_angle_between(&pose.rotation, &turned) < ROUNDING);
+}
+
+#[test]
+fn limits_that_are_not_a_ur3s_are_told() {
+    let robot = arm();
+    assert_noted(
+        &robot,
+        "effort limits are used: 61, 62, 33, 14, 13, 12.5 N m",
+    );
+    assert_noted(&robot, "the shipped UR3's are 56, 56, 28, 12, 12, 12");
+    assert_noted(
+        &robot,
+        "velocity limits are used: 2.9, 2.8, 2.7, 6.1, 6, 5.9 rad/s",
+    );
+}
+
+#[test]
+fn a_package_may_have_a_hyphen_in_its_name() {
+    let files = Files::new(&collision_mesh("package://my-robot/meshes/box.stl", ""));
+    let robot = files.load().unwrap();
+    assert_is_the_box(&upper_arm_hull(&robot));
+    assert_noted(
+        &robot,
+        "'upper_arm_link' is convex: it is used as its convex hull (8 vertices)",
+    );
+}
+
+#[test]
+fn an_unknown_package_is_named_with_the_option_that_gives_it() {
+    let files = Files::new(&collision_mesh("package://other-robot/meshes/box.stl", ""));
+    let finding = files.load().unwrap_err().to_string();
+    assert!(finding.contains("`other-robot`"), "{finding}");
+    assert!(
+        finding.contains("--package-path other-robot=DIR"),
+        "{finding}"
+    );
+    assert!(finding.contains("arm.urdf:"), "{finding}");
+}
+
+#[test]
+fn a_missing_collision_mesh_is_an_error_with_its_line() {
+    let text = collision_mesh("package://my-robot/meshes/gone.stl", "");
+    let finding = Files::new(&text).load().unwrap_err();
+    let line = text.lines().position(|line| line.contains("gone.stl"));
+    assert_eq!(finding.line, line.map(|line| line + 1));
+    assert!(finding.to_string().contains("gone.stl"), "{finding}");
+}
+
+#[test]
+fn a_mesh_that_is_no_stl_is_an_error_where_it_can_be_hit() {
+    let files = Files::new(&collision_mesh("package://my-robot/meshes/box.stl", ""));
+    files.add("box.stl", b"<COLLADA/>");
+    let finding = files.load().unwrap_err().to_string();
+    assert!(finding.contains("box.stl"), "{finding}");
+}
+
+/// Wrist 2 carries a camera that has a surface of its own: that must not hide the gap.
+#[test]
+fn a_link_whose_visual_is_collada_is_drawn_as_its_collision_geometry() {
+    let file = "package://my-robot/meshes/wrist.dae";
+    let text = changed(
+        r#"<link name="wrist_2_link">"#,
+        &format!(
+            r#"<link name="wrist_2_link"><visual><geometry><mesh filename="{file}"/></geometry></visual>"#
+        ),
+    );
+    let robot = Files::new(&text).load().unwrap();
+    assert_noted(
+        &robot,
+        "left out of pictures, which show its collision geometry",
+    );
+    let visuals = &robot.links[4].visuals;
+    assert_eq!(
+        visuals.len(),
+        2,
+        "sphere of the wrist and box of the camera"
+    );
+    assert_eq!(visuals[1].color_rgba, [0.9, 0.5, 0.1, 1.0]);
+}
+
+#[test]
+fn a_mesh_is_drawn_itself_not_as_its_hull() {
+    let file = "package://my-robot/meshes/box.stl";
+    let mesh = format!(r#"<geometry><mesh filename="{file}"/></geometry>"#);
+    let text = with_upper_arm(&format!(
+        r#"<visual><geometry><mesh filename="gone.dae"/></geometry></visual>
+        <collision>{mesh}</collision>"#
+    ));
+    let files = Files::new(&text);
+    // Without its last two triangles the box is open, which its hull is not.
+    let mut open = box_stl(b"open", 1.0);
+    open.truncate(84 + 10 * 50);
+    open[80] = 10;
+    files.add("box.stl", &open);
+    let robot = files.load().unwrap();
+    assert_eq!(upper_arm_hull(&robot).triangles.len(), 12);
+    let drawn = &robot.links[1].visuals.last().unwrap().mesh;
+    assert_eq!(drawn.triangles.len(), 10);
+}
+
+#[test]
+fn meshes_are_scaled() {
+    let scale = r#"scale="0.001 0.001 0.001""#;
+    let files = Files::new(&collision_mesh("package://my-robot/meshes/box.stl", scale));
+    files.add("box.stl", &box_stl(b"millimetres", 1000.0));
+    assert_is_the_box(&upper_arm_hull(&files.load().unwrap()));
+}
+
+#[test]
+fn a_mirrored_mesh_keeps_its_outside_out() {
+    let file = "package://my-robot/meshes/box.stl";
+    let text = with_upper_arm(&format!(
+        r#"<visual><geometry><mesh filename="{file}" scale="1 -1 1"/></geometry></visual>"#
+    ));
+    let robot = Files::new(&text).load().unwrap();
+    let volume = volume_m3(&robot.links[1].visuals[0].mesh);
+    assert!((volume / box_volume_m3() - 1.0).abs() < 1e-5, "{volume}");
+}
+
+#[test]
+fn stl_files_are_told_apart_by_their_size_not_their_first_word() {
+    let files = Files::new(&collision_mesh("package://my-robot/meshes/box.stl", ""));
+    files.add("box.stl", &box_stl(b"solid box\n", 1.0));
+    assert_is_the_box(&upper_arm_hull(&files.load().unwrap()));
+
+    let mut text = "solid\n".to_owned();
+    for triangle in BOX {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for [x, y, z] in triangle.map(corner) {
+            writeln!(text, "vertex {x} {y} {z}").unwrap();
+        }
+        text += "endloop\nendfacet\n";
+    }
+    files.add("box.stl", (text + "endsolid\n").as_bytes());
+    assert_is_the_box(&upper_arm_hull(&files.load().unwrap()));
+}
+
+#[test]
+fn a_moving_link_without_collision_geometry_is_told() {
+    let text = changed(
+        r#"<collision>
+      <geometry><sphere radius="0.03"/></geometry>
+    </collision>"#,
+        "",
+    );
+    let robot = Files::new(&text).load().unwrap();
+    assert_noted(&robot, "wrist_3 has no collision geometry");
+}
+
+/// The arm's file without a single mass.
+fn massless() -> String {
+    let mut text = ARM.to_owned();
+    while let Some(start) = text.find("<inertial>") {
+        let end = text.find("</inertial>").unwrap() + "</inertial>".len();
+        text.replace_range(start..end, "");
+    }
+    text
+}
+
+#[test]
+fn a_moving_link_without_mass_is_an_error() {
+    let finding = Files::new(&massless()).load().unwrap_err().to_string();
+    assert!(
+        finding.contains("link 'shoulder_link' has no mass"),
+        "{finding}"
+    );
+    assert!(
+        finding.contains("--missing-inertia nominal-ur3"),
+        "{finding}"
+    );
+    let point = changed(
+        r#"<inertia ixx="0.0041" ixy="0.0002" ixz="-0.0003" iyy="0.0052" iyz="0.0001" izz="0.0029"/>"#,
+        r#"<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>"#,
+    );
+    let finding = Files::new(&point).load().unwrap_err().to_string();
+    assert!(finding.contains("has no moment of inertia"), "{finding}");
+}
+
+/// Link frames differ, so the stand-in's masses have to be moved into them.
+#[test]
+fn nominal_masses_weigh_the_same_in_other_link_frames() {
+    let files = Files::new(&massless());
+    let foreign = load_robot(&Overrides {
+        missing_inertia: Some(MissingInertia::NominalOf("ur3".to_owned())),
+        ..files.overrides()
+    })
+    .unwrap();
+    for link in [
+        "shoulder",
+        "upper_arm",
+        "forearm",
+        "wrist_1",
+        "wrist_2",
+        "wrist_3",
+    ] {
+        let note = format!("link '{link}_link' has no mass: the shipped UR3's {link} is used");
+        assert_noted(&foreign, &note);
+    }
+    let shipped = load_robot(&Overrides::default()).unwrap();
+    let q = Joints::new(0.4, -1.3, 1.1, 0.7, -0.9, 2.0);
+    let (qd, qdd) = (q.map(|x| x - 0.5), q.map(|x| 3.0 * x + 1.0));
+    let [a, b] = [&foreign, &shipped].map(|robot| {
+        let dynamics = Dynamics {
+            chain: robot.chain,
+            bodies: robot.bodies,
+            armature_kgm2: Joints::zeros(),
+            gravity_m_s2: Vector3::new(0.0, 0.0, -9.80665),
+        };
+        dynamics.inverse_dynamics(&q, &qd, &qdd)
+    });
+    assert!((a - b).amax() < 1e-7, "{a} {b}");
+    assert_ne!(
+        foreign.bodies.map(|body: Body| body.com_m),
+        shipped.bodies.map(|body| body.com_m)
+    );
+}
+
+#[test]
+fn nominal_masses_are_not_given_to_another_arm() {
+    let longer = massless().replacen(r#"xyz="0 0 0.1219""#, r#"xyz="0 0 0.1339""#, 1);
+    let files = Files::new(&longer);
+    let finding = load_robot(&Overrides {
+        missing_inertia: Some(MissingInertia::NominalOf("ur3".to_owned())),
+        ..files.overrides()
+    })
+    .unwrap_err()
+    .to_string();
+    assert!(finding.contains("lengths are not a UR3's"), "{finding}");
+}
+
+#[test]
+fn a_file_that_xacro_wrote_is_a_urdf_and_one_for_xacro_is_not() {
+    assert!(ARM.contains("xmlns:xacro") && ARM.contains("${"));
+    for (from, to) in [
+        (UPPER_ARM, r#"<xacro:insert_block name="more"/>"#),
+        (r#"<mass value="2.1"/>"#, r#"<mass value="${base_mass}"/>"#),
+    ] {
+        let finding = Files::new(&changed(from, to)).load().unwrap_err();
+        let line = changed(from, to).lines().position(|line| line.contains(to));
+        assert_eq!(finding.line, line.map(|line| line + 1));
+        assert!(finding.to_string().contains("xacro file"), "{finding}");
+    }
+}
+
+/// The loader looks joints up by name.
+#[test]
+fn a_joint_name_is_not_given_twice() {
+    let again = r#"<link name="spare"/><joint name="elbow_joint" type="revolute">
+        <parent link="base_link"/><child link="spare"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint><transmission name="pan">"#;
+    let text = changed(r#"<transmission name="pan">"#, again);
+    let finding = Files::new(&text).load().unwrap_err().to_string();
+    assert!(
+        finding.contains("joint 'elbow_joint' is there twice"),
+        "{finding}"
+    );
+}

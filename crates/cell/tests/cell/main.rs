@@ -1,0 +1,13 @@
+//! Scenario and model files, from outside the crate.
+
+mod arm_models;
+mod arms;
+mod calibration;
+mod family;
+mod foreign_urdf;
+mod goal_direction;
+mod pair_classes;
+mod schema;
+mod schema_probes;
+mod study;
+mod urdf_slips;

@@ -1,0 +1,262 @@
+//! One motion of one arm: what torque the plant gets next, and what it did.
+
+use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_kinematics::{Dynamics, JOINT_COUNT, JOINT_LABELS, Joints};
+
+use crate::actuation::Drives;
+use crate::{
+    ActuatedTorque, Actuation, Brakes, Cost, EngineError, EngineIdentity, PlantState, Recording,
+    Servo,
+};
+
+/// Speed that no arm reaches, rad/s: 16 times the fastest joint of a UR3.
+const ABSURD_SPEED_RAD_S: f64 = 100.0;
+
+/// Position that no joint reaches, rad: 16 turns.
+const ABSURD_POSITION_RAD: f64 = 100.0;
+
+/// A trajectory whose end lies this fraction of a step behind a step's end needs no further step.
+const STEP_SLACK: f64 = 1e-6;
+
+/// What one arm is to do.
+#[derive(Debug, Clone, Copy)]
+pub struct Motion<'a> {
+    /// The servo.
+    pub servo: &'a Servo,
+    /// The drives.
+    pub actuation: &'a Actuation,
+    /// What the servo follows.
+    pub trajectory: &'a JointTrajectory,
+    /// From when on the arm is braked instead, if ever.
+    pub braking: Option<Braking<'a>>,
+}
+
+/// From a moment on the drives are off and the brakes act.
+#[derive(Debug, Clone, Copy)]
+pub struct Braking<'a> {
+    /// The moment, s.
+    pub from_s: f64,
+    /// The brakes.
+    pub brakes: Brakes,
+    /// The arm that they brake: the plant's own.
+    pub dynamics: &'a Dynamics,
+}
+
+/// A motion under way.
+///
+/// Plants are stepped by the caller, so that several of them can go in turn:
+///
+/// ```text
+/// drive.record(plant.begin(motion.trajectory))
+/// while let Some(torque) = drive.torque()? { drive.record(plant.step(&torque)?)? }
+/// drive.finish()
+/// ```
+#[derive(Debug)]
+pub(crate) struct Drive<'a> {
+    trajectory: &'a JointTrajectory,
+    drives: Drives<'a>,
+    steps: usize,
+    braking: Option<Braking<'a>>,
+    recording: Recording,
+}
+
+impl<'a> Drive<'a> {
+    /// Prepares a motion from its start to its end on a plant with steps of `timestep_s` whose
+    /// velocities are `velocity_age_s` old (see [`Plant::velocity_age_s`](crate::Plant)).
+    ///
+    /// The servo is sampled once per step and its torque held over it. The last state is the first
+    /// one at or after the trajectory's end.
+    ///
+    /// # Errors
+    /// [`EngineError::BadSetting`] for gains, limits and imperfections out of range.
+    pub(crate) fn new(
+        motion: &Motion<'a>,
+        engine: EngineIdentity,
+        timestep_s: f64,
+        velocity_age_s: f64,
+    ) -> Result<Self, EngineError> {
+        let Motion {
+            servo,
+            actuation,
+            trajectory,
+            braking,
+        } = *motion;
+        servo.check()?;
+        actuation.check()?;
+        let steps = step_count(trajectory.duration_s(), timestep_s);
+        Ok(Self {
+            trajectory,
+            drives: Drives::new(servo, actuation, timestep_s, velocity_age_s),
+            steps,
+            braking,
+            recording: Recording {
+                engine,
+                timestep_s,
+                time_s: Vec::with_capacity(steps + 1),
+                state: Vec::with_capacity(steps + 1),
+                reference: Vec::with_capacity(steps + 1),
+                torque_nm: Vec::with_capacity(steps),
+                drive_nm: Vec::with_capacity(steps),
+                saturated_steps: 0,
+                saturation: Default::default(),
+                cost: Cost::default(),
+            },
+        })
+    }
+
+    /// Torque of the next step, N m; none after the last one.
+    ///
+    /// # Errors
+    /// [`EngineError::Diverged`] if it is not a number.
+    ///
+    /// # Panics
+    /// If no state was recorded yet.
+    pub(crate) fn torque(&mut self) -> Result<Option<Joints>, EngineError> {
+        let step = self.recording.torque_nm.len();
+        if step >= self.steps {
+            return Ok(None);
+        }
+        let state = self.recording.state.last().expect("recorded after reset");
+        let time_s = step as f64 * self.recording.timestep_s;
+        let braking = self
+            .braking
+            .filter(|braking| time_s >= braking.from_s - STEP_SLACK * self.recording.timestep_s);
+        let torque = if let Some(Braking {
+            brakes, dynamics, ..
+        }) = braking
+        {
+            let h = self.recording.timestep_s;
+            let torque_nm = brakes.torque(dynamics, &state.position, &state.velocity, h);
+            ActuatedTorque {
+                link_nm: torque_nm,
+                drive_nm: Joints::zeros(),
+                saturated: [false; JOINT_COUNT],
+            }
+        } else {
+            let planned = self.recording.reference.last();
+            self.drives.torque(
+                self.trajectory,
+                time_s,
+                planned.expect("recorded with its state"),
+                &state.position,
+                &state.velocity,
+            )
+        };
+        check_torque(self.recording.engine.name, time_s, &torque.drive_nm)?;
+        self.recording.saturated_steps += usize::from(torque.saturated.contains(&true));
+        for (joint, cut) in self.recording.saturation.iter_mut().zip(torque.saturated) {
+            if cut {
+                joint.steps += 1;
+                joint.first_time_s.get_or_insert(time_s);
+            }
+        }
+        self.recording.torque_nm.push(torque.link_nm);
+        self.recording.drive_nm.push(torque.drive_nm);
+        Ok(Some(torque.link_nm))
+    }
+
+    /// Keeps the state after the reset or after a step.
+    ///
+    /// # Errors
+    /// [`EngineError::Diverged`] if it left every sensible range; it is kept all the same.
+    pub(crate) fn record(&mut self, state: PlantState) -> Result<(), EngineError> {
+        let recording = &mut self.recording;
+        let time_s = recording.state.len() as f64 * recording.timestep_s;
+        recording.time_s.push(time_s);
+        recording.state.push(state);
+        recording.reference.push(self.trajectory.sample(time_s));
+        check_state(recording.engine.name, time_s, &state)
+    }
+
+    /// The recording; its cost is the caller's to fill in.
+    pub(crate) fn finish(self) -> Recording {
+        self.recording
+    }
+
+    /// The error with what was recorded until it came: [`EngineError::Stopped`]. Errors that are
+    /// not the motion's own stay as they are.
+    pub(crate) fn stopped_by(self, error: EngineError) -> EngineError {
+        if !matches!(
+            error,
+            EngineError::Diverged { .. } | EngineError::Unstable { .. }
+        ) {
+            return error;
+        }
+        let mut recording = self.recording;
+        let sensible = |state: &PlantState| check_state("", 0.0, state).is_ok();
+        let count = recording.state.iter().take_while(|s| sensible(s)).count();
+        recording.time_s.truncate(count);
+        recording.state.truncate(count);
+        recording.reference.truncate(count);
+        recording.torque_nm.truncate(count.saturating_sub(1));
+        recording.drive_nm.truncate(count.saturating_sub(1));
+        EngineError::Stopped {
+            error: Box::new(error),
+            recording: Box::new(recording),
+        }
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "durations are not negative and far below 2^52 steps"
+)]
+fn step_count(duration_s: f64, timestep_s: f64) -> usize {
+    (duration_s / timestep_s - STEP_SLACK).ceil().max(0.0) as usize
+}
+
+fn check_torque(engine: &'static str, time_s: f64, torque_nm: &Joints) -> Result<(), EngineError> {
+    check(engine, time_s, "torque", torque_nm, f64::MAX)
+}
+
+fn check_state(engine: &'static str, time_s: f64, state: &PlantState) -> Result<(), EngineError> {
+    check(
+        engine,
+        time_s,
+        "position",
+        &state.position,
+        ABSURD_POSITION_RAD,
+    )?;
+    check(
+        engine,
+        time_s,
+        "velocity",
+        &state.velocity,
+        ABSURD_SPEED_RAD_S,
+    )
+}
+
+fn check(
+    engine: &'static str,
+    time_s: f64,
+    quantity: &'static str,
+    values: &Joints,
+    limit: f64,
+) -> Result<(), EngineError> {
+    for (&value, joint) in values.iter().zip(JOINT_LABELS) {
+        if value.abs() > limit || value.is_nan() {
+            return Err(EngineError::Diverged {
+                engine,
+                time_s,
+                joint,
+                quantity,
+                value,
+            });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_cover_the_trajectory_and_no_more() {
+        assert_eq!(step_count(0.0, 1e-3), 0);
+        assert_eq!(step_count(2.0, 1e-3), 2000);
+        assert_eq!(step_count(0.3, 0.1), 3);
+        assert_eq!(step_count(2.0004, 1e-3), 2001);
+    }
+}

@@ -1,0 +1,79 @@
+//! Least clearances by class, as values of the report.
+
+use std::collections::BTreeMap;
+
+use needlebench_cell::ClearanceClass;
+use serde::Serialize;
+
+/// Least clearance of a class.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ClassClearance {
+    /// Signed distance: positive apart, negative the penetration depth.
+    pub minimum_m: f64,
+    /// Proven lower bound over the whole motion; none where there is no motion.
+    pub certified_lower_bound_m: Option<f64>,
+    /// The two solids.
+    pub pair: [String; 2],
+    /// Nearest (or deepest) points of the two, in the world.
+    pub witness_points_m: [[f64; 3]; 2],
+    /// Phase of the motion; `final_posture` without one, `insertion` for the needle's route.
+    pub phase: &'static str,
+    /// Time in the motion.
+    pub time_s: Option<f64>,
+    /// Engine whose motion it is.
+    pub engine: Option<String>,
+}
+
+/// Clearances by class; a class that the cell has no part for is absent.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct ClearanceReport {
+    /// By class name.
+    #[serde(flatten)]
+    pub classes: BTreeMap<&'static str, ClassClearance>,
+    /// Least over the classes of physical bodies, the guide's intended stand-off left out.
+    pub minimum_m: Option<f64>,
+    /// Least proven lower bound over the same classes; none unless all of them have one.
+    pub minimum_certified_m: Option<f64>,
+}
+
+impl ClearanceReport {
+    /// The least clearances of a motion.
+    pub fn of(minima: &BTreeMap<ClearanceClass, ClassClearance>) -> Self {
+        let named = minima
+            .iter()
+            .map(|(class, found)| (class.name(), found.clone()));
+        Self::new(named.collect())
+    }
+
+    /// Clearances by class with the least of those that count.
+    pub fn new(classes: BTreeMap<&'static str, ClassClearance>) -> Self {
+        let mut made = Self {
+            classes,
+            minimum_m: None,
+            minimum_certified_m: None,
+        };
+        made.minimum_m = made.least().map(|found| found.minimum_m);
+        made.minimum_certified_m = made
+            .physical()
+            .map(|found| found.certified_lower_bound_m)
+            .reduce(|least, next| Some(least?.min(next?)))
+            .flatten();
+        made
+    }
+
+    /// The least clearance of physical bodies from each other, the guide's intended stand-off left
+    /// out.
+    pub fn least(&self) -> Option<&ClassClearance> {
+        self.physical()
+            .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
+    }
+
+    fn physical(&self) -> impl Iterator<Item = &ClassClearance> {
+        self.classes
+            .iter()
+            .filter(|(class, _)| {
+                ClearanceClass::named(class).is_some_and(ClearanceClass::is_unwanted)
+            })
+            .map(|(_, found)| found)
+    }
+}

@@ -1,0 +1,212 @@
+//! Where the needle is: predicted, simulated, and over all arms and patients.
+
+use needlebench_cell::study::StudyMode::Dynamic;
+
+use super::{ALL, MM, NEEDLE_RESOLUTION_M, UNSIMULATED};
+use crate::metric::entry::Better::Less;
+use crate::metric::entry::Bound::Value;
+use crate::metric::entry::Draw::{OverBudget, ThisDraw};
+use crate::metric::entry::Precision::Fine;
+use crate::metric::entry::Source::{Configuration, Engines};
+use crate::metric::entry::Stage::{FinalPosture, Simulated};
+use crate::metric::entry::{Metric, Missing, Role, Show, Statistics};
+use crate::metric::quantity::Quantity::{Angle, Length};
+use crate::metric::readers::budget;
+
+const NEEDLE_RESOLUTION_RAD: f64 = 1e-5;
+
+/// The needle where the balance of torques lets it come to rest, without any engine; without
+/// imperfections where the arm is commanded to, which leaves the residual of the inverse kinematics.
+pub(super) const PREDICTED: &[Metric] = &[
+    Metric::new(
+        "tip_error_predicted",
+        "predicted tip error",
+        "distance of the needle's tip from the target, by the balance of torques",
+        Length,
+        Configuration(|each| Some(each.predicted?.tip_position_error_m)),
+    )
+    .family("tip_error")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("tip_error_static")
+    .case(3, "tip\nmm")
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
+    .criterion("max_tip_position_error_mm", UNSIMULATED, |criteria| {
+        criteria.max_tip_position_error_mm.map(|mm| mm * MM)
+    })
+    .missing(Missing::Skips)
+    .statistics(
+        Statistics::BY_CASE
+            .role(Role::TipError)
+            .criterion("max_tip_error_mm")
+            .page(Fine),
+    ),
+    Metric::new(
+        "needle_angle_error_predicted",
+        "predicted needle angle error",
+        "angle between planned and actual needle, by the balance of torques",
+        Angle,
+        Configuration(|each| Some(each.predicted?.needle_angle_error_rad)),
+    )
+    .family("needle_angle_error")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("needle_angle_error_static")
+    .better(Less, NEEDLE_RESOLUTION_RAD)
+    .criterion("max_needle_angle_error_deg", UNSIMULATED, |criteria| {
+        criteria.max_needle_angle_error_deg.map(f64::to_radians)
+    })
+    .missing(Missing::Skips),
+    Metric::new(
+        "guide_position_error_predicted",
+        "predicted guide position error",
+        "distance of the guide's exit from its planned place, by the balance of torques",
+        Length,
+        Configuration(|each| Some(each.predicted?.guide_position_error_m)),
+    )
+    .family("guide_position_error")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("guide_position_error_static")
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
+    .criterion("max_guide_position_error_mm", UNSIMULATED, |criteria| {
+        criteria.max_guide_position_error_mm.map(|mm| mm * MM)
+    })
+    .missing(Missing::Skips),
+    Metric::new(
+        "lateral_error_predicted",
+        "predicted lateral error",
+        "distance of the target from the needle's axis, by the balance of torques",
+        Length,
+        Configuration(|each| Some(each.predicted?.lateral_error_m)),
+    )
+    .family("lateral_error")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("lateral_error_static")
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
+    .statistics(Statistics::BY_CASE.criterion("max_tip_lateral_mm")),
+    Metric::new(
+        "depth_error_predicted",
+        "predicted depth error",
+        "distance of the needle's tip from the target along the needle, deeper is positive, by the balance \
+         of torques",
+        Length,
+        Configuration(|each| Some(each.predicted?.depth_error_m)),
+    )
+    .family("depth_error")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("depth_error_static")
+    .show(Show::SmallLength),
+];
+
+/// The needle as it settles in the engines.
+pub(super) const SIMULATED: &[Metric] = &[
+    Metric::new(
+        "tip_error",
+        "tip error",
+        "distance of the settled needle's tip from the target",
+        Length,
+        Engines(|each| Some(each.needle.tip_position_error_m)),
+    )
+    .known(Value, ThisDraw, Simulated)
+    .each_engine()
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .ranked("tip_error_mm")
+    .pareto()
+    .show(Show::SmallLength)
+    .case(3, "tip\nmm")
+    .table(0, "tip error\n{engine}")
+    .summary(0, "Tip error {engine}")
+    .page(0, "Tip error {engine}")
+    .page_side(0, "Tip error")
+    .criterion("max_tip_position_error_mm", &[Dynamic], |criteria| {
+        criteria.max_tip_position_error_mm.map(|mm| mm * MM)
+    })
+    .statistics(
+        Statistics::BY_CASE
+            .role(Role::TipError)
+            .criterion("max_tip_error_mm")
+            .page(Fine),
+    ),
+    Metric::new(
+        "needle_angle_error",
+        "needle angle error",
+        "settled angle between planned and actual needle",
+        Angle,
+        Engines(|each| Some(each.needle.needle_angle_error_rad)),
+    )
+    .known(Value, ThisDraw, Simulated)
+    .better(Less, NEEDLE_RESOLUTION_RAD)
+    .criterion("max_needle_angle_error_deg", &[Dynamic], |criteria| {
+        criteria.max_needle_angle_error_deg.map(f64::to_radians)
+    }),
+    Metric::new(
+        "guide_position_error",
+        "guide position error",
+        "settled distance of the guide's exit from its planned place",
+        Length,
+        Engines(|each| Some(each.needle.guide_position_error_m)),
+    )
+    .known(Value, ThisDraw, Simulated)
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
+    .criterion("max_guide_position_error_mm", &[Dynamic], |criteria| {
+        criteria.max_guide_position_error_mm.map(|mm| mm * MM)
+    }),
+    Metric::new(
+        "lateral_error",
+        "lateral error",
+        "settled distance of the target from the needle's axis",
+        Length,
+        Engines(|each| Some(each.needle.lateral_error_m)),
+    )
+    .known(Value, ThisDraw, Simulated)
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
+    .statistics(Statistics::BY_CASE.criterion("max_tip_lateral_mm"))
+    .formerly(&["tip_lateral"]),
+    Metric::new(
+        "depth_error",
+        "depth error",
+        "settled distance of the needle's tip from the target along the needle, deeper is positive",
+        Length,
+        Engines(|each| Some(each.needle.depth_error_m)),
+    )
+    .known(Value, ThisDraw, Simulated)
+    .show(Show::SmallLength),
+];
+
+/// The needle over all arms and patients.
+pub(super) const BUDGET: &[Metric] = &[
+    Metric::new(
+        "tip_rms",
+        "rms tip error",
+        "root mean square distance of the needle's tip from the target, analytic",
+        Length,
+        Configuration(|each| Some(budget(each)?.rms_m)),
+    )
+    .known(Value, OverBudget, FinalPosture)
+    .in_static_cases("tip_rms_static")
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .ranked("tip_error_mm")
+    .pareto()
+    .criterion("max_tip_rms_mm", ALL, |criteria| {
+        criteria.max_tip_rms_mm.map(|mm| mm * MM)
+    })
+    .detail(|each, _, _| each.budget_failure.clone().unwrap_or_default())
+    .statistics(Statistics::BY_CASE.criterion("max_tip_rms_mm")),
+    Metric::new(
+        "tip_lateral_rms",
+        "rms lateral tip error",
+        "root mean square distance of the needle's tip from the target across the needle, analytic",
+        Length,
+        Configuration(|each| Some(budget(each)?.lateral_rms_m)),
+    )
+    .known(Value, OverBudget, FinalPosture)
+    .in_static_cases("tip_lateral_rms_static")
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .criterion("max_tip_lateral_rms_mm", ALL, |criteria| {
+        criteria.max_tip_lateral_rms_mm.map(|mm| mm * MM)
+    })
+    .detail(|each, _, _| each.budget_failure.clone().unwrap_or_default()),
+];

@@ -1,0 +1,170 @@
+//! Verdicts on made-up measurements.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use needlebench_cell::scenario::{ClearanceCriteria, CriteriaSection};
+use needlebench_cell::study::StudyMode;
+use needlebench_cell::{Expectation, Goal, Overrides, load_scenario};
+use needlebench_evaluation::report::{
+    ClassClearance, ClearanceReport, ConfigurationReport, GoalReport, MarginsReport,
+    RejectionReport, Status, Verdict,
+};
+use needlebench_evaluation::{
+    NeedleMeasurement, check_configuration, first_missed_by_posture, judge,
+};
+use needlebench_kinematics::ik::Configuration;
+
+/// Configuration `index` with a least clearance to the skin and a joint margin, not yet judged.
+fn configuration(index: usize, clearance_m: f64, margin: f64) -> ConfigurationReport {
+    let found = ClassClearance {
+        minimum_m: clearance_m,
+        certified_lower_bound_m: None,
+        pair: ["forearm.2".into(), "skin".into()],
+        witness_points_m: [[0.0; 3], [clearance_m, 0.0, 0.0]],
+        phase: "transfer",
+        time_s: Some(1.0),
+        engine: Some("rapier".into()),
+    };
+    ConfigurationReport {
+        status: Status::Ok,
+        joints_rad: Some([0.0; 6]),
+        roll_rad: Some(0.0),
+        margins: Some(MarginsReport {
+            joint_limit: margin,
+            wrist_sine: 1.0,
+            elbow_sine: 1.0,
+            shoulder_m: 0.3,
+            manipulability_m3: 0.01,
+        }),
+        clearance: ClearanceReport::new(BTreeMap::from([("robot_phantom", found)])),
+        ..ConfigurationReport::new(Configuration::ALL[index].label())
+    }
+}
+
+fn rejected(index: usize) -> ConfigurationReport {
+    let mut made = configuration(index, -0.01, 0.5);
+    made.status = Status::Rejected;
+    made.rejections = vec![RejectionReport {
+        rule: "collision",
+        value: -0.01,
+        limit: 0.0,
+        unit: "m",
+        detail: "forearm.2 and skin".into(),
+    }];
+    made
+}
+
+fn goal() -> Goal {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/table3.toml");
+    let resolved = load_scenario(&path, &Overrides::default()).unwrap();
+    Goal {
+        expected: BTreeMap::new(),
+        ..resolved.goals[0].clone()
+    }
+}
+
+fn report(configurations: Vec<ConfigurationReport>) -> Vec<GoalReport> {
+    vec![GoalReport {
+        name: "pose".into(),
+        lesion: None,
+        entry_m: None,
+        target_m: [0.0; 3],
+        axis: [0.0, 0.0, 1.0],
+        insertion_length_m: 0.1,
+        standoff_m: None,
+        configurations,
+        recommended: None,
+        ranking: None,
+    }]
+}
+
+#[test]
+fn a_configuration_that_no_engine_measured_has_failed() {
+    let mut goals = report(vec![configuration(0, 0.05, 0.5)]);
+    let (verdict, _) = judge(&mut goals, &[goal()], &CriteriaSection::default(), false);
+    assert_eq!(verdict, Verdict::Fail);
+    assert_eq!(goals[0].configurations[0].status, Status::Failed);
+}
+
+#[test]
+fn rejections_alone_do_not_fail_a_goal_that_asks_for_no_configuration() {
+    let mut goals = report((0..8).map(rejected).collect());
+    let criteria = CriteriaSection {
+        min_working_configurations: 0,
+        ..Default::default()
+    };
+    let (verdict, results) = judge(&mut goals, &[goal()], &criteria, true);
+    assert_eq!(verdict, Verdict::Pass);
+    assert!(results.iter().all(|result| result.pass));
+}
+
+#[test]
+fn an_expected_rejection_that_does_not_come_fails() {
+    let mut expecting = goal();
+    expecting.expected.insert(
+        Configuration::ALL[0],
+        Expectation::Rejected("unreachable".into()),
+    );
+    let mut goals = report(vec![rejected(0)]);
+    let criteria = CriteriaSection {
+        min_working_configurations: 0,
+        ..Default::default()
+    };
+    let (verdict, results) = judge(&mut goals, &[expecting], &criteria, true);
+    assert_eq!(verdict, Verdict::Fail);
+    let missed = results
+        .iter()
+        .find(|result| result.criterion == "expected")
+        .unwrap();
+    assert!(
+        !missed.pass && missed.detail.contains("got collision"),
+        "{}",
+        missed.detail
+    );
+}
+
+/// What a static case would make of the same criteria.
+#[test]
+fn a_criterion_is_judged_by_what_is_known_and_in_one_order() {
+    let criteria = CriteriaSection {
+        max_tip_position_error_mm: Some(1.0),
+        max_tip_rms_mm: Some(1.0),
+        min_clearance_mm: ClearanceCriteria {
+            robot_phantom: Some(60.0),
+            robot_table: Some(1.0),
+            ..ClearanceCriteria::default()
+        },
+        ..CriteriaSection::default()
+    };
+    let mut made = configuration(0, 0.05, 0.5);
+    made.posture_clearance_m = BTreeMap::from([("robot_phantom", 0.08)]);
+    let keys = |mode: StudyMode, made: &ConfigurationReport| -> Vec<(String, bool)> {
+        let checked = check_configuration("pose", made, &criteria, mode, false);
+        let results = checked.into_iter();
+        results
+            .map(|result| (result.criterion, result.pass))
+            .collect()
+    };
+    let (rms, skin) = ("max_tip_rms_mm", "min_clearance_mm.robot_phantom");
+    // There is no engine, no budget and no table. The motion comes nearer than the posture.
+    let missed = [(rms.to_owned(), false), (skin.to_owned(), false)];
+    assert_eq!(keys(StudyMode::Dynamic, &made), missed);
+    assert_eq!(first_missed_by_posture(&made, &criteria), None);
+    made.posture_clearance_m.insert("robot_phantom", 0.055);
+    assert_eq!(first_missed_by_posture(&made, &criteria), Some(skin));
+    // A proven bound goes before the nearest approach.
+    let found = made.clearance.classes.get_mut("robot_phantom").unwrap();
+    (found.minimum_m, found.certified_lower_bound_m) = (0.07, Some(0.065));
+    assert_eq!(keys(StudyMode::Dynamic, &made)[1], (skin.to_owned(), true));
+    // Without engines the needle is judged where it is predicted.
+    made.predicted = Some(NeedleMeasurement {
+        tip_position_error_m: 2e-3,
+        lateral_error_m: 2e-3,
+        ..NeedleMeasurement::default()
+    });
+    let tip = "max_tip_position_error_mm";
+    assert_eq!(first_missed_by_posture(&made, &criteria), Some(tip));
+    assert_eq!(keys(StudyMode::Planned, &made)[0], (tip.to_owned(), false));
+    assert_eq!(keys(StudyMode::Dynamic, &made)[0].0, rms);
+}

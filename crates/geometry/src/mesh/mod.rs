@@ -1,0 +1,23 @@
+//! Triangle meshes: reading, checking and mending them, and the convex pieces that engines need.
+
+mod cache;
+mod check;
+mod decompose;
+mod fidelity;
+mod hull;
+mod mend;
+mod solid;
+mod stl;
+mod surface_index;
+
+pub use check::{MeshDefect, MeshFacts, check_closed, inverted_part, open_edges};
+pub use decompose::decompose;
+pub use fidelity::{Fidelity, points_on};
+pub use hull::{HullError, convex_hull, simplified_hull};
+pub use mend::{Mended, mend};
+pub use solid::{Use, shape_of_surface};
+pub use stl::{StlError, read_stl};
+pub use surface_index::SurfaceIndex;
+
+pub use crate::measure::{area_m2, centroid_m, extent_m, size_m, volume_m3};
+pub use crate::topology::weld;

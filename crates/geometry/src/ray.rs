@@ -1,0 +1,249 @@
+//! Where a line of sight meets a solid, in closed form.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::shape::{Shape, TriangleMesh};
+
+/// Parameter, 0 at `from` and 1 at `to`, at which the segment first is inside the shape; `None` if
+/// it passes. Ends are in the shape's frame, m.
+///
+/// Convex shapes are met where the line is inside all their faces at once, so a segment that only
+/// touches passes. A mesh is met at its first triangle; a segment that starts inside one is met
+/// where it leaves.
+pub fn first_hit(shape: &Shape, from: &Point3<f64>, to: &Point3<f64>) -> Option<f64> {
+    let along = to - from;
+    match shape {
+        Shape::Sphere { radius_m } => in_ball(&from.coords, &along, *radius_m).hit(),
+        Shape::Cylinder {
+            radius_m,
+            half_length_m,
+        } => in_tube(from, &along, *radius_m)
+            .and(slab(from.z, along.z, *half_length_m))
+            .hit(),
+        Shape::Capsule {
+            radius_m,
+            half_length_m,
+        } => {
+            let tube = in_tube(from, &along, *radius_m).and(slab(from.z, along.z, *half_length_m));
+            [half_length_m, &-half_length_m]
+                .map(|z| {
+                    let from_end = from.coords - Vector3::new(0.0, 0.0, *z);
+                    in_ball(&from_end, &along, *radius_m)
+                })
+                .into_iter()
+                .chain([tube])
+                .filter_map(Interval::hit)
+                .reduce(f64::min)
+        }
+        Shape::Cuboid { half_extents_m } => (0..3)
+            .map(|axis| slab(from[axis], along[axis], half_extents_m[axis]))
+            .fold(Interval::ALL, Interval::and)
+            .hit(),
+        Shape::Convex(mesh) => in_hull(&mesh.0, from, &along).hit(),
+        Shape::Mesh(mesh) => mesh.surface.first_hit(from, &along),
+    }
+}
+
+/// Part of a segment, by its parameters; empty if `low >= high`.
+#[derive(Debug, Clone, Copy)]
+struct Interval {
+    low: f64,
+    high: f64,
+}
+
+impl Interval {
+    const ALL: Self = Self {
+        low: 0.0,
+        high: 1.0,
+    };
+    const EMPTY: Self = Self {
+        low: 1.0,
+        high: 0.0,
+    };
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            low: self.low.max(other.low),
+            high: self.high.min(other.high),
+        }
+    }
+
+    fn hit(self) -> Option<f64> {
+        (self.low < self.high).then_some(self.low)
+    }
+}
+
+/// Where `|from + t along| <= radius_m`.
+fn in_ball(from: &Vector3<f64>, along: &Vector3<f64>, radius_m: f64) -> Interval {
+    below_zero(
+        along.norm_squared(),
+        from.dot(along),
+        from.norm_squared() - radius_m * radius_m,
+    )
+}
+
+/// Where the distance from the z axis is at most `radius_m`.
+fn in_tube(from: &Point3<f64>, along: &Vector3<f64>, radius_m: f64) -> Interval {
+    let (from, along) = (from.xy().coords, along.xy());
+    below_zero(
+        along.norm_squared(),
+        from.dot(&along),
+        from.norm_squared() - radius_m * radius_m,
+    )
+}
+
+/// Where `a t^2 + 2 b t + c <= 0`, for `a >= 0`, within the segment.
+fn below_zero(a: f64, b: f64, c: f64) -> Interval {
+    if a <= 0.0 {
+        return if c <= 0.0 {
+            Interval::ALL
+        } else {
+            Interval::EMPTY
+        };
+    }
+    let discriminant = b * b - a * c;
+    if discriminant <= 0.0 {
+        return Interval::EMPTY;
+    }
+    let root = discriminant.sqrt();
+    Interval::ALL.and(Interval {
+        low: (-b - root) / a,
+        high: (-b + root) / a,
+    })
+}
+
+/// Where `|from + t along| <= half_m` on one axis.
+fn slab(from: f64, along: f64, half_m: f64) -> Interval {
+    half_line(along, half_m - from).and(half_line(-along, half_m + from))
+}
+
+/// Where `t slope <= limit`, within the segment.
+fn half_line(slope: f64, limit: f64) -> Interval {
+    let mut inside = Interval::ALL;
+    if slope > 0.0 {
+        inside.high = inside.high.min(limit / slope);
+    } else if slope < 0.0 {
+        inside.low = inside.low.max(limit / slope);
+    } else if limit < 0.0 {
+        return Interval::EMPTY;
+    }
+    inside
+}
+
+fn in_hull(mesh: &TriangleMesh, from: &Point3<f64>, along: &Vector3<f64>) -> Interval {
+    let mut inside = Interval::ALL;
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|i| mesh.vertices_m[i as usize]);
+        let outwards = (b - a).cross(&(c - a));
+        inside = inside.and(half_line(outwards.dot(along), outwards.dot(&(a - from))));
+        if inside.low >= inside.high {
+            break;
+        }
+    }
+    inside
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use needlebench_kinematics::random::SplitMix64;
+
+    use super::*;
+    use crate::shape::{ConvexMesh, SolidMesh};
+
+    /// Rounding of a few operations on metres.
+    const ROUNDING: f64 = 1e-12;
+
+    fn shapes() -> Vec<Shape> {
+        let half = Vector3::new(0.3, 0.2, 0.1);
+        let cuboid = Shape::Cuboid {
+            half_extents_m: half,
+        };
+        let surface = cuboid.surface(1e-3);
+        vec![
+            Shape::Sphere { radius_m: 0.3 },
+            Shape::Cylinder {
+                radius_m: 0.2,
+                half_length_m: 0.3,
+            },
+            Shape::Capsule {
+                radius_m: 0.15,
+                half_length_m: 0.2,
+            },
+            cuboid,
+            Shape::Convex(Arc::new(ConvexMesh(surface.clone()))),
+            Shape::Mesh(Arc::new(SolidMesh {
+                surface,
+                pieces: Vec::new(),
+            })),
+        ]
+    }
+
+    fn inside(shape: &Shape, p: &Point3<f64>) -> bool {
+        match shape {
+            Shape::Sphere { radius_m } => p.coords.norm() < *radius_m,
+            Shape::Cylinder {
+                radius_m,
+                half_length_m,
+            } => p.z.abs() < *half_length_m && p.x.hypot(p.y) < *radius_m,
+            Shape::Capsule {
+                radius_m,
+                half_length_m,
+            } => {
+                let z = p.z - p.z.clamp(-half_length_m, *half_length_m);
+                Vector3::new(p.x, p.y, z).norm() < *radius_m
+            }
+            _ => p.x.abs() < 0.3 && p.y.abs() < 0.2 && p.z.abs() < 0.1,
+        }
+    }
+
+    #[test]
+    fn a_segment_is_met_where_its_first_inner_point_lies() {
+        /// Steps along the segment; what is shorter than one of them may be missed by the walk.
+        const STEPS: u32 = 2000;
+        let mut random = SplitMix64::new(7);
+        let mut coordinate = || random.uniform(-0.6, 0.6);
+        let (mut hits, mut passes) = (0, 0);
+        for shape in shapes() {
+            for _ in 0..100 {
+                let from = Point3::new(coordinate(), coordinate(), coordinate());
+                let to = Point3::new(coordinate(), coordinate(), coordinate());
+                if inside(&shape, &from) {
+                    continue;
+                }
+                let at = |t: f64| from + (to - from) * t;
+                let walked = (0..=STEPS)
+                    .map(|k| f64::from(k) / f64::from(STEPS))
+                    .find(|t| inside(&shape, &at(*t)));
+                let found = first_hit(&shape, &from, &to);
+                match (walked, found) {
+                    (Some(walked), Some(found)) => {
+                        hits += 1;
+                        assert!(
+                            found <= walked && walked - found <= 1.0 / f64::from(STEPS) + ROUNDING
+                        );
+                    }
+                    (None, None) => passes += 1,
+                    (None, Some(found)) => {
+                        // The walk has stepped over a corner: just behind the hit is inside.
+                        assert!(inside(&shape, &at(found + 1e-6)), "{shape:?}");
+                    }
+                    (Some(_), None) => panic!("{shape:?} missed"),
+                }
+            }
+        }
+        assert!(hits > 100 && passes > 100, "{hits} {passes}");
+    }
+
+    #[test]
+    fn a_segment_that_only_touches_passes() {
+        let from = Point3::new(-1.0, 0.3, 0.0);
+        let to = Point3::new(1.0, 0.3, 0.0);
+        assert_eq!(
+            first_hit(&Shape::Sphere { radius_m: 0.3 }, &from, &to),
+            None
+        );
+        assert!(first_hit(&Shape::Sphere { radius_m: 0.3001 }, &from, &to).is_some());
+    }
+}

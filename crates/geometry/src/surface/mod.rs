@@ -1,0 +1,14 @@
+//! Signed distance of a convex shape or a closed surface from a closed surface.
+//!
+//! Apart, it is the least over the triangles (`nearest`). A side that is within the other is told
+//! from one that is outside by a winding number; then, and when a triangle is touched, the depth
+//! (`penetration_depth`) is the length of the shortest of proven separating translations
+//! (`separating_translation`).
+
+mod distance;
+mod nearest;
+mod penetration_depth;
+mod separating_translation;
+mod sides;
+
+pub(crate) use distance::separation_within;

@@ -1,0 +1,134 @@
+//! Arguments that several commands have.
+
+mod engine;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use nalgebra::Matrix3x4;
+use needlebench_cell::MissingInertia;
+use needlebench_kinematics::UrModel;
+
+pub(crate) use engine::{EngineArgument, EngineParser};
+
+/// Another robot than the scenario's, and whose data it has.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct RobotArguments {
+    /// The arm whose data the robot has: a shipped one's name, such as ur5e, or an arm.toml; without
+    /// --robot it is the robot too.
+    #[arg(long, value_name = "ARM")]
+    pub arm: Option<String>,
+    #[command(flatten)]
+    pub urdf: UrdfArguments,
+}
+
+/// Another robot than the scenario's.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct UrdfArguments {
+    /// URDF of another UR arm, or a shipped arm's name, instead of the scenario's or the default one.
+    #[arg(long, value_name = "URDF")]
+    pub robot: Option<PathBuf>,
+    /// Folder of a ROS package that the URDF's meshes name; may be given several times.
+    #[arg(long, value_name = "NAME=DIR")]
+    pub package_path: Vec<String>,
+    /// Factory calibration of the arm, as ROS's `ur_calibration` writes it: its joint origins
+    /// replace the URDF's.
+    #[arg(long, value_name = "YAML")]
+    pub calibration: Option<PathBuf>,
+    /// What to do when a moving link has no mass.
+    #[arg(long, value_name = "POLICY", value_parser = missing_inertia())]
+    pub missing_inertia: Option<MissingInertia>,
+}
+
+/// Another robot than the default one, where its kinematics are enough.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct ArmArguments {
+    /// A UR arm by name, with its nominal lengths: UR3, UR3e, UR5, UR5e, UR10, UR10e or UR16e.
+    #[arg(
+        long,
+        value_name = "MODEL",
+        conflicts_with_all = ["robot", "package_path", "missing_inertia"]
+    )]
+    pub arm: Option<UrModel>,
+    #[command(flatten)]
+    pub robot: UrdfArguments,
+}
+
+/// Refuse the robot, or take the mass properties of the arm that it is.
+fn missing_inertia() -> impl TypedValueParser<Value = MissingInertia> {
+    PossibleValuesParser::new(MissingInertia::texts()).map(|text| {
+        text.parse()
+            .expect("it is one of the texts that are possible")
+    })
+}
+
+/// Six comma-separated finite numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Six(pub [f64; 6]);
+
+impl std::str::FromStr for Six {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let numbers: Vec<f64> = text
+            .split(',')
+            .map(|word| finite(word.trim()))
+            .collect::<Result<_, _>>()?;
+        let count = numbers.len();
+        numbers
+            .try_into()
+            .map(Self)
+            .map_err(|_| format!("needs six numbers separated by commas, got {count}"))
+    }
+}
+
+/// The upper three rows `[R | p]` of a pose's matrix, as they were given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PoseMatrix(pub Matrix3x4<f64>);
+
+impl std::str::FromStr for PoseMatrix {
+    type Err = String;
+
+    /// Reads what programs print: numbers between commas, semicolons, brackets and white space.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let numbers: Vec<f64> = text
+            .split(|each: char| each.is_whitespace() || ",;[]()".contains(each))
+            .filter(|word| !word.is_empty())
+            .map(finite)
+            .collect::<Result<_, _>>()?;
+        let count = numbers.len();
+        let rows = match count {
+            12 => &numbers[..],
+            16 => {
+                let (rows, last) = numbers.split_at(12);
+                if last != [0.0, 0.0, 0.0, 1.0] {
+                    let columns = [3, 7, 11].iter().all(|&at| rows[at] == 0.0) && last[3] == 1.0;
+                    return Err(if columns {
+                        "the numbers are column by column; give them row by row".to_owned()
+                    } else {
+                        format!("the last row is {last:?}, but has to be 0, 0, 0, 1")
+                    });
+                }
+                rows
+            }
+            _ => {
+                return Err(format!(
+                    "needs 12 numbers (three rows of rotation and position) or 16, got {count}"
+                ));
+            }
+        };
+        Ok(Self(Matrix3x4::from_row_slice(rows)))
+    }
+}
+
+fn finite(word: &str) -> Result<f64, String> {
+    let number: f64 = word
+        .parse()
+        .map_err(|_| format!("`{word}` is not a number"))?;
+    if number.is_finite() {
+        Ok(number)
+    } else {
+        Err(format!("`{word}` is not finite"))
+    }
+}

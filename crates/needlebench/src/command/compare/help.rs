@@ -1,0 +1,67 @@
+//! What `needlebench compare --help` says after the arguments: with every metric of the table.
+
+use needlebench_engine::{ENGINES, engine_names};
+use needlebench_evaluation::metric::{Metric, MetricKey, metrics};
+use needlebench_study::compare::STUDY_RATES;
+
+const INTRODUCTION: &str = "\
+Exits with 1 if a configuration that worked is missing, fails or is rejected (unless \
+--allow-status-change), or if a metric got worse than its --max-loss allows: \
+METRIC[:CONFIGURATION]=VALUE.
+
+Two studies (folders with results.parquet, or such tables) are compared case by case if they have \
+the same cases, else by 95 % intervals. They exit with 1 if more than chance was lost of the layouts \
+that work or of a configuration's success rate (unless --allow-status-change, or a --max-loss is on \
+it), or if a --max-loss is exceeded: METRIC[@PERCENT][:CONFIGURATION]=VALUE, the quantile at PERCENT \
+(default 5, of errors 95) of a configuration, of `every` one, or of the `best` of each layout (default).
+
+Each line has what is known of one thing in several ways; each name is one of them. Where the first \
+result does not have the first of a line, that name stands for the next that both have, and the \
+comparison says so. `_static` is of static cases of studies.
+";
+
+const EXAMPLES: &str = "\
+Example: needlebench compare out/before/layouts out/after/layouts --max-loss clearance@5=1mm \
+--max-loss success_rate:Right-Up-Fold=0.02 --max-loss tip_error@95:every=0.1mm
+Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm
+Example: needlebench compare scenarios/table3.toml other_table.toml --max-loss motion_time=10%";
+
+/// The help.
+pub(crate) fn compare_help() -> String {
+    let mut families: Vec<&str> = Vec::new();
+    for metric in metrics() {
+        if !families.contains(&metric.family) {
+            families.push(metric.family);
+        }
+    }
+    let lines: Vec<String> = families.into_iter().map(family).collect();
+    let rates: Vec<String> = STUDY_RATES
+        .iter()
+        .map(|rate| format!("  {}: {}", rate.name, rate.words))
+        .collect();
+    format!(
+        "{INTRODUCTION}\nMetrics:\n{}\n\nRates of studies:\n{}\n\n{EXAMPLES}",
+        lines.join("\n"),
+        rates.join("\n")
+    )
+}
+
+/// The metrics of a family, what says most first.
+fn family(name: &str) -> String {
+    let members = || metrics().rev().filter(|metric| metric.family == name);
+    let of_runs = members().map(|metric| metric.key.to_owned());
+    let of_static_cases = members()
+        .filter_map(MetricKey::of_static_case)
+        .map(|key| key.key().into_owned());
+    let of_engines = members()
+        .filter(|metric| metric.each_engine)
+        .flat_map(|metric| {
+            let engines = engine_names(ENGINES).into_iter();
+            engines.filter_map(move |engine| MetricKey::of_engine(metric, engine))
+        })
+        .map(|key| key.key().into_owned());
+    let mut keys: Vec<String> = of_runs.chain(of_static_cases).chain(of_engines).collect();
+    keys.dedup();
+    let words = Metric::of_key(name).map_or(name, |metric| metric.words);
+    format!("  {}: {words}", keys.join(", "))
+}

@@ -1,0 +1,233 @@
+//! `needlebench compare` of two studies.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use needlebench_bench::study::FormerResults;
+use needlebench_cell::Finding;
+use needlebench_evaluation::metric::resolve;
+use needlebench_evaluation::{Compared, Loss, Rate, Subject, Threshold};
+use needlebench_study::compare::{
+    ComparedStudy, STUDY_RATES, StudyCompareOptions, StudyComparison, StudyLimit, StudyPair,
+    StudySubject, StudyThreshold,
+};
+use needlebench_study::{MANIFEST_FILE, ParquetResults, RESULTS_FILE, ResultsError};
+
+use super::super::run::probe_file;
+use super::super::{print_json, print_text};
+use super::CompareArguments;
+use super::thresholds::{Given, thresholds};
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use needlebench_report::table::study_comparison::study_comparison_text;
+use needlebench_report::{study_comparison_junit, study_comparison_markdown, write_atomically};
+
+/// Whether a path is a study's folder, or its table.
+fn is_study(path: &Path) -> bool {
+    let is_table = path
+        .extension()
+        .is_some_and(|extension| extension == "parquet");
+    is_table || path.join(RESULTS_FILE).is_file() || path.join(MANIFEST_FILE).is_file()
+}
+
+/// Compares two studies; none if neither is one.
+pub(super) fn compare_if_studies(arguments: &CompareArguments) -> Result<Option<ExitStatus>> {
+    let studies = [&arguments.a, &arguments.b].map(|path| is_study(path));
+    if studies == [false, false] {
+        return Ok(None);
+    }
+    let prepared = match prepare(arguments, studies) {
+        Ok(prepared) => prepared,
+        Err(findings) => {
+            print_findings(&findings);
+            return Ok(Some(ExitStatus::BadInput));
+        }
+    };
+    let comparison = match compared(arguments, &prepared) {
+        Ok(comparison) => comparison,
+        Err(error) => {
+            print_findings(&[finding(error)]);
+            return Ok(Some(ExitStatus::BadInput));
+        }
+    };
+    let write = |path: &Path, text: String| {
+        write_atomically(path, text.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))
+    };
+    if let Some(path) = &arguments.junit {
+        write(path, study_comparison_junit(&comparison)?)?;
+    }
+    if let Some(path) = &arguments.markdown {
+        write(path, study_comparison_markdown(&comparison))?;
+    }
+    if arguments.json {
+        print_json(&comparison)?;
+    } else {
+        print_text(study_comparison_text(&comparison, arguments.all).trim_end())?;
+    }
+    Ok(Some(if comparison.pass {
+        ExitStatus::Success
+    } else {
+        ExitStatus::CriterionFailed
+    }))
+}
+
+struct Prepared {
+    given: Given,
+    results: [ParquetResults; 2],
+}
+
+/// Reads both studies and compares them.
+fn compared(
+    arguments: &CompareArguments,
+    prepared: &Prepared,
+) -> Result<StudyComparison, ResultsError> {
+    let names = [&arguments.a, &arguments.b].map(|path| path.display().to_string());
+    let [a, b] = &prepared.results;
+    let former = [a, b].map(|results| results.is_former().then(|| FormerResults::new(results)));
+    let side = |at: usize| ComparedStudy {
+        source: &names[at],
+        name: prepared.results[at].study_name(),
+        study_id: prepared.results[at].study_id(),
+        results: match &former[at] {
+            Some(former) => former,
+            None => &prepared.results[at],
+        },
+    };
+    let given = &prepared.given.thresholds;
+    let quantiles: Vec<f64> = given
+        .iter()
+        .filter_map(|threshold| match threshold.subject {
+            Subject::Metric(_, quantile) => quantile,
+            Subject::Rate(_) => None,
+        })
+        .collect();
+    let pair = StudyPair::read(side(0), side(1), &quantiles)?;
+    let mut notes: Vec<String> = former
+        .iter()
+        .zip(&names)
+        .filter_map(|(former, name)| Some(former.as_ref()?.note(name)))
+        .collect();
+    let mut thresholds = Vec::new();
+    for threshold in given {
+        notes.extend(threshold.note.clone());
+        let (of_study, note) = on_columns(threshold, &pair);
+        notes.extend(note);
+        thresholds.push(of_study);
+    }
+    Ok(pair.compare(&StudyCompareOptions {
+        thresholds,
+        allow_status_change: prepared.given.allow_status_change,
+        notes,
+    }))
+}
+
+/// A threshold in the units of the studies' columns, on the metric that both can be compared by; and
+/// what there is to say where that is not the one that was asked for.
+fn on_columns(threshold: &Threshold, pair: &StudyPair<'_>) -> (StudyThreshold, Option<String>) {
+    let (subject, si, note) = match &threshold.subject {
+        Subject::Rate(rate) => {
+            let mut rates = STUDY_RATES.into_iter();
+            let rate = rates.find(|each| each.name == rate.name);
+            let rate = rate.expect("only the rates of studies are known");
+            (StudySubject::Rate(rate), 1.0, None)
+        }
+        Subject::Metric(wanted, quantile) => {
+            let resolved = resolve(wanted, |key| pair.have(key)[0], |key| pair.have(key)[1]);
+            let quantile = quantile.expect("thresholds of studies have one");
+            let key = resolved.key.key().into_owned();
+            let subject = StudySubject::Metric(key, quantile);
+            (subject, resolved.key.metric().unit.si, resolved.note)
+        }
+    };
+    let limit = match threshold.limit.in_unit(si) {
+        Loss::Absolute(limit) => StudyLimit::Absolute(limit),
+        Loss::Relative(share) => StudyLimit::Relative(share),
+    };
+    let of_study = StudyThreshold {
+        subject,
+        of: threshold.of.clone(),
+        limit,
+        key: threshold.key.clone(),
+        text: threshold.text.clone(),
+    };
+    let note = note.map(|note| format!("threshold {}: {note}", threshold.key));
+    (of_study, note)
+}
+
+/// Everything that can be wrong before a table is read.
+fn prepare(arguments: &CompareArguments, studies: [bool; 2]) -> Result<Prepared, Vec<Finding>> {
+    let given = given(arguments)?;
+    for (path, argument) in [
+        (&arguments.junit, "--junit"),
+        (&arguments.markdown, "--markdown"),
+    ] {
+        if let Some(path) = path {
+            probe_file(path, argument).map_err(|finding| vec![finding])?;
+        }
+    }
+    for (path, other, is_study) in [
+        (&arguments.a, &arguments.b, studies[0]),
+        (&arguments.b, &arguments.a, studies[1]),
+    ] {
+        if !is_study {
+            let finding = Finding::new(
+                path.display().to_string(),
+                format!("this is no study, but {} is one", other.display()),
+            );
+            return Err(vec![finding.hint(
+                "compare two studies: folders with results.parquet, or such tables",
+            )]);
+        }
+    }
+    let results = [open(&arguments.a)?, open(&arguments.b)?];
+    Ok(Prepared { given, results })
+}
+
+/// Thresholds and what else is said of the comparison.
+fn given(arguments: &CompareArguments) -> Result<Given, Vec<Finding>> {
+    let mut findings = Vec::new();
+    if !arguments.goal.is_empty() {
+        findings.push(
+            Finding::new("--goal", "goals of studies cannot be matched by hand")
+                .hint("studies with other goals are compared by their rates and quantiles"),
+        );
+    }
+    let rates = STUDY_RATES.map(|rate| Rate {
+        name: rate.name,
+        of_configurations: rate.of_configurations,
+    });
+    match thresholds(arguments, Compared::Studies(&rates)) {
+        Ok(given) if findings.is_empty() => Ok(given),
+        Ok(_) => Err(findings),
+        Err(more) => {
+            findings.extend(more);
+            Err(findings)
+        }
+    }
+}
+
+fn open(path: &Path) -> Result<ParquetResults, Vec<Finding>> {
+    let table: PathBuf = if path.is_dir() {
+        path.join(RESULTS_FILE)
+    } else {
+        path.to_owned()
+    };
+    if path.is_dir() && !table.is_file() {
+        let finding = Finding::new(
+            path.display().to_string(),
+            format!("the study is not complete: it has no {RESULTS_FILE}"),
+        );
+        return Err(vec![finding.hint(
+            "finish it with `needlebench study STUDY --resume`, or `needlebench merge` its shards",
+        )]);
+    }
+    ParquetResults::open(&table).map_err(|error| vec![finding(error)])
+}
+
+fn finding(error: ResultsError) -> Finding {
+    match error.message.split_once("\nhint: ") {
+        Some((message, hint)) => Finding::new(error.file, message).hint(hint),
+        None => Finding::new(error.file, error.message),
+    }
+}

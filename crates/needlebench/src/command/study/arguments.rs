@@ -1,0 +1,92 @@
+//! Arguments of `study` and `merge`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use needlebench_study::Shard;
+
+use crate::arguments::RobotArguments;
+
+pub(crate) const STUDY_HELP: &str = "\
+A study is one TOML file: a scenario, factors that vary it, and what is asked of the results. Every case \
+has a number that decides everything about it.
+
+Writes DIR/NAME/results.parquet, summary.json, summary.md, report.html and study.json. An interrupted \
+study goes on with --resume. Shards may run on several machines; `merge` joins them.
+
+Example: needlebench study scenarios/studies/layouts.toml
+Example: needlebench study scenarios/studies/layouts.toml --case 1234
+Example: needlebench study scenarios/studies/layouts.toml --shard 1/3 --out shard1
+Example: needlebench merge scenarios/studies/layouts.toml shard1/layouts shard2/layouts shard3/layouts";
+
+/// Arguments of `study`.
+#[derive(Debug, Args)]
+pub(crate) struct StudyArguments {
+    /// Study file.
+    #[arg(value_name = "STUDY")]
+    pub study: PathBuf,
+    /// Folder for results; the study gets a folder of its name in it.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Go on with a study that was interrupted.
+    #[arg(long)]
+    pub resume: bool,
+    /// Start without asking, however long it will take.
+    #[arg(long)]
+    pub yes: bool,
+    /// Compute one of N parts: 1/N to N/N.
+    #[arg(long, value_name = "K/N")]
+    pub shard: Option<Shard>,
+    /// Compute these cases alone and print their rows; nothing is written.
+    #[arg(long, value_name = "ID", conflicts_with_all = ["resume", "shard", "csv"])]
+    pub case: Vec<u64>,
+    /// With --case: run it with engines, pictures and a page, as `run` does, into the study's folder.
+    #[arg(long, requires = "case")]
+    pub run: bool,
+    #[command(flatten)]
+    pub results: StudyResultArguments,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+/// Arguments of `merge`.
+#[derive(Debug, Args)]
+pub(crate) struct MergeArguments {
+    /// Study file.
+    #[arg(value_name = "STUDY")]
+    pub study: PathBuf,
+    /// Folders of all its shards, those with the file `study.json`.
+    #[arg(required = true, value_name = "SHARD")]
+    pub shards: Vec<PathBuf>,
+    /// Folder for results; the study gets a folder of its name in it.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub results: StudyResultArguments,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+/// What is made of a complete table, and how.
+#[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub(crate) struct StudyResultArguments {
+    /// Write results.csv too.
+    #[arg(long)]
+    pub csv: bool,
+    /// Print one JSON document instead of the tables.
+    #[arg(long)]
+    pub json: bool,
+    /// Write JUnit XML of the study's criteria to this file.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+    /// Threads; the number of cores if left out. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: Option<u16>,
+    /// Write no page.
+    #[arg(long)]
+    pub no_page: bool,
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+}

@@ -1,0 +1,209 @@
+//! One name is one number, in runs and in studies, of this version and of older ones.
+
+use std::collections::BTreeSet;
+
+use needlebench_evaluation::metric::MetricKey;
+use serde_json::Value;
+
+use crate::support::{Bench, SMALL};
+
+const IMPERFECT: &str = "
+[engines]
+run = [\"rapier\"]
+[imperfections]
+budget_samples = 2
+[imperfections.calibration]
+[imperfections.encoder]
+[imperfections.payload]
+[imperfections.friction]
+[imperfections.registration]
+[imperfections.breathing]
+";
+
+/// Two places of the phantom.
+fn study(mode: &str) -> String {
+    format!(
+        "name = \"{mode}\"\nscenario = \"s.toml\"\nseed = 1\nmode = \"{mode}\"\n[[factors]]\nname = \"up\"\n\
+         key = \"phantom.position_mm[2]\"\nvalues = [-2, 0]\nrelative = true\n"
+    )
+}
+
+#[test]
+fn a_case_and_its_run_have_the_same_number_under_the_same_name() {
+    let bench = Bench::with_scenario(&format!("{SMALL}{IMPERFECT}"));
+    for (mode, fewest_shared) in [("static", 1), ("planned", 28), ("dynamic", 55)] {
+        bench.write("study.toml", study(mode));
+        let case = ["study", "study.toml", "--case", "1", "--quiet"];
+        let rows = bench.run(&[&case[..], &["--json"]].concat());
+        let rows = rows.exits_with(0).json();
+        let status = bench
+            .run(&[&case[..], &["--run", "--no-page"]].concat())
+            .status;
+        // The nominal pose is missed by more than a millimetre.
+        assert!(matches!(status, Some(0 | 1)), "{status:?}");
+        let report = bench.read_json(&format!("out/{mode}/cases/1/report.json"));
+        let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+        for (row, configuration) in rows["rows"].as_array().unwrap().iter().zip(configurations) {
+            assert_eq!(row["configuration"], configuration["label"]);
+            let mut shared = 0;
+            for (column, value) in row["metrics"].as_object().unwrap() {
+                let key = MetricKey::named(column, &["rapier"]).unwrap();
+                let of_run = &configuration["metrics"][&*key.key()];
+                let Some(of_run) = of_run.as_f64() else {
+                    // What a run does not have says so by its name.
+                    let name = key.key();
+                    let is_of_study = name.ends_with("_static") || name.contains("_planned");
+                    assert!(is_of_study, "{mode} {column}");
+                    continue;
+                };
+                #[expect(clippy::cast_possible_truncation, reason = "as columns are")]
+                let bits = |value: f64| (value as f32).to_bits();
+                assert_eq!(
+                    bits(value.as_f64().unwrap()),
+                    bits(of_run / key.metric().unit.si),
+                    "{mode} {} {column}",
+                    row["configuration"]
+                );
+                shared += 1;
+            }
+            assert!(
+                configuration["status"] == "rejected" || shared >= fewest_shared,
+                "{mode} {shared}"
+            );
+        }
+    }
+}
+
+#[test]
+fn studies_of_an_older_version_are_compared_by_todays_names() {
+    for (mode, name, said) in [
+        (
+            "static",
+            include_bytes!("former/static.parquet").as_slice(),
+            "`clearance_mm` as `clearance_static_mm`",
+        ),
+        (
+            "planned",
+            include_bytes!("former/planned.parquet").as_slice(),
+            "`certified_clearance_mm` as `clearance_planned_mm`",
+        ),
+        (
+            "dynamic",
+            include_bytes!("former/dynamic.parquet").as_slice(),
+            "`clearance_mm` as `clearance_attained_mm`",
+        ),
+    ] {
+        let bench = Bench::with_scenario(&format!("{SMALL}[engines]\nrun = [\"rapier\"]\n"));
+        bench.write("former.parquet", name);
+        bench.write("study.toml", study(mode));
+        let arguments = ["study", "study.toml", "--quiet", "--no-page"];
+        bench.run(&arguments).exits_with(0);
+        let now = format!("out/{mode}");
+        let mut arguments = vec!["compare", "former.parquet", &now];
+        for limit in ["clearance=1um", "self_clearance=1um", "tip_error=1um"] {
+            arguments.extend(["--max-loss", limit]);
+        }
+        let answer = bench.run(&arguments).exits_with(0).stdout;
+        assert!(
+            answer.contains("former.parquet is of an older version"),
+            "{answer}"
+        );
+        assert!(answer.contains(said), "{answer}");
+        assert!(answer.contains("the same 2 cases in both"), "{answer}");
+        // Nothing has changed but the names.
+        let found = bench.run(&[&arguments[..], &["--json"]].concat()).json();
+        let differences = found["paired"]["differences"].as_array().unwrap();
+        assert!(differences.len() > 8, "{differences:#?}");
+        for each in differences {
+            let mean = each["mean"].as_f64().unwrap();
+            assert!(mean.abs() < 1e-4, "{each:#}");
+        }
+        for (threshold, family) in [
+            ("clearance=1um", "clearance"),
+            ("self_clearance=1um", "self_clearance"),
+        ] {
+            let is_itself = mode == "dynamic" && family == "clearance";
+            let note = format!("threshold {family}: `{family}` was not measured");
+            assert_eq!(answer.contains(&note), !is_itself, "{threshold} {answer}");
+        }
+    }
+}
+
+#[test]
+fn a_name_that_static_studies_lack_is_answered_by_their_own_and_said() {
+    let bench = Bench::with_scenario(SMALL);
+    bench.write("study.toml", study("static"));
+    let arguments = ["study", "study.toml", "--quiet", "--no-page"];
+    bench.run(&arguments).exits_with(0);
+    let compare = |limit: &str| {
+        let study = "out/static";
+        bench.run(&["compare", study, study, "--max-loss", limit])
+    };
+    let answer = compare("clearance@5=1mm").exits_with(0).stdout;
+    let note = "note: threshold clearance@5: `clearance` was not measured: compared by \
+                `clearance_static` (";
+    assert!(answer.contains(note), "{answer}");
+    let answer = compare("clearance_static@5=1mm").exits_with(0).stdout;
+    assert!(!answer.contains("note:"), "{answer}");
+    // Whoever says more says exactly what is meant.
+    let answer = compare("clearance_attained@5=1mm").exits_with(1).stdout;
+    assert!(answer.contains("neither study has values"), "{answer}");
+    let answer = compare("certified_clearance=1mm").exits_with(0).stdout;
+    assert!(
+        answer.contains("note: `certified_clearance` is called `clearance` now"),
+        "{answer}"
+    );
+}
+
+#[test]
+fn a_report_without_keys_has_the_numbers_of_one_with_them() {
+    let bench = Bench::with_scenario(SMALL);
+    let report = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
+    let report = report.exits_with(0).stdout;
+    bench.write("now.json", &report);
+    let mut former: Value = serde_json::from_str(&report).unwrap();
+    for each in former["goals"][0]["configurations"].as_array_mut().unwrap() {
+        each.as_object_mut().unwrap().remove("metrics");
+    }
+    bench.write("former.json", former.to_string());
+    let found = bench.run(&["compare", "former.json", "now.json", "--json"]);
+    let found = found.exits_with(0).json();
+    assert!(
+        found["notes"][0]
+            .as_str()
+            .unwrap()
+            .contains("former.json is of an older version")
+    );
+    let mut known = BTreeSet::new();
+    for each in found["goals"][0]["configurations"].as_array().unwrap() {
+        for metric in each["metrics"].as_array().unwrap() {
+            let name = metric["metric"].as_str().unwrap();
+            if metric["a"].is_null() {
+                // What older versions did not measure.
+                assert_eq!(metric["outcome"], "new", "{metric:#}");
+            } else {
+                assert_eq!(metric["a"], metric["b"], "{metric:#}");
+                known.insert(name.to_owned());
+            }
+        }
+    }
+    for name in [
+        "clearance",
+        "clearance_attained",
+        "arm_to_skin",
+        "least_clearance",
+        "needle_corridor",
+        "needle_route",
+        "tip_error",
+        "tip_error_rapier",
+        "depth_error",
+        "motion_time",
+        "peak_torque",
+        "joint_margin",
+        "singularity_margin",
+        "free_fraction",
+        "q3",
+    ] {
+        assert!(known.contains(name), "{name} is not in {known:?}");
+    }
+}

@@ -1,0 +1,306 @@
+//! What plans are made with: the solver, the checker, and one posture with what can be said of it.
+
+use std::f64::consts::TAU;
+
+use needlebench_cell::scenario::PlanningSection;
+use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, Roll};
+use needlebench_clearance::{ClassMinima, ClearanceModel};
+use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
+use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
+
+use crate::motion::MotionChecker;
+use crate::{Rejection, Rule};
+/// Where a final posture stands between its limits and singularities.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PostureMargins {
+    /// 1 in the middle of every joint's range, 0 at a limit.
+    pub joint_limit: f64,
+    /// `|sin q5|`.
+    pub wrist_sine: f64,
+    /// `|sin q3|`.
+    pub elbow_sine: f64,
+    /// `sqrt(rho^2 - d4^2)`, m.
+    pub shoulder_m: f64,
+    /// `sqrt(det J J^T)` of the flange.
+    pub manipulability: f64,
+}
+
+/// A posture that brings the guide to its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Final joint positions, rad, wrapped as the motion reaches them.
+    pub joints: Joints,
+    /// Angle of the guide about the needle, rad.
+    pub roll_rad: f64,
+    /// Whole turns that were added to the positions in `(-pi, pi]`.
+    pub wrap: [i32; JOINT_COUNT],
+    /// Distance of the flange from its planned place, m.
+    pub residual_m: f64,
+    /// Angle of the flange from its planned orientation, rad.
+    pub residual_rad: f64,
+    /// Wrist 3 is free at this pose.
+    pub wrist_3_is_free: bool,
+    /// Margins of the posture.
+    pub margins: PostureMargins,
+    /// Least clearance of the final posture, per class.
+    pub clearance: ClassMinima,
+}
+
+/// Plans the goals of one scenario.
+#[derive(Debug)]
+pub struct Planner<'a> {
+    pub(crate) resolved: &'a ResolvedScenario,
+    kinematics: Kinematics,
+    pub(crate) checker: MotionChecker<'a>,
+    /// Keys of the scenario's `[ranking]` with weights and utilities.
+    ranking_aims: Vec<(&'static str, needlebench_cell::ranking::Aim)>,
+}
+
+impl<'a> Planner<'a> {
+    /// Prepares the planner.
+    ///
+    /// # Errors
+    /// [`NotUrGeometry`] if the robot is not a UR arm.
+    pub fn new(
+        resolved: &'a ResolvedScenario,
+        clearance: &'a ClearanceModel,
+    ) -> Result<Self, NotUrGeometry> {
+        let planning = &resolved.scenario.planning;
+        Ok(Self {
+            resolved,
+            kinematics: Kinematics::new(resolved.cell.robot.chain)?
+                .within(resolved.cell.robot.limits),
+            checker: MotionChecker::new(
+                &resolved.cell,
+                clearance,
+                planning.min_clearance_mm * 1e-3,
+                planning.min_self_clearance_mm * 1e-3,
+                planning.sample_spacing_mm * 1e-3,
+            ),
+            ranking_aims: resolved.scenario.ranking.aims().to_vec(),
+        })
+    }
+
+    pub(crate) fn cell(&self) -> &Cell {
+        &self.resolved.cell
+    }
+
+    pub(crate) fn start(&self) -> &Joints {
+        &self.resolved.start
+    }
+
+    pub(crate) fn planning(&self) -> &PlanningSection {
+        &self.resolved.scenario.planning
+    }
+
+    pub(crate) fn ranking_aims(&self) -> &[(&'static str, needlebench_cell::ranking::Aim)] {
+        &self.ranking_aims
+    }
+
+    /// Least clearance that a class of physical bodies may have, m.
+    pub(crate) fn limit_m(&self, class: ClearanceClass) -> f64 {
+        self.checker.limit_m(class)
+    }
+
+    /// The solver, for callers that need poses of their own.
+    pub fn kinematics(&self) -> &Kinematics {
+        &self.kinematics
+    }
+
+    /// Pose of the flange in `base_link` that brings the guide to a goal.
+    pub fn base_link_from_flange(&self, goal: &Goal, roll_rad: f64) -> Pose {
+        let cell = &self.resolved.cell;
+        cell.robot.world_from_base_link.inverse()
+            * goal.world_from_guide_exit_at(roll_rad)
+            * cell.tool.flange_from_guide_exit.inverse()
+    }
+
+    /// Rolls that are looked at: all round where it is free, else the one.
+    pub fn rolls(&self, goal: &Goal, count: u32) -> Vec<f64> {
+        match goal.roll {
+            Roll::Fixed(roll_rad) => vec![roll_rad],
+            Roll::Free => (0..count)
+                .map(|k| TAU * f64::from(k) / f64::from(count))
+                .collect(),
+        }
+    }
+    /// Margins, clearances and broken rules of one posture.
+    pub(crate) fn candidate(
+        &self,
+        roll_rad: f64,
+        solution: &Solution,
+    ) -> (Candidate, Vec<Rejection>) {
+        let planning = &self.resolved.scenario.planning;
+        let limits = &self.resolved.cell.robot.limits;
+        let mut rejections = Vec::new();
+        if solution.kind == SolutionKind::Nearest {
+            rejections.push(Rejection {
+                rule: Rule::NearestOnly,
+                value: solution.residual_m,
+                limit: 1e-9,
+                unit: "m",
+                detail: "the refined posture misses the pose".to_owned(),
+                class: None,
+            });
+        }
+        for (joint, label) in JOINT_LABELS.into_iter().enumerate() {
+            if limits.0[joint].turns(solution.joints[joint]).is_none() {
+                let (position, limit) = (solution.joints[joint], limits.0[joint]);
+                rejections.push(Rejection {
+                    rule: Rule::JointLimit,
+                    value: position,
+                    limit: if position > limit.upper_rad {
+                        limit.upper_rad
+                    } else {
+                        limit.lower_rad
+                    },
+                    unit: "rad",
+                    detail: format!("{label} has no place in its range"),
+                    class: None,
+                });
+            }
+        }
+        let margins = self.margins(&solution.joints);
+        for (value, limit, unit, detail) in [
+            (
+                margins.wrist_sine,
+                planning.min_singularity_sine,
+                "1",
+                "wrist: |sin q5|",
+            ),
+            (
+                margins.elbow_sine,
+                planning.min_singularity_sine,
+                "1",
+                "elbow: |sin q3|",
+            ),
+            (
+                margins.shoulder_m,
+                planning.min_shoulder_distance_mm * 1e-3,
+                "m",
+                "shoulder: sqrt(rho^2 - d4^2)",
+            ),
+        ] {
+            if value < limit {
+                rejections.push(Rejection {
+                    rule: Rule::Singular,
+                    value,
+                    limit,
+                    unit,
+                    detail: detail.to_owned(),
+                    class: None,
+                });
+            }
+        }
+        let (clearance, broken) = self.clearance_rules(&solution.joints);
+        rejections.extend(broken);
+        let candidate = Candidate {
+            joints: solution.joints,
+            roll_rad,
+            wrap: [0; JOINT_COUNT],
+            residual_m: solution.residual_m,
+            residual_rad: solution.residual_rad,
+            wrist_3_is_free: solution.wrist_3_is_free,
+            margins,
+            clearance,
+        };
+        (candidate, rejections)
+    }
+
+    /// Least clearances of a posture, and the rules about them that it breaks.
+    pub fn clearance_rules(&self, q: &Joints) -> (ClassMinima, Vec<Rejection>) {
+        let mut rejections = Vec::new();
+        let (clearance, collision) = self.checker.posture(q);
+        if let Some(pair) = collision {
+            rejections.push(Rejection {
+                rule: Rule::Collision,
+                value: pair.separation.distance_m,
+                limit: self.checker.limit_m(pair.class),
+                unit: "m",
+                detail: {
+                    let (a, b) = pair.solid_names(&self.resolved.cell);
+                    format!("{a} and {b} in the final posture")
+                },
+                class: Some(pair.class),
+            });
+        }
+        if let Some(corridor) = clearance.get(ClearanceClass::NeedleCorridor)
+            && self.planning().require_needle_corridor
+            && corridor.separation.distance_m < 0.0
+        {
+            let (a, b) = corridor.solid_names(&self.resolved.cell);
+            let blocker = match a {
+                "needle_corridor" | "hand_cone" => b,
+                _ => a,
+            };
+            rejections.push(Rejection {
+                rule: Rule::NeedleCorridor,
+                value: corridor.separation.distance_m,
+                limit: 0.0,
+                unit: "m",
+                detail: format!("{blocker} stands behind the guide"),
+                class: Some(ClearanceClass::NeedleCorridor),
+            });
+        }
+        (clearance, rejections)
+    }
+
+    pub(crate) fn margins(&self, q: &Joints) -> PostureMargins {
+        let jacobian = self.kinematics.chain.jacobian(q);
+        PostureMargins {
+            joint_limit: self.resolved.cell.robot.limits.margin(q),
+            wrist_sine: q[4].sin().abs(),
+            elbow_sine: q[2].sin().abs(),
+            shoulder_m: self.kinematics.geometry.wrist_forward_m(q).abs(),
+            manipulability: jacobian.determinant().abs(),
+        }
+    }
+}
+/// Why a configuration is not among the solutions of a pose.
+pub(crate) fn absent(configuration: Configuration, found: &Solutions) -> Rejection {
+    match found.unreachable.iter().find(|(c, _)| *c == configuration) {
+        Some((_, reason)) => Rejection {
+            rule: Rule::Unreachable,
+            value: reason.missing_m(),
+            limit: 0.0,
+            unit: "m",
+            detail: unreachable_detail(*reason),
+            class: None,
+        },
+        None => merged(configuration, &found.solutions),
+    }
+}
+
+fn unreachable_detail(reason: needlebench_kinematics::ik::Unreachable) -> String {
+    use needlebench_kinematics::ik::Unreachable;
+    match reason {
+        Unreachable::WristTooNear { .. } => "the wrist is too near to the shoulder axis",
+        Unreachable::ElbowTooShort { .. } => "upper arm and forearm are too short",
+        Unreachable::ElbowTooLong { .. } => "the elbow cannot fold so far",
+        Unreachable::NoCounterpart { .. } => {
+            "the nominal arm reaches the pose, the calibrated one does not"
+        }
+        Unreachable::NotFinite => "the pose is not finite",
+    }
+    .to_owned()
+}
+
+fn merged(configuration: Configuration, solutions: &[Solution]) -> Rejection {
+    let twin = solutions
+        .iter()
+        .find(|each| each.merged || each.wrist_3_is_free);
+    Rejection {
+        rule: Rule::Merged,
+        value: 0.0,
+        limit: 0.0,
+        unit: "1",
+        detail: match twin {
+            Some(twin) => format!(
+                "{configuration} is the same posture as {}",
+                twin.configuration
+            ),
+            None => format!("{configuration} does not exist at this pose"),
+        },
+        class: None,
+    }
+}

@@ -1,0 +1,5 @@
+//! Plans, from outside the crate.
+
+mod around;
+mod families;
+mod plans;

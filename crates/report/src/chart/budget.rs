@@ -1,0 +1,280 @@
+//! Where the needle goes: error budgets as ellipses, and the shares of the sources.
+
+use needlebench_evaluation::report::GoalReport;
+use needlebench_uncertainty::Source;
+use needlebench_uncertainty::budget::{ErrorBudget, Moments, SourceBudget};
+
+use super::axis::Axis;
+use super::drawing::{Anchor, Chart, Size};
+use super::legend::{ROW_PX, Sample, legend};
+use super::paint::{Paint, Stroke};
+use super::panel::Panel;
+use crate::table::budget::{ALLOWED_M, budgets, mm};
+
+/// Side of a panel, px.
+const PANEL_PX: f64 = 240.0;
+/// From the left end of a tile to its panels, and from one panel to the next, px.
+const BESIDE_PX: f64 = 58.0;
+/// From the top of a tile to its panels, and from their foot to the bar of shares, px.
+const ABOVE_PX: f64 = 30.0;
+const BELOW_PX: f64 = 56.0;
+const BAR_PX: f64 = 14.0;
+/// Width and height of a tile, and the space around it, px.
+const TILE_PX: [f64; 2] = [
+    2.0 * (BESIDE_PX + PANEL_PX),
+    ABOVE_PX + PANEL_PX + BELOW_PX + BAR_PX + 24.0,
+];
+const GAP_PX: f64 = 20.0;
+const COLUMNS: usize = 2;
+
+const TARGET: Stroke = Stroke {
+    paint: Paint::Series(0),
+    width: 3.0,
+    dash: None,
+};
+const SKIN: Stroke = Stroke {
+    paint: Paint::Series(5),
+    width: 2.0,
+    dash: None,
+};
+const DRAWN: Stroke = Stroke {
+    paint: Paint::Ink,
+    width: 1.2,
+    dash: Some([4.0, 3.0]),
+};
+
+/// Radius of the ellipse that holds 95 % of a plane normal distribution, in standard deviations.
+const ELLIPSE_95: f64 = 2.4477;
+
+/// Where the needle goes: 95 % ellipses at skin and target, across and along the needle, and the
+/// shares of the sources, for every configuration; none without imperfections.
+pub fn budget_chart(goal: &GoalReport) -> Option<Chart> {
+    let budgets = budgets(goal);
+    if budgets.is_empty() {
+        return None;
+    }
+    let tiles: Vec<(&str, &ErrorBudget)> = budgets
+        .into_iter()
+        .map(|(configuration, budget)| (configuration.label, budget))
+        .collect();
+    Some(chart(&goal.name, &tiles))
+}
+
+fn chart(goal: &str, budgets: &[(&str, &ErrorBudget)]) -> Chart {
+    let reach_m = budgets
+        .iter()
+        .flat_map(|(_, budget)| [budget.total.at_target, budget.total.at_skin])
+        .map(|point| {
+            let moments = point.analytic;
+            moments.bias().amax() + ELLIPSE_95 * moments.principal()[0].0
+        })
+        .fold(ALLOWED_M, f64::max)
+        * 1.08;
+    let width = COLUMNS as f64 * (TILE_PX[0] + GAP_PX) + GAP_PX;
+    let title = format!("{goal}: where the needle goes");
+    let mut chart = Chart::new([width, 0.0], &*title);
+    chart.write_large([GAP_PX, 24.0], title);
+    let allowed = format!("{} mm: what radiologists allow on average", mm(ALLOWED_M));
+    let entries = [
+        (Sample::Line(TARGET), "95 % at the target"),
+        (Sample::Line(SKIN), "95 % at the skin"),
+        (Sample::Line(DRAWN), "95 % at the target, by draws"),
+        (Sample::Circle(8.0, limit()), &*allowed),
+    ];
+    let rows = legend(&mut chart, [GAP_PX, 56.0], width - 2.0 * GAP_PX, entries);
+    let top = 56.0 + ROW_PX * rows as f64;
+    for (index, (label, budget)) in budgets.iter().enumerate() {
+        let corner = [
+            GAP_PX + (index % COLUMNS) as f64 * (TILE_PX[0] + GAP_PX),
+            top + (index / COLUMNS) as f64 * (TILE_PX[1] + GAP_PX),
+        ];
+        tile(&mut chart, corner, label, budget, reach_m);
+    }
+    let rows = budgets.len().div_ceil(COLUMNS) as f64;
+    chart.size[1] = top + rows * (TILE_PX[1] + GAP_PX);
+    chart
+}
+
+fn limit() -> Stroke {
+    Stroke::full(Paint::Limit, 1.2)
+}
+
+fn tile(chart: &mut Chart, [left, top]: [f64; 2], label: &str, budget: &ErrorBudget, reach_m: f64) {
+    let total = &budget.total;
+    let heading = format!(
+        "{label}   {} mm rms, {} mm across",
+        mm(total.at_target.analytic.rms_m),
+        mm(total.at_target.analytic.lateral_rms_m)
+    );
+    chart.write(Anchor::Start, [left, top + 8.0], heading);
+    let reach_mm = 1e3 * reach_m;
+    let axis = |name: &str| Axis::linear(format!("{name} (mm)"), -reach_mm, reach_mm);
+    let panels = [
+        (1, "y, across"),
+        // Along the needle.
+        (2, "z, along"),
+    ];
+    for (place, (vertical, name)) in panels.into_iter().enumerate() {
+        let panel = Panel {
+            corner: [
+                left + BESIDE_PX + place as f64 * (BESIDE_PX + PANEL_PX),
+                top + ABOVE_PX,
+            ],
+            size: [PANEL_PX; 2],
+            title: String::new(),
+            x: axis("x, across"),
+            y: axis(name),
+        };
+        panel.draw(chart);
+        let scale = 0.5 * PANEL_PX / reach_m;
+        chart.circle(panel.at([0.0, 0.0]), ALLOWED_M * scale, limit());
+        let mut ellipse = |moments: &Moments, stroke: Stroke| {
+            let outline = ellipse_points(moments, (0, vertical));
+            panel.curve(chart, outline, stroke);
+            let bias = moments.bias();
+            let middle = [1e3 * bias[0], 1e3 * bias[vertical]];
+            panel.points(chart, [middle], stroke.width + 1.0, stroke.paint);
+        };
+        ellipse(&total.at_skin.analytic, SKIN);
+        ellipse(&total.at_target.analytic, TARGET);
+        if let Some(sampled) = &total.at_target.monte_carlo {
+            ellipse(sampled, DRAWN);
+        }
+    }
+    let bar = [left + BESIDE_PX, top + ABOVE_PX + PANEL_PX + BELOW_PX];
+    shares(chart, bar, TILE_PX[0] - BESIDE_PX, budget);
+}
+
+/// Closed outline of the 95 % ellipse in two of the axes, mm.
+fn ellipse_points(moments: &Moments, (x, y): (usize, usize)) -> Vec<[f64; 2]> {
+    const POINTS: u32 = 96;
+    let (bias, covariance) = (moments.bias(), moments.covariance());
+    let (xx, yy, xy) = (covariance[(x, x)], covariance[(y, y)], covariance[(x, y)]);
+    // Cholesky factor of the two rows and columns.
+    let a = xx.max(0.0).sqrt();
+    let b = if a > 0.0 { xy / a } else { 0.0 };
+    let c = (yy - b * b).max(0.0).sqrt();
+    (0..=POINTS)
+        .map(|k| {
+            let (sine, cosine) =
+                (std::f64::consts::TAU * f64::from(k) / f64::from(POINTS)).sin_cos();
+            [
+                1e3 * (bias[x] + ELLIPSE_95 * a * cosine),
+                1e3 * (bias[y] + ELLIPSE_95 * (b * cosine + c * sine)),
+            ]
+        })
+        .collect()
+}
+
+/// A bar of the sources' shares of the mean square, with their names in the order of their size.
+fn shares(chart: &mut Chart, [left, top]: [f64; 2], width: f64, budget: &ErrorBudget) {
+    /// Between an entry's colour and its text, and between entries, px.
+    const SPACE_PX: [f64; 2] = [5.0, 14.0];
+    let square = |each: &SourceBudget| each.at_target.analytic.rms_m.powi(2);
+    let sum: f64 = budget.sources.iter().map(square).sum();
+    if sum <= 0.0 {
+        return;
+    }
+    let mut names = Vec::new();
+    let mut drawn: f64 = 0.0;
+    for each in &budget.sources {
+        let Some(source) = each.source else { continue };
+        let color = Source::ALL
+            .iter()
+            .position(|known| *known == source)
+            .map_or(Paint::Soft, Paint::Series);
+        let share = square(each) / sum;
+        let place = |share: f64| (share * width).round();
+        let (from, to) = (place(drawn), place(drawn + share));
+        chart.fill([left + from, top], [to - from, BAR_PX], color);
+        drawn += share;
+        if share >= 0.02 {
+            let name = format!("{} {:.0} %", source.name(), share * 100.0);
+            names.push((share, color, name));
+        }
+    }
+    names.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (mut x, y) = (left, top + BAR_PX + 13.0);
+    for (_, color, name) in names {
+        let text = x + 10.0 + SPACE_PX[0];
+        let end = text + Size::Small.width(&name);
+        if end > left + width {
+            break;
+        }
+        chart.fill([x, y - 5.0], [10.0, 10.0], color);
+        chart.write(Anchor::Start, [text, y], name);
+        x = end + SPACE_PX[1];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use needlebench_uncertainty::budget::PointBudget;
+
+    use super::super::drawing::tests::assert_legible;
+    use super::*;
+
+    fn point(rms_m: f64) -> PointBudget {
+        let variance = rms_m * rms_m / 3.0;
+        let moments = Moments {
+            bias_m: [0.5 * rms_m, 0.0, -0.2 * rms_m],
+            covariance_m2: [
+                [variance, 0.5 * variance, 0.0],
+                [0.5 * variance, variance, 0.0],
+                [0.0, 0.0, variance],
+            ],
+            rms_m,
+            lateral_rms_m: rms_m,
+        };
+        PointBudget {
+            analytic: moments,
+            monte_carlo: Some(moments),
+            radius_95_m: None,
+            covariance_difference: None,
+            bias_difference_m: None,
+        }
+    }
+
+    fn of(source: Option<Source>, rms_m: f64) -> SourceBudget {
+        SourceBudget {
+            source,
+            at_skin: point(0.8 * rms_m),
+            at_target: point(rms_m),
+        }
+    }
+
+    #[test]
+    fn budgets_of_all_sources_are_legible() {
+        for rms_m in [0.0, 1e-4, 3e-3, 0.2] {
+            let budget = ErrorBudget {
+                samples: 100,
+                sources: Source::ALL.map(|source| of(Some(source), rms_m)).into(),
+                total: of(None, rms_m),
+                dominant: None,
+            };
+            let budgets = [("Right-Down-Unfold", &budget), ("Left-Up-Fold", &budget)];
+            for count in [1, 2] {
+                assert_legible(&chart("a_goal", &budgets[..count]));
+            }
+        }
+    }
+
+    #[test]
+    fn ellipses_go_round_the_bias_at_the_radius_of_95_per_cent() {
+        let moments = point(3e-3).analytic;
+        let outline = ellipse_points(&moments, (0, 2));
+        assert_eq!(outline.len(), 97);
+        // Uncorrelated, so upright: 2.4477 standard deviations either way.
+        let right = outline
+            .iter()
+            .map(|point| point[0])
+            .fold(f64::MIN, f64::max);
+        let high = outline
+            .iter()
+            .map(|point| point[1])
+            .fold(f64::MIN, f64::max);
+        let reach_mm = ELLIPSE_95 * 3.0_f64.sqrt();
+        assert!((right - (1.5 + reach_mm)).abs() < 1e-9, "{right}");
+        assert!((high - (-0.6 + reach_mm)).abs() < 1e-9, "{high}");
+    }
+}

@@ -1,0 +1,62 @@
+//! Files that are either whole or not there.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use tempfile::Builder;
+
+/// Writes a file beside its place first and then renames it, so that nobody ever sees half of it.
+/// Who may read it is decided by the user's mask, as of any file.
+///
+/// It is not made to outlive a power failure: a run is made again. What a study has computed in days
+/// is, by the store's own `AtomicFile`, which waits for the disk.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = Builder::new();
+    builder.prefix(".").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    file.persist(path)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_there_is_replaced_and_nothing_else_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("report.json");
+        for text in ["first", "second"] {
+            write_atomically(&path, text.as_bytes()).unwrap();
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        }
+        assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+        let missing = folder.path().join("missing").join("report.json");
+        assert!(write_atomically(&missing, b"").is_err());
+        // A folder cannot be replaced; the temporary file goes all the same.
+        assert!(write_atomically(folder.path(), b"").is_err());
+        assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_it_as_any_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let [ours, usual] = ["ours", "usual"].map(|name| folder.path().join(name));
+        write_atomically(&ours, b"").unwrap();
+        std::fs::write(&usual, b"").unwrap();
+        let [ours, usual] = [ours, usual].map(|path| path.metadata().unwrap().permissions().mode());
+        assert_eq!(ours, usual);
+    }
+}

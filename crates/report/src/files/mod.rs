@@ -1,0 +1,23 @@
+//! What commands write into their folders of results.
+//!
+//! Charts and pictures are drawn here and not before: they are large, and soon on the disk. Nothing
+//! of an earlier run stays that somebody could take for a result of this one.
+
+mod atlas;
+mod atomic;
+mod error;
+mod folder;
+mod iso9283;
+mod pictures;
+mod run;
+mod servo;
+mod study;
+
+pub use atlas::write_atlas;
+pub use atomic::write_atomically;
+pub use error::FilesError;
+pub use folder::Folder;
+pub use iso9283::{write_measured, write_test};
+pub use run::{RunFiles, write_run};
+pub use servo::write_servo;
+pub use study::{FinishedStudy, StudyOutput, StudySummary, write_study};

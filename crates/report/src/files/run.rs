@@ -1,0 +1,161 @@
+//! Files of a scenario's run.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use needlebench_bench::progress::Progress;
+use needlebench_bench::{EngineRun, EventRun, ScenarioRun};
+use needlebench_cell::ResolvedScenario;
+use needlebench_engine::Engine;
+use needlebench_planning::GoalPlan;
+
+use super::error::FilesError;
+use super::folder::Folder;
+use super::iso9283::write_test;
+use super::pictures::{Pictures, remove_pictures};
+use crate::chart::press::press_chart;
+use crate::csv::{press_csv, recording_csv, recording_name};
+use crate::junit::junit;
+use crate::markdown::markdown;
+use crate::page::run_page;
+
+/// Which files a run leaves besides its report, and how they are made.
+#[derive(Debug, Clone, Copy)]
+pub struct RunFiles<'a> {
+    /// Pictures and charts, if the scenario wants any.
+    pub pictures: bool,
+    /// The page.
+    pub page: bool,
+    /// Threads that draw.
+    pub jobs: usize,
+    /// Drawing is not begun once this is set: somebody asked to stop.
+    pub cancel: &'a AtomicBool,
+    /// Engines that there are, with their titles.
+    pub engines: &'a [&'static dyn Engine],
+}
+
+/// Names of files, by goal and configuration.
+type Names = Vec<Vec<Vec<String>>>;
+
+/// Writes everything that a run leaves, and the names of the files into its report.
+pub fn write_run(
+    resolved: &ResolvedScenario,
+    finished: &mut ScenarioRun,
+    folder: Folder<'_>,
+    wanted: RunFiles<'_>,
+    progress: &dyn Progress,
+) -> Result<(), FilesError> {
+    let started = Instant::now();
+    let pictures = resolved.scenario.recording.pictures && wanted.pictures;
+    let mut names = write_recordings(resolved, finished, folder)?;
+    for run in &finished.events {
+        let of_run = write_events(resolved, run, &finished.plans, folder, pictures)?;
+        names[run.goal][run.configuration].extend(of_run);
+    }
+    if pictures && !wanted.cancel.load(Ordering::Relaxed) {
+        progress.message("drawing");
+        let drawing = Pictures::new(resolved, folder, wanted.jobs);
+        for (index, goal) in finished.report.goals.iter().enumerate() {
+            drawing.write(index, goal, &mut names[index])?;
+        }
+    } else {
+        for goal in &resolved.goals {
+            remove_pictures(folder, &goal.name)?;
+        }
+    }
+    for (goal, names) in resolved.goals.iter().zip(&names) {
+        folder.remove_others(&goal.name, &names.concat())?;
+    }
+    for (goal, names) in finished.report.goals.iter_mut().zip(names) {
+        for (configuration, names) in goal.configurations.iter_mut().zip(names) {
+            configuration.files = names;
+        }
+    }
+    if let (Some(run), Some(report)) = (&finished.iso9283, &mut finished.report.iso9283) {
+        let name = &resolved.scenario.name;
+        report.files = write_test(name, report, run, folder, pictures)?;
+    }
+    if wanted.page {
+        progress.message("writing the page");
+        folder.write("report.html", run_page(resolved, finished))?;
+    } else {
+        folder.remove("report.html")?;
+    }
+    let report = &mut finished.report;
+    let writing_s = started.elapsed().as_secs_f64();
+    report.timings.insert("writing_s".to_owned(), writing_s);
+    folder.write_json("report.json", report)?;
+    folder.write("junit.xml", junit(&[report])?)?;
+    folder.write("summary.md", markdown(report, wanted.engines))
+}
+
+/// Recordings of all motions, those that ended early among them.
+fn write_recordings(
+    resolved: &ResolvedScenario,
+    finished: &ScenarioRun,
+    folder: Folder<'_>,
+) -> Result<Names, FilesError> {
+    let period_s = resolved.scenario.recording.period_ms * 1e-3;
+    let write = |goal: usize, configuration: usize, run: &EngineRun, stopped: bool| {
+        let plan = &finished.plans[goal].configurations[configuration];
+        let trajectory = plan.trajectory.as_ref().expect("what ran has a trajectory");
+        let engine = if stopped {
+            format!("{}.stopped", run.engine)
+        } else {
+            run.engine.to_owned()
+        };
+        let file = recording_name(plan.configuration, &engine);
+        let name = format!("{}/{file}", resolved.goals[goal].name);
+        folder.write(&name, recording_csv(run, trajectory, period_s))?;
+        Ok::<String, FilesError>(name)
+    };
+    let mut names: Names = Vec::new();
+    for (goal, runs) in finished.runs.iter().enumerate() {
+        folder.make(&resolved.goals[goal].name)?;
+        let mut of_goal = Vec::new();
+        for (configuration, runs) in runs.iter().enumerate() {
+            let written = runs
+                .iter()
+                .map(|run| write(goal, configuration, run, false));
+            of_goal.push(written.collect::<Result<Vec<String>, FilesError>>()?);
+        }
+        names.push(of_goal);
+    }
+    for stopped in &finished.stopped {
+        let (goal, configuration) = (stopped.goal, stopped.configuration);
+        let name = write(goal, configuration, &stopped.run, true)?;
+        names[goal][configuration].push(name);
+    }
+    Ok(names)
+}
+
+/// Recordings of the contacts that were asked for, and a chart of each.
+fn write_events(
+    resolved: &ResolvedScenario,
+    run: &EventRun,
+    plans: &[GoalPlan],
+    folder: Folder<'_>,
+    pictures: bool,
+) -> Result<Vec<String>, FilesError> {
+    let goal = &resolved.goals[run.goal];
+    let label = plans[run.goal].configurations[run.configuration].configuration;
+    let mut names = Vec::new();
+    for (index, press) in run.press.iter().enumerate() {
+        let Ok(press) = press else { continue };
+        let stem = format!("{}/{label}.press-{}", goal.name, index + 1);
+        for (engine, events) in &run.engines {
+            let Some(Some(recording)) = events.press.get(index) else {
+                continue;
+            };
+            let name = format!("{stem}.{engine}.csv");
+            folder.write(&name, press_csv(goal, press, recording))?;
+            names.push(name);
+        }
+        if pictures {
+            let title = format!("{}, {label}", goal.name);
+            let chart = press_chart(&title, press, run, index);
+            names.extend(folder.write_chart(&stem, &chart)?);
+        }
+    }
+    Ok(names)
+}

@@ -1,0 +1,163 @@
+//! What a study leaves besides its table.
+
+use std::path::Path;
+
+use needlebench_bench::study::{PreparedStudy, RobustnessResult, StudyCase, robustness_of};
+use needlebench_study::ParquetResults;
+use needlebench_study::statistics::{
+    CriterionResult, Summary, SummaryOptions, judge_study, summarise,
+};
+use serde::Serialize;
+
+use super::atomic::write_atomically;
+use super::error::FilesError;
+use super::folder::Folder;
+use crate::junit::study_junit;
+use crate::markdown::study::summary_markdown;
+use crate::page::study::{CasePlaces, StudyPage};
+use crate::table::study::parts::parts;
+use crate::table::study::robustness::robustness_parts;
+use crate::table::study::text::summary_text;
+use needlebench_bench::progress::Progress;
+
+/// Name of the page in a study's folder.
+const PAGE_FILE: &str = "report.html";
+
+/// Statistics of a study, with the verdict.
+#[derive(Debug, Serialize)]
+pub struct StudySummary {
+    /// Name of the study.
+    name: String,
+    /// The question that it answers.
+    description: String,
+    /// Hash of everything that decides the results.
+    study_id: String,
+    /// Number of cases.
+    cases: u64,
+    /// `pass` if all criteria are met.
+    verdict: &'static str,
+    /// Criteria of the study.
+    criteria: Vec<CriterionResult>,
+    /// How far the base scenario's phantom may move; none unless the study asks for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robustness: Option<Vec<RobustnessResult>>,
+    /// Statistics.
+    #[serde(flatten)]
+    statistics: Summary,
+}
+
+/// Where results go, and which.
+pub struct StudyOutput<'a> {
+    /// Folder of the study's results.
+    pub folder: &'a Path,
+    /// Where JUnit goes, if anywhere.
+    pub junit: Option<&'a Path>,
+    /// Whether the page is written.
+    pub page: bool,
+    /// Threads for what is computed on the way.
+    pub threads: usize,
+}
+
+/// What was written.
+pub struct FinishedStudy {
+    /// Its statistics.
+    pub summary: StudySummary,
+    /// The summary for a terminal.
+    pub text: String,
+    /// All criteria are met.
+    pub passed: bool,
+}
+
+/// Sums up a study's table and writes what there is to write.
+pub fn write_study(
+    prepared: &PreparedStudy,
+    results: &ParquetResults,
+    output: &StudyOutput<'_>,
+    progress: &dyn Progress,
+) -> Result<FinishedStudy, FilesError> {
+    let file = &prepared.study.file;
+    progress.message("statistics");
+    let options = SummaryOptions {
+        sampling: file.sampling.method,
+        working_configurations: file.criteria.working_configurations.unwrap_or(2) as usize,
+        more_quantiles: file
+            .criteria
+            .quantiles()
+            .iter()
+            .map(|each| each.quantile)
+            .collect(),
+        factors: true,
+    };
+    let statistics = summarise(results, &options)?;
+    let criteria = judge_study(&statistics, &file.criteria);
+    let robustness = file
+        .robustness
+        .as_ref()
+        .map(|section| robustness_of(&prepared.study, section, output.threads, progress))
+        .transpose()
+        .map_err(|findings| {
+            let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
+            FilesError::Robustness(texts.join("; "))
+        })?;
+    let passed = criteria.iter().all(|criterion| criterion.pass);
+    let summary = StudySummary {
+        name: file.name.clone(),
+        description: file.description.clone(),
+        study_id: prepared.identity.id.clone(),
+        cases: prepared.design.cases(),
+        verdict: if passed { "pass" } else { "fail" },
+        criteria,
+        robustness,
+        statistics,
+    };
+    let folder = Folder(output.folder);
+    let json = serde_json::to_string_pretty(&summary)?;
+    folder.write("summary.json", json)?;
+    let more = file
+        .robustness
+        .as_ref()
+        .zip(summary.robustness.as_ref())
+        .map_or_else(Vec::new, |(section, results)| {
+            robustness_parts(section, results)
+        });
+    let parts = parts(&summary.statistics, &summary.criteria, more);
+    let markdown = summary_markdown(&file.name, &summary.criteria, &parts);
+    folder.write("summary.md", markdown)?;
+    let text = summary_text(&parts);
+    if let Some(path) = output.junit {
+        let document = study_junit(&file.name, &summary.criteria)?;
+        write_atomically(path, document.as_bytes()).map_err(|source| FilesError::Write {
+            path: path.to_owned(),
+            source,
+        })?;
+    }
+    if output.page {
+        progress.message("writing the page");
+        let places = |case: u64| {
+            let layout = StudyCase::new(&prepared.study, &prepared.design, case);
+            let resolved = layout.scenario(&prepared.study).ok()?;
+            Some(CasePlaces {
+                world_from_base_link: resolved.cell.robot.world_from_base_link,
+                world_from_phantom: resolved.phantom.map(|placed| placed.world_from_phantom),
+            })
+        };
+        let page = StudyPage {
+            name: &file.name,
+            description: &file.description,
+            file: &prepared.study.source.file,
+            results,
+            summary: &serde_json::to_value(&summary)?,
+            manifest: &serde_json::to_value(prepared.manifest(None))?,
+            base: Some(prepared.study.family.base()),
+            places: Some(&places),
+        };
+        folder.write(PAGE_FILE, page.html()?)?;
+    } else {
+        folder.remove(PAGE_FILE)?;
+    }
+    Ok(FinishedStudy {
+        summary,
+        text,
+        passed,
+    })
+}

@@ -1,0 +1,45 @@
+//! Two results side by side.
+
+use needlebench_evaluation::compare::Comparison;
+use quick_junit::{SerializeError, TestCase, TestCaseStatus, TestSuite};
+
+use super::failure::failure;
+
+/// The comparison as JUnit XML: a suite for each goal, a case for each configuration.
+pub fn comparison_junit(comparison: &Comparison) -> Result<String, SerializeError> {
+    let mut document = quick_junit::Report::new("needlebench compare");
+    let case = |suite: &str, name: &str, goal: Option<&str>, label: Option<&str>| {
+        let failures: Vec<&str> = comparison
+            .failures
+            .iter()
+            .filter(|failure| failure.goal.as_deref() == goal && failure.label.as_deref() == label)
+            .map(|failure| failure.detail.as_str())
+            .collect();
+        let status = if failures.is_empty() {
+            TestCaseStatus::success()
+        } else {
+            failure(&failures.join("; "))
+        };
+        let mut case = TestCase::new(name, status);
+        case.set_classname(suite);
+        case
+    };
+    for goal in &comparison.goals {
+        let name = format!("compare.{}", goal.name());
+        let mut suite = TestSuite::new(name.clone());
+        for each in &goal.configurations {
+            suite.add_test_case(case(
+                &name,
+                &each.label,
+                Some(goal.name()),
+                Some(&each.label),
+            ));
+        }
+        suite.add_test_case(case(&name, "goal", Some(goal.name()), None));
+        document.add_test_suite(suite);
+    }
+    let mut suite = TestSuite::new("compare");
+    suite.add_test_case(case("compare", "thresholds", None, None));
+    document.add_test_suite(suite);
+    document.to_string()
+}

@@ -1,0 +1,12 @@
+//! JUnit XML, for continuous integration.
+
+mod comparison;
+mod failure;
+mod run;
+mod study;
+mod study_comparison;
+
+pub use comparison::comparison_junit;
+pub use run::junit;
+pub use study::study_junit;
+pub use study_comparison::study_comparison_junit;

@@ -1,0 +1,112 @@
+//! A run: a suite for each goal, a case for each configuration.
+
+use needlebench_evaluation::iso9283::SUBJECT;
+use needlebench_evaluation::report::{CriterionResult, Report, Status};
+use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
+
+use super::failure::failure;
+use crate::number::value_and_limit;
+
+/// Reports as one JUnit document. Contains no times: two runs give the same bytes.
+///
+/// A rejected configuration counts as skipped unless that contradicts what is expected of it.
+pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
+    let mut document = quick_junit::Report::new("needlebench");
+    for report in reports {
+        for goal in &report.goals {
+            let mut suite = TestSuite::new(format!("{}.{}", report.scenario.name, goal.name));
+            for configuration in &goal.configurations {
+                let failures: Vec<String> = report
+                    .criteria
+                    .iter()
+                    .filter(|result| result.goal == goal.name && !result.pass)
+                    .filter(|result| result.label.as_deref() == Some(configuration.label))
+                    .map(described)
+                    .collect();
+                let status = if !failures.is_empty() {
+                    failure(&failures.join("; "))
+                } else if configuration.status == Status::Rejected {
+                    let mut status = TestCaseStatus::skipped();
+                    if let Some(rejection) = configuration.rejections.first() {
+                        status.set_message(format!("{}: {}", rejection.rule, rejection.detail));
+                    }
+                    status
+                } else if configuration.engines.is_empty() {
+                    failure("no engine measured it")
+                } else {
+                    TestCaseStatus::success()
+                };
+                let mut case = TestCase::new(configuration.label, status);
+                case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
+                suite.add_test_case(case);
+            }
+            let failures: Vec<String> = report
+                .criteria
+                .iter()
+                .filter(|result| result.goal == goal.name && result.label.is_none() && !result.pass)
+                .map(described)
+                .collect();
+            let status = if failures.is_empty() {
+                TestCaseStatus::success()
+            } else {
+                failure(&failures.join("; "))
+            };
+            let mut case = TestCase::new("goal", status);
+            case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
+            suite.add_test_case(case);
+            document.add_test_suite(suite);
+        }
+        if report.iso9283.is_some() || report.criteria.iter().any(|each| each.goal == SUBJECT) {
+            document.add_test_suite(iso9283_suite(report));
+        }
+        if !report.engine_failures.is_empty() {
+            let mut suite = TestSuite::new(format!("{}.engines", report.scenario.name));
+            for broken in &report.engine_failures {
+                let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
+                status.set_message(broken.message.clone());
+                suite.add_test_case(TestCase::new(broken.engine.clone(), status));
+            }
+            document.add_test_suite(suite);
+        }
+    }
+    document.to_string()
+}
+
+/// A test by ISO 9283: a case for each criterion.
+fn iso9283_suite(report: &Report) -> TestSuite {
+    let name = format!("{}.{SUBJECT}", report.scenario.name);
+    let mut suite = TestSuite::new(name.clone());
+    for result in report.criteria.iter().filter(|each| each.goal == SUBJECT) {
+        let status = if result.pass {
+            TestCaseStatus::success()
+        } else {
+            failure(&described(result))
+        };
+        let engine = result
+            .engine
+            .as_ref()
+            .map_or(String::new(), |engine| format!(" ({engine})"));
+        let mut case = TestCase::new(format!("{}{engine}", result.criterion), status);
+        case.set_classname(name.clone());
+        suite.add_test_case(case);
+    }
+    suite
+}
+
+fn described(result: &CriterionResult) -> String {
+    let engine = result
+        .engine
+        .as_ref()
+        .map_or(String::new(), |engine| format!(" ({engine})"));
+    match (result.value, result.limit) {
+        (Some(value), Some(limit)) => {
+            let (value, limit) = value_and_limit(value, limit, result.unit);
+            let text = format!(
+                "{}{engine}: {value}, limit {limit} {}",
+                result.criterion, result.detail
+            );
+            text.trim_end().to_owned()
+        }
+        _ => format!("{}{engine}: {}", result.criterion, result.detail),
+    }
+}

@@ -1,0 +1,20 @@
+//! Results for people and other programs: tables, Markdown, JUnit, CSV, charts, pictures and pages,
+//! and the folders that they are written into.
+
+pub mod chart;
+pub mod csv;
+pub mod files;
+mod junit;
+mod markdown;
+pub mod number;
+pub mod page;
+pub mod picture;
+#[cfg(test)]
+#[path = "../../engine/tests/engine/common/replay.rs"]
+mod replay;
+pub mod table;
+
+pub use files::write_atomically;
+pub use junit::{comparison_junit, junit, study_comparison_junit, study_junit};
+pub use markdown::{comparison_markdown, markdown, study_comparison_markdown};
+pub use table::{plain_table, report_text};

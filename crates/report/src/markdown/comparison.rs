@@ -1,0 +1,62 @@
+//! Two results side by side.
+
+use needlebench_evaluation::compare::Comparison;
+
+use crate::table::comparison::{
+    failure_text, goal_title, metric_texts, remarks, rows, side_text, unchanged,
+};
+
+/// The comparison as Markdown, for pull requests: what changed alone.
+pub fn comparison_markdown(comparison: &Comparison) -> String {
+    let mut lines = vec![
+        format!(
+            "# {} against {}: {}",
+            comparison.a.source,
+            comparison.b.source,
+            if comparison.pass { "pass" } else { "**fail**" }
+        ),
+        String::new(),
+        format!("- {}", side_text("A", &comparison.a)),
+        format!("- {}", side_text("B", &comparison.b)),
+    ];
+    for difference in &comparison.provenance_differences {
+        let text = |side: &Option<String>| side.clone().unwrap_or_else(|| "none".to_owned());
+        lines.push(format!(
+            "- {}: `{}` -> `{}`",
+            difference.what,
+            text(&difference.a),
+            text(&difference.b)
+        ));
+    }
+    lines.extend(
+        comparison
+            .notes
+            .iter()
+            .map(|note| format!("- note: {note}")),
+    );
+    lines.push(String::new());
+    for failure in &comparison.failures {
+        lines.push(format!("- **lost** {}", failure_text(failure)));
+    }
+    for goal in &comparison.goals {
+        lines.push(format!("\n## {}\n", goal_title(goal)));
+        lines.extend(remarks(goal).into_iter().map(|line| format!("- {line}")));
+        let rows = rows(goal, false);
+        if !rows.is_empty() {
+            lines.push("\n| Configuration | Metric | A | B | Change | |".to_owned());
+            lines.push("|---|---|--:|--:|--:|---|".to_owned());
+            for (configuration, found) in rows {
+                let [words, a, b, change, outcome] = metric_texts(found);
+                lines.push(format!(
+                    "| {} | {words} | {a} | {b} | {change} | {outcome} |",
+                    configuration.label
+                ));
+            }
+        }
+        if goal.a.is_some() && goal.b.is_some() {
+            lines.push(format!("\n{} values are the same.", unchanged(goal)));
+        }
+    }
+    lines.push(String::new());
+    lines.join("\n")
+}

@@ -1,0 +1,12 @@
+//! Markdown, for pull requests and pages of continuous integration.
+
+mod comparison;
+mod iso9283;
+mod ranking;
+mod run;
+pub(crate) mod study;
+mod study_comparison;
+
+pub use comparison::comparison_markdown;
+pub use run::markdown;
+pub use study_comparison::study_comparison_markdown;

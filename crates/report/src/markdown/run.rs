@@ -1,0 +1,162 @@
+//! Markdown summary, for pull requests and CI pages.
+
+use std::fmt::Write;
+
+use needlebench_engine::Engine;
+use needlebench_evaluation::report::{GoalReport, Report, Status, Verdict};
+
+use super::ranking::ranking_markdown;
+use crate::table::engine_headings::{EngineHeading, engine_headings};
+use crate::table::shown::{Shown, shown_metrics};
+
+/// The report as Markdown; `engines` are those that there are, with their titles.
+pub fn markdown(report: &Report, engines: &[&'static dyn Engine]) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_report(&mut text, report, &engine_headings(report, engines));
+    text
+}
+
+fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) -> std::fmt::Result {
+    let verdict = match report.verdict {
+        Verdict::Pass => "pass",
+        Verdict::Fail => "**fail**",
+    };
+    writeln!(out, "# {}: {verdict}\n", report.scenario.name)?;
+    if !report.scenario.description.is_empty() {
+        writeln!(out, "{}\n", report.scenario.description)?;
+    }
+    for goal in &report.goals {
+        writeln!(out, "## {}\n", goal.name)?;
+        write_configurations(out, goal, engines)?;
+        writeln!(out)?;
+        let comparison = ranking_markdown(goal);
+        if !comparison.is_empty() {
+            writeln!(out, "{comparison}")?;
+        }
+        for each in &goal.configurations {
+            if let Some(first) = each.rejections.first() {
+                writeln!(out, "- {}: {}: {}", each.label, first.rule, first.detail)?;
+            }
+        }
+        if goal
+            .configurations
+            .iter()
+            .any(|each| !each.rejections.is_empty())
+        {
+            writeln!(out)?;
+        }
+        match &goal.recommended {
+            Some(found) => writeln!(out, "Recommended: **{}** - {}\n", found.label, found.reason)?,
+            None => writeln!(out, "No configuration works.\n")?,
+        }
+    }
+    if let Some(iso9283) = &report.iso9283 {
+        out.push_str(&super::iso9283::report_markdown(iso9283));
+    }
+    let failed: Vec<_> = report
+        .criteria
+        .iter()
+        .filter(|result| !result.pass)
+        .collect();
+    writeln!(
+        out,
+        "{} of {} criteria met.",
+        report.criteria.len() - failed.len(),
+        report.criteria.len()
+    )?;
+    for result in failed {
+        writeln!(
+            out,
+            "- {} {} {}: {} {}",
+            result.goal,
+            result.label.as_deref().unwrap_or(""),
+            result.engine.as_deref().unwrap_or(""),
+            result.criterion,
+            result.detail
+        )?;
+    }
+    for failure in &report.engine_failures {
+        writeln!(
+            out,
+            "- engine {} failed: {}",
+            failure.engine, failure.message
+        )?;
+    }
+    if !report.enclosure.is_empty() {
+        writeln!(
+            out,
+            "\n| Link | Enclosing primitives off the mesh, mean (mm) | Worst (mm) | Mesh out of the primitives (mm) |\n|---|--:|--:|--:|"
+        )?;
+        for each in &report.enclosure {
+            writeln!(
+                out,
+                "| {} | {:.2} | {:.2} | {:.2} |",
+                each.link,
+                each.mean_overhang_m * 1e3,
+                each.worst_overhang_m * 1e3,
+                each.worst_protrusion_m * 1e3
+            )?;
+        }
+        writeln!(out)?;
+    }
+    for note in &report.notes {
+        writeln!(out, "- note: {note}")?;
+    }
+    let provenance = &report.provenance;
+    writeln!(
+        out,
+        "\nneedlebench {} ({}), {}; {}.",
+        provenance.version,
+        provenance.git_revision,
+        provenance
+            .engines
+            .iter()
+            .map(|engine| format!("{} {}", engine.name, engine.version))
+            .collect::<Vec<_>>()
+            .join(", "),
+        provenance.truth
+    )
+}
+
+/// The configurations of a goal, with the metrics that the table of metrics gives a heading.
+fn write_configurations(
+    out: &mut String,
+    goal: &GoalReport,
+    engines: &[EngineHeading],
+) -> std::fmt::Result {
+    let columns: Vec<(String, Shown)> = shown_metrics(engines, |heading| heading.summary).collect();
+    let is_least = |shown: &Shown| shown.metric().family == "least_clearance";
+    write!(out, "| Configuration | Status |")?;
+    for (heading, shown) in &columns {
+        let between = if is_least(shown) { " Between |" } else { "" };
+        write!(out, " {heading} |{between}")?;
+    }
+    write!(out, "\n|---|---|")?;
+    for (_, shown) in &columns {
+        let between = if is_least(shown) { "---|" } else { "" };
+        write!(out, "--:|{between}")?;
+    }
+    writeln!(out)?;
+    for each in &goal.configurations {
+        let status = match (each.status, each.rejections.first()) {
+            (Status::Rejected, Some(first)) => format!("rejected: {}", first.rule),
+            (status, _) => status.name().to_owned(),
+        };
+        let mark = match &goal.recommended {
+            Some(found) if found.label == each.label => "**",
+            _ => "",
+        };
+        write!(out, "| {mark}{}{mark} | {status} |", each.label)?;
+        for (_, shown) in &columns {
+            write!(out, " {} |", shown.text(each))?;
+            if is_least(shown) {
+                let least = each.clearance.least();
+                let pair = least.map_or("-".to_owned(), |found| found.pair.join(", "));
+                write!(out, " {pair} |")?;
+            }
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,89 @@
+//! A study's statistics as Markdown, for pull requests.
+
+use std::fmt::Write;
+
+use needlebench_study::statistics::CriterionResult;
+
+use crate::table::study::parts::Part;
+
+/// Text that breaks no table.
+fn cell_text(text: &str) -> String {
+    text.trim().replace('\n', " ").replace('|', "\\|")
+}
+
+/// Headings in one line each: one that only has a second line shares the first of those before it.
+fn headings(header: &[String]) -> Vec<String> {
+    let mut first = "";
+    let mut names = Vec::new();
+    for name in header {
+        let name = name.trim_start_matches('<');
+        if let Some(second) = name.strip_prefix('\n') {
+            names.push(cell_text(&format!("{first} {second}")));
+        } else {
+            first = name.split('\n').next().unwrap_or_default();
+            names.push(cell_text(name));
+        }
+    }
+    names
+}
+
+/// The summary as Markdown.
+pub fn summary_markdown(title: &str, criteria: &[CriterionResult], parts: &[Part]) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_markdown(&mut text, title, criteria, parts);
+    text
+}
+
+fn write_markdown(
+    out: &mut String,
+    title: &str,
+    criteria: &[CriterionResult],
+    parts: &[Part],
+) -> std::fmt::Result {
+    let failed = criteria.iter().filter(|each| !each.pass).count();
+    let verdict = match (criteria.len(), failed) {
+        (0, _) => String::new(),
+        (_, 0) => ": pass".to_owned(),
+        _ => ": **fail**".to_owned(),
+    };
+    writeln!(out, "# {title}{verdict}\n")?;
+    for part in parts {
+        match part {
+            Part::Heading(heading) => writeln!(out, "## {heading}\n")?,
+            Part::Lines(lines) => {
+                for line in lines {
+                    writeln!(out, "- {}", line.trim())?;
+                }
+                writeln!(out)?;
+            }
+            Part::Table { header, rows } => {
+                writeln!(out, "| {} |", headings(header).join(" | "))?;
+                out.push('|');
+                for (at, name) in header.iter().enumerate() {
+                    let text = at == 0 || name.starts_with('<');
+                    out.push_str(if text { "---|" } else { "--:|" });
+                }
+                writeln!(out)?;
+                for row in rows {
+                    let cells: Vec<String> = row.iter().map(|cell| cell_text(cell)).collect();
+                    writeln!(out, "| {} |", cells.join(" | "))?;
+                }
+                writeln!(out)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headings_are_whole_and_cells_keep_their_signs() {
+        let header = ["tip\n(mm) 50 %", "\n95 %", "<why"].map(str::to_owned);
+        assert_eq!(headings(&header), ["tip (mm) 50 %", "tip 95 %", "why"]);
+        assert_eq!(cell_text("< 0.3 | x"), "< 0.3 \\| x");
+    }
+}

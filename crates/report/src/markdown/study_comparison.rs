@@ -1,0 +1,33 @@
+//! Two studies side by side.
+
+use needlebench_study::compare::StudyComparison;
+
+use crate::table::study_comparison::{failure_text, intro, row, shown};
+
+/// The comparison as Markdown, for pull requests: what changed alone.
+pub fn study_comparison_markdown(comparison: &StudyComparison) -> String {
+    let verdict = if comparison.pass { "pass" } else { "**fail**" };
+    let mut lines = vec![format!(
+        "# {} against {}: {verdict}\n",
+        comparison.a.source, comparison.b.source
+    )];
+    lines.extend(
+        intro(comparison)
+            .into_iter()
+            .map(|line| format!("- {line}")),
+    );
+    for failure in &comparison.failures {
+        lines.push(format!("- **lost** {}", failure_text(failure)));
+    }
+    let rows = shown(comparison, false);
+    if !rows.is_empty() {
+        lines.push("\n| What | A | B | B less A | |".to_owned());
+        lines.push("|---|--:|--:|--:|---|".to_owned());
+        for change in &rows {
+            lines.push(format!("| {} |", row(change).join(" | ")));
+        }
+    }
+    let same = comparison.changes.len() - rows.len();
+    lines.push(format!("\n{same} rates and quantiles are the same.\n"));
+    lines.join("\n")
+}

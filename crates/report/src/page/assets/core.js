@@ -1,0 +1,234 @@
+// What all pages share: reading the payload, building elements, writing numbers.
+'use strict';
+
+const NB = {};
+
+/** Seconds between opening the page and its first picture; for tests. */
+NB.timing = { opened: performance.now() };
+
+/** Okabe and Ito's colours, which people with any colour vision tell apart. */
+NB.palette = {
+  black: '#000000', orange: '#e69f00', sky: '#56b4e9', green: '#009e73',
+  yellow: '#f0e442', blue: '#0072b2', vermillion: '#d55e00', purple: '#cc79a7', grey: '#767676',
+};
+
+/** An element. Attributes starting with `on` are listeners; text goes in as text, never as markup. */
+NB.el = function (tag, attributes, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes || {})) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith('on')) element.addEventListener(name.slice(2), value);
+    else if (name === 'text') element.textContent = value;
+    else if (name === 'value' || name === 'checked' || name === 'disabled' || name === 'selected') element[name] = value;
+    else element.setAttribute(name, value === true ? '' : value);
+  }
+  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined));
+  return element;
+};
+
+NB.clear = function (element, ...children) {
+  element.replaceChildren(...children.flat(Infinity).filter((child) => child !== null && child !== undefined));
+  return element;
+};
+
+/** Reads the payload: the document, with `NB.array` for what it refers to. */
+NB.read = async function () {
+  const element = document.getElementById('payload');
+  const text = atob(element.textContent);
+  element.remove();
+  const compressed = new Uint8Array(text.length);
+  for (let k = 0; k < text.length; k++) compressed[k] = text.charCodeAt(k);
+  const stream = new Blob([compressed]).stream().pipeThrough(new DecompressionStream('deflate'));
+  const raw = await new Response(stream).arrayBuffer();
+  const length = new DataView(raw).getUint32(0, true);
+  NB.raw = raw;
+  NB.arrays = Math.ceil((4 + length) / 4) * 4;
+  return JSON.parse(new TextDecoder().decode(new Uint8Array(raw, 4, length)));
+};
+
+/** The codes of a reference, or its values where it is quantised; NaN stands for none. */
+NB.array = function (reference) {
+  const { t, n, at, step, low } = reference;
+  const start = NB.arrays + at;
+  if (t === 'f64') return new Float64Array(NB.raw.slice(start, start + 8 * n));
+  let codes;
+  if (reference.p) {
+    const bytes = new Uint8Array(NB.raw, start, 2 * n);
+    codes = new Uint16Array(n);
+    for (let k = 0; k < n; k++) codes[k] = bytes[k] | bytes[n + k] << 8;
+  } else {
+    codes = new { u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, f32: Float32Array }[t](NB.raw, start, n);
+  }
+  if (step === undefined) return codes;
+  const none = t === 'u8' ? 255 : 65535;
+  const values = new Float32Array(n);
+  let last = 0;
+  for (let k = 0; k < n; k++) {
+    const code = reference.d ? (codes[k] + last) & 65535 : codes[k];
+    last = code;
+    values[k] = code === none ? NaN : low + step * code;
+  }
+  return values;
+};
+
+/** Runs a page's script and says so where it cannot run. */
+NB.start = async function (build) {
+  const app = document.getElementById('app');
+  try {
+    if (typeof DecompressionStream === 'undefined') {
+      throw new Error('this browser is too old: it has no DecompressionStream (from 2023 on, all have)');
+    }
+    const page = await NB.read();
+    app.replaceChildren();
+    build(page, app);
+    requestAnimationFrame(() => requestAnimationFrame(() => {
+      NB.timing.firstView = performance.now();
+      document.documentElement.dataset.ready = 'true';
+    }));
+  } catch (error) {
+    app.replaceChildren(NB.el('p', { class: 'error', role: 'alert', text: `This page cannot be shown: ${error.message}` }));
+    throw error;
+  }
+};
+
+// Numbers. Minus signs are minus signs; what is missing is a dash.
+NB.minus = (text) => text.replace('-', '\u2212');
+NB.fixed = (value, digits) => (value === null || value === undefined || Number.isNaN(value) ? '\u2013' : NB.minus((Number(value.toFixed(digits)) || 0).toFixed(digits)));
+NB.mm = (metres, digits = 1) => NB.fixed(metres === null || metres === undefined ? NaN : metres * 1e3, digits);
+NB.deg = (radians, digits = 1) => NB.fixed(radians === null || radians === undefined ? NaN : radians * 180 / Math.PI, digits);
+NB.percent = (share) => NB.fixed(share === null || share === undefined ? NaN : share * 100, 0);
+/** Columns of metrics, described by the page: the first of their keys that a configuration has is shown. */
+NB.metricColumns = (columns) => columns.map(({ title, unit, format, keys, help }) => ({
+  title, unit, help, numeric: true,
+  cell: ({ metrics }) => NB.formats[format](keys.map((key) => metrics[key]).find((value) => value !== undefined)),
+}));
+NB.formats = {
+  millimetres: (value) => NB.mm(value), length: (value) => NB.length(value), number: (value) => NB.fixed(value, 2),
+  percent: (value) => NB.percent(value), degrees: (value) => NB.deg(value),
+};
+/** A length in the unit that suits it. */
+NB.length = function (metres) {
+  if (metres === null || metres === undefined || Number.isNaN(metres)) return '\u2013';
+  const size = Math.abs(metres);
+  if (size === 0) return '0 mm';
+  if (size < 1e-10) return '< 0.1 nm';
+  if (size < 1e-7) return `${NB.fixed(metres * 1e9, 1)} nm`;
+  if (size < 1e-4) return `${NB.fixed(metres * 1e6, 1)} \u00b5m`;
+  return `${NB.fixed(metres * 1e3, 2)} mm`;
+};
+/** A value with its SI unit as people read it. */
+NB.quantity = function (value, unit) {
+  if (value === null || value === undefined) return '\u2013';
+  if (unit === 'm') return NB.length(value);
+  if (unit === 'rad') return `${NB.deg(value, 2)}\u00b0`;
+  if (unit === '1' || unit === '') return NB.significant(value);
+  if (unit === 'm/rad') return `${NB.fixed(value, 2)} mm/mrad`;
+  return `${NB.significant(value)} ${unit}`;
+};
+NB.significant = function (value) {
+  if (value === null || value === undefined || Number.isNaN(value)) return '\u2013';
+  if (Number.isInteger(value) && Math.abs(value) < 1e7) return NB.minus(String(value));
+  return NB.minus(String(Number(value.toPrecision(4))));
+};
+NB.words = (name) => String(name).replaceAll('_', ' ');
+
+/** A table with a caption: `columns` of `{ title, unit, numeric, cell(row) }`. */
+NB.table = function (caption, columns, rows, options = {}) {
+  const head = NB.el('tr', null, columns.map((column) => NB.el('th', {
+    scope: 'col', class: column.numeric ? 'number' : null, title: column.help,
+  }, column.title, column.unit ? NB.el('span', { class: 'unit', text: ` ${column.unit}` }) : null)));
+  const body = rows.map((row) => NB.el('tr', options.row ? options.row(row) : null, columns.map((column, index) => {
+    const content = column.cell(row);
+    const attributes = { class: column.numeric ? 'number' : column.text ? 'text' : null };
+    const isNode = content instanceof Node || Array.isArray(content);
+    return index === 0
+      ? NB.el('th', { scope: 'row' }, isNode ? content : String(content))
+      : NB.el('td', attributes, isNode ? content : String(content));
+  })));
+  return NB.el('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': caption },
+    NB.el('table', { class: options.class },
+      NB.el('caption', { text: caption }), NB.el('thead', null, head), NB.el('tbody', null, body)));
+};
+
+/** A fold-out section. */
+NB.section = (title, open, ...children) =>
+  NB.el('details', { class: 'section', open: open || null }, NB.el('summary', null, NB.el('h2', { text: title })), ...children);
+
+NB.checkbox = function (label, checked, change) {
+  const input = NB.el('input', { type: 'checkbox', checked, onchange: (event) => change(event.target.checked) });
+  return NB.el('label', { class: 'check' }, input, NB.el('span', { text: label }));
+};
+
+NB.select = function (label, options, value, change) {
+  const select = NB.el('select', { onchange: (event) => change(event.target.value) },
+    options.map(([key, text]) => NB.el('option', { value: key, selected: key === value, text })));
+  return NB.el('label', { class: 'field' }, NB.el('span', { text: label }), select);
+};
+
+/** Lets arrow keys move the choice among the rows of a list; `choose(index)` is called. */
+NB.rows = function (rows, choose) {
+  rows.forEach((row, index) => {
+    row.addEventListener('click', () => choose(index));
+    row.addEventListener('keydown', (event) => {
+      const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+      let to = null;
+      if (step) to = Math.min(Math.max(index + step, 0), rows.length - 1);
+      else if (event.key === 'Home') to = 0;
+      else if (event.key === 'End') to = rows.length - 1;
+      else if (event.key === 'Enter' || event.key === ' ') to = index;
+      if (to === null || event.target.closest('input, button') ) return;
+      event.preventDefault();
+      choose(to);
+      rows[to].focus();
+    });
+  });
+};
+NB.mark = function (rows, chosen) {
+  rows.forEach((row, index) => {
+    const is = index === chosen;
+    row.setAttribute('aria-selected', is);
+    row.tabIndex = is ? 0 : -1;
+  });
+};
+
+/** Every details element is open on paper, and nothing scrolls. */
+window.addEventListener('beforeprint', () => {
+  for (const details of document.querySelectorAll('details:not([open])')) {
+    details.dataset.closed = 'true';
+    details.open = true;
+  }
+});
+window.addEventListener('afterprint', () => {
+  for (const details of document.querySelectorAll('details[data-closed]')) {
+    delete details.dataset.closed;
+    details.open = false;
+  }
+});
+
+/** Any document as nested lists. */
+NB.tree = function (value) {
+  if (value === null || value === undefined) return NB.el('span', { text: '\u2013' });
+  if (typeof value === 'number') return NB.el('span', { text: NB.significant(value) });
+  if (typeof value !== 'object') return NB.el('span', { text: String(value) });
+  if (Array.isArray(value) && value.every((each) => typeof each !== 'object' || each === null)) {
+    return NB.el('span', { text: value.map((each) => (typeof each === 'number' ? NB.significant(each) : String(each))).join(', ') });
+  }
+  return NB.el('dl', null, Object.entries(value).flatMap(([key, each]) => [NB.el('dt', { text: NB.words(key) }), NB.el('dd', null, NB.tree(each))]));
+};
+
+NB.provenance = function (provenance, file) {
+  return NB.el('div', null,
+    NB.el('dl', null,
+      NB.el('dt', { text: 'needlebench' }), NB.el('dd', { text: `${provenance.version} (${provenance.git_revision})` }),
+      file ? [NB.el('dt', { text: 'file' }), NB.el('dd', { text: file })] : null,
+      NB.el('dt', { text: 'seed' }), NB.el('dd', { text: String(provenance.seed) }),
+      NB.el('dt', { text: 'truth' }), NB.el('dd', { text: provenance.truth }),
+      NB.el('dt', { text: 'lock file' }), NB.el('dd', null, NB.el('code', { text: provenance.cargo_lock_sha256 })),
+      provenance.engines.map((engine) => [NB.el('dt', { text: `${engine.name} ${engine.version}` }),
+        NB.el('dd', { text: engine.settings.map(([key, value]) => `${key} = ${value}`).join(', ') })])),
+    NB.table('Files that went in', [
+      { title: 'Role', cell: (input) => input.role },
+      { title: 'File', cell: (input) => input.file },
+      { title: 'SHA-256', cell: (input) => NB.el('code', { text: input.sha256 }) },
+    ], provenance.inputs, { class: 'small' }));
+};

@@ -1,0 +1,186 @@
+//! The page of a run.
+
+use needlebench_cell::{ClearanceClass, ResolvedScenario};
+use needlebench_engine::ENGINES;
+use needlebench_evaluation::metric::{Heading, Show};
+use needlebench_evaluation::report::GoalReport;
+use needlebench_evaluation::room::RoomModel;
+use needlebench_kinematics::Joints;
+use serde_json::{Value, json};
+
+use super::motion::motion;
+use super::pack::Pack;
+use super::room;
+use super::scene::{chain, pose, surroundings};
+use super::viewer::Viewer;
+use crate::table::engine_headings::{EngineHeading, engine_headings};
+use crate::table::shown::{Shown, shown_metrics};
+use needlebench_bench::ScenarioRun;
+
+const SCRIPT: &str = include_str!("assets/run.js");
+
+/// The page of a finished run: everything of its report but the timings, the cell, and all recorded
+/// motions.
+pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
+    let mut pack = Pack::default();
+    let report = &finished.report;
+    let mut document = json!({
+        "kind": "run",
+        "report": serde_json::to_value(report).expect("reports are plain data"),
+        "scene": surroundings(resolved, &mut pack),
+        "start": Vec::from(resolved.start.as_slice()),
+        "realChain": chain(&finished.real_arm.world_from_base_link, &finished.real_arm.chain),
+    });
+    // They differ from run to run, and the page should not.
+    if let Some(report) = document["report"].as_object_mut() {
+        report.remove("timings");
+    }
+    let unwanted = ClearanceClass::ALL.into_iter();
+    let unwanted = unwanted.filter(|class| class.is_unwanted());
+    document["unwantedClasses"] = json!(unwanted.map(ClearanceClass::name).collect::<Vec<_>>());
+    let room = RoomModel::new(resolved);
+    let goals: Vec<Value> = (0..resolved.goals.len())
+        .map(|goal| self::goal(resolved, finished, &room, goal, &mut pack))
+        .collect();
+    document["goals"] = json!(goals);
+    let page = Viewer {
+        kind: "run",
+        name: &report.scenario.name,
+        description: &report.scenario.description,
+        script: SCRIPT,
+    };
+    page.html(pack, &document)
+}
+
+/// Columns of metrics that any configuration has, as the page shows them.
+fn columns(
+    goal: &GoalReport,
+    engines: &[EngineHeading],
+    heading: impl Fn(&Heading) -> Option<(u8, &'static str)>,
+) -> Vec<Value> {
+    let is_measured = |shown: &Shown| {
+        let mut all = goal.configurations.iter();
+        all.any(|each| shown.value(each).is_some())
+    };
+    shown_metrics(engines, heading)
+        .filter(|(_, shown)| is_measured(shown))
+        .map(|(title, shown)| {
+            let (format, unit) = match shown.metric().show {
+                Show::Millimetres => ("millimetres", "mm"),
+                Show::SmallLength => ("length", ""),
+                Show::Seconds => ("number", "s"),
+                Show::Percent => ("percent", "%"),
+                Show::Degrees => ("degrees", "\u{b0}"),
+                Show::Number => ("number", ""),
+            };
+            json!({
+                "title": title,
+                "format": format,
+                "unit": unit,
+                "keys": shown.keys(),
+                "help": shown.description(),
+            })
+        })
+        .collect()
+}
+
+/// What the report does not have of a goal.
+fn goal(
+    resolved: &ResolvedScenario,
+    finished: &ScenarioRun,
+    room: &RoomModel<'_>,
+    goal: usize,
+    pack: &mut Pack,
+) -> Value {
+    let engines = engine_headings(&finished.report, ENGINES);
+    let report = &finished.report.goals[goal];
+    let configurations: Vec<Value> = report
+        .configurations
+        .iter()
+        .enumerate()
+        .map(|(index, configuration)| {
+            let mut runs: Vec<Value> = finished.runs[goal][index]
+                .iter()
+                .map(|run| motion(run, false, pack))
+                .collect();
+            let stopped = finished
+                .stopped
+                .iter()
+                .filter(|each| each.goal == goal && each.configuration == index);
+            runs.extend(stopped.map(|each| motion(&each.run, true, pack)));
+            let flange = configuration.joints_rad.map(|joints_rad| {
+                let q = Joints::from_column_slice(&joints_rad);
+                pose(&resolved.cell.robot.world_from_flange(&q))
+            });
+            json!({
+                "runs": runs,
+                "flange": flange,
+                "room": room::configuration(resolved, room, goal, configuration, pack),
+            })
+        })
+        .collect();
+    json!({
+        "columns": {
+            "table": columns(report, &engines, |heading| heading.page),
+            "side": columns(report, &engines, |heading| heading.page_side),
+        },
+        "guideExit": pose(&resolved.goals[goal].world_from_guide_exit),
+        "room": room::people(resolved, room, goal),
+        "configurations": configurations,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use needlebench_cell::{Overrides, load_scenario};
+
+    use super::*;
+    use crate::page::pack::unpack::of_page;
+    use needlebench_bench::{RunOptions, run_scenario};
+
+    #[test]
+    fn recorded_motions_and_clearances_come_back() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/small.toml");
+        let resolved = load_scenario(&path, &Overrides::default()).unwrap();
+        let options = RunOptions {
+            engines: Some(vec!["rapier".into()]),
+            ..RunOptions::default()
+        };
+        let finished = run_scenario(&resolved, &options).unwrap();
+        let back = of_page(&run_page(&resolved, &finished));
+        assert!(back.document["report"].get("timings").is_none());
+        let mut seen = 0;
+        for (index, runs) in finished.runs[0].iter().enumerate() {
+            let configuration = &back.document["goals"][0]["configurations"][index];
+            for (at, run) in runs.iter().enumerate() {
+                let page = &configuration["runs"][at];
+                assert_eq!(page["engine"], "rapier");
+                let times = back.column(&page["time"]);
+                assert_eq!(
+                    times.last().map(|t| (t * 1e4).round()),
+                    run.recording.time_s.last().map(|t| (t * 1e4).round())
+                );
+                for joint in 0..6 {
+                    let reference = &page["joints"][joint];
+                    let half_step = 0.5001 * reference["step"].as_f64().unwrap();
+                    for (time_s, q) in times.iter().zip(back.column(reference)) {
+                        let state = run.recording.time_s.partition_point(|t| *t < time_s - 1e-4);
+                        let expected = run.recording.state[state].position[joint];
+                        assert!((q - expected).abs() <= half_step, "{q} for {expected}");
+                    }
+                }
+                for (class, distances_m) in &run.clearance.distance_m {
+                    let reference = &page["curves"][class.name()];
+                    let least = |values: &[f64]| values.iter().copied().fold(f64::MAX, f64::min);
+                    // Least values are the ends of ranges, which are kept; JSON rounds the last bit.
+                    let away_m = least(&back.column(reference)) - least(distances_m);
+                    assert!(away_m.abs() < 1e-15, "{away_m}");
+                }
+                seen += 1;
+            }
+        }
+        assert!(seen >= 4, "{seen} motions");
+    }
+}

@@ -1,0 +1,326 @@
+use std::borrow::Cow;
+
+use needlebench_bench::study::StudyColumns;
+use needlebench_cell::study::StudyMode;
+use needlebench_kinematics::random::SplitMix64;
+use needlebench_study::{
+    CaseResult, Factor, FactorKind, FactorValue, Level, MetricColumn, Outcome, Results,
+    ResultsError, Role, Row,
+};
+use serde_json::{Value, json};
+
+use super::StudyPage;
+use crate::page::pack::unpack::{Unpacked, of_page};
+
+/// Largest page of a study.
+const MOST_BYTES: usize = 10_000_000;
+
+/// A table that is made as it is read: two goals, a tool, a level of calibration and six numbers.
+pub struct Synthetic {
+    pub columns: Vec<MetricColumn>,
+    pub factors: Vec<Factor>,
+    pub cases: u64,
+}
+
+impl Synthetic {
+    pub fn new(cases: u64) -> Self {
+        let levels = |name: &str, labels: &[&str], role| Factor {
+            name: name.to_owned(),
+            unit: String::new(),
+            role,
+            kind: FactorKind::Levels(
+                labels
+                    .iter()
+                    .map(|label| Level {
+                        label: (*label).to_owned(),
+                        number: None,
+                    })
+                    .collect(),
+            ),
+        };
+        let number = |name: &str, unit: &str, low, high| Factor {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            role: Role::Circumstance,
+            kind: FactorKind::Continuous { low, high },
+        };
+        let factors = vec![
+            levels(
+                "goal",
+                &["left_upper_anterior", "right_pleural_lateral"],
+                Role::Circumstance,
+            ),
+            levels(
+                "tool",
+                &["perpendicular", "inline", "offset </script>"],
+                Role::Choice,
+            ),
+            number("phantom_x", "mm", -60.0, 60.0),
+            number("phantom_y", "mm", -60.0, 60.0),
+            number("phantom_yaw", "deg", -15.0, 15.0),
+            number("chest_depth", "mm", 190.0, 280.0),
+            number("base_x", "mm", -100.0, 100.0),
+            number("base_y", "mm", -100.0, 100.0),
+        ];
+        let columns = StudyColumns::new(&[StudyMode::Static], &[]).described();
+        Self {
+            columns,
+            factors,
+            cases,
+        }
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "columns of single precision"
+    )]
+    fn case(&self, case: u64) -> (Vec<FactorValue>, CaseResult) {
+        let mut random = SplitMix64::new(case / 6);
+        let mut values = vec![
+            FactorValue::Level((case % 2) as usize),
+            FactorValue::Level((case / 2 % 3) as usize),
+        ];
+        let mut numbers = Vec::new();
+        for factor in &self.factors[2..] {
+            let FactorKind::Continuous { low, high } = factor.kind else {
+                continue;
+            };
+            let number = random.uniform(low, high);
+            numbers.push((number - low) / (high - low) - 0.5);
+            values.push(FactorValue::Number(number));
+        }
+        let tool = (case / 2 % 3) as f64;
+        let mut noise = SplitMix64::new(case);
+        let rows = std::array::from_fn(|index| {
+            let side = if index % 2 == 0 { 1.0 } else { -1.0 };
+            let reach = numbers[0] * side + 0.5 * numbers[1] - 0.3 * numbers[2] * numbers[5];
+            let clearance_mm =
+                25.0 + 60.0 * reach - 8.0 * tool - 4.0 * index as f64 + noise.uniform(-4.0, 4.0);
+            let outcome = if numbers[3] > 0.49 {
+                Outcome::Invalid
+            } else if clearance_mm < 0.0 {
+                Outcome::Rejected
+            } else if clearance_mm < 6.0 {
+                Outcome::Failed
+            } else {
+                Outcome::Ok
+            };
+            let detail = match outcome {
+                Outcome::Ok => "",
+                Outcome::Failed => "min_clearance_mm.robot_phantom",
+                Outcome::Rejected => "collision robot_phantom",
+                Outcome::Invalid => "phantom.position_mm",
+            };
+            let index = u8::try_from(index).unwrap();
+            let mut row = Row::new(index, outcome, Cow::Borrowed(detail));
+            if outcome != Outcome::Invalid {
+                row.values = vec![f32::NAN; self.columns.len()];
+                let mut set = |key: &str, value: f64| {
+                    let mut columns = self.columns.iter();
+                    let place = columns.position(|column| column.key == key).unwrap();
+                    row.values[place] = value as f32;
+                };
+                set("clearance_static", clearance_mm);
+                set(
+                    "tip_error_static",
+                    1.2 + numbers[4].abs() + noise.uniform(0.0, 0.8),
+                );
+                set("surplus_static", clearance_mm - 5.0);
+                set("self_clearance_static", 9.0 + noise.uniform(0.0, 20.0));
+                for (joint, start) in [-85.0, -105.0, 30.0, 40.0, 100.0, 10.0]
+                    .into_iter()
+                    .enumerate()
+                {
+                    set(
+                        &format!("q{}_static", joint + 1),
+                        start + 30.0 * numbers[joint] + 4.0 * f64::from(index),
+                    );
+                }
+            }
+            row
+        });
+        (values, CaseResult { case, rows })
+    }
+}
+
+impl Results for Synthetic {
+    fn factors(&self) -> &[Factor] {
+        &self.factors
+    }
+
+    fn columns(&self) -> &[MetricColumn] {
+        &self.columns
+    }
+
+    fn cases(&self) -> u64 {
+        self.cases
+    }
+
+    fn visit(
+        &self,
+        visit: &mut dyn FnMut(&[FactorValue], &CaseResult),
+    ) -> Result<(), ResultsError> {
+        for case in 0..self.cases {
+            let (values, result) = self.case(case);
+            visit(&values, &result);
+        }
+        Ok(())
+    }
+}
+
+fn page(results: &Synthetic, summary: &Value) -> String {
+    let page = StudyPage {
+        name: "synthetic </script><img src=x>",
+        description: "A table made up for tests.",
+        file: "studies/synthetic.toml",
+        results,
+        summary,
+        manifest: &json!({"seed": 1}),
+        base: None,
+        places: None,
+    };
+    page.html().unwrap()
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "small codes"
+)]
+fn code(value: f64) -> usize {
+    value as usize
+}
+
+fn index_of_case(unpacked: &Unpacked, case: u64) -> Option<usize> {
+    let numbers = &unpacked.document["numbers"];
+    if numbers.is_null() {
+        return usize::try_from(case).ok();
+    }
+    let mut sum = 0.0;
+    unpacked.column(numbers).iter().position(|step| {
+        sum += step;
+        sum == case as f64
+    })
+}
+
+#[test]
+fn columns_come_back_within_half_a_step() {
+    let results = Synthetic::new(600);
+    let back = of_page(&page(&results, &json!({})));
+    let document = &back.document;
+    assert_eq!(document["kept"], 600);
+    let (values, result) = results.case(123);
+    let tools = back.column(&document["factors"][1]["column"]);
+    assert_eq!(FactorValue::Level(code(tools[123])), values[1]);
+    for metric in document["metrics"].as_array().unwrap() {
+        let column = &metric["column"];
+        let step = column["step"].as_f64().unwrap();
+        let read = back.column(column);
+        let name = metric["name"].as_str().unwrap();
+        let mut columns = results.columns.iter();
+        let index = columns.position(|each| each.name == name).unwrap();
+        for (row, expected) in result.rows.iter().enumerate() {
+            let expected = expected.get(index).map_or(f64::NAN, f64::from);
+            let found = read[row * 600 + 123];
+            assert!(
+                (found - expected).abs() <= 0.5001 * step || found.is_nan() && expected.is_nan(),
+                "{name}: {found} for {expected}"
+            );
+        }
+    }
+    let outcomes = back.column(&document["outcomes"]);
+    let code = code(outcomes[3 * 600 + 123]);
+    assert_eq!(
+        document["outcomeNames"][code][0],
+        result.rows[3].outcome.name()
+    );
+    assert_eq!(document["outcomeNames"][code][1], *result.rows[3].detail);
+}
+
+#[test]
+fn a_page_keeps_its_size_and_the_cases_that_are_noted() {
+    let results = Synthetic::new(250_000);
+    let noted = 123_457;
+    let html = page(&results, &json!({"evidence": {"worst": [{"case": noted}]}}));
+    assert!(html.len() < MOST_BYTES, "{} bytes", html.len());
+    let back = of_page(&html);
+    let kept = back.document["kept"].as_u64().unwrap();
+    assert!((70_000..=100_001).contains(&kept), "{kept}");
+    let index = index_of_case(&back, noted).unwrap();
+    let posed = back.column(&back.document["postures"]["cases"]);
+    assert!(posed.contains(&(index as f64)));
+    // No level is preferred by the choice of cases: a third each, give or take four deviations.
+    let tools = back.column(&back.document["factors"][1]["column"]);
+    let first = tools.iter().filter(|tool| **tool == 0.0).count() as f64;
+    assert!((first - kept as f64 / 3.0).abs() < 4.0 * (kept as f64 * 2.0 / 9.0).sqrt());
+}
+
+#[test]
+fn names_stay_texts_and_bytes_stay_the_same() {
+    let results = Synthetic::new(60);
+    let html = page(&results, &json!({}));
+    assert!(!html.contains("<img"));
+    assert!(!html.contains("offset </script>"));
+    assert_eq!(html, page(&results, &json!({})));
+}
+
+#[test]
+fn an_empty_table_has_a_page() {
+    let results = Synthetic::new(0);
+    let back = of_page(&page(&results, &json!({})));
+    assert_eq!(back.document["kept"], 0);
+}
+
+/// A summary with the keys that the page draws, from the table itself.
+fn summary(results: &Synthetic) -> Value {
+    let mut ok = [0_u64; 8];
+    results
+        .visit(&mut |_, result| {
+            for (count, row) in ok.iter_mut().zip(&result.rows) {
+                *count += u64::from(row.outcome == Outcome::Ok);
+            }
+        })
+        .unwrap();
+    let configurations: Vec<Value> = needlebench_kinematics::ik::Configuration::ALL
+        .iter()
+        .zip(ok)
+        .map(|(configuration, ok)| {
+            let rate = ok as f64 / results.cases as f64;
+            json!({
+                "label": configuration.label(), "ok": ok, "failed": 0, "rejected": results.cases - ok, "best": 0,
+                "success": {"successes": ok, "of": results.cases, "rate": rate,
+                    "interval": {"low": rate - 0.004, "high": rate + 0.004}, "effective_size": 1e4, "remark": null},
+            })
+        })
+        .collect();
+    json!({
+        "schema_version": 1,
+        "confidence": 0.95,
+        "overall": {"goal": null, "cases": results.cases, "invalid": 0, "configurations": configurations},
+        "evidence": {"invalid": [12, 18], "configurations": [
+            {"of": "best", "worst": [{"metric": "clearance_static_mm", "cases": [{"case": 77, "value": 6.01}, {"case": 78, "value": 6.02}]}]}]},
+        "notes": ["A table made up for tests <b>"],
+    })
+}
+
+#[test]
+#[ignore = "writes the page that tests/page opens, to the file that PAGE_OUT names"]
+fn a_page_of_a_hundred_thousand_cases_for_the_browser() {
+    let path = std::env::var_os("PAGE_OUT").expect("PAGE_OUT names the file to write");
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let scenario = root.join("scenarios/supine_suite.toml");
+    let base = needlebench_cell::load_scenario(&scenario, &needlebench_cell::Overrides::default())
+        .unwrap();
+    let results = Synthetic::new(100_000);
+    let page = StudyPage {
+        name: "synthetic </script><img src=x>",
+        description: "A table made up for tests </script><script>window.attacked = true</script>",
+        file: "studies/synthetic.toml",
+        results: &results,
+        summary: &summary(&results),
+        manifest: &json!({"seed": 1}),
+        base: Some(&base),
+        places: None,
+    };
+    std::fs::write(path, page.html().unwrap()).unwrap();
+}

@@ -1,0 +1,93 @@
+//! Pages that draw themselves from a payload.
+
+use quick_xml::escape::escape;
+use serde_json::Value;
+
+use super::document::Document;
+use super::pack::Pack;
+
+const STYLE: &str = include_str!("assets/page.css");
+const THREE: &str = include_str!("assets/three.bundle.js");
+const CORE: &str = include_str!("assets/core.js");
+const VIEW: &str = include_str!("assets/view.js");
+const PLOT: &str = include_str!("assets/plot.js");
+
+/// What a page says before its scripts run, and which script is its own.
+pub(super) struct Viewer<'a> {
+    /// `run`, `atlas` or `study`.
+    pub kind: &'static str,
+    /// Name of the scenario or study.
+    pub name: &'a str,
+    /// Its description.
+    pub description: &'a str,
+    /// The page's own script.
+    pub script: &'static str,
+}
+
+impl Viewer<'_> {
+    /// The whole file.
+    pub fn html(&self, pack: Pack, document: &Value) -> String {
+        let body = format!(
+            "<header class=\"top\"><h1>{}</h1><p>{}</p></header>\n\
+             <main id=\"app\"><p id=\"loading\">Loading ...</p>\n\
+             <noscript><p>This page draws its contents with JavaScript, which is switched off. The same \
+             results are in the JSON file beside it.</p></noscript></main>\n\
+             <script type=\"application/octet-stream\" id=\"payload\">{}</script>",
+            escape(self.name),
+            escape(self.description),
+            pack.payload(document)
+        );
+        Document {
+            title: &format!("{}: {} - needlebench", self.kind, self.name),
+            style: STYLE,
+            body: &body,
+            scripts: &[THREE, CORE, VIEW, PLOT, self.script],
+        }
+        .html()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn names_and_descriptions_cannot_become_markup() {
+        let attack = "</script><img src=x onerror=\"alert('1')\">&amp;";
+        let page = Viewer {
+            kind: "run",
+            name: attack,
+            description: attack,
+            script: "",
+        };
+        let html = page.html(Pack::default(), &json!({"name": attack}));
+        assert!(!html.contains("<img"));
+        assert!(html.contains(
+            "<h1>&lt;/script&gt;&lt;img src=x onerror=&quot;alert(&apos;1&apos;)&quot;&gt;&amp;amp;</h1>"
+        ));
+        // The payload and the five scripts, opened and closed.
+        assert_eq!(html.matches("<script").count(), 6);
+        assert_eq!(html.matches("</script>").count(), 6);
+    }
+
+    #[test]
+    fn no_script_can_close_itself_or_reach_out() {
+        for script in [THREE, CORE, VIEW, PLOT] {
+            assert!(!script.to_lowercase().contains("</script"));
+            assert!(!script.to_lowercase().contains("<!--"));
+        }
+        for script in [CORE, VIEW, PLOT] {
+            for name in [
+                "innerHTML",
+                "outerHTML",
+                "insertAdjacentHTML",
+                "document.write",
+                "eval(",
+                "fetch(",
+            ] {
+                assert!(!script.contains(name), "{name}");
+            }
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! A picture of each configuration, and all of a goal on one sheet.
+
+use std::sync::Arc;
+
+use nalgebra::{Point2, Point3, Vector3};
+use needlebench_cell::phantom::Tissue;
+use needlebench_cell::{Goal, ResolvedScenario};
+use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
+use needlebench_geometry::Visual;
+use needlebench_kinematics::{Joints, Pose};
+
+use super::camera::Camera;
+use super::image::Image;
+use super::render::render;
+use super::scene::{Anchor, Floor, Label, Line3, Scene, SurfaceInstance};
+use crate::number::{millimetres, small_length};
+
+/// Size of one picture, pixels.
+const SIZE_PX: [u32; 2] = [1000, 750];
+/// Height of the arm's reach over its base, for framing, m.
+const REACH_M: f64 = 0.55;
+/// Share of a needle's direction that leads away from the robot, beyond which pictures look the
+/// same way.
+const FROM_ROBOT_SIDE: f64 = 0.75;
+/// Fineness of curved surfaces in pictures, m.
+const CHORD_ERROR_M: f64 = 3e-4;
+
+/// Everything of a cell that does not move, made once for all pictures of a scenario.
+pub struct Backdrop {
+    surfaces: Vec<SurfaceInstance>,
+}
+
+impl Backdrop {
+    /// Everything of a scenario that does not move.
+    pub fn new(resolved: &ResolvedScenario) -> Self {
+        let robot = &resolved.cell.robot;
+        let mut surfaces = Vec::new();
+        add(
+            &mut surfaces,
+            &robot.base.visuals,
+            &robot.world_from_base_link,
+        );
+        for fixture in &resolved.fixtures {
+            for solid in &fixture.solids {
+                // Opaque: inner faces of a gantry made of convex pieces stay hidden.
+                let mut color_rgba = fixture.color_rgba;
+                color_rgba[3] = 1.0;
+                surfaces.push(SurfaceInstance {
+                    mesh: Arc::new(solid.shape.surface(CHORD_ERROR_M)),
+                    world_from_surface: solid.parent_from_shape,
+                    color_rgba,
+                });
+            }
+        }
+        if let Some(placed) = &resolved.phantom {
+            for part in &placed.phantom.parts {
+                let mut color_rgba = part.color_rgba;
+                match part.tissue {
+                    Tissue::Skin => color_rgba[3] = 0.22,
+                    Tissue::Organ => color_rgba[3] = 0.4,
+                    _ => {}
+                }
+                surfaces.push(SurfaceInstance {
+                    mesh: Arc::new(part.solid.shape.surface(CHORD_ERROR_M)),
+                    world_from_surface: placed.world_from_phantom * part.solid.parent_from_shape,
+                    color_rgba,
+                });
+            }
+        }
+        Self { surfaces }
+    }
+}
+
+fn add(surfaces: &mut Vec<SurfaceInstance>, visuals: &[Visual], world_from_parent: &Pose) {
+    surfaces.extend(visuals.iter().map(|visual| SurfaceInstance {
+        mesh: Arc::clone(&visual.mesh),
+        world_from_surface: world_from_parent * visual.parent_from_visual,
+        color_rgba: visual.color_rgba,
+    }));
+}
+
+/// Draws one configuration in its final posture; `None` if it has none.
+pub fn configuration_picture(
+    resolved: &ResolvedScenario,
+    backdrop: &Backdrop,
+    camera: &Camera,
+    goal: &Goal,
+    report: &ConfigurationReport,
+) -> Option<Image> {
+    let q = Joints::from_column_slice(&report.joints_rad?);
+    let mut scene = posture_scene(resolved, backdrop, &q);
+
+    let exit = Point3::from(goal.world_from_guide_exit.translation.vector);
+    let behind = exit
+        - goal.axis.into_inner()
+            * (resolved.cell.tool.guide_length_m() + resolved.cell.tool.needle.length_m * 0.5);
+    scene.lines.push(Line3 {
+        from_m: behind,
+        to_m: goal.target_m,
+        color_rgba: [0.0, 0.55, 0.2, 1.0],
+        width_px: 3.0,
+    });
+    scene.labels.push(Label {
+        text: caption(report),
+        anchor: Anchor::TopLeft,
+    });
+    scene.labels.push(Label {
+        text: "target".to_owned(),
+        anchor: Anchor::World(goal.target_m),
+    });
+    if let Some(found) = report.clearance.least() {
+        scene.labels.push(Label {
+            text: format!(
+                "least clearance {} mm\n{} - {}\n({})",
+                millimetres(found.minimum_m),
+                found.pair[0],
+                found.pair[1],
+                found.phase
+            ),
+            anchor: Anchor::BottomLeft,
+        });
+    }
+    scene.floor = Some(floor(resolved, goal));
+    Some(render(&scene, camera))
+}
+
+/// The cell with the arm in a posture.
+pub(super) fn posture_scene(resolved: &ResolvedScenario, backdrop: &Backdrop, q: &Joints) -> Scene {
+    let robot = &resolved.cell.robot;
+    let mut scene = Scene {
+        surfaces: backdrop.surfaces.clone(),
+        ..Scene::default()
+    };
+    for (link, pose) in robot.links.iter().zip(robot.world_from_links(q)) {
+        add(&mut scene.surfaces, &link.visuals, &pose);
+    }
+    add(
+        &mut scene.surfaces,
+        &resolved.cell.tool.visuals,
+        &robot.world_from_flange(q),
+    );
+    scene
+}
+
+/// The floor under robot and patient.
+pub(super) fn floor(resolved: &ResolvedScenario, goal: &Goal) -> Floor {
+    let base = resolved.cell.robot.world_from_base_link.translation.vector;
+    Floor {
+        center_m: Point2::new(
+            0.5 * (base.x + goal.target_m.x),
+            0.5 * (base.y + goal.target_m.y),
+        ),
+        z_m: 0.0,
+        radius_m: 1.6,
+        spacing_m: 0.25,
+    }
+}
+
+/// The camera of all pictures of a goal, so that they can be compared.
+pub fn goal_camera(resolved: &ResolvedScenario, goal: &Goal) -> Camera {
+    Camera::framing(&framed(resolved, goal), viewpoint(resolved, goal), SIZE_PX)
+}
+
+/// Points that every picture of a goal shows.
+fn framed(resolved: &ResolvedScenario, goal: &Goal) -> Vec<Point3<f64>> {
+    let base = Point3::from(resolved.cell.robot.world_from_base_link.translation.vector);
+    let mut points = vec![goal.target_m];
+    for corner in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
+        for height_m in [-0.1, REACH_M] {
+            points.push(base + Vector3::new(0.2 * corner[0], 0.2 * corner[1], height_m));
+        }
+    }
+    if let Some(placed) = &resolved.phantom {
+        let skin = placed.phantom.skin();
+        let pose = placed.world_from_phantom * skin.parent_from_shape;
+        points.extend(
+            skin.shape
+                .surface(CHORD_ERROR_M)
+                .vertices_m
+                .iter()
+                .map(|v| pose * v),
+        );
+    }
+    points
+}
+
+/// Direction of view: from the side of the robot that looks across towards the goal, from above.
+pub(super) fn viewpoint(resolved: &ResolvedScenario, goal: &Goal) -> Vector3<f64> {
+    let base = resolved.cell.robot.world_from_base_link.translation.vector;
+    let ahead = goal.target_m.coords - base;
+    let across = Vector3::new(ahead.y, -ahead.x, 0.0);
+    let level = across.try_normalize(1e-6).unwrap_or(Vector3::x());
+    let forward = Vector3::new(ahead.x, ahead.y, 0.0)
+        .try_normalize(1e-6)
+        .unwrap_or(Vector3::y());
+    // Back towards the robot, unless the needle comes so much from its side that the chest would
+    // hide the guide.
+    let along = if goal.axis.dot(&forward) > FROM_ROBOT_SIDE {
+        0.45
+    } else {
+        -0.45
+    };
+    level * -0.75 + forward * along + Vector3::new(0.0, 0.0, -0.55)
+}
+
+fn caption(report: &ConfigurationReport) -> String {
+    let mut lines = vec![report.label.to_owned()];
+    match (report.status, report.rejections.first()) {
+        (Status::Rejected, Some(first)) => lines.push(format!("rejected: {}", first.rule)),
+        (status, _) => lines.push(status.name().to_owned()),
+    }
+    for (engine, measured) in &report.engines {
+        let error_m = measured.needle.tip_position_error_m;
+        lines.push(format!("{engine}: tip error {}", small_length(error_m)));
+    }
+    lines.join("\n")
+}
+
+/// Caption of a configuration on the sheet of its goal.
+pub fn sheet_caption(goal: &GoalReport, report: &ConfigurationReport) -> String {
+    let chosen = goal
+        .recommended
+        .as_ref()
+        .is_some_and(|found| found.label == report.label);
+    let mark = if chosen { " (recommended)" } else { "" };
+    match report.rejections.first() {
+        Some(first) => format!("{}: {}", report.label, first.rule),
+        None => format!("{}{mark}", report.label),
+    }
+}

@@ -1,0 +1,185 @@
+//! The error budgets of a goal as a table by source, with what follows from it.
+
+use std::fmt::Write;
+
+use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
+use needlebench_uncertainty::Source;
+use needlebench_uncertainty::budget::{ErrorBudget, SourceBudget};
+
+use super::plain_table;
+
+/// Mean of the largest errors that 153 interventional radiologists allow, m.
+pub(crate) const ALLOWED_M: f64 = 2.7e-3;
+
+/// Root mean square tip errors of needle robots in clinical use, m.
+const CLINICAL_M: [f64; 2] = [1.2e-3, 2.8e-3];
+
+/// Configurations that have a budget.
+pub(crate) fn budgets(goal: &GoalReport) -> Vec<(&ConfigurationReport, &ErrorBudget)> {
+    goal.configurations
+        .iter()
+        .filter_map(|each| Some((each, each.budget.as_ref()?)))
+        .collect()
+}
+
+/// Millimetres with two decimals.
+pub(crate) fn mm(metres: f64) -> String {
+    format!("{:.2}", metres * 1e3)
+}
+
+/// Budgets as a table with what follows from them; none without imperfections.
+pub fn budget_text(goal: &GoalReport) -> Option<String> {
+    let budgets = budgets(goal);
+    let (_, first) = budgets.first()?;
+    let sources: Vec<Source> = first
+        .sources
+        .iter()
+        .filter_map(|each| each.source)
+        .collect();
+    let mut header = vec!["configuration".to_owned()];
+    header.extend(sources.iter().map(|source| source.name().to_owned()));
+    header.extend(
+        [
+            "all",
+            "all:\nacross",
+            "all:\nbias",
+            "all:\nspread",
+            "all:\nat skin",
+            "95 %\nwithin",
+        ]
+        .map(str::to_owned),
+    );
+    header.push("ways differ\nspread, bias".to_owned());
+    let mut table = plain_table(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    for (configuration, budget) in &budgets {
+        let mut row = vec![configuration.label.to_owned()];
+        row.extend(
+            budget
+                .sources
+                .iter()
+                .map(|each| mm(each.at_target.analytic.rms_m)),
+        );
+        let total = &budget.total.at_target;
+        let moments = &total.analytic;
+        row.push(mm(moments.rms_m));
+        row.push(mm(moments.lateral_rms_m));
+        row.push(mm(moments.bias().norm()));
+        row.push(mm(moments.covariance().trace().sqrt()));
+        row.push(mm(budget.total.at_skin.analytic.rms_m));
+        row.push(total.radius_95_m.map_or_else(|| "-".to_owned(), mm));
+        row.push(largest_difference(budget));
+        table.add_row(row);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(comfy_table::CellAlignment::Right);
+    }
+    let mut text = format!(
+        "error budget of the needle's tip over all arms and patients (mm, root mean square; by Jacobians{})\n{table}\n",
+        if first.samples > 0 {
+            format!(", against {} draws", first.samples)
+        } else {
+            String::new()
+        }
+    );
+    // Writing to a String cannot fail.
+    let _ = write_remarks(&mut text, goal, &budgets);
+    Some(text)
+}
+
+/// The worst differences of the two ways over all sources: covariance in per cent, bias in um.
+fn largest_difference(budget: &ErrorBudget) -> String {
+    let all = || budget.sources.iter().chain([&budget.total]);
+    let points = || all().flat_map(|each| [each.at_skin, each.at_target]);
+    let covariance = points()
+        .filter_map(|point| point.covariance_difference)
+        .reduce(f64::max);
+    let bias = points()
+        .filter_map(|point| point.bias_difference_m)
+        .reduce(f64::max);
+    match (covariance, bias) {
+        (Some(covariance), Some(bias_m)) => {
+            format!("{:.1} %, {:.1} um", covariance * 100.0, bias_m * 1e6)
+        }
+        (None, Some(bias_m)) => format!("-, {:.1} um", bias_m * 1e6),
+        _ => "-".to_owned(),
+    }
+}
+
+fn write_remarks(
+    out: &mut String,
+    goal: &GoalReport,
+    budgets: &[(&ConfigurationReport, &ErrorBudget)],
+) -> std::fmt::Result {
+    let rms = |budget: &ErrorBudget| budget.total.at_target.analytic.rms_m;
+    let best = budgets
+        .iter()
+        .filter(|(configuration, _)| configuration.rejections.is_empty())
+        .min_by(|(_, a), (_, b)| rms(a).total_cmp(&rms(b)));
+    if let Some((configuration, budget)) = best {
+        let dominant = budget.dominant.map_or("nothing", Source::name);
+        writeln!(
+            out,
+            "least off of those that work: {}, {} mm, most of it by {dominant}",
+            configuration.label,
+            mm(rms(budget))
+        )?;
+        for source in budget.sources.iter().filter_map(|each| each.source) {
+            let of = |each: &SourceBudget| each.at_target.analytic.rms_m;
+            let value = |budget: &ErrorBudget| {
+                let found = budget
+                    .sources
+                    .iter()
+                    .find(|each| each.source == Some(source));
+                found.map_or(f64::NAN, of)
+            };
+            let mut order: Vec<_> = budgets
+                .iter()
+                .filter(|(configuration, _)| configuration.rejections.is_empty())
+                .collect();
+            order.sort_by(|(_, a), (_, b)| value(a).total_cmp(&value(b)));
+            if let ([least, .., most], true) = (&order[..], order.len() > 1) {
+                let (low, high) = (value(least.1), value(most.1));
+                if high > 1.2 * low && high > 0.1e-3 {
+                    writeln!(
+                        out,
+                        "to {}: least sensitive {} ({} mm), most {} ({} mm)",
+                        source.name(),
+                        least.0.label,
+                        mm(low),
+                        most.0.label,
+                        mm(high)
+                    )?;
+                }
+            }
+        }
+    }
+    for configuration in &goal.configurations {
+        if let Some(why) = &configuration.budget_failure {
+            writeln!(out, "{}: no error budget: {why}", configuration.label)?;
+        }
+        for (engine, report) in &configuration.engines {
+            if let Some(off_m) = report
+                .unexplained_tip_m
+                .filter(|off_m| *off_m > UNEXPLAINED_M)
+            {
+                writeln!(
+                    out,
+                    "{}: {engine} leaves the tip {} mm from where the balance of torques has it",
+                    configuration.label,
+                    mm(off_m)
+                )?;
+            }
+        }
+    }
+    writeln!(
+        out,
+        "anchors: {} mm is what interventional radiologists allow on average, {} to {} mm what \
+         needle robots in clinics reach",
+        mm(ALLOWED_M),
+        mm(CLINICAL_M[0]),
+        mm(CLINICAL_M[1])
+    )
+}
+
+/// Distance from the prediction that is worth a line, m.
+const UNEXPLAINED_M: f64 = 0.1e-3;

@@ -1,0 +1,187 @@
+//! Contacts, stops and ways back as tables.
+
+use std::fmt::Write;
+
+use comfy_table::{Cell, CellAlignment, Table};
+use needlebench_evaluation::events::PressEngineReport;
+use needlebench_evaluation::report::GoalReport;
+
+use super::plain_table;
+use crate::number::{millimetres, percent_with, small_length};
+
+/// What the events of a goal's configurations measured; none where none were asked for.
+pub fn events_text(goal: &GoalReport) -> Option<String> {
+    goal.configurations
+        .iter()
+        .find(|each| each.events.is_some())?;
+    let mut text = String::new();
+    let tables = [
+        ("contacts that were asked for", press_table(goal)),
+        ("emergency stop", stop_table(goal)),
+        ("way back along the needle", retract_table(goal)),
+    ];
+    for (heading, table) in tables {
+        if table.row_count() > 0 {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{heading}\n{table}");
+        }
+    }
+    Some(text)
+}
+
+fn add(table: &mut Table, row: Vec<String>, texts: usize) {
+    let cells = row.into_iter().enumerate().map(|(at, text)| {
+        let cell = Cell::new(text);
+        if at < texts {
+            cell
+        } else {
+            cell.set_alignment(CellAlignment::Right)
+        }
+    });
+    table.add_row(cells);
+}
+
+fn or_dash(value: Option<f64>, text: impl Fn(f64) -> String) -> String {
+    value.map_or("-".to_owned(), text)
+}
+
+fn press_table(goal: &GoalReport) -> Table {
+    let mut table = plain_table(&[
+        "configuration",
+        "touching",
+        "friction",
+        "engine",
+        "onset\n(s)",
+        "at\n(mm/s)",
+        "peak\n(N)",
+        "settled\n(N)",
+        "impulse\n(N s)",
+        "off\nbalance",
+        "deepest",
+        "recovery\n(s)",
+        "forces\ndiffer",
+        "tips\ndiffer",
+    ]);
+    for configuration in &goal.configurations {
+        let Some(events) = &configuration.events else {
+            continue;
+        };
+        for press in &events.press {
+            if let Some(reason) = &press.not_staged {
+                let row = vec![configuration.label.to_owned(), reason.clone()];
+                add(&mut table, row, 2);
+            }
+            for (engine, measured) in &press.engines {
+                let mut row = vec![
+                    configuration.label.to_owned(),
+                    press.solids.join(", "),
+                    format!("{}", press.friction),
+                    engine.clone(),
+                ];
+                row.extend(contact_texts(measured));
+                row.push(or_dash(press.force_difference, |share| {
+                    percent_with(share, 3)
+                }));
+                row.push(or_dash(press.tip_difference_settled_m, small_length));
+                add(&mut table, row, 2);
+            }
+        }
+    }
+    table
+}
+
+fn contact_texts(measured: &PressEngineReport) -> Vec<String> {
+    let first = measured.episodes.first();
+    let over = |value: fn(&needlebench_evaluation::ContactEpisode) -> f64| {
+        measured.episodes.iter().map(value)
+    };
+    vec![
+        or_dash(first.map(|each| each.start_s), |s| format!("{s:.3}")),
+        or_dash(first.and_then(|each| each.approach_speed_m_s), |speed| {
+            format!("{:.1}", 1e3 * speed)
+        }),
+        format!("{:.1}", over(|each| each.peak_force_n).fold(0.0, f64::max)),
+        or_dash(measured.settled_force_n, |force| format!("{force:.3}")),
+        format!("{:.2}", over(|each| each.impulse_ns).sum::<f64>()),
+        or_dash(measured.balance_difference, |share| percent_with(share, 3)),
+        small_length(over(|each| each.deepest_penetration_m).fold(0.0, f64::max)),
+        or_dash(measured.recovery_s, |s| format!("{s:.3}")),
+    ]
+}
+
+fn stop_table(goal: &GoalReport) -> Table {
+    let mut table = plain_table(&[
+        "configuration",
+        "phase",
+        "category",
+        "engine",
+        "at (s)",
+        "stands\nafter (s)",
+        "tip went\n(mm)",
+        "flange\n(mm)",
+        "off the\npath (mm)",
+        "least\n(mm)",
+        "certified\n(mm)",
+        "predicted worst\ntip (mm)",
+    ]);
+    for configuration in &goal.configurations {
+        let stop = configuration
+            .events
+            .as_ref()
+            .and_then(|each| each.stop.as_ref());
+        let Some(stop) = stop else { continue };
+        for (engine, measured) in &stop.engines {
+            let fine = |metres: f64| format!("{:.3}", 1e3 * metres);
+            let row = vec![
+                configuration.label.to_owned(),
+                stop.phase.to_owned(),
+                stop.category.to_string(),
+                engine.clone(),
+                format!("{:.3}", stop.at_s),
+                or_dash(measured.stopping_time_s, |s| format!("{s:.3}")),
+                fine(measured.tip_distance_m),
+                fine(measured.flange_distance_m),
+                fine(measured.off_path_m),
+                or_dash(measured.clearance.minimum_m, millimetres),
+                or_dash(measured.clearance.minimum_certified_m, millimetres),
+                fine(stop.envelope.worst_tip_distance_m),
+            ];
+            add(&mut table, row, 2);
+        }
+    }
+    table
+}
+
+fn retract_table(goal: &GoalReport) -> Table {
+    let mut table = plain_table(&[
+        "configuration",
+        "engine",
+        "needle in\n(mm)",
+        "straight\n(mm)",
+        "guide off\nthe axis",
+        "turned by\n(urad)",
+        "touches",
+        "least\n(mm)",
+        "certified\n(mm)",
+    ]);
+    for configuration in &goal.configurations {
+        let Some(events) = &configuration.events else {
+            continue;
+        };
+        for (engine, measured) in &events.retract {
+            let row = vec![
+                configuration.label.to_owned(),
+                engine.clone(),
+                millimetres(measured.inserted_length_m),
+                millimetres(measured.straight_length_m),
+                small_length(measured.largest_lateral_deviation_m),
+                format!("{:.3}", 1e6 * measured.largest_angle_rad),
+                measured.contacts.len().to_string(),
+                or_dash(measured.clearance.minimum_m, millimetres),
+                or_dash(measured.clearance.minimum_certified_m, millimetres),
+            ];
+            add(&mut table, row, 2);
+        }
+    }
+    table
+}

@@ -1,0 +1,20 @@
+//! Tables and lines for a terminal.
+
+pub mod atlas;
+pub(crate) mod budget;
+pub mod comparison;
+pub(crate) mod engine_headings;
+pub(crate) mod events;
+pub mod iso9283;
+mod plain;
+pub(crate) mod ranking;
+mod referee;
+mod run;
+mod saturation;
+pub mod servo;
+pub(crate) mod shown;
+pub mod study;
+pub mod study_comparison;
+
+pub use plain::plain_table;
+pub use run::report_text;

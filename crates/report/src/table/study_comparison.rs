@@ -1,0 +1,201 @@
+//! Two studies side by side.
+
+use comfy_table::{Cell, CellAlignment, Color, ContentArrangement};
+use needlebench_study::compare::{
+    Change, Paired, StudyComparison, StudyFailure, StudySide, Transition, value_text, what,
+};
+
+use super::plain_table;
+use crate::number::percent_with;
+
+/// Columns that the table fits into.
+const WIDTH: u16 = 100;
+/// Smallest difference of values that is shown as one, in their unit: 1 um, 0.01 %.
+const SAME: f64 = 1e-3;
+const SAME_SHARE: f64 = 1e-4;
+
+fn side_text(name: &str, side: &StudySide) -> String {
+    let id: String = side.study_id.chars().take(12).collect();
+    format!(
+        "{name}: {}: {} ({id}), {} cases, {} valid layouts",
+        side.source, side.name, side.cases, side.layouts
+    )
+}
+
+fn percent(share: Option<f64>) -> String {
+    share.map_or("-".to_owned(), |share| percent_with(share, 2))
+}
+
+fn transition_text(what: &str, transition: &Transition) -> Option<String> {
+    if transition.lost == 0 && transition.gained == 0 {
+        return None;
+    }
+    let p = if transition.p < 1e-4 {
+        "p < 0.0001".to_owned()
+    } else {
+        format!("p = {:.2}", transition.p)
+    };
+    let cases = |name: &str, cases: &[u64], count: u64| {
+        let list: Vec<String> = cases.iter().map(ToString::to_string).collect();
+        let more = if count > cases.len() as u64 {
+            ", ..."
+        } else {
+            ""
+        };
+        if list.is_empty() {
+            String::new()
+        } else {
+            format!("; {name} in cases {}{more}", list.join(", "))
+        }
+    };
+    Some(format!(
+        "{what}: lost in {} layouts ({}), gained in {} ({}), {p}{}{}",
+        transition.lost,
+        percent(transition.lost_share),
+        transition.gained,
+        percent(transition.gained_share),
+        cases("lost", &transition.lost_cases, transition.lost),
+        cases("gained", &transition.gained_cases, transition.gained)
+    ))
+}
+
+/// What changed case by case.
+fn paired_lines(paired: &Paired) -> Vec<String> {
+    let mut lines = vec![format!(
+        "the same {} cases in both, compared one by one; {} valid in both, {} no longer valid, {} newly \
+         valid",
+        paired.cases, paired.layouts, paired.became_invalid, paired.became_valid
+    )];
+    lines.extend(transition_text("layouts that work", &paired.working));
+    for each in &paired.configurations {
+        lines.extend(transition_text(&each.label, &each.success));
+    }
+    for each in &paired.differences {
+        let largest = [("worse", &each.losses), ("better", &each.gains)];
+        for (way, cases) in largest {
+            // A configuration that lost 1 um is no news.
+            let Some(first) = cases.first().filter(|first| first.value > SAME) else {
+                continue;
+            };
+            lines.push(format!(
+                "{} of {}: case {} {way} by {}; on average {} (B less A, {} layouts)",
+                each.words,
+                each.of,
+                first.case,
+                value_text(first.value, &each.unit),
+                value_text(each.mean, &each.unit),
+                each.count
+            ));
+        }
+    }
+    lines
+}
+
+fn is_changed(change: &Change) -> bool {
+    let same = if change.unit == "1" { SAME_SHARE } else { SAME };
+    change.change.is_none_or(|by| by.abs() >= same) || change.beyond_chance
+}
+
+pub(crate) fn intro(comparison: &StudyComparison) -> Vec<String> {
+    let mut lines = vec![side_text("A", &comparison.a), side_text("B", &comparison.b)];
+    lines.extend(comparison.notes.iter().map(|note| format!("note: {note}")));
+    if let Some(reason) = &comparison.unpaired_because {
+        lines.push(format!(
+            "not the same cases ({reason}): rates and quantiles are compared, by their 95 % intervals"
+        ));
+    }
+    if let Some(paired) = &comparison.paired {
+        lines.extend(paired_lines(paired));
+    }
+    lines
+}
+
+/// What, A, B, change, and how sure.
+pub(crate) fn row(change: &Change) -> [String; 5] {
+    let text =
+        |value: Option<f64>| value.map_or("-".to_owned(), |value| value_text(value, &change.unit));
+    let loss = change.loss.unwrap_or_default();
+    let way = match (is_changed(change), loss > 0.0) {
+        (false, _) => "same",
+        (true, true) => "worse",
+        (true, false) => "better",
+    };
+    let sure = if is_changed(change) && !change.beyond_chance {
+        " (or chance)"
+    } else {
+        ""
+    };
+    let difference = change.change.map_or("-".to_owned(), |by| {
+        let sign = if by > 0.0 { "+" } else { "" };
+        format!("{sign}{}", value_text(by, &change.unit))
+    });
+    [
+        what(change),
+        text(change.a),
+        text(change.b),
+        difference,
+        format!("{way}{sure}"),
+    ]
+}
+
+pub(crate) fn shown(comparison: &StudyComparison, all: bool) -> Vec<&Change> {
+    let changes = comparison.changes.iter();
+    changes.filter(|change| all || is_changed(change)).collect()
+}
+
+pub(crate) fn failure_text(failure: &StudyFailure) -> String {
+    let cases: Vec<String> = failure.cases.iter().map(ToString::to_string).collect();
+    if cases.is_empty() {
+        failure.detail.clone()
+    } else {
+        format!("{}; see cases {} of B", failure.detail, cases.join(", "))
+    }
+}
+
+/// The comparison as text; `all` lists what did not change too.
+pub fn study_comparison_text(comparison: &StudyComparison, all: bool) -> String {
+    let mut lines = intro(comparison);
+    let rows = shown(comparison, all);
+    let same = comparison.changes.len() - rows.len();
+    if !rows.is_empty() {
+        let mut table = plain_table(&["what", "A", "B", "B less A", ""]);
+        table.set_content_arrangement(ContentArrangement::Dynamic);
+        table.set_width(WIDTH);
+        for change in rows {
+            let [what, a, b, difference, outcome] = row(change);
+            let right = |text: String| Cell::new(text).set_alignment(CellAlignment::Right);
+            let outcome = match outcome.as_str() {
+                "worse" => Cell::new(outcome).fg(Color::Red),
+                "better" => Cell::new(outcome).fg(Color::Green),
+                _ => Cell::new(outcome),
+            };
+            table.add_row(vec![
+                Cell::new(what),
+                right(a),
+                right(b),
+                right(difference),
+                outcome,
+            ]);
+        }
+        lines.push(table.to_string());
+    }
+    if !all {
+        lines.push(format!("{same} rates and quantiles are the same"));
+    }
+    lines.push(String::new());
+    for threshold in comparison.thresholds.iter().filter(|each| each.pass) {
+        lines.push(format!(
+            "allowed {} = {}: {}",
+            threshold.threshold, threshold.limit, threshold.detail
+        ));
+    }
+    for failure in &comparison.failures {
+        lines.push(format!("FAILED {}", failure_text(failure)));
+    }
+    lines.push(match comparison.failures.len() {
+        0 => "PASS: nothing was lost beyond what is allowed".to_owned(),
+        1 => "FAIL: 1 loss".to_owned(),
+        count => format!("FAIL: {count} losses"),
+    });
+    lines.join("\n")
+}

@@ -1,0 +1,55 @@
+//! What happens while a study is computed or merged.
+
+use std::path::Path;
+
+/// What happens in a run. `Display` gives a line for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "fields are named in the messages")]
+pub enum Progress<'a> {
+    /// The journal ends within a record, as after a kill; its block is computed again.
+    CutOff {
+        journal: &'a Path,
+        offset: u64,
+        bytes: u64,
+    },
+    /// Something else has changed the journal; what was there is computed again.
+    Damage {
+        journal: &'a Path,
+        offset: u64,
+        bytes: u64,
+    },
+    /// So many cases were there at the beginning.
+    Begin { kept: u64, total: u64 },
+    /// So many cases are in the journal.
+    Cases { done: u64, total: u64 },
+    /// So many cases are in the table.
+    Table { done: u64, total: u64 },
+}
+
+impl std::fmt::Display for Progress<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::CutOff {
+                journal,
+                offset,
+                bytes,
+            } => write!(
+                f,
+                "{}: ends within a block; {bytes} bytes from byte {offset} on are cut off",
+                journal.display()
+            ),
+            Self::Damage {
+                journal,
+                offset,
+                bytes,
+            } => write!(
+                f,
+                "{}: {bytes} bytes from byte {offset} on are damaged; what was there is computed again",
+                journal.display()
+            ),
+            Self::Begin { kept, total } => write!(f, "{kept} of {total} cases are there already"),
+            Self::Cases { done, total } => write!(f, "{done} of {total} cases"),
+            Self::Table { done, total } => write!(f, "{done} of {total} cases in the table"),
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! Studies, from outside the crate.
+
+mod design;
+mod store;

@@ -1,0 +1,5 @@
+//! Imperfections and error budgets, from outside the crate.
+
+mod budget;
+mod common;
+mod settled;

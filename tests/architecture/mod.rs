@@ -1,0 +1,246 @@
+//! The layers of the workspace: who may depend on whom, and who owns which heavy dependency.
+
+mod modules;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Every crate under `crates/` and the crates of the workspace that it may depend on.
+///
+/// Data flows one way: a new edge is a decision, and belongs here first.
+const LAYERS: [(&str, &[&str]); 13] = [
+    ("kinematics", &[]),
+    ("geometry", &["kinematics"]),
+    ("cell", &["geometry", "kinematics"]),
+    ("clearance", &["cell", "geometry", "kinematics"]),
+    ("planning", &["clearance", "cell", "kinematics"]),
+    ("engine", &["cell", "geometry", "kinematics"]),
+    ("uncertainty", &["engine", "cell", "kinematics"]),
+    ("study", &["cell", "kinematics"]),
+    (
+        "evaluation",
+        &[
+            "uncertainty",
+            "engine",
+            "clearance",
+            "cell",
+            "geometry",
+            "kinematics",
+        ],
+    ),
+    (
+        "bench",
+        &[
+            "study",
+            "evaluation",
+            "uncertainty",
+            "engine",
+            "planning",
+            "clearance",
+            "cell",
+            "kinematics",
+        ],
+    ),
+    (
+        "report",
+        &[
+            "bench",
+            "study",
+            "evaluation",
+            "uncertainty",
+            "engine",
+            "planning",
+            "clearance",
+            "cell",
+            "geometry",
+            "kinematics",
+        ],
+    ),
+    (
+        "paper",
+        &[
+            "report",
+            "bench",
+            "evaluation",
+            "engine",
+            "clearance",
+            "cell",
+            "geometry",
+            "kinematics",
+        ],
+    ),
+    (
+        "needlebench",
+        &[
+            "paper",
+            "report",
+            "bench",
+            "study",
+            "evaluation",
+            "engine",
+            "planning",
+            "clearance",
+            "cell",
+            "kinematics",
+        ],
+    ),
+];
+
+/// Dependencies that one crate alone has, hidden behind its own types.
+const OWNERS: [(&str, &str); 14] = [
+    ("rapier3d-f64", "engine"),
+    ("parry3d-f64", "geometry"),
+    ("toml", "cell"),
+    ("schemars", "cell"),
+    ("roxmltree", "cell"),
+    ("granit-parser", "cell"),
+    ("stl_io", "geometry"),
+    ("parquet", "study"),
+    ("zstd", "study"),
+    ("crc32fast", "study"),
+    ("png", "report"),
+    ("quick-junit", "report"),
+    ("indicatif", "needlebench"),
+    ("clap", "needlebench"),
+];
+
+/// What `cargo metadata` knows of a package of the workspace.
+struct Package {
+    manifest: PathBuf,
+    dependencies: Vec<Dependency>,
+}
+
+struct Dependency {
+    name: String,
+    /// For tests only: builds nothing that others use.
+    development: bool,
+}
+
+/// Packages of the workspace by the name of their folder.
+fn packages() -> BTreeMap<String, Package> {
+    let output = Command::new(env!("CARGO"))
+        .args([
+            "metadata",
+            "--format-version",
+            "1",
+            "--no-deps",
+            "--offline",
+        ])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    metadata["packages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|package| {
+            let manifest = PathBuf::from(text(&package["manifest_path"]));
+            let folder = manifest.parent().unwrap().file_name().unwrap();
+            let dependencies = package["dependencies"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|dependency| Dependency {
+                    name: short(&text(&dependency["name"])),
+                    development: dependency["kind"] == "dev",
+                })
+                .collect();
+            let name = folder.to_str().unwrap().to_owned();
+            let package = Package {
+                manifest,
+                dependencies,
+            };
+            (name, package)
+        })
+        .collect()
+}
+
+/// `cell` for `needlebench-cell`: a package is named after its folder.
+fn short(name: &str) -> String {
+    name.strip_prefix("needlebench-").unwrap_or(name).to_owned()
+}
+
+#[test]
+fn every_crate_of_the_workspace_has_its_layer() {
+    let found: BTreeSet<String> = packages().into_keys().collect();
+    let mut expected: BTreeSet<String> = LAYERS.map(|(name, _)| name.to_owned()).into();
+    // This package, which may use everything and which nobody uses.
+    expected.insert("tests".to_owned());
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn crates_depend_on_lower_layers_only() {
+    let packages = packages();
+    for (name, allowed) in LAYERS {
+        let used: Vec<&str> = packages[name]
+            .dependencies
+            .iter()
+            .map(|dependency| dependency.name.as_str())
+            .filter(|dependency| packages.contains_key(*dependency))
+            .collect();
+        for dependency in used {
+            assert!(
+                allowed.contains(&dependency),
+                "{name} depends on {dependency}, but may depend on {allowed:?} only"
+            );
+        }
+    }
+}
+
+#[test]
+fn every_allowed_edge_is_used() {
+    // An edge that nobody needs is a door left open.
+    let packages = packages();
+    for (name, allowed) in LAYERS {
+        for dependency in allowed {
+            let used = packages[name]
+                .dependencies
+                .iter()
+                .any(|each| each.name == *dependency && !each.development);
+            assert!(used, "{name} does not use {dependency}");
+        }
+    }
+}
+
+#[test]
+fn heavy_dependencies_have_one_owner() {
+    let packages = packages();
+    for (dependency, owner) in OWNERS {
+        let users: Vec<&str> = packages
+            .iter()
+            // The cross-crate tests compare with whatever they need.
+            .filter(|(name, _)| *name != "tests")
+            .filter(|(_, package)| {
+                let mut names = package.dependencies.iter();
+                // Tests compare with whatever they need.
+                names.any(|each| each.name == dependency && !each.development)
+            })
+            .map(|(name, _)| name.as_str())
+            .collect();
+        assert_eq!(users, [owner], "users of {dependency}");
+    }
+}
+
+#[test]
+fn every_crate_takes_the_lints_of_the_workspace_which_forbid_unsafe_code() {
+    let root = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml"));
+    assert!(root.unwrap().contains("unsafe_code = \"forbid\""));
+    for (name, package) in packages() {
+        let text = std::fs::read_to_string(package.manifest).unwrap();
+        assert!(
+            text.contains("\n[lints]\nworkspace = true\n"),
+            "{name} has no `[lints] workspace = true`"
+        );
+    }
+}
