@@ -3,7 +3,6 @@
 //!
 //! Positive is a gap, negative a penetration depth. Distances of two shapes are those of
 //! [`needlebench_geometry::separation`], as accurate as it says there.
-
 //!
 //! ```
 //! use std::path::Path;
@@ -17,13 +16,14 @@
 //!     .expect("a shipped scenario is sound");
 //! let model = ClearanceModel::new(&scenario.cell);
 //!
-//! // Stretched out along the table, 0.1 m over nothing: the elbow straight, the wrist level.
+//! // Nearly straight, the forearm level.
 //! let stretched_out = Joints::new(0.0, -0.4, 0.2, 0.2, 0.0, 0.0);
 //! let minima = model.minimum_per_class(&stretched_out);
 //! let nearest = minima.get(ClearanceClass::RobotTable).expect("the cell has a table");
 //! let (link, table) = nearest.solid_names(&scenario.cell);
 //! println!("{link} is {:.1} mm from {table}", nearest.separation.distance_m * 1e3);
-//! # assert_eq!((link, table), ("", ""));
+//! assert_eq!((link, table), ("upper_arm.0", "table"));
+//! assert!((0.267..0.269).contains(&nearest.separation.distance_m));
 //! ```
 //!
 //! # Accuracy

@@ -73,7 +73,6 @@ fn further_engine_is_in_the_rows_of_a_study() {
     let (alone, together) = (of(&["replay"]), of(&["rapier", "replay"]));
     let mut compared = 0;
     for (alone, together) in alone.iter().zip(&together) {
-        assert_eq!(alone.outcome, together.outcome);
         assert_eq!(alone.get("engine_difference_peak"), None);
         let Some(apart_m) = together.get("engine_difference_peak") else {
             continue;

@@ -118,7 +118,7 @@ fn every_joint_has_one_stop() {
     );
     let finding = refused(elbow, "[[brakes.stops]]\njoint = \"shoulder_pan\"");
     says(&finding, "brakes.stops[2].joint", &["has two stops"]);
-    let finding = refused("time_s = 0.092", "");
+    let finding = refused("\ntime_s = 0.092", "\n");
     says(
         &finding,
         "brakes.stops[2].time_s",

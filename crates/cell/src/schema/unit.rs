@@ -33,9 +33,9 @@ const COUNTS: [(&str, &str); 4] = [
     ("cycles", "cycles"),
 ];
 
-/// Unit that a key ends with, such as `mm` or `deg`; empty if it has none.
+/// Unit that a key ends with or is, such as `mm` of `standoff_mm` and `kg`; empty if it has none.
 pub(crate) fn unit_of(key: &str) -> &'static str {
-    let found = UNITS.iter().find(|(end, ..)| key.ends_with(end));
+    let found = (UNITS.iter()).find(|(end, ..)| key.ends_with(end) || end[1..] == *key);
     found.map_or("", |(_, unit, _)| unit)
 }
 
@@ -81,6 +81,8 @@ mod tests {
         assert_eq!(unit_of("joint_jerk_deg_s3"), "deg/s^3");
         assert_eq!(unit_of("contact_damping_per_s"), "1/s");
         assert_eq!(unit_of("urdf"), "");
+        assert_eq!(unit_of("kg"), "kg");
+        assert_eq!(unit_of("symptoms"), "");
         assert_eq!(written_after("roll_samples"), "samples");
     }
 

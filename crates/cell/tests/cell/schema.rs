@@ -137,7 +137,8 @@ fn defaults_lie_in_their_ranges() {
     let scenario = parse_scenario("s.toml", text).unwrap();
     // Every default, written out.
     let text = toml::to_string(&scenario).unwrap();
-    assert!(text.len() > 2000, "{text}");
+    let written = text.lines().filter(|line| line.contains('=')).count();
+    assert!(written > 50, "{text}");
     assert_eq!(parse_scenario("s.toml", &text).unwrap(), scenario);
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Quickhull (Barber, Dobkin and Huhdanpaa, 1996). On which side of a face a point is comes from
 //! Shewchuk's adaptive predicate, which is exact: points in planes, on lines and on top of each
-//! other, of which meshes are full, cannot break the surface. parry's hull is not used; the README
-//! of this crate has the figures.
+//! other, of which meshes are full, cannot break the surface. parry's hull is not used; the
+//! documentation of this crate has the figures.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -410,7 +410,9 @@ mod tests {
     fn what_is_left_out_is_no_further_outside_than_was_said() {
         let points = turned_cylinder(256, 9);
         let hull = simplified_hull(&points, 2e-5).unwrap().0;
-        assert!(hull.vertices_m.len() < 200, "{}", hull.vertices_m.len());
+        // The chord of every other spoke is within 9e-6 m of the circle, so half of the corners would do.
+        let [kept, all] = [&hull, &convex_hull(&points).unwrap().0].map(|hull| hull.vertices_m.len());
+        assert!(3 * kept < 2 * all, "{kept} of {all}");
         assert_hull(&points, &hull, 2e-5);
     }
 

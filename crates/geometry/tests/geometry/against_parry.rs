@@ -1,5 +1,6 @@
 //! Hulls, decompositions, volumes and mesh checks of parry beside ours: which of them this crate
-//! uses, and why not the others. The README has the figures that the ignored tests print:
+//! uses, and why not the others. The crate's documentation has the figures that the ignored tests
+//! print:
 //!
 //! ```text
 //! cargo test --release -p needlebench-geometry -- --ignored --nocapture against_parry

@@ -312,12 +312,12 @@ fn unknown_tool_is_refused_with_the_shipped_ones() {
 }
 
 #[test]
-fn unknown_robot_is_refused_with_the_shipped_one() {
-    refused_with("[robot]", "[robot]\nurdf = \"ur3e\"")
+fn unknown_robot_is_refused_with_the_shipped_ones() {
+    refused_with("[robot]", "[robot]\nurdf = \"ur4e\"")
         .at("urdf")
         .key("robot.urdf")
-        .says("ur3e")
-        .hints("did you mean `ur3`?");
+        .says("ur4e")
+        .hints("did you mean `ur3e`? Shipped: ur3, ur3e, ur5e");
 }
 
 #[test]

@@ -41,7 +41,7 @@ fn stature_in_metres_is_refused() {
     refused("[[people.persons]]\nstatures_mm = [1.75]")
         .at("statures_mm")
         .key("people.persons[0].statures_mm[0]")
-        .hints("in mm");
+        .hints("did you give metres?");
 }
 
 #[test]

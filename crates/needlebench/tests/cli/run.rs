@@ -188,7 +188,7 @@ fn provenance_identifies_the_program_the_engines_and_every_input() {
     assert_eq!(names, ["rapier", "mujoco"]);
     let inputs = provenance["inputs"].as_array().unwrap();
     let roles: Vec<&Value> = inputs.iter().map(|input| &input["role"]).collect();
-    assert_eq!(roles, ["scenario", "robot", "tool", "phantom"]);
+    assert_eq!(roles, ["scenario", "robot", "tool", "arm data", "phantom"]);
     for input in inputs {
         assert_eq!(input["sha256"].as_str().unwrap().len(), 64);
     }

@@ -6,8 +6,8 @@ use super::paint::{Paint, Stroke};
 
 /// Space between ticks, px: along, and upwards.
 const TICKS_PX: [f64; 2] = [90.0, 45.0];
-/// From the frame to the middle of the texts of ticks and of an axis below it, px.
-const TICK_BELOW_PX: f64 = 14.0;
+/// From the frame to the middle of the texts of ticks, clear of those beside it, and of an axis below it, px.
+const TICK_BELOW_PX: f64 = 16.0;
 const LABEL_BELOW_PX: f64 = 34.0;
 /// From the frame to the end of the texts of ticks beside it, and on to the middle of the label, px.
 const TICK_BESIDE_PX: f64 = 7.0;
