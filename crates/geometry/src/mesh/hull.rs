@@ -411,7 +411,8 @@ mod tests {
         let points = turned_cylinder(256, 9);
         let hull = simplified_hull(&points, 2e-5).unwrap().0;
         // The chord of every other spoke is within 9e-6 m of the circle, so half of the corners would do.
-        let [kept, all] = [&hull, &convex_hull(&points).unwrap().0].map(|hull| hull.vertices_m.len());
+        let [kept, all] =
+            [&hull, &convex_hull(&points).unwrap().0].map(|hull| hull.vertices_m.len());
         assert!(3 * kept < 2 * all, "{kept} of {all}");
         assert_hull(&points, &hull, 2e-5);
     }

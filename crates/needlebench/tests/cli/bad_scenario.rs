@@ -313,10 +313,10 @@ fn unknown_tool_is_refused_with_the_shipped_ones() {
 
 #[test]
 fn unknown_robot_is_refused_with_the_shipped_ones() {
-    refused_with("[robot]", "[robot]\nurdf = \"ur4e\"")
+    refused_with("[robot]", "[robot]\nurdf = \"ur3-e\"")
         .at("urdf")
         .key("robot.urdf")
-        .says("ur4e")
+        .says("ur3-e")
         .hints("did you mean `ur3e`? Shipped: ur3, ur3e, ur5e");
 }
 

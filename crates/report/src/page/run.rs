@@ -142,7 +142,8 @@ mod tests {
 
     #[test]
     fn recorded_motions_and_clearances_come_back() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../needlebench/tests/cli/small.toml");
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../needlebench/tests/cli/small.toml");
         let resolved = load_scenario(&path, &Overrides::default()).unwrap();
         let options = RunOptions {
             engines: Some(vec!["rapier".into()]),

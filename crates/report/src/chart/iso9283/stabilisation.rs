@@ -3,7 +3,7 @@
 use needlebench_evaluation::iso9283::Arrival;
 
 use crate::chart::axis::Axis;
-use crate::chart::drawing::{Anchor, Chart};
+use crate::chart::drawing::Chart;
 use crate::chart::legend::{Sample, legend_column};
 use crate::chart::paint::{Paint, Stroke};
 use crate::chart::panel::Panel;
@@ -56,8 +56,6 @@ pub fn stabilisation_chart(heading: &str, arrivals: &[Arrival], limit_band_m: f6
     panel.draw(&mut chart);
     panel.upright(&mut chart, 0.0, Stroke::full(Paint::Ink, 1.5));
     panel.level(&mut chart, limit_band_m, BAND);
-    let [right, y] = panel.at([panel.x.high, limit_band_m]);
-    chart.write(Anchor::Start, [right + 8.0, y], "limit band");
     for arrival in arrivals {
         let points = arrival.time_s.iter().zip(&arrival.distance_m);
         let points = points
@@ -74,8 +72,9 @@ pub fn stabilisation_chart(heading: &str, arrivals: &[Arrival], limit_band_m: f6
         .collect();
     let entries = names
         .iter()
-        .map(|(pose, name)| (Sample::Line(stroke(*pose)), name.as_str()));
-    legend_column(&mut chart, [right + 10.0, top + 16.0], entries);
+        .map(|(pose, name)| (Sample::Line(stroke(*pose)), name.as_str()))
+        .chain([(Sample::Line(BAND), "limit band")]);
+    legend_column(&mut chart, [left + width + 10.0, top + 16.0], entries);
     chart
 }
 
