@@ -11,13 +11,14 @@ use serde_json::Value;
 /// Every crate under `crates/` and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 13] = [
+const LAYERS: [(&str, &[&str]); 14] = [
     ("kinematics", &[]),
     ("geometry", &["kinematics"]),
     ("cell", &["geometry", "kinematics"]),
     ("clearance", &["cell", "geometry", "kinematics"]),
     ("planning", &["clearance", "cell", "kinematics"]),
     ("engine", &["cell", "geometry", "kinematics"]),
+    ("render", &["geometry", "kinematics"]),
     ("uncertainty", &["engine", "cell", "kinematics"]),
     ("study", &["cell", "kinematics"]),
     (
@@ -47,6 +48,7 @@ const LAYERS: [(&str, &[&str]); 13] = [
     (
         "report",
         &[
+            "render",
             "bench",
             "study",
             "evaluation",
@@ -63,6 +65,7 @@ const LAYERS: [(&str, &[&str]); 13] = [
         "paper",
         &[
             "report",
+            "render",
             "bench",
             "evaluation",
             "engine",
@@ -101,7 +104,7 @@ const OWNERS: [(&str, &str); 14] = [
     ("parquet", "study"),
     ("zstd", "study"),
     ("crc32fast", "study"),
-    ("png", "report"),
+    ("png", "render"),
     ("quick-junit", "report"),
     ("indicatif", "needlebench"),
     ("clap", "needlebench"),

@@ -9,7 +9,7 @@
 
 use needlebench_cell::ranking::{Aim, RankingSection};
 
-use crate::metric::{Better, Metric, metrics};
+use crate::metric::{Better, Bound, Metric, metrics};
 use crate::pareto::{dominates, levels, pareto_set};
 pub use crate::ranking_report::{
     Dominance, GoalRanking, RankedMetric, RankingReport, Term, WeightChange,
@@ -121,7 +121,8 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
 /// those that every configuration has.
 ///
 /// Of several metrics with one key the last counts that any configuration has: the tip error over all
-/// arms and patients where there is a budget, a proven clearance where there is one.
+/// arms and patients where there is a budget, a proven clearance where there is one. Where none has, the
+/// proven or the first one is named.
 fn columns(
     configurations: &[ConfigurationReport],
     working: &[usize],
@@ -138,8 +139,10 @@ fn columns(
         };
         let of_key = || metrics().filter(|metric| metric.ranking_key == Some(key));
         let is_measured = |metric: &&Metric| values(metric).iter().any(Option::is_some);
+        let is_proven = |metric: &&Metric| metric.bound == Bound::Certified;
         let found = of_key().rev().find(is_measured);
         let metric = found
+            .or_else(|| of_key().find(is_proven))
             .or_else(|| of_key().next())
             .expect("every key has a metric");
         let measured = values(metric);

@@ -25,7 +25,7 @@ pub const FEWEST_FIDUCIALS: usize = 3;
 /// far below any layout that is of use: at this share the TRE is a million times the FLE.
 const COLLINEAR_SPREAD: f64 = 1e-6;
 
-/// Coordinates beyond this are none: no room is as large, and their squares might overflow.
+/// Coordinates beyond this are none: nothing measured is as far, and their squares might overflow.
 const FARTHEST_M: f64 = 1e9;
 
 /// Gap of the two largest eigenvalues, as a share of the largest, below which two rotations fit
@@ -49,7 +49,7 @@ pub enum RegistrationError {
         /// Points of the second set.
         to: usize,
     },
-    /// A coordinate that is no number, or beyond every room.
+    /// A coordinate that is no number, or too far away to be measured.
     #[error("coordinate {axis} of fiducial {index} is {value}")]
     BadCoordinate {
         /// Which point, from 0.

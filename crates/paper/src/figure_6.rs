@@ -9,9 +9,10 @@ use needlebench_geometry::Visual;
 use needlebench_kinematics::{Joints, Pose};
 
 use super::free_space::{BASE_HEIGHT_M, ConfigurationSpace, Space};
-use needlebench_report::picture::{
-    Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceInstance, render, voxel_surface,
+use needlebench_render::{
+    Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceInstance, render,
 };
+use needlebench_report::picture::voxel_surface;
 
 const SIZE_PX: [u32; 2] = [800, 660];
 /// Fineness of curved surfaces, m.

@@ -1,7 +1,7 @@
 //! Files of a reproduction.
 
+use needlebench_render::tile;
 use needlebench_report::files::{FilesError, Folder};
-use needlebench_report::picture::tile;
 
 use super::Reproduction;
 use super::html::page;

@@ -34,7 +34,7 @@ pub use text::text;
 
 use needlebench_bench::progress::Progress;
 use needlebench_bench::provenance::provenance;
-use needlebench_report::picture::Image;
+use needlebench_render::Image;
 
 /// Somebody asked to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

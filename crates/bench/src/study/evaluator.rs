@@ -1,7 +1,7 @@
 //! The rows of a case, by what the study computes of it.
 
 use needlebench_cell::study::{ResolvedStudy, StudyMode};
-use needlebench_engine::{ENGINES, Engine, EnginePool, choose_engines};
+use needlebench_engine::{ENGINES, EnginePool, choose_engines};
 use needlebench_study::{CaseError, CaseEvaluator, CaseResult, CaseWorker, Design};
 
 use super::case::StudyCase;
@@ -15,7 +15,6 @@ pub struct StudyEvaluator<'a> {
     study: &'a ResolvedStudy,
     design: &'a Design,
     columns: &'a StudyColumns,
-    engines: &'static [&'static dyn Engine],
 }
 
 impl<'a> StudyEvaluator<'a> {
@@ -25,14 +24,7 @@ impl<'a> StudyEvaluator<'a> {
             study,
             design,
             columns,
-            engines: ENGINES,
         }
-    }
-
-    /// With other engines than those of the program.
-    #[must_use]
-    pub fn with_engines(self, engines: &'static [&'static dyn Engine]) -> Self {
-        Self { engines, ..self }
     }
 }
 
@@ -43,8 +35,7 @@ impl CaseEvaluator for StudyEvaluator<'_> {
             design: self.design,
             columns: self.columns,
             postures: StaticWorker::default(),
-            engines: self.engines,
-            pool: EnginePool::new(self.engines),
+            pool: EnginePool::new(ENGINES),
         }))
     }
 }
@@ -54,7 +45,6 @@ struct Worker<'a> {
     design: &'a Design,
     columns: &'a StudyColumns,
     postures: StaticWorker,
-    engines: &'static [&'static dyn Engine],
     pool: EnginePool,
 }
 
@@ -73,7 +63,7 @@ impl CaseWorker for Worker<'_> {
                         .engines
                         .as_ref()
                         .or(resolved.scenario.engines.run.as_ref());
-                    choose_engines(self.engines, named.map(Vec::as_slice))
+                    choose_engines(ENGINES, named.map(Vec::as_slice))
                         .map_err(|error| error.to_string())
                         .and_then(|engines| dynamic_rows(&resolved, &engines, &self.pool))
                         .map_err(|message| CaseError { case, message })?

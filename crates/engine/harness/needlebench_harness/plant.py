@@ -79,7 +79,7 @@ class Plant:
     """
 
     def __init__(self, *, index: int, model: Model) -> None:
-        """Make room for a state."""
+        """Prepare the memory of a state."""
         self.index = index
         self.model = model
         self.data = mujoco.MjData(model.mj)

@@ -220,7 +220,7 @@ impl<'a> Hull<'a> {
         assigned
     }
 
-    /// Takes in a point that sees a face: all faces that it sees make room for new ones to their rim.
+    /// Takes in a point that sees a face: all faces that it sees make way for new ones to their rim.
     fn add(&mut self, point: usize, seen: usize) -> Result<(), HullError> {
         let mut visible = vec![seen];
         self.faces[seen].alive = false;

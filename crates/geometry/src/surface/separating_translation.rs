@@ -96,7 +96,7 @@ pub(crate) fn separating_translation(
                 on_a,
             });
         }
-        // Inside with room to all sides: on to where something may be touched again.
+        // Inside and free to all sides: on to where something may be touched again.
         let Nearest::Apart(found) = nearest(&there, f64::INFINITY) else {
             return None;
         };

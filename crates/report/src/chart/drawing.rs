@@ -1,6 +1,6 @@
 //! A chart as a value: marks in the plane, in the order in which they lie on each other.
 
-use crate::picture::text::TextSize;
+use needlebench_render::TextSize;
 
 use super::paint::{Paint, Stroke};
 

@@ -120,9 +120,9 @@ fn chart(title: &str, duration_s: f64, phases: &[Phase], curves: &[Curves]) -> C
     chart
 }
 
-/// From a round value to a round value, zero among them, with room for the names of the phases.
+/// From a round value to a round value, zero among them, with space for the names of the phases.
 fn with_zero(label: &str, values: impl Iterator<Item = f64>) -> Axis {
-    const ROOM: f64 = 0.1;
+    const HEADROOM: f64 = 0.1;
     let (low, high) = values
         .filter(|value| value.is_finite())
         .fold((0.0_f64, 0.0_f64), |(low, high), value| {
@@ -132,7 +132,7 @@ fn with_zero(label: &str, values: impl Iterator<Item = f64>) -> Axis {
     if step == 0.0 {
         return Axis::linear(label, 0.0, 1.0);
     }
-    let high = high + ROOM * (high - low);
+    let high = high + HEADROOM * (high - low);
     Axis::linear(
         label,
         (low / step).floor() * step,

@@ -1,7 +1,7 @@
 //! The back end for pixels.
 
-use crate::picture::Image;
-use crate::picture::text::signed;
+use needlebench_render::Image;
+use needlebench_render::signed;
 
 use super::drawing::{Chart, Mark, Text};
 use super::paint::{Paint, Rgb, Stroke};

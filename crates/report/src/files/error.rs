@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use needlebench_study::ResultsError;
 
-use crate::picture::PictureError;
+use needlebench_render::PictureError;
 
 /// What can go wrong with files of results.
 #[derive(Debug, thiserror::Error)]

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::atomic::write_atomically;
 use super::error::FilesError;
 use crate::chart::Chart;
-use crate::picture::Image;
+use needlebench_render::Image;
 
 /// Files of charts: pixels for viewers and documents, vectors for papers and pages.
 const CHARTS: [&str; 2] = ["png", "svg"];

@@ -13,7 +13,7 @@ use crate::chart::budget::budget_chart;
 use crate::chart::ranking::ranking_chart;
 use crate::picture::configuration::{Backdrop, configuration_picture, goal_camera, sheet_caption};
 use crate::picture::room::{RoomPictures, room_caption};
-use crate::picture::{Image, tile};
+use needlebench_render::{Image, tile};
 
 /// What is added to the names of pictures: those of the posture, those of the room.
 const KINDS: [&str; 2] = ["", ".room"];

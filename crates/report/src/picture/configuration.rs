@@ -8,11 +8,10 @@ use needlebench_cell::{Goal, ResolvedScenario};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
 use needlebench_geometry::Visual;
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_render::{
+    Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceInstance, render,
+};
 
-use super::camera::Camera;
-use super::image::Image;
-use super::render::render;
-use super::scene::{Anchor, Floor, Label, Line3, Scene, SurfaceInstance};
 use crate::number::{millimetres, small_length};
 
 /// Size of one picture, pixels.

@@ -1,33 +1,7 @@
-//! Pictures of scenes: a software renderer without window, GPU or system fonts.
-//!
-//! [`render`] turns a [`Scene`] seen by a [`Camera`] into an [`Image`], the same bytes for the same
-//! input. Opaque surfaces are seen from both sides; translucent ones (opacity below 1) from their
-//! outside only, blended back to front at every sample, so that what is within a translucent skin
-//! stays visible. Two by two samples per pixel smooth the edges. What cannot be drawn (vertices
-//! that are not finite, indices out of range, anything behind the camera) is left out.
+//! What is drawn of a result: the arm in each configuration, and the room that it leaves to people.
 
-mod camera;
-mod color;
 pub mod configuration;
-mod floor;
-mod geometry;
-pub(crate) mod image;
-mod label;
-mod lamps;
-mod normals;
-mod raster;
-mod render;
 pub mod room;
-mod scene;
-mod sheet;
-#[cfg(test)]
-mod tests;
-pub(crate) mod text;
 mod voxels;
 
-pub use camera::{Camera, Projection};
-pub use image::{Image, PictureError};
-pub use render::render;
-pub use scene::{Anchor, Floor, Label, Line3, Scene, SurfaceInstance};
-pub use sheet::tile;
 pub use voxels::voxel_surface;

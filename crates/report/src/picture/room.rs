@@ -11,12 +11,9 @@ use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
 use needlebench_evaluation::room::{RoomModel, RoomReport, SECTOR_RADIUS_M, sight_segments};
 use needlebench_geometry::{Shape, TriangleMesh};
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_render::{Anchor, Camera, Image, Label, Line3, Scene, SurfaceInstance, render};
 
-use super::camera::Camera;
 use super::configuration::{Backdrop, floor, posture_scene, sheet_caption, viewpoint};
-use super::image::Image;
-use super::render::render;
-use super::scene::{Anchor, Label, Line3, Scene, SurfaceInstance};
 use super::voxels::voxel_surface;
 
 /// Size of one picture, pixels.

@@ -97,7 +97,7 @@ impl Drop for Staging {
 /// Removes the set-ups that died half-way: those whose guard nobody holds.
 ///
 /// `target` is the environment whose guard the caller itself holds. Folders that cannot be removed
-/// stay; they only take room.
+/// stay; they only take space.
 pub(super) fn remove_dead_staging(target: &Path) {
     let Some(parent) = target.parent() else {
         return;

@@ -334,7 +334,7 @@ pub(super) const NEEDLE_CORRIDOR: &[Metric] = {
     clearance_of_class!(
         NeedleCorridor,
         "needle_corridor",
-        "room behind the guide",
+        "space behind the guide",
         "clearance of the volume behind the guide that needle and hand need, while the arm holds",
         "min_clearance_mm.needle_corridor",
         needle_corridor,

@@ -19,7 +19,7 @@ pub(super) const PEOPLE: &[Metric] = &[
     .ranked("free_fraction")
     .pareto()
     .show(Show::Percent)
-    .summary(5, "Free room")
+    .summary(5, "Free space")
     .criterion("min_free_fraction", MOVING, |criteria| {
         criteria.min_free_fraction
     }),

@@ -1,4 +1,4 @@
-// The page of an atlas: what works at which roll, how much room there is, and why not.
+// The page of an atlas: what works at which roll, by what margin, and why not.
 'use strict';
 
 /** Colours of the rules that reject; hatching and the text under the cursor tell them apart, too. */

@@ -85,12 +85,12 @@ NB.Axes = class {
     context.textAlign = 'center';
     context.textBaseline = 'top';
     const xTicks = this.x.labels ? this.x.labels.map((_, index) => index) : NB.ticks(this.x.low, this.x.high, width / 80);
-    const room = this.x.labels ? width / this.x.labels.length - 6 : 80;
+    const space = this.x.labels ? width / this.x.labels.length - 6 : 80;
     for (const tick of xTicks) {
       const at = Math.round(this.px(tick)) + 0.5;
       context.beginPath(); context.moveTo(at, top); context.lineTo(at, top + height); context.stroke();
       const text = this.x.labels ? this.x.labels[tick] : NB.tickText(tick, xTicks.step || 1);
-      context.fillText(this.fit(context, text, room), at, top + height + 5);
+      context.fillText(this.fit(context, text, space), at, top + height + 5);
     }
     context.strokeStyle = '#8a9099';
     context.strokeRect(left + 0.5, top + 0.5, width, height);

@@ -394,7 +394,7 @@ NB.StudyPage = class extends NB.StudyPlots {
     }
     this.viewNote.textContent = [
       has ? `${this.page.configurations[c]} in case ${this.caseOf(index)}.`
-        : at === undefined ? 'The posture of this case is not on the page (there is room for some thousand): rerun it by the command.' : 'This configuration has no posture.',
+        : at === undefined ? 'The posture of this case is not on the page (it holds some thousand): rerun it by the command.' : 'This configuration has no posture.',
       known ? 'Robot and phantom stand where they do in this case; sizes and tools are those of the base scenario.'
         : 'The surroundings are those of the base scenario: what this case changes of them is not drawn.'].join(' ');
     this.view.draw();

@@ -2,14 +2,14 @@
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-use super::image::Image;
+use crate::image::Image;
 
 /// Text colour.
 const INK: [u8; 3] = [25, 30, 38];
 
 /// Height of a line of text.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TextSize(RasterHeight);
+pub struct TextSize(RasterHeight);
 
 impl TextSize {
     /// For axes and legends.
@@ -27,6 +27,7 @@ impl TextSize {
         })
     }
 
+    /// Height of a line, px.
     pub fn line_px(self) -> usize {
         self.0.val()
     }
@@ -81,8 +82,8 @@ fn shown(character: char) -> char {
     }
 }
 
-/// Pixel counts as coordinates.
-pub(crate) fn signed(pixels: usize) -> i64 {
+/// Pixel counts as coordinates; pictures have no more than an `i64` holds.
+pub fn signed(pixels: usize) -> i64 {
     i64::try_from(pixels).unwrap_or(i64::MAX)
 }
 

@@ -172,7 +172,7 @@ fn slopes(vertical_fov_rad: f64, width_px: u32, height_px: u32) -> Vector2<f64> 
 
 /// A camera ready for use. Eye frame: x to the right, y downwards, z forwards.
 #[derive(Debug, Clone)]
-pub(super) struct View {
+pub(crate) struct View {
     /// Rotation to the eye frame from the world.
     pub eye_from_world: Matrix3<f64>,
     /// The eye in the world, m.
@@ -190,7 +190,7 @@ pub(super) struct View {
 
 /// A half space of the eye frame, `normal . point + offset >= 0`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct HalfSpace {
+pub(crate) struct HalfSpace {
     pub normal: Vector3<f64>,
     pub offset: f64,
 }
@@ -204,7 +204,7 @@ impl HalfSpace {
 
 /// A point of the picture, px from its top left corner, with its nearness.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Projected {
+pub(crate) struct Projected {
     pub x_px: f64,
     pub y_px: f64,
     /// Grows towards the eye and is linear across the picture on every plane of space: 1 / depth in

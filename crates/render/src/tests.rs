@@ -7,7 +7,7 @@ use nalgebra::{Point2, Point3, Translation3, UnitQuaternion, Vector3};
 use needlebench_geometry::{Shape, TriangleMesh};
 use needlebench_kinematics::Pose;
 
-use super::{
+use crate::{
     Anchor, Camera, Floor, Image, Label, Line3, PictureError, Projection, Scene, SurfaceInstance,
     render, tile,
 };

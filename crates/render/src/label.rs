@@ -1,9 +1,9 @@
 //! Labels: texts on translucent boxes, out of each other's way.
 
-use super::camera::View;
-use super::image::Image;
-use super::scene::{Anchor, Label};
-use super::text::{TextSize, signed};
+use crate::camera::View;
+use crate::image::Image;
+use crate::scene::{Anchor, Label};
+use crate::text::{TextSize, signed};
 
 /// Colour and opacity of a box.
 const BOX: ([u8; 3], u8) = ([255, 255, 255], 205);
@@ -40,7 +40,7 @@ impl Rectangle {
 }
 
 /// Draws the labels in their order.
-pub(super) fn draw(image: &mut Image, labels: &[Label], view: &View) {
+pub(crate) fn draw(image: &mut Image, labels: &[Label], view: &View) {
     let size = TextSize::for_picture(image.height_px());
     let mut taken: Vec<Rectangle> = Vec::new();
     // Corners first: they have nowhere else to go.
@@ -108,7 +108,7 @@ fn wanted(
             }
             #[expect(clippy::cast_possible_truncation, reason = "inside the picture")]
             let (x, y) = (at.x_px as i64, at.y_px as i64);
-            // Up and to the right; to the left where the right has no room.
+            // Up and to the right; to the left where the right has no space.
             let left = if x + LEADER_PX[0] <= right {
                 x + LEADER_PX[0]
             } else {

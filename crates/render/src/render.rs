@@ -3,15 +3,15 @@
 use std::num::NonZero;
 use std::ops::RangeFrom;
 
-use super::camera::{Camera, View};
-use super::color::{self, Encoder, Light};
-use super::floor::{FloorSample, FloorView};
-use super::geometry::{Assembler, Material, Primitive};
-use super::image::Image;
-use super::label;
-use super::lamps::Lamps;
-use super::raster::{Facing, Grid, SAMPLES_PER_PIXEL, rasterise};
-use super::scene::Scene;
+use crate::camera::{Camera, View};
+use crate::color::{self, Encoder, Light};
+use crate::floor::{FloorSample, FloorView};
+use crate::geometry::{Assembler, Material, Primitive};
+use crate::image::Image;
+use crate::label;
+use crate::lamps::Lamps;
+use crate::raster::{Facing, Grid, SAMPLES_PER_PIXEL, rasterise};
+use crate::scene::Scene;
 
 /// No primitive, or no further fragment.
 const NONE: u32 = u32::MAX;

@@ -35,7 +35,7 @@ impl Image {
     }
 
     /// The picture of `pixels`, row by row from the top left, of which there are `width_px` each.
-    pub(super) fn from_pixels(width_px: usize, pixels: Vec<[u8; 3]>) -> Self {
+    pub(crate) fn from_pixels(width_px: usize, pixels: Vec<[u8; 3]>) -> Self {
         let height_px = pixels.len().checked_div(width_px).unwrap_or(0);
         Self {
             width_px,
@@ -64,7 +64,7 @@ impl Image {
     }
 
     /// Covers the pixel with `color` to the extent of `opacity` (0 to 255); nothing outside.
-    pub(crate) fn blend(&mut self, x: i64, y: i64, color: [u8; 3], opacity: u8) {
+    pub fn blend(&mut self, x: i64, y: i64, color: [u8; 3], opacity: u8) {
         let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else {
             return;
         };
@@ -80,12 +80,7 @@ impl Image {
     }
 
     /// Fills a rectangle, clipped to this picture.
-    pub(crate) fn fill(
-        &mut self,
-        [left, top]: [usize; 2],
-        [width, height]: [usize; 2],
-        color: [u8; 3],
-    ) {
+    pub fn fill(&mut self, [left, top]: [usize; 2], [width, height]: [usize; 2], color: [u8; 3]) {
         let right = (left + width).min(self.width_px);
         for y in top..(top + height).min(self.height_px) {
             let row = y * self.width_px;
@@ -96,7 +91,7 @@ impl Image {
     }
 
     /// Copies `other` with its top left corner at the given pixel, clipped to this picture.
-    pub(super) fn paste(&mut self, other: &Self, left: usize, top: usize) {
+    pub(crate) fn paste(&mut self, other: &Self, left: usize, top: usize) {
         let width = other.width_px.min(self.width_px.saturating_sub(left));
         let height = other.height_px.min(self.height_px.saturating_sub(top));
         for y in 0..height {

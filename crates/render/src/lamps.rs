@@ -2,14 +2,14 @@
 
 use nalgebra::Vector3;
 
-use super::camera::View;
-use super::color::Light;
-use super::geometry::Material;
+use crate::camera::View;
+use crate::color::Light;
+use crate::geometry::Material;
 
 /// Lamps that stand with the camera: a key light above its left shoulder, a fill light at its
 /// right, and the sky.
 #[derive(Debug)]
-pub(super) struct Lamps {
+pub(crate) struct Lamps {
     /// Towards the key light, in the world.
     pub key_in_world: Vector3<f64>,
     key: Vector3<f32>,

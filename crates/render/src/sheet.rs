@@ -1,7 +1,7 @@
 //! Contact sheets: several pictures on one page.
 
-use super::image::Image;
-use super::text::{TextSize, signed};
+use crate::image::Image;
+use crate::text::{TextSize, signed};
 
 /// Space around the pictures, px.
 const GAP_PX: usize = 12;
@@ -39,10 +39,10 @@ pub fn tile(images: &[(Image, String)], columns: usize) -> Image {
         let left = GAP_PX + position % columns * step[0];
         let top = GAP_PX + position / columns * step[1];
         page.paste(image, left, top);
-        let room = width_px / size.extent_px("x")[0].max(1);
+        let letters = width_px / size.extent_px("x")[0].max(1);
         let cut: Vec<String> = caption
             .lines()
-            .map(|line| line.chars().take(room).collect())
+            .map(|line| line.chars().take(letters).collect())
             .collect();
         let below = top + height_px + GAP_PX / 4;
         size.write(&mut page, [signed(left), signed(below)], &cut.join("\n"));

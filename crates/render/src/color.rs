@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 /// Red, green and blue in proportion to light, 0 to 1.
-pub(super) type Light = Vector3<f32>;
+pub(crate) type Light = Vector3<f32>;
 
 /// Steps of the way from light to sRGB: a step is below half a level even in the dark.
 const ENCODER_STEPS: u16 = 8192;
@@ -19,13 +19,13 @@ fn decoded(value: f32) -> f32 {
 }
 
 /// The light of an sRGB colour, 0 to 1.
-pub(super) fn light([red, green, blue]: [f32; 3]) -> Light {
+pub(crate) fn light([red, green, blue]: [f32; 3]) -> Light {
     Light::new(decoded(red), decoded(green), decoded(blue))
 }
 
 /// From light to sRGB bytes, by table.
 #[derive(Debug)]
-pub(super) struct Encoder {
+pub(crate) struct Encoder {
     bytes: Vec<u8>,
 }
 

@@ -12,7 +12,7 @@ const CREASE_COSINE: f64 = 0.766;
 ///
 /// Vertices at exactly the same place count as one, as mesh files often repeat them. Triangles with
 /// indices out of range or vertices that are not finite have zero normals.
-pub(super) fn corner_normals(mesh: &TriangleMesh) -> Vec<[Vector3<f64>; 3]> {
+pub(crate) fn corner_normals(mesh: &TriangleMesh) -> Vec<[Vector3<f64>; 3]> {
     let places = &places(mesh);
     let faces: Vec<Face> = mesh
         .triangles

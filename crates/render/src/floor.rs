@@ -2,10 +2,10 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 
-use super::camera::{Projected, View};
-use super::color::{self, Light};
-use super::raster::{Facing, Grid, SAMPLES_PER_PIXEL, rasterise};
-use super::scene::{Floor, Scene};
+use crate::camera::{Projected, View};
+use crate::color::{self, Light};
+use crate::raster::{Facing, Grid, SAMPLES_PER_PIXEL, rasterise};
+use crate::scene::{Floor, Scene};
 
 /// Cells of the shadow along each side of the floor's square.
 const SHADOW_CELLS: usize = 256;
@@ -24,7 +24,7 @@ const COLOR: [f32; 3] = [0.93, 0.935, 0.94];
 
 /// A floor ready to be looked at.
 #[derive(Debug)]
-pub(super) struct FloorView<'a> {
+pub(crate) struct FloorView<'a> {
     floor: &'a Floor,
     view: &'a View,
     light: Light,
@@ -59,7 +59,7 @@ impl Linear {
 
 /// What a place of the picture shows of the floor.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct FloorSample {
+pub(crate) struct FloorSample {
     pub nearness: f32,
     pub light: Light,
     pub opacity: f32,

@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::camera::{HalfSpace, Projected, View};
-use super::color::{self, Light};
-use super::normals::corner_normals;
-use super::scene::{Line3, SurfaceInstance};
+use crate::camera::{HalfSpace, Projected, View};
+use crate::color::{self, Light};
+use crate::normals::corner_normals;
+use crate::scene::{Line3, SurfaceInstance};
 
 /// Lines are this much nearer than they are, so that one lying on a surface is seen.
 const LINE_BIAS: f64 = 5e-4;
@@ -15,7 +15,7 @@ const OPAQUE: f32 = 0.999;
 
 /// How a surface or a line looks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Material {
+pub(crate) struct Material {
     pub light: Light,
     pub opacity: f32,
     /// Lines are not.
@@ -38,7 +38,7 @@ impl Material {
 
 /// What a sample shows: a triangle before clipping, in the eye frame, or a line.
 #[derive(Debug, Clone)]
-pub(super) struct Primitive {
+pub(crate) struct Primitive {
     pub material: u32,
     corners_m: [Vector3<f32>; 3],
     normals: [Vector3<f32>; 3],
@@ -72,7 +72,7 @@ impl Primitive {
 
 /// Places, clips and projects; keeps what shading needs.
 #[derive(Debug)]
-pub(super) struct Assembler<'a> {
+pub(crate) struct Assembler<'a> {
     view: &'a View,
     guards: [HalfSpace; 5],
     pub materials: Vec<Material>,

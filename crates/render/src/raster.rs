@@ -3,28 +3,28 @@
 //! Triangles that share an edge cover each sample along it exactly once (top-left rule), so
 //! translucent surfaces show no seams.
 
-use super::camera::Projected;
+use crate::camera::Projected;
 
 /// Samples per pixel along each side.
-pub(super) const SAMPLES_PER_PIXEL: usize = 2;
+pub(crate) const SAMPLES_PER_PIXEL: usize = 2;
 
 /// Fixed-point units per sample.
 const UNITS: i64 = 256;
 
 /// Fixed-point units per pixel. Coordinates stay below 2^24 (8192 px, a guard band of four
-/// pictures, 512 units per pixel), so their products fit 64 bits with room to spare.
+/// pictures, 512 units per pixel), so their products fit 64 bits with some to spare.
 const UNITS_PER_PIXEL: f64 = 512.0;
 
 /// A rectangle of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     pub columns: usize,
     pub rows: usize,
 }
 
 /// Which side of a triangle is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Facing {
+pub(crate) enum Facing {
     /// Both sides.
     Both,
     /// Only counter-clockwise triangles, as the viewer sees them.
@@ -80,7 +80,7 @@ fn fixed(corner: &Projected) -> Option<[i64; 2]> {
 /// Calls `emit` with the index (row by row) and the nearness of every sample inside the triangle.
 ///
 /// Triangles without area, with corners that are not finite, or outside the grid emit nothing.
-pub(super) fn rasterise(
+pub(crate) fn rasterise(
     mut corners: [Projected; 3],
     facing: Facing,
     grid: Grid,
