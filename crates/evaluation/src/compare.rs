@@ -97,6 +97,8 @@ impl GoalComparison {
 }
 
 /// Better, worse or the same.
+///
+/// A metric without a direction, such as a joint's position, is neither better nor worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Change {
@@ -104,6 +106,8 @@ pub enum Change {
     Better,
     /// The second is worse.
     Worse,
+    /// Another value of what has no direction.
+    Changed,
     /// No difference beyond the resolution.
     Same,
     /// Only the first has it.
@@ -449,6 +453,7 @@ fn compare_metric(key: &MetricKey, a: Option<f64>, b: Option<f64>) -> Option<Met
         (Some(_), None) => Change::Lost,
         (None, Some(_)) => Change::New,
         (Some(a), Some(b)) => match metric.compare(a, b) {
+            Ordering::Less if metric.better.is_none() => Change::Changed,
             Ordering::Less => Change::Worse,
             Ordering::Equal => Change::Same,
             Ordering::Greater => Change::Better,

@@ -44,5 +44,5 @@ pub use motion::{
 pub use needle::{NeedleMeasurement, measure_guide, measure_needle, tip_of};
 pub use route::{RouteObstacles, needle_route};
 pub use sensitivity::tip_sensitivity;
-pub use stored::StoredReport;
+pub use stored::{StoredConfiguration, StoredReport};
 pub use threshold::{BEST, Compared, EVERY, Loss, Rate, Subject, Threshold, ThresholdError};

@@ -27,7 +27,9 @@ pub(crate) fn provenance_differences(
     let mut keys: Vec<&String> = of_a.keys().chain(of_b.keys()).collect();
     keys.sort();
     keys.dedup();
+    let has_all = !a.is_case() && !b.is_case();
     keys.into_iter()
+        .filter(|key| has_all || of_a.contains_key(*key) && of_b.contains_key(*key))
         .filter(|key| of_a.get(*key).map(|v| &v.identity) != of_b.get(*key).map(|v| &v.identity))
         .map(|key| ProvenanceDifference {
             what: key.clone(),

@@ -3,10 +3,23 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::Finding;
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use crate::metric::former_report;
+use crate::metric::{MetricKey, former_report};
 use crate::report::{Report, SCHEMA_VERSION};
+
+/// A configuration of a study's case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredConfiguration {
+    /// Label.
+    pub label: &'static str,
+    /// What became of it, as reports and studies call it.
+    pub status: &'static str,
+    /// The rule or criterion that it breaks.
+    pub rejection: Option<String>,
+    /// What was measured, by metrics' keys, in SI units.
+    pub measured: BTreeMap<String, f64>,
+}
 
 /// A report as its documented keys, with where it comes from.
 ///
@@ -16,6 +29,7 @@ use crate::report::{Report, SCHEMA_VERSION};
 pub struct StoredReport {
     source: String,
     report: Value,
+    is_case: bool,
 }
 
 impl StoredReport {
@@ -24,6 +38,75 @@ impl StoredReport {
         Self {
             source: source.into(),
             report: serde_json::to_value(report).expect("reports have string keys"),
+            is_case: false,
+        }
+    }
+
+    /// A case of a study, as a report with its goal alone. `program` is version and revision of what
+    /// computed it.
+    pub fn of_case(
+        source: impl Into<String>,
+        study: &str,
+        goal: &str,
+        configurations: Vec<StoredConfiguration>,
+        program: [Option<&str>; 2],
+    ) -> Self {
+        let configurations: Vec<Value> = configurations
+            .into_iter()
+            .map(|each| {
+                let rejections: Vec<Value> = (each.rejection.iter())
+                    .map(|rule| json!({ "rule": rule }))
+                    .collect();
+                json!({
+                    "label": each.label,
+                    "status": each.status,
+                    "rejections": rejections,
+                    "metrics": each.measured,
+                })
+            })
+            .collect();
+        Self {
+            source: source.into(),
+            report: json!({
+                "schema_version": SCHEMA_VERSION,
+                "scenario": { "name": study },
+                "provenance": { "version": program[0], "git_revision": program[1] },
+                "goals": [{ "name": goal, "configurations": configurations }],
+            }),
+            is_case: true,
+        }
+    }
+
+    /// Leaves of a run what a case of a study has: its goal, if the run has that too, the metrics that are
+    /// columns of the study, and of each number the seven digits that a column keeps.
+    pub fn as_case(&mut self, case: &Self) {
+        let of_case: Vec<&str> = case.goals().map(|(name, _)| name).collect();
+        let is_kept = |goal: &Value| {
+            let name = goal.get("name").and_then(Value::as_str);
+            name.is_some_and(|name| of_case.contains(&name))
+        };
+        let Some(goals) = self.report.get_mut("goals").and_then(Value::as_array_mut) else {
+            return;
+        };
+        if goals.iter().any(is_kept) {
+            goals.retain(is_kept);
+        }
+        let configurations = goals
+            .iter_mut()
+            .filter_map(|goal| goal.get_mut("configurations")?.as_array_mut())
+            .flatten();
+        for configuration in configurations {
+            let mut measured = Self::measured(configuration);
+            measured.retain(|key, _| case.measures(key));
+            let engines = configuration.get("engines").and_then(Value::as_object);
+            let engines: Vec<&str> =
+                engines.map_or(Vec::new(), |each| each.keys().map(String::as_str).collect());
+            for (key, value) in &mut measured {
+                if let Some(key) = MetricKey::named(key, &engines) {
+                    *value = key.metric().unit.as_column(*value);
+                }
+            }
+            configuration["metrics"] = json!(measured);
         }
     }
 
@@ -66,6 +149,7 @@ impl StoredReport {
         let stored = Self {
             source: file.to_owned(),
             report,
+            is_case: false,
         };
         stored.check()?;
         Ok(stored)
@@ -161,6 +245,22 @@ impl StoredReport {
         numbers
             .filter_map(|(key, value)| Some((key.clone(), value.as_f64()?)))
             .collect()
+    }
+
+    /// Whether it is a case of a study: it has the study's columns, and little of where it comes from.
+    pub(crate) fn is_case(&self) -> bool {
+        self.is_case
+    }
+
+    /// Whether any of its configurations has a metric.
+    fn measures(&self, key: &str) -> bool {
+        let configurations = self
+            .goals()
+            .filter_map(|(_, goal)| goal.get("configurations")?.as_array())
+            .flatten();
+        configurations
+            .filter_map(|each| each.get("metrics"))
+            .any(|metrics| metrics.get(key).is_some())
     }
 
     /// Whether it was written before metrics had keys.

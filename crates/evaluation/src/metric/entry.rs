@@ -258,7 +258,7 @@ impl Metric {
             definition,
             quantity,
             better: None,
-            resolution: 0.0,
+            resolution: quantity.resolution(),
             bound: Bound::Value,
             draw: Draw::Nominal,
             stage: Stage::FinalPosture,

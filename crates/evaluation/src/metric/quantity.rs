@@ -22,6 +22,15 @@ pub enum Quantity {
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 impl Quantity {
+    /// Differences up to this, in SI units, are none where a metric states no other: 0.001 deg, 1 um, and
+    /// a millionth of whatever else there is.
+    pub(super) const fn resolution(self) -> f64 {
+        match self {
+            Self::Angle => 1e-3 * DEGREE,
+            _ => 1e-6,
+        }
+    }
+
     /// Unit in reports.
     pub fn unit(self) -> &'static str {
         match self {
@@ -123,6 +132,13 @@ impl Unit {
 
     const fn new(symbol: &'static str, suffix: &'static str, si: f64) -> Self {
         Self { symbol, suffix, si }
+    }
+
+    /// A value in SI units with the seven digits that a column of a study keeps of it.
+    pub fn as_column(self, value: f64) -> f64 {
+        #[expect(clippy::cast_possible_truncation, reason = "as columns are")]
+        let column = (value / self.si) as f32;
+        f64::from(column) * self.si
     }
 }
 

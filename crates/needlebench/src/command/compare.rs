@@ -1,5 +1,6 @@
 //! `needlebench compare`.
 
+mod case;
 mod help;
 mod studies;
 mod thresholds;
@@ -18,7 +19,8 @@ use needlebench_evaluation::{Compared, StoredReport};
 
 use super::run::probe_file;
 use super::{load_checked, print_json, print_text};
-use studies::compare_if_studies;
+use case::case_of_study;
+use studies::{compare_if_studies, is_study};
 use thresholds::thresholds;
 
 use crate::exit::ExitStatus;
@@ -32,7 +34,7 @@ use needlebench_report::{comparison_junit, comparison_markdown, write_atomically
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(crate) struct CompareArguments {
     /// First result: a report.json, a results folder, or a scenario, which is then run; or a study's
-    /// folder or results.parquet.
+    /// folder or results.parquet, and with a run on the other side --case.
     #[arg(value_name = "A")]
     pub a: PathBuf,
     /// Second result, likewise.
@@ -46,6 +48,9 @@ pub(crate) struct CompareArguments {
         default_value = "rapier"
     )]
     pub engine: EngineArgument,
+    /// Case of a study that is compared with a run.
+    #[arg(long, value_name = "ID")]
+    pub case: Option<u64>,
     /// A goal of A that is called otherwise in B; may be given several times.
     #[arg(long, value_name = "A=B")]
     pub goal: Vec<Pair>,
@@ -169,8 +174,22 @@ fn compared(
             probe_file(path, argument)?;
         }
     }
-    let (a, b) = (input(&arguments.a)?, input(&arguments.b)?);
-    Ok((options, a.report(arguments)?, b.report(arguments)?))
+    let [of_a, of_b] = [&arguments.a, &arguments.b].map(|path| is_study(path));
+    if arguments.case.is_some() && !of_a && !of_b {
+        return Err(Finding::new("--case", "neither of the two is a study")
+            .hint("it is the case of a study that a run is compared with")
+            .into());
+    }
+    let read = |path| input(path, arguments.case);
+    let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
+    let (mut a, mut b) = (a.report(arguments)?, b.report(arguments)?);
+    if of_a {
+        b.as_case(&a);
+    }
+    if of_b {
+        a.as_case(&b);
+    }
+    Ok((options, a, b))
 }
 
 fn options(arguments: &CompareArguments) -> Result<CompareOptions, Refused> {
@@ -190,7 +209,11 @@ enum Input {
     Scenario(PathBuf, Box<Runnable>),
 }
 
-fn input(path: &Path) -> Result<Input, Refused> {
+fn input(path: &Path, case: Option<u64>) -> Result<Input, Refused> {
+    if is_study(path) {
+        let report = case_of_study(path, case).map_err(Refused::Input)?;
+        return Ok(Input::Stored(report));
+    }
     let name = path.display().to_string();
     if path
         .extension()

@@ -204,7 +204,7 @@ fn what_cannot_be_compared_is_refused_with_a_hint() {
     bench
         .run(&["compare", "a", "s.toml"])
         .exits_with(2)
-        .complains(["s.toml", "this is no study, but a is one"]);
+        .complains(["--case", "a run is compared with one of the study's"]);
     let table = &tables()[0];
     bench.write("half.parquet", &table[..table.len() / 2]);
     bench

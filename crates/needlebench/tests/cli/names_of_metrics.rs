@@ -207,3 +207,37 @@ fn a_report_without_keys_has_the_numbers_of_one_with_them() {
         assert!(known.contains(name), "{name} is not in {known:?}");
     }
 }
+
+#[test]
+fn a_case_of_a_study_is_compared_with_its_run() {
+    let bench = Bench::with_scenario(&format!("{SMALL}{IMPERFECT}"));
+    bench.write("study.toml", study("dynamic"));
+    bench
+        .run(&["study", "study.toml", "--quiet", "--no-page"])
+        .exits_with(0);
+    let run = ["study", "study.toml", "--case", "1", "--run", "--quiet"];
+    bench.run(&[&run[..], &["--no-page"]].concat());
+    let compare = ["compare", "out/dynamic/cases/1", "out/dynamic"];
+    let with = |more: &[&str]| bench.run(&[&compare[..], more].concat());
+    let same = with(&["--case", "1", "--max-loss", "tip_error=1nm", "--json"]);
+    let same = same.exits_with(0).json();
+    assert_eq!(same["provenance_differences"].to_string(), "[]");
+    let mut compared = 0;
+    for each in same["goals"][0]["configurations"].as_array().unwrap() {
+        assert_eq!(each["status"], "same", "{each}");
+        for metric in each["metrics"].as_array().unwrap() {
+            assert_eq!(metric["outcome"], "same", "{metric}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 6 * 40, "{compared}");
+    // Another place of the patient is another number.
+    let other = with(&["--case", "0", "--max-loss", "tip_error=1nm", "--json"]);
+    assert!(other.stdout.contains("\"worse\""), "{}", other.stdout);
+    with(&[])
+        .exits_with(2)
+        .complains(["out/dynamic", "--case", "--case N"]);
+    with(&["--case", "2"])
+        .exits_with(2)
+        .complains(["no case 2", "cases 0 to 1"]);
+}

@@ -1,7 +1,7 @@
 //! Report pages: one HTML file each, with everything in it, that opens from disk without a network.
 //!
 //! A page is markup, style and scripts (readable files under `assets/`, and three.js) and one payload:
-//! base64 of zlib of a [`Pack`], that is a JSON document and the arrays that it refers to. Rust
+//! base64 of zlib of a pack, that is a JSON document and the arrays that it refers to. Rust
 //! gathers and quantises; the scripts draw. The payload holds no characters that markup could take
 //! for its own, and the scripts put texts into the page as texts only, so names from files cannot
 //! become markup. A content security policy forbids the page every connection.

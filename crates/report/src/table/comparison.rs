@@ -11,6 +11,7 @@ fn change_text(change: Change) -> &'static str {
     match change {
         Change::Better => "better",
         Change::Worse => "worse",
+        Change::Changed => "changed",
         Change::Same => "same",
         Change::Lost => "lost",
         Change::New => "new",
@@ -164,7 +165,7 @@ pub fn comparison_text(comparison: &Comparison, all: bool) -> String {
                 let outcome = match found.outcome {
                     Change::Worse | Change::Lost => Cell::new(outcome).fg(Color::Red),
                     Change::Better | Change::New => Cell::new(outcome).fg(Color::Green),
-                    Change::Same => Cell::new(outcome),
+                    Change::Same | Change::Changed => Cell::new(outcome),
                 };
                 // The name once, over all its metrics.
                 let name = if configuration.label == last {

@@ -15,6 +15,8 @@ that work or of a configuration's success rate (unless --allow-status-change, or
 it), or if a --max-loss is exceeded: METRIC[@PERCENT][:CONFIGURATION]=VALUE, the quantile at PERCENT \
 (default 5, of errors 95) of a configuration, of `every` one, or of the `best` of each layout (default).
 
+A run beside a study: with --case, the case's rows are compared like a run of its goal.
+
 Each line has what is known of one thing in several ways; each name is one of them. Where the first \
 result does not have the first of a line, that name stands for the next that both have, and the \
 comparison says so. `_static` is of static cases of studies.
@@ -23,6 +25,7 @@ comparison says so. `_static` is of static cases of studies.
 const EXAMPLES: &str = "\
 Example: needlebench compare out/before/layouts out/after/layouts --max-loss clearance@5=1mm \
 --max-loss success_rate:Right-Up-Fold=0.02 --max-loss tip_error@95:every=0.1mm
+Example: needlebench compare out/layouts/cases/7 out/layouts --case 7
 Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm
 Example: needlebench compare scenarios/table3.toml other_table.toml --max-loss motion_time=10%";
 

@@ -23,20 +23,20 @@ use needlebench_report::table::study_comparison::study_comparison_text;
 use needlebench_report::{study_comparison_junit, study_comparison_markdown, write_atomically};
 
 /// Whether a path is a study's folder, or its table.
-fn is_study(path: &Path) -> bool {
+pub(super) fn is_study(path: &Path) -> bool {
     let is_table = path
         .extension()
         .is_some_and(|extension| extension == "parquet");
     is_table || path.join(RESULTS_FILE).is_file() || path.join(MANIFEST_FILE).is_file()
 }
 
-/// Compares two studies; none if neither is one.
+/// Compares two studies; none if either is not one.
 pub(super) fn compare_if_studies(arguments: &CompareArguments) -> Result<Option<ExitStatus>> {
     let studies = [&arguments.a, &arguments.b].map(|path| is_study(path));
-    if studies == [false, false] {
+    if studies != [true, true] {
         return Ok(None);
     }
-    let prepared = match prepare(arguments, studies) {
+    let prepared = match prepare(arguments) {
         Ok(prepared) => prepared,
         Err(findings) => {
             print_findings(&findings);
@@ -156,7 +156,7 @@ fn on_columns(threshold: &Threshold, pair: &StudyPair<'_>) -> (StudyThreshold, O
 }
 
 /// Everything that can be wrong before a table is read.
-fn prepare(arguments: &CompareArguments, studies: [bool; 2]) -> Result<Prepared, Vec<Finding>> {
+fn prepare(arguments: &CompareArguments) -> Result<Prepared, Vec<Finding>> {
     let given = given(arguments)?;
     for (path, argument) in [
         (&arguments.junit, "--junit"),
@@ -166,20 +166,6 @@ fn prepare(arguments: &CompareArguments, studies: [bool; 2]) -> Result<Prepared,
             probe_file(path, argument).map_err(|finding| vec![finding])?;
         }
     }
-    for (path, other, is_study) in [
-        (&arguments.a, &arguments.b, studies[0]),
-        (&arguments.b, &arguments.a, studies[1]),
-    ] {
-        if !is_study {
-            let finding = Finding::new(
-                path.display().to_string(),
-                format!("this is no study, but {} is one", other.display()),
-            );
-            return Err(vec![finding.hint(
-                "compare two studies: folders with results.parquet, or such tables",
-            )]);
-        }
-    }
     let results = [open(&arguments.a)?, open(&arguments.b)?];
     Ok(Prepared { given, results })
 }
@@ -187,6 +173,12 @@ fn prepare(arguments: &CompareArguments, studies: [bool; 2]) -> Result<Prepared,
 /// Thresholds and what else is said of the comparison.
 fn given(arguments: &CompareArguments) -> Result<Given, Vec<Finding>> {
     let mut findings = Vec::new();
+    if arguments.case.is_some() {
+        findings.push(
+            Finding::new("--case", "two studies are compared with all their cases")
+                .hint("`--case` is the case of a study that a run is compared with"),
+        );
+    }
     if !arguments.goal.is_empty() {
         findings.push(
             Finding::new("--goal", "goals of studies cannot be matched by hand")
@@ -207,7 +199,7 @@ fn given(arguments: &CompareArguments) -> Result<Given, Vec<Finding>> {
     }
 }
 
-fn open(path: &Path) -> Result<ParquetResults, Vec<Finding>> {
+pub(super) fn open(path: &Path) -> Result<ParquetResults, Vec<Finding>> {
     let table: PathBuf = if path.is_dir() {
         path.join(RESULTS_FILE)
     } else {
@@ -225,7 +217,7 @@ fn open(path: &Path) -> Result<ParquetResults, Vec<Finding>> {
     ParquetResults::open(&table).map_err(|error| vec![finding(error)])
 }
 
-fn finding(error: ResultsError) -> Finding {
+pub(super) fn finding(error: ResultsError) -> Finding {
     match error.message.split_once("\nhint: ") {
         Some((message, hint)) => Finding::new(error.file, message).hint(hint),
         None => Finding::new(error.file, error.message),

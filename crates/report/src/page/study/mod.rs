@@ -51,7 +51,7 @@ pub struct CasePlaces {
 }
 
 impl StudyPage<'_> {
-    /// The whole page. Reads the results once; keeps at most [`columns::MOST_CASES`] cases.
+    /// The whole page. Reads the results once; keeps at most `MOST_CASES` cases.
     ///
     /// # Errors
     /// What cannot be read of the results.

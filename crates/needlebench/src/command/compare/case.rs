@@ -1,0 +1,93 @@
+//! A case of a study beside a run.
+
+use std::path::Path;
+
+use needlebench_bench::study::FormerResults;
+use needlebench_cell::Finding;
+use needlebench_engine::{ENGINES, engine_names};
+use needlebench_evaluation::metric::MetricKey;
+use needlebench_evaluation::{StoredConfiguration, StoredReport};
+use needlebench_kinematics::ik::Configuration;
+use needlebench_study::{
+    FactorKind, FactorValue, MetricColumn, Outcome, ParquetResults, Results, Row,
+};
+
+use super::studies::{finding, open};
+
+/// A case of a study's table as a report of its goal; the only case if none is named.
+pub(super) fn case_of_study(path: &Path, case: Option<u64>) -> Result<StoredReport, Vec<Finding>> {
+    let results = open(path)?;
+    let source = path.display().to_string();
+    let refused = |message: String, hint: String| {
+        let finding = Finding::new(&source, message).key("--case");
+        vec![finding.hint(hint)]
+    };
+    let cases = results.cases();
+    let case = match case {
+        Some(case) => case,
+        None if cases == 1 => 0,
+        None => {
+            let message = format!("a run is compared with one of the study's {cases} cases");
+            return Err(refused(message, "say which: `--case N`".to_owned()));
+        }
+    };
+    let former = results.is_former().then(|| FormerResults::new(&results));
+    let table: &dyn Results = match &former {
+        Some(former) => former,
+        None => &results,
+    };
+    let mut found = None;
+    let visited = table.visit(&mut |values, result| {
+        if result.case == case {
+            found = Some((values[0], result.rows.clone()));
+        }
+    });
+    visited.map_err(|error| vec![finding(error)])?;
+    let Some((goal, rows)) = found else {
+        let message = format!("the table has no case {case}");
+        let hint = format!("the study has the cases 0 to {}", cases.saturating_sub(1));
+        return Err(refused(message, hint));
+    };
+    let name = format!("{source}, case {case}");
+    let goal = goal_name(table, goal);
+    let configurations = rows.iter().map(|row| configuration(row, table.columns()));
+    Ok(StoredReport::of_case(
+        name,
+        results.study_name(),
+        &goal,
+        configurations.collect(),
+        program(&results),
+    ))
+}
+
+/// The goal is the first factor.
+fn goal_name(results: &dyn Results, value: FactorValue) -> String {
+    let goal = &results.factors()[0];
+    match (&goal.kind, value) {
+        (FactorKind::Levels(levels), FactorValue::Level(level)) => levels[level].label.clone(),
+        _ => goal.name.clone(),
+    }
+}
+
+/// A row by the keys of its columns, in SI units.
+fn configuration(row: &Row, columns: &[MetricColumn]) -> StoredConfiguration {
+    let engines = engine_names(ENGINES);
+    let values = columns.iter().enumerate().filter_map(|(index, column)| {
+        let key = MetricKey::named(&column.key, &engines)?;
+        Some((
+            column.key.clone(),
+            f64::from(row.get(index)?) * key.metric().unit.si,
+        ))
+    });
+    StoredConfiguration {
+        label: Configuration::ALL[usize::from(row.configuration)].label(),
+        status: row.outcome.name(),
+        rejection: (row.outcome != Outcome::Ok).then(|| row.detail.to_string()),
+        measured: values.collect(),
+    }
+}
+
+/// Version and revision of the program that computed the study.
+fn program(results: &ParquetResults) -> [Option<&str>; 2] {
+    ["version", "git_revision"].map(|key| results.provenance()[key].as_str())
+}
