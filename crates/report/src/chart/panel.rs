@@ -4,8 +4,10 @@ use super::axis::Axis;
 use super::drawing::{Anchor, Chart, Mark, Size};
 use super::paint::{Paint, Stroke};
 
-/// Space between ticks, px: along, and upwards.
+/// Space between ticks, px: along, where it is wide, and upwards.
 const TICKS_PX: [f64; 2] = [90.0, 45.0];
+/// Ticks along that even a narrow one has, if their texts have as much space as those beside it.
+const FEWEST_TICKS: f64 = 4.0;
 /// From the frame to the middle of the texts of ticks, clear of those beside it, and of an axis below it, px.
 const TICK_BELOW_PX: f64 = 16.0;
 const LABEL_BELOW_PX: f64 = 34.0;
@@ -58,7 +60,8 @@ impl Panel {
         let ([left, top], [width, height]) = (self.corner, self.size);
         let foot = top + height;
         let mut free = f64::NEG_INFINITY;
-        for (value, text) in self.x.ticks(width / TICKS_PX[0]) {
+        let [wide, narrow] = TICKS_PX.map(|space| width / space);
+        for (value, text) in self.x.ticks(wide.max(narrow.min(FEWEST_TICKS))) {
             let x = left + self.x.share(value) * width;
             chart.line([x, top], [x, foot], Stroke::full(Paint::Grid, 1.0));
             // A text that would touch the one before it is left out.
