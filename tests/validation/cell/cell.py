@@ -225,7 +225,8 @@ def assembled_urdf(scenario: Path) -> tuple[str, set[str]]:
         xyz=[0.0] * 3,
         rpy=[0.0, 0.0, math.radians(tool.get("mount_rotation_deg", 0.0))],
     )
-    arm = text(robot.get("urdf", "ur3"), "ur3")
+    name = robot.get("urdf", "ur3")
+    arm = text(name, name)
     guide = text(tool.get("urdf", "offset"), "needle_guide")
     links = set(re.findall(r'<link\s+name="([^"]+)"', guide))
     return f'<robot name="cell"><link name="cell"/>{place}{arm}{bolted}{guide}</robot>', links
