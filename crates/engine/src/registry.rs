@@ -50,8 +50,9 @@ pub fn choose_engines<S: AsRef<str>>(
 mod tests {
     use super::*;
 
+    /// Of the first two, however many there are.
     fn chosen(names: Option<&[&str]>) -> Result<Vec<&'static str>, UnknownEngine> {
-        choose_engines(ENGINES, names).map(|engines| engine_names(&engines))
+        choose_engines(&ENGINES[..2], names).map(|engines| engine_names(&engines))
     }
 
     #[test]
