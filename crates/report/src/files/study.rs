@@ -15,8 +15,8 @@ use super::folder::Folder;
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
 use crate::page::study::{CasePlaces, StudyPage};
-use crate::table::study::parts::parts;
-use crate::table::study::robustness::robustness_parts;
+use crate::table::study::document::blocks;
+use crate::table::study::robustness::robustness_blocks;
 use crate::table::study::text::summary_text;
 use needlebench_bench::progress::Progress;
 
@@ -118,12 +118,12 @@ pub fn write_study(
         .as_ref()
         .zip(summary.robustness.as_ref())
         .map_or_else(Vec::new, |(section, results)| {
-            robustness_parts(section, results)
+            robustness_blocks(section, results)
         });
-    let parts = parts(&summary.statistics, &summary.criteria, more);
-    let markdown = summary_markdown(&file.name, &summary.criteria, &parts);
+    let blocks = blocks(&summary.statistics, &summary.criteria, more);
+    let markdown = summary_markdown(&file.name, &summary.criteria, &blocks);
     folder.write("summary.md", markdown)?;
-    let text = summary_text(&parts);
+    let text = summary_text(&blocks);
     if let Some(path) = output.junit {
         let document = study_junit(&file.name, &summary.criteria)?;
         write_atomically(path, document.as_bytes()).map_err(|source| FilesError::Write {

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use needlebench_study::statistics::CriterionResult;
 
-use crate::table::study::parts::Part;
+use crate::table::study::document::Block;
 
 /// Text that breaks no table.
 fn cell_text(text: &str) -> String {
@@ -28,10 +28,10 @@ fn headings(header: &[String]) -> Vec<String> {
 }
 
 /// The summary as Markdown.
-pub fn summary_markdown(title: &str, criteria: &[CriterionResult], parts: &[Part]) -> String {
+pub fn summary_markdown(title: &str, criteria: &[CriterionResult], blocks: &[Block]) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
-    let _ = write_markdown(&mut text, title, criteria, parts);
+    let _ = write_markdown(&mut text, title, criteria, blocks);
     text
 }
 
@@ -39,7 +39,7 @@ fn write_markdown(
     out: &mut String,
     title: &str,
     criteria: &[CriterionResult],
-    parts: &[Part],
+    blocks: &[Block],
 ) -> std::fmt::Result {
     let failed = criteria.iter().filter(|each| !each.pass).count();
     let verdict = match (criteria.len(), failed) {
@@ -48,16 +48,16 @@ fn write_markdown(
         _ => ": **fail**".to_owned(),
     };
     writeln!(out, "# {title}{verdict}\n")?;
-    for part in parts {
+    for part in blocks {
         match part {
-            Part::Heading(heading) => writeln!(out, "## {heading}\n")?,
-            Part::Lines(lines) => {
+            Block::Heading(heading) => writeln!(out, "## {heading}\n")?,
+            Block::Lines(lines) => {
                 for line in lines {
                     writeln!(out, "- {}", line.trim())?;
                 }
                 writeln!(out)?;
             }
-            Part::Table { header, rows } => {
+            Block::Table { header, rows } => {
                 writeln!(out, "| {} |", headings(header).join(" | "))?;
                 out.push('|');
                 for (at, name) in header.iter().enumerate() {

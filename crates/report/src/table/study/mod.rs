@@ -1,7 +1,7 @@
 //! A study's statistics, and one of its cases, as text.
 
 mod case;
-pub(crate) mod parts;
+pub(crate) mod document;
 pub(crate) mod robustness;
 pub(crate) mod text;
 

@@ -4,10 +4,10 @@ use needlebench_bench::study::RobustnessResult;
 use needlebench_bench::study::robustness::{Breaking, Robustness, Unaware};
 use needlebench_cell::study::RobustnessSection;
 
-use super::parts::{Part, table};
+use super::document::{Block, table};
 
 /// The radii as a table, with the rule that breaks.
-pub fn robustness_parts(section: &RobustnessSection, results: &[RobustnessResult]) -> Vec<Part> {
+pub fn robustness_blocks(section: &RobustnessSection, results: &[RobustnessResult]) -> Vec<Block> {
     let radius = |found: Option<&Breaking>, most: f64| match found {
         Some(found) if found.radius == 0.0 => "0".to_owned(),
         Some(found) => format!("{:.2}", found.radius),
@@ -42,7 +42,7 @@ pub fn robustness_parts(section: &RobustnessSection, results: &[RobustnessResult
         })
         .collect();
     vec![
-        Part::Heading("robustness: how far the patient of the base scenario may move".to_owned()),
+        Block::Heading("robustness: how far the patient of the base scenario may move".to_owned()),
         table(
             [
                 "goal",
@@ -55,7 +55,7 @@ pub fn robustness_parts(section: &RobustnessSection, results: &[RobustnessResult
             ],
             rows,
         ),
-        Part::Lines(vec![
+        Block::Lines(vec![
             "Smallest shift, and turn about the vertical and the long axis, that breaks the configuration: \
              with its posture solved anew, and with the arm left where it stands. `summary.json` has the \
              breaking cases."

@@ -2,26 +2,26 @@
 
 use comfy_table::{Cell, CellAlignment, ContentArrangement};
 
-use super::parts::Part;
+use super::document::Block;
 use crate::table::plain_table;
 
 /// Columns that tables fit into.
 const WIDTH: u16 = 100;
 
 /// A summary as text, 100 columns wide.
-pub fn summary_text(parts: &[Part]) -> String {
+pub fn summary_text(blocks: &[Block]) -> String {
     let mut text = String::new();
-    for part in parts {
+    for part in blocks {
         match part {
-            Part::Heading(heading) => {
+            Block::Heading(heading) => {
                 text.push('\n');
                 text.push_str(heading);
             }
-            Part::Lines(lines) => {
+            Block::Lines(lines) => {
                 let lines: Vec<String> = lines.iter().map(|line| wrapped(line)).collect();
                 text.push_str(&lines.join("\n"));
             }
-            Part::Table { header, rows } => {
+            Block::Table { header, rows } => {
                 let names: Vec<&str> = header
                     .iter()
                     .map(|name| name.trim_start_matches('<'))

@@ -9,7 +9,7 @@ use crate::number::{in_percent, three_digits};
 
 /// One part of a document.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Part {
+pub enum Block {
     /// A heading.
     Heading(String),
     /// A table: its first column is text, the others are numbers unless their heading starts with `<`.
@@ -30,31 +30,31 @@ const ROUNDING_MM: f64 = 1e-6;
 /// Interactions that are shown of each response.
 const MOST_INTERACTIONS: usize = 3;
 
-/// All parts, the verdict last; `more` comes before the notes.
-pub fn parts(summary: &Summary, criteria: &[CriterionResult], more: Vec<Part>) -> Vec<Part> {
-    let mut parts = vec![Part::Lines(overview(summary))];
+/// All blocks, the verdict last; `more` comes before the notes.
+pub fn blocks(summary: &Summary, criteria: &[CriterionResult], more: Vec<Block>) -> Vec<Block> {
+    let mut blocks = vec![Block::Lines(overview(summary))];
     if summary.overall.layouts > 0 {
-        configurations(summary, &mut parts);
-        goals(summary, &mut parts);
-        effects(summary, &mut parts);
-        regions(summary, &mut parts);
-        choices(summary, &mut parts);
-        evidence(summary, &mut parts);
+        configurations(summary, &mut blocks);
+        goals(summary, &mut blocks);
+        effects(summary, &mut blocks);
+        regions(summary, &mut blocks);
+        choices(summary, &mut blocks);
+        evidence(summary, &mut blocks);
     }
-    parts.extend(more);
+    blocks.extend(more);
     if !summary.notes.is_empty() {
         let notes = summary.notes.iter().map(|note| format!("note: {note}"));
-        parts.push(Part::Lines(notes.collect()));
+        blocks.push(Block::Lines(notes.collect()));
     }
     if !criteria.is_empty() {
-        parts.push(Part::Heading("criteria".to_owned()));
-        parts.push(Part::Lines(criteria.iter().map(criterion).collect()));
+        blocks.push(Block::Heading("criteria".to_owned()));
+        blocks.push(Block::Lines(criteria.iter().map(criterion).collect()));
     }
-    parts
+    blocks
 }
 
-pub fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>) -> Part {
-    Part::Table {
+pub fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>) -> Block {
+    Block::Table {
         header: header.map(str::to_owned).to_vec(),
         rows,
     }
@@ -114,7 +114,7 @@ fn overview(summary: &Summary) -> Vec<String> {
     lines
 }
 
-fn configurations(summary: &Summary, parts: &mut Vec<Part>) {
+fn configurations(summary: &Summary, blocks: &mut Vec<Block>) {
     let layouts = summary.overall.layouts as f64;
     let quantile = |of: &str, metric: &str, p: f64| {
         let spread = summary.spread(of, metric);
@@ -167,9 +167,9 @@ fn configurations(summary: &Summary, parts: &mut Vec<Part>) {
     ];
     best.extend(numbers(BEST));
     rows.push(best);
-    parts.push(Part::Heading("configurations".to_owned()));
-    parts.push(Part::Table { header, rows });
-    parts.push(Part::Lines(vec![
+    blocks.push(Block::Heading("configurations".to_owned()));
+    blocks.push(Block::Table { header, rows });
+    blocks.push(Block::Lines(vec![
         "quantiles: of the configurations over layouts in which they are not rejected; of the best, \
          which is ok and has the largest clearance, over layouts that work"
             .to_owned(),
@@ -188,11 +188,11 @@ fn configurations(summary: &Summary, parts: &mut Vec<Part>) {
         })
         .collect();
     if !rows.is_empty() {
-        parts.push(table(["configuration", "<not ok because of"], rows));
+        blocks.push(table(["configuration", "<not ok because of"], rows));
     }
 }
 
-fn goals(summary: &Summary, parts: &mut Vec<Part>) {
+fn goals(summary: &Summary, blocks: &mut Vec<Block>) {
     if summary.goals.len() < 2 {
         return;
     }
@@ -211,8 +211,8 @@ fn goals(summary: &Summary, parts: &mut Vec<Part>) {
             }),
         ]
     });
-    parts.push(Part::Heading("goals".to_owned()));
-    parts.push(table(
+    blocks.push(Block::Heading("goals".to_owned()));
+    blocks.push(table(
         [
             "goal",
             "valid\nlayouts",
@@ -224,7 +224,7 @@ fn goals(summary: &Summary, parts: &mut Vec<Part>) {
     ));
 }
 
-fn effects(summary: &Summary, parts: &mut Vec<Part>) {
+fn effects(summary: &Summary, blocks: &mut Vec<Block>) {
     let effects = &summary.effects;
     if effects.axes.is_empty() {
         return;
@@ -252,10 +252,10 @@ fn effects(summary: &Summary, parts: &mut Vec<Part>) {
         row.push(range.unwrap_or("-".to_owned()));
         row
     });
-    parts.push(Part::Heading(
+    blocks.push(Block::Heading(
         "share of the variance that each factor explains (%)".to_owned(),
     ));
-    parts.push(table(
+    blocks.push(table(
         [
             "factor",
             "any\nworks",
@@ -289,7 +289,7 @@ fn effects(summary: &Summary, parts: &mut Vec<Part>) {
         }
     }
     if !lines.is_empty() {
-        parts.push(Part::Lines(lines));
+        blocks.push(Block::Lines(lines));
     }
 }
 
@@ -302,7 +302,7 @@ fn spread_of_bins(bins: &[BinMean]) -> Option<String> {
 }
 
 /// Runs of neighbouring bins with the same winner, of factors where it changes.
-fn regions(summary: &Summary, parts: &mut Vec<Part>) {
+fn regions(summary: &Summary, blocks: &mut Vec<Block>) {
     let regions = &summary.regions;
     let rows: Vec<Vec<String>> = regions
         .maps
@@ -318,10 +318,10 @@ fn regions(summary: &Summary, parts: &mut Vec<Part>) {
     if rows.is_empty() {
         return;
     }
-    parts.push(Part::Heading(
+    blocks.push(Block::Heading(
         "where another configuration is the best".to_owned(),
     ));
-    parts.push(table(
+    blocks.push(table(
         [
             "factor",
             "<from .. to",
@@ -374,7 +374,7 @@ fn winners_of(summary: &Summary, map: &RegionMap) -> Vec<Vec<String>> {
     rows
 }
 
-fn choices(summary: &Summary, parts: &mut Vec<Part>) {
+fn choices(summary: &Summary, blocks: &mut Vec<Block>) {
     let Some(ranking) = &summary.choices else {
         return;
     };
@@ -399,11 +399,11 @@ fn choices(summary: &Summary, parts: &mut Vec<Part>) {
         ]
     };
     let rows = (1..).zip(&ranking.choices).take(MOST_CHOICES).map(row);
-    parts.push(Part::Heading(
+    blocks.push(Block::Heading(
         "what is ours to choose, best first".to_owned(),
     ));
     let more = format!("{} or more\n(%)", ranking.working_configurations);
-    parts.push(Part::Table {
+    blocks.push(Block::Table {
         header: [
             "choice",
             "works (%)",
@@ -439,10 +439,10 @@ fn choices(summary: &Summary, parts: &mut Vec<Part>) {
             case_list(&first.failing)
         ));
     }
-    parts.push(Part::Lines(lines));
+    blocks.push(Block::Lines(lines));
 }
 
-fn evidence(summary: &Summary, parts: &mut Vec<Part>) {
+fn evidence(summary: &Summary, blocks: &mut Vec<Block>) {
     let mut lines = Vec::new();
     let none = &summary.evidence.fewer_than[0];
     if !none.is_empty() {
@@ -481,8 +481,8 @@ fn evidence(summary: &Summary, parts: &mut Vec<Part>) {
         ));
     }
     if !lines.is_empty() {
-        parts.push(Part::Heading("cases worth a look".to_owned()));
-        parts.push(Part::Lines(lines));
+        blocks.push(Block::Heading("cases worth a look".to_owned()));
+        blocks.push(Block::Lines(lines));
     }
 }
 
