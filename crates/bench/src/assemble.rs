@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Point3;
 use needlebench_cell::{ArmInUse, ClearanceClass, enclosures};
 use needlebench_engine::{EngineIdentity, Recording};
 use needlebench_evaluation::metric::measured;
@@ -163,10 +164,13 @@ fn configuration_report(
     let cell = &resolved.cell;
     let goal = &resolved.goals[goal_index];
     let candidate = plan.candidate.as_ref();
+    let motion = plan.trajectory.as_ref();
+    let predicted = motion.and_then(|motion| real.predicted(goal_index, motion));
     let engines: BTreeMap<String, EngineReport> = runs
         .iter()
         .map(|run| {
-            let mut report = engine_report(setup, goal_index, plan, run);
+            let predicted_m = predicted.as_ref().map(|each| each.tip_m);
+            let mut report = engine_report(setup, goal_index, plan, run, predicted_m);
             let contacts = &mut report.motion.contact.episodes;
             add_approach_speeds(contacts, real.cell(), real.model(), &run.recording);
             (run.engine.to_owned(), report)
@@ -232,8 +236,7 @@ fn configuration_report(
         posture_clearance_m,
         surplus_m: surplus_m(&setup.planner, plan),
         predicted: if real.is_imperfect() {
-            let motion = plan.trajectory.as_ref();
-            motion.and_then(|motion| real.predicted_needle(goal_index, motion))
+            predicted.map(|each| each.needle)
         } else {
             commanded
         },
@@ -293,6 +296,7 @@ fn engine_report(
     goal_index: usize,
     plan: &ConfigurationPlan,
     run: &EngineRun,
+    predicted_m: Option<Point3<f64>>,
 ) -> EngineReport {
     let real = &setup.real;
     let (cell, goal) = (real.cell(), real.goal(goal_index));
@@ -311,9 +315,7 @@ fn engine_report(
     let rests_at_m = real.is_imperfect().then_some(rested_m);
     EngineReport {
         needle: measure_needle(cell, real.phantom(), goal, &settled.world_from_flange),
-        unexplained_tip_m: real
-            .predicted_tip(goal_index, trajectory)
-            .map(|predicted_m| (rested_m - predicted_m).norm()),
+        unexplained_tip_m: predicted_m.map(|predicted_m| (rested_m - predicted_m).norm()),
         motion: measure_motion(cell, goal, trajectory, &run.recording, band_m, rests_at_m),
         clearance: ClearanceReport::of(&run.clearance.minima),
     }

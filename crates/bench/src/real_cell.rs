@@ -1,5 +1,6 @@
 //! The cell as it really is in a run: the nominal one, or one draw of the scenario's imperfections.
 
+use nalgebra::Point3;
 use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Actuation, Servo, ServoGains};
@@ -10,7 +11,7 @@ use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::rotation_vector;
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_uncertainty::{Layout, Settled, Truth, resting_friction, settle};
+use needlebench_uncertainty::{Layout, Settled, Truth, settle_after};
 
 /// Keeps the draw of imperfections apart from the other things that a scenario's seed decides.
 const STREAM: u64 = 0x7472_7574_6821;
@@ -149,44 +150,29 @@ impl<'a> RealCell<'a> {
         }
     }
 
-    /// Where the needle's tip is predicted to come to rest at the end of a motion, world: the
-    /// balance of torques, without any engine. None for the nominal robot, and where a drive is too
-    /// weak.
-    pub fn predicted_tip(
-        &self,
-        goal: usize,
-        trajectory: &JointTrajectory,
-    ) -> Option<nalgebra::Point3<f64>> {
-        let (truth, settled) = self.settled(trajectory)?;
+    /// What the balance of torques predicts of the end of a motion, without any engine; none for the
+    /// nominal robot, and where a drive is too weak.
+    pub fn predicted(&self, goal: usize, trajectory: &JointTrajectory) -> Option<PredictedNeedle> {
+        let Imperfect { truth, cell, .. } = self.imperfect.as_ref()?;
         let nominal = &self.resolved.cell;
-        let depth_m = self.resolved.goals[goal].insertion_length_m;
-        Some(truth.needle_points(nominal, &settled.position, [0.0, depth_m])[1])
-    }
-
-    /// The needle where it is predicted to come to rest at the end of a motion, but for its place in
-    /// the skin; none for the nominal robot, and where a drive is too weak.
-    pub fn predicted_needle(
-        &self,
-        goal: usize,
-        trajectory: &JointTrajectory,
-    ) -> Option<NeedleMeasurement> {
-        let (_, settled) = self.settled(trajectory)?;
-        let flange = self.cell().robot.world_from_flange(&settled.position);
-        let needle = measure_needle(self.cell(), None, self.goal(goal), &flange);
-        Some(needle)
-    }
-
-    /// The truth, and where the arm rests in it at the end of a motion.
-    fn settled(&self, trajectory: &JointTrajectory) -> Option<(&Truth, Settled)> {
-        let Imperfect { truth, .. } = self.imperfect.as_ref()?;
-        let friction = truth.actuation.friction.as_ref();
-        let resting = friction.map(|friction| resting_friction(friction, trajectory));
-        let dynamics = truth.dynamics(&self.resolved.cell);
         let servo = servo_of(self.resolved);
-        let target = trajectory.end();
-        let settled = settle(&servo, &dynamics, truth, resting.as_ref(), &target).ok()?;
-        Some((truth, settled))
+        let settled = settle_after(&servo, &truth.dynamics(nominal), truth, trajectory);
+        let Settled { position, .. } = settled.ok()?;
+        let flange = cell.robot.world_from_flange(&position);
+        let depth_m = self.resolved.goals[goal].insertion_length_m;
+        Some(PredictedNeedle {
+            tip_m: truth.needle_points(nominal, &position, [0.0, depth_m])[1],
+            needle: measure_needle(cell, None, self.goal(goal), &flange),
+        })
     }
+}
+
+/// Where the needle is predicted to come to rest.
+pub struct PredictedNeedle {
+    /// Its tip, world.
+    pub tip_m: Point3<f64>,
+    /// What would be measured of it, but for its place in the skin.
+    pub needle: NeedleMeasurement,
 }
 
 /// One draw of the scenario's imperfections, from its seed; none without any.

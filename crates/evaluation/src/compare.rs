@@ -241,6 +241,13 @@ pub fn compare(
         failures.extend(status_failures(&goals));
     }
     let mut notes = former_notes(a, b);
+    let mut metrics = goals
+        .iter()
+        .flat_map(|goal| &goal.configurations)
+        .flat_map(|each| &each.metrics);
+    if !metrics.any(|found| found.a.is_some() && found.b.is_some()) {
+        notes.push("no number is in both: nothing but what became of each is compared".to_owned());
+    }
     for threshold in &options.thresholds {
         let found = threshold_failures(&goals, threshold);
         failures.extend(found.failures);

@@ -15,7 +15,7 @@ pub struct StoredConfiguration {
     pub label: &'static str,
     /// What became of it, as reports and studies call it.
     pub status: &'static str,
-    /// The rule or criterion that it breaks.
+    /// The rule that rejects it, with what it is about behind it: `collision robot_phantom`.
     pub rejection: Option<String>,
     /// What was measured, by metrics' keys, in SI units.
     pub measured: BTreeMap<String, f64>,
@@ -54,13 +54,14 @@ impl StoredReport {
         let configurations: Vec<Value> = configurations
             .into_iter()
             .map(|each| {
-                let rejections: Vec<Value> = (each.rejection.iter())
-                    .map(|rule| json!({ "rule": rule }))
-                    .collect();
+                let rejections = each.rejection.iter().map(|rejection| {
+                    let (rule, detail) = rejection.split_once(' ').unwrap_or((rejection, ""));
+                    json!({ "rule": rule, "detail": detail })
+                });
                 json!({
                     "label": each.label,
                     "status": each.status,
-                    "rejections": rejections,
+                    "rejections": rejections.collect::<Vec<Value>>(),
                     "metrics": each.measured,
                 })
             })
@@ -77,8 +78,9 @@ impl StoredReport {
         }
     }
 
-    /// Leaves of a run what a case of a study has: its goal, if the run has that too, the metrics that are
-    /// columns of the study, and of each number the seven digits that a column keeps.
+    /// Leaves of a run what a case of a study has: its goal, if the run has that too, without a
+    /// recommendation, the metrics that are columns of the study, and of each number the seven digits
+    /// that a column keeps.
     pub fn as_case(&mut self, case: &Self) {
         let of_case: Vec<&str> = case.goals().map(|(name, _)| name).collect();
         let is_kept = |goal: &Value| {
@@ -91,6 +93,9 @@ impl StoredReport {
         if goals.iter().any(is_kept) {
             goals.retain(is_kept);
         }
+        for goal in goals.iter_mut().filter_map(Value::as_object_mut) {
+            goal.remove("recommended");
+        }
         let configurations = goals
             .iter_mut()
             .filter_map(|goal| goal.get_mut("configurations")?.as_array_mut())
@@ -101,8 +106,8 @@ impl StoredReport {
             let engines = configuration.get("engines").and_then(Value::as_object);
             let engines: Vec<&str> =
                 engines.map_or(Vec::new(), |each| each.keys().map(String::as_str).collect());
-            for (key, value) in &mut measured {
-                if let Some(key) = MetricKey::named(key, &engines) {
+            for key in MetricKey::all(&engines) {
+                if let Some(value) = measured.get_mut(&*key.key()) {
                     *value = key.metric().unit.as_column(*value);
                 }
             }

@@ -17,5 +17,5 @@ mod jitter;
 mod settle;
 mod truth;
 
-pub use settle::{RestingFriction, SettleError, Settled, resting_friction, settle};
+pub use settle::{RestingFriction, SettleError, Settled, resting_friction, settle, settle_after};
 pub use truth::{Draw, Layout, Source, Truth};

@@ -127,6 +127,21 @@ pub enum SettleError {
     },
 }
 
+/// Where the arm rests at the end of a motion, with the friction that this leaves.
+///
+/// # Errors
+/// As [`settle`].
+pub fn settle_after(
+    servo: &Servo,
+    real: &Dynamics,
+    truth: &Truth,
+    motion: &JointTrajectory,
+) -> Result<Settled, SettleError> {
+    let friction = truth.actuation.friction.as_ref();
+    let resting = friction.map(|friction| resting_friction(friction, motion));
+    settle(servo, real, truth, resting.as_ref(), &motion.end())
+}
+
 /// Where the arm rests when its reference holds `target`.
 ///
 /// The balance of one joint, with the believed gravity torque `g` at the reference, the true one `t` at
@@ -138,7 +153,7 @@ pub enum SettleError {
 /// q = q_r - x - offset - rounding - C t
 /// ```
 ///
-/// Agrees with the engines' settled postures; see `tests/settled.rs` of this crate for how well.
+/// Agrees with the engines' settled postures; see `tests/uncertainty/settled.rs` of this crate for how well.
 ///
 /// # Errors
 /// [`SettleError`].

@@ -211,7 +211,7 @@ impl<'a> Case<'a> {
             .zip(report.configurations)
             .zip(&self.failed);
         eight(rows.map(|((plan, measured), failed)| {
-            let (outcome, detail) = match (broken_rule(plan), failed, measured.status) {
+            let (outcome, detail) = match (broken_rule(&plan.rejections), failed, measured.status) {
                 (Some(rule), _, _) => (Outcome::Rejected, rule),
                 (None, Some(engine), _) => {
                     (Outcome::Failed, format!("engine_failure {engine}").into())

@@ -76,7 +76,7 @@ pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], String>
     let criteria = &resolved.scenario.criteria;
     let rows = plan.configurations.iter().zip(report.configurations);
     Ok(eight(rows.map(|(plan, measured)| {
-        let (outcome, detail) = match broken_rule(plan) {
+        let (outcome, detail) = match broken_rule(&plan.rejections) {
             Some(rule) => (Outcome::Rejected, rule),
             None => match missed(goal, criteria, &measured) {
                 Some(criterion) => (Outcome::Failed, criterion),

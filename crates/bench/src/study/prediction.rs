@@ -7,7 +7,7 @@ use needlebench_kinematics::Dynamics;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{Candidate, Planner};
 use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, analytic_total};
-use needlebench_uncertainty::{Truth, resting_friction, settle};
+use needlebench_uncertainty::{Truth, settle_after};
 
 use crate::budgets::analytic_budget;
 use crate::real_cell::{drawn_truth, servo_of};
@@ -92,16 +92,7 @@ impl<'a> Prediction<'a> {
 
     fn needle(&self, real: &Real, motion: &JointTrajectory) -> Option<NeedleMeasurement> {
         let goal = &self.resolved.goals[0];
-        let friction = real.truth.actuation.friction.as_ref();
-        let resting = friction.map(|friction| resting_friction(friction, motion));
-        let settled = settle(
-            &real.servo,
-            &real.dynamics,
-            &real.truth,
-            resting.as_ref(),
-            &motion.end(),
-        )
-        .ok()?;
+        let settled = settle_after(&real.servo, &real.dynamics, &real.truth, motion).ok()?;
         let exit = real
             .truth
             .world_from_guide_exit(&self.resolved.cell, &settled.position);

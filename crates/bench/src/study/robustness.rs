@@ -18,6 +18,7 @@
 
 mod search;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use needlebench_cell::{Change, Finding, KeyPath, ResolvedScenario, ScenarioFamily};
@@ -149,7 +150,7 @@ pub fn robustness(
     let unaware = joints_rad.map(|joints_rad| {
         let q = Joints::from_column_slice(&joints_rad);
         let mut stays = |resolved: Result<ResolvedScenario, Vec<Finding>>| match resolved {
-            Ok(resolved) => worker.clearance_broken(&resolved, &q).map(str::to_owned),
+            Ok(resolved) => worker.clearance_broken(&resolved, &q).map(Cow::into_owned),
             Err(findings) => Some(impossible(&findings)),
         };
         Unaware {

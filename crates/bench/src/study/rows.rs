@@ -6,7 +6,7 @@ use needlebench_cell::study::StudyMode;
 use needlebench_evaluation::metric::{self, MetricKey};
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{ConfigurationPlan, Rule};
+use needlebench_planning::{Rejection, Rule};
 use needlebench_study::{Measure, MetricColumn, Outcome, Row};
 
 /// One configuration in one case.
@@ -106,8 +106,8 @@ pub fn metric_column(key: &MetricKey) -> MetricColumn {
 }
 
 /// The rule that rejects a configuration: `joint_limit`, `collision robot_phantom`.
-pub(super) fn broken_rule(plan: &ConfigurationPlan) -> Option<Cow<'static, str>> {
-    let rejection = plan.rejections.first()?;
+pub(super) fn broken_rule(rejections: &[Rejection]) -> Option<Cow<'static, str>> {
+    let rejection = rejections.first()?;
     let name = rejection.rule.name();
     Some(match (rejection.rule, rejection.class) {
         (Rule::Collision | Rule::NoMotion, Some(class)) => {

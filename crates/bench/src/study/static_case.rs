@@ -1,5 +1,6 @@
 //! Static cases: the final postures of a layout, without motions and without engines.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use needlebench_cell::phantom::Phantom;
@@ -10,11 +11,11 @@ use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_evaluation::{RouteObstacles, first_missed_by_posture};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{Member, Planner, Rejection, Rule};
+use needlebench_planning::{Member, Planner};
 use needlebench_study::Outcome;
 
 use super::prediction::Prediction;
-use super::rows::CaseRow;
+use super::rows::{CaseRow, broken_rule};
 use crate::assemble::margins_report;
 
 /// Layouts of which the prepared geometry is kept: of phantoms of some sizes, of some tools.
@@ -93,17 +94,16 @@ impl StaticWorker {
         &mut self,
         resolved: &ResolvedScenario,
         q: &Joints,
-    ) -> Option<&'static str> {
+    ) -> Option<Cow<'static, str>> {
         let broken = self.evaluate(resolved, |planner, _, _| {
             let (clearance, rejections) = planner.clearance_rules(q);
-            let rule = rejections.first().map(rule_detail);
-            rule.or_else(|| {
+            broken_rule(&rejections).or_else(|| {
                 let mut posture = ConfigurationReport::new("");
                 set_clearances(&mut posture, &clearance);
-                first_missed_by_posture(&posture, &resolved.scenario.criteria)
+                first_missed_by_posture(&posture, &resolved.scenario.criteria).map(Cow::from)
             })
         });
-        broken.unwrap_or_else(Some)
+        broken.unwrap_or_else(|key| Some(key.into()))
     }
 
     /// Does something with a layout that is ready for it; the key at fault where it cannot be.
@@ -173,10 +173,9 @@ fn row(
     route_m: Option<f64>,
 ) -> CaseRow {
     let resolved = prediction.resolved();
-    let rejection = member.rejections.first();
-    let (outcome, detail) = match rejection {
-        Some(rejection) => (Outcome::Rejected, rule_detail(rejection)),
-        None => (Outcome::Ok, ""),
+    let (outcome, detail) = match broken_rule(&member.rejections) {
+        Some(rule) => (Outcome::Rejected, rule),
+        None => (Outcome::Ok, "".into()),
     };
     let mut row = CaseRow::new(configuration, StudyMode::Static, outcome, detail);
     let posture = &mut row.measured;
@@ -197,7 +196,7 @@ fn row(
     let predicted = prediction.of(planner, candidate);
     posture.predicted = predicted.needle;
     posture.budget = predicted.budget;
-    if rejection.is_none()
+    if outcome == Outcome::Ok
         && let Some(missed) = first_missed_by_posture(posture, &resolved.scenario.criteria)
     {
         row.outcome = Outcome::Failed;
@@ -212,22 +211,4 @@ fn set_clearances(posture: &mut ConfigurationReport, minima: &ClassMinima) {
     posture
         .posture_clearance_m
         .extend(found.map(|pair| (pair.class.name(), pair.separation.distance_m)));
-}
-
-/// The rule, and for collisions the class of the pair.
-fn rule_detail(rejection: &Rejection) -> &'static str {
-    match (rejection.rule, rejection.class) {
-        (Rule::Collision, Some(class)) => match class {
-            ClearanceClass::RobotPhantom => "collision robot_phantom",
-            ClearanceClass::RobotTable => "collision robot_table",
-            ClearanceClass::RobotGantry => "collision robot_gantry",
-            ClearanceClass::RobotMount => "collision robot_mount",
-            ClearanceClass::SelfCollision => "collision self",
-            ClearanceClass::ToolPhantom => "collision tool_phantom",
-            ClearanceClass::GuideStandoff => "collision guide_standoff",
-            ClearanceClass::NeedleCorridor => "collision needle_corridor",
-            ClearanceClass::NeedleRoute => "collision needle_route",
-        },
-        (rule, _) => rule.name(),
-    }
 }

@@ -178,10 +178,10 @@ fn a_settled_tip_without_friction_is_that_of_a_run() {
             continue;
         };
         let motion = JointTrajectory::starting_at(candidate.joints);
-        let Some(tip) = real.predicted_tip(0, &motion) else {
+        let Some(predicted) = real.predicted(0, &motion) else {
             continue;
         };
-        let error_m = (tip - real.goal(0).target_m).norm();
+        let error_m = (predicted.tip_m - real.goal(0).target_m).norm();
         let row = &rows[configuration.index()];
         let tip_m = row.get("tip_error_static").unwrap();
         assert!((tip_m - error_m).abs() < ROUNDING_M, "{tip_m} {error_m}");

@@ -1,5 +1,6 @@
 //! Where the needle is: predicted, simulated, and over all arms and patients.
 
+use needlebench_cell::scenario::CriteriaSection;
 use needlebench_cell::study::StudyMode::Dynamic;
 
 use super::{ALL, MM, NEEDLE_RESOLUTION_M, UNSIMULATED};
@@ -14,6 +15,21 @@ use crate::metric::quantity::Quantity::{Angle, Length};
 use crate::metric::readers::budget;
 
 const NEEDLE_RESOLUTION_RAD: f64 = 1e-5;
+
+// Limits of what is judged by the prediction where nothing is simulated.
+
+fn tip_limit_m(criteria: &CriteriaSection) -> Option<f64> {
+    criteria.max_tip_position_error_mm.map(|mm| mm * MM)
+}
+
+fn angle_limit_rad(criteria: &CriteriaSection) -> Option<f64> {
+    let limit_deg = criteria.max_needle_angle_error_deg;
+    limit_deg.map(f64::to_radians)
+}
+
+fn guide_limit_m(criteria: &CriteriaSection) -> Option<f64> {
+    criteria.max_guide_position_error_mm.map(|mm| mm * MM)
+}
 
 /// The needle where the balance of torques lets it come to rest, without any engine; without
 /// imperfections where the arm is commanded to, which leaves the residual of the inverse kinematics.
@@ -31,9 +47,7 @@ pub(super) const PREDICTED: &[Metric] = &[
     .case(3, "tip\nmm")
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .criterion("max_tip_position_error_mm", UNSIMULATED, |criteria| {
-        criteria.max_tip_position_error_mm.map(|mm| mm * MM)
-    })
+    .criterion("max_tip_position_error_mm", UNSIMULATED, tip_limit_m)
     .missing(Missing::Skips)
     .statistics(
         Statistics::BY_CASE
@@ -52,9 +66,7 @@ pub(super) const PREDICTED: &[Metric] = &[
     .known(Value, ThisDraw, FinalPosture)
     .in_static_cases("needle_angle_error_static")
     .better(Less, NEEDLE_RESOLUTION_RAD)
-    .criterion("max_needle_angle_error_deg", UNSIMULATED, |criteria| {
-        criteria.max_needle_angle_error_deg.map(f64::to_radians)
-    })
+    .criterion("max_needle_angle_error_deg", UNSIMULATED, angle_limit_rad)
     .missing(Missing::Skips),
     Metric::new(
         "guide_position_error_predicted",
@@ -68,9 +80,7 @@ pub(super) const PREDICTED: &[Metric] = &[
     .in_static_cases("guide_position_error_static")
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .criterion("max_guide_position_error_mm", UNSIMULATED, |criteria| {
-        criteria.max_guide_position_error_mm.map(|mm| mm * MM)
-    })
+    .criterion("max_guide_position_error_mm", UNSIMULATED, guide_limit_m)
     .missing(Missing::Skips),
     Metric::new(
         "lateral_error_predicted",
@@ -119,9 +129,7 @@ pub(super) const SIMULATED: &[Metric] = &[
     .summary(0, "Tip error {engine}")
     .page(0, "Tip error {engine}")
     .page_side(0, "Tip error")
-    .criterion("max_tip_position_error_mm", &[Dynamic], |criteria| {
-        criteria.max_tip_position_error_mm.map(|mm| mm * MM)
-    })
+    .criterion("max_tip_position_error_mm", &[Dynamic], tip_limit_m)
     .statistics(
         Statistics::BY_CASE
             .role(Role::TipError)
@@ -137,9 +145,7 @@ pub(super) const SIMULATED: &[Metric] = &[
     )
     .known(Value, ThisDraw, Simulated)
     .better(Less, NEEDLE_RESOLUTION_RAD)
-    .criterion("max_needle_angle_error_deg", &[Dynamic], |criteria| {
-        criteria.max_needle_angle_error_deg.map(f64::to_radians)
-    }),
+    .criterion("max_needle_angle_error_deg", &[Dynamic], angle_limit_rad),
     Metric::new(
         "guide_position_error",
         "guide position error",
@@ -150,9 +156,7 @@ pub(super) const SIMULATED: &[Metric] = &[
     .known(Value, ThisDraw, Simulated)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .criterion("max_guide_position_error_mm", &[Dynamic], |criteria| {
-        criteria.max_guide_position_error_mm.map(|mm| mm * MM)
-    }),
+    .criterion("max_guide_position_error_mm", &[Dynamic], guide_limit_m),
     Metric::new(
         "lateral_error",
         "lateral error",

@@ -8,9 +8,7 @@ use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::metric::MetricKey;
 use needlebench_evaluation::{StoredConfiguration, StoredReport};
 use needlebench_kinematics::ik::Configuration;
-use needlebench_study::{
-    FactorKind, FactorValue, MetricColumn, Outcome, ParquetResults, Results, Row,
-};
+use needlebench_study::{FactorKind, FactorValue, Outcome, ParquetResults, Results, Row};
 
 use super::studies::{finding, open};
 
@@ -50,7 +48,12 @@ pub(super) fn case_of_study(path: &Path, case: Option<u64>) -> Result<StoredRepo
     };
     let name = format!("{source}, case {case}");
     let goal = goal_name(table, goal);
-    let configurations = rows.iter().map(|row| configuration(row, table.columns()));
+    let engines = engine_names(ENGINES);
+    let columns = table.columns().iter();
+    let keys: Vec<Option<MetricKey>> = columns
+        .map(|column| MetricKey::named(&column.key, &engines))
+        .collect();
+    let configurations = rows.iter().map(|row| configuration(row, &keys));
     Ok(StoredReport::of_case(
         name,
         results.study_name(),
@@ -70,19 +73,18 @@ fn goal_name(results: &dyn Results, value: FactorValue) -> String {
 }
 
 /// A row by the keys of its columns, in SI units.
-fn configuration(row: &Row, columns: &[MetricColumn]) -> StoredConfiguration {
-    let engines = engine_names(ENGINES);
-    let values = columns.iter().enumerate().filter_map(|(index, column)| {
-        let key = MetricKey::named(&column.key, &engines)?;
-        Some((
-            column.key.clone(),
-            f64::from(row.get(index)?) * key.metric().unit.si,
-        ))
+fn configuration(row: &Row, keys: &[Option<MetricKey>]) -> StoredConfiguration {
+    let values = keys.iter().enumerate().filter_map(|(index, key)| {
+        let key = key.as_ref()?;
+        let value = f64::from(row.get(index)?) * key.metric().unit.si;
+        Some((key.key().into_owned(), value))
     });
+    // A criterion that was missed is none.
+    let rejected = matches!(row.outcome, Outcome::Rejected | Outcome::Invalid);
     StoredConfiguration {
         label: Configuration::ALL[usize::from(row.configuration)].label(),
         status: row.outcome.name(),
-        rejection: (row.outcome != Outcome::Ok).then(|| row.detail.to_string()),
+        rejection: rejected.then(|| row.detail.to_string()),
         measured: values.collect(),
     }
 }
