@@ -16,7 +16,7 @@ const LAYERS: [(&str, &[&str]); 14] = [
     ("geometry", &["kinematics"]),
     ("cell", &["geometry", "kinematics"]),
     ("clearance", &["cell", "geometry", "kinematics"]),
-    ("planning", &["clearance", "cell", "kinematics"]),
+    ("planning", &["clearance", "cell", "geometry", "kinematics"]),
     ("engine", &["cell", "geometry", "kinematics"]),
     ("render", &["geometry", "kinematics"]),
     ("uncertainty", &["engine", "cell", "kinematics"]),

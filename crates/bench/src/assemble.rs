@@ -9,16 +9,18 @@ use needlebench_evaluation::metric::measured;
 use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
-    MarginsReport, PhaseReport, RejectionReport, Report, SCHEMA_VERSION, ScenarioSummary,
-    SearchReport, Status,
+    MarginsReport, PhaseReport, RejectionReport, Report, RouteReport, SCHEMA_VERSION,
+    ScenarioSummary, SearchReport, Status,
 };
 use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
-    add_approach_speeds, engine_difference, judge, measure_motion, measure_needle, needle_route,
-    planned_clearance, posture_clearance, tip_of, tip_sensitivity,
+    add_approach_speeds, engine_difference, judge, measure_motion, measure_needle,
+    planned_clearance, posture_clearance, route_clearance, tip_of, tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, PostureMargins, Rule};
+use needlebench_planning::{
+    ConfigurationPlan, GoalPlan, Planner, PostureMargins, Rule, judge_route, needle_route,
+};
 
 use crate::adjudication::Adjudicated;
 use crate::budgets::Budgets;
@@ -114,7 +116,8 @@ pub(crate) fn goal_report(
     let route = resolved
         .phantom
         .as_ref()
-        .and_then(|placed| needle_route(&resolved.cell, placed, goal));
+        .and_then(|placed| needle_route(&resolved.cell, placed, goal))
+        .map(|nearest| route_clearance(&nearest.part.name, &nearest.separation));
     GoalReport {
         name: goal.name.clone(),
         lesion: goal.lesion.clone(),
@@ -123,6 +126,13 @@ pub(crate) fn goal_report(
         axis: goal.axis.into_inner().into(),
         insertion_length_m: goal.insertion_length_m,
         standoff_m: goal.standoff_m,
+        needle_route: judge_route(resolved, goal).map(|judged| RouteReport {
+            part: judged.nearest.part.name.clone(),
+            tissue: judged.nearest.part.tissue.to_string(),
+            distance_m: judged.distance_m,
+            margin_m: judged.margin_m,
+            kept: judged.is_kept(),
+        }),
         configurations: plan
             .configurations
             .iter()

@@ -50,7 +50,10 @@ pub(crate) fn jobs(setup: &Setup<'_>, plans: &[GoalPlan]) -> Vec<Job> {
                     && plan.rejections.iter().all(|rejection| {
                         matches!(
                             rejection.rule,
-                            Rule::Collision | Rule::NeedleCorridor | Rule::NoMotion
+                            Rule::NeedleRoute
+                                | Rule::Collision
+                                | Rule::NeedleCorridor
+                                | Rule::NoMotion
                         )
                     }))
     };

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::{
-    CertificateOptions, ClassMinima, ClearanceModel, Motion, MotionCertificate, RecordedMotion,
-    certify, certify_sampled,
+    CertificateOptions, ClassMinima, ClearanceModel, Motion, MotionCertificate, ROUNDING_M,
+    RecordedMotion, certify, certify_sampled,
 };
 use needlebench_engine::Recording;
 use needlebench_geometry::Separation;
@@ -213,6 +213,15 @@ pub fn posture_clearance(
             )
         })
         .collect()
+}
+
+/// Clearance of the planned needle, from skin to target, from what it comes nearest to.
+pub fn route_clearance(part: &str, separation: &Separation) -> ClassClearance {
+    ClassClearance {
+        // One exact distance that is never optimistic, but for rounding.
+        certified_lower_bound_m: Some(separation.distance_m - ROUNDING_M),
+        ..class_clearance(("needle", part), separation, "insertion", None, None)
+    }
 }
 
 pub(crate) fn class_clearance(

@@ -6,14 +6,20 @@ use needlebench_cell::{Expectation, Goal};
 use needlebench_kinematics::ik::Configuration;
 
 use crate::check_configuration;
-use crate::report::{ConfigurationReport, CriterionResult, GoalReport, Status, Verdict};
+use crate::report::{
+    ConfigurationReport, CriterionResult, GoalReport, RouteReport, Status, Verdict,
+};
+
+/// Criterion of the margins that the planned needle keeps, and the rule that rejects where it does not.
+const NEEDLE_ROUTE: &str = "needle_route";
 
 /// Judges all configurations of all goals: sets each status, and returns the verdict with every
 /// criterion that was checked.
 ///
 /// A configuration that works is `failed` if it misses a criterion. The verdict is `fail` if any
 /// configuration is, unless that was expected; if a goal has fewer working configurations than
-/// asked for; or if a configuration's outcome is not the expected one.
+/// asked for; if the planned needle comes too near to what it has to keep away from; or if a
+/// configuration's outcome is not the expected one.
 pub fn judge(
     goals: &mut [GoalReport],
     planned: &[Goal],
@@ -55,6 +61,11 @@ pub fn judge(
                 results.push(result);
             }
         }
+        if let Some(route) = &report.needle_route {
+            let result = check_route(goal, route);
+            failed |= !result.pass;
+            results.push(result);
+        }
         let working = report
             .configurations
             .iter()
@@ -76,6 +87,34 @@ pub fn judge(
         });
     }
     (if failed { Verdict::Fail } else { Verdict::Pass }, results)
+}
+
+/// The margins of the needle's route. One that is missed is met all the same where it is what is expected
+/// of every configuration.
+fn check_route(goal: &Goal, route: &RouteReport) -> CriterionResult {
+    let is_expected = Configuration::ALL.iter().all(|each| {
+        let expected = goal.expected.get(each);
+        matches!(expected, Some(Expectation::Rejected(rule)) if rule == NEEDLE_ROUTE)
+    });
+    let does = if route.kept {
+        "keeps away from"
+    } else {
+        "does not keep away from"
+    };
+    CriterionResult {
+        goal: goal.name.clone(),
+        label: None,
+        engine: None,
+        criterion: NEEDLE_ROUTE.to_owned(),
+        value: Some(route.distance_m),
+        limit: Some(route.margin_m),
+        unit: "m",
+        pass: route.kept || is_expected,
+        detail: format!(
+            "the planned needle {does} {} ({})",
+            route.part, route.tissue
+        ),
+    }
 }
 
 fn check_expectation(

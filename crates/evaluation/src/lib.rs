@@ -23,7 +23,6 @@ mod reason;
 pub mod referee;
 pub mod report;
 pub mod room;
-mod route;
 mod sensitivity;
 mod stored;
 mod threshold;
@@ -31,7 +30,7 @@ mod verdict;
 
 pub use clearance::{
     ClearanceSeries, certify_recording, measure_clearance, planned_clearance, posture_clearance,
-    recorded_clearance, sample_indices,
+    recorded_clearance, route_clearance, sample_indices,
 };
 pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balance};
 pub use criteria::{check_configuration, first_missed_by_posture};
@@ -42,7 +41,6 @@ pub use motion::{
     measure_motion,
 };
 pub use needle::{NeedleMeasurement, measure_guide, measure_needle, tip_of};
-pub use route::{RouteObstacles, needle_route};
 pub use sensitivity::tip_sensitivity;
 pub use stored::{StoredConfiguration, StoredReport};
 pub use threshold::{BEST, Compared, EVERY, Loss, Rate, Subject, Threshold, ThresholdError};

@@ -125,12 +125,29 @@ pub struct GoalReport {
     pub insertion_length_m: f64,
     /// Planned gap between guide exit and entry point.
     pub standoff_m: Option<f64>,
+    /// What the planned needle keeps away from least; none where there is nothing to keep away from.
+    pub needle_route: Option<RouteReport>,
     /// All eight configurations.
     pub configurations: Vec<ConfigurationReport>,
     /// The one to choose; none if none works.
     pub recommended: Option<Recommendation>,
     /// How those that work compare; none until they are ranked.
     pub ranking: Option<GoalRanking>,
+}
+
+/// How the planned needle keeps away from bone, vessels and organs that do not contain the target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RouteReport {
+    /// The part of which it keeps its margin least, or misses it most.
+    pub part: String,
+    /// Bone, vessel or organ.
+    pub tissue: String,
+    /// Signed distance of the needle's surface, negative inside, never optimistic.
+    pub distance_m: f64,
+    /// The least that it has to be.
+    pub margin_m: f64,
+    /// The margin is kept; if not, every configuration is rejected.
+    pub kept: bool,
 }
 
 /// Which configuration to choose.

@@ -11,6 +11,7 @@ mod plan;
 mod planner;
 mod press;
 mod rejection;
+mod route;
 mod transfer;
 
 pub use family::{Aim, Best, EDGE_RAD, Edge, Family, Member, RollRange};
@@ -20,3 +21,4 @@ pub use plan::GoalPlan;
 pub use planner::{Candidate, Planner, PostureMargins};
 pub use press::{PressError, PressPlan, stage_press};
 pub use rejection::{Rejection, Rule};
+pub use route::{RouteClearance, RouteJudgement, judge_route, needle_route, route_rejection};

@@ -6,7 +6,7 @@ use needlebench_kinematics::ik::{Configuration, wrap_angle};
 use crate::family::Member;
 use crate::motion_plan::ConfigurationPlan;
 use crate::planner::{Candidate, Planner};
-use crate::{Rejection, Rule};
+use crate::{Rejection, Rule, route_rejection};
 /// All eight configurations of one goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GoalPlan {
@@ -22,40 +22,56 @@ const SEARCH_TRIES: usize = 3;
 
 impl Planner<'_> {
     /// Plans all eight configurations of a goal.
+    ///
+    /// Motions are planned to a goal whose needle's route is refused too: what a configuration could do is
+    /// worth knowing, but none works.
     pub fn plan(&self, goal: &Goal) -> GoalPlan {
+        let route = route_rejection(self.resolved, goal);
         let configurations = Configuration::ALL
             .into_iter()
             .zip(self.grids(goal))
-            .map(|(configuration, grid)| self.plan_configuration(goal, configuration, grid))
+            .map(|(configuration, grid)| {
+                let mut plan = self.plan_configuration(goal, configuration, grid);
+                plan.rejections.splice(0..0, route.clone());
+                if route.is_some() {
+                    plan.retreat = None;
+                }
+                plan
+            })
             .collect();
         GoalPlan { configurations }
     }
 
     /// For each of the eight configurations the posture that a plan tries first: of those that break
     /// no rule the best by the scenario's `roll_aim`, else the one that comes nearest to working. No
-    /// motions are looked at.
+    /// motions are looked at. Where the needle's route is refused, all are.
     pub fn postures(&self, goal: &Goal) -> [Member; 8] {
+        let route = route_rejection(self.resolved, goal);
         if let Roll::Fixed(roll_rad) = goal.roll {
-            return self.members_at(goal, roll_rad);
+            let members = self.members_at(goal, roll_rad);
+            return members.map(|member| member.on_route(route.as_ref()));
         }
         let mut grids = self.grids(goal).into_iter();
         Configuration::ALL.map(|configuration| {
             let grid = grids.next().expect("there are eight");
-            self.first(goal, configuration, grid)
+            let first = self.first(goal, configuration, grid);
+            first.on_route(route.as_ref())
         })
     }
 
     /// One of [`Planner::postures`].
     pub fn posture(&self, goal: &Goal, configuration: Configuration) -> Member {
-        if let Roll::Fixed(roll_rad) = goal.roll {
-            return self.member_at(goal, configuration, roll_rad);
-        }
-        let rolls = self.rolls(goal, self.planning().roll_samples);
-        let grid = rolls
-            .into_iter()
-            .map(|roll_rad| self.member_at(goal, configuration, roll_rad))
-            .collect();
-        self.first(goal, configuration, grid)
+        let member = if let Roll::Fixed(roll_rad) = goal.roll {
+            self.member_at(goal, configuration, roll_rad)
+        } else {
+            let rolls = self.rolls(goal, self.planning().roll_samples);
+            let grid = rolls
+                .into_iter()
+                .map(|roll_rad| self.member_at(goal, configuration, roll_rad))
+                .collect();
+            self.first(goal, configuration, grid)
+        };
+        member.on_route(route_rejection(self.resolved, goal).as_ref())
     }
 
     fn first(&self, goal: &Goal, configuration: Configuration, grid: Vec<Member>) -> Member {

@@ -5,6 +5,8 @@ use needlebench_cell::ClearanceClass;
 /// Rules, in the order in which they are applied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Rule {
+    /// The planned needle comes too near to bone, vessel or organ: no configuration changes that.
+    NeedleRoute,
     /// No joint positions bring the guide there in this configuration.
     Unreachable,
     /// At this pose the configuration is the same posture as another one.
@@ -29,6 +31,7 @@ impl Rule {
     /// Name in reports and in `expected` of scenario files.
     pub fn name(self) -> &'static str {
         match self {
+            Self::NeedleRoute => "needle_route",
             Self::Unreachable => "unreachable",
             Self::Merged => "merged",
             Self::NearestOnly => "nearest_only",

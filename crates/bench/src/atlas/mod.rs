@@ -8,7 +8,7 @@ use needlebench_cell::{Goal, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{Aim, Family, Member, Planner};
+use needlebench_planning::{Aim, Family, Member, Planner, route_rejection};
 
 pub use report::{AtlasReport, BranchReport, GoalAtlasReport};
 
@@ -62,9 +62,18 @@ pub fn goal_atlas(
             column.push(member);
         }
     }
-    let families = in_parallel(threads, &Configuration::ALL, |&configuration| {
+    let mut families = in_parallel(threads, &Configuration::ALL, |&configuration| {
         planner.family(goal, configuration, &members[configuration.index()])
     });
+    // What would work but for the needle's route: no configuration is to go there.
+    if let Some(route) = route_rejection(resolved, goal) {
+        for member in members.iter_mut().flatten() {
+            *member = member.clone().on_route(Some(&route));
+        }
+        for family in &mut families {
+            family.ranges.clear();
+        }
+    }
     Ok(GoalAtlas {
         rolls_rad,
         aim,

@@ -1,17 +1,15 @@
 //! Static cases: the final postures of a layout, without motions and without engines.
 
 use std::borrow::Cow;
-use std::sync::Arc;
 
-use needlebench_cell::phantom::Phantom;
 use needlebench_cell::study::StudyMode;
 use needlebench_cell::{ClearanceClass, Finding, ResolvedScenario};
 use needlebench_clearance::{ClassMinima, ClearanceModel};
+use needlebench_evaluation::first_missed_by_posture;
 use needlebench_evaluation::report::ConfigurationReport;
-use needlebench_evaluation::{RouteObstacles, first_missed_by_posture};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{Member, Planner};
+use needlebench_planning::{Member, Planner, needle_route};
 use needlebench_study::Outcome;
 
 use super::prediction::Prediction;
@@ -40,7 +38,6 @@ const KEPT: usize = 8;
 pub struct StaticWorker {
     /// The one used last is the last.
     models: Vec<ClearanceModel>,
-    routes: Vec<(Arc<Phantom>, RouteObstacles)>,
 }
 
 /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
@@ -115,7 +112,7 @@ impl StaticWorker {
         if resolved.goals.is_empty() {
             return Err("goals");
         }
-        let route_m = self.route_m(resolved);
+        let route_m = route_m(resolved);
         let prediction = Prediction::new(resolved)?;
         let model = self.model(resolved);
         let planner = Planner::new(resolved, model).map_err(|_| "robot.urdf")?;
@@ -145,24 +142,13 @@ impl StaticWorker {
         self.models.push(model);
         &self.models[self.models.len() - 1]
     }
+}
 
-    /// Clearance of the planned needle on its way, m; none without a phantom.
-    fn route_m(&mut self, resolved: &ResolvedScenario) -> Option<f64> {
-        let placed = resolved.phantom.as_ref()?;
-        let phantom = &placed.phantom;
-        let known = |(each, _): &(Arc<Phantom>, RouteObstacles)| Arc::ptr_eq(each, phantom);
-        let index = self.routes.iter().position(known).unwrap_or_else(|| {
-            if self.routes.len() == KEPT {
-                self.routes.remove(0);
-            }
-            let obstacles = RouteObstacles::new(phantom);
-            self.routes.push((Arc::clone(phantom), obstacles));
-            self.routes.len() - 1
-        });
-        let obstacles = &self.routes[index].1;
-        let (_, separation) = obstacles.nearest(&resolved.cell, placed, &resolved.goals[0])?;
-        Some(separation.distance_m)
-    }
+/// Clearance of the planned needle on its way, m; none without a phantom.
+fn route_m(resolved: &ResolvedScenario) -> Option<f64> {
+    let placed = resolved.phantom.as_ref()?;
+    let nearest = needle_route(&resolved.cell, placed, &resolved.goals[0])?;
+    Some(nearest.separation.distance_m)
 }
 
 fn row(

@@ -7,10 +7,9 @@ use needlebench_cell::{
     Change, ClearanceClass, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting,
 };
 use needlebench_clearance::ClearanceModel;
-use needlebench_evaluation::needle_route;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_planning::Planner;
+use needlebench_planning::{Planner, needle_route};
 use needlebench_study::Outcome;
 
 use super::robustness::{RobustnessSettings, robustness};
@@ -78,7 +77,10 @@ fn agrees(resolved: &ResolvedScenario, row: &CaseRow, configuration: Configurati
     assert_eq!(row.get("clearance_static"), Some(least_m));
     let placed = resolved.phantom.as_ref().unwrap();
     let route = needle_route(&resolved.cell, placed, goal);
-    assert_eq!(row.get("needle_route"), route.map(|route| route.minimum_m));
+    assert_eq!(
+        row.get("needle_route"),
+        route.map(|route| route.separation.distance_m)
+    );
     assert_eq!(
         row.get("wrist_sine_static"),
         Some(candidate.margins.wrist_sine)

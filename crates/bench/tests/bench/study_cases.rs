@@ -70,7 +70,7 @@ fn resolved(text: &str) -> ResolvedScenario {
 
 /// The same with the patient elsewhere.
 fn shifted() -> String {
-    let edited = SMALL.replace("[146.0, -597.5, 0]", "[140.0, -590.0, 0]");
+    let edited = SMALL.replace("[148.0, -597.5, 0]", "[152.0, -590.0, 0]");
     assert_ne!(edited, SMALL);
     edited
 }

@@ -13,6 +13,7 @@ mod loft;
 mod markers;
 mod organs;
 mod parameters;
+mod route_obstacles;
 mod skeleton;
 mod skin;
 mod solids;
@@ -29,6 +30,7 @@ use serde::{Deserialize, Serialize};
 pub use error::PhantomError;
 pub(crate) use parameters::PARAMETERS;
 pub use parameters::{LesionParameters, MarkerParameters, PhantomParameters};
+pub use route_obstacles::{RouteObstacle, RouteObstacles};
 
 #[cfg(test)]
 pub(crate) use loft::assert_convex_and_closed;
@@ -134,6 +136,7 @@ pub struct Phantom {
     /// Skin markers, in the order of the parameters.
     pub markers: Vec<Marker>,
     skin_surface: SkinSurface,
+    route_obstacles: route_obstacles::OnDemand,
 }
 
 impl Phantom {
@@ -192,6 +195,7 @@ impl Phantom {
             lesions,
             markers,
             skin_surface: SkinSurface::Convex(skin_faces),
+            route_obstacles: route_obstacles::OnDemand::default(),
         })
     }
 
@@ -209,7 +213,13 @@ impl Phantom {
             lesions,
             markers,
             skin_surface,
+            route_obstacles: route_obstacles::OnDemand::default(),
         }
+    }
+
+    /// Bones, vessels and organs, ready for distances; prepared once.
+    pub fn route_obstacles(&self) -> &RouteObstacles {
+        self.route_obstacles.of(&self.parts)
     }
 
     /// The outer surface: one closed mesh, phantom frame. The shipped ones are convex.

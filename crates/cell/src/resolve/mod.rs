@@ -9,6 +9,7 @@ pub mod iso9283;
 mod layout;
 mod library;
 mod names;
+mod needle_route;
 mod overrides;
 pub mod people;
 mod phantom;
@@ -38,6 +39,7 @@ use imperfections::{Imperfections, resolve_imperfections};
 use iso9283::{Iso9283Protocol, resolve_iso9283};
 use layout::Layout;
 pub(crate) use library::ModelLibrary;
+use needle_route::check_needle_route;
 pub use overrides::Overrides;
 use people::{People, Room, resolve_people};
 pub use phantom::PlacedPhantom;
@@ -192,6 +194,9 @@ pub(crate) fn resolve(
         phantom_source.clone_from(&unplaced.model);
         phantom_parts.clone_from(&unplaced.parts);
     }
+
+    let route = &scenario.planning.needle_route;
+    check_needle_route(toml, route, phantom.as_ref(), &mut notes).map_err(one)?;
 
     let mut fixtures = Vec::new();
     let mut surroundings = Vec::new();

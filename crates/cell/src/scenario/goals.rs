@@ -11,7 +11,8 @@ use crate::schema::NAME;
 use crate::toml_text::TomlText;
 
 /// Rules that reject configurations: the words that `expected` may use.
-pub const REJECTION_RULES: [&str; 9] = [
+pub const REJECTION_RULES: [&str; 10] = [
+    "needle_route",
     "unreachable",
     "merged",
     "joint_limit",

@@ -55,7 +55,7 @@ pub use people::{
 };
 pub(crate) use phantom::{ChestSize, NO_MODEL};
 pub use phantom::{LengthUnit, PartSection, PartTissue, PhantomSection, Posture};
-pub use planning::{PlanningSection, RollAim};
+pub use planning::{NeedleRouteSection, PlanningSection, RollAim};
 pub use ranking::RankingSection;
 pub use recording::RecordingSection;
 pub use robot::RobotSection;

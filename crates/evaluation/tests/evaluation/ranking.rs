@@ -169,6 +169,7 @@ fn goal(configurations: Vec<ConfigurationReport>) -> GoalReport {
         axis: [0.0, 0.0, 1.0],
         insertion_length_m: 0.1,
         standoff_m: None,
+        needle_route: None,
         configurations,
         recommended: None,
         ranking: None,

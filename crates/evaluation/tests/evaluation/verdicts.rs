@@ -73,6 +73,7 @@ fn report(configurations: Vec<ConfigurationReport>) -> Vec<GoalReport> {
         axis: [0.0, 0.0, 1.0],
         insertion_length_m: 0.1,
         standoff_m: None,
+        needle_route: None,
         configurations,
         recommended: None,
         ranking: None,

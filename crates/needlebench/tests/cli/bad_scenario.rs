@@ -177,8 +177,8 @@ fn goal_inside_the_table_is_refused() {
     // Without `rest_on_table` the phantom may be pushed into the table by mistake.
     let sunk = with_edit(
         SMALL,
-        "position_mm = [146.0, -597.5, 0]",
-        "position_mm = [146.0, -597.5, 660]\nrest_on_table = false",
+        "position_mm = [148.0, -597.5, 0]",
+        "position_mm = [148.0, -597.5, 660]\nrest_on_table = false",
     );
     let text = with_edit(&sunk, FLANGE_POSE, ENTRY_AND_TARGET);
     refused(&text)

@@ -52,6 +52,16 @@ impl Member {
     pub fn works(&self) -> bool {
         self.rejections.is_empty()
     }
+
+    /// The same where the needle's route is refused: the first rule that it breaks.
+    #[must_use]
+    pub fn on_route(mut self, refused: Option<&Rejection>) -> Self {
+        if let Some(route) = refused {
+            self.surplus = self.surplus.min(route.value - route.limit);
+            self.rejections.insert(0, route.clone());
+        }
+        self
+    }
 }
 
 impl Planner<'_> {

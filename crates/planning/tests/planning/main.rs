@@ -3,3 +3,4 @@
 mod around;
 mod families;
 mod plans;
+mod routes;

@@ -43,7 +43,7 @@ center_mm = [300, -598]
 top_height_mm = 739.5
 [[goals]]
 name = "lesion"
-entry_mm = [-135, -55, 28]
+entry_mm = [-139.1, -42.8, 10]
 lesion = "pleural_based"
 "#;
 
@@ -59,7 +59,7 @@ fn beside() -> ResolvedScenario {
                 .clone()
                 .expect("a hint with the point on the skin");
             let point = hint.rsplit("at ").next().expect("the point").to_owned();
-            scenario(&text.replace("[-135, -55, 28]", &point))
+            scenario(&text.replace("[-139.1, -42.8, 10]", &point))
         }
     }
 }
@@ -216,7 +216,7 @@ fn table_text() -> String {
     let entry = placed.world_from_phantom.inverse() * goal.entry_m.unwrap();
     let point = entry.coords * 1e3;
     BESIDE.replace(
-        "[-135, -55, 28]",
+        "[-139.1, -42.8, 10]",
         &format!("[{}, {}, {}]", point.x, point.y, point.z),
     )
 }

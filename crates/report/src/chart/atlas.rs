@@ -36,7 +36,8 @@ const NO_POSTURE: Rgb = [196, 196, 196];
 
 /// Rules in the order of the legend with their colours: dark and light ones in turn, as colours
 /// alone are not told apart by everybody.
-const RULES: [(Rule, Rgb); 7] = [
+const RULES: [(Rule, Rgb); 8] = [
+    (Rule::NeedleRoute, [230, 60, 20]),
     (Rule::Collision, [176, 30, 40]),
     (Rule::NeedleCorridor, [240, 180, 60]),
     (Rule::Singular, [88, 60, 150]),

@@ -7,6 +7,7 @@ use needlebench_evaluation::report::{GoalReport, Report, Status, Verdict};
 
 use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
+use crate::table::route_in_words;
 use crate::table::shown::{Shown, shown_metrics};
 
 /// The report as Markdown; `engines` are those that there are, with their titles.
@@ -33,6 +34,18 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         let comparison = ranking_markdown(goal);
         if !comparison.is_empty() {
             writeln!(out, "{comparison}")?;
+        }
+        if let Some(route) = &goal.needle_route {
+            let words = route_in_words(route);
+            writeln!(
+                out,
+                "{}\n",
+                if route.kept {
+                    words
+                } else {
+                    format!("**{words}**")
+                }
+            )?;
         }
         for each in &goal.configurations {
             if let Some(first) = each.rejections.first() {

@@ -18,3 +18,4 @@ pub mod study_comparison;
 
 pub use plain::plain_table;
 pub use run::report_text;
+pub(crate) use run::route_in_words;

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use comfy_table::{Cell, CellAlignment, Color, Table};
 use needlebench_engine::Engine;
 use needlebench_evaluation::iso9283::SUBJECT;
-use needlebench_evaluation::report::{GoalReport, Report, Status, Verdict};
+use needlebench_evaluation::report::{GoalReport, Report, RouteReport, Status, Verdict};
 
 use super::budget::budget_text;
 use super::engine_headings::{EngineHeading, engine_headings};
@@ -297,18 +297,25 @@ fn write_missed(out: &mut String, report: &Report, goal: &str) -> std::fmt::Resu
     Ok(())
 }
 
+/// How the planned needle keeps away from what it must not meet, in a sentence.
+pub(crate) fn route_in_words(route: &RouteReport) -> String {
+    let mm = 1e3 * route.distance_m;
+    let RouteReport { part, tissue, .. } = route;
+    let where_it_goes = if mm < 0.0 {
+        format!("{:.1} mm deep through {part} ({tissue})", -mm)
+    } else {
+        format!("{mm:.1} mm from {part} ({tissue})")
+    };
+    format!(
+        "needle route{}: {where_it_goes}, margin {:.1} mm",
+        if route.kept { "" } else { " REFUSED" },
+        1e3 * route.margin_m
+    )
+}
+
 fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::fmt::Result {
-    if let Some(route) = goal
-        .configurations
-        .first()
-        .and_then(|each| each.clearance.classes.get("needle_route"))
-    {
-        writeln!(
-            out,
-            "needle route: {:.1} mm from {}",
-            route.minimum_m * 1e3,
-            route.pair[1]
-        )?;
+    if let Some(route) = &goal.needle_route {
+        writeln!(out, "{}", route_in_words(route))?;
     }
     for configuration in &goal.configurations {
         if let Some(rejection) = configuration.rejections.first() {

@@ -483,7 +483,17 @@ NB.RunPage = class {
     const recommended = this.goal.recommended;
     NB.clear(this.table,
       recommended ? NB.el('p', null, NB.el('strong', { text: `Recommended: ${recommended.label}. ` }), recommended.reason) : NB.el('p', { class: 'error', text: 'No configuration works.' }),
+      this.routeSentence(),
       table);
+  }
+
+  // How the planned needle keeps away from bone, vessels and organs; red where it does not.
+  routeSentence() {
+    const route = this.goal.needle_route;
+    if (!route) return '';
+    const part = `${NB.words(route.part)} (${route.tissue})`;
+    const where = route.distance_m < 0 ? `${NB.mm(-route.distance_m, 1)} mm deep through ${part}` : `${NB.mm(route.distance_m, 1)} mm from ${part}`;
+    return NB.el('p', { class: route.kept ? '' : 'error', text: `Needle route${route.kept ? '' : ' refused'}: ${where}, margin ${NB.mm(route.margin_m, 1)} mm.` });
   }
 
   budgetTable() {

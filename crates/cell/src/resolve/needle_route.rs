@@ -1,0 +1,68 @@
+//! What the needle may pass through by name, and what it cannot be kept away from.
+
+use std::collections::BTreeSet;
+
+use super::phantom::PlacedPhantom;
+use crate::phantom::Tissue;
+use crate::scenario::NeedleRouteSection;
+use crate::toml_text::TomlText;
+use crate::{Finding, nearest_name};
+
+/// Refuses names of nothing, and notes what no needle's route is held against.
+pub(super) fn check_needle_route(
+    toml: &TomlText<'_>,
+    section: &NeedleRouteSection,
+    phantom: Option<&PlacedPhantom>,
+    notes: &mut Vec<String>,
+) -> Result<(), Finding> {
+    let tissues = [Tissue::Bone, Tissue::Vessel, Tissue::Organ];
+    let parts = phantom.map_or(&[][..], |placed| &placed.phantom.route_obstacles().parts);
+    for (index, name) in section.off.iter().enumerate() {
+        let is_tissue = tissues.iter().any(|tissue| tissue.to_string() == *name);
+        if is_tissue || parts.iter().any(|part| part.is_called(name)) {
+            continue;
+        }
+        let words = tissues.map(|tissue| tissue.to_string());
+        let structures: BTreeSet<&str> = parts
+            .iter()
+            .filter_map(|part| part.organ.as_deref())
+            .collect();
+        let known = words.iter().map(String::as_str);
+        let known: Vec<&str> = known.chain(structures).collect();
+        let near = nearest_name(
+            name,
+            known
+                .iter()
+                .copied()
+                .chain(parts.iter().map(|part| part.name.as_str())),
+        );
+        let finding = toml.finding(
+            &format!("planning.needle_route.off[{index}]"),
+            format!("the phantom has no `{name}`"),
+        );
+        return Err(finding.hint(match near {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("one of {}, or the name of a part", known.join(", ")),
+        }));
+    }
+    if phantom.is_none() {
+        return Ok(());
+    }
+    if !section.off.is_empty() {
+        notes.push(format!(
+            "needle route: by `planning.needle_route.off` nothing keeps the needle out of {}",
+            section.off.join(", ")
+        ));
+    }
+    let missing = tissues
+        .into_iter()
+        .filter(|tissue| parts.iter().all(|part| part.tissue != *tissue));
+    let missing: Vec<String> = missing.map(|tissue| tissue.to_string()).collect();
+    if !missing.is_empty() {
+        notes.push(format!(
+            "needle route: the phantom has no {}, so no route is held against it",
+            missing.join(", no ")
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,141 @@
+//! What the planned needle passes on its way from the skin to its end.
+
+use nalgebra::Point3;
+use needlebench_cell::phantom::{RouteObstacle, Tissue};
+use needlebench_cell::scenario::NeedleRouteSection;
+use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom, ResolvedScenario};
+use needlebench_clearance::ROUNDING_M;
+use needlebench_geometry::Separation;
+
+use crate::{Rejection, Rule};
+
+/// What a planned needle comes near to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RouteClearance<'a> {
+    /// The part.
+    pub part: &'a RouteObstacle,
+    /// Signed distance with the needle as A, world.
+    pub separation: Separation,
+}
+
+/// What the planned needle comes nearest to of bones, vessels and organs, from the skin to where it ends;
+/// `None` without a phantom that has any.
+///
+/// The organ that contains the target is left out: the needle has to enter it.
+pub fn needle_route<'a>(
+    cell: &Cell,
+    placed: &'a PlacedPhantom,
+    goal: &Goal,
+) -> Option<RouteClearance<'a>> {
+    nearest_of(cell, placed, goal, |_| true)
+}
+
+fn nearest_of<'a>(
+    cell: &Cell,
+    placed: &'a PlacedPhantom,
+    goal: &Goal,
+    wanted: impl Fn(&RouteObstacle) -> bool,
+) -> Option<RouteClearance<'a>> {
+    let obstacles = placed.phantom.route_obstacles();
+    let entry = goal.entry_m?;
+    let counts = |index: usize| {
+        let part = &obstacles.parts[index];
+        let is_entered = goal.target_organ.is_some() && part.organ == goal.target_organ;
+        !is_entered && wanted(part)
+    };
+    let (index, separation) = obstacles.solids.nearest_to_segment(
+        &entry,
+        &needle_end(goal),
+        0.5 * cell.tool.needle.outer_diameter_m,
+        &placed.world_from_phantom,
+        counts,
+    )?;
+    Some(RouteClearance {
+        part: &obstacles.parts[index],
+        separation,
+    })
+}
+
+/// Where the needle's tip ends, or the target where that is deeper.
+fn needle_end(goal: &Goal) -> Point3<f64> {
+    let exit = Point3::from(goal.world_from_guide_exit.translation.vector);
+    let tip = exit + goal.axis.into_inner() * goal.insertion_length_m;
+    let deeper = (tip - goal.target_m).dot(&goal.axis) > 0.0;
+    if deeper { tip } else { goal.target_m }
+}
+
+/// Whether the scenario keeps the needle away from a part.
+fn is_off(section: &NeedleRouteSection, part: &RouteObstacle) -> bool {
+    section.off.iter().any(|name| part.is_called(name))
+}
+
+/// Least distance of the needle from a tissue, m; none for what it may pass through.
+fn margin_m(section: &NeedleRouteSection, tissue: Tissue) -> Option<f64> {
+    let margin_mm = match tissue {
+        Tissue::Bone => section.bone_mm,
+        Tissue::Vessel => section.vessel_mm,
+        Tissue::Organ => section.organ_mm,
+        Tissue::Skin | Tissue::Lesion | Tissue::Marker => return None,
+    };
+    Some(margin_mm * 1e-3)
+}
+
+/// What a planned needle keeps away from least, by its margin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RouteJudgement<'a> {
+    /// What it is, and how far.
+    pub nearest: RouteClearance<'a>,
+    /// The distance less what rounding may add to it, m.
+    pub distance_m: f64,
+    /// The least that it has to be, m.
+    pub margin_m: f64,
+}
+
+impl RouteJudgement<'_> {
+    /// The margin is kept.
+    pub fn is_kept(&self) -> bool {
+        self.distance_m >= self.margin_m
+    }
+}
+
+/// The margin that the planned needle of a goal keeps least, or misses most; `None` where there is nothing
+/// to keep away from, or it is switched off.
+pub fn judge_route<'a>(resolved: &'a ResolvedScenario, goal: &Goal) -> Option<RouteJudgement<'a>> {
+    let placed = resolved.phantom.as_ref()?;
+    let section = &resolved.scenario.planning.needle_route;
+    [Tissue::Bone, Tissue::Vessel, Tissue::Organ]
+        .into_iter()
+        .filter_map(|tissue| {
+            let margin_m = margin_m(section, tissue)?;
+            let wanted = |part: &RouteObstacle| part.tissue == tissue && !is_off(section, part);
+            let nearest = nearest_of(&resolved.cell, placed, goal, wanted)?;
+            Some(RouteJudgement {
+                distance_m: nearest.separation.distance_m - ROUNDING_M,
+                nearest,
+                margin_m,
+            })
+        })
+        .min_by(|a, b| {
+            let surplus = |each: &RouteJudgement<'_>| each.distance_m - each.margin_m;
+            surplus(a).total_cmp(&surplus(b))
+        })
+}
+
+/// Why no configuration is to go to a goal; `None` if the needle's route keeps its margins.
+pub fn route_rejection(resolved: &ResolvedScenario, goal: &Goal) -> Option<Rejection> {
+    let judged = judge_route(resolved, goal).filter(|judged| !judged.is_kept())?;
+    let RouteObstacle { name, tissue, .. } = judged.nearest.part;
+    let does = if judged.distance_m < 0.0 {
+        "goes through"
+    } else {
+        "comes too near to"
+    };
+    Some(Rejection {
+        rule: Rule::NeedleRoute,
+        value: judged.distance_m,
+        limit: judged.margin_m,
+        unit: "m",
+        detail: format!("the planned needle {does} {name} ({tissue})"),
+        class: Some(ClearanceClass::NeedleRoute),
+    })
+}
