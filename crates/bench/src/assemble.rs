@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Point3;
+use needlebench_cell::imperfections::{ArmClass, BreathState, Expected};
 use needlebench_cell::{ArmInUse, ClearanceClass, enclosures};
 use needlebench_engine::{EngineIdentity, Recording};
 use needlebench_evaluation::metric::measured;
 use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
-    ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport, GoalReport,
-    MarginsReport, PhaseReport, RejectionReport, Report, RouteReport, SCHEMA_VERSION,
-    ScenarioSummary, SearchReport, Status,
+    ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport,
+    ExpectedReport, GoalReport, MarginsReport, PhaseReport, RejectionReport, Report, RouteReport,
+    SCHEMA_VERSION, ScenarioSummary, SearchReport, Status,
 };
 use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
@@ -97,9 +98,35 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
         enclosure: enclosures(&resolved.cell.robot),
         notes: resolved.notes.clone(),
+        expected: resolved.expected.as_ref().map(expected_report),
         truth: setup.real.report(),
         provenance: provenance(resolved, results.identities),
         timings: results.timings,
+    }
+}
+
+/// What arm and patient the expected tip errors are of.
+fn expected_report(expected: &Expected) -> ExpectedReport {
+    ExpectedReport {
+        arm: expected.class.map(ArmClass::name),
+        arm_in_words: match expected.class {
+            Some(ArmClass::FactoryCalibrated) => {
+                "the controller knows the maker's calibration of its arm: what is left is what that \
+                 leaves, and what moves with the load"
+            }
+            Some(ArmClass::NominalKinematics) => {
+                "inverse kinematics with nominal lengths: the arm is off by all that a calibration would say"
+            }
+            Some(ArmClass::CalibratedHere) => {
+                "the controller knows a calibration measured in place with the tool on: what is left is \
+                 what that leaves"
+            }
+            None => "as the scenario's [imperfections] say",
+        },
+        breath: match expected.breath {
+            BreathState::Hold => "hold",
+            BreathState::Free => "free",
+        },
     }
 }
 

@@ -1,8 +1,9 @@
 //! The fifth stage: error budgets.
 
+use needlebench_cell::imperfections::Expected;
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
 use needlebench_uncertainty::budget::{
-    BudgetCase, ErrorBudget, Moments, PointBudget, SourceBudget, analytic_total, budget,
+    BudgetCase, ErrorBudget, Moments, PointBudget, Samples, SourceBudget, analytic_total, budget,
 };
 
 use crate::parallel::in_parallel;
@@ -12,11 +13,18 @@ use crate::setup::Setup;
 /// wrong where there is none.
 pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
 
-/// Budgets of all configurations that have a motion; none at all without imperfections.
+/// Budgets of all configurations that have a motion, over the arms and patients that the expected tip
+/// error is of.
+///
+/// Those of the scenario's own imperfections are drawn source by source too; of a class of arm what the
+/// draws are for is how far 95 % of them stay within.
 pub(crate) fn budgets(setup: &Setup<'_>, plans: &[GoalPlan], threads: usize) -> Budgets {
     let seed = setup.resolved.scenario.seed;
+    let is_own = setup.resolved.imperfections.is_some();
     of_each(setup, plans, threads, |case| {
-        budget(case, case.imperfections.budget_samples, seed).map_err(|error| error.to_string())
+        let total = case.imperfections.budget_samples;
+        let each_source = if is_own { total } else { 0 };
+        budget(case, Samples { total, each_source }, seed).map_err(|error| error.to_string())
     })
 }
 
@@ -46,6 +54,8 @@ pub(crate) fn analytic_budget(moments: [Moments; 2]) -> ErrorBudget {
             at_target,
         },
         dominant: None,
+        before_insertion: None,
+        breathing_freely: None,
     }
 }
 
@@ -56,7 +66,7 @@ fn of_each(
     budget: impl Fn(&BudgetCase<'_>) -> Result<ErrorBudget, String> + Sync,
 ) -> Budgets {
     let resolved = setup.resolved;
-    let Some(imperfections) = &resolved.imperfections else {
+    let Some(Expected { imperfections, .. }) = &resolved.expected else {
         return plans
             .iter()
             .map(|plan| plan.configurations.iter().map(|_| None).collect())

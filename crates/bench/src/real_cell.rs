@@ -118,7 +118,7 @@ impl<'a> RealCell<'a> {
             tool_mass_error_kg: truth.tool_body.mass_kg - nominal.tool.body.mass_kg,
             tool_com_error_m: (truth.tool_body.com_m - nominal.tool.body.com_m).into(),
             encoder_offset_rad: truth.actuation.encoder.map(|each| joints(each.offset_rad)),
-            compliance_rad_per_nm: joints(truth.actuation.compliance_rad_per_nm),
+            compliance_rad_per_nm: joints(truth.actuation.gears.compliance_rad_per_nm[0]),
             friction_true_over_nominal: truth
                 .actuation
                 .friction

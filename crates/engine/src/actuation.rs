@@ -10,7 +10,7 @@
 //!
 //! ```text
 //! tau     = tau_m - F
-//! theta   = q + C tau                        motor angle, C the compliance of the gear
+//! theta   = q + twist(tau)                   motor angle, by the gear's stiffness, which grows with torque
 //! reading = round(theta + offset) + noise    encoder at the motor
 //! tau_m   = clamp(tau_ff + kp (q_r - reading) + kd (qd_r - qd))
 //! ```
@@ -20,6 +20,7 @@
 
 use std::collections::VecDeque;
 
+use needlebench_cell::imperfections::GearTwist;
 use needlebench_kinematics::random::NormalPairs;
 use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
@@ -36,8 +37,8 @@ pub struct Actuation {
     pub commands: Option<CommandTiming>,
     /// Encoders; exact ones if none.
     pub encoder: Option<Encoder>,
-    /// Compliance of each joint's gear, rad/(N m); 0 is rigid.
-    pub compliance_rad_per_nm: Joints,
+    /// How each joint's gear twists; rigid ones by default.
+    pub gears: GearTwist,
     /// Friction of the joints; none if none.
     pub friction: Option<JointFriction>,
     /// Torques that the drives can give, N m, where they are less than the servo believes.
@@ -175,7 +176,7 @@ impl Actuation {
             }
         };
         not_negative("torque_delay_s", self.torque_delay_s)?;
-        for value in &self.compliance_rad_per_nm {
+        for value in self.gears.compliance_rad_per_nm.iter().flatten() {
             not_negative("compliance_rad_per_nm", *value)?;
         }
         if let Some(commands) = &self.commands {
@@ -305,8 +306,6 @@ impl<'a> Drives<'a> {
             };
         }
         let kp = Joints::from(self.servo.gains.kp_nm_per_rad);
-        let compliance = self.actuation.compliance_rad_per_nm;
-        let softening = kp.component_mul(&compliance).add_scalar(1.0);
         let friction = self.friction_nm(velocity);
         let mut wanted = wanted;
         if let Some(friction) = &self.actuation.friction {
@@ -319,7 +318,7 @@ impl<'a> Drives<'a> {
         }
         // Until the first one has arrived, the first one holds.
         let wanted = self.on_the_way[0];
-        let link_nm = (wanted - friction).component_div(&softening);
+        let link_nm = self.actuation.gears.in_series(&kp, &(wanted - friction));
         let unlimited = link_nm + friction;
         // NaN passes the clamp unchanged, so that the run loop sees the divergence.
         let drive_nm =

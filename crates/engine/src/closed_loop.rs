@@ -20,7 +20,8 @@ const BISECTIONS: usize = 14;
 /// ```
 ///
 /// with the mass matrix `M` (armature included), the encoder's error `n`, the bristles of a friction
-/// that sticks, and `S = 1 / (1 + kp C)` for gears of compliance `C`: the semi-implicit Euler step of
+/// that sticks, and `S = 1 / (1 + kp C)` for gears of compliance `C`, where they are stiffest, which is nearest to
+/// instability: the semi-implicit Euler step of
 /// the plants under torques that are held. Gravity's change with the posture is left out: it is a
 /// hundredth of the gains.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,7 +39,7 @@ impl ClosedLoop {
         let kp = Joints::from(servo.gains.kp_nm_per_rad);
         let kd = Joints::from(servo.gains.kd_nms_per_rad);
         let softening = kp
-            .component_mul(&actuation.compliance_rad_per_nm)
+            .component_mul(&actuation.gears.stiffest_rad_per_nm())
             .map(|each| (1.0 + each).recip());
         let (bristle, damping) = actuation.friction.map_or_else(
             || (Joints::zeros(), Joints::zeros()),

@@ -46,6 +46,9 @@ pub struct Report {
     pub enclosure: Vec<LinkEnclosure>,
     /// What was assumed or adjusted.
     pub notes: Vec<String>,
+    /// What arm and patient the expected tip errors (`configurations[].budget`) are of; none if there are
+    /// none.
+    pub expected: Option<ExpectedReport>,
     /// The arm and the patient that were simulated, where they are not the nominal ones.
     pub truth: Option<TruthReport>,
     /// Where the numbers come from.
@@ -84,6 +87,18 @@ pub struct TruthReport {
     pub breath_target_m: [f64; 3],
     /// Place of the needle's axis at entry and exit of the guide, x and y of the guide's frame.
     pub needle_in_guide_m: [[f64; 2]; 2],
+}
+
+/// What arm and patient the expected tip error is of.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ExpectedReport {
+    /// `factory_calibrated`, `nominal_kinematics`, `calibrated_here`; none where the scenario's own
+    /// `[imperfections]` say it.
+    pub arm: Option<&'static str>,
+    /// What the controller knows of the arm, in words.
+    pub arm_in_words: &'static str,
+    /// `hold` or `free`.
+    pub breath: &'static str,
 }
 
 /// Which scenario it was.

@@ -5,7 +5,7 @@ mod analytic;
 mod monte_carlo;
 
 use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, Vector3};
-use needlebench_cell::imperfections::Imperfections;
+use needlebench_cell::imperfections::{Breathing, Imperfections, SkinMarkers};
 use needlebench_cell::{Cell, Goal};
 use needlebench_engine::Servo;
 use needlebench_kinematics::registration::RegistrationError;
@@ -13,6 +13,7 @@ use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{Joints, Pose};
 use serde::Serialize;
 
+use crate::truth::only;
 use crate::{RestingFriction, SettleError, Source, resting_friction};
 
 /// What a budget is made for: one configuration of one goal.
@@ -164,10 +165,19 @@ pub struct SourceBudget {
     pub at_target: PointBudget,
 }
 
+/// How many draws a budget takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Samples {
+    /// For all sources together; 0 for the analytic budget alone.
+    pub total: usize,
+    /// For each source alone.
+    pub each_source: usize,
+}
+
 /// Error budget of one configuration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorBudget {
-    /// Samples of the Monte Carlo, per source and for all together.
+    /// Samples of the Monte Carlo for all sources together.
     pub samples: usize,
     /// Each source as if it were alone.
     pub sources: Vec<SourceBudget>,
@@ -175,23 +185,30 @@ pub struct ErrorBudget {
     pub total: SourceBudget,
     /// Source with the largest mean square at the target.
     pub dominant: Option<Source>,
+    /// Of the needle's line at the target before it goes in, in a phantom that lies still: without
+    /// markers that move, bending, indentation and breathing. By Jacobians; none in a budget of totals.
+    pub before_insertion: Option<Moments>,
+    /// At the target of a patient who breathes freely, where the breath is held in the rest of the
+    /// budget. By Jacobians; none in a budget of totals.
+    pub breathing_freely: Option<Moments>,
 }
 
-/// The budget of a configuration; `samples` of Monte Carlo, `seed` of its draws.
+/// The budget of a configuration; `seed` is that of its draws.
 ///
 /// # Errors
 /// [`BudgetError`].
 pub fn budget(
     case: &BudgetCase<'_>,
-    samples: usize,
+    samples: Samples,
     seed: u64,
 ) -> Result<ErrorBudget, BudgetError> {
     let of = |source: Option<Source>| -> Result<SourceBudget, BudgetError> {
         let imperfections = source.map_or_else(
             || case.imperfections.clone(),
-            |source| source.alone(case.imperfections),
+            |source| only(case.imperfections, |each| each == source),
         );
         let analytic = analytic::moments(case, &imperfections)?;
+        let samples = source.map_or(samples.total, |_| samples.each_source);
         let sampled = if samples > 1 {
             Some(monte_carlo::moments(case, &imperfections, samples, seed)?)
         } else {
@@ -230,11 +247,41 @@ pub fn budget(
             rms(a).total_cmp(&rms(b))
         })
         .and_then(|each| each.source);
+    let at_target = |imperfections: &Imperfections| -> Result<Moments, BudgetError> {
+        let [_, at_target] = analytic::moments(case, imperfections)?;
+        Ok(at_target)
+    };
     Ok(ErrorBudget {
-        samples,
+        samples: samples.total,
         sources,
         total: of(None)?,
         dominant,
+        before_insertion: Some(at_target(&only(
+            case.imperfections,
+            Source::is_before_insertion,
+        ))?),
+        breathing_freely: breathing_freely(case.imperfections)
+            .map(|free| at_target(&free))
+            .transpose()?,
+    })
+}
+
+/// The same patient with no breath held; none who does not hold it, or does not breathe.
+fn breathing_freely(imperfections: &Imperfections) -> Option<Imperfections> {
+    let held = imperfections
+        .breathing
+        .filter(|breathing| breathing.phase_spread.is_some())?;
+    let free = |breathing: Breathing| Breathing {
+        phase_spread: None,
+        ..breathing
+    };
+    Some(Imperfections {
+        breathing: Some(free(held)),
+        skin_markers: imperfections.skin_markers.clone().map(|skin| SkinMarkers {
+            breathing: free(skin.breathing),
+            ..skin
+        }),
+        ..imperfections.clone()
     })
 }
 

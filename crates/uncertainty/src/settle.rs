@@ -150,7 +150,7 @@ pub fn settle_after(
 /// ```text
 /// moving:   kp x0 + g + c - F = t          F friction, c its compensation
 /// at rest:  kp x  + g - F' = t             c gone; the bristles hold F' after springing back
-/// q = q_r - x - offset - rounding - C t
+/// q = q_r - x - offset - rounding - twist(t)
 /// ```
 ///
 /// Agrees with the engines' settled postures; see `tests/uncertainty/settled.rs` of this crate for how well.
@@ -184,7 +184,7 @@ pub fn settle(
     for _ in 0..ITERATIONS {
         load = real.gravity_torque(&position);
         let error = (load - believed).component_div(&kp) + error_of_friction;
-        position = target - error - offset - actuation.compliance_rad_per_nm.component_mul(&load);
+        position = target - error - offset - actuation.gears.twist_rad(&load);
     }
     let drive_nm = load;
     let limit = actuation

@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
-use needlebench_cell::imperfections::{self, ArmPopulation, Breathing, Imperfections};
+use needlebench_cell::imperfections::{
+    self, ArmPopulation, Breathing, GearTwist, Imperfections, NeedleBending,
+};
 use needlebench_cell::{BodyKind, Cell, Goal, PlacedPhantom};
 use needlebench_engine::{Actuation, CommandTiming, Encoder, JointFriction};
 use needlebench_kinematics::random::SplitMix64;
@@ -32,24 +34,48 @@ pub enum Source {
     Friction,
     /// Play of the needle in the guide.
     Guide,
+    /// Place of the robot's base in terms of what sees the markers.
+    HandEye,
     /// Registration of the phantom.
     Registration,
+    /// Markers that move with the skin.
+    SkinMarkers,
+    /// Localisation of the target in the image.
+    Imaging,
+    /// Bending of the needle in tissue.
+    Needle,
+    /// Tissue that gives way along the needle.
+    Indentation,
     /// Breathing.
     Breathing,
 }
 
 impl Source {
     /// All of them, in the order of reports.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 13] = [
         Self::Calibration,
         Self::Encoder,
         Self::Elasticity,
         Self::Payload,
         Self::Friction,
         Self::Guide,
+        Self::HandEye,
         Self::Registration,
+        Self::SkinMarkers,
+        Self::Imaging,
+        Self::Needle,
+        Self::Indentation,
         Self::Breathing,
     ];
+
+    /// Whether it is there before the needle goes in: what a needle's line is off by in a phantom that
+    /// lies still, which robots are measured by without deploying the needle.
+    pub fn is_before_insertion(self) -> bool {
+        !matches!(
+            self,
+            Self::SkinMarkers | Self::Needle | Self::Indentation | Self::Breathing
+        )
+    }
 
     /// Name in reports.
     pub fn name(self) -> &'static str {
@@ -60,27 +86,13 @@ impl Source {
             Self::Payload => "payload",
             Self::Friction => "friction",
             Self::Guide => "guide",
+            Self::HandEye => "hand_eye",
             Self::Registration => "registration",
+            Self::SkinMarkers => "skin_markers",
+            Self::Imaging => "imaging",
+            Self::Needle => "needle",
+            Self::Indentation => "indentation",
             Self::Breathing => "breathing",
-        }
-    }
-
-    /// The imperfections with this source alone.
-    pub(crate) fn alone(self, all: &Imperfections) -> Imperfections {
-        let is = |source| self == source;
-        Imperfections {
-            budget_samples: all.budget_samples,
-            calibration: all.calibration.clone().filter(|_| is(Self::Calibration)),
-            encoder: all.encoder.filter(|_| is(Self::Encoder)),
-            elasticity: all.elasticity.filter(|_| is(Self::Elasticity)),
-            payload: all.payload.filter(|_| is(Self::Payload)),
-            friction: all.friction.clone().filter(|_| is(Self::Friction)),
-            guide_clearance_m: all.guide_clearance_m.filter(|_| is(Self::Guide)),
-            registration: all.registration.clone().filter(|_| is(Self::Registration)),
-            breathing: all.breathing.filter(|_| is(Self::Breathing)),
-            drive_limit_nm: None,
-            control: None,
-            sources: Vec::new(),
         }
     }
 
@@ -93,9 +105,49 @@ impl Source {
             Self::Payload => all.payload.is_some(),
             Self::Friction => all.friction.is_some(),
             Self::Guide => all.guide_clearance_m.is_some(),
+            Self::HandEye => all.hand_eye.is_some(),
             Self::Registration => all.registration.is_some(),
+            Self::SkinMarkers => all.skin_markers.is_some(),
+            Self::Imaging => all.imaging_m.is_some(),
+            Self::Needle => all.needle.is_some(),
+            Self::Indentation => all.indentation.is_some(),
             Self::Breathing => all.breathing.is_some(),
         }
+    }
+}
+
+/// The imperfections with some sources alone.
+pub(crate) fn only(all: &Imperfections, wanted: impl Fn(Source) -> bool) -> Imperfections {
+    Imperfections {
+        budget_samples: all.budget_samples,
+        calibration: all
+            .calibration
+            .clone()
+            .filter(|_| wanted(Source::Calibration)),
+        encoder: all.encoder.filter(|_| wanted(Source::Encoder)),
+        elasticity: all
+            .elasticity
+            .clone()
+            .filter(|_| wanted(Source::Elasticity)),
+        payload: all.payload.filter(|_| wanted(Source::Payload)),
+        friction: all.friction.clone().filter(|_| wanted(Source::Friction)),
+        guide_clearance_m: all.guide_clearance_m.filter(|_| wanted(Source::Guide)),
+        hand_eye: all.hand_eye.filter(|_| wanted(Source::HandEye)),
+        registration: all
+            .registration
+            .clone()
+            .filter(|_| wanted(Source::Registration)),
+        skin_markers: all
+            .skin_markers
+            .clone()
+            .filter(|_| wanted(Source::SkinMarkers)),
+        imaging_m: all.imaging_m.filter(|_| wanted(Source::Imaging)),
+        needle: all.needle.filter(|_| wanted(Source::Needle)),
+        indentation: all.indentation.filter(|_| wanted(Source::Indentation)),
+        breathing: all.breathing.filter(|_| wanted(Source::Breathing)),
+        drive_limit_nm: None,
+        control: None,
+        sources: Vec::new(),
     }
 }
 
@@ -131,22 +183,25 @@ impl Layout {
                     Source::Elasticity | Source::Friction => add(JOINT_COUNT, Variable::Normal),
                     Source::Payload => add(4, Variable::Normal),
                     Source::Guide => add(4, Variable::Uniform),
+                    Source::HandEye => add(6, Variable::Normal),
                     Source::Registration => {
                         let markers = imperfections.registration.as_ref();
                         add(markers.map_or(0, |(at, _)| 3 * at.len()), Variable::Normal);
                     }
-                    Source::Breathing => {
-                        let free = imperfections
-                            .breathing
-                            .is_some_and(|breathing| breathing.phase_spread.is_none());
+                    Source::SkinMarkers => {
+                        let markers = imperfections.skin_markers.as_ref();
                         add(
-                            1,
-                            if free {
-                                Variable::Uniform
-                            } else {
-                                Variable::Normal
-                            },
+                            markers.map_or(0, |each| 3 * each.markers_m.len()),
+                            Variable::Normal,
                         );
+                        add(1, Variable::Normal);
+                        add(2, Variable::Uniform);
+                    }
+                    Source::Imaging => add(3, Variable::Normal),
+                    Source::Needle | Source::Indentation => add(2, Variable::Normal),
+                    Source::Breathing => {
+                        add(1, Variable::Normal);
+                        add(2, Variable::Uniform);
                     }
                 }
             }
@@ -204,6 +259,12 @@ pub struct Truth {
     pub breath_allowance_m: f64,
     /// Place of the needle's axis in the guide: at its entry and at its exit, guide frame, m.
     pub needle_m: [Vector2<f64>; 2],
+    /// Where the target really is beside where the image shows it, world, m.
+    pub unseen_m: Vector3<f64>,
+    /// Force across the needle's tip, guide frame, N, and the needle.
+    pub side_force: Option<(Vector2<f64>, NeedleBending)>,
+    /// Motion of skin and target along the insertion, m.
+    pub indented_m: [f64; 2],
 }
 
 impl Truth {
@@ -221,13 +282,6 @@ impl Truth {
         seed: u64,
     ) -> Result<Self, RegistrationError> {
         let of = |source| layout.of(source, draw);
-        let chain = imperfections
-            .calibration
-            .as_ref()
-            .map_or(cell.robot.chain, |arms| {
-                let deviations = arms.deviations(of(Source::Calibration));
-                ArmPopulation::moved(&cell.robot.chain, &deviations)
-            });
         let factors = |values: &[f64], spread: f64| {
             Joints::from_fn(|i, _| (1.0 + spread * values[i]).max(LEAST_FACTOR))
         };
@@ -242,12 +296,30 @@ impl Truth {
                 }),
             }
         });
-        let compliance_rad_per_nm =
-            imperfections
-                .elasticity
-                .map_or_else(Joints::zeros, |(compliance, spread)| {
-                    compliance.component_mul(&factors(of(Source::Elasticity), spread))
-                });
+        let elasticity = imperfections.elasticity.as_ref();
+        let softness =
+            elasticity.map(|elasticity| factors(of(Source::Elasticity), elasticity.spread));
+        let gears = elasticity.zip(softness);
+        let gears = gears.map_or_else(GearTwist::default, |(elasticity, softness)| {
+            elasticity.gears.scaled(&softness)
+        });
+        let calibrated = imperfections.calibration.as_ref();
+        let mut deviations = calibrated.map(|arms| arms.deviations(of(Source::Calibration)));
+        if let Some((absorbed, softness)) = elasticity
+            .and_then(|each| each.absorbed.as_ref())
+            .zip(softness)
+        {
+            // What a calibration has taken for geometry is not there: the gears do it.
+            let deviations = deviations.get_or_insert([Vector6::zeros(); JOINT_COUNT]);
+            for (taken, factor) in absorbed.iter().zip(&softness) {
+                for (deviation, part) in deviations.iter_mut().zip(taken) {
+                    *deviation -= part * *factor;
+                }
+            }
+        }
+        let chain = deviations.map_or(cell.robot.chain, |deviations| {
+            ArmPopulation::moved(&cell.robot.chain, &deviations)
+        });
         let tool_body = imperfections.payload.map_or(cell.tool.body, |payload| {
             let values = of(Source::Payload);
             let mass_kg =
@@ -271,33 +343,50 @@ impl Truth {
             },
         );
         let place = place.copied().unwrap_or_else(Pose::identity);
-        let shift = imperfections
-            .registration
-            .as_ref()
-            .map(|(markers, fle_rms_m)| {
-                let sigma_m = fle_rms_m / 3.0_f64.sqrt();
-                let seen: Vec<Point3<f64>> = markers
-                    .iter()
-                    .zip(of(Source::Registration).chunks_exact(3))
-                    .map(|(at, off)| at + Vector3::new(off[0], off[1], off[2]) * sigma_m)
-                    .collect();
-                // The plan believes in `place`, fitted to what was seen of markers that are really
-                // at `place * fitted^-1`.
-                let fitted = register(markers, &seen)?;
-                Ok(place * fitted.inverse() * place.inverse())
-            })
-            .transpose()?
-            .unwrap_or_else(Pose::identity);
+        let shift = registered(
+            imperfections,
+            of(Source::Registration),
+            of(Source::SkinMarkers),
+        )?;
+        let hand_eye = imperfections.hand_eye.map_or_else(Pose::identity, |error| {
+            let values = of(Source::HandEye);
+            let vector = |at: usize| Vector3::new(values[at], values[at + 1], values[at + 2]);
+            // About the phantom's origin, by axes of the world.
+            let centre = Translation3::from(place.translation.vector);
+            let turned = Pose::from_parts(
+                Translation3::from(vector(0) * error.translation_m),
+                UnitQuaternion::new(vector(3) * error.rotation_rad),
+            );
+            centre * turned * centre.inverse()
+        });
+        let shift = hand_eye * (place * shift * place.inverse());
         let (breath_m, breath_allowance_m) = imperfections.breathing.map_or_else(
             || ([Vector3::zeros(); 2], 0.0),
             |breathing| {
-                let share = breath(phase(&breathing, of(Source::Breathing)[0]));
+                let share = breath(phase(&breathing, of(Source::Breathing)));
                 let moved = [breathing.skin_m, breathing.target_m]
                     .map(|amplitude| shift.rotation * (place.rotation * amplitude) * share);
                 let allowance_m = breathing.skin_m.norm() * share.max(1.0 - share);
                 (moved, allowance_m)
             },
         );
+        let unseen_m = imperfections
+            .imaging_m
+            .map_or_else(Vector3::zeros, |spread_m| {
+                let values = Vector3::from_column_slice(of(Source::Imaging));
+                shift.rotation * (place.rotation * spread_m.component_mul(&values))
+            });
+        let side_force = imperfections.needle.map(|needle| {
+            let values = of(Source::Needle);
+            // Equal and independent along both axes: any direction, and this root mean square.
+            let force_n = Vector2::new(values[0], values[1])
+                * (needle.side_force_n * std::f64::consts::FRAC_1_SQRT_2);
+            (force_n, needle)
+        });
+        let indented_m = imperfections.indentation.map_or([0.0; 2], |indentation| {
+            let values = of(Source::Indentation);
+            std::array::from_fn(|at| indentation.mean_m[at] + indentation.spread_m[at] * values[at])
+        });
         Ok(Self {
             chain,
             tool_body,
@@ -306,7 +395,7 @@ impl Truth {
                     .control
                     .map(|[period_s, delay_s, _]| CommandTiming { period_s, delay_s }),
                 encoder,
-                compliance_rad_per_nm,
+                gears,
                 friction,
                 drive_limit_nm: imperfections.drive_limit_nm,
                 torque_delay_s: imperfections.control.map_or(0.0, |[_, _, delay_s]| delay_s),
@@ -316,6 +405,9 @@ impl Truth {
             breath_m,
             breath_allowance_m,
             needle_m,
+            unseen_m,
+            side_force,
+            indented_m,
         })
     }
 
@@ -359,21 +451,34 @@ impl Truth {
         }
     }
 
-    /// Where a planned target really is, world.
-    pub fn target(&self, planned: &Point3<f64>) -> Point3<f64> {
-        self.shift * planned + self.breath_m[1]
+    /// Where the needle's points at the skin and at the target should be, from where they are planned,
+    /// world: the real phantom's, as the straight needle sees them.
+    ///
+    /// What bends the needle off its line counts as a motion of skin and target the other way.
+    pub fn wanted(&self, goal: &Goal, planned: &[Point3<f64>; 2]) -> [Point3<f64>; 2] {
+        let length_m = goal.insertion_length_m;
+        let depths_m = [goal.standoff_m.unwrap_or(0.0), length_m];
+        std::array::from_fn(|at| {
+            let bent_m = self
+                .side_force
+                .map_or_else(Vector3::zeros, |(force_n, needle)| {
+                    let across = force_n * needle.compliance_m_per_n(depths_m[at], length_m);
+                    goal.world_from_guide_exit.rotation * Vector3::new(across.x, across.y, 0.0)
+                });
+            let pushed_m = goal.axis.into_inner() * self.indented_m[at];
+            let unseen_m = [Vector3::zeros(), self.unseen_m][at];
+            self.shift * planned[at] + self.breath_m[at] + unseen_m + pushed_m - bent_m
+        })
     }
 
-    /// Where a planned entry point really is, world.
-    pub fn entry(&self, planned: &Point3<f64>) -> Point3<f64> {
-        self.shift * planned + self.breath_m[0]
-    }
-
-    /// The goal with its target and entry point where they really are; the plan's guide pose stays.
+    /// The goal with its target and entry point where they really are, as [`Truth::wanted`] has them; the
+    /// plan's guide pose stays.
     pub fn goal(&self, planned: &Goal) -> Goal {
+        let entry_m = planned.entry_m.unwrap_or(planned.target_m);
+        let [entry_m, target_m] = self.wanted(planned, &[entry_m, planned.target_m]);
         Goal {
-            target_m: self.target(&planned.target_m),
-            entry_m: planned.entry_m.map(|entry| self.entry(&entry)),
+            target_m,
+            entry_m: planned.entry_m.map(|_| entry_m),
             ..planned.clone()
         }
     }
@@ -431,12 +536,51 @@ pub(crate) fn breath(phase: f64) -> f64 {
     (std::f64::consts::PI * phase).sin().powi(4)
 }
 
-fn phase(breathing: &Breathing, value: f64) -> f64 {
-    breathing
-        .phase_spread
-        .map_or(0.5 * (value + 1.0), |spread| {
-            breathing.phase + spread * value
-        })
+/// Phase from a normal value, one that says whether the hold fails, and one for the phase if it does.
+fn phase(breathing: &Breathing, values: &[f64]) -> f64 {
+    let share = |value: f64| 0.5 * (value + 1.0);
+    match breathing.phase_spread {
+        Some(spread) if share(values[1]) >= breathing.hold_failure => {
+            breathing.phase + spread * values[0]
+        }
+        _ => share(values[2]),
+    }
+}
+
+/// Where the phantom really is in terms of where markers that are seen with an error, and have moved with
+/// the skin, say it is; phantom frame.
+fn registered(
+    imperfections: &Imperfections,
+    seen: &[f64],
+    moved: &[f64],
+) -> Result<Pose, RegistrationError> {
+    let registration = imperfections.registration.as_ref();
+    let skin = imperfections.skin_markers.as_ref();
+    let Some(markers) = registration
+        .map(|(markers, _)| markers)
+        .or(skin.map(|skin| &skin.markers_m))
+    else {
+        return Ok(Pose::identity());
+    };
+    let mut places = markers.clone();
+    let mut scatter = |values: &[f64], spread_m: f64| {
+        for (place, off) in places.iter_mut().zip(values.chunks_exact(3)) {
+            *place += Vector3::new(off[0], off[1], off[2]) * spread_m;
+        }
+    };
+    if let Some((_, fle_rms_m)) = registration {
+        scatter(seen, fle_rms_m / 3.0_f64.sqrt());
+    }
+    if let Some(skin) = skin {
+        let (shifts, breathing) = moved.split_at(3 * skin.markers_m.len());
+        scatter(shifts, skin.shift_m);
+        let risen = skin.breathing.skin_m * breath(phase(&skin.breathing, breathing));
+        for place in &mut places {
+            *place += risen;
+        }
+    }
+    // The plan believes in a phantom fitted to what was seen of markers that are really elsewhere.
+    Ok(register(markers, &places)?.inverse())
 }
 
 /// Uniform point of the unit disc from two uniform numbers in (-1, 1): concentric squares to

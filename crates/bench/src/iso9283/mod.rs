@@ -237,6 +237,7 @@ fn empty_report(
     timings: BTreeMap<String, f64>,
 ) -> Report {
     Report {
+        expected: None,
         truth: None,
         schema_version: SCHEMA_VERSION,
         scenario: ScenarioSummary {

@@ -1,6 +1,7 @@
 //! Where the needle comes to rest in a posture, without any engine.
 
 use needlebench_cell::ResolvedScenario;
+use needlebench_cell::imperfections::Imperfections;
 use needlebench_engine::Servo;
 use needlebench_evaluation::{NeedleMeasurement, measure_guide};
 use needlebench_kinematics::Dynamics;
@@ -24,13 +25,14 @@ pub(super) struct Predicted {
 /// Predicts the needle in the postures of one layout.
 pub(super) struct Prediction<'a> {
     resolved: &'a ResolvedScenario,
+    servo: Servo,
     real: Option<Real>,
-    with_budget: bool,
+    /// What the budget is of, where a criterion asks for one.
+    expected: Option<&'a Imperfections>,
 }
 
 struct Real {
     truth: Truth,
-    servo: Servo,
     dynamics: Dynamics,
 }
 
@@ -45,17 +47,18 @@ impl<'a> Prediction<'a> {
                 let truth = truth.map_err(|_| "imperfections.registration.markers_mm")?;
                 Ok::<_, &'static str>(Real {
                     dynamics: truth.dynamics(&resolved.cell),
-                    servo: servo_of(resolved),
                     truth,
                 })
             })
             .transpose()?;
         let criteria = &resolved.scenario.criteria;
         let asked = criteria.max_tip_rms_mm.is_some() || criteria.max_tip_lateral_rms_mm.is_some();
+        let expected = resolved.expected.as_ref().filter(|_| asked);
         Ok(Self {
             resolved,
-            with_budget: asked && real.is_some(),
+            servo: servo_of(resolved),
             real,
+            expected: expected.map(|expected| &expected.imperfections),
         })
     }
 
@@ -65,44 +68,38 @@ impl<'a> Prediction<'a> {
 
     pub fn of(&self, planner: &Planner<'_>, candidate: &Candidate) -> Predicted {
         let goal = &self.resolved.goals[0];
-        let Some(real) = &self.real else {
-            let exit = self.resolved.cell.world_from_guide_exit(&candidate.joints);
-            return Predicted {
-                needle: Some(measure_guide(None, goal, &exit)),
-                budget: None,
-            };
-        };
         // How the joints came to rest matters for friction alone.
-        let motion = if real.truth.actuation.friction.is_some() {
+        let drawn = self.real.as_ref().map(|real| &real.truth.actuation);
+        let sticks = drawn.is_some_and(|drives| drives.friction.is_some())
+            || self.expected.is_some_and(|each| each.friction.is_some());
+        let motion = if sticks {
             planner.approach(goal, candidate)
         } else {
             Some(JointTrajectory::starting_at(candidate.joints))
         };
-        let Some(motion) = motion else {
-            return Predicted {
-                needle: None,
-                budget: None,
-            };
+        let needle = match &self.real {
+            Some(real) => motion.as_ref().and_then(|motion| self.needle(real, motion)),
+            None => {
+                let exit = self.resolved.cell.world_from_guide_exit(&candidate.joints);
+                Some(measure_guide(None, goal, &exit))
+            }
         };
         Predicted {
-            needle: self.needle(real, &motion),
-            budget: self.budget(real, &motion),
+            needle,
+            budget: motion.as_ref().and_then(|motion| self.budget(motion)),
         }
     }
 
     fn needle(&self, real: &Real, motion: &JointTrajectory) -> Option<NeedleMeasurement> {
         let goal = &self.resolved.goals[0];
-        let settled = settle_after(&real.servo, &real.dynamics, &real.truth, motion).ok()?;
+        let settled = settle_after(&self.servo, &real.dynamics, &real.truth, motion).ok()?;
         let exit = real
             .truth
             .world_from_guide_exit(&self.resolved.cell, &settled.position);
         Some(measure_guide(None, &real.truth.goal(goal), &exit))
     }
 
-    fn budget(&self, real: &Real, motion: &JointTrajectory) -> Option<ErrorBudget> {
-        if !self.with_budget {
-            return None;
-        }
+    fn budget(&self, motion: &JointTrajectory) -> Option<ErrorBudget> {
         let case = BudgetCase {
             cell: &self.resolved.cell,
             goal: &self.resolved.goals[0],
@@ -111,8 +108,8 @@ impl<'a> Prediction<'a> {
                 .phantom
                 .as_ref()
                 .map(|each| &each.world_from_phantom),
-            servo: &real.servo,
-            imperfections: self.resolved.imperfections.as_ref()?,
+            servo: &self.servo,
+            imperfections: self.expected?,
             trajectory: motion,
             timestep_s: self.resolved.scenario.engines.timestep_ms * 1e-3,
         };

@@ -239,11 +239,32 @@ pub struct ControlData {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GearData {
-    /// Torsional stiffness per joint, N m/rad.
+    /// Torsional stiffness per joint, N m/rad; of a strain-wave gear the first of its three, `K1`.
     #[schemars(inner(range(min = 100.0, max = 1e9)))]
     pub stiffness_nm_rad: [f64; 6],
+    /// How a strain-wave gear stiffens under torque; of one stiffness if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffening: Option<Stiffening>,
     /// A citation, or `assumed: ` and why.
     pub source: String,
+}
+
+/// How strain-wave gears stiffen: their second and third stiffness, and the torques where these begin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stiffening {
+    /// Torque per joint up to which the first stiffness holds, `T1`, N m.
+    #[schemars(inner(range(min = 0.0, max = 1e4)))]
+    pub first_corner_nm: [f64; 6],
+    /// Stiffness from there on, `K2`, N m/rad.
+    #[schemars(inner(range(min = 100.0, max = 1e9)))]
+    pub second_nm_rad: [f64; 6],
+    /// Torque up to which it holds, `T2`, N m.
+    #[schemars(inner(range(min = 0.0, max = 1e4)))]
+    pub second_corner_nm: [f64; 6],
+    /// Stiffness beyond, `K3`, N m/rad.
+    #[schemars(inner(range(min = 100.0, max = 1e9)))]
+    pub third_nm_rad: [f64; 6],
 }
 
 /// Friction of the joints, by the LuGre model.

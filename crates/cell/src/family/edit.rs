@@ -123,6 +123,7 @@ impl Editable {
                     ranking,
                     recording,
                     people,
+                    expected,
                     imperfections,
                     events
                 ]
@@ -168,6 +169,7 @@ impl Scenario {
             ranking: self.ranking.clone(),
             recording: self.recording.clone(),
             people: self.people.clone(),
+            expected: self.expected.clone(),
             imperfections: self.imperfections.clone(),
             events: self.events.clone(),
         }

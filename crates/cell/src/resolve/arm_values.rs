@@ -2,6 +2,7 @@
 
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
+use super::imperfections::GearTwist;
 use crate::arm::data::ArmData;
 use crate::scenario::{ControlBlock, ElasticityBlock, FrictionBlock, Iso9283Section, Scenario};
 use crate::toml_text::TomlText;
@@ -38,12 +39,12 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Compliance of the gears, rad/(N m).
-pub(crate) fn gear_compliance(
+/// How the gears twist. A stiffness that the scenario gives holds for every torque.
+pub(crate) fn gear_twist(
     toml: &TomlText<'_>,
     block: &ElasticityBlock,
     robot: &Robot,
-) -> Result<Joints, Finding> {
+) -> Result<GearTwist, Finding> {
     let table = Table::new(toml, robot, "gears");
     let known = table.data().and_then(|data| data.gears.as_ref());
     let stiffness_nm_rad = table.pick(
@@ -51,7 +52,18 @@ pub(crate) fn gear_compliance(
         block.stiffness_nm_rad,
         known.map(|gears| gears.stiffness_nm_rad),
     )?;
-    Ok(Joints::from(stiffness_nm_rad.map(f64::recip)))
+    let compliance = |stiffness: [f64; 6]| Joints::from(stiffness.map(f64::recip));
+    let stiffening = known.and_then(|gears| gears.stiffening.as_ref());
+    Ok(
+        match stiffening.filter(|_| block.stiffness_nm_rad.is_none()) {
+            None => GearTwist::linear(compliance(stiffness_nm_rad)),
+            Some(more) => GearTwist {
+                compliance_rad_per_nm: [stiffness_nm_rad, more.second_nm_rad, more.third_nm_rad]
+                    .map(compliance),
+                corner_nm: [more.first_corner_nm, more.second_corner_nm].map(Joints::from),
+            },
+        },
+    )
 }
 
 /// Friction of the joints by the LuGre model, as the controller believes it.

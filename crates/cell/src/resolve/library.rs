@@ -4,11 +4,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use needlebench_kinematics::Pose;
+use needlebench_kinematics::{Body, Chain, JOINT_COUNT, Pose};
 
 use super::cache::Cache;
 use super::fixtures::fixture_finding;
-use super::imperfections::{RealArms, resolve_calibration};
+use super::imperfections::{
+    GearTwist, OriginDeviations, RealArms, absorbed_sag, resolve_calibration,
+};
 use super::overrides::Overrides;
 use super::phantom::{UnplacedPhantom, scenario_phantom};
 use super::robot::scenario_robot;
@@ -22,7 +24,7 @@ use crate::scenario::{
     Scenario, TableSection,
 };
 use crate::toml_text::TomlText;
-use crate::{Finding, Robot};
+use crate::{Finding, Robot, Tool};
 
 /// What decides a phantom.
 #[derive(Debug)]
@@ -54,6 +56,16 @@ pub(crate) struct ModelLibrary {
     gantries: Cache<GantrySection, Fixture>,
     mounts: Cache<(MountSection, Pose), Fixture>,
     real_arms: Cache<(CalibrationBlock, Option<ModelSource>), RealArms>,
+    absorbed: Cache<AbsorbedKey, [OriginDeviations; JOINT_COUNT]>,
+}
+
+/// What decides what a calibration takes of an arm's sag.
+#[derive(Debug, PartialEq)]
+struct AbsorbedKey {
+    chain: Chain,
+    bodies: [Body; JOINT_COUNT],
+    carried: Option<(Body, Pose)>,
+    gears: GearTwist,
 }
 
 /// What decides a robot but its place.
@@ -194,5 +206,43 @@ impl ModelLibrary {
                 Ok((key.clone(), arms))
             },
         )
+    }
+
+    /// What a calibration that was measured on the sagging arm takes of its sag; with the tool on, or
+    /// without.
+    pub fn absorbed_sag(
+        &self,
+        robot: &Robot,
+        tool: Option<&Tool>,
+        gears: &GearTwist,
+    ) -> Arc<[OriginDeviations; JOINT_COUNT]> {
+        let key = AbsorbedKey {
+            chain: robot.chain,
+            bodies: robot.bodies,
+            carried: tool.map(|tool| (tool.body, tool.flange_from_guide_exit)),
+            gears: *gears,
+        };
+        let made = self.absorbed.get(
+            |known| *known == key,
+            || {
+                let absorbed = absorbed_sag(robot, tool, gears);
+                let AbsorbedKey {
+                    chain,
+                    bodies,
+                    carried,
+                    gears,
+                } = key;
+                Ok::<_, std::convert::Infallible>((
+                    AbsorbedKey {
+                        chain,
+                        bodies,
+                        carried,
+                        gears,
+                    },
+                    absorbed,
+                ))
+            },
+        );
+        made.unwrap_or_else(|never| match never {})
     }
 }

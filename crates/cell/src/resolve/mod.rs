@@ -35,7 +35,7 @@ use crate::{Finding, Robot};
 use arm_values::check_brakes;
 pub use goals::{Expectation, Goal, Roll};
 use goals::{Surroundings, resolve_goal};
-use imperfections::{Imperfections, resolve_imperfections};
+use imperfections::{Expected, Imperfections, RealThings};
 use iso9283::{Iso9283Protocol, resolve_iso9283};
 use layout::Layout;
 pub(crate) use library::ModelLibrary;
@@ -82,8 +82,11 @@ pub struct ResolvedScenario {
     pub notes: Vec<String>,
     /// The people in the room, by goal.
     pub people: People,
-    /// How the real arm and phantom differ; none if they do not.
+    /// How the real arm and phantom that are simulated differ; none if they do not.
     pub imperfections: Option<Imperfections>,
+    /// What arm and patient the expected tip error is of; none where the arm's data do not say enough, or
+    /// there are no goals.
+    pub expected: Option<Expected>,
 }
 
 /// Reads, resolves and validates a scenario file.
@@ -286,26 +289,20 @@ pub(crate) fn resolve(
             .map_or(tool.needle.length_m, |mm| mm * 1e-3),
         hand_cone_half_angle_rad: scenario.tool.hand_cone_half_angle_deg.to_radians(),
     };
-    let imperfections = match &scenario.imperfections {
-        None => None,
-        Some(section) => {
-            let block = section.calibration.as_ref();
-            let arms = block.map(|block| library.real_arms(toml, block, &robot, base));
-            let arms = arms.transpose().map_err(one)?;
-            notes.extend(arms.iter().flat_map(|arms| arms.notes.iter().cloned()));
-            let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
-            let timestep_ms = scenario.engines.timestep_ms;
-            let resolved = resolve_imperfections(
-                toml,
-                section,
-                &robot,
-                arms.as_deref(),
-                bore_clearance_m,
-                timestep_ms,
-            );
-            Some(resolved.map_err(one)?)
-        }
+    let real = RealThings {
+        toml,
+        library,
+        robot: &robot,
+        tool: &tool,
+        base,
+        timestep_ms: scenario.engines.timestep_ms,
     };
+    let imperfections = scenario.imperfections.as_ref();
+    let imperfections = imperfections.map(|section| real.resolve(section, &mut notes));
+    let imperfections = imperfections.transpose().map_err(one)?;
+    let expected = real
+        .expected(&scenario, imperfections.as_ref(), &mut notes)
+        .map_err(one)?;
     check_brakes(toml, &scenario, &robot, &mut notes).map_err(one)?;
     let file = &source.file;
     let servo = servo_settings(file, &scenario.controller, &robot, &tool, &mut notes);
@@ -333,6 +330,7 @@ pub(crate) fn resolve(
         notes,
         people,
         imperfections,
+        expected,
     })
 }
 

@@ -37,10 +37,96 @@ pub struct ImperfectionsSection {
     pub control: Option<ControlBlock>,
     /// Play of the needle in its guide.
     pub guide: Option<GuideBlock>,
+    /// Place of the robot's base in terms of the CT or tracker that sees the markers.
+    pub hand_eye: Option<HandEyeBlock>,
     /// Registration of the phantom by markers.
     pub registration: Option<RegistrationBlock>,
+    /// Motion of the markers with the skin that they stick to.
+    pub skin_markers: Option<SkinMarkersBlock>,
+    /// Localisation of the target in the image.
+    pub imaging: Option<ImagingBlock>,
+    /// Bending of the needle in tissue.
+    pub needle: Option<NeedleBlock>,
+    /// Tissue that gives way under needle, hand and guide.
+    pub indentation: Option<IndentationBlock>,
     /// Breathing of the phantom.
     pub breathing: Option<BreathingBlock>,
+}
+
+/// What the controller knows of its arm's joint origins.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum ArmClass {
+    /// It knows the maker's calibration of this arm, measured without a tool: what it does not know is what
+    /// that calibration leaves, and what moves with the load. The default.
+    #[default]
+    FactoryCalibrated,
+    /// Inverse kinematics are computed elsewhere, with nominal lengths: the arm is off by all that its
+    /// calibration would say.
+    NominalKinematics,
+    /// The calibration that the scenario has, measured in place and with the tool on: what it does not know
+    /// is what that leaves.
+    CalibratedHere,
+}
+
+impl ArmClass {
+    /// Name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FactoryCalibrated => "factory_calibrated",
+            Self::NominalKinematics => "nominal_kinematics",
+            Self::CalibratedHere => "calibrated_here",
+        }
+    }
+}
+
+/// Whether the patient's breath is held while the needle goes in.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum BreathState {
+    /// Held near the end of expiration, but for the holds that fail.
+    #[default]
+    Hold,
+    /// The needle goes in at any phase.
+    Free,
+}
+
+/// Of which arm and patient the expected tip error is, where there are no `[imperfections]`: those of all
+/// default blocks.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ExpectedSection {
+    /// What the controller knows of its arm; `calibrated_here` if the scenario has a calibration, else
+    /// `factory_calibrated`.
+    pub arm: Option<ArmClass>,
+    /// Whether the breath is held.
+    pub breath: BreathState,
 }
 
 /// Joint origins of the real arm.
@@ -56,6 +142,16 @@ pub struct CalibrationBlock {
     /// Factor on the deviations.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub scale: f64,
+    /// What the controller knows of them.
+    pub class: ArmClass,
+    /// Share of the population's deviations, about none, that a calibration leaves: of
+    /// `factory_calibrated` and `calibrated_here`. Assumed: a fifth, which is 0.3 mm at a tip 200 mm in front
+    /// of the flange; UR publishes no figure.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-hint" = "it is a share: 20 % are 0.2"))]
+    pub residual: f64,
+    /// The calibration was measured on an arm that sags under its own weight, and has taken for geometry
+    /// what sag looks like it: that part is not counted again with `elasticity`.
+    pub measured_under_gravity: bool,
 }
 
 impl Default for CalibrationBlock {
@@ -63,6 +159,9 @@ impl Default for CalibrationBlock {
         Self {
             arm: "population".to_owned(),
             scale: 1.0,
+            class: ArmClass::default(),
+            residual: 0.2,
+            measured_under_gravity: true,
         }
     }
 }
@@ -97,7 +196,8 @@ impl Default for EncoderBlock {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ElasticityBlock {
-    /// Torsional stiffness of each joint, N m/rad; the arm's own if left out.
+    /// Torsional stiffness of each joint at every torque, N m/rad; if left out the arm's own, which grows
+    /// with the torque where its data say so.
     #[schemars(inner(range(min = 100.0, max = 1e9)))]
     pub stiffness_nm_rad: Option<[f64; 6]>,
     /// Relative standard deviation of each joint's compliance. Assumed.
@@ -264,6 +364,141 @@ impl Default for RegistrationBlock {
     }
 }
 
+/// Place of the robot's base in terms of the CT or tracker that sees the markers: the hand-eye calibration.
+///
+/// The error is a rotation about the phantom's origin (mid-chest, where such a calibration is made to be
+/// good) and a translation, independent and equal along all axes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct HandEyeBlock {
+    /// Standard deviation of the place along each axis, mm. Assumed: a tracker with 0.25 mm rms at a
+    /// marker, seen in a dozen places, and the arm's own errors while it is seen.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub translation_mm: f64,
+    /// Standard deviation of the rotation about each axis, deg. Assumed.
+    #[schemars(range(min = 0.0, max = 5.0))]
+    pub rotation_deg: f64,
+}
+
+impl Default for HandEyeBlock {
+    fn default() -> Self {
+        Self {
+            translation_mm: 0.3,
+            rotation_deg: 0.05,
+        }
+    }
+}
+
+/// Markers that move with the skin they stick to, between the image and the moment they are seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SkinMarkersBlock {
+    /// Standard deviation of each marker's motion along each axis, mm, independent of the others: skin
+    /// that shifts on what lies under it. Assumed.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub shift_mm: f64,
+    /// All markers rise together with the `skin_mm` of `[imperfections.breathing]`, at a phase of their
+    /// own: standard deviation of that phase about the end of expiration. Assumed: as well met as the
+    /// needle's.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub phase_spread: f64,
+}
+
+impl Default for SkinMarkersBlock {
+    fn default() -> Self {
+        Self {
+            shift_mm: 0.5,
+            phase_spread: 0.08,
+        }
+    }
+}
+
+/// Where the target is seen in the image.
+///
+/// Each axis of the target is uniform within half a voxel, and off by what the reader's choice of its
+/// centre is off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImagingBlock {
+    /// Size of a voxel along the phantom's axes (left, posterior, superior), mm; the last is the slice's
+    /// thickness. Assumed: a chest CT for an intervention.
+    #[schemars(inner(range(min = 0.01, max = 20.0)))]
+    pub voxel_mm: [f64; 3],
+    /// Standard deviation of the chosen centre of the target along each axis, mm. Assumed.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub reader_mm: f64,
+}
+
+impl Default for ImagingBlock {
+    fn default() -> Self {
+        Self {
+            voxel_mm: [0.7, 0.7, 2.0],
+            reader_mm: 0.3,
+        }
+    }
+}
+
+/// Bending of the needle: a force across its tip, from the bevel, on a beam that the guide holds.
+///
+/// An Euler-Bernoulli cantilever from the guide's exit to the tip, `delta = F L^3 / (3 E I)`, the model of a
+/// concentrated force at the bevel that mechanics of needle steering begin with (Misra et al., Int. J.
+/// Robotics Research 29(13), 2010), without the tissue that supports the shaft: an upper estimate for the
+/// force. The bevel points anywhere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct NeedleBlock {
+    /// Root mean square of the force across the tip, N. Assumed: 1 mm at the end of an 18 G needle with
+    /// its stylet, 90 mm from the guide. Radiologists report at most 5.3 mm of unwanted bending, on average
+    /// (de Jong et al., Medical Devices 11, 2018, 259-265).
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub side_force_n: f64,
+    /// Young's modulus of the needle, GPa: stainless steel.
+    #[schemars(range(min = 1.0, max = 500.0))]
+    pub young_gpa: f64,
+    /// Diameter of the needle's bore, mm; 0 with its stylet in, as it goes in.
+    #[schemars(range(min = 0.0, max = 5.0))]
+    pub bore_mm: f64,
+}
+
+impl Default for NeedleBlock {
+    fn default() -> Self {
+        Self {
+            side_force_n: 0.1,
+            young_gpa: 200.0,
+            bore_mm: 0.0,
+        }
+    }
+}
+
+/// Tissue that gives way along the needle, under needle, hand and guide.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct IndentationBlock {
+    /// Mean motion of the skin along the insertion, mm. Assumed.
+    #[schemars(range(min = 0.0, max = 30.0))]
+    pub skin_mm: f64,
+    /// Standard deviation of it, mm. Assumed.
+    #[schemars(range(min = 0.0, max = 30.0))]
+    pub skin_spread_mm: f64,
+    /// Mean motion of the target, mm. Assumed: a fraction of the skin's.
+    #[schemars(range(min = 0.0, max = 30.0))]
+    pub target_mm: f64,
+    /// Standard deviation of it, mm. Assumed.
+    #[schemars(range(min = 0.0, max = 30.0))]
+    pub target_spread_mm: f64,
+}
+
+impl Default for IndentationBlock {
+    fn default() -> Self {
+        Self {
+            skin_mm: 2.0,
+            skin_spread_mm: 1.0,
+            target_mm: 0.5,
+            target_spread_mm: 0.5,
+        }
+    }
+}
+
 /// Breathing of the phantom.
 ///
 /// Skin and lesion move by their amplitudes times `sin^4(pi phase)` (Lujan et al., Med. Phys. 26(5),
@@ -288,6 +523,9 @@ pub struct BreathingBlock {
     /// Standard deviation of that phase: how well it is met. `free = true` leaves it uniform.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub phase_spread: f64,
+    /// Share of holds that fail: the needle then goes in at any phase. Assumed.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-hint" = "it is a share: 5 % are 0.05"))]
+    pub hold_failure: f64,
     /// The needle goes in at any phase.
     pub free: bool,
 }
@@ -300,6 +538,7 @@ impl Default for BreathingBlock {
             period_s: 4.0,
             phase: 0.0,
             phase_spread: 0.08,
+            hold_failure: 0.05,
             free: false,
         }
     }
@@ -312,9 +551,67 @@ fn arms(_: &mut SchemaGenerator) -> Schema {
     names_or_path(&names.collect::<Vec<_>>())
 }
 
+impl ImperfectionsSection {
+    /// Every block with its defaults, of an arm of which the controller knows this, and of a patient who
+    /// breathes like that.
+    pub fn of_class(class: ArmClass, breath: BreathState) -> Self {
+        Self {
+            budget_samples: None,
+            calibration: Some(CalibrationBlock {
+                class,
+                ..CalibrationBlock::default()
+            }),
+            encoder: Some(EncoderBlock::default()),
+            elasticity: Some(ElasticityBlock::default()),
+            payload: Some(PayloadBlock::default()),
+            friction: Some(FrictionBlock::default()),
+            torque_limits: None,
+            control: None,
+            guide: Some(GuideBlock::default()),
+            hand_eye: Some(HandEyeBlock::default()),
+            registration: Some(RegistrationBlock::default()),
+            skin_markers: Some(SkinMarkersBlock::default()),
+            imaging: Some(ImagingBlock::default()),
+            needle: Some(NeedleBlock::default()),
+            indentation: Some(IndentationBlock::default()),
+            breathing: Some(BreathingBlock {
+                free: breath == BreathState::Free,
+                ..BreathingBlock::default()
+            }),
+        }
+    }
+}
+
 /// Blocks that contradict themselves.
 pub(super) fn check(toml: &TomlText<'_>, section: &ImperfectionsSection) -> Vec<Finding> {
     let mut findings = Vec::new();
+    if section.skin_markers.is_some() {
+        for (other, given) in [
+            ("registration", section.registration.is_some()),
+            ("breathing", section.breathing.is_some()),
+        ] {
+            if !given {
+                let key = "imperfections.skin_markers";
+                let lack = format!("markers that move need `[imperfections.{other}]` beside them");
+                findings.push(toml.finding(key, lack).hint(
+                    "the markers' places stand under `registration`, the skin's motion under `breathing`",
+                ));
+            }
+        }
+    }
+    if let Some(block) = &section.calibration
+        && block.class != ArmClass::NominalKinematics
+        && block.arm != "population"
+    {
+        let (arm, class) = (&block.arm, block.class.name());
+        findings.push(
+            toml.finding(
+                "imperfections.calibration.arm",
+                format!("`{arm}` is one real arm, of which a {class} controller knows the origins"),
+            )
+            .hint("`class = \"nominal_kinematics\"` for a controller that knows nominal lengths alone"),
+        );
+    }
     if let Some(block) = &section.registration {
         let key = "imperfections.registration.markers_mm";
         if is_on_a_line(&block.markers_mm) {

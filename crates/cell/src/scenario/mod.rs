@@ -43,8 +43,10 @@ pub use fixtures::{GantrySection, MountSection, TableSection};
 pub(crate) use goals::EVERY_CONFIGURATION;
 pub use goals::{FlangePose, GoalSection, REJECTION_RULES};
 pub use imperfections::{
-    BreathingBlock, CalibrationBlock, ControlBlock, ElasticityBlock, EncoderBlock, FrictionBlock,
-    GuideBlock, ImperfectionsSection, PayloadBlock, RegistrationBlock, TorqueLimitsBlock,
+    ArmClass, BreathState, BreathingBlock, CalibrationBlock, ControlBlock, ElasticityBlock,
+    EncoderBlock, ExpectedSection, FrictionBlock, GuideBlock, HandEyeBlock, ImagingBlock,
+    ImperfectionsSection, IndentationBlock, NeedleBlock, PayloadBlock, RegistrationBlock,
+    SkinMarkersBlock, TorqueLimitsBlock,
 };
 pub use iso9283::{
     Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES, STANDARD_EDGES_MM,
@@ -129,8 +131,11 @@ pub struct Scenario {
     /// The people in the room, and what they prefer.
     #[serde(default)]
     pub people: PeopleSection,
-    /// How the real arm and the real phantom differ from what the controller believes; not at all
-    /// if left out.
+    /// Of which arm and patient the expected tip error is.
+    #[serde(default)]
+    pub expected: ExpectedSection,
+    /// How the real arm and the real phantom that are simulated differ from what the controller believes;
+    /// not at all if left out. The expected tip error is of these, then.
     #[serde(default)]
     pub imperfections: Option<ImperfectionsSection>,
     /// Contacts, stops and the way back, simulated besides the planned motion; none if left out.

@@ -70,6 +70,8 @@ pub enum Show {
 pub struct Heading {
     /// Place among the columns of the printed table, and its heading there.
     pub table: Option<(u8, &'static str)>,
+    /// The same in the printed table of what the engines make of the motion.
+    pub engines: Option<(u8, &'static str)>,
     /// Place among the columns of the Markdown summary, and its heading there.
     pub summary: Option<(u8, &'static str)>,
     /// Place among the columns of a page's table of configurations, and its heading there.
@@ -276,6 +278,7 @@ impl Metric {
             },
             heading: Heading {
                 table: None,
+                engines: None,
                 summary: None,
                 page: None,
                 page_side: None,
@@ -395,6 +398,16 @@ impl Metric {
         Self {
             heading: Heading {
                 table: Some((place, heading)),
+                ..self.heading
+            },
+            ..self
+        }
+    }
+
+    pub(super) const fn engines(self, place: u8, heading: &'static str) -> Self {
+        Self {
+            heading: Heading {
+                engines: Some((place, heading)),
                 ..self.heading
             },
             ..self

@@ -64,6 +64,8 @@ fn budget(rms_m: f64) -> ErrorBudget {
             at_target: point(),
         },
         dominant: None,
+        before_insertion: None,
+        breathing_freely: None,
     }
 }
 

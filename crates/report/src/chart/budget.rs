@@ -251,6 +251,8 @@ mod tests {
                 sources: Source::ALL.map(|source| of(Some(source), rms_m)).into(),
                 total: of(None, rms_m),
                 dominant: None,
+                before_insertion: None,
+                breathing_freely: None,
             };
             let budgets = [("Right-Down-Unfold", &budget), ("Left-Up-Fold", &budget)];
             for count in [1, 2] {

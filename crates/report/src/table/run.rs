@@ -6,9 +6,13 @@ use std::fmt::Write;
 use comfy_table::{Cell, CellAlignment, Color, Table};
 use needlebench_engine::Engine;
 use needlebench_evaluation::iso9283::SUBJECT;
-use needlebench_evaluation::report::{GoalReport, Report, RouteReport, Status, Verdict};
+use needlebench_evaluation::metric::Heading;
+use needlebench_evaluation::report::{
+    ConfigurationReport, GoalReport, Report, RouteReport, Status, Verdict,
+};
+use needlebench_uncertainty::budget::ErrorBudget;
 
-use super::budget::budget_text;
+use super::budget::{ALLOWED_M, CLINICAL_LATERAL_M, CLINICAL_M, budget_text, budgets, mm};
 use super::engine_headings::{EngineHeading, engine_headings};
 use super::events::events_text;
 use super::plain_table;
@@ -32,8 +36,24 @@ fn write_report(
     let headings = engine_headings(report, engines);
     for goal in &report.goals {
         writeln!(out, "{}", goal_heading(goal))?;
-        writeln!(out, "{}", goal_table(goal, &headings))?;
+        let (differing, constant) = split(goal, columns(&headings, |heading| heading.table));
+        writeln!(out, "{}", goal_table(goal, &differing, Mostly::Shown))?;
         writeln!(out, "* worst of those that work, < recommended")?;
+        write_constant(out, goal, &constant)?;
+        write_expected(out, report, goal)?;
+        let checks = columns(&headings, |heading| heading.engines);
+        if goal
+            .configurations
+            .iter()
+            .any(|each| !each.engines.is_empty())
+        {
+            writeln!(
+                out,
+                "check of control and integration, {}",
+                simulated_arm(report)
+            )?;
+            writeln!(out, "{}", goal_table(goal, &checks, Mostly::Left))?;
+        }
         if let Some(comparison) = comparison_text(goal) {
             writeln!(out, "{comparison}")?;
         }
@@ -44,7 +64,12 @@ fn write_report(
         if let Some(events) = events_text(goal) {
             write!(out, "{events}")?;
         }
-        if let Some(budget) = budget_text(goal) {
+        // Of a class of arm the sources are on the page and in the chart.
+        let is_own = report
+            .expected
+            .as_ref()
+            .is_some_and(|expected| expected.arm.is_none());
+        if let Some(budget) = budget_text(goal).filter(|_| is_own) {
             write!(out, "{budget}")?;
         }
         if let Some(table) = super::referee::referee_table(goal) {
@@ -117,17 +142,147 @@ struct Column {
 }
 
 /// The columns of a goal's table, in their order.
-fn columns(engines: &[EngineHeading]) -> Vec<Column> {
-    shown_metrics(engines, |heading| heading.table)
+fn columns(
+    engines: &[EngineHeading],
+    heading: impl Fn(&Heading) -> Option<(u8, &'static str)>,
+) -> Vec<Column> {
+    shown_metrics(engines, heading)
         .map(|(heading, metric)| Column { heading, metric })
         .collect()
 }
 
+/// Columns that differ between configurations, and those that say the same of all or of none.
+///
+/// The arm's clearance from itself says the same of all where the same two links are nearest in all: that
+/// is how the arm is built.
+fn split(goal: &GoalReport, columns: Vec<Column>) -> (Vec<Column>, Vec<Column>) {
+    let own_pair_is_one = own_pair(goal).is_some();
+    columns.into_iter().partition(|column| {
+        let values = goal
+            .configurations
+            .iter()
+            .filter_map(|each| column.metric.value(each));
+        let mut texts: Vec<String> = values.map(|(_, text)| text).collect();
+        texts.sort();
+        texts.dedup();
+        let is_own = column.metric.metric().family == "self_clearance";
+        texts.len() > 1 && !(is_own && own_pair_is_one)
+    })
+}
+
+/// The two links of the arm that are nearest to each other in every configuration, if they are the same.
+fn own_pair(goal: &GoalReport) -> Option<[&str; 2]> {
+    let link = |name: &'_ str| -> usize { name.find('.').unwrap_or(name.len()) };
+    let mut pairs = goal.configurations.iter().filter_map(|each| {
+        let [a, b] = &each.clearance.classes.get("self")?.pair;
+        let (a, b) = (&a[..link(a)], &b[..link(b)]);
+        Some(if a <= b { [a, b] } else { [b, a] })
+    });
+    let first = pairs.next()?;
+    pairs.all(|pair| pair == first).then_some(first)
+}
+
+/// What is the same in all configurations, in one line.
+fn write_constant(out: &mut String, goal: &GoalReport, constant: &[Column]) -> std::fmt::Result {
+    let mut parts = Vec::new();
+    for column in constant {
+        let values = || {
+            let all = goal.configurations.iter();
+            all.filter_map(|each| column.metric.value(each))
+        };
+        let Some((_, text)) = values().next() else {
+            continue;
+        };
+        let name = column.heading.replace('\n', " ");
+        if let (Some([a, b]), "self_clearance") = (own_pair(goal), column.metric.metric().family) {
+            let sizes = || values().map(|(value, _)| value * 1e3);
+            let least = sizes().fold(f64::INFINITY, f64::min);
+            let most = sizes().fold(f64::NEG_INFINITY, f64::max);
+            parts.push(format!(
+                "the arm's own {a} and {b} are {least:.1} to {most:.1} mm apart by its build"
+            ));
+        } else {
+            parts.push(format!("{} {text}", name.trim()));
+        }
+    }
+    if parts.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "the same in all: {}", parts.join("; "))
+}
+
+/// What arm and patient the expected tip errors are of, and what they compare with.
+fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::fmt::Result {
+    let Some(expected) = &report.expected else {
+        return Ok(());
+    };
+    let arm = expected.arm.map_or("the arm", |arm| arm);
+    let breath = match expected.breath {
+        "free" => "breathes freely",
+        _ => "holds the breath",
+    };
+    writeln!(
+        out,
+        "expected tip error: over all arms and patients - {arm}: {}; the patient {breath}",
+        expected.arm_in_words
+    )?;
+    let budgets = budgets(goal);
+    let range = |value: &dyn Fn(&ErrorBudget) -> Option<f64>| {
+        let values: Vec<f64> = budgets
+            .iter()
+            .filter(|(each, _)| each.status == Status::Ok)
+            .filter_map(|(_, budget)| value(budget))
+            .collect();
+        let least = values.iter().copied().reduce(f64::min)?;
+        let most = values.iter().copied().reduce(f64::max)?;
+        Some(format!("{} to {} mm", mm(least), mm(most)))
+    };
+    let before = range(&|budget| Some(budget.before_insertion?.lateral_rms_m));
+    let after = range(&|budget| Some(budget.total.at_target.analytic.rms_m));
+    if let (Some(before), Some(after)) = (before, after) {
+        writeln!(
+            out,
+            "like with like: across the needle before it goes in {before} (needle robots {} to {}); at \
+             the target {after} ({} to {}); allowed {}",
+            mm(CLINICAL_LATERAL_M[0]),
+            mm(CLINICAL_LATERAL_M[1]),
+            mm(CLINICAL_M[0]),
+            mm(CLINICAL_M[1]),
+            mm(ALLOWED_M)
+        )?;
+    }
+    Ok(())
+}
+
+/// Which arm the engines have simulated.
+fn simulated_arm(report: &Report) -> &'static str {
+    if report.truth.is_some() {
+        "of the one arm and patient that the seed draws"
+    } else {
+        "of an arm that is just what its controller believes: nothing of a real arm's accuracy"
+    }
+}
+
+/// Whether the source that most of the expected tip error is by has a column.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Mostly {
+    Shown,
+    Left,
+}
+
 /// The eight rows of a goal; the worst number of each column is marked with `*` and in colour.
-fn goal_table(goal: &GoalReport, headings: &[EngineHeading]) -> Table {
-    let columns = columns(headings);
+fn goal_table(goal: &GoalReport, columns: &[Column], mostly: Mostly) -> Table {
+    let dominant = |each: &ConfigurationReport| Some(each.budget.as_ref()?.dominant?.name());
+    let mostly = mostly == Mostly::Shown
+        && goal
+            .configurations
+            .iter()
+            .any(|each| dominant(each).is_some());
     let mut header = vec!["configuration", "status"];
     header.extend(columns.iter().map(|column| column.heading.as_str()));
+    if mostly {
+        header.push("mostly\nby");
+    }
     let mut table = plain_table(&header);
     let worst: Vec<Option<f64>> = columns
         .iter()
@@ -165,6 +320,9 @@ fn goal_table(goal: &GoalReport, headings: &[EngineHeading]) -> Table {
                 Some((_, text)) => Cell::new(text),
             };
             row.push(cell.set_alignment(CellAlignment::Right));
+        }
+        if mostly {
+            row.push(Cell::new(dominant(configuration).unwrap_or("-")));
         }
         table.add_row(row);
     }

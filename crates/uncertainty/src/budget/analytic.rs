@@ -39,26 +39,69 @@ pub(super) fn moments(
                 [1.0, -1.0].map(|sign| displaced(&(joints.bias + deviation * sign)));
             bias += 0.5 * (ahead + behind) - displaced(&joints.bias);
         }
-        let mut covariance = jacobian * joints.covariance * jacobian.transpose();
+        let mut covariance = jacobian * joints.rigid_covariance * jacobian.transpose();
+        covariance += elasticity(
+            case,
+            imperfections,
+            &joints.sag_spread,
+            &jacobian,
+            &target,
+            point,
+        );
         if let Some(arms) = &imperfections.calibration {
             let (curved, spread) = calibration(case, arms, &target, point);
             bias += curved;
             covariance += spread;
         }
-        if let Some((markers, fle_rms_m)) = &imperfections.registration {
-            let place = case.place.copied().unwrap_or_else(Pose::identity);
-            let in_phantom = tre_covariance(markers, &(place.inverse() * point), *fle_rms_m)?;
-            let turn = place.rotation.to_rotation_matrix();
+        let place = case.place.copied().unwrap_or_else(Pose::identity);
+        let turn = place.rotation.to_rotation_matrix();
+        let registration = imperfections.registration.as_ref();
+        let registration = registration.map(|(markers, fle_rms_m)| (markers, *fle_rms_m));
+        let skin = imperfections.skin_markers.as_ref();
+        // Three axes of the same spread.
+        let moving = skin.map(|skin| (&skin.markers_m, skin.shift_m * 3.0_f64.sqrt()));
+        for (markers, fle_rms_m) in registration.into_iter().chain(moving) {
+            let in_phantom = tre_covariance(markers, &(place.inverse() * point), fle_rms_m)?;
             covariance += turn * in_phantom * turn.inverse();
             // A rotation w moves a point by w x r + w x (w x r) / 2.
-            let (centroid, transform) = transform_covariance(markers, *fle_rms_m)?;
+            let (centroid, transform) = transform_covariance(markers, fle_rms_m)?;
             let rotation = transform.fixed_view::<3, 3>(3, 3).into_owned();
             let arm = place.inverse() * point - centroid;
             let curved = 0.5 * (rotation - Matrix3::identity() * rotation.trace()) * arm;
             bias -= turn * curved;
         }
+        if let Some(skin) = skin {
+            // The phantom is believed to be where its markers have risen to.
+            let risen = place.rotation * skin.breathing.skin_m;
+            let (mean, variance) = breath_moments(&skin.breathing);
+            bias += risen * mean;
+            covariance += risen * risen.transpose() * variance;
+        }
+        if let Some(error) = &imperfections.hand_eye {
+            let arm = point.coords - place.translation.vector;
+            let (slid, turned) = (error.translation_m.powi(2), error.rotation_rad.powi(2));
+            // E[(w x r)(w x r)^T] = s^2 (r.r I - r r^T) for independent w of variance s^2.
+            let swung = Matrix3::identity() * arm.norm_squared() - arm * arm.transpose();
+            covariance += Matrix3::identity() * slid + swung * turned;
+            // E[w x (w x r)] / 2 = -s^2 r; the target moves, so the error is the other way.
+            bias += arm * turned;
+        }
+        if let (Some(spread_m), 1) = (&imperfections.imaging_m, index) {
+            let in_phantom = Matrix3::from_diagonal(&spread_m.component_mul(spread_m));
+            covariance += turn * in_phantom * turn.inverse();
+        }
+        let along = exit.rotation * Vector3::z();
+        let across = Matrix3::identity() - along * along.transpose();
+        if let Some(needle) = &imperfections.needle {
+            let [depth_m, length_m] = [case.depths_m()[index], case.depths_m()[1]];
+            let bent_m = needle.side_force_n * needle.compliance_m_per_n(depth_m, length_m);
+            covariance += across * (0.5 * bent_m * bent_m);
+        }
+        if let Some(indentation) = &imperfections.indentation {
+            bias -= along * indentation.mean_m[index];
+            covariance += along * along.transpose() * indentation.spread_m[index].powi(2);
+        }
         if let Some(breathing) = &imperfections.breathing {
-            let place = case.place.copied().unwrap_or_else(Pose::identity);
             let amplitude = [breathing.skin_m, breathing.target_m][index];
             let moved = place.rotation * amplitude;
             let (mean, variance) = breath_moments(breathing);
@@ -69,9 +112,7 @@ pub(super) fn moments(
             let lever = case.depths_m()[index] / case.cell.tool.guide_length_m();
             // Variance of one coordinate of a uniform disc: a quarter of the radius squared.
             let variance = (0.5 * clearance_m).powi(2) / 4.0;
-            let across = variance * ((1.0 + lever).powi(2) + lever.powi(2));
-            let along = exit.rotation * Vector3::z();
-            covariance += (Matrix3::identity() - along * along.transpose()) * across;
+            covariance += across * (variance * ((1.0 + lever).powi(2) + lever.powi(2)));
         }
         let bias = from_world * bias;
         let mut covariance = from_world * covariance * from_world.inverse();
@@ -109,7 +150,12 @@ fn mean_displacement(
 /// Errors of the joints at rest: real minus commanded, rad.
 struct JointErrors {
     bias: Joints,
+    /// Of all.
     covariance: Matrix6<f64>,
+    /// Of all but the gears.
+    rigid_covariance: Matrix6<f64>,
+    /// Standard deviation of each joint's twist, rad.
+    sag_spread: Joints,
 }
 
 impl JointErrors {
@@ -123,20 +169,18 @@ impl JointErrors {
         let mut bias = Joints::zeros();
         let mut covariance = Matrix6::zeros();
         let believed = case.servo.dynamics.gravity_torque(target);
-        let compliance = truth.actuation.compliance_rad_per_nm;
+        let gears = &truth.actuation.gears;
         let real = truth.dynamics(case.cell);
         // The weight of the arm where it has sagged to.
         let upright = real.gravity_torque(target);
-        let load = real.gravity_torque(&(target - compliance.component_mul(&upright)));
+        let load = real.gravity_torque(&(target - gears.twist_rad(&upright)));
         // What a torque that the controller does not know does: servo and gear in series.
-        let yields = kp.map(f64::recip) + compliance;
+        let yields = kp.map(f64::recip) + gears.slope_rad_per_nm(&load);
         let unknown = load - believed;
-        bias -=
-            unknown.component_div(&kp) + truth.actuation.compliance_rad_per_nm.component_mul(&load);
-        if let Some((compliance, spread)) = imperfections.elasticity {
-            let sag = compliance.component_mul(&load) * spread;
-            covariance += Matrix6::from_diagonal(&sag.component_mul(&sag));
-        }
+        let sag = gears.twist_rad(&load);
+        bias -= unknown.component_div(&kp) + sag;
+        let elasticity = imperfections.elasticity.as_ref();
+        let sag_spread = sag * elasticity.map_or(0.0, |each| each.spread);
         if let Some(payload) = imperfections.payload {
             let mut column = |body: needlebench_kinematics::Body| {
                 let other = Truth {
@@ -181,7 +225,12 @@ impl JointErrors {
                 covariance += jitter.covariance();
             }
         }
-        Self { bias, covariance }
+        Self {
+            bias,
+            covariance: covariance + Matrix6::from_diagonal(&sag_spread.component_mul(&sag_spread)),
+            rigid_covariance: covariance,
+            sag_spread,
+        }
     }
 
     /// Deviations along the principal axes of the covariance, one standard deviation each.
@@ -189,6 +238,49 @@ impl JointErrors {
         let eigen = SymmetricEigen::new(self.covariance);
         std::array::from_fn(|k| eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt())
     }
+}
+
+/// Poses of the joints' origins at a posture, world.
+fn world_from_origins(case: &BudgetCase<'_>, q: &Joints) -> [Pose; JOINT_COUNT] {
+    let robot = &case.cell.robot;
+    let links = robot.world_from_links(q);
+    std::array::from_fn(|i| {
+        let parent = if i == 0 {
+            robot.world_from_base_link
+        } else {
+            links[i - 1]
+        };
+        parent * robot.chain.joints[i].parent_from_joint
+    })
+}
+
+/// Covariance of a point under gears of uncertain compliance, world: of each joint what its twist does,
+/// less what a calibration has taken of it for geometry.
+fn elasticity(
+    case: &BudgetCase<'_>,
+    imperfections: &Imperfections,
+    sag_spread: &Joints,
+    jacobian: &Matrix3x6<f64>,
+    q: &Joints,
+    point: &Point3<f64>,
+) -> Matrix3<f64> {
+    let Some(elasticity) = &imperfections.elasticity else {
+        return Matrix3::zeros();
+    };
+    let origins = world_from_origins(case, q);
+    let columns = (0..JOINT_COUNT).map(|joint| {
+        let sags: Vector3<f64> = jacobian.column(joint) * sag_spread[joint];
+        let taken = elasticity
+            .absorbed
+            .as_ref()
+            .map_or_else(Vector3::zeros, |absorbed| {
+                let taken = &absorbed[joint];
+                let moved = (0..JOINT_COUNT).map(|i| moved_by(&origins[i], &taken[i], point));
+                moved.sum::<Vector3<f64>>() * elasticity.spread
+            });
+        sags + taken
+    });
+    columns.map(|column| column * column.transpose()).sum()
 }
 
 /// Second-order part of the mean, and covariance, of a point under a population of arms, world.
@@ -199,15 +291,7 @@ fn calibration(
     point: &Point3<f64>,
 ) -> (Vector3<f64>, Matrix3<f64>) {
     let robot = &case.cell.robot;
-    let links = robot.world_from_links(q);
-    let origins: [Pose; JOINT_COUNT] = std::array::from_fn(|i| {
-        let parent = if i == 0 {
-            robot.world_from_base_link
-        } else {
-            links[i - 1]
-        };
-        parent * robot.chain.joints[i].parent_from_joint
-    });
+    let origins = world_from_origins(case, q);
     let in_flange = robot.world_from_flange(q).inverse() * point;
     let at = |deviations: &[nalgebra::Vector6<f64>; JOINT_COUNT]| -> Point3<f64> {
         let chain = ArmPopulation::moved(&robot.chain, deviations);
@@ -258,8 +342,13 @@ fn breath_moments(breathing: &Breathing) -> (f64, f64) {
             })
             .sum()
     };
-    let first = mean(&FOURTH);
-    (first, (mean(&EIGHTH) - first * first).max(0.0))
+    // Holds that fail are at any phase.
+    let any = |series: &[f64; 5]| {
+        let failed = breathing.hold_failure;
+        (1.0 - failed) * mean(series) + failed * series[0]
+    };
+    let first = any(&FOURTH);
+    (first, (any(&EIGHTH) - first * first).max(0.0))
 }
 
 #[cfg(test)]
@@ -271,13 +360,14 @@ mod tests {
 
     #[test]
     fn moments_of_the_breath_are_those_of_a_quadrature() {
-        for phase_spread in [Some(0.08), Some(0.3), None] {
+        for (phase_spread, hold_failure) in [(Some(0.08), 0.0), (Some(0.3), 0.0), (None, 0.0)] {
             let breathing = Breathing {
                 skin_m: Vector3::zeros(),
                 target_m: Vector3::zeros(),
                 period_s: 4.0,
                 phase: 0.1,
                 phase_spread,
+                hold_failure,
             };
             let (mut weight, mut first, mut second) = (0.0, 0.0, 0.0);
             let steps = 200_000;
@@ -301,5 +391,24 @@ mod tests {
             assert!((mean - first).abs() < QUADRATURE, "{mean} {first}");
             assert!((variance - (second - first * first)).abs() < QUADRATURE);
         }
+    }
+
+    /// `sin^4` of a uniform phase has mean 3/8 and mean square 35/128: a mixture is between.
+    #[test]
+    fn holds_that_fail_mix_in_every_phase() {
+        let breathing = |hold_failure| Breathing {
+            skin_m: Vector3::zeros(),
+            target_m: Vector3::zeros(),
+            period_s: 4.0,
+            phase: 0.0,
+            phase_spread: Some(0.0),
+            hold_failure,
+        };
+        // Held exactly at the end of expiration there is no motion; a tenth fails.
+        let (mean, variance) = breath_moments(&breathing(0.1));
+        assert!((mean - 0.0375).abs() < QUADRATURE);
+        assert!((variance - (0.1 * 35.0 / 128.0 - 0.0375_f64.powi(2))).abs() < QUADRATURE);
+        let (mean, _) = breath_moments(&breathing(0.0));
+        assert!(mean.abs() < QUADRATURE);
     }
 }

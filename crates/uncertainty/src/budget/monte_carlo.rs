@@ -46,7 +46,7 @@ pub(super) fn moments(
         let settled = settle(case.servo, &real, &truth, friction.as_ref(), &target)?;
         let position = settled.position + trembling;
         let needle = truth.needle_points(case.cell, &position, depths_m);
-        let wanted = [truth.entry(&planned[0]), truth.target(&planned[1])];
+        let wanted = truth.wanted(case.goal, &planned);
         for ((errors, needle), wanted) in errors.iter_mut().zip(needle).zip(wanted) {
             errors.push(from_world * (needle - wanted));
         }

@@ -1,7 +1,7 @@
 //! The two ways to the error budget agree.
 
 use crate::common::{ALL, POSTURES, imperfect, motion_to, servo};
-use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, budget};
+use needlebench_uncertainty::budget::{BudgetCase, ErrorBudget, Samples, budget};
 
 /// Samples of the figure that is held: 10 000.
 const SAMPLES: usize = 10_000;
@@ -31,6 +31,10 @@ fn budgets(blocks: &str, samples: usize) -> Vec<ErrorBudget> {
                 trajectory: &trajectory,
                 timestep_s: 1e-3,
             };
+            let samples = Samples {
+                total: samples,
+                each_source: samples,
+            };
             budget(&case, samples, 5).expect("the markers are sound and the drives strong enough")
         })
         .collect()
@@ -39,7 +43,7 @@ fn budgets(blocks: &str, samples: usize) -> Vec<ErrorBudget> {
 #[test]
 fn jacobians_and_ten_thousand_draws_agree_for_every_source_and_for_all() {
     for (posture, budget) in budgets(ALL, SAMPLES).iter().enumerate() {
-        assert_eq!(budget.sources.len(), 8);
+        assert_eq!(budget.sources.len(), 13);
         for each in budget.sources.iter().chain([&budget.total]) {
             for (place, point) in [("skin", each.at_skin), ("target", each.at_target)] {
                 let what = format!("posture {posture}, {:?} at the {place}", each.source);

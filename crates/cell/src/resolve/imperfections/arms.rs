@@ -8,7 +8,7 @@ use needlebench_kinematics::{Chain, JOINT_COUNT, Pose, UrGeometry, UrModel};
 
 use crate::arm::data::{ArmData, PopulationData};
 use crate::files::{Location, ModelSource};
-use crate::scenario::CalibrationBlock;
+use crate::scenario::{ArmClass, CalibrationBlock};
 use crate::toml_text::TomlText;
 use crate::{Arm, Calibration, Finding, Robot, nearest_name};
 
@@ -42,6 +42,14 @@ impl ArmPopulation {
                 .collect()
         };
         Self { mean, modes }
+    }
+
+    /// The same spread about no deviation at all: what a calibration leaves.
+    fn about_none(self) -> Self {
+        Self {
+            mean: [Vector6::zeros(); JOINT_COUNT],
+            ..self
+        }
     }
 
     /// Deviations for the weights of the modes.
@@ -131,7 +139,12 @@ pub(crate) fn resolve_calibration(
     };
     let (deviations, sources): (Vec<_>, Vec<_>) = arms.into_iter().unzip();
     Ok(RealArms {
-        population: ArmPopulation::of(&deviations, block.scale),
+        population: match block.class {
+            ArmClass::NominalKinematics => ArmPopulation::of(&deviations, block.scale),
+            ArmClass::FactoryCalibrated | ArmClass::CalibratedHere => {
+                ArmPopulation::of(&deviations, block.scale * block.residual).about_none()
+            }
+        },
         sources,
         notes,
     })

@@ -1,20 +1,29 @@
 //! Imperfections in SI units, with what they name read.
 
+mod absorbed;
 mod arms;
+mod gears;
+mod real;
 
-use nalgebra::{Point3, Vector3};
-use needlebench_kinematics::Joints;
+use nalgebra::{Point3, Vector3, Vector6};
+use needlebench_kinematics::{JOINT_COUNT, Joints};
 
+pub(crate) use absorbed::absorbed_sag;
 pub use arms::ArmPopulation;
 pub(crate) use arms::{RealArms, resolve_calibration};
+pub use gears::GearTwist;
+pub use real::Expected;
+pub(crate) use real::RealThings;
 
 pub use super::arm_values::JointFriction;
-use super::arm_values::{gear_compliance, joint_friction, set_point_period_ms};
+pub(crate) use super::arm_values::gear_twist;
+use super::arm_values::{joint_friction, set_point_period_ms};
 use crate::files::ModelSource;
-pub use crate::scenario::CalibrationBlock;
-use crate::scenario::ImperfectionsSection;
+pub use crate::scenario::{ArmClass, BreathState, CalibrationBlock};
+use crate::scenario::{ImperfectionsSection, NeedleBlock};
 use crate::toml_text::TomlText;
-use crate::{Finding, Robot};
+use crate::{Finding, Robot, Tool};
+use std::sync::Arc;
 
 /// The imperfections in SI units, with what they name resolved.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,8 +34,8 @@ pub struct Imperfections {
     pub calibration: Option<ArmPopulation>,
     /// Encoders.
     pub encoder: Option<EncoderSpread>,
-    /// Compliance of the gears, rad/(N m), and its relative standard deviation.
-    pub elasticity: Option<(Joints, f64)>,
+    /// Twist of the gears.
+    pub elasticity: Option<Elasticity>,
     /// Error of the believed tool.
     pub payload: Option<PayloadSpread>,
     /// Friction as the controller believes it.
@@ -37,12 +46,83 @@ pub struct Imperfections {
     pub control: Option<[f64; 3]>,
     /// Diametral clearance of the needle in its guide, m.
     pub guide_clearance_m: Option<f64>,
+    /// Place of the robot's base.
+    pub hand_eye: Option<HandEye>,
     /// Markers in the phantom frame and root mean square localisation error, m.
     pub registration: Option<(Vec<Point3<f64>>, f64)>,
+    /// Motion of the markers.
+    pub skin_markers: Option<SkinMarkers>,
+    /// Standard deviation of the target in the image along the phantom's axes, m.
+    pub imaging_m: Option<Vector3<f64>>,
+    /// Bending of the needle.
+    pub needle: Option<NeedleBending>,
+    /// Motion of skin and target along the insertion.
+    pub indentation: Option<Indentation>,
     /// Breathing.
     pub breathing: Option<Breathing>,
     /// Files that were read.
     pub sources: Vec<ModelSource>,
+}
+
+/// Deviations of joint origins: translation (m) and rotation vector (rad) per joint.
+pub type OriginDeviations = [Vector6<f64>; JOINT_COUNT];
+
+/// Elasticity of the gears.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Elasticity {
+    /// How they twist.
+    pub gears: GearTwist,
+    /// Relative standard deviation of each joint's compliance.
+    pub spread: f64,
+    /// What a calibration that was measured on the sagging arm took for geometry, by the joint that
+    /// sagged; none if there was no such calibration.
+    pub absorbed: Option<Arc<[OriginDeviations; JOINT_COUNT]>>,
+}
+
+/// Error of the robot's base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HandEye {
+    /// Standard deviation along each axis, m.
+    pub translation_m: f64,
+    /// Standard deviation about each axis, rad, about the phantom's origin.
+    pub rotation_rad: f64,
+}
+
+/// Markers that move with the skin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkinMarkers {
+    /// The markers, phantom frame.
+    pub markers_m: Vec<Point3<f64>>,
+    /// Standard deviation of each along each axis, m.
+    pub shift_m: f64,
+    /// Their common motion.
+    pub breathing: Breathing,
+}
+
+/// Bending of the needle under a force across its tip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NeedleBending {
+    /// Root mean square of the force, N.
+    pub side_force_n: f64,
+    /// Flexural rigidity, N m^2.
+    pub rigidity_nm2: f64,
+}
+
+impl NeedleBending {
+    /// Deflection per force at a depth of a needle that is held at depth 0 and ends at `length_m`, m/N:
+    /// `s^2 (3 L - s) / (6 E I)`.
+    pub fn compliance_m_per_n(&self, depth_m: f64, length_m: f64) -> f64 {
+        depth_m * depth_m * (3.0 * length_m - depth_m) / (6.0 * self.rigidity_nm2)
+    }
+}
+
+/// Motion of skin and target along the insertion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Indentation {
+    /// Mean, of skin and target, m.
+    pub mean_m: [f64; 2],
+    /// Standard deviation, of skin and target, m.
+    pub spread_m: [f64; 2],
 }
 
 /// Encoders, rad.
@@ -82,6 +162,8 @@ pub struct Breathing {
     pub phase: f64,
     /// Standard deviation of the phase; none if it is uniform.
     pub phase_spread: Option<f64>,
+    /// Share of breaths whose phase is uniform all the same.
+    pub hold_failure: f64,
 }
 
 /// Samples of the Monte Carlo in a run unless the scenario says.
@@ -94,11 +176,40 @@ pub(crate) fn resolve_imperfections(
     section: &ImperfectionsSection,
     robot: &Robot,
     arms: Option<&RealArms>,
-    bore_clearance_m: f64,
+    elasticity: Option<Elasticity>,
+    tool: &Tool,
     timestep_ms: f64,
 ) -> Result<Imperfections, Finding> {
+    let bore_clearance_m = tool.bore_m - tool.needle.outer_diameter_m;
     let joints = Joints::from_column_slice;
-    let elasticity = section.elasticity.as_ref();
+    let breathing = section.breathing.as_ref().map(|block| Breathing {
+        skin_m: Vector3::from(block.skin_mm) * 1e-3,
+        target_m: Vector3::from(block.target_mm) * 1e-3,
+        period_s: block.period_s,
+        phase: block.phase,
+        phase_spread: (!block.free).then_some(block.phase_spread),
+        hold_failure: block.hold_failure,
+    });
+    let registration = section.registration.as_ref().map(|block| {
+        let markers = block.markers_mm.iter();
+        let markers = markers.map(|mm| Point3::from(Vector3::from(*mm) * 1e-3));
+        (
+            markers.collect::<Vec<_>>(),
+            block.localisation_error_mm * 1e-3,
+        )
+    });
+    let skin_markers = section.skin_markers.as_ref().zip(registration.as_ref());
+    let skin_markers = skin_markers
+        .zip(breathing)
+        .map(|((block, (markers, _)), breathing)| SkinMarkers {
+            markers_m: markers.clone(),
+            shift_m: block.shift_mm * 1e-3,
+            breathing: Breathing {
+                phase: 0.0,
+                phase_spread: breathing.phase_spread.map(|_| block.phase_spread),
+                ..breathing
+            },
+        });
     let friction = section.friction.as_ref();
     let control = section.control.as_ref();
     Ok(Imperfections {
@@ -109,9 +220,7 @@ pub(crate) fn resolve_imperfections(
             noise_rad: joints(&block.noise_deg.map(f64::to_radians)),
             zero_spread_rad: joints(&block.zero_spread_deg.map(f64::to_radians)),
         }),
-        elasticity: elasticity
-            .map(|block| Ok((gear_compliance(toml, block, robot)?, block.spread)))
-            .transpose()?,
+        elasticity,
         payload: section.payload.as_ref().map(|block| PayloadSpread {
             mass_error_kg: block.mass_error_kg,
             mass_spread_kg: block.mass_spread_kg,
@@ -136,18 +245,52 @@ pub(crate) fn resolve_imperfections(
                 .diametral_clearance_mm
                 .map_or(bore_clearance_m, |mm| mm * 1e-3)
         }),
-        registration: section.registration.as_ref().map(|block| {
-            let markers = block.markers_mm.iter();
-            let markers = markers.map(|mm| Point3::from(Vector3::from(*mm) * 1e-3));
-            (markers.collect(), block.localisation_error_mm * 1e-3)
+        hand_eye: section.hand_eye.as_ref().map(|block| HandEye {
+            translation_m: block.translation_mm * 1e-3,
+            rotation_rad: block.rotation_deg.to_radians(),
         }),
-        breathing: section.breathing.as_ref().map(|block| Breathing {
-            skin_m: Vector3::from(block.skin_mm) * 1e-3,
-            target_m: Vector3::from(block.target_mm) * 1e-3,
-            period_s: block.period_s,
-            phase: block.phase,
-            phase_spread: (!block.free).then_some(block.phase_spread),
+        registration,
+        skin_markers,
+        imaging_m: section.imaging.as_ref().map(|block| {
+            let reader = block.reader_mm * block.reader_mm;
+            Vector3::from(block.voxel_mm).map(|voxel| (voxel * voxel / 12.0 + reader).sqrt() * 1e-3)
         }),
+        needle: section
+            .needle
+            .as_ref()
+            .map(|block| needle_bending(toml, block, tool))
+            .transpose()?,
+        indentation: section.indentation.as_ref().map(|block| Indentation {
+            mean_m: [block.skin_mm, block.target_mm].map(|mm| mm * 1e-3),
+            spread_m: [block.skin_spread_mm, block.target_spread_mm].map(|mm| mm * 1e-3),
+        }),
+        breathing,
         sources: arms.map(|arms| arms.sources.clone()).unwrap_or_default(),
+    })
+}
+
+/// The needle as a beam.
+fn needle_bending(
+    toml: &TomlText<'_>,
+    block: &NeedleBlock,
+    tool: &Tool,
+) -> Result<NeedleBending, Finding> {
+    let (outer_m, bore_m) = (tool.needle.outer_diameter_m, block.bore_mm * 1e-3);
+    if bore_m >= outer_m {
+        return Err(toml
+            .finding(
+                "imperfections.needle.bore_mm",
+                format!(
+                    "a bore of {} mm leaves nothing of a needle of {:.3} mm",
+                    block.bore_mm,
+                    outer_m * 1e3
+                ),
+            )
+            .hint("0 for a needle with its stylet in"));
+    }
+    let area_moment_m4 = std::f64::consts::PI / 64.0 * (outer_m.powi(4) - bore_m.powi(4));
+    Ok(NeedleBending {
+        side_force_n: block.side_force_n,
+        rigidity_nm2: block.young_gpa * 1e9 * area_moment_m4,
     })
 }

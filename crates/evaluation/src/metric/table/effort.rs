@@ -30,7 +30,7 @@ pub(super) const EFFORT: &[Metric] = &[
     .ranked("motion_time_s")
     .pareto()
     .table(10, "motion\n(s)")
-    .page(2, "Motion"),
+    .page(13, "Motion"),
     Metric::new(
         "settling_time",
         "settling time",
@@ -56,7 +56,7 @@ pub(super) const EFFORT: &[Metric] = &[
     .better(Less, SHARE_RESOLUTION)
     .ranked("peak_torque_ratio")
     .show(Show::Percent)
-    .table(4, "torque\nof limit")
+    .engines(4, "torque\nof limit")
     .criterion("max_peak_torque_ratio", &[Dynamic], |criteria| {
         criteria.max_peak_torque_ratio
     }),
@@ -94,7 +94,7 @@ pub(super) const EFFORT: &[Metric] = &[
     .known(Value, ThisDraw, Simulated)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .table(3, "tracking\npeak"),
+    .engines(3, "tracking\npeak"),
 ];
 
 /// How far the engines are apart.
@@ -110,8 +110,8 @@ pub(super) const ENGINES_COMPARED: &[Metric] = &[
     .known(Value, ThisDraw, Simulated)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .table(1, "engines differ\npeak")
-    .page(1, "Engines apart")
+    .engines(1, "engines differ\npeak")
+    .page(21, "Engines apart")
     .criterion("max_engine_difference_peak_mm", &[Dynamic], |criteria| {
         criteria.max_engine_difference_peak_mm.map(|mm| mm * MM)
     })
@@ -127,8 +127,8 @@ pub(super) const ENGINES_COMPARED: &[Metric] = &[
     .known(Value, ThisDraw, Simulated)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .table(2, "\nsettled")
-    .summary(1, "Engines differ, settled")
+    .engines(2, "\nsettled")
+    .summary(6, "Engines differ, settled")
     .criterion("max_engine_difference_settled_mm", &[Dynamic], |criteria| {
         criteria.max_engine_difference_settled_mm.map(|mm| mm * MM)
     })

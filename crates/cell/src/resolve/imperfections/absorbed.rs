@@ -1,0 +1,169 @@
+//! What a calibration that is measured on a sagging arm takes for geometry.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3, Vector6};
+use needlebench_kinematics::random::SplitMix64;
+use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints, Pose};
+
+use super::{GearTwist, OriginDeviations};
+use crate::{Robot, Tool};
+
+/// Postures that the calibration is made from. Assumed; a few hundred are what kinematic calibrations take,
+/// and the fit changes little beyond.
+const POSTURES: usize = 200;
+
+/// What a radian of the flange's orientation counts beside a metre of its place, m: the reach of a tool.
+const LEVER_M: f64 = 0.2;
+
+/// Share of the largest eigenvalue below which a combination of deviations moves nothing: origins of
+/// parallel axes can slide along them.
+const REDUNDANT: f64 = 1e-9;
+
+/// Standard gravity, m/s^2, on an upright arm.
+const GRAVITY_M_S2: f64 = 9.80665;
+
+/// Origin deviations that fit best, over postures all round an upright arm, what the twist of each joint's
+/// gear does to the flange: one set for each joint that twists.
+///
+/// A calibration moves joint origins until the arm's model meets the measured poses, whatever moved these.
+/// What constant deviations can imitate of a sag that changes with the posture is in the calibration
+/// already; the rest is left to the sag. The fit is of least squares in place and orientation
+/// ([`LEVER_M`]), to first order, and the smallest of those that fit equally. `tool` is what the arm
+/// carried, if it did.
+pub(crate) fn absorbed_sag(
+    robot: &Robot,
+    tool: Option<&Tool>,
+    gears: &GearTwist,
+) -> [OriginDeviations; JOINT_COUNT] {
+    let chain = &robot.chain;
+    let mut bodies = robot.bodies;
+    if let Some(tool) = tool {
+        let carried = tool.body.transformed(&chain.wrist_3_from_flange);
+        bodies[JOINT_COUNT - 1] = bodies[JOINT_COUNT - 1].combined_with(&carried);
+    }
+    let dynamics = Dynamics {
+        chain: *chain,
+        bodies,
+        armature_kgm2: Joints::zeros(),
+        gravity_m_s2: Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
+    };
+    let mut random = SplitMix64::new(0x6361_6c69);
+    let size = 6 * JOINT_COUNT;
+    let mut normal = DMatrix::zeros(size, size);
+    let mut sides = DMatrix::zeros(size, JOINT_COUNT);
+    let mut seen = 0;
+    while seen < POSTURES {
+        let q = Joints::from_fn(|_, _| random.uniform(-std::f64::consts::PI, std::f64::consts::PI));
+        let links = chain.link_poses(&q);
+        let flange = chain.base_link_from_flange(&q).translation.vector;
+        // Nobody measures an arm that hangs over the edge of its table.
+        if flange.z < 0.0 {
+            continue;
+        }
+        seen += 1;
+        let twist = gears.twist_rad(&dynamics.gravity_torque(&q));
+        let jacobian = chain.jacobian_at(&q, &Vector3::zeros());
+        let mut rows = DMatrix::zeros(6, size);
+        for joint in 0..JOINT_COUNT {
+            let parent = if joint == 0 {
+                Pose::identity()
+            } else {
+                links[joint - 1]
+            };
+            let origin = parent * chain.joints[joint].parent_from_joint;
+            let local = origin.inverse_transform_point(&flange.into()).coords;
+            for axis in 0..3 {
+                let unit = Vector3::ith(axis, 1.0);
+                let along = origin.rotation * unit;
+                let swung = origin.rotation * unit.cross(&local);
+                let (slides, turns) = (6 * joint + axis, 6 * joint + 3 + axis);
+                rows.view_mut((0, slides), (3, 1)).copy_from(&along);
+                rows.view_mut((0, turns), (3, 1)).copy_from(&swung);
+                rows.view_mut((3, turns), (3, 1))
+                    .copy_from(&(along * LEVER_M));
+            }
+        }
+        for joint in 0..JOINT_COUNT {
+            let mut moved: Vector6<f64> = jacobian.column(joint) * -twist[joint];
+            moved.fixed_rows_mut::<3>(3).scale_mut(LEVER_M);
+            let mut side = sides.column_mut(joint);
+            side += rows.transpose() * DVector::from_column_slice(moved.as_slice());
+        }
+        normal += rows.transpose() * &rows;
+    }
+    let eigen = SymmetricEigen::new(normal);
+    let least = REDUNDANT * eigen.eigenvalues.amax();
+    let solved = eigen.eigenvectors.transpose() * sides;
+    let solved = DMatrix::from_fn(size, JOINT_COUNT, |row, joint| {
+        let value = eigen.eigenvalues[row];
+        if value > least {
+            solved[(row, joint)] / value
+        } else {
+            0.0
+        }
+    });
+    let solved = eigen.eigenvectors * solved;
+    std::array::from_fn(|sagging| {
+        std::array::from_fn(|joint| Vector6::from_fn(|row, _| solved[(6 * joint + row, sagging)]))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ArmPopulation;
+    use super::*;
+
+    fn gears() -> GearTwist {
+        GearTwist::linear(Joints::from(
+            [1e4, 1e4, 4.7e3, 2.7e3, 2.7e3, 2.7e3].map(f64::recip),
+        ))
+    }
+
+    fn sum(parts: &[OriginDeviations; JOINT_COUNT]) -> OriginDeviations {
+        std::array::from_fn(|joint| parts.iter().map(|part| part[joint]).sum())
+    }
+
+    /// Root mean square distance of the flange from where the controller has it, over other postures than
+    /// those of the fit: the whole non-linear arm, with its twist, under a chain that the controller
+    /// believes in.
+    fn rms_m(robot: &Robot, believed: &OriginDeviations) -> f64 {
+        let dynamics = Dynamics {
+            chain: robot.chain,
+            bodies: robot.bodies,
+            armature_kgm2: Joints::zeros(),
+            gravity_m_s2: Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
+        };
+        let believed = ArmPopulation::moved(&robot.chain, believed);
+        let mut random = SplitMix64::new(99);
+        let (mut total, mut count) = (0.0, 0.0);
+        while count < 500.0 {
+            let q = Joints::from_fn(|_, _| random.uniform(-3.0, 3.0));
+            let sagged = q - gears().twist_rad(&dynamics.gravity_torque(&q));
+            let real = robot
+                .chain
+                .base_link_from_flange(&sagged)
+                .translation
+                .vector;
+            if real.z < 0.0 {
+                continue;
+            }
+            total += (real - believed.base_link_from_flange(&q).translation.vector).norm_squared();
+            count += 1.0;
+        }
+        (total / count).sqrt()
+    }
+
+    #[test]
+    fn calibration_under_gravity_takes_a_part_of_the_sag_and_not_all() {
+        let robot = crate::load_robot(&crate::Overrides::default()).unwrap();
+        let none = [Vector6::zeros(); JOINT_COUNT];
+        let absorbed = sum(&absorbed_sag(&robot, None, &gears()));
+        let (before, after) = (rms_m(&robot, &none), rms_m(&robot, &absorbed));
+        assert!(after < 0.8 * before, "{before} {after}");
+        assert!(after > 0.0);
+        // It is a minimum: neither less nor more of it fits better.
+        for share in [0.8, 1.2] {
+            let other = absorbed.map(|each| each * share);
+            assert!(rms_m(&robot, &other) > after, "{share}");
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Imperfections of a scenario: those that are simulated, and those that the expected tip error is of.
+
+use std::path::Path;
+
+use super::{Elasticity, Imperfections, gear_twist, resolve_imperfections};
+use crate::resolve::library::ModelLibrary;
+use crate::scenario::{ArmClass, BreathState, ImperfectionsSection, Scenario};
+use crate::toml_text::TomlText;
+use crate::{Finding, Robot, Tool};
+
+/// What arm and patient the expected tip error is of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expected {
+    /// The class of arm; none where the scenario's own `[imperfections]` say it all.
+    pub class: Option<ArmClass>,
+    /// Whether the breath is held.
+    pub breath: BreathState,
+    /// How they differ from what the controller believes.
+    pub imperfections: Imperfections,
+}
+
+/// What imperfections are resolved with.
+pub(crate) struct RealThings<'a> {
+    pub toml: &'a TomlText<'a>,
+    pub library: &'a ModelLibrary,
+    pub robot: &'a Robot,
+    pub tool: &'a Tool,
+    pub base: &'a Path,
+    pub timestep_ms: f64,
+}
+
+impl RealThings<'_> {
+    /// The imperfections of a section.
+    pub fn resolve(
+        &self,
+        section: &ImperfectionsSection,
+        notes: &mut Vec<String>,
+    ) -> Result<Imperfections, Finding> {
+        let block = section.calibration.as_ref();
+        let arms = block.map(|block| {
+            self.library
+                .real_arms(self.toml, block, self.robot, self.base)
+        });
+        let arms = arms.transpose()?;
+        let elasticity = section.elasticity.as_ref().map(|elastic| {
+            let gears = gear_twist(self.toml, elastic, self.robot)?;
+            let measured = block.filter(|block| block.measured_under_gravity);
+            Ok(Elasticity {
+                absorbed: measured.map(|block| {
+                    let carried = block.class == ArmClass::CalibratedHere;
+                    let tool = carried.then_some(self.tool);
+                    self.library.absorbed_sag(self.robot, tool, &gears)
+                }),
+                gears,
+                spread: elastic.spread,
+            })
+        });
+        let resolved = resolve_imperfections(
+            self.toml,
+            section,
+            self.robot,
+            arms.as_deref(),
+            elasticity.transpose()?,
+            self.tool,
+            self.timestep_ms,
+        )?;
+        notes.extend(arms.iter().flat_map(|arms| arms.notes.iter().cloned()));
+        Ok(resolved)
+    }
+
+    /// What the expected tip error of a scenario is of: its own imperfections, else those of its class of
+    /// arm.
+    pub fn expected(
+        &self,
+        scenario: &Scenario,
+        own: Option<&Imperfections>,
+        notes: &mut Vec<String>,
+    ) -> Result<Option<Expected>, Finding> {
+        let section = &scenario.expected;
+        let is_calibrated = self.robot.calibration.is_some();
+        if section.arm == Some(ArmClass::CalibratedHere) && !is_calibrated {
+            let finding = self
+                .toml
+                .finding("expected.arm", "the scenario has no calibration");
+            return Err(finding.hint(
+                "`calibration` under [robot] or `--calibration FILE`; `factory_calibrated` is an arm \
+                 whose controller has the maker's",
+            ));
+        }
+        if let Some(own) = own {
+            if section.arm.is_some() {
+                let finding = self
+                    .toml
+                    .finding("expected.arm", "`arm` contradicts [imperfections]");
+                return Err(finding.hint(
+                    "the expected tip error is of the [imperfections]: `class` under \
+                     [imperfections.calibration] says what the controller knows",
+                ));
+            }
+            let free = own
+                .breathing
+                .is_some_and(|each| each.phase_spread.is_none());
+            return Ok(Some(Expected {
+                class: None,
+                breath: if free {
+                    BreathState::Free
+                } else {
+                    BreathState::Hold
+                },
+                imperfections: own.clone(),
+            }));
+        }
+        if scenario.goals.is_empty() {
+            return Ok(None);
+        }
+        let class = section.arm.unwrap_or(if is_calibrated {
+            ArmClass::CalibratedHere
+        } else {
+            ArmClass::FactoryCalibrated
+        });
+        let blocks = ImperfectionsSection::of_class(class, section.breath);
+        match self.resolve(&blocks, notes) {
+            Ok(imperfections) => Ok(Some(Expected {
+                class: Some(class),
+                breath: section.breath,
+                imperfections,
+            })),
+            // What the scenario itself asked for has to be possible.
+            Err(finding) if section.arm.is_some() => Err(finding),
+            Err(finding) => {
+                notes.push(format!("no expected tip error: {}", finding.message));
+                Ok(None)
+            }
+        }
+    }
+}
