@@ -46,3 +46,4 @@ pub use route::{RouteObstacles, needle_route};
 pub use sensitivity::tip_sensitivity;
 pub use stored::{StoredConfiguration, StoredReport};
 pub use threshold::{BEST, Compared, EVERY, Loss, Rate, Subject, Threshold, ThresholdError};
+pub use verdict::{UNCOMPARED, unmeasured_by};

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use comfy_table::{Cell, CellAlignment, Color, Table};
 use needlebench_engine::Engine;
 use needlebench_evaluation::iso9283::SUBJECT;
-use needlebench_evaluation::report::{GoalReport, Report, Status, Verdict};
+use needlebench_evaluation::report::{GoalReport, Report, Status};
 
 use super::budget::budget_text;
 use super::engine_headings::{EngineHeading, engine_headings};
@@ -14,6 +14,7 @@ use super::events::events_text;
 use super::plain_table;
 use super::ranking::comparison_text;
 use super::shown::{Shown, shown_metrics};
+use super::verdict::{capitals, counts, status};
 use crate::number::value_and_limit;
 
 /// The whole report as text; `engines` are those that there are, with their titles.
@@ -32,7 +33,7 @@ fn write_report(
     let headings = engine_headings(report, engines);
     for goal in &report.goals {
         writeln!(out, "{}", goal_heading(goal))?;
-        writeln!(out, "{}", goal_table(goal, &headings))?;
+        writeln!(out, "{}", goal_table(report, goal, &headings))?;
         writeln!(out, "* worst of those that work, < recommended")?;
         if let Some(comparison) = comparison_text(goal) {
             writeln!(out, "{comparison}")?;
@@ -86,13 +87,7 @@ fn write_report(
     for note in &report.notes {
         writeln!(out, "note: {note}")?;
     }
-    let failed = report.criteria.iter().filter(|result| !result.pass).count();
-    let verdict = match report.verdict {
-        Verdict::Pass => "PASS",
-        Verdict::Fail => "FAIL",
-    };
-    let count = report.criteria.len();
-    writeln!(out, "{verdict}: {} of {count} criteria met", count - failed)
+    writeln!(out, "{}: {}", capitals(report.verdict), counts(report))
 }
 
 fn goal_heading(goal: &GoalReport) -> String {
@@ -124,7 +119,7 @@ fn columns(engines: &[EngineHeading]) -> Vec<Column> {
 }
 
 /// The eight rows of a goal; the worst number of each column is marked with `*` and in colour.
-fn goal_table(goal: &GoalReport, headings: &[EngineHeading]) -> Table {
+fn goal_table(report: &Report, goal: &GoalReport, headings: &[EngineHeading]) -> Table {
     let columns = columns(headings);
     let mut header = vec!["configuration", "status"];
     header.extend(columns.iter().map(|column| column.heading.as_str()));
@@ -143,8 +138,11 @@ fn goal_table(goal: &GoalReport, headings: &[EngineHeading]) -> Table {
         };
         let status = match (configuration.status, configuration.rejections.first()) {
             (Status::Rejected, Some(first)) => Cell::new(first.rule).fg(Color::Yellow),
-            (Status::Failed, _) => Cell::new("failed").fg(Color::Red),
-            (status, _) => Cell::new(status.name()),
+            _ => match status(report, &goal.name, configuration) {
+                failed @ "failed" => Cell::new(failed).fg(Color::Red),
+                incomplete @ "incomplete" => Cell::new(incomplete).fg(Color::Yellow),
+                other => Cell::new(other),
+            },
         };
         let mut row = vec![
             if chosen {
