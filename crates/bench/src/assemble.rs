@@ -39,8 +39,8 @@ pub(crate) struct Results<'a> {
     pub budgets: &'a Budgets,
     /// By goal and configuration.
     pub adjudicated: &'a [Vec<Adjudicated>],
-    /// Several engines were to run, and none failed: their differences count.
-    pub all_engines_ran: bool,
+    /// Engines that were to measure everything.
+    pub engines: &'a [&'static str],
     pub failures: Vec<EngineFailure>,
     pub identities: Vec<EngineIdentity>,
     pub timings: BTreeMap<String, f64>,
@@ -53,6 +53,8 @@ pub(crate) struct Context<'a> {
     /// None where nobody asks for the room.
     pub room: Option<RoomModel<'a>>,
     pub events: &'a [EventRun],
+    /// Engines that were to measure everything.
+    pub engines: &'a [&'static str],
 }
 
 /// The report of a run.
@@ -63,6 +65,7 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         budgets: results.budgets,
         room: Some(RoomModel::new(resolved)),
         events: results.events,
+        engines: results.engines,
     };
     let mut goals: Vec<GoalReport> = results
         .plans
@@ -74,11 +77,11 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
             goal_report(&context, index, plan, runs, adjudicated)
         })
         .collect();
-    let (verdict, criteria) = judge(
+    let (verdict, judged) = judge(
         &mut goals,
         &resolved.goals,
         &resolved.scenario.criteria,
-        results.all_engines_ran,
+        results.engines,
     );
     for goal in &mut goals {
         rank_goal(goal, &resolved.scenario.ranking);
@@ -91,7 +94,8 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
             file: resolved.source.file.clone(),
         },
         verdict,
-        criteria,
+        criteria: judged.results,
+        not_judged: judged.not_judged,
         goals,
         iso9283: None,
         engine_failures: results.failures,
@@ -236,6 +240,7 @@ fn configuration_report(
     ConfigurationReport {
         label: plan.configuration.label(),
         status: Status::Rejected, // `judge` sets it
+        not_judged: 0,            // this too
         rejections: plan
             .rejections
             .iter()
@@ -284,7 +289,7 @@ fn configuration_report(
         events: events
             .iter()
             .find(|run| run.goal == goal_index && run.configuration == plan.configuration.index())
-            .map(|run| events_report(setup, plan, run)),
+            .map(|run| events_report(setup, plan, run, context.engines)),
         room: room
             .as_ref()
             .zip(candidate)

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use needlebench_cell::ResolvedScenario;
 use needlebench_clearance::ClearanceModel;
-use needlebench_engine::{Engine, EngineIdentity, EnginePool};
+use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::report::EngineFailure;
 use needlebench_planning::GoalPlan;
 
@@ -123,7 +123,7 @@ fn run_goals(
         events: &events,
         budgets: &budgets,
         adjudicated: &adjudications.by_goal,
-        all_engines_ran: engines.len() > 1 && failures.is_empty(),
+        engines: &engine_names(engines),
         failures,
         identities,
         timings: timings.all,

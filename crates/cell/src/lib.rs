@@ -38,7 +38,7 @@ pub use arm::{Arm, Recognition};
 pub use family::{Change, KeyPath, ScenarioFamily, Setting};
 pub use files::{ModelSource, PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};
-pub use limit::Limit;
+pub use limit::{Limit, digits_apart};
 pub use model::{
     AppliedCalibration, ArmInUse, ArmReport, BodyKind, BodyPair, Cell, ClearanceClass,
     CollisionBody, Frame, LeftOut, Link, LinkMember, Needle, NeedleCorridor, PairRule, Robot, Tool,

@@ -24,6 +24,9 @@ struct Content {
     /// A configuration that no longer works does not fail the comparison.
     #[serde(default)]
     allow_status_change: bool,
+    /// A goal, a configuration, a metric or cases that only the first result has do not fail the comparison.
+    #[serde(default)]
+    allow_lost: bool,
     /// Largest loss by metric, with its unit.
     #[serde(default)]
     max_loss: BTreeMap<String, String>,
@@ -56,6 +59,11 @@ impl ThresholdsFile {
     /// Whether a configuration that no longer works does not fail the comparison.
     pub fn allow_status_change(&self) -> bool {
         self.content.allow_status_change
+    }
+
+    /// Whether what only the first result has does not fail the comparison.
+    pub fn allow_lost(&self) -> bool {
+        self.content.allow_lost
     }
 
     /// Largest losses: metric and limit, as written.

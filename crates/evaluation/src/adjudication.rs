@@ -221,6 +221,13 @@ fn first_contact(recording: &Recording) -> Option<usize> {
         .position(|state| state.contact.count > 0)
 }
 
+const PEAK_TIP: &str = "engines.envelope.peak_tip_um";
+const JOINT_TORQUE: &str = "engines.envelope.joint_torque_nm";
+const SETTLED_TIP: &str = "engines.envelope.settled_tip_nm";
+
+/// What is judged of two motions that touch nothing.
+pub(crate) const WITHOUT_CONTACT: [&str; 3] = [PEAK_TIP, JOINT_TORQUE, SETTLED_TIP];
+
 /// Every quantity with the pair of engines that differs most in it.
 fn measured_over_pairs<'a>(
     cell: &Cell,
@@ -268,13 +275,13 @@ fn measured(
     let distance = |k: usize| (tip(&a.state[k]) - tip(&b.state[k])).norm();
     let mut found = vec![
         Measured::over(
-            "engines.envelope.peak_tip_um",
+            PEAK_TIP,
             envelope.peak_tip_um * 1e-6,
             "m",
             (0..free).map(|k| (a.time_s[k], distance(k), None)),
         ),
         Measured::over(
-            "engines.envelope.joint_torque_nm",
+            JOINT_TORQUE,
             envelope.joint_torque_nm,
             "N m",
             (0..free.min(a.steps()).min(b.steps())).map(|k| {
@@ -323,7 +330,7 @@ fn measured(
         ));
     } else if free == states {
         found.push(settled(
-            "engines.envelope.settled_tip_nm",
+            SETTLED_TIP,
             envelope.settled_tip_nm * 1e-9,
             "m",
             distance(last),

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::metric::{MetricKey, resolve};
 pub use crate::provenance::ProvenanceDifference;
 use crate::provenance::provenance_differences;
-use crate::report::SCHEMA_VERSION;
+use crate::report::{SCHEMA_VERSION, Verdict};
 use crate::stored::StoredReport;
 use crate::threshold::{EVERY, Subject, Threshold};
 
@@ -22,6 +22,8 @@ pub struct CompareOptions {
     pub thresholds: Vec<Threshold>,
     /// A configuration that no longer works does not fail the comparison.
     pub allow_status_change: bool,
+    /// A goal, a configuration or a metric that only the first has does not fail the comparison.
+    pub allow_lost: bool,
 }
 
 /// Two results side by side.
@@ -29,10 +31,15 @@ pub struct CompareOptions {
 pub struct Comparison {
     /// Version of the keys.
     pub schema_version: u32,
-    /// Whether nothing was lost beyond what is allowed.
+    /// `pass` where nothing was lost beyond what is allowed; `incomplete` where nothing is known to be
+    /// lost, but one of the two is not complete.
+    pub verdict: Verdict,
+    /// Whether the verdict is `pass`.
     pub pass: bool,
-    /// What was, if anything.
+    /// What was lost, if anything.
     pub failures: Vec<ComparisonFailure>,
+    /// Which of the two is not complete, and why.
+    pub incomplete: Vec<String>,
     /// The first result.
     pub a: Side,
     /// The second result.
@@ -52,7 +59,7 @@ pub struct Side {
     pub source: String,
     /// Name of its scenario.
     pub scenario: Option<String>,
-    /// `pass` or `fail`.
+    /// `pass`, `fail` or `incomplete`.
     pub verdict: Option<String>,
     /// Version of needlebench.
     pub version: Option<String>,
@@ -218,8 +225,9 @@ pub enum CompareError {
 ///
 /// Lost is what a metric got worse by. The comparison fails where a loss is more than a threshold
 /// allows for a configuration that worked and is not rejected now, where a metric with a threshold
-/// is no longer measured or never was, and, unless that is allowed, where a goal or configuration
-/// that worked is missing or does not.
+/// is no longer measured or never was; unless that is allowed where a configuration that worked does not;
+/// and, unless that is allowed, where a goal, a configuration, or a metric of one that works in both is
+/// missing in the second.
 ///
 /// # Errors
 /// If the goals cannot be matched.
@@ -240,6 +248,13 @@ pub fn compare(
     if !options.allow_status_change {
         failures.extend(status_failures(&goals));
     }
+    if !options.allow_lost {
+        failures.extend(lost(&goals));
+    }
+    let incomplete: Vec<String> = [a, b]
+        .into_iter()
+        .filter_map(StoredReport::incomplete)
+        .collect();
     let mut notes = former_notes(a, b);
     let mut metrics = goals
         .iter()
@@ -254,10 +269,13 @@ pub fn compare(
         notes.extend(threshold.note.clone());
         notes.extend(found.note);
     }
+    let verdict = Verdict::of(!failures.is_empty(), !incomplete.is_empty());
     Ok(Comparison {
         schema_version: SCHEMA_VERSION,
-        pass: failures.is_empty(),
+        verdict,
+        pass: verdict == Verdict::Pass,
         failures,
+        incomplete,
         a: side(a),
         b: side(b),
         provenance_differences: provenance_differences(a, b),
@@ -483,36 +501,83 @@ fn compare_metric(key: &MetricKey, a: Option<f64>, b: Option<f64>) -> Option<Met
     })
 }
 
+/// Configurations that do worse.
 fn status_failures(goals: &[GoalComparison]) -> Vec<ComparisonFailure> {
     let mut failures = Vec::new();
     for goal in goals {
-        let mut fail = |label: Option<&str>, detail: String| {
+        for each in goal
+            .configurations
+            .iter()
+            .filter(|each| each.status == Change::Worse)
+        {
+            let before = each.status_a.as_deref().unwrap_or("missing");
+            let now = each.status_b.as_deref().unwrap_or("missing");
+            let why = each.rejection_b.as_ref();
+            let why = why.map_or(String::new(), |why| format!(" ({why})"));
+            failures.push(ComparisonFailure {
+                goal: Some(goal.name().to_owned()),
+                label: Some(each.label.clone()),
+                metric: None,
+                detail: format!("was {before}, is {now}{why}"),
+            });
+        }
+    }
+    failures
+}
+
+/// Metrics that a failure names; the rest are counted.
+const MOST_NAMED: usize = 6;
+
+/// Goals, configurations, and metrics of configurations that work in both, that the second does not have.
+fn lost(goals: &[GoalComparison]) -> Vec<ComparisonFailure> {
+    let mut failures = Vec::new();
+    for goal in goals {
+        let mut fail = |label: Option<&str>, metric: Option<&str>, detail: String| {
             failures.push(ComparisonFailure {
                 goal: Some(goal.name().to_owned()),
                 label: label.map(str::to_owned),
-                metric: None,
+                metric: metric.map(str::to_owned),
                 detail,
             });
         };
         if goal.b.is_none() {
-            fail(None, "the goal is missing in the second result".to_owned());
+            fail(
+                None,
+                None,
+                "the goal is missing in the second result".to_owned(),
+            );
             continue;
         }
         for each in &goal.configurations {
-            let before = each.status_a.as_deref().unwrap_or("missing");
-            match each.status {
-                Change::Worse => {
-                    let now = each.status_b.as_deref().unwrap_or("missing");
-                    let why = each.rejection_b.as_ref();
-                    let why = why.map_or(String::new(), |why| format!(" ({why})"));
-                    fail(Some(&each.label), format!("was {before}, is {now}{why}"));
-                }
-                // A rejected one that is no longer listed is no loss.
-                Change::Lost if standing(before) > 0 => {
-                    fail(Some(&each.label), format!("was {before}, is missing"));
-                }
-                _ => {}
+            let label = Some(each.label.as_str());
+            if each.status == Change::Lost {
+                let before = each.status_a.as_deref().unwrap_or("missing");
+                fail(label, None, format!("was {before}, is missing"));
+                continue;
             }
+            // What is rejected is measured as far as it came, which is no loss of its own.
+            let works =
+                |status: &Option<String>| status.as_deref().is_some_and(|it| standing(it) > 0);
+            if !works(&each.status_a) || !works(&each.status_b) {
+                continue;
+            }
+            let is_lost = |found: &&MetricComparison| found.outcome == Change::Lost;
+            let keys: Vec<&str> = each
+                .metrics
+                .iter()
+                .filter(is_lost)
+                .map(|found| &*found.metric)
+                .collect();
+            if keys.is_empty() {
+                continue;
+            }
+            let named = keys[..keys.len().min(MOST_NAMED)].join(", ");
+            let more = match keys.len().saturating_sub(MOST_NAMED) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            let only = (keys.len() == 1).then(|| keys[0]);
+            fail(label, only, format!("no longer measured: {named}{more}"));
         }
     }
     failures
@@ -575,7 +640,7 @@ fn threshold_failures(goals: &[GoalComparison], threshold: &Threshold) -> Held {
                     "{words}: {} to {}, worse by {}, allowed {}",
                     text(first),
                     text(second),
-                    text(loss),
+                    threshold.loss_text(loss, first),
                     threshold.text
                 )
             }

@@ -4,9 +4,10 @@ use needlebench_cell::Limit;
 use needlebench_cell::scenario::CriteriaSection;
 use needlebench_cell::study::StudyMode;
 
-use crate::adjudication::sentence;
+use crate::adjudication::{WITHOUT_CONTACT, sentence};
 use crate::metric::{Better, Criterion, Metric, Missing, Source, metrics};
-use crate::report::{ConfigurationReport, CriterionResult, EngineReport};
+use crate::report::{ConfigurationReport, CriterionResult, EngineReport, Judged, NotJudged};
+use crate::verdict::{UNCOMPARED, unmeasured_by};
 
 /// A criterion on a value.
 struct Checked<'a> {
@@ -96,16 +97,16 @@ fn of_configuration<'a>(
 
 /// Checks a configuration that works against all criteria; a run's are those of a dynamic case.
 ///
-/// Values of the engines are checked for each engine that ran, clearances over all of them and by
-/// their proven lower bounds. What engines differ by is checked where `compared` says that all of them
-/// ran.
+/// Values of the engines are checked for each of `engines`, those that were to measure it; clearances
+/// over all of them and by their proven lower bounds; what engines differ by where there are several of
+/// them. What was to be measured and was not is not judged.
 pub fn check_configuration(
     goal: &str,
     configuration: &ConfigurationReport,
     criteria: &CriteriaSection,
     mode: StudyMode,
-    compared: bool,
-) -> Vec<CriterionResult> {
+    engines: &[&str],
+) -> Judged {
     let result = |checked: Checked<'_>| CriterionResult {
         goal: goal.to_owned(),
         label: Some(configuration.label.to_owned()),
@@ -121,19 +122,94 @@ pub fn check_configuration(
             criteria,
         ),
     };
-    let of_engines = of_engines(configuration, criteria, mode).map(result);
-    let mut results: Vec<CriterionResult> = of_engines.collect();
+    let missing = |engine: Option<&str>, criterion: &str, reason: String| NotJudged {
+        goal: goal.to_owned(),
+        label: Some(configuration.label.to_owned()),
+        engine: engine.map(str::to_owned),
+        criterion: criterion.to_owned(),
+        reason,
+    };
+    let mut judged = Judged::default();
+    for checked in of_engines(configuration, criteria, mode) {
+        let never = checked.criterion.missing == Missing::Never;
+        let result = result(checked);
+        if never && result.value.is_none() {
+            judged.results.push(result);
+        } else {
+            judged.add(result, || "it has no value".to_owned());
+        }
+    }
+    let unmeasured = |name: &&&str| !configuration.engines.contains_key(**name);
+    let absent: Vec<&str> = engines.iter().filter(unmeasured).copied().collect();
+    for name in &absent {
+        let of_engine = limits(criteria, mode)
+            .filter(|(metric, ..)| matches!(metric.source, Source::Engines(_)))
+            .map(|(_, criterion, _)| criterion.key);
+        // Even without a limit on what it measures it was to show that the motion can be made.
+        let keys: Vec<&str> = of_engine.collect();
+        let keys = if keys.is_empty() {
+            vec!["measured"]
+        } else {
+            keys
+        };
+        let reason = || unmeasured_by(name);
+        let all = keys.iter().map(|key| missing(Some(name), key, reason()));
+        judged.not_judged.extend(all);
+    }
     let (of_both, others): (Vec<_>, Vec<_>) = of_configuration(configuration, criteria, mode)
-        .partition(|checked| checked.criterion.missing == Missing::FailsIfCompared);
-    if compared {
-        results.extend(of_both.into_iter().map(result));
-        results.extend(within_envelope(goal, configuration));
+        .partition(|checked| checked.criterion.missing == Missing::UnjudgedIfCompared);
+    if engines.len() > 1 {
+        for checked in of_both {
+            judged.add(result(checked), || UNCOMPARED.to_owned());
+        }
+        if configuration.adjudication.is_none() {
+            let all = WITHOUT_CONTACT.map(|key| missing(None, key, UNCOMPARED.to_owned()));
+            judged.not_judged.extend(all);
+        }
+        let of_envelope = within_envelope(goal, configuration);
+        judged.results.extend(of_envelope);
     }
-    results.extend(others.into_iter().map(result));
+    for checked in others {
+        judged.add(result(checked), || match &configuration.budget_failure {
+            Some(failure) => format!("there is no error budget: {failure}"),
+            None => "it was not measured".to_owned(),
+        });
+    }
+    if configuration.engines.is_empty() && !absent.is_empty() {
+        // What is known of the plan was to be judged by the simulated motion.
+        for key in planned_alone(configuration, criteria, mode) {
+            judged
+                .not_judged
+                .push(missing(None, key, "no engine measured it".to_owned()));
+        }
+    }
     if let Some(events) = &configuration.events {
-        results.extend(events.checks.iter().cloned());
+        judged.extend(events.checks.clone());
     }
-    results
+    judged
+}
+
+/// Keys of criteria that are skipped where nothing is measured, but could be judged in another mode: there
+/// is something to measure.
+fn planned_alone(
+    configuration: &ConfigurationReport,
+    criteria: &CriteriaSection,
+    mode: StudyMode,
+) -> Vec<&'static str> {
+    let mut keys: Vec<&'static str> = limits(criteria, mode)
+        .filter(|(metric, criterion, _)| {
+            let is_known = |other: &&Metric| other.read(configuration).is_some();
+            matches!(metric.source, Source::Configuration(_))
+                && criterion.missing == Missing::Skips
+                && metric.read(configuration).is_none()
+                && metrics()
+                    .filter(|other| other.family == metric.family)
+                    .any(|other| is_known(&other))
+        })
+        .map(|(_, criterion, _)| criterion.key)
+        .collect();
+    keys.dedup();
+    keys
 }
 
 /// The envelope that the scenario sets for the engines' difference.

@@ -15,7 +15,7 @@ pub use press::{PressEngineReport, PressReport, measure_press, press_difference}
 pub use retract::{RetractionEngineReport, measure_retraction};
 pub use stop::{StopEngineReport, measure_stop};
 
-use crate::report::CriterionResult;
+use crate::report::Judged;
 
 /// Events of one configuration.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
@@ -26,9 +26,9 @@ pub struct EventsReport {
     pub stop: Option<StopReport>,
     /// The way back, by engine; empty if the scenario does not ask for it.
     pub retract: BTreeMap<String, RetractionEngineReport>,
-    /// What was judged; in the report's own list of criteria.
+    /// What was judged and what was to be; in the report's own lists of criteria.
     #[serde(skip)]
-    pub checks: Vec<CriterionResult>,
+    pub checks: Judged,
 }
 
 /// A stop on the way in.

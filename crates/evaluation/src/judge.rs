@@ -7,86 +7,106 @@ use needlebench_kinematics::ik::Configuration;
 
 use crate::check_configuration;
 use crate::report::{
-    ConfigurationReport, CriterionResult, GoalReport, RouteReport, Status, Verdict,
+    ConfigurationReport, CriterionResult, GoalReport, Judged, NotJudged, RouteReport, Status,
+    Verdict,
 };
 
 /// Criterion of the margins that the planned needle keeps, and the rule that rejects where it does not.
 const NEEDLE_ROUTE: &str = "needle_route";
 
-/// Judges all configurations of all goals: sets each status, and returns the verdict with every
-/// criterion that was checked.
+/// Judges all configurations of all goals: sets each status, and returns every criterion that was
+/// judged or was to be. `engines` are those that were to measure.
 ///
-/// A configuration that works is `failed` if it misses a criterion. The verdict is `fail` if any
-/// configuration is, unless that was expected; if a goal has fewer working configurations than
-/// asked for; if the planned needle comes too near to what it has to keep away from; or if a
-/// configuration's outcome is not the expected one.
+/// A configuration that works is `failed` if it misses a criterion, or if no engine measured it. The
+/// verdict is `fail` if any configuration misses one, unless that was expected; if a goal has fewer
+/// working configurations than asked for; if the planned needle comes too near to what it has to keep
+/// away from; or if a configuration's outcome is not the expected one. It
+/// is `incomplete` if none of this is known and something was not measured that was to be judged.
 pub fn judge(
     goals: &mut [GoalReport],
     planned: &[Goal],
     criteria: &CriteriaSection,
-    both_engines_ran: bool,
-) -> (Verdict, Vec<CriterionResult>) {
-    let mut results = Vec::new();
+    engines: &[&str],
+) -> (Verdict, Judged) {
+    let mut all = Judged::default();
     let mut failed = false;
     for (report, goal) in goals.iter_mut().zip(planned) {
+        let (mut working, mut open) = (0_u32, 0_u32);
         for configuration in &mut report.configurations {
             let expected = Configuration::from_label(configuration.label)
                 .and_then(|each| goal.expected.get(&each));
             if configuration.rejections.is_empty() {
-                let checked = check_configuration(
+                let judged = check_configuration(
                     &goal.name,
                     configuration,
                     criteria,
                     StudyMode::Dynamic,
-                    both_engines_ran,
+                    engines,
                 );
-                let met = checked.iter().all(|result| result.pass);
+                let missed = judged.results.iter().any(|result| !result.pass);
                 let measured = !configuration.engines.is_empty();
-                configuration.status = if met && measured {
-                    Status::Ok
-                } else {
+                configuration.not_judged = judged.not_judged.len();
+                configuration.status = if missed || !measured {
                     Status::Failed
+                } else {
+                    Status::Ok
                 };
-                if configuration.status == Status::Failed && expected != Some(&Expectation::Failed)
-                {
-                    failed = true;
+                match (missed, configuration.not_judged) {
+                    (true, _) => failed |= expected != Some(&Expectation::Failed),
+                    (false, 0) => working += 1,
+                    (false, _) => open += 1,
                 }
-                results.extend(checked);
+                all.extend(judged);
+                if let Some(expected) = expected {
+                    let result = check_expectation(&goal.name, configuration, expected);
+                    // What is still open may come out as expected; what works is not rejected any more.
+                    let undecided = !missed
+                        && configuration.not_judged > 0
+                        && !matches!(expected, Expectation::Rejected(_));
+                    if undecided {
+                        all.not_judged.push(NotJudged {
+                            goal: result.goal,
+                            label: result.label,
+                            engine: None,
+                            criterion: result.criterion,
+                            reason: DEPENDS.to_owned(),
+                        });
+                    } else {
+                        failed |= !result.pass;
+                        all.results.push(result);
+                    }
+                }
             } else {
                 configuration.status = Status::Rejected;
-            }
-            if let Some(expected) = expected {
-                let result = check_expectation(&goal.name, configuration, expected);
-                failed |= !result.pass;
-                results.push(result);
+                if let Some(expected) = expected {
+                    let result = check_expectation(&goal.name, configuration, expected);
+                    failed |= !result.pass;
+                    all.results.push(result);
+                }
             }
         }
         if let Some(route) = &report.needle_route {
             let result = check_route(goal, route);
             failed |= !result.pass;
-            results.push(result);
+            all.results.push(result);
         }
-        let working = report
-            .configurations
-            .iter()
-            .filter(|each| each.status == Status::Ok)
-            .count();
-        let wanted = f64::from(criteria.min_working_configurations);
-        let enough = working as f64 >= wanted;
-        failed |= !enough;
-        results.push(CriterionResult {
+        let wanted = criteria.min_working_configurations;
+        let known = working >= wanted || working + open < wanted;
+        let result = CriterionResult {
             goal: goal.name.clone(),
             label: None,
             engine: None,
             criterion: "min_working_configurations".to_owned(),
-            value: Some(working as f64),
-            limit: Some(wanted),
+            value: known.then(|| f64::from(working)),
+            limit: Some(f64::from(wanted)),
             unit: "1",
-            pass: enough,
+            pass: working >= wanted,
             detail: String::new(),
-        });
+        };
+        failed |= known && !result.pass;
+        all.add(result, || DEPENDS.to_owned());
     }
-    (if failed { Verdict::Fail } else { Verdict::Pass }, results)
+    (Verdict::of(failed, !all.not_judged.is_empty()), all)
 }
 
 /// The margins of the needle's route. One that is missed is met all the same where it is what is expected
@@ -116,6 +136,9 @@ fn check_route(goal: &Goal, route: &RouteReport) -> CriterionResult {
         ),
     }
 }
+
+/// Why a criterion on what became of configurations is not judged.
+const DEPENDS: &str = "it depends on what was not judged";
 
 fn check_expectation(
     goal: &str,

@@ -44,3 +44,4 @@ pub use needle::{NeedleMeasurement, measure_guide, measure_needle, tip_of};
 pub use sensitivity::tip_sensitivity;
 pub use stored::{StoredConfiguration, StoredReport};
 pub use threshold::{BEST, Compared, EVERY, Loss, Rate, Subject, Threshold, ThresholdError};
+pub use verdict::{UNCOMPARED, unmeasured_by};

@@ -16,7 +16,7 @@ use crate::needle::NeedleMeasurement;
 use crate::ranking_report::{Dominance, GoalRanking, RankingReport};
 use crate::referee::RefereeReport;
 use crate::room::RoomReport;
-pub use crate::verdict::{CriterionResult, Verdict};
+pub use crate::verdict::{CriterionResult, Judged, NotJudged, Verdict};
 
 /// Version of the report's keys.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -28,10 +28,12 @@ pub struct Report {
     pub schema_version: u32,
     /// The scenario.
     pub scenario: ScenarioSummary,
-    /// `pass` or `fail`.
+    /// `pass`, `fail` or `incomplete`.
     pub verdict: Verdict,
-    /// Every criterion that was checked.
+    /// Every criterion that was judged.
     pub criteria: Vec<CriterionResult>,
+    /// Every criterion that was to be judged and could not be.
+    pub not_judged: Vec<NotJudged>,
     /// The goals.
     pub goals: Vec<GoalReport>,
     /// The test by ISO 9283, in place of goals.
@@ -178,7 +180,8 @@ pub struct Recommendation {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// It works and meets all criteria.
+    /// It works and meets all criteria that were judged; [`ConfigurationReport::not_judged`] says how
+    /// many were not.
     Ok,
     /// It cannot work.
     Rejected,
@@ -258,6 +261,8 @@ pub struct ConfigurationReport {
     pub label: &'static str,
     /// What became of it.
     pub status: Status,
+    /// How many criteria on it were to be judged and could not be.
+    pub not_judged: usize,
     /// Rules that reject it, first failing one first.
     pub rejections: Vec<RejectionReport>,
     /// Final joint positions.
@@ -334,6 +339,7 @@ impl ConfigurationReport {
         Self {
             label,
             status: Status::Rejected,
+            not_judged: 0,
             rejections: Vec::new(),
             joints_rad: None,
             roll_rad: None,

@@ -6,7 +6,7 @@ use needlebench_cell::Finding;
 use serde_json::{Value, json};
 
 use crate::metric::{MetricKey, former_report};
-use crate::report::{Report, SCHEMA_VERSION};
+use crate::report::{Report, SCHEMA_VERSION, Verdict};
 
 /// A configuration of a study's case.
 #[derive(Debug, Clone, PartialEq)]
@@ -266,6 +266,35 @@ impl StoredReport {
         configurations
             .filter_map(|each| each.get("metrics"))
             .any(|metrics| metrics.get(key).is_some())
+    }
+
+    /// Why it is not complete, if it is not: by its verdict, by what was not judged, and of versions without
+    /// such a verdict by engines that failed.
+    pub(crate) fn incomplete(&self) -> Option<String> {
+        let count = |key: &str| {
+            self.report
+                .get(key)
+                .and_then(Value::as_array)
+                .map_or(0, Vec::len)
+        };
+        let engines = self.report.get("engine_failures").and_then(Value::as_array);
+        let failed: Vec<&str> = engines
+            .into_iter()
+            .flatten()
+            .filter_map(|each| each.get("engine")?.as_str())
+            .collect();
+        let unjudged = count("not_judged");
+        let why = match (unjudged, failed.is_empty()) {
+            (0, true) if self.text("/verdict") != Some(Verdict::Incomplete.name()) => return None,
+            (0, true) => "its verdict says so".to_owned(),
+            (0, false) => format!("{} failed", failed.join(", ")),
+            (_, true) => format!("{unjudged} criteria were not judged"),
+            (_, false) => format!(
+                "{unjudged} criteria were not judged, {} failed",
+                failed.join(", ")
+            ),
+        };
+        Some(format!("{} is not complete: {why}", self.source))
     }
 
     /// Whether it was written before metrics had keys.

@@ -1,6 +1,6 @@
 //! Largest losses that a comparison allows, of runs and of studies.
 
-use needlebench_cell::nearest_name;
+use needlebench_cell::{digits_apart, nearest_name};
 use needlebench_kinematics::ik::Configuration;
 
 use crate::metric::{MetricKey, Quantity};
@@ -50,6 +50,8 @@ pub struct Threshold {
     pub key: String,
     /// The limit as it was given.
     pub text: String,
+    /// Unit that the limit was given in, with its size in SI.
+    pub unit: (&'static str, f64),
     /// What the name was before, if it was given by a former one.
     pub note: Option<String>,
 }
@@ -125,14 +127,35 @@ impl Threshold {
             Subject::Metric(metric, _) => metric.metric().quantity,
             Subject::Rate(_) => Quantity::Ratio,
         };
+        let (loss, unit) = parse_limit(name, quantity, limit.trim())?;
         Ok(Self {
             of: configuration(&subject, of, compared)?,
-            limit: parse_limit(name, quantity, limit.trim())?,
+            limit: loss,
+            unit,
             subject,
             key: key.trim().to_owned(),
             text: limit.trim().to_owned(),
             note,
         })
+    }
+
+    /// A loss from the first value that is more than allowed, in the unit of the limit and with the digits
+    /// that show it.
+    pub fn loss_text(&self, loss: f64, first: f64) -> String {
+        let (name, size) = self.unit;
+        match self.limit {
+            Loss::Absolute(limit) => {
+                let text = digits_apart(loss / size, limit / size);
+                format!("{text} {name}").trim_end().to_owned()
+            }
+            Loss::Relative(share) if first != 0.0 => {
+                format!(
+                    "{} %",
+                    digits_apart(100.0 * loss / first.abs(), 100.0 * share)
+                )
+            }
+            Loss::Relative(_) => format!("{loss:.3e} from 0"),
+        }
     }
 
     /// Whether it is on the same number as another.
@@ -245,7 +268,12 @@ fn configuration(
     Err(wrong(format!("`{of}` is no configuration"), hint))
 }
 
-fn parse_limit(name: &str, quantity: Quantity, text: &str) -> Result<Loss, ThresholdError> {
+/// The limit, and the unit that it is given in.
+fn parse_limit(
+    name: &str,
+    quantity: Quantity,
+    text: &str,
+) -> Result<(Loss, (&'static str, f64)), ThresholdError> {
     let units = quantity.units();
     let example = match quantity {
         Quantity::Ratio => "such as 0.02, or 2% of the first value".to_owned(),
@@ -271,10 +299,14 @@ fn parse_limit(name: &str, quantity: Quantity, text: &str) -> Result<Loss, Thres
     }
     let unit = text[end..].trim();
     if unit == "%" {
-        return Ok(Loss::Relative(value / 100.0));
+        return Ok((Loss::Relative(value / 100.0), ("%", 1.0)));
     }
-    if let Some((_, scale)) = units.iter().find(|(name, _)| *name == unit) {
-        return Ok(Loss::Absolute(value * scale));
+    if let Some(known) = units.iter().find(|(name, _)| *name == unit) {
+        return Ok((Loss::Absolute(value * known.1), *known));
+    }
+    // No loss at all is the same in every unit.
+    if unit.is_empty() && value == 0.0 {
+        return Ok((Loss::Absolute(0.0), units[0]));
     }
     let known = units.iter().map(|(name, _)| *name);
     let known = known.filter(|name| !name.is_empty()).chain(["%"]);
@@ -327,6 +359,30 @@ mod tests {
         assert_eq!(limit("joint_margin", "0.05"), Loss::Absolute(0.05));
         assert_eq!(limit("joint_margin", "5%"), Loss::Relative(0.05));
         assert_eq!(limit("tip_error_rapier", "5%"), Loss::Relative(0.05));
+    }
+
+    #[test]
+    fn no_loss_at_all_needs_no_unit() {
+        for metric in ["self_clearance", "motion_time", "hand_cone", "joint_margin"] {
+            assert_eq!(limit(metric, "0"), Loss::Absolute(0.0), "{metric}");
+        }
+        assert!(parse("self_clearance", "1", Compared::Runs).is_err());
+    }
+
+    #[test]
+    fn a_loss_is_told_with_the_digits_that_exceed_its_limit() {
+        let text = |key, given, loss, first| {
+            let threshold = parse(key, given, Compared::Runs).unwrap();
+            assert!(threshold.limit.is_exceeded_by(loss, first));
+            threshold.loss_text(loss, first)
+        };
+        assert_eq!(
+            text("clearance", "10.001mm", 10.0014e-3, 0.02),
+            "10.0014 mm"
+        );
+        assert_eq!(text("clearance", "10um", 10.0014e-3, 0.02), "10000 um");
+        assert_eq!(text("motion_time", "10%", 0.400_02, 4.0), "10.0005 %");
+        assert_eq!(text("self_clearance", "0", 1e-9, 0.02), "1.00e-6 mm");
     }
 
     #[test]

@@ -17,7 +17,7 @@ use crate::exit::ExitStatus;
 #[derive(Debug, Parser)]
 #[command(name = "needlebench", version = PROGRAM_VERSION, propagate_version = true, max_term_width = 100)]
 #[command(
-    after_help = "Exit status: 0 all criteria met, 1 a criterion failed, 2 bad input, \
+    after_help = "Exit status: 0 all criteria met, 1 a criterion failed or was not judged, 2 bad input, \
                         3 the environment or an engine failed, 130 interrupted."
 )]
 struct Cli {

@@ -2,12 +2,14 @@
 
 use std::process::ExitCode;
 
+use needlebench_evaluation::report::Verdict;
+
 /// What a run's exit status says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ExitStatus {
     /// All criteria were met.
     Success,
-    /// A criterion was not met.
+    /// A criterion was not met, or could not be judged.
     CriterionFailed,
     /// The input is wrong.
     BadInput,
@@ -18,6 +20,14 @@ pub enum ExitStatus {
 }
 
 impl ExitStatus {
+    /// Of what was judged: only what is complete and met succeeds.
+    pub fn of(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Pass => Self::Success,
+            Verdict::Fail | Verdict::Incomplete => Self::CriterionFailed,
+        }
+    }
+
     /// The number.
     pub fn code(self) -> u8 {
         match self {

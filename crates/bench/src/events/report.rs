@@ -10,14 +10,20 @@ use needlebench_evaluation::events::{
     measure_stop, press_difference,
 };
 use needlebench_evaluation::largest_over_pairs;
+use needlebench_evaluation::report::Judged;
 use needlebench_planning::{ConfigurationPlan, PressError, PressPlan};
 
 use super::checks::checks;
 use super::{EngineEvents, EventRun, section};
 use crate::setup::Setup;
 
-/// The report's part about the events of a configuration.
-pub fn events_report(setup: &Setup<'_>, plan: &ConfigurationPlan, run: &EventRun) -> EventsReport {
+/// The report's part about the events of a configuration; `engines` are those that were to measure them.
+pub fn events_report(
+    setup: &Setup<'_>,
+    plan: &ConfigurationPlan,
+    run: &EventRun,
+    engines: &[&str],
+) -> EventsReport {
     let (resolved, real) = (setup.resolved, &setup.real);
     let events = section(resolved);
     let (cell, model, goal) = (real.cell(), real.model(), real.goal(run.goal));
@@ -89,9 +95,15 @@ pub fn events_report(setup: &Setup<'_>, plan: &ConfigurationPlan, run: &EventRun
         press,
         stop,
         retract,
-        checks: Vec::new(),
+        checks: Judged::default(),
     };
-    report.checks = checks(&goal.name, plan.configuration.label(), events, &report);
+    report.checks = checks(
+        &goal.name,
+        plan.configuration.label(),
+        events,
+        &report,
+        engines,
+    );
     report
 }
 

@@ -8,7 +8,7 @@ use std::time::Instant;
 use needlebench_cell::iso9283::Iso9283Protocol;
 use needlebench_cell::{ArmInUse, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
-use needlebench_engine::{Engine, EngineIdentity, EnginePool};
+use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::iso9283::{
     Commanded, EngineMeasurement, Iso9283Report, ProtocolSummary, SUBJECT, StabilisationReport,
     drift, evaluate, judge,
@@ -47,6 +47,7 @@ pub(crate) fn run(
         Ok(plan) => plan,
         Err(error) => return Ok(unplanned(resolved, &error.to_string(), timings)),
     };
+    let chosen = engine_names(engines);
     let outcomes = simulate_engines(&setup, protocol, plan, engines, control);
     timings.insert(
         "simulation_s".to_owned(),
@@ -90,14 +91,15 @@ pub(crate) fn run(
         .as_ref()
         .expect("a resolved protocol has its section")
         .criteria;
-    let (verdict, criteria) = judge(&report, own, &scenario.criteria);
+    let judged = judge(&report, own, &scenario.criteria, &chosen);
     let interrupted = control.is_cancelled();
     Ok(ScenarioRun {
         events: Vec::new(),
         stopped: Vec::new(),
         report: Report {
-            verdict,
-            criteria,
+            verdict: judged.verdict(),
+            criteria: judged.results,
+            not_judged: judged.not_judged,
             truth: setup.real.report(),
             iso9283: Some(report),
             engine_failures: failures,
@@ -247,6 +249,7 @@ fn empty_report(
         },
         verdict: Verdict::Fail,
         criteria: Vec::new(),
+        not_judged: Vec::new(),
         goals: Vec::new(),
         iso9283: None,
         engine_failures: Vec::new(),

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use needlebench_cell::ResolvedScenario;
 use needlebench_cell::study::StudyMode;
 use needlebench_clearance::ClearanceModel;
-use needlebench_engine::{Engine, EngineError, EnginePool};
+use needlebench_engine::{Engine, EngineError, EnginePool, engine_names};
 use needlebench_evaluation::judge;
-use needlebench_evaluation::report::{CriterionResult, Status};
+use needlebench_evaluation::report::{Judged, Status};
 use needlebench_planning::GoalPlan;
 use needlebench_study::Outcome;
 
@@ -23,6 +23,9 @@ use crate::simulate::{Detail, EngineRun, Simulation};
 
 use super::planned::{case_report, case_setup, eight};
 use super::rows::{CaseRow, broken_rule};
+
+/// How the detail of a configuration begins whose motion an engine could not carry out; the engine follows.
+pub const ENGINE_FAILURE: &str = "engine_failure";
 
 /// Nobody interrupts a case: a study ends between two of them.
 static NEVER: AtomicBool = AtomicBool::new(false);
@@ -109,7 +112,7 @@ pub fn dynamic_case(
         }
         cost.engines.push((engine.name(), begun.elapsed()));
     }
-    let rows = case.rows(engines.len());
+    let rows = case.rows(&engine_names(engines));
     cost.other = started.elapsed().saturating_sub(cost.total());
     Ok(DynamicCase { rows, cost })
 }
@@ -189,7 +192,7 @@ impl<'a> Case<'a> {
         Ok(())
     }
 
-    fn rows(mut self, engines: usize) -> [CaseRow; 8] {
+    fn rows(mut self, engines: &[&'static str]) -> [CaseRow; 8] {
         // What one engine measured where another failed is no result of the configuration.
         for (runs, failed) in self.runs.iter_mut().zip(&self.failed) {
             if failed.is_some() {
@@ -199,11 +202,11 @@ impl<'a> Case<'a> {
         let (setup, plan) = (self.setup, &self.plans[0]);
         let judged = |runs: &Vec<EngineRun>| Adjudicated::without_referee(setup, 0, runs);
         let adjudicated: Vec<Adjudicated> = self.runs.iter().map(judged).collect();
-        let report = case_report(setup, plan, &self.runs, &adjudicated, &self.events);
+        let report = case_report(setup, plan, &self.runs, &adjudicated, &self.events, engines);
         let mut reports = [report];
         let resolved = setup.resolved;
         let criteria = &resolved.scenario.criteria;
-        let (_, checked) = judge(&mut reports, &resolved.goals, criteria, engines > 1);
+        let (_, judged) = judge(&mut reports, &resolved.goals, criteria, engines);
         let [report] = reports;
         let rows = plan
             .configurations
@@ -214,10 +217,10 @@ impl<'a> Case<'a> {
             let (outcome, detail) = match (broken_rule(&plan.rejections), failed, measured.status) {
                 (Some(rule), _, _) => (Outcome::Rejected, rule),
                 (None, Some(engine), _) => {
-                    (Outcome::Failed, format!("engine_failure {engine}").into())
+                    (Outcome::Failed, format!("{ENGINE_FAILURE} {engine}").into())
                 }
-                (None, None, Status::Ok) => (Outcome::Ok, "".into()),
-                (None, None, _) => (Outcome::Failed, missed(&checked, measured.label)),
+                (None, None, Status::Ok) if measured.not_judged == 0 => (Outcome::Ok, "".into()),
+                (None, None, _) => (Outcome::Failed, missed(&judged, measured.label)),
             };
             CaseRow {
                 outcome,
@@ -229,12 +232,22 @@ impl<'a> Case<'a> {
     }
 }
 
-/// The first criterion that a configuration misses.
-fn missed(checked: &[CriterionResult], label: &str) -> Cow<'static, str> {
-    checked
+/// The first criterion that a configuration misses, or else that could not be judged, which is not met.
+fn missed(judged: &Judged, label: &str) -> Cow<'static, str> {
+    let counts = |of: Option<&str>, criterion: &str| of == Some(label) && criterion != "expected";
+    let missed = judged
+        .results
         .iter()
-        .find(|result| {
-            !result.pass && result.label.as_deref() == Some(label) && result.criterion != "expected"
+        .filter(|result| !result.pass)
+        .map(|each| (each.label.as_deref(), &each.criterion));
+    let unjudged = judged
+        .not_judged
+        .iter()
+        .map(|each| (each.label.as_deref(), &each.criterion));
+    missed
+        .chain(unjudged)
+        .find(|(of, criterion)| counts(*of, criterion))
+        .map_or("no_engine".into(), |(_, criterion)| {
+            criterion.clone().into()
         })
-        .map_or("no_engine".into(), |result| result.criterion.clone().into())
 }

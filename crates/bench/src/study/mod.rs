@@ -16,7 +16,7 @@ mod static_case;
 mod tests;
 
 pub use case::StudyCase;
-pub use dynamic::{CaseCost, DynamicCase, dynamic_case, dynamic_rows};
+pub use dynamic::{CaseCost, DynamicCase, ENGINE_FAILURE, dynamic_case, dynamic_rows};
 pub use evaluator::StudyEvaluator;
 pub use former::FormerResults;
 pub use identity::Identity;

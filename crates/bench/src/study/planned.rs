@@ -43,6 +43,7 @@ pub(super) fn case_report(
     runs: &[Vec<EngineRun>],
     adjudicated: &[Adjudicated],
     events: &[EventRun],
+    engines: &[&'static str],
 ) -> GoalReport {
     let criteria = &setup.resolved.scenario.criteria;
     let room_counts = criteria.min_free_fraction.is_some()
@@ -53,6 +54,7 @@ pub(super) fn case_report(
         budgets: &analytic_budgets(setup, std::slice::from_ref(plan)),
         room: room_counts.then(|| RoomModel::new(setup.resolved)),
         events,
+        engines,
     };
     goal_report(&context, 0, plan, runs, adjudicated)
 }
@@ -71,7 +73,7 @@ pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], String>
     let plan = setup.planner.plan(&resolved.goals[0]);
     let none: Vec<Vec<EngineRun>> = plan.configurations.iter().map(|_| Vec::new()).collect();
     let adjudicated = vec![Adjudicated::default(); none.len()];
-    let report = case_report(&setup, &plan, &none, &adjudicated, &[]);
+    let report = case_report(&setup, &plan, &none, &adjudicated, &[], &[]);
     let goal = &resolved.goals[0].name;
     let criteria = &resolved.scenario.criteria;
     let rows = plan.configurations.iter().zip(report.configurations);
@@ -92,15 +94,19 @@ pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], String>
     })))
 }
 
-/// The first criterion, in the order of a run's, that the motion is known to miss.
+/// The first criterion, in the order of a run's, that the motion is known to miss, or else that it
+/// could not be judged by.
 fn missed(
     goal: &str,
     criteria: &CriteriaSection,
     report: &ConfigurationReport,
 ) -> Option<Cow<'static, str>> {
-    let checked = check_configuration(goal, report, criteria, StudyMode::Planned, false);
-    let missed = checked.into_iter().find(|result| !result.pass)?;
-    Some(missed.criterion.into())
+    let judged = check_configuration(goal, report, criteria, StudyMode::Planned, &[]);
+    let missed = judged.results.into_iter().find(|result| !result.pass);
+    // What cannot be judged is not met.
+    let unjudged = judged.not_judged.into_iter().next();
+    let criterion = missed.map(|result| result.criterion);
+    Some(criterion.or(unjudged.map(|each| each.criterion))?.into())
 }
 
 /// One row of each configuration.

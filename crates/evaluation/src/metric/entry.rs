@@ -86,13 +86,16 @@ pub struct Heading {
 /// What a criterion makes of a value that is missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Missing {
-    /// It was to be measured: the criterion is missed.
-    Fails,
+    /// It was to be measured: the criterion is not judged.
+    Unjudged,
+    /// It was looked for and never came, as the time of settling of what does not settle: the criterion
+    /// is missed.
+    Never,
     /// There is nothing to measure: the criterion says nothing.
     Skips,
-    /// Engines that both ran were to be compared: it is missed. Otherwise the criterion says nothing,
+    /// Several engines were to be compared: the criterion is not judged. With one engine it says nothing,
     /// whatever the value.
-    FailsIfCompared,
+    UnjudgedIfCompared,
 }
 
 /// The criterion on a metric: its limit.
@@ -354,7 +357,7 @@ impl Metric {
                 key,
                 limit,
                 modes,
-                missing: Missing::Fails,
+                missing: Missing::Unjudged,
                 detail: |_, _, _| String::new(),
             }),
             ..self

@@ -81,11 +81,35 @@ fn report(configurations: Vec<ConfigurationReport>) -> Vec<GoalReport> {
 }
 
 #[test]
-fn a_configuration_that_no_engine_measured_has_failed() {
+fn what_no_engine_measured_is_not_judged() {
     let mut goals = report(vec![configuration(0, 0.05, 0.5)]);
-    let (verdict, _) = judge(&mut goals, &[goal()], &CriteriaSection::default(), false);
-    assert_eq!(verdict, Verdict::Fail);
+    let engines = ["rapier", "mujoco"];
+    let (verdict, judged) = judge(&mut goals, &[goal()], &CriteriaSection::default(), &engines);
+    assert_eq!(verdict, Verdict::Incomplete);
     assert_eq!(goals[0].configurations[0].status, Status::Failed);
+    assert_eq!(judged.results, []);
+    for engine in engines {
+        let mut all = judged.not_judged.iter();
+        assert!(
+            all.any(|each| each.engine.as_deref() == Some(engine)),
+            "{engine}"
+        );
+    }
+    let goal_itself = judged.not_judged.last().unwrap();
+    assert_eq!(goal_itself.criterion, "min_working_configurations");
+}
+
+#[test]
+fn what_is_missed_goes_before_what_is_not_judged() {
+    // Two are asked for, but one at most can come to work.
+    let mut goals = report(vec![configuration(0, 0.05, 0.5), rejected(1)]);
+    let criteria = CriteriaSection {
+        min_working_configurations: 2,
+        ..Default::default()
+    };
+    let (verdict, judged) = judge(&mut goals, &[goal()], &criteria, &["rapier"]);
+    assert_eq!(verdict, Verdict::Fail);
+    assert!(!judged.not_judged.is_empty());
 }
 
 #[test]
@@ -95,9 +119,9 @@ fn rejections_alone_do_not_fail_a_goal_that_asks_for_no_configuration() {
         min_working_configurations: 0,
         ..Default::default()
     };
-    let (verdict, results) = judge(&mut goals, &[goal()], &criteria, true);
+    let (verdict, judged) = judge(&mut goals, &[goal()], &criteria, &["rapier", "mujoco"]);
     assert_eq!(verdict, Verdict::Pass);
-    assert!(results.iter().all(|result| result.pass));
+    assert!(judged.results.iter().all(|result| result.pass));
 }
 
 #[test]
@@ -112,9 +136,10 @@ fn an_expected_rejection_that_does_not_come_fails() {
         min_working_configurations: 0,
         ..Default::default()
     };
-    let (verdict, results) = judge(&mut goals, &[expecting], &criteria, true);
+    let (verdict, judged) = judge(&mut goals, &[expecting], &criteria, &["rapier", "mujoco"]);
     assert_eq!(verdict, Verdict::Fail);
-    let missed = results
+    let missed = judged
+        .results
         .iter()
         .find(|result| result.criterion == "expected")
         .unwrap();
@@ -140,16 +165,19 @@ fn a_criterion_is_judged_by_what_is_known_and_in_one_order() {
     };
     let mut made = configuration(0, 0.05, 0.5);
     made.posture_clearance_m = BTreeMap::from([("robot_phantom", 0.08)]);
-    let keys = |mode: StudyMode, made: &ConfigurationReport| -> Vec<(String, bool)> {
-        let checked = check_configuration("pose", made, &criteria, mode, false);
-        let results = checked.into_iter();
+    // What is not judged comes last, with neither.
+    let keys = |mode: StudyMode, made: &ConfigurationReport| -> Vec<(String, Option<bool>)> {
+        let judged = check_configuration("pose", made, &criteria, mode, &[]);
+        let results = judged.results.into_iter();
+        let results = results.map(|result| (result.criterion, Some(result.pass)));
+        let open = judged.not_judged.into_iter();
         results
-            .map(|result| (result.criterion, result.pass))
+            .chain(open.map(|each| (each.criterion, None)))
             .collect()
     };
     let (rms, skin) = ("max_tip_rms_mm", "min_clearance_mm.robot_phantom");
     // There is no engine, no budget and no table. The motion comes nearer than the posture.
-    let missed = [(rms.to_owned(), false), (skin.to_owned(), false)];
+    let missed = [(skin.to_owned(), Some(false)), (rms.to_owned(), None)];
     assert_eq!(keys(StudyMode::Dynamic, &made), missed);
     assert_eq!(first_missed_by_posture(&made, &criteria), None);
     made.posture_clearance_m.insert("robot_phantom", 0.055);
@@ -157,7 +185,10 @@ fn a_criterion_is_judged_by_what_is_known_and_in_one_order() {
     // A proven bound goes before the nearest approach.
     let found = made.clearance.classes.get_mut("robot_phantom").unwrap();
     (found.minimum_m, found.certified_lower_bound_m) = (0.07, Some(0.065));
-    assert_eq!(keys(StudyMode::Dynamic, &made)[1], (skin.to_owned(), true));
+    assert_eq!(
+        keys(StudyMode::Dynamic, &made)[0],
+        (skin.to_owned(), Some(true))
+    );
     // Without engines the needle is judged where it is predicted.
     made.predicted = Some(NeedleMeasurement {
         tip_position_error_m: 2e-3,
@@ -166,6 +197,9 @@ fn a_criterion_is_judged_by_what_is_known_and_in_one_order() {
     });
     let tip = "max_tip_position_error_mm";
     assert_eq!(first_missed_by_posture(&made, &criteria), Some(tip));
-    assert_eq!(keys(StudyMode::Planned, &made)[0], (tip.to_owned(), false));
-    assert_eq!(keys(StudyMode::Dynamic, &made)[0].0, rms);
+    assert_eq!(
+        keys(StudyMode::Planned, &made)[0],
+        (tip.to_owned(), Some(false))
+    );
+    assert_eq!(keys(StudyMode::Dynamic, &made)[1].0, rms);
 }

@@ -55,7 +55,8 @@ pub(crate) struct CompareArguments {
     #[arg(long, value_name = "A=B")]
     pub goal: Vec<Pair>,
     /// Largest loss of a metric that is allowed, with its unit: clearance=0.5mm, tip_error=5%; may be
-    /// given several times. `--help` lists the metrics. 0 allows no loss at all, not even rounding.
+    /// given several times. `--help` lists the metrics. 0, with or without a unit, allows no loss at all,
+    /// not even rounding.
     #[arg(long, value_name = "METRIC=VALUE")]
     pub max_loss: Vec<Pair>,
     /// TOML file with such losses under [max_loss]; those of the command line go before it.
@@ -64,6 +65,9 @@ pub(crate) struct CompareArguments {
     /// Do not fail where a configuration no longer works.
     #[arg(long)]
     pub allow_status_change: bool,
+    /// Do not fail where a goal, a configuration, a metric or cases of A are missing in B.
+    #[arg(long)]
+    pub allow_lost: bool,
     /// List values that did not change too.
     #[arg(long)]
     pub all: bool,
@@ -144,11 +148,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus> {
             } else {
                 print_text(comparison_text(&comparison, arguments.all).trim_end())?;
             }
-            Ok(if comparison.pass {
-                ExitStatus::Success
-            } else {
-                ExitStatus::CriterionFailed
-            })
+            Ok(ExitStatus::of(comparison.verdict))
         }
         Err(Refused::Input(findings)) => {
             print_findings(&findings);
@@ -198,6 +198,7 @@ fn options(arguments: &CompareArguments) -> Result<CompareOptions, Refused> {
         renamed_goals: arguments.goal.iter().map(|pair| pair.0.clone()).collect(),
         thresholds: given.thresholds,
         allow_status_change: given.allow_status_change,
+        allow_lost: given.allow_lost,
     })
 }
 

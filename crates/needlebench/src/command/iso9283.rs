@@ -159,10 +159,14 @@ pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus> {
         }
     };
     let limits = limits(arguments, &report);
-    let met = limits.iter().all(|limit| limit.pass);
+    let missed = limits
+        .iter()
+        .any(|limit| limit.value_m.is_some() && !limit.pass);
+    let open = limits.iter().any(|limit| limit.value_m.is_none());
+    let verdict = Verdict::of(missed, open);
     let judged = Judged {
         report: &report,
-        verdict: if met { Verdict::Pass } else { Verdict::Fail },
+        verdict,
         limits,
     };
     if let Some(folder) = &arguments.out {
@@ -174,24 +178,30 @@ pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus> {
     } else {
         let mut text = measured_text(&report);
         for limit in judged.limits.iter().filter(|limit| !limit.pass) {
-            let value = limit.value_m.map_or("not measured".to_owned(), |value| {
-                format!("{:.4} mm", value * 1e3)
-            });
+            let (word, value) = match limit.value_m {
+                Some(value_m) => ("FAILED", format!("{:.4} mm", value_m * 1e3)),
+                None => ("not judged", "not measured".to_owned()),
+            };
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
-                "FAILED {}: {value}, limit {} mm",
+                "{word} {}: {value}, limit {} mm",
                 limit.criterion,
                 limit.limit_m * 1e3
             );
         }
+        if !judged.limits.is_empty() {
+            let met = judged.limits.iter().filter(|limit| limit.pass).count();
+            let _ = writeln!(
+                text,
+                "{}: {met} of {} limits met",
+                verdict.name().to_uppercase(),
+                judged.limits.len()
+            );
+        }
         print_text(text.trim_end())?;
     }
-    Ok(if met {
-        ExitStatus::Success
-    } else {
-        ExitStatus::CriterionFailed
-    })
+    Ok(ExitStatus::of(verdict))
 }
 
 fn measured(arguments: &Iso9283Arguments) -> Result<(MeasuredReport, Vec<Attained>), Vec<Finding>> {

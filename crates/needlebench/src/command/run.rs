@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, Result};
 use needlebench_cell::Finding;
 use needlebench_engine::ENGINES;
-use needlebench_evaluation::report::{Report, Verdict};
+use needlebench_evaluation::report::Report;
 use serde::Serialize;
 
 use super::{load_runnable, overrides, print_json, print_text};
@@ -204,10 +204,8 @@ fn outcome(finished: &ScenarioRun) -> ExitStatus {
         ExitStatus::Interrupted
     } else if !finished.report.engine_failures.is_empty() {
         ExitStatus::EnvironmentFailed
-    } else if finished.report.verdict == Verdict::Fail {
-        ExitStatus::CriterionFailed
     } else {
-        ExitStatus::Success
+        ExitStatus::of(finished.report.verdict)
     }
 }
 

@@ -205,7 +205,9 @@ fn too_long(
 
 fn show(progress: &TerminalProgress, event: Event<'_>) {
     match event {
-        Event::CutOff { .. } | Event::Damage { .. } => anstream::eprintln!("{event}"),
+        Event::CutOff { .. } | Event::Damage { .. } | Event::Unsound { .. } => {
+            anstream::eprintln!("{event}")
+        }
         Event::Begin { kept, total } => {
             if kept > 0 {
                 anstream::eprintln!("{event}");
@@ -264,11 +266,7 @@ fn finish(
     } else {
         print_text(&format!("{}results: {}", finished.text, folder.display()))?;
     }
-    Ok(if finished.passed {
-        ExitStatus::Success
-    } else {
-        ExitStatus::CriterionFailed
-    })
+    Ok(ExitStatus::of(finished.verdict))
 }
 
 /// Computes cases alone.

@@ -54,6 +54,76 @@ fn stand_in(command: &str) -> Value {
 }
 
 #[test]
+fn what_an_engine_did_not_measure_is_incomplete_wherever_a_verdict_stands() {
+    let bench = Bench::with_scenario(SMALL);
+    let broken = [("NEEDLEBENCH_HARNESS_COMMAND", Some("sh -c \"exit 7\""))];
+    let both = ["run", "s.toml", "--engine", "both", "--out"];
+    let whole = bench.run(&[&both[..], &["whole"]].concat()).exits_with(0);
+    let partial = [&both[..], &["part", "--junit", "part.xml"]].concat();
+    let partial = bench.run_with(&broken, &partial).exits_with(3);
+    let [whole_report, report] =
+        ["whole", "part"].map(|folder| bench.read_json(&format!("{folder}/small/report.json")));
+    let count = |report: &Value, key: &str| report[key].as_array().unwrap().len();
+    let total = count(&whole_report, "criteria");
+    let judged = count(&report, "criteria");
+    assert_eq!(
+        (
+            whole_report["verdict"].as_str(),
+            count(&whole_report, "not_judged")
+        ),
+        (Some("pass"), 0)
+    );
+    assert_eq!(report["verdict"], "incomplete");
+    assert!(judged < total);
+    assert_eq!(judged + count(&report, "not_judged"), total);
+    let last = |text: &str| {
+        let line = text.lines().rfind(|line| !line.starts_with("results: "));
+        line.unwrap().to_owned()
+    };
+    assert_eq!(
+        last(&whole.stdout),
+        format!("PASS: {total} of {total} criteria met")
+    );
+    let begin = format!("INCOMPLETE: {judged} of {total} criteria judged, all met; not judged: ");
+    assert!(last(&partial.stdout).starts_with(&begin), "{partial:#?}");
+    let markdown = String::from_utf8(bench.read("part/small/summary.md")).unwrap();
+    assert!(
+        markdown.starts_with("# small: **incomplete**\n"),
+        "{markdown}"
+    );
+    let junit = String::from_utf8(bench.read("part.xml")).unwrap();
+    assert!(junit.contains("errors=\"8\""), "{junit}"); // six configurations, the goal, the engine
+    assert!(junit.contains("not judged: "), "{junit}");
+
+    // Compared with a whole run metrics are lost, which needs to be allowed by name.
+    let compared = bench
+        .run(&["compare", "whole/small", "part/small"])
+        .exits_with(1);
+    assert!(
+        last(&compared.stdout).starts_with("FAIL: "),
+        "{compared:#?}"
+    );
+    assert!(
+        compared.stdout.contains("no longer measured: "),
+        "{compared:#?}"
+    );
+    for [a, b] in [["whole", "part"], ["part", "whole"], ["part", "part"]] {
+        let [a, b] = [a, b].map(|folder| format!("{folder}/small"));
+        let compared = bench
+            .run(&["compare", "--allow-lost", &a, &b])
+            .exits_with(1);
+        assert!(
+            last(&compared.stdout).starts_with("INCOMPLETE: "),
+            "{compared:#?}"
+        );
+    }
+    let same = bench
+        .run(&["compare", "whole/small", "whole/small"])
+        .exits_with(0);
+    assert!(last(&same.stdout).starts_with("PASS: "), "{same:#?}");
+}
+
+#[test]
 fn without_python_the_run_says_what_is_missing_and_how_to_mend_it() {
     let cache = Bench::new();
     let folder = cache.path("cache").display().to_string();

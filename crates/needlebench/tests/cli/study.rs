@@ -157,12 +157,16 @@ fn a_folder_with_results_is_neither_overwritten_nor_mixed() {
         .exits_with(2)
         .complains(["another study", "different"]);
     assert!(bench.read("out/moved/results.parquet") == table);
-    // A table that is cut off is found.
+    // A table that is cut off is found, and made whole again on request.
     bench.write("study.toml", STUDY);
     bench.write("out/moved/results.parquet", &table[..table.len() / 2]);
-    let answer = run(&bench, &["--resume"]);
-    assert_eq!(answer.status, Some(2), "{answer:#?}");
-    answer.complains(["results.parquet"]);
+    let compared = bench.run(&["compare", "out/moved", "out/moved"]);
+    compared
+        .exits_with(2)
+        .complains(["results.parquet", "--resume"]);
+    let answer = run(&bench, &["--resume"]).exits_with(0);
+    answer.complains(["results.parquet: is cut off", "computed again"]);
+    assert!(bench.read("out/moved/results.parquet") == table);
 }
 
 #[test]

@@ -1,8 +1,12 @@
 //! What a study leaves besides its table.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use needlebench_bench::study::{PreparedStudy, RobustnessResult, StudyCase, robustness_of};
+use needlebench_bench::study::{
+    ENGINE_FAILURE, PreparedStudy, RobustnessResult, StudyCase, robustness_of,
+};
+use needlebench_evaluation::report::Verdict;
 use needlebench_study::ParquetResults;
 use needlebench_study::statistics::{
     CriterionResult, Summary, SummaryOptions, judge_study, summarise,
@@ -15,9 +19,10 @@ use super::folder::Folder;
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
 use crate::page::study::{CasePlaces, StudyPage};
-use crate::table::study::document::blocks;
+use crate::table::study::document::{Block, blocks};
 use crate::table::study::robustness::robustness_blocks;
 use crate::table::study::text::summary_text;
+use crate::table::verdict::capitals;
 use needlebench_bench::progress::Progress;
 
 /// Name of the page in a study's folder.
@@ -34,10 +39,12 @@ pub struct StudySummary {
     study_id: String,
     /// Number of cases.
     cases: u64,
-    /// `pass` if all criteria are met.
-    verdict: &'static str,
+    /// `pass`, `fail` or `incomplete`.
+    verdict: Verdict,
     /// Criteria of the study.
     criteria: Vec<CriterionResult>,
+    /// What was to be judged and could not be, and why.
+    not_judged: Vec<String>,
     /// How far the base scenario's phantom may move; none unless the study asks for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     robustness: Option<Vec<RobustnessResult>>,
@@ -64,8 +71,8 @@ pub struct FinishedStudy {
     pub summary: StudySummary,
     /// The summary for a terminal.
     pub text: String,
-    /// All criteria are met.
-    pub passed: bool,
+    /// Whether all criteria are judged and met.
+    pub verdict: Verdict,
 }
 
 /// Sums up a study's table and writes what there is to write.
@@ -99,14 +106,17 @@ pub fn write_study(
             let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
             FilesError::Robustness(texts.join("; "))
         })?;
-    let passed = criteria.iter().all(|criterion| criterion.pass);
+    let not_judged = not_judged(&statistics, &criteria);
+    let missed = criteria.iter().filter(|each| each.is_missed()).count();
+    let verdict = Verdict::of(missed > 0, !not_judged.is_empty());
     let summary = StudySummary {
         name: file.name.clone(),
         description: file.description.clone(),
         study_id: prepared.identity.id.clone(),
         cases: prepared.design.cases(),
-        verdict: if passed { "pass" } else { "fail" },
+        verdict,
         criteria,
+        not_judged,
         robustness,
         statistics,
     };
@@ -120,8 +130,10 @@ pub fn write_study(
         .map_or_else(Vec::new, |(section, results)| {
             robustness_blocks(section, results)
         });
-    let blocks = blocks(&summary.statistics, &summary.criteria, more);
-    let markdown = summary_markdown(&file.name, &summary.criteria, &blocks);
+    let mut blocks = blocks(&summary.statistics, &summary.criteria, more);
+    blocks.extend(last_line(&summary).map(|line| Block::Lines(vec![line])));
+    let verdict = last_line(&summary).map(|_| summary.verdict);
+    let markdown = summary_markdown(&file.name, verdict, &blocks);
     folder.write("summary.md", markdown)?;
     let text = summary_text(&blocks);
     if let Some(path) = output.junit {
@@ -156,8 +168,58 @@ pub fn write_study(
         folder.remove(PAGE_FILE)?;
     }
     Ok(FinishedStudy {
+        verdict: summary.verdict,
         summary,
         text,
-        passed,
     })
+}
+
+/// What was to be judged and could not be: criteria without values, and motions that engines could not
+/// carry out, of which nothing is measured.
+fn not_judged(statistics: &Summary, criteria: &[CriterionResult]) -> Vec<String> {
+    let open = criteria.iter().filter(|each| !each.is_judged());
+    let mut reasons: Vec<String> = open
+        .map(|each| {
+            let of = each
+                .of
+                .as_ref()
+                .map_or(String::new(), |of| format!(" {of}"));
+            format!("{}{of}: {}", each.criterion, each.detail)
+        })
+        .collect();
+    let mut failures: BTreeMap<&str, u64> = BTreeMap::new();
+    let configurations = statistics.overall.configurations.iter();
+    for each in configurations.flat_map(|each| &each.details) {
+        if let Some(engine) = each.detail.strip_prefix(ENGINE_FAILURE) {
+            *failures.entry(engine.trim()).or_default() += each.count;
+        }
+    }
+    reasons.extend(failures.into_iter().map(|(engine, count)| {
+        format!("{engine} could not carry out {count} motions, of which nothing is measured")
+    }));
+    reasons
+}
+
+/// The verdict with its counts; none where there is nothing to judge.
+fn last_line(summary: &StudySummary) -> Option<String> {
+    let total = summary.criteria.len();
+    let judged = summary
+        .criteria
+        .iter()
+        .filter(|each| each.is_judged())
+        .count();
+    let met = summary.criteria.iter().filter(|each| each.pass).count();
+    let verdict = capitals(summary.verdict);
+    if summary.not_judged.is_empty() {
+        return (total > 0).then(|| format!("{verdict}: {met} of {total} criteria met"));
+    }
+    let why = summary.not_judged.join("; ");
+    let met = if met == judged {
+        "all met".to_owned()
+    } else {
+        format!("{met} of them met")
+    };
+    Some(format!(
+        "{verdict}: {judged} of {total} criteria judged, {met}; not judged: {why}"
+    ))
 }

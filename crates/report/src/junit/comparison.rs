@@ -3,7 +3,7 @@
 use needlebench_evaluation::compare::Comparison;
 use quick_junit::{SerializeError, TestCase, TestCaseStatus, TestSuite};
 
-use super::failure::failure;
+use super::failure::{failure, not_judged};
 
 /// The comparison as JUnit XML: a suite for each goal, a case for each configuration.
 pub fn comparison_junit(comparison: &Comparison) -> Result<String, SerializeError> {
@@ -40,6 +40,9 @@ pub fn comparison_junit(comparison: &Comparison) -> Result<String, SerializeErro
     }
     let mut suite = TestSuite::new("compare");
     suite.add_test_case(case("compare", "thresholds", None, None));
+    for reason in &comparison.incomplete {
+        suite.add_test_case(TestCase::new("complete", not_judged(reason)));
+    }
     document.add_test_suite(suite);
     document.to_string()
 }

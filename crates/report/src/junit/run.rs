@@ -4,7 +4,7 @@ use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::report::{CriterionResult, Report, Status};
 use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
-use super::failure::failure;
+use super::failure::{failure, not_judged};
 use crate::number::value_and_limit;
 
 /// Reports as one JUnit document. Contains no times: two runs give the same bytes.
@@ -23,8 +23,11 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                     .filter(|result| result.label.as_deref() == Some(configuration.label))
                     .map(described)
                     .collect();
+                let open = open(report, &goal.name, Some(configuration.label));
                 let status = if !failures.is_empty() {
                     failure(&failures.join("; "))
+                } else if !open.is_empty() {
+                    not_judged(&open)
                 } else if configuration.status == Status::Rejected {
                     let mut status = TestCaseStatus::skipped();
                     if let Some(rejection) = configuration.rejections.first() {
@@ -46,10 +49,13 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                 .filter(|result| result.goal == goal.name && result.label.is_none() && !result.pass)
                 .map(described)
                 .collect();
-            let status = if failures.is_empty() {
-                TestCaseStatus::success()
-            } else {
+            let open = open(report, &goal.name, None);
+            let status = if !failures.is_empty() {
                 failure(&failures.join("; "))
+            } else if !open.is_empty() {
+                not_judged(&open)
+            } else {
+                TestCaseStatus::success()
             };
             let mut case = TestCase::new("goal", status);
             case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
@@ -72,6 +78,16 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
     document.to_string()
 }
 
+/// What was not judged of a configuration, or of the goal as a whole: criteria and why.
+fn open(report: &Report, goal: &str, label: Option<&str>) -> String {
+    let all = report.not_judged.iter();
+    let of_it = all.filter(|each| each.goal == goal && each.label.as_deref() == label);
+    let texts: Vec<String> = of_it
+        .map(|each| format!("{}: {}", each.criterion, each.reason))
+        .collect();
+    texts.join("; ")
+}
+
 /// A test by ISO 9283: a case for each criterion.
 fn iso9283_suite(report: &Report) -> TestSuite {
     let name = format!("{}.{SUBJECT}", report.scenario.name);
@@ -87,6 +103,16 @@ fn iso9283_suite(report: &Report) -> TestSuite {
             .as_ref()
             .map_or(String::new(), |engine| format!(" ({engine})"));
         let mut case = TestCase::new(format!("{}{engine}", result.criterion), status);
+        case.set_classname(name.clone());
+        suite.add_test_case(case);
+    }
+    for each in report.not_judged.iter().filter(|each| each.goal == SUBJECT) {
+        let engine = each.engine.as_ref();
+        let engine = engine.map_or(String::new(), |engine| format!(" ({engine})"));
+        let mut case = TestCase::new(
+            format!("{}{engine}", each.criterion),
+            not_judged(&each.reason),
+        );
         case.set_classname(name.clone());
         suite.add_test_case(case);
     }

@@ -3,7 +3,7 @@
 use needlebench_study::statistics::CriterionResult;
 use quick_junit::{SerializeError, TestCase, TestCaseStatus, TestSuite};
 
-use super::failure::failure;
+use super::failure::{failure, not_judged};
 
 /// The criteria of a study as one JUnit document.
 pub fn study_junit(name: &str, criteria: &[CriterionResult]) -> Result<String, SerializeError> {
@@ -16,6 +16,8 @@ pub fn study_junit(name: &str, criteria: &[CriterionResult]) -> Result<String, S
             .map_or(String::new(), |of| format!(" {of}"));
         let status = if criterion.pass {
             TestCaseStatus::success()
+        } else if !criterion.is_judged() {
+            not_judged(&criterion.detail)
         } else {
             let value = criterion
                 .value

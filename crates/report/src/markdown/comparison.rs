@@ -1,6 +1,7 @@
 //! Two results side by side.
 
 use needlebench_evaluation::compare::Comparison;
+use needlebench_evaluation::report::Verdict;
 
 use crate::table::comparison::{
     failure_text, goal_title, metric_texts, remarks, rows, side_text, unchanged,
@@ -13,7 +14,10 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
             "# {} against {}: {}",
             comparison.a.source,
             comparison.b.source,
-            if comparison.pass { "pass" } else { "**fail**" }
+            match comparison.verdict {
+                Verdict::Pass => "pass".to_owned(),
+                other => format!("**{}**", other.name()),
+            }
         ),
         String::new(),
         format!("- {}", side_text("A", &comparison.a)),
@@ -35,6 +39,9 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
             .map(|note| format!("- note: {note}")),
     );
     lines.push(String::new());
+    for reason in &comparison.incomplete {
+        lines.push(format!("- **incomplete** {reason}"));
+    }
     for failure in &comparison.failures {
         lines.push(format!("- **lost** {}", failure_text(failure)));
     }

@@ -9,6 +9,7 @@ use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::route_in_words;
 use crate::table::shown::{Shown, shown_metrics};
+use crate::table::verdict::{counts, status};
 
 /// The report as Markdown; `engines` are those that there are, with their titles.
 pub fn markdown(report: &Report, engines: &[&'static dyn Engine]) -> String {
@@ -22,6 +23,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     let verdict = match report.verdict {
         Verdict::Pass => "pass",
         Verdict::Fail => "**fail**",
+        Verdict::Incomplete => "**incomplete**",
     };
     writeln!(out, "# {}: {verdict}\n", report.scenario.name)?;
     if !report.scenario.description.is_empty() {
@@ -29,7 +31,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     }
     for goal in &report.goals {
         writeln!(out, "## {}\n", goal.name)?;
-        write_configurations(out, goal, engines)?;
+        write_configurations(out, report, goal, engines)?;
         writeln!(out)?;
         let comparison = ranking_markdown(goal);
         if !comparison.is_empty() {
@@ -72,12 +74,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         .iter()
         .filter(|result| !result.pass)
         .collect();
-    writeln!(
-        out,
-        "{} of {} criteria met.",
-        report.criteria.len() - failed.len(),
-        report.criteria.len()
-    )?;
+    writeln!(out, "{}.", counts(report))?;
     for result in failed {
         writeln!(
             out,
@@ -88,6 +85,9 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
             result.criterion,
             result.detail
         )?;
+    }
+    for (label, reason, criteria) in not_judged(report) {
+        writeln!(out, "- not judged: {label}: {criteria} ({reason})")?;
     }
     for failure in &report.engine_failures {
         writeln!(
@@ -132,9 +132,27 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     )
 }
 
+/// What was not judged: goal and configuration, why, and which criteria, those of one reason together.
+fn not_judged(report: &Report) -> Vec<(String, &str, String)> {
+    let mut found: Vec<(String, &str, String)> = Vec::new();
+    for each in &report.not_judged {
+        let label = each.label.as_deref().unwrap_or_default();
+        let subject = format!("{} {label}", each.goal).trim_end().to_owned();
+        match found.last_mut() {
+            Some((of, reason, criteria)) if *of == subject && *reason == each.reason => {
+                criteria.push_str(", ");
+                criteria.push_str(&each.criterion);
+            }
+            _ => found.push((subject, &each.reason, each.criterion.clone())),
+        }
+    }
+    found
+}
+
 /// The configurations of a goal, with the metrics that the table of metrics gives a heading.
 fn write_configurations(
     out: &mut String,
+    report: &Report,
     goal: &GoalReport,
     engines: &[EngineHeading],
 ) -> std::fmt::Result {
@@ -154,7 +172,7 @@ fn write_configurations(
     for each in &goal.configurations {
         let status = match (each.status, each.rejections.first()) {
             (Status::Rejected, Some(first)) => format!("rejected: {}", first.rule),
-            (status, _) => status.name().to_owned(),
+            _ => status(report, &goal.name, each).to_owned(),
         };
         let mark = match &goal.recommended {
             Some(found) if found.label == each.label => "**",

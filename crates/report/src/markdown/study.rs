@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use needlebench_study::statistics::CriterionResult;
+use needlebench_evaluation::report::Verdict;
 
 use crate::table::study::document::Block;
 
@@ -27,26 +27,24 @@ fn headings(header: &[String]) -> Vec<String> {
     names
 }
 
-/// The summary as Markdown.
-pub fn summary_markdown(title: &str, criteria: &[CriterionResult], blocks: &[Block]) -> String {
+/// The summary as Markdown; without a verdict where there is nothing to judge.
+pub fn summary_markdown(title: &str, verdict: Option<Verdict>, blocks: &[Block]) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
-    let _ = write_markdown(&mut text, title, criteria, blocks);
+    let _ = write_markdown(&mut text, title, verdict, blocks);
     text
 }
 
 fn write_markdown(
     out: &mut String,
     title: &str,
-    criteria: &[CriterionResult],
+    verdict: Option<Verdict>,
     blocks: &[Block],
 ) -> std::fmt::Result {
-    let failed = criteria.iter().filter(|each| !each.pass).count();
-    let verdict = match (criteria.len(), failed) {
-        (0, _) => String::new(),
-        (_, 0) => ": pass".to_owned(),
-        _ => ": **fail**".to_owned(),
-    };
+    let verdict = verdict.map_or(String::new(), |verdict| match verdict {
+        Verdict::Pass => ": pass".to_owned(),
+        other => format!(": **{}**", other.name()),
+    });
     writeln!(out, "# {title}{verdict}\n")?;
     for part in blocks {
         match part {

@@ -198,10 +198,19 @@ pub fn comparison_text(comparison: &Comparison, all: bool) -> String {
 }
 
 fn verdict(comparison: &Comparison) -> String {
-    match comparison.failures.len() {
-        0 => "PASS: nothing was lost beyond what is allowed".to_owned(),
-        1 => "FAIL: 1 loss".to_owned(),
-        count => format!("FAIL: {count} losses"),
+    let incomplete = comparison.incomplete.join("; ");
+    match (comparison.failures.len(), comparison.incomplete.is_empty()) {
+        (0, true) => "PASS: nothing was lost beyond what is allowed".to_owned(),
+        (0, false) => format!("INCOMPLETE: nothing is known to be lost, but {incomplete}"),
+        (count, complete) => {
+            let losses = if count == 1 { "loss" } else { "losses" };
+            let more = if complete {
+                String::new()
+            } else {
+                format!("; {incomplete}")
+            };
+            format!("FAIL: {count} {losses}{more}")
+        }
     }
 }
 

@@ -15,6 +15,7 @@ pub mod servo;
 pub(crate) mod shown;
 pub mod study;
 pub mod study_comparison;
+pub(crate) mod verdict;
 
 pub use plain::plain_table;
 pub use run::report_text;

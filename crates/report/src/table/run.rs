@@ -8,7 +8,7 @@ use needlebench_engine::Engine;
 use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::metric::Heading;
 use needlebench_evaluation::report::{
-    ConfigurationReport, GoalReport, Report, RouteReport, Status, Verdict,
+    ConfigurationReport, GoalReport, Report, RouteReport, Status,
 };
 use needlebench_uncertainty::budget::ErrorBudget;
 
@@ -18,6 +18,7 @@ use super::events::events_text;
 use super::plain_table;
 use super::ranking::comparison_text;
 use super::shown::{Shown, shown_metrics};
+use super::verdict::{capitals, counts, status};
 use crate::number::value_and_limit;
 
 /// The whole report as text; `engines` are those that there are, with their titles.
@@ -37,7 +38,11 @@ fn write_report(
     for goal in &report.goals {
         writeln!(out, "{}", goal_heading(goal))?;
         let (differing, constant) = split(goal, columns(&headings, |heading| heading.table));
-        writeln!(out, "{}", goal_table(goal, &differing, Mostly::Shown))?;
+        writeln!(
+            out,
+            "{}",
+            goal_table(report, goal, &differing, Mostly::Shown)
+        )?;
         writeln!(out, "* worst of those that work, < recommended")?;
         write_constant(out, goal, &constant)?;
         write_expected(out, report, goal)?;
@@ -52,7 +57,7 @@ fn write_report(
                 "check of control and integration, {}",
                 simulated_arm(report)
             )?;
-            writeln!(out, "{}", goal_table(goal, &checks, Mostly::Left))?;
+            writeln!(out, "{}", goal_table(report, goal, &checks, Mostly::Left))?;
         }
         if let Some(comparison) = comparison_text(goal) {
             writeln!(out, "{comparison}")?;
@@ -111,13 +116,7 @@ fn write_report(
     for note in &report.notes {
         writeln!(out, "note: {note}")?;
     }
-    let failed = report.criteria.iter().filter(|result| !result.pass).count();
-    let verdict = match report.verdict {
-        Verdict::Pass => "PASS",
-        Verdict::Fail => "FAIL",
-    };
-    let count = report.criteria.len();
-    writeln!(out, "{verdict}: {} of {count} criteria met", count - failed)
+    writeln!(out, "{}: {}", capitals(report.verdict), counts(report))
 }
 
 fn goal_heading(goal: &GoalReport) -> String {
@@ -271,7 +270,7 @@ enum Mostly {
 }
 
 /// The eight rows of a goal; the worst number of each column is marked with `*` and in colour.
-fn goal_table(goal: &GoalReport, columns: &[Column], mostly: Mostly) -> Table {
+fn goal_table(report: &Report, goal: &GoalReport, columns: &[Column], mostly: Mostly) -> Table {
     let dominant = |each: &ConfigurationReport| Some(each.budget.as_ref()?.dominant?.name());
     let mostly = mostly == Mostly::Shown
         && goal
@@ -298,8 +297,11 @@ fn goal_table(goal: &GoalReport, columns: &[Column], mostly: Mostly) -> Table {
         };
         let status = match (configuration.status, configuration.rejections.first()) {
             (Status::Rejected, Some(first)) => Cell::new(first.rule).fg(Color::Yellow),
-            (Status::Failed, _) => Cell::new("failed").fg(Color::Red),
-            (status, _) => Cell::new(status.name()),
+            _ => match status(report, &goal.name, configuration) {
+                failed @ "failed" => Cell::new(failed).fg(Color::Red),
+                incomplete @ "incomplete" => Cell::new(incomplete).fg(Color::Yellow),
+                other => Cell::new(other),
+            },
         };
         let mut row = vec![
             if chosen {

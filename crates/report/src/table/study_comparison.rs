@@ -30,10 +30,10 @@ fn transition_text(what: &str, transition: &Transition) -> Option<String> {
     if transition.lost == 0 && transition.gained == 0 {
         return None;
     }
-    let p = if transition.p < 1e-4 {
-        "p < 0.0001".to_owned()
-    } else {
-        format!("p = {:.2}", transition.p)
+    let p = match transition.p {
+        ..1e-4 => "p < 0.0001".to_owned(),
+        p @ ..0.01 => format!("p = {p:.1e}"),
+        p => format!("p = {p:.2}"),
     };
     let cases = |name: &str, cases: &[u64], count: u64| {
         let list: Vec<String> = cases.iter().map(ToString::to_string).collect();

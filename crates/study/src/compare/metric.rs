@@ -1,5 +1,7 @@
 //! What two studies are compared by, and the losses that are allowed.
 
+use needlebench_cell::digits_apart;
+
 use crate::MetricColumn;
 
 /// Every configuration by itself.
@@ -65,6 +67,27 @@ pub struct StudyThreshold {
     pub key: String,
     /// The limit as it was given.
     pub text: String,
+}
+
+impl StudyThreshold {
+    /// A loss that is more than allowed, in brackets, with the digits that show it.
+    pub(crate) fn loss_text(&self, loss: f64, first: f64, unit: &str) -> String {
+        match (self.limit, unit) {
+            (StudyLimit::Absolute(limit), "1") => {
+                format!(" ({} points)", digits_apart(100.0 * loss, 100.0 * limit))
+            }
+            (StudyLimit::Absolute(limit), unit) => {
+                format!(" ({} {unit})", digits_apart(loss, limit))
+            }
+            (StudyLimit::Relative(share), _) if first != 0.0 => {
+                format!(
+                    " ({} %)",
+                    digits_apart(100.0 * loss / first.abs(), 100.0 * share)
+                )
+            }
+            (StudyLimit::Relative(_), _) => String::new(),
+        }
+    }
 }
 
 /// A limit of a loss.

@@ -132,6 +132,8 @@ pub struct StudyCompareOptions {
     pub thresholds: Vec<StudyThreshold>,
     /// A rate that fell by more than chance does not fail the comparison unless a threshold says so.
     pub allow_status_change: bool,
+    /// Cases and metrics that only the first has do not fail the comparison.
+    pub allow_lost: bool,
     /// What there is to say of the names of metrics.
     pub notes: Vec<String>,
 }
@@ -197,7 +199,8 @@ impl<'a> StudyPair<'a> {
     ///
     /// The comparison fails where a loss is more than a threshold allows, and, unless that is allowed,
     /// where the share of layouts that work or the success rate of a configuration is less by more
-    /// than chance and no threshold is on it.
+    /// than chance and no threshold is on it; and, unless that is allowed, where the second has fewer
+    /// cases or no values of a metric that the first has.
     pub fn compare(self, options: &StudyCompareOptions) -> StudyComparison {
         let [a, b] = self.studies;
         let [summary_a, summary_b] = &self.summaries;
@@ -214,6 +217,9 @@ impl<'a> StudyPair<'a> {
         let changes = both.changes();
         if !options.allow_status_change {
             failures.extend(lost_rates(&both, options, &changes));
+        }
+        if !options.allow_lost {
+            failures.extend(lost(summary_a, summary_b));
         }
         StudyComparison {
             schema_version: COMPARISON_VERSION,
@@ -255,6 +261,40 @@ fn held(
         }
     }
     (thresholds, failures)
+}
+
+/// Cases and metrics that the second study does not have.
+fn lost(a: &Summary, b: &Summary) -> Vec<StudyFailure> {
+    let failure = |metric: &str, detail: String| StudyFailure {
+        metric: metric.to_owned(),
+        of: None,
+        threshold: None,
+        detail,
+        cases: Vec::new(),
+    };
+    let mut failures = Vec::new();
+    let (before, now) = (a.overall.cases, b.overall.cases);
+    if now < before {
+        let detail = format!(
+            "{} of {before} cases are missing in the second study",
+            before - now
+        );
+        failures.push(failure("cases", detail));
+    }
+    let has_values = |summary: &Summary, key: &str| {
+        let mut columns = summary.metrics.iter();
+        columns.any(|column| {
+            let mut spreads = summary.spreads.iter();
+            column.key == key && spreads.any(|spread| spread.metric == column.name)
+        })
+    };
+    for column in &a.metrics {
+        if has_values(a, &column.key) && !has_values(b, &column.key) {
+            let detail = format!("{}: the second study has no values", column.words);
+            failures.push(failure(&column.key, detail));
+        }
+    }
+    failures
 }
 
 /// Rates that fell by more than chance and have no threshold.
@@ -340,7 +380,11 @@ fn judged(threshold: &StudyThreshold, change: &Change) -> ThresholdResult {
         pass,
         detail: match (change.a, change.b) {
             (Some(_), Some(_)) if pass => in_words(change),
-            (Some(_), Some(_)) => format!("{}{allowed} {}", in_words(change), threshold.text),
+            (Some(first), Some(_)) => {
+                let loss =
+                    threshold.loss_text(change.loss.unwrap_or_default(), first, &change.unit);
+                format!("{}{allowed} {}{loss}", in_words(change), threshold.text)
+            }
             (None, None) => format!("{}: neither study has values", what(change)),
             (None, Some(_)) => format!("{}: the first study has no values", what(change)),
             (Some(_), None) => format!("{}: the second study has no values", what(change)),

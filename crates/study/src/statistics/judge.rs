@@ -34,6 +34,18 @@ pub struct CriterionResult {
     pub cases: Vec<u64>,
 }
 
+impl CriterionResult {
+    /// Whether there was anything to judge it by; if not, it is neither met nor missed.
+    pub fn is_judged(&self) -> bool {
+        self.value.is_some() && (!self.confidence || self.interval.is_some())
+    }
+
+    /// Judged and not met.
+    pub fn is_missed(&self) -> bool {
+        self.is_judged() && !self.pass
+    }
+}
+
 /// What is judged.
 struct Judged {
     criterion: &'static str,

@@ -25,12 +25,17 @@ impl AtomicFile {
         let temporary = path.with_file_name(name);
         Ok(Self {
             path: path.to_owned(),
-            file: File::create(&temporary)?,
+            file: File::options()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(true)
+                .open(&temporary)?,
             temporary: Some(temporary),
         })
     }
 
-    /// To write to.
+    /// To write to, and to read what is written.
     pub(crate) fn file(&self) -> &File {
         &self.file
     }

@@ -6,12 +6,15 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use super::atomic::sync_folder;
+use super::codec::Packer;
 use super::columns::Columns;
 use super::error::StudyError;
-use super::journal::{BlockReader, JOURNAL_FILE, Journal, Places, kept};
+use super::journal::{BlockReader, JOURNAL_FILE, Journal, Key, Places, kept, scan};
 use super::manifest::{MANIFEST_FILE, Manifest, Status};
+use super::parquet_read::ParquetResults;
 use super::parquet_write::{self, WriteError};
 use super::progress::Progress;
+use super::salvage::sound_blocks;
 
 /// Name of the table in a study's folder.
 pub const RESULTS_FILE: &str = "results.parquet";
@@ -46,16 +49,27 @@ impl Folder {
         watch: &(dyn Fn(Progress) + Sync),
     ) -> Result<Opened, StudyError> {
         std::fs::create_dir_all(path).map_err(StudyError::io("create", path))?;
-        if check(path, manifest, resume)? == Some(Status::Complete) {
+        // Who only reads needs no lock.
+        if check(path, manifest, resume)? == Some(Status::Complete)
+            && unsound(path, manifest)?.is_none()
+        {
             return Ok(Opened::Complete);
         }
         let mut journal = Journal::lock(path)?;
         // Another process may have completed the study while this one waited for its turn.
+        let mut damaged = None;
         if check(path, manifest, true)? == Some(Status::Complete) {
-            if manifest.shard.is_none() {
-                remove_journal(path)?;
-            }
-            return Ok(Opened::Complete);
+            damaged = unsound(path, manifest)?;
+            let Some(reason) = &damaged else {
+                if manifest.shard.is_none() {
+                    remove_journal(path)?;
+                }
+                return Ok(Opened::Complete);
+            };
+            watch(Progress::Unsound {
+                file: &path.join(data_file(manifest)),
+                reason,
+            });
         }
         let mut manifest = manifest.clone();
         manifest.status = Status::Running;
@@ -76,12 +90,31 @@ impl Folder {
                 bytes: scan.tail_bytes,
             });
         }
-        Ok(Opened::Running(Box::new(Self {
+        let mut folder = Self {
             path: path.to_owned(),
             manifest,
             journal,
             places: scan.places,
-        })))
+        };
+        if damaged.is_some() && folder.manifest.shard.is_none() {
+            folder.salvage()?;
+        }
+        Ok(Opened::Running(Box::new(folder)))
+    }
+
+    /// Puts what is sound of the damaged table back into the journal.
+    fn salvage(&mut self) -> Result<(), StudyError> {
+        let (key, manifest) = (Key::new(&self.manifest), self.manifest.clone());
+        let table = self.path.join(RESULTS_FILE);
+        let mut packer = Packer::new().map_err(|error| StudyError::Worker(error.to_string()))?;
+        let salvaged = sound_blocks(&table, &manifest, |block, columns| {
+            let packed = packer.pack(columns)?;
+            self.append(block, &key.record(block, columns.cases, &packed))
+        });
+        salvaged.map_err(|source| {
+            let kept = kept(&manifest, &self.places);
+            self.write_error(JOURNAL_FILE, source, kept)
+        })
     }
 
     /// Adds a block.
@@ -184,19 +217,47 @@ fn check(path: &Path, manifest: &Manifest, resume: bool) -> Result<Option<Status
             Status::Running => "this study, not complete,",
         }));
     }
-    let data = if manifest.shard.is_some() {
+    Ok(Some(found.status))
+}
+
+/// The file that has the results of a complete folder: a shard's journal is its result.
+fn data_file(manifest: &Manifest) -> &'static str {
+    if manifest.shard.is_some() {
         JOURNAL_FILE
     } else {
         RESULTS_FILE
-    };
-    if found.status == Status::Complete && !path.join(data).exists() {
-        let message = format!(
-            "says that the study is complete, but {data} is not there\n\
-             hint: remove {MANIFEST_FILE} to compute it again"
-        );
-        return Err(StudyError::file(&path.join(MANIFEST_FILE), message));
     }
-    Ok(Some(found.status))
+}
+
+/// What is wrong with a folder that says that it is complete, if anything is: all of it is read.
+fn unsound(path: &Path, manifest: &Manifest) -> Result<Option<String>, StudyError> {
+    let file = path.join(data_file(manifest));
+    if !file.exists() {
+        return Ok(Some("is not there".to_owned()));
+    }
+    if manifest.shard.is_none() {
+        return Ok(match ParquetResults::open(&file) {
+            Ok(results) => results.other_than(manifest).map(str::to_owned),
+            Err(error) => {
+                let (message, _) = error
+                    .message
+                    .split_once('\n')
+                    .unwrap_or((&error.message, ""));
+                Some(message.to_owned())
+            }
+        });
+    }
+    let found = match scan(&file, manifest) {
+        Ok(found) => found,
+        Err(error @ StudyError::Io { .. }) => return Err(error),
+        Err(error) => return Ok(Some(error.to_string())),
+    };
+    let (kept, total) = (kept(manifest, &found.places), manifest.own_cases());
+    // What is no record between records is left of a damage that was computed again.
+    Ok((kept < total).then(|| {
+        let lost = total - kept;
+        format!("{lost} of {total} cases are damaged or missing")
+    }))
 }
 
 fn remove_journal(folder: &Path) -> Result<(), StudyError> {

@@ -15,7 +15,7 @@ use crate::{Factor, MetricColumn};
 /// Name of the manifest in a study's folder.
 pub const MANIFEST_FILE: &str = "study.json";
 
-/// Version of the files of a folder: manifest, journal and tables.
+/// Version of a folder's manifest and journal.
 pub const SCHEMA_VERSION: u32 = 2;
 
 /// What a folder's results are results of. It names no time, no machine and no number of threads:

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::StudyError;
 use super::folder::{Blocks, Folder, Opened, RESULTS_FILE, write_results};
-use super::journal::{BlockReader, JOURNAL_FILE, scan};
+use super::journal::{BlockReader, JOURNAL_FILE, kept, scan};
 use super::manifest::{Manifest, Shard, Status};
 use super::parquet_write::WriteError;
 use super::progress::Progress;
@@ -87,7 +87,14 @@ fn lock(shards: &[(PathBuf, Manifest)]) -> Result<Vec<File>, StudyError> {
     let mut locks = Vec::new();
     for (folder, _) in shards {
         let path = folder.join(JOURNAL_FILE);
-        let file = File::open(&path).map_err(StudyError::io("open", &path))?;
+        let file = match File::open(&path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                let message = "is not there\nhint: `needlebench study STUDY --shard K/N --resume` computes it again";
+                return Err(StudyError::file(&path, message));
+            }
+            Err(error) => return Err(StudyError::io("open", &path)(error)),
+        };
         match file.try_lock_shared() {
             Ok(()) => locks.push(file),
             Err(std::fs::TryLockError::WouldBlock) => {
@@ -115,7 +122,9 @@ fn collect(
     for (index, (folder, shard)) in shards.iter().enumerate() {
         let path = folder.join(JOURNAL_FILE);
         let scan = scan(&path, shard)?;
-        for damage in &scan.damages {
+        // Of what was computed again nothing is missing.
+        let lost = kept(shard, &scan.places) < shard.own_cases();
+        for damage in scan.damages.iter().filter(|_| lost) {
             watch(Progress::Damage {
                 journal: &path,
                 offset: damage.offset,
@@ -173,7 +182,12 @@ fn missing_message(manifest: &Manifest, shards: &[(PathBuf, Manifest)], missing:
             let part = shard
                 .shard
                 .map_or("the study".to_owned(), |part| format!("shard {part}"));
-            lines.push(format!("  {}: {part} is not complete", folder.display()));
+            let damaged = if shard.status == Status::Complete {
+                "was complete and is damaged"
+            } else {
+                "is not complete"
+            };
+            lines.push(format!("  {}: {part} {damaged}", folder.display()));
         }
     }
     let parts: std::collections::BTreeSet<u32> = shards
@@ -188,6 +202,10 @@ fn missing_message(manifest: &Manifest, shards: &[(PathBuf, Manifest)], missing:
             }
         }
     }
-    lines.push("hint: finish unfinished shards with --resume".to_owned());
+    lines.push(
+        "hint: `needlebench study STUDY --shard K/N --resume` finishes a shard, and computes what is damaged \
+         again"
+            .to_owned(),
+    );
     lines.join("\n")
 }

@@ -19,7 +19,9 @@ mod parquet_read;
 mod parquet_write;
 mod progress;
 mod run;
+mod salvage;
 mod schema;
+mod seal;
 
 pub use case_design::CaseDesign;
 pub use csv::write_csv;

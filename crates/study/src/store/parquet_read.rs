@@ -18,17 +18,20 @@ use parquet::file::reader::{ChunkReader, Length, RowGroupReader};
 use parquet::file::serialized_reader::SerializedRowGroupReader;
 
 use super::columns::{Columns, FactorColumn, ROWS, blank_case};
-use super::manifest::SCHEMA_VERSION;
+use super::manifest::Manifest;
 use super::schema::{
     self, CASES_KEY, CRC_KEY, Column, Content, FACTORS_KEY, ID_KEY, METRICS_KEY, NAME_KEY,
-    PROVENANCE_KEY, VERSION_KEY,
+    PROVENANCE_KEY, SUM_KEY, TABLE_VERSION, VERSION_KEY,
 };
+use super::seal;
 use crate::{
     CaseResult, Factor, FactorKind, FactorValue, MetricColumn, Outcome, Results, ResultsError,
 };
 
 /// Version of tables whose columns have no keys.
 const FORMER_VERSION: u32 = 1;
+/// Version of tables without a sum of the whole file.
+const UNSEALED_VERSION: u32 = 2;
 
 /// Columns beside factors and metrics: case, configuration, outcome, detail.
 const FIXED_COLUMNS: usize = 4;
@@ -67,18 +70,14 @@ pub struct ParquetResults {
 }
 
 impl ParquetResults {
-    /// Opens a table and checks that it is one of a study and that all of it is there.
+    /// Opens a table and checks that it is one of a study, that all of it is there, and that no bit of it
+    /// has changed since it was written.
     ///
     /// # Errors
     /// What is wrong with the file.
     pub fn open(path: &Path) -> Result<Self, ResultsError> {
         let fail = |message: String| failure(path, message);
-        let mut file =
-            File::open(path).map_err(|error| fail(format!("cannot be opened: {error}")))?;
-        check_ends(&mut file).map_err(fail)?;
-        let metadata = ParquetMetaDataReader::new()
-            .parse_and_finish(&file)
-            .map_err(|error| fail(format!("is damaged: {}", text_of(&error))))?;
+        let (file, metadata) = metadata_of(path)?;
         let file_metadata = metadata.file_metadata();
         let get = |key: &str| {
             let pairs = file_metadata.key_value_metadata();
@@ -87,11 +86,26 @@ impl ParquetResults {
         let version = get(VERSION_KEY).ok_or_else(|| {
             fail("is a Parquet file, but no results of a study of needlebench".to_owned())
         })?;
-        let is_former = version == FORMER_VERSION.to_string();
-        if version != SCHEMA_VERSION.to_string() && !is_former {
+        let is = |known: u32| version == known.to_string();
+        let is_former = is(FORMER_VERSION);
+        if !is(TABLE_VERSION) && !is(UNSEALED_VERSION) && !is_former {
             return Err(fail(format!(
-                "has schema version {version}; this program reads version {SCHEMA_VERSION}"
+                "has schema version {version}; this program reads version {TABLE_VERSION}"
             )));
+        }
+        match get(SUM_KEY) {
+            Some(stored) => {
+                let whole = seal::is_whole(&file, stored);
+                let whole = whole.map_err(|error| fail(format!("cannot be read: {error}")))?;
+                if !whole {
+                    return Err(fail(format!("is damaged: its SHA-256 is another\n{HEAL}")));
+                }
+            }
+            // Those before had none.
+            None if is(TABLE_VERSION) => {
+                return Err(fail(format!("is damaged: it has no SHA-256\n{HEAL}")));
+            }
+            None => {}
         }
         let need =
             |key: &str| get(key).ok_or_else(|| fail(format!("has no {key} in its metadata")));
@@ -126,6 +140,51 @@ impl ParquetResults {
         };
         results.check_layout().map_err(fail)?;
         Ok(results)
+    }
+
+    /// A table of a study that is known, of which nothing but the bytes of row groups and their sums is
+    /// believed: each has to be checked by itself.
+    pub(crate) fn open_damaged(path: &Path, manifest: &Manifest) -> Result<Self, ResultsError> {
+        let (file, metadata) = metadata_of(path)?;
+        let pairs = metadata.file_metadata().key_value_metadata();
+        let stored = pairs
+            .and_then(|pairs| pairs.iter().find(|pair| pair.key == CRC_KEY))
+            .and_then(|pair| pair.value.as_deref());
+        let checks = stored.and_then(|text| serde_json::from_str(text).ok());
+        let results = Self {
+            id: manifest.study_id.clone(),
+            name: manifest.name.clone(),
+            columns: schema::columns(&manifest.factors, &manifest.columns),
+            metrics: manifest.columns.clone(),
+            is_former: false,
+            path: path.to_owned(),
+            provenance: manifest.provenance.clone(),
+            factors: manifest.factors.clone(),
+            cases: manifest.cases,
+            checks: checks.unwrap_or_default(),
+            file: Mutex::new(file),
+            metadata,
+        };
+        results
+            .check_layout()
+            .map_err(|message| failure(path, message))?;
+        Ok(results)
+    }
+
+    /// CRC32 of the bytes of a row group, as it was written.
+    pub(crate) fn check(&self, group: usize) -> u32 {
+        self.checks[group]
+    }
+
+    /// Why it is not the table of a study, if it is not.
+    pub(crate) fn other_than(&self, manifest: &Manifest) -> Option<&'static str> {
+        let same = self.id == manifest.study_id
+            && self.name == manifest.name
+            && self.cases == manifest.cases
+            && self.factors == manifest.factors
+            && self.metrics == manifest.columns
+            && self.provenance == manifest.provenance;
+        (!same).then_some("is of another study")
     }
 
     /// Hash of everything that decides the results.
@@ -388,6 +447,21 @@ impl Results for ParquetResults {
     }
 }
 
+/// What to do about a damaged table.
+const HEAL: &str =
+    "hint: `needlebench study STUDY --resume` computes what is damaged again; or copy it again";
+
+/// Opens a file and reads its footer.
+fn metadata_of(path: &Path) -> Result<(File, ParquetMetaData), ResultsError> {
+    let fail = |message: String| failure(path, message);
+    let mut file = File::open(path).map_err(|error| fail(format!("cannot be opened: {error}")))?;
+    check_ends(&mut file).map_err(fail)?;
+    let metadata = ParquetMetaDataReader::new()
+        .parse_and_finish(&file)
+        .map_err(|error| fail(format!("is damaged: {}\n{HEAL}", text_of(&error))))?;
+    Ok((file, metadata))
+}
+
 /// A file that is empty, no Parquet, or cut off, told apart before anything is decoded.
 fn check_ends(file: &mut File) -> Result<(), String> {
     const MAGIC: [u8; 4] = *b"PAR1";
@@ -405,8 +479,7 @@ fn check_ends(file: &mut File) -> Result<(), String> {
     match ends.map(|end| end == MAGIC) {
         [true, true] => Ok(()),
         [true, false] => Err(format!(
-            "is cut off: it has {length} bytes and no end\n\
-             hint: copy it again, or run the study again"
+            "is cut off: it has {length} bytes and no end\n{HEAL}"
         )),
         _ => Err("is no Parquet file".to_owned()),
     }

@@ -19,7 +19,8 @@ use super::atomic::AtomicFile;
 use super::columns::{Columns, FactorColumn, ROWS};
 use super::manifest::Manifest;
 use super::ordered::in_order;
-use super::schema::{self, CRC_KEY, Column, Content};
+use super::schema::{self, CRC_KEY, Column, Content, SUM_KEY};
+use super::seal;
 use crate::{Factor, FactorKind, Outcome};
 
 /// Cases of a row group: 65 536 rows, of which a reader needs about 15 MB.
@@ -94,12 +95,15 @@ pub(crate) fn write<E: Send>(
     )?;
     let checks = serde_json::to_string(&checks).expect("numbers");
     writer.append_key_value_metadata(KeyValue::new(CRC_KEY.to_owned(), checks));
+    // Last, so that nothing that looks like it comes behind it.
+    writer.append_key_value_metadata(KeyValue::new(SUM_KEY.to_owned(), seal::BLANK.to_owned()));
     writer.close()?;
+    seal::seal(file.file()).map_err(WriteError::File)?;
     file.commit().map_err(WriteError::File)
 }
 
 /// How the tables of a study look.
-struct Layout<'a> {
+pub(crate) struct Layout<'a> {
     factors: &'a [Factor],
     columns: Vec<Column>,
     schema: TypePtr,
@@ -108,7 +112,7 @@ struct Layout<'a> {
 }
 
 impl<'a> Layout<'a> {
-    fn new(manifest: &'a Manifest) -> Self {
+    pub(crate) fn new(manifest: &'a Manifest) -> Self {
         let columns = schema::columns(&manifest.factors, &manifest.columns);
         let schema = schema::parquet_schema(&columns);
         Self {
@@ -118,6 +122,11 @@ impl<'a> Layout<'a> {
             columns,
             schema,
         }
+    }
+
+    /// CRC32 of the row group that such cases make.
+    pub(crate) fn crc(&self, first: u64, cases: &Columns) -> Option<u32> {
+        self.encode(first, cases).ok().map(|group| group.crc)
     }
 
     fn encode(&self, first: u64, cases: &Columns) -> Result<Group, ParquetError> {

@@ -18,6 +18,8 @@ pub enum Progress<'a> {
         offset: u64,
         bytes: u64,
     },
+    /// A folder that says that it is complete is not: what is not sound is computed again.
+    Unsound { file: &'a Path, reason: &'a str },
     /// So many cases were there at the beginning.
     Begin { kept: u64, total: u64 },
     /// So many cases are in the journal.
@@ -46,6 +48,11 @@ impl std::fmt::Display for Progress<'_> {
                 f,
                 "{}: {bytes} bytes from byte {offset} on are damaged; what was there is computed again",
                 journal.display()
+            ),
+            Self::Unsound { file, reason } => write!(
+                f,
+                "{}: {reason}; the study was complete, and what is not sound is computed again",
+                file.display()
             ),
             Self::Begin { kept, total } => write!(f, "{kept} of {total} cases are there already"),
             Self::Cases { done, total } => write!(f, "{done} of {total} cases"),

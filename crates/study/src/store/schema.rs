@@ -7,7 +7,7 @@ use needlebench_kinematics::ik::Configuration;
 use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
 use parquet::schema::types::{Type, TypePtr};
 
-use super::manifest::{Manifest, SCHEMA_VERSION};
+use super::manifest::Manifest;
 use crate::{Factor, FactorKind, Level, MetricColumn, Role};
 
 /// Key of the metadata: version of the table's layout.
@@ -28,6 +28,12 @@ pub(crate) const COLUMNS_KEY: &str = "needlebench.columns";
 pub(crate) const METRICS_KEY: &str = "needlebench.metrics";
 /// Key of the metadata: CRC32 of the bytes of each row group, JSON.
 pub(crate) const CRC_KEY: &str = "needlebench.row_group_crc32";
+
+/// Key of the metadata: SHA-256 of the whole file.
+pub(crate) const SUM_KEY: &str = "needlebench.sha256";
+
+/// Version of tables, which from 3 on have a sum of the whole file.
+pub(crate) const TABLE_VERSION: u32 = 3;
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -178,7 +184,7 @@ pub(crate) fn metadata(manifest: &Manifest, columns: &[Column]) -> Vec<(&'static
         .collect();
     let json = |result: serde_json::Result<String>| result.expect("string keys only");
     vec![
-        (VERSION_KEY, SCHEMA_VERSION.to_string()),
+        (VERSION_KEY, TABLE_VERSION.to_string()),
         (ID_KEY, manifest.study_id.clone()),
         (NAME_KEY, manifest.name.clone()),
         (CASES_KEY, manifest.cases.to_string()),

@@ -43,6 +43,7 @@ pub(super) const EFFORT: &[Metric] = &[
     .criterion("max_settling_time_s", &[Dynamic], |criteria| {
         criteria.max_settling_time_s
     })
+    .missing(Missing::Never)
     .detail(|_, _, criteria| format!("into a band of {:.4} mm", criteria.settling_band_mm)),
     Metric::new(
         "peak_torque",
@@ -115,7 +116,7 @@ pub(super) const ENGINES_COMPARED: &[Metric] = &[
     .criterion("max_engine_difference_peak_mm", &[Dynamic], |criteria| {
         criteria.max_engine_difference_peak_mm.map(|mm| mm * MM)
     })
-    .missing(Missing::FailsIfCompared),
+    .missing(Missing::UnjudgedIfCompared),
     Metric::new(
         "engine_difference_settled",
         "engines differ, settled",
@@ -132,5 +133,5 @@ pub(super) const ENGINES_COMPARED: &[Metric] = &[
     .criterion("max_engine_difference_settled_mm", &[Dynamic], |criteria| {
         criteria.max_engine_difference_settled_mm.map(|mm| mm * MM)
     })
-    .missing(Missing::FailsIfCompared),
+    .missing(Missing::UnjudgedIfCompared),
 ];

@@ -5,14 +5,14 @@ use needlebench_evaluation::metric::{Metric, MetricKey, metrics};
 use needlebench_study::compare::STUDY_RATES;
 
 const INTRODUCTION: &str = "\
-Exits with 1 if a configuration that worked is missing, fails or is rejected (unless \
---allow-status-change), or if a metric got worse than its --max-loss allows: \
-METRIC[:CONFIGURATION]=VALUE.
+Exits with 1 if a configuration that worked fails or is rejected (unless --allow-status-change), if a \
+goal, a configuration or a metric is missing in the second result (unless --allow-lost), if a metric got \
+worse than its --max-loss allows: METRIC[:CONFIGURATION]=VALUE, or if either result is incomplete.
 
 Two studies (folders with results.parquet, or such tables) are compared case by case if they have \
 the same cases, else by 95 % intervals. They exit with 1 if more than chance was lost of the layouts \
 that work or of a configuration's success rate (unless --allow-status-change, or a --max-loss is on \
-it), or if a --max-loss is exceeded: METRIC[@PERCENT][:CONFIGURATION]=VALUE, the quantile at PERCENT \
+it), if cases or a metric are missing in the second (unless --allow-lost), or if a --max-loss is exceeded: METRIC[@PERCENT][:CONFIGURATION]=VALUE, the quantile at PERCENT \
 (default 5, of errors 95) of a configuration, of `every` one, or of the `best` of each layout (default).
 
 A run beside a study: with --case, the case's rows are compared like a run of its goal.

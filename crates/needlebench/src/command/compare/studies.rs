@@ -118,6 +118,7 @@ fn compared(
     Ok(pair.compare(&StudyCompareOptions {
         thresholds,
         allow_status_change: prepared.given.allow_status_change,
+        allow_lost: prepared.given.allow_lost,
         notes,
     }))
 }

@@ -10,6 +10,7 @@ use super::{CompareArguments, Pair};
 pub(super) struct Given {
     pub thresholds: Vec<Threshold>,
     pub allow_status_change: bool,
+    pub allow_lost: bool,
 }
 
 /// Reads the file of thresholds and the arguments, which go before it; of several on one number the last
@@ -21,6 +22,7 @@ pub(super) fn thresholds(
     let mut given = Given {
         thresholds: Vec::new(),
         allow_status_change: arguments.allow_status_change,
+        allow_lost: arguments.allow_lost,
     };
     let mut findings = Vec::new();
     let engines = engine_names(ENGINES);
@@ -28,6 +30,7 @@ pub(super) fn thresholds(
     if let Some(path) = &arguments.thresholds {
         let file = ThresholdsFile::load(path).map_err(|finding| vec![finding])?;
         given.allow_status_change |= file.allow_status_change();
+        given.allow_lost |= file.allow_lost();
         for (key, limit) in file.max_loss() {
             match parse(key, limit) {
                 Ok(threshold) => given.thresholds.push(threshold),

@@ -154,6 +154,13 @@ NB.table = function (caption, columns, rows, options = {}) {
 NB.section = (title, open, ...children) =>
   NB.el('details', { class: 'section', open: open || null }, NB.el('summary', null, NB.el('h2', { text: title })), ...children);
 
+/** A verdict as a chip: only `pass` is good. */
+NB.verdict = (verdict) => {
+  const words = { pass: ['good', '\u2713 passed'], fail: ['bad', '\u2717 failed'], incomplete: ['bad', '? incomplete'] };
+  const [style, text] = words[verdict] || ['bad', String(verdict)];
+  return NB.el('span', { class: `chip ${style}`, text });
+};
+
 NB.checkbox = function (label, checked, change) {
   const input = NB.el('input', { type: 'checkbox', checked, onchange: (event) => change(event.target.checked) });
   return NB.el('label', { class: 'check' }, input, NB.el('span', { text: label }));

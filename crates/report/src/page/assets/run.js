@@ -23,11 +23,15 @@ NB.RunPage = class {
   }
 
   head() {
-    const { verdict, criteria, engine_failures: failures } = this.report;
+    const { verdict, criteria, not_judged: open, engine_failures: failures } = this.report;
     const met = criteria.filter((each) => each.pass).length;
+    const all = criteria.length + open.length;
+    const counts = open.length
+      ? `${criteria.length} of ${all} criteria judged, ${met === criteria.length ? 'all' : `${met} of them`} met; ${open.length} not judged`
+      : `${met} of ${criteria.length} criteria met`;
     return NB.el('div', { class: 'bar' },
-      NB.el('span', { class: `chip ${verdict === 'pass' ? 'good' : 'bad'}`, text: verdict === 'pass' ? '\u2713 passed' : '\u2717 failed' }),
-      NB.el('span', { text: `${met} of ${criteria.length} criteria met` }),
+      NB.verdict(verdict),
+      NB.el('span', { text: counts }),
       failures.map((each) => NB.el('span', { class: 'error', text: `${each.engine} failed${each.during ? ` during ${each.during}` : ''}: ${each.message}` })));
   }
 
@@ -408,7 +412,9 @@ NB.RunPage = class {
   status(configuration) {
     const recommended = this.goal.recommended?.label === configuration.label;
     const words = { ok: ['good', '\u2713 ok'], failed: ['bad', '\u2717 failed'], rejected: ['off', '\u2013 rejected'] };
-    const [style, text] = words[configuration.status];
+    const missed = this.report.criteria.some((each) => !each.pass && each.criterion !== 'expected' && each.goal === this.goal.name && each.label === configuration.label);
+    const open = configuration.not_judged > 0 && !missed;
+    const [style, text] = open ? ['bad', '? incomplete'] : words[configuration.status];
     return [NB.el('span', { class: style, text }), recommended ? NB.el('span', { class: 'good', text: ' \u2605', title: 'recommended' }) : ''];
   }
 
@@ -544,7 +550,14 @@ NB.RunPage = class {
       { title: 'Met', cell: (c) => NB.el('span', { class: c.pass ? 'good' : 'bad', text: c.pass ? '\u2713 met' : '\u2717 missed' }) },
       { title: '', cell: (c) => c.detail },
     ];
-    return NB.section(`Criteria (${sorted.length})`, sorted.some((each) => !each.pass), NB.table('What was checked, missed ones first', columns, sorted, { class: 'small' }));
+    const open = this.report.not_judged;
+    const unjudged = [
+      ...columns.slice(0, 4),
+      { title: 'Why it was not judged', cell: (c) => c.reason },
+    ];
+    return NB.section(`Criteria (${sorted.length}${open.length ? `, ${open.length} not judged` : ''})`, open.length > 0 || sorted.some((each) => !each.pass),
+      NB.table('What was checked, missed ones first', columns, sorted, { class: 'small' }),
+      open.length ? NB.table('What was to be judged and was not', unjudged, open, { class: 'small' }) : null);
   }
 
   provenance() {

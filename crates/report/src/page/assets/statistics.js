@@ -19,7 +19,7 @@ NB.Statistics = class {
     if (!summary || typeof summary !== 'object') return [];
     const rate = (value) => (value && value.rate !== null && value.rate !== undefined
       ? `${NB.fixed(100 * value.rate, 1)} %${value.interval ? ` (${NB.fixed(100 * value.interval.low, 1)} to ${NB.fixed(100 * value.interval.high, 1)})` : ''}` : '\u2013');
-    const done = new Set(['schema_version', 'confidence', 'overall', 'goals', 'metrics', 'spreads', 'effects', 'regions', 'choices', 'evidence', 'notes', 'methods', 'criteria']);
+    const done = new Set(['schema_version', 'confidence', 'overall', 'goals', 'metrics', 'spreads', 'effects', 'regions', 'choices', 'evidence', 'notes', 'methods', 'criteria', 'not_judged', 'verdict']);
     const sections = [];
     const add = (key, title, open, make) => {
       if (summary[key] === undefined || summary[key] === null) return;
@@ -30,7 +30,10 @@ NB.Statistics = class {
     add('criteria', 'Criteria', true, (criteria) => NB.table('What was checked', [
       { title: 'Criterion', cell: (c) => NB.words(c.criterion) }, { title: 'Of', cell: (c) => c.of || '' },
       { title: 'Value', numeric: true, cell: (c) => NB.significant(c.value) }, { title: 'Limit', numeric: true, cell: (c) => NB.significant(c.limit) },
-      { title: 'Met', cell: (c) => NB.el('span', { class: c.pass ? 'good' : 'bad', text: c.pass ? '\u2713 met' : '\u2717 missed' }) },
+      { title: 'Met', cell: (c) => {
+        const open = c.value === null || (c.confidence && c.interval === null);
+        return NB.el('span', { class: c.pass ? 'good' : 'bad', text: c.pass ? '\u2713 met' : open ? '? not judged' : '\u2717 missed' });
+      } },
     ], criteria, { class: 'small' }));
     add('notes', 'Notes', true, (notes) => NB.el('ul', { class: 'plain' }, notes.map((note) => NB.el('li', { text: String(note) }))));
     add('choices', 'Which choice is the best', true, ({ choices, axes }) => NB.table(`Choices of ${axes.map((axis) => NB.words(axis.name)).join(' and ')}, the best first`, [

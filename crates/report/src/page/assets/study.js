@@ -66,10 +66,10 @@ NB.StudyPage = class extends NB.StudyPlots {
   head() {
     const { cases, kept } = this.page;
     const group = (value) => value.toLocaleString('en').replaceAll(',', '\u202f');
-    const criteria = this.page.manifest?.criteria || this.page.summary?.criteria;
-    const met = Array.isArray(criteria) ? criteria.filter((each) => each.pass).length : 0;
+    const { criteria = [], verdict, not_judged: open = [] } = this.page.summary || {};
     return NB.el('div', { class: 'bar' },
-      Array.isArray(criteria) && criteria.length ? NB.el('span', { class: `chip ${met === criteria.length ? 'good' : 'bad'}`, text: met === criteria.length ? '\u2713 passed' : '\u2717 failed' }) : null,
+      criteria.length || open.length ? NB.verdict(verdict) : null,
+      open.length ? NB.el('span', { class: 'error', text: `not judged: ${open.join('; ')}` }) : null,
       NB.el('span', { text: `${group(cases)} cases of 8 configurations` }),
       kept < cases ? NB.el('strong', { text: `The plots show ${group(kept)} of them: one of each block of successive cases, drawn by a fixed rule, and those that the statistics name. All tables of statistics are of all cases.` }) : null);
   }

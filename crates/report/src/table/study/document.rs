@@ -512,7 +512,11 @@ fn criterion(result: &CriterionResult) -> String {
     };
     format!(
         "{} {}{of}: {value}{interval}, limit {}{judged}: {}{cases}",
-        if result.pass { "met" } else { "FAILED" },
+        match (result.pass, result.is_judged()) {
+            (true, _) => "met",
+            (false, true) => "FAILED",
+            (false, false) => "not judged",
+        },
         result.criterion,
         text(result.limit),
         result.detail

@@ -42,7 +42,8 @@ fn missing_shards_are_listed() {
         "48 of 100 cases are missing\n  \
          shard 2/4 is not among the folders\n  \
          shard 4/4 is not among the folders\n\
-         hint: finish unfinished shards with --resume"
+         hint: `needlebench study STUDY --shard K/N --resume` finishes a shard, and \
+          computes what is damaged again"
     );
     assert_eq!(refused(place, &[]), "there is nothing to merge");
     let text = refused(place, &[place.join("nowhere")]);
@@ -60,8 +61,9 @@ fn a_shard_that_is_not_complete_is_named() {
     assert_eq!(
         refused(place, &folders),
         "8 of 100 cases are missing\n  \
-         /2of2: shard 2/2 is not complete\n\
-         hint: finish unfinished shards with --resume"
+         /2of2: shard 2/2 was complete and is damaged\n\
+         hint: `needlebench study STUDY --shard K/N --resume` finishes a shard, and \
+          computes what is damaged again"
     );
 }
 

@@ -174,22 +174,6 @@ fn a_garbled_manifest_and_one_of_the_future_are_refused() {
     }
 }
 
-#[test]
-fn a_complete_study_without_its_table_is_no_study() {
-    let folder = tempfile::tempdir().unwrap();
-    Request::new(CASES, BLOCK).run(folder.path()).unwrap();
-    std::fs::remove_file(folder.path().join(RESULTS_FILE)).unwrap();
-    let request = Request {
-        resume: true,
-        ..Request::new(CASES, BLOCK)
-    };
-    assert_eq!(
-        refused(&request, folder.path()),
-        "FOLDER/study.json: says that the study is complete, but results.parquet is not there\n\
-         hint: remove study.json to compute it again"
-    );
-}
-
 struct NoEngine;
 
 impl CaseEvaluator for NoEngine {
