@@ -142,8 +142,9 @@ pub struct CalibrationBlock {
     /// Factor on the deviations.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub scale: f64,
-    /// What the controller knows of them.
-    pub class: ArmClass,
+    /// What the controller knows of them; `nominal_kinematics` if `arm` names one arm, else
+    /// `factory_calibrated`.
+    pub class: Option<ArmClass>,
     /// Share of the population's deviations, about none, that a calibration leaves: of
     /// `factory_calibrated` and `calibrated_here`. Assumed: a fifth, which is 0.3 mm at a tip 200 mm in front
     /// of the flange; UR publishes no figure.
@@ -154,12 +155,26 @@ pub struct CalibrationBlock {
     pub measured_under_gravity: bool,
 }
 
+/// Value of `arm` for the distribution of all arms in the data.
+pub(crate) const POPULATION: &str = "population";
+
+impl CalibrationBlock {
+    /// What the controller knows of its arm.
+    pub(crate) fn class(&self) -> ArmClass {
+        self.class.unwrap_or(if self.arm == POPULATION {
+            ArmClass::FactoryCalibrated
+        } else {
+            ArmClass::NominalKinematics
+        })
+    }
+}
+
 impl Default for CalibrationBlock {
     fn default() -> Self {
         Self {
-            arm: "population".to_owned(),
+            arm: POPULATION.to_owned(),
             scale: 1.0,
-            class: ArmClass::default(),
+            class: None,
             residual: 0.2,
             measured_under_gravity: true,
         }
@@ -547,7 +562,7 @@ impl Default for BreathingBlock {
 fn arms(_: &mut SchemaGenerator) -> Schema {
     let shipped = Arm::shipped_calibrations().into_iter();
     let names = shipped.map(|(name, _)| name);
-    let names = names.chain(["population".to_owned()]);
+    let names = names.chain([POPULATION.to_owned()]);
     names_or_path(&names.collect::<Vec<_>>())
 }
 
@@ -558,7 +573,7 @@ impl ImperfectionsSection {
         Self {
             budget_samples: None,
             calibration: Some(CalibrationBlock {
-                class,
+                class: Some(class),
                 ..CalibrationBlock::default()
             }),
             encoder: Some(EncoderBlock::default()),
@@ -600,10 +615,10 @@ pub(super) fn check(toml: &TomlText<'_>, section: &ImperfectionsSection) -> Vec<
         }
     }
     if let Some(block) = &section.calibration
-        && block.class != ArmClass::NominalKinematics
-        && block.arm != "population"
+        && block.class() != ArmClass::NominalKinematics
+        && block.arm != POPULATION
     {
-        let (arm, class) = (&block.arm, block.class.name());
+        let (arm, class) = (&block.arm, block.class().name());
         findings.push(
             toml.finding(
                 "imperfections.calibration.arm",

@@ -42,6 +42,7 @@ pub use events::{EventsSection, PressClass, PressSection, StopSection};
 pub use fixtures::{GantrySection, MountSection, TableSection};
 pub(crate) use goals::EVERY_CONFIGURATION;
 pub use goals::{FlangePose, GoalSection, REJECTION_RULES};
+pub(crate) use imperfections::POPULATION;
 pub use imperfections::{
     ArmClass, BreathState, BreathingBlock, CalibrationBlock, ControlBlock, ElasticityBlock,
     EncoderBlock, ExpectedSection, FrictionBlock, GuideBlock, HandEyeBlock, ImagingBlock,

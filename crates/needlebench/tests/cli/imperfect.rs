@@ -9,6 +9,7 @@ const BLOCKS: &str = "
 [imperfections]
 budget_samples = 200
 [imperfections.calibration]
+class = \"nominal_kinematics\"
 [imperfections.encoder]
 [imperfections.elasticity]
 [imperfections.payload]
@@ -16,7 +17,12 @@ budget_samples = 200
 [imperfections.control]
 [imperfections.guide]
 diametral_clearance_mm = 0.1
+[imperfections.hand_eye]
 [imperfections.registration]
+[imperfections.skin_markers]
+[imperfections.imaging]
+[imperfections.needle]
+[imperfections.indentation]
 [imperfections.breathing]
 ";
 

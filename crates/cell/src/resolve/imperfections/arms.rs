@@ -8,13 +8,13 @@ use needlebench_kinematics::{Chain, JOINT_COUNT, Pose, UrGeometry, UrModel};
 
 use crate::arm::data::{ArmData, PopulationData};
 use crate::files::{Location, ModelSource};
-use crate::scenario::{ArmClass, CalibrationBlock};
+use crate::scenario::{ArmClass, CalibrationBlock, POPULATION};
 use crate::toml_text::TomlText;
 use crate::{Arm, Calibration, Finding, Robot, nearest_name};
 
-/// One arm: per joint, translation (m) and rotation vector (rad) of the true joint origin in the
-/// nominal one.
-type Deviations = [Vector6<f64>; JOINT_COUNT];
+/// OriginDeviations of an arm's joint origins: per joint, translation (m) and rotation vector (rad) of the true
+/// origin in the nominal one.
+pub type OriginDeviations = [Vector6<f64>; JOINT_COUNT];
 
 /// Distribution of arms: `mean + sum_k weight_k * modes_k` with independent standard normal
 /// weights. It has the mean and the covariance of the arms that it was made from.
@@ -28,9 +28,9 @@ pub struct ArmPopulation {
 
 impl ArmPopulation {
     /// The population with the mean and the covariance of some arms; one arm is that arm itself.
-    fn of(arms: &[Deviations], scale: f64) -> Self {
+    fn of(arms: &[OriginDeviations], scale: f64) -> Self {
         let count = arms.len() as f64;
-        let mean: Deviations = std::array::from_fn(|joint| {
+        let mean: OriginDeviations = std::array::from_fn(|joint| {
             arms.iter().map(|arm| arm[joint]).sum::<Vector6<f64>>() * (scale / count)
         });
         let modes = if arms.len() < 2 {
@@ -52,7 +52,7 @@ impl ArmPopulation {
         }
     }
 
-    /// Deviations for the weights of the modes.
+    /// OriginDeviations for the weights of the modes.
     ///
     /// # Panics
     /// If there are not as many weights as modes.
@@ -81,7 +81,7 @@ impl ArmPopulation {
 }
 
 /// How a calibrated arm deviates from nominal joint origins.
-fn deviations_of(calibration: &Calibration, nominal: &UrGeometry) -> Deviations {
+fn deviations_of(calibration: &Calibration, nominal: &UrGeometry) -> OriginDeviations {
     let nominal = nominal.chain();
     let real = calibration.chain();
     std::array::from_fn(|joint| {
@@ -110,9 +110,6 @@ fn read(location: &Location) -> Result<Calibration, Finding> {
     Calibration::parse(&file, &text)
 }
 
-/// Value of `arm` for the distribution of all arms in the data.
-const POPULATION: &str = "population";
-
 /// The real arms of a block, the files that they are from, and what was assumed.
 #[derive(Debug)]
 pub(crate) struct RealArms {
@@ -139,7 +136,7 @@ pub(crate) fn resolve_calibration(
     };
     let (deviations, sources): (Vec<_>, Vec<_>) = arms.into_iter().unzip();
     Ok(RealArms {
-        population: match block.class {
+        population: match block.class() {
             ArmClass::NominalKinematics => ArmPopulation::of(&deviations, block.scale),
             ArmClass::FactoryCalibrated | ArmClass::CalibratedHere => {
                 ArmPopulation::of(&deviations, block.scale * block.residual).about_none()
@@ -151,7 +148,7 @@ pub(crate) fn resolve_calibration(
 }
 
 /// A real arm's deviations and the file that they are from.
-type RealArm = (Deviations, ModelSource);
+type RealArm = (OriginDeviations, ModelSource);
 
 /// Every arm in the data of the robot's arm.
 fn population(toml: &TomlText<'_>, robot: &Robot) -> Result<(Vec<RealArm>, Vec<String>), Finding> {
@@ -267,7 +264,7 @@ fn named_calibrations(robot: &Robot) -> Vec<(String, Location)> {
 mod tests {
     use super::*;
 
-    fn shipped() -> Vec<Deviations> {
+    fn shipped() -> Vec<OriginDeviations> {
         let robot = crate::load_robot(&crate::Overrides::default()).unwrap();
         let toml = TomlText::without_text("test");
         let (arms, _) = population(&toml, &robot).unwrap();

@@ -5,11 +5,11 @@ mod arms;
 mod gears;
 mod real;
 
-use nalgebra::{Point3, Vector3, Vector6};
+use nalgebra::{Point3, Vector3};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
 pub(crate) use absorbed::absorbed_sag;
-pub use arms::ArmPopulation;
+pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
 pub use gears::GearTwist;
 pub use real::Expected;
@@ -63,9 +63,6 @@ pub struct Imperfections {
     /// Files that were read.
     pub sources: Vec<ModelSource>,
 }
-
-/// Deviations of joint origins: translation (m) and rotation vector (rad) per joint.
-pub type OriginDeviations = [Vector6<f64>; JOINT_COUNT];
 
 /// Elasticity of the gears.
 #[derive(Debug, Clone, PartialEq)]

@@ -47,7 +47,7 @@ impl RealThings<'_> {
             let measured = block.filter(|block| block.measured_under_gravity);
             Ok(Elasticity {
                 absorbed: measured.map(|block| {
-                    let carried = block.class == ArmClass::CalibratedHere;
+                    let carried = block.class() == ArmClass::CalibratedHere;
                     let tool = carried.then_some(self.tool);
                     self.library.absorbed_sag(self.robot, tool, &gears)
                 }),

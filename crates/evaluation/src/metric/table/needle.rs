@@ -194,8 +194,9 @@ pub(super) const BUDGET: &[Metric] = &[
     .better(Less, NEEDLE_RESOLUTION_M)
     .ranked("tip_error_mm")
     .pareto()
-    .table(0, "expected\nrms (mm)")
-    .summary(0, "Expected tip error, rms (mm)")
+    .show(Show::SmallLength)
+    .table(0, "expected\nrms")
+    .summary(0, "Expected tip error, rms")
     .page(0, "Expected rms")
     .page_side(0, "Expected rms")
     .criterion("max_tip_rms_mm", ALL, |criteria| {
@@ -212,8 +213,9 @@ pub(super) const BUDGET: &[Metric] = &[
     )
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
     .table(1, "95 %\nwithin")
-    .summary(1, "95 % within (mm)")
+    .summary(1, "95 % within")
     .page(1, "95 % within")
     .page_side(1, "95 % within"),
     Metric::new(
@@ -225,6 +227,7 @@ pub(super) const BUDGET: &[Metric] = &[
     )
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
     .table(2, "\nbias")
     .page(2, "Bias"),
     Metric::new(
@@ -236,6 +239,7 @@ pub(super) const BUDGET: &[Metric] = &[
     )
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
     .table(3, "if breath\nis free"),
     Metric::new(
         "tip_lateral_rms_before_insertion",

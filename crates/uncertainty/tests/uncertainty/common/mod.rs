@@ -12,6 +12,7 @@ use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 /// Every effect that has a block, with its defaults.
 pub const ALL: &str = "
 [imperfections.calibration]
+class = \"nominal_kinematics\"
 [imperfections.encoder]
 zero_spread_deg = [0.01, 0.01, 0.01, 0.02, 0.02, 0.02]
 [imperfections.elasticity]
@@ -22,7 +23,12 @@ com_error_mm = [0, 5, 10]
 [imperfections.control]
 [imperfections.guide]
 diametral_clearance_mm = 0.15
+[imperfections.hand_eye]
 [imperfections.registration]
+[imperfections.skin_markers]
+[imperfections.imaging]
+[imperfections.needle]
+[imperfections.indentation]
 [imperfections.breathing]
 ";
 
