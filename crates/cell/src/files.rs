@@ -8,6 +8,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::finding::Finding;
+use crate::input::read_data;
 
 static BUILTIN: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/../../models");
 
@@ -110,7 +111,7 @@ impl Location {
                 .get_file(path)
                 .map(|file| file.contents().to_vec())
                 .ok_or_else(|| "no such shipped model".to_owned()),
-            Self::Disk(path) => std::fs::read(path).map_err(|error| error.to_string()),
+            Self::Disk(path) => read_data(path).map_err(|error| error.to_string()),
         }
     }
 

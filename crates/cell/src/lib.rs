@@ -23,9 +23,11 @@ pub mod family;
 mod files;
 mod finding;
 pub mod fixtures;
+mod input;
 mod limit;
 mod model;
 pub mod phantom;
+mod printable;
 mod resolve;
 mod robot;
 pub mod scenario;
@@ -38,12 +40,16 @@ pub use arm::{Arm, Recognition};
 pub use family::{Change, KeyPath, ScenarioFamily, Setting};
 pub use files::{ModelSource, PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};
+pub use input::{
+    InputError, MOST_DATA_BYTES, MOST_TEXT_BYTES, open_input, read_data, read_data_text, read_text,
+};
 pub use limit::{Limit, digits_apart};
 pub use model::{
     AppliedCalibration, ArmInUse, ArmReport, BodyKind, BodyPair, Cell, ClearanceClass,
     CollisionBody, Frame, LeftOut, Link, LinkMember, Needle, NeedleCorridor, PairRule, Robot, Tool,
     pair_rule, place_in_chain,
 };
+pub use printable::{printable, printable_json, printable_line};
 pub use resolve::{
     Expectation, Goal, Overrides, PlacedPhantom, ResolvedScenario, Roll, ServoSettings,
     imperfections, iso9283, load_robot, load_scenario, people, resolve_scenario,

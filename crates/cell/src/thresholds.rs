@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::Finding;
+use crate::input::read_text;
 use crate::schema::FileSchema;
 use crate::toml_text::TomlText;
 
@@ -39,8 +40,9 @@ impl ThresholdsFile {
     /// If it cannot be read, is no TOML, or has other keys.
     pub fn load(path: &Path) -> Result<Self, Finding> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            Finding::new(&file, format!("the thresholds cannot be read: {error}"))
+        let text = read_text(path).map_err(|error| {
+            let hint = error.hint("thresholds are a TOML file with the section [max_loss]");
+            Finding::new(&file, format!("the thresholds cannot be read: {error}")).hint(hint)
         })?;
         Self::parse(file, text)
     }

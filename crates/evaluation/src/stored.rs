@@ -1,8 +1,9 @@
 //! Reports that were stored, by this version or another one.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use needlebench_cell::Finding;
+use needlebench_cell::{Finding, printable, printable_line};
 use serde_json::{Value, json};
 
 use crate::metric::{MetricKey, former_report};
@@ -151,8 +152,9 @@ impl StoredReport {
             }
             report = results.swap_remove(0);
         }
+        make_printable(&mut report);
         let stored = Self {
-            source: file.to_owned(),
+            source: printable_line(file),
             report,
             is_case: false,
         };
@@ -313,6 +315,20 @@ impl StoredReport {
             .into_iter()
             .flatten()
             .filter_map(|goal| Some((goal.get("name")?.as_str()?, goal)))
+    }
+}
+
+/// Takes what a terminal would take for a command out of all texts: a report may come from anywhere.
+fn make_printable(value: &mut Value) {
+    match value {
+        Value::String(text) => {
+            if let Cow::Owned(shown) = printable(text) {
+                *text = shown;
+            }
+        }
+        Value::Array(values) => values.iter_mut().for_each(make_printable),
+        Value::Object(entries) => entries.values_mut().for_each(make_printable),
+        _ => {}
     }
 }
 

@@ -11,6 +11,7 @@ use crate::command::{
     RunArguments, STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
 };
 use crate::exit::ExitStatus;
+use crate::output::complain;
 
 /// Testbench for needle-guide robots: which of the eight arm configurations put the needle guide
 /// on its place, how far off the needle's tip is, and how close anything comes to anything.
@@ -144,7 +145,7 @@ pub fn main() -> ExitCode {
             if closed {
                 return ExitStatus::Success.into();
             }
-            anstream::eprintln!("error: {error:#}");
+            complain(&format!("error: {error:#}"));
             ExitStatus::EnvironmentFailed.into()
         }
     }

@@ -1,24 +1,44 @@
 //! Findings as diagnostics with a caret under the place.
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
-use needlebench_cell::Finding;
+use std::path::Path;
+
+use needlebench_cell::{Finding, printable, printable_line, read_text};
+
+use crate::output::complain_styled;
 
 /// Prints findings to standard error.
 pub(crate) fn print_findings(findings: &[Finding]) {
     for finding in findings {
-        anstream::eprintln!("{}\n", rendered(finding));
+        complain_styled(&format!("{}\n", rendered(finding)));
     }
 }
 
 fn rendered(finding: &Finding) -> String {
+    // Shipped models have no file on disk to quote.
+    let text = read_text(Path::new(&finding.file)).unwrap_or_default();
+    let finding = &Finding {
+        file: printable_line(&finding.file),
+        key: finding.key.as_deref().map(printable_line),
+        message: printable(&finding.message).into_owned(),
+        hint: finding
+            .hint
+            .as_deref()
+            .map(|hint| printable(hint).into_owned()),
+        ..finding.clone()
+    };
     let title = match &finding.key {
         Some(key) if !finding.message.contains(key.as_str()) => {
             format!("{key}: {}", finding.message)
         }
         _ => finding.message.clone(),
     };
-    // Shipped models have no file on disk to quote.
-    let text = std::fs::read_to_string(&finding.file).unwrap_or_default();
+    // A place in a text that is shown otherwise than it is written would be another one.
+    let text = if printable(&text) == text {
+        text
+    } else {
+        String::new()
+    };
     let span = finding
         .span
         .clone()

@@ -7,6 +7,7 @@ mod cli;
 mod command;
 pub mod exit;
 mod findings;
+mod output;
 mod progress;
 
 pub use cli::{command_line, main};

@@ -28,6 +28,7 @@ use crate::engine_name::check_engine_names;
 use crate::files::ModelSource;
 use crate::files::source_of;
 use crate::fixtures::Fixture;
+use crate::input::read_text;
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, NeedleCorridor};
 use crate::scenario::{self, Scenario};
 use crate::toml_text::TomlText;
@@ -95,15 +96,9 @@ pub struct ResolvedScenario {
 /// Every [`Finding`] of the first stage that has any: text, values, models, goals.
 pub fn load_scenario(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
     let file = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| {
-        let finding = Finding::new(&file, format!("cannot read the scenario: {error}"));
-        vec![
-            finding.hint(if error.kind() == std::io::ErrorKind::InvalidData {
-                "save the file as UTF-8 text"
-            } else {
-                "scenarios are TOML files, such as scenarios/table3.toml"
-            }),
-        ]
+    let text = read_text(path).map_err(|error| {
+        let hint = error.hint("scenarios are TOML files, such as scenarios/table3.toml");
+        vec![Finding::new(&file, format!("cannot read the scenario: {error}")).hint(hint)]
     })?;
     resolve_scenario(
         &file,

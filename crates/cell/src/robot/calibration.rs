@@ -23,6 +23,7 @@ use needlebench_kinematics::{
 use super::yaml_text::{YamlEntry, YamlNode, YamlValue, parse_yaml};
 use crate::files::ModelSource;
 use crate::files::source_of;
+use crate::input::read_text;
 use crate::model::AppliedCalibration;
 use crate::{Finding, Robot, nearest_name};
 
@@ -112,13 +113,11 @@ impl Calibration {
     /// What is wrong with the file.
     pub fn load(path: &Path) -> Result<Self, Finding> {
         let file = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|error| {
-            Finding::new(&file, format!("cannot read the calibration: {error}"))
-                .hint("the path is relative to the working directory")
+        let text = read_text(path).map_err(|error| {
+            let hint = error.hint("the path is relative to the working directory");
+            Finding::new(&file, format!("cannot read the calibration: {error}")).hint(hint)
         })?;
-        let text = std::str::from_utf8(&bytes)
-            .map_err(|error| Finding::new(&file, format!("not UTF-8 text: {error}")))?;
-        Self::parse(&file, text)
+        Self::parse(&file, &text)
     }
 
     /// Reads the text of a file.

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use roxmltree::Node;
 
+use crate::input::read_text;
 use crate::model::Cell;
 use crate::{Finding, nearest_name};
 
@@ -41,9 +42,9 @@ impl Srdf {
     /// A [`Finding`] if it cannot be read, is not XML, is no SRDF, or a pair lacks a link.
     pub fn load(path: &Path) -> Result<Self, Finding> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            Finding::new(&file, format!("cannot read the SRDF: {error}"))
-                .hint("the path is relative to the working directory")
+        let text = read_text(path).map_err(|error| {
+            let hint = error.hint("the path is relative to the working directory");
+            Finding::new(&file, format!("cannot read the SRDF: {error}")).hint(hint)
         })?;
         Self::parse(&file, &text)
     }

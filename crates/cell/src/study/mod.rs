@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
+use crate::input::read_text;
 use crate::scenario::EngineName;
 use crate::schema::{COLUMN, FileSchema, NAME};
 use crate::toml_text::TomlText;
@@ -337,11 +338,9 @@ pub struct ResolvedStudy {
 /// Every [`Finding`] of the first stage that has any: text, scenario, factors.
 pub fn load_study(path: &Path, overrides: &Overrides) -> Result<ResolvedStudy, Vec<Finding>> {
     let file = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| {
-        vec![
-            Finding::new(&file, format!("cannot read the study: {error}"))
-                .hint("studies are TOML files, such as scenarios/studies/layouts.toml"),
-        ]
+    let text = read_text(path).map_err(|error| {
+        let hint = error.hint("studies are TOML files, such as scenarios/studies/layouts.toml");
+        vec![Finding::new(&file, format!("cannot read the study: {error}")).hint(hint)]
     })?;
     let base = path.parent().unwrap_or(Path::new(""));
     resolve::resolve(&file, &text, base, overrides)

@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use needlebench_cell::scenario::EnginesSection;
 
-use super::{HarnessProcess, MujocoFleet, MujocoPlant, MujocoSettings, ensure};
+use super::{
+    Environment, HarnessError, HarnessProcess, MujocoFleet, MujocoPlant, MujocoSettings, ensure,
+};
 use crate::{ArmSpec, Engine, EngineCheck, EngineError, EngineSession, Fleet, Plant};
 
 /// Motions that share messages: as many as a goal has configurations.
@@ -53,7 +55,7 @@ impl Engine for Mujoco {
                         versions.mujoco, versions.python, versions.numpy
                     ))
                 }
-                Err(error) => Err(error.to_string()),
+                Err(error) => Err(in_environment(&error, &environment)),
             },
         }));
         checks
@@ -69,7 +71,7 @@ impl Engine for Mujoco {
         let environment = ensure(tell).map_err(|error| not_started(error.to_string()))?;
         let timeout = Duration::from_secs_f64(settings.harness_timeout_s);
         let process = HarnessProcess::start(&environment, timeout)
-            .map_err(|error| not_started(error.to_string()))?;
+            .map_err(|error| not_started(in_environment(&error, &environment)))?;
         Ok(Box::new(OwnProcess(process)))
     }
 }
@@ -115,5 +117,16 @@ impl MujocoSettings {
             friction: arm.friction,
             ..Self::default()
         }
+    }
+}
+
+/// Why the process did not start, and where the environment is that it did not start in.
+fn in_environment(error: &HarnessError, environment: &Environment) -> String {
+    match &environment.folder {
+        Some(folder) => format!(
+            "{error}\nhint: its environment is {}; it is made again once that folder is removed",
+            folder.display()
+        ),
+        None => error.to_string(),
     }
 }

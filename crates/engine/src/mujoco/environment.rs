@@ -3,6 +3,7 @@
 mod command;
 mod guard;
 mod install;
+mod installed;
 mod python;
 
 use std::env;
@@ -63,6 +64,8 @@ const VERIFY_LIMIT: Duration = Duration::from_mins(2);
 pub struct Environment {
     /// The interpreter.
     pub python: PathBuf,
+    /// Folder that holds all of it; none of another program in its place.
+    pub folder: Option<PathBuf>,
 }
 
 /// Where the set-up looks and writes.
@@ -180,10 +183,13 @@ pub enum EnvironmentError {
     },
     /// The installed packages do not work.
     #[error(
-        "MuJoCo was installed but does not work: {reason}\n\
-         hint: set NEEDLEBENCH_PYTHON to another Python of 3.11 or newer"
+        "MuJoCo was installed in {} but does not work: {reason}\n\
+         hint: set NEEDLEBENCH_PYTHON to another Python of 3.11 or newer",
+        folder.display()
     )]
     Verify {
+        /// The environment.
+        folder: PathBuf,
         /// What went wrong.
         reason: String,
     },
@@ -223,14 +229,18 @@ fn unwritable(path: &Path, source: io::Error) -> EnvironmentError {
 pub fn ensure(progress: &mut dyn FnMut(&str)) -> Result<Environment, EnvironmentError> {
     if let Some(words) = harness_override() {
         let python = PathBuf::from(&words[0]);
-        return Ok(Environment { python });
+        return Ok(Environment {
+            python,
+            folder: None,
+        });
     }
     ensure_with(&EnvironmentOptions::from_process(), progress)
 }
 
 /// [`ensure`] with explicit options.
 ///
-/// Safe to call from several processes at once; an interrupted set-up is never taken for complete.
+/// Safe to call from several processes at once; an interrupted set-up is never taken for complete, and an
+/// environment whose files are not those that were installed is made again.
 pub fn ensure_with(
     options: &EnvironmentOptions,
     progress: &mut dyn FnMut(&str),
@@ -246,8 +256,9 @@ pub fn ensure_with(
     let target = cache.join(format!("harness-{}", &key[..16]));
     let environment = Environment {
         python: install::venv_python(&target.join("venv")),
+        folder: Some(target.clone()),
     };
-    if is_complete(&target, &key) {
+    if state(&target, &key) == State::Complete {
         return Ok(environment);
     }
     fs::create_dir_all(&cache).map_err(|source| unwritable(&cache, source))?;
@@ -261,8 +272,13 @@ pub fn ensure_with(
             seconds: GUARD_LIMIT.as_secs(),
         });
     };
-    if is_complete(&target, &key) {
-        return Ok(environment);
+    match state(&target, &key) {
+        State::Complete => return Ok(environment),
+        State::Damaged(reason) => progress(&format!(
+            "the MuJoCo environment in {} is damaged and is made again: {reason}",
+            target.display()
+        )),
+        State::Absent => {}
     }
     guard::remove_dead_staging(&target);
     progress(&format!(
@@ -275,7 +291,7 @@ pub fn ensure_with(
     let stamp = staging.folder.join(STAMP);
     fs::write(&stamp, &key).map_err(|source| unwritable(&stamp, source))?;
     staging
-        .publish(&target, || is_complete(&target, &key))
+        .publish(&target, || state(&target, &key) == State::Complete)
         .map_err(|source| unwritable(&target, source))?;
     progress("MuJoCo is ready");
     Ok(environment)
@@ -295,12 +311,12 @@ fn build(
     fs::write(&requirements, REQUIREMENTS).map_err(|source| unwritable(&requirements, source))?;
     install::install(options, python, folder, &requirements, progress)?;
     let venv_python = install::venv_python(&folder.join("venv"));
-    install::install_package(&venv_python, &SOURCES)?;
+    install::install_package(&venv_python, &SOURCES, target)?;
     progress("checking that MuJoCo works");
-    verify(&venv_python)
+    verify(&venv_python, target)
 }
 
-fn verify(venv_python: &Path) -> Result<(), EnvironmentError> {
+fn verify(venv_python: &Path, target: &Path) -> Result<(), EnvironmentError> {
     const ASK: &str = "import mujoco, needlebench_harness.server; print(mujoco.mj_versionString())";
     let answer = command::run(
         Command::new(venv_python).args(["-I", "-c", ASK]),
@@ -311,11 +327,41 @@ fn verify(venv_python: &Path) -> Result<(), EnvironmentError> {
         Ok(version) => format!("it is version {version:?}, not {MUJOCO_VERSION}"),
         Err(failure) => failure.to_string(),
     };
-    Err(EnvironmentError::Verify { reason })
+    let folder = target.to_owned();
+    Err(EnvironmentError::Verify { folder, reason })
 }
 
-fn is_complete(target: &Path, key: &str) -> bool {
-    fs::read_to_string(target.join(STAMP)).is_ok_and(|stamp| stamp == key)
+/// What there is of an environment.
+#[derive(Debug, PartialEq, Eq)]
+enum State {
+    /// Nothing that was ever complete.
+    Absent,
+    /// All of it, as it was installed.
+    Complete,
+    /// It was complete; why it is not any more.
+    Damaged(String),
+}
+
+fn state(target: &Path, key: &str) -> State {
+    if !fs::read_to_string(target.join(STAMP)).is_ok_and(|stamp| stamp == key) {
+        return State::Absent;
+    }
+    match installed::check(target, &pinned(), &SOURCES) {
+        Ok(()) => State::Complete,
+        Err(reason) => State::Damaged(reason),
+    }
+}
+
+/// Names and versions that the requirements pin.
+fn pinned() -> Vec<(String, String)> {
+    let lines = REQUIREMENTS.lines();
+    lines
+        .filter_map(|line| {
+            let (name, rest) = line.split_once("==")?;
+            let version = rest.split([' ', ';', '\\']).next()?;
+            Some((name.trim().to_owned(), version.to_owned()))
+        })
+        .collect()
 }
 
 /// Hash of all that an environment is made of, so that a change of any makes a new environment.

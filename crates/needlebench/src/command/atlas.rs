@@ -11,6 +11,7 @@ use needlebench_planning::Aim;
 
 use super::run::prepare_folder;
 use super::{load, overrides, print_json, print_text};
+use crate::output::shown;
 
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
@@ -132,7 +133,7 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
             "{}\n\n{}\nresults: {}",
             resolved.scenario.name,
             tables.join("\n\n"),
-            folder.display()
+            shown(&folder)
         ))?;
     }
     // As `run`: a goal that no configuration can serve is a failure.

@@ -1,6 +1,7 @@
 //! `needlebench check`.
 
 use crate::arguments::RobotArguments;
+use crate::output::shown;
 use anyhow::Result;
 use clap::Args;
 use needlebench_cell::Finding;
@@ -50,7 +51,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
                             };
                             print_text(&format!(
                                 "{}: ok ({purpose}, {} bodies, {} pairs)",
-                                path.display(),
+                                shown(path),
                                 resolved.cell.bodies.len(),
                                 resolved.cell.pairs.len()
                             ))?;

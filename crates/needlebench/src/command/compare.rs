@@ -8,11 +8,12 @@ mod thresholds;
 pub(crate) use help::compare_help;
 
 use crate::arguments::{EngineArgument, EngineParser};
+use crate::output::complain;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use needlebench_cell::{Finding, Overrides};
+use needlebench_cell::{Finding, Overrides, read_data_text};
 use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::compare::{CompareOptions, compare as compare_reports};
 use needlebench_evaluation::{Compared, StoredReport};
@@ -155,7 +156,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus> {
             Ok(ExitStatus::BadInput)
         }
         Err(Refused::Engine(message)) => {
-            anstream::eprintln!("error: {message}");
+            complain(&format!("error: {message}"));
             Ok(ExitStatus::EnvironmentFailed)
         }
     }
@@ -232,14 +233,17 @@ fn input(path: &Path, case: Option<u64>) -> Result<Input, Refused> {
     } else {
         path.to_owned()
     };
-    let text = std::fs::read_to_string(&file).map_err(|error| {
+    let text = read_data_text(&file).map_err(|error| {
         let mut finding = Finding::new(
             file.display().to_string(),
             format!("the report cannot be read: {error}"),
         );
         finding.hint = Some(match results_below(path) {
             Some(below) => format!("`{name}` has the results of several scenarios: try {below}"),
-            None => "give a report.json, a results folder, or a scenario".to_owned(),
+            None => {
+                let hint = error.hint("give a report.json, a results folder, or a scenario");
+                hint.to_owned()
+            }
         });
         Refused::from(finding)
     })?;

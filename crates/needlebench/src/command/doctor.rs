@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::{print_json, print_text};
 use crate::exit::ExitStatus;
+use crate::output::complain;
 use needlebench_bench::provenance::GIT_REVISION;
 
 #[derive(Serialize)]
@@ -40,7 +41,7 @@ pub(crate) fn doctor(json: bool) -> Result<ExitStatus> {
     for engine in ENGINES {
         let found = engine.check(&mut |text| {
             if !json {
-                anstream::eprintln!("{text}");
+                complain(text);
             }
         });
         checks.extend(found.into_iter().map(|each| Check {

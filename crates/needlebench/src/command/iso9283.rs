@@ -6,7 +6,7 @@ use std::path::Path;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use needlebench_cell::Finding;
+use needlebench_cell::{Finding, read_data_text};
 use needlebench_evaluation::iso9283::{
     Attained, LogUnits, MeasuredReport, RotationColumns, measured_report, read_commanded, read_log,
 };
@@ -235,18 +235,14 @@ fn measured(arguments: &Iso9283Arguments) -> Result<(MeasuredReport, Vec<Attaine
 }
 
 fn read(path: &Path) -> Result<String, Vec<Finding>> {
-    std::fs::read_to_string(path).map_err(|error| {
+    read_data_text(path).map_err(|error| {
+        let hint = error
+            .hint("`needlebench run` of a scenario with [iso9283] writes an example of both files");
         let finding = Finding::new(
             path.display().to_string(),
             format!("cannot read the file: {error}"),
         );
-        vec![
-            finding.hint(if error.kind() == std::io::ErrorKind::InvalidData {
-                "save the file as UTF-8 text"
-            } else {
-                "`needlebench run` of a scenario with [iso9283] writes an example of both files"
-            }),
-        ]
+        vec![finding.hint(hint)]
     })
 }
 

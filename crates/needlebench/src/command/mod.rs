@@ -14,11 +14,12 @@ mod schema;
 mod servo;
 mod study;
 
-use std::io::Write;
 use std::path::Path;
 
-use anyhow::{Context, Result};
-use needlebench_cell::{Finding, Overrides, PackagePaths, ResolvedScenario, load_scenario};
+use anyhow::Result;
+use needlebench_cell::{
+    Finding, Overrides, PackagePaths, ResolvedScenario, load_scenario, printable_json,
+};
 use needlebench_engine::{ENGINES, engine_names};
 use serde::Serialize;
 
@@ -41,6 +42,7 @@ use needlebench_bench::Runnable;
 use crate::arguments::{RobotArguments, UrdfArguments};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::output::print_text;
 
 /// Reads a scenario; prints what is wrong with it and gives `None` if it cannot be used.
 fn load(path: &Path, overrides: &Overrides) -> Option<ResolvedScenario> {
@@ -84,18 +86,8 @@ fn urdf_overrides(arguments: &UrdfArguments) -> Result<Overrides, Finding> {
 
 /// Prints one JSON document to standard output.
 fn print_json(value: &impl Serialize) -> Result<()> {
-    print_text(&serde_json::to_string_pretty(value).map_err(std::io::Error::from)?)
-}
-
-/// Prints text and a line end to standard output.
-///
-/// A reader that stops reading is no error: what the command found decides its exit status.
-fn print_text(text: &str) -> Result<()> {
-    let mut out = anstream::stdout().lock();
-    match writeln!(out, "{text}").and_then(|()| out.flush()) {
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        other => other.context("cannot write to standard output"),
-    }
+    let document = serde_json::to_string_pretty(value).map_err(std::io::Error::from)?;
+    print_text(&printable_json(&document))
 }
 
 /// Prints completions for a shell.

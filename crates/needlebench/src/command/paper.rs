@@ -9,6 +9,7 @@ use anyhow::{Context, Result};
 
 use super::run::prepare_folder;
 use super::{print_json, print_text};
+use crate::output::{complain, shown};
 
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
@@ -52,7 +53,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
     let mut found = match found {
         Ok(found) => found,
         Err(PaperError::Interrupted) => {
-            anstream::eprintln!("interrupted: nothing was written");
+            complain("interrupted: nothing was written");
             return Ok(ExitStatus::Interrupted);
         }
         Err(error) => return Err(error.into()),
@@ -62,7 +63,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
     if arguments.json {
         print_json(&found.report)?;
     } else {
-        let out = arguments.out.display();
+        let out = shown(&arguments.out);
         print_text(&format!("{}results: {out}", text(&found.report)))?;
     }
     Ok(if found.report.passes() {

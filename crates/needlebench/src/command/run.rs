@@ -1,6 +1,7 @@
 //! `needlebench run`.
 
 use crate::arguments::{EngineArgument, EngineParser, RobotArguments};
+use crate::output::{complain, shown};
 use clap::Args;
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -188,13 +189,13 @@ pub(super) fn run_into(
     if outputs.text {
         let name = &resolved.scenario.name;
         let text = report_text(&finished.report, ENGINES);
-        print_text(&format!("{name}\n{text}results: {}", folder.display()))?;
+        print_text(&format!("{name}\n{text}results: {}", shown(folder)))?;
     }
     if finished.interrupted {
-        anstream::eprintln!(
+        complain(&format!(
             "interrupted: what was finished until then is in {}",
-            folder.display()
-        );
+            shown(folder)
+        ));
     }
     Ok((outcome(&finished), finished.report))
 }

@@ -1,6 +1,7 @@
 //! `needlebench servo`.
 
 use crate::arguments::{EngineArgument, EngineParser, RobotArguments};
+use crate::output::{complain, shown};
 use anyhow::{Context, Result};
 use clap::Args;
 use needlebench_cell::{Finding, ResolvedScenario, nearest_name};
@@ -96,22 +97,22 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus> {
             if let Err(error) =
                 measure_in(&resolved, engine, &mut report, &servo, &linear, &posture)
             {
-                anstream::eprintln!("error: {}: {error}", engine.name());
+                complain(&format!("error: {}: {error}", engine.name()));
                 status = ExitStatus::EnvironmentFailed;
             }
         }
     } else {
-        anstream::eprintln!(
-            "warning: the servo is unstable with kp, kd, rotor inertia and step as they are: no responses"
+        complain(
+            "warning: the servo is unstable with kp, kd, rotor inertia and step as they are: no responses",
         );
         status = ExitStatus::CriterionFailed;
     }
     write_servo(&report, Folder(&folder), !arguments.no_pictures)
-        .with_context(|| format!("cannot write the results to {}", folder.display()))?;
+        .with_context(|| format!("cannot write the results to {}", shown(&folder)))?;
     if arguments.json {
         print_json(&report)?;
     } else {
-        print_text(&format!("{}\nresults: {}", text(&report), folder.display()))?;
+        print_text(&format!("{}\nresults: {}", text(&report), shown(&folder)))?;
     }
     Ok(status)
 }

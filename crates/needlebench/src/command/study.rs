@@ -20,6 +20,7 @@ use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 use arguments::StudyResultArguments;
 pub(crate) use arguments::{MergeArguments, STUDY_HELP, StudyArguments};
@@ -74,10 +75,10 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
     match end {
         Err(error) => Ok(failed(&error)),
         Ok(RunEnd::Partial { done, total }) => {
-            anstream::eprintln!(
+            complain(&format!(
                 "interrupted: {done} of {total} cases are in {}; --resume goes on",
-                folder.display()
-            );
+                shown(&folder)
+            ));
             Ok(ExitStatus::Interrupted)
         }
         Ok(RunEnd::Finished {
@@ -87,7 +88,7 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
             print_text(&format!(
                 "{cases} of {} cases are in {}; `needlebench merge` joins all shards",
                 prepared.design.cases(),
-                folder.display()
+                shown(&folder)
             ))?;
             Ok(ExitStatus::Success)
         }
@@ -206,11 +207,11 @@ fn too_long(
 fn show(progress: &TerminalProgress, event: Event<'_>) {
     match event {
         Event::CutOff { .. } | Event::Damage { .. } | Event::Unsound { .. } => {
-            anstream::eprintln!("{event}")
+            complain(&event.to_string())
         }
         Event::Begin { kept, total } => {
             if kept > 0 {
-                anstream::eprintln!("{event}");
+                complain(&event.to_string());
             }
             progress.message("cases");
             progress.at(kept, total);
@@ -224,7 +225,7 @@ fn show(progress: &TerminalProgress, event: Event<'_>) {
 }
 
 fn failed(error: &StudyError) -> ExitStatus {
-    anstream::eprintln!("error: {error}");
+    complain(&format!("error: {error}"));
     if error.is_input() {
         ExitStatus::BadInput
     } else {
@@ -264,7 +265,7 @@ fn finish(
     if arguments.json {
         print_json(&finished.summary)?;
     } else {
-        print_text(&format!("{}results: {}", finished.text, folder.display()))?;
+        print_text(&format!("{}results: {}", finished.text, shown(folder)))?;
     }
     Ok(ExitStatus::of(finished.verdict))
 }
@@ -345,7 +346,7 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
                 runs.push((runnable, folder.join(number.to_string()), options));
             }
             Err(findings) => {
-                anstream::eprintln!("case {number} cannot exist:");
+                complain(&format!("case {number} cannot exist:"));
                 print_findings(&findings);
                 return Ok(ExitStatus::BadInput);
             }

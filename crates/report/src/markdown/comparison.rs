@@ -3,6 +3,7 @@
 use needlebench_evaluation::compare::Comparison;
 use needlebench_evaluation::report::Verdict;
 
+use super::escape::{code, inline};
 use crate::table::comparison::{
     failure_text, goal_title, metric_texts, remarks, rows, side_text, unchanged,
 };
@@ -12,22 +13,22 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
     let mut lines = vec![
         format!(
             "# {} against {}: {}",
-            comparison.a.source,
-            comparison.b.source,
+            inline(&comparison.a.source),
+            inline(&comparison.b.source),
             match comparison.verdict {
                 Verdict::Pass => "pass".to_owned(),
                 other => format!("**{}**", other.name()),
             }
         ),
         String::new(),
-        format!("- {}", side_text("A", &comparison.a)),
-        format!("- {}", side_text("B", &comparison.b)),
+        format!("- {}", inline(&side_text("A", &comparison.a))),
+        format!("- {}", inline(&side_text("B", &comparison.b))),
     ];
     for difference in &comparison.provenance_differences {
-        let text = |side: &Option<String>| side.clone().unwrap_or_else(|| "none".to_owned());
+        let text = |side: &Option<String>| code(side.as_deref().unwrap_or("none"));
         lines.push(format!(
-            "- {}: `{}` -> `{}`",
-            difference.what,
+            "- {}: {} -> {}",
+            inline(&difference.what),
             text(&difference.a),
             text(&difference.b)
         ));
@@ -36,18 +37,22 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
         comparison
             .notes
             .iter()
-            .map(|note| format!("- note: {note}")),
+            .map(|note| format!("- note: {}", inline(note))),
     );
     lines.push(String::new());
     for reason in &comparison.incomplete {
-        lines.push(format!("- **incomplete** {reason}"));
+        lines.push(format!("- **incomplete** {}", inline(reason)));
     }
     for failure in &comparison.failures {
-        lines.push(format!("- **lost** {}", failure_text(failure)));
+        lines.push(format!("- **lost** {}", inline(&failure_text(failure))));
     }
     for goal in &comparison.goals {
-        lines.push(format!("\n## {}\n", goal_title(goal)));
-        lines.extend(remarks(goal).into_iter().map(|line| format!("- {line}")));
+        lines.push(format!("\n## {}\n", inline(&goal_title(goal))));
+        lines.extend(
+            remarks(goal)
+                .into_iter()
+                .map(|line| format!("- {}", inline(&line))),
+        );
         let rows = rows(goal, false);
         if !rows.is_empty() {
             lines.push("\n| Configuration | Metric | A | B | Change | |".to_owned());
@@ -55,8 +60,9 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
             for (configuration, found) in rows {
                 let [words, a, b, change, outcome] = metric_texts(found);
                 lines.push(format!(
-                    "| {} | {words} | {a} | {b} | {change} | {outcome} |",
-                    configuration.label
+                    "| {} | {} | {a} | {b} | {change} | {outcome} |",
+                    inline(&configuration.label),
+                    inline(&words)
                 ));
             }
         }

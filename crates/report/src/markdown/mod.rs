@@ -1,6 +1,7 @@
 //! Markdown, for pull requests and pages of continuous integration.
 
 mod comparison;
+pub(crate) mod escape;
 mod iso9283;
 mod ranking;
 mod run;

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use needlebench_engine::Engine;
 use needlebench_evaluation::report::{GoalReport, Report, Status, Verdict};
 
+use super::escape::{inline, paragraph};
 use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::route_in_words;
@@ -25,12 +26,12 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         Verdict::Fail => "**fail**",
         Verdict::Incomplete => "**incomplete**",
     };
-    writeln!(out, "# {}: {verdict}\n", report.scenario.name)?;
+    writeln!(out, "# {}: {verdict}\n", inline(&report.scenario.name))?;
     if !report.scenario.description.is_empty() {
-        writeln!(out, "{}\n", report.scenario.description)?;
+        writeln!(out, "{}\n", paragraph(&report.scenario.description))?;
     }
     for goal in &report.goals {
-        writeln!(out, "## {}\n", goal.name)?;
+        writeln!(out, "## {}\n", inline(&goal.name))?;
         write_configurations(out, report, goal, engines)?;
         writeln!(out)?;
         let comparison = ranking_markdown(goal);
@@ -51,7 +52,8 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         }
         for each in &goal.configurations {
             if let Some(first) = each.rejections.first() {
-                writeln!(out, "- {}: {}: {}", each.label, first.rule, first.detail)?;
+                let detail = inline(&first.detail);
+                writeln!(out, "- {}: {}: {detail}", each.label, first.rule)?;
             }
         }
         if goal
@@ -62,7 +64,10 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
             writeln!(out)?;
         }
         match &goal.recommended {
-            Some(found) => writeln!(out, "Recommended: **{}** - {}\n", found.label, found.reason)?,
+            Some(found) => {
+                let reason = inline(&found.reason);
+                writeln!(out, "Recommended: **{}** - {reason}\n", found.label)?;
+            }
             None => writeln!(out, "No configuration works.\n")?,
         }
     }
@@ -74,26 +79,32 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         .iter()
         .filter(|result| !result.pass)
         .collect();
-    writeln!(out, "{}.", counts(report))?;
+    writeln!(out, "{}.", paragraph(&counts(report)))?;
     for result in failed {
         writeln!(
             out,
             "- {} {} {}: {} {}",
-            result.goal,
+            inline(&result.goal),
             result.label.as_deref().unwrap_or(""),
             result.engine.as_deref().unwrap_or(""),
             result.criterion,
-            result.detail
+            inline(&result.detail)
         )?;
     }
     for (label, reason, criteria) in not_judged(report) {
-        writeln!(out, "- not judged: {label}: {criteria} ({reason})")?;
+        writeln!(
+            out,
+            "- not judged: {}: {criteria} ({})",
+            inline(&label),
+            inline(reason)
+        )?;
     }
     for failure in &report.engine_failures {
         writeln!(
             out,
             "- engine {} failed: {}",
-            failure.engine, failure.message
+            failure.engine,
+            inline(&failure.message)
         )?;
     }
     if !report.enclosure.is_empty() {
@@ -105,7 +116,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
             writeln!(
                 out,
                 "| {} | {:.2} | {:.2} | {:.2} |",
-                each.link,
+                inline(&each.link),
                 each.mean_overhang_m * 1e3,
                 each.worst_overhang_m * 1e3,
                 each.worst_protrusion_m * 1e3
@@ -114,7 +125,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         writeln!(out)?;
     }
     for note in &report.notes {
-        writeln!(out, "- note: {note}")?;
+        writeln!(out, "- note: {}", inline(note))?;
     }
     let provenance = &report.provenance;
     writeln!(
@@ -183,7 +194,7 @@ fn write_configurations(
             write!(out, " {} |", shown.text(each))?;
             if is_least(shown) {
                 let least = each.clearance.least();
-                let pair = least.map_or("-".to_owned(), |found| found.pair.join(", "));
+                let pair = least.map_or("-".to_owned(), |found| inline(&found.pair.join(", ")));
                 write!(out, " {pair} |")?;
             }
         }

@@ -4,11 +4,12 @@ use std::fmt::Write;
 
 use needlebench_evaluation::report::Verdict;
 
+use super::escape::inline;
 use crate::table::study::document::Block;
 
 /// Text that breaks no table.
 fn cell_text(text: &str) -> String {
-    text.trim().replace('\n', " ").replace('|', "\\|")
+    inline(text)
 }
 
 /// Headings in one line each: one that only has a second line shares the first of those before it.
@@ -45,13 +46,13 @@ fn write_markdown(
         Verdict::Pass => ": pass".to_owned(),
         other => format!(": **{}**", other.name()),
     });
-    writeln!(out, "# {title}{verdict}\n")?;
+    writeln!(out, "# {}{verdict}\n", inline(title))?;
     for part in blocks {
         match part {
-            Block::Heading(heading) => writeln!(out, "## {heading}\n")?,
+            Block::Heading(heading) => writeln!(out, "## {}\n", inline(heading))?,
             Block::Lines(lines) => {
                 for line in lines {
-                    writeln!(out, "- {}", line.trim())?;
+                    writeln!(out, "- {}", inline(line))?;
                 }
                 writeln!(out)?;
             }

@@ -2,6 +2,7 @@
 
 use needlebench_study::compare::StudyComparison;
 
+use super::escape::inline;
 use crate::table::study_comparison::{failure_text, intro, row, shown};
 
 /// The comparison as Markdown, for pull requests: what changed alone.
@@ -9,22 +10,26 @@ pub fn study_comparison_markdown(comparison: &StudyComparison) -> String {
     let verdict = if comparison.pass { "pass" } else { "**fail**" };
     let mut lines = vec![format!(
         "# {} against {}: {verdict}\n",
-        comparison.a.source, comparison.b.source
+        inline(&comparison.a.source),
+        inline(&comparison.b.source)
     )];
     lines.extend(
         intro(comparison)
             .into_iter()
-            .map(|line| format!("- {line}")),
+            .map(|line| format!("- {}", inline(&line))),
     );
     for failure in &comparison.failures {
-        lines.push(format!("- **lost** {}", failure_text(failure)));
+        lines.push(format!("- **lost** {}", inline(&failure_text(failure))));
     }
     let rows = shown(comparison, false);
     if !rows.is_empty() {
         lines.push("\n| What | A | B | B less A | |".to_owned());
         lines.push("|---|--:|--:|--:|---|".to_owned());
         for change in &rows {
-            lines.push(format!("| {} |", row(change).join(" | ")));
+            lines.push(format!(
+                "| {} |",
+                row(change).map(|cell| inline(&cell)).join(" | ")
+            ));
         }
     }
     let same = comparison.changes.len() - rows.len();

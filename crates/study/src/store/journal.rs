@@ -33,6 +33,7 @@ use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 
 use crc32fast::Hasher;
+use needlebench_cell::{InputError, open_input};
 
 use super::codec::{self, Packed};
 use super::columns::Columns;
@@ -244,7 +245,11 @@ pub(crate) fn kept(manifest: &Manifest, places: &Places) -> u64 {
 /// [`StudyError::File`] if it is the journal of another study, or none.
 pub(crate) fn scan(path: &Path, manifest: &Manifest) -> Result<Scan, StudyError> {
     let failed = || StudyError::io("read", path);
-    let file = File::open(path).map_err(failed())?;
+    let file = match open_input(path) {
+        Ok(file) => file,
+        Err(InputError::Io(error)) => return Err(failed()(error)),
+        Err(error) => return Err(StudyError::file(path, format!("is no journal: {error}"))),
+    };
     let length = file.metadata().map_err(failed())?.len();
     let key = Key::new(manifest);
     let mut source = Source {

@@ -5,6 +5,7 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
+use needlebench_cell::{InputError, read_data_text};
 use serde::{Deserialize, Serialize};
 
 use super::atomic::write_atomically;
@@ -207,10 +208,14 @@ impl Manifest {
     /// [`StudyError::File`] if it is none or of another version.
     pub fn read(folder: &Path) -> Result<Option<Self>, StudyError> {
         let path = folder.join(MANIFEST_FILE);
-        let text = match std::fs::read_to_string(&path) {
+        let text = match read_data_text(&path) {
             Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(StudyError::io("read", &path)(error)),
+            Err(error) if error.is_not_found() => return Ok(None),
+            Err(InputError::Io(error)) => return Err(StudyError::io("read", &path)(error)),
+            Err(error) => {
+                let message = format!("is no manifest of a study: {error}");
+                return Err(StudyError::file(&path, message));
+            }
         };
         let version: Version = serde_json::from_str(&text).map_err(|error| {
             StudyError::file(&path, format!("is no manifest of a study: {error}"))

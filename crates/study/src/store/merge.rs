@@ -3,6 +3,8 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
+use needlebench_cell::{InputError, open_input};
+
 use super::error::StudyError;
 use super::folder::{Blocks, Folder, Opened, RESULTS_FILE, write_results};
 use super::journal::{BlockReader, JOURNAL_FILE, kept, scan};
@@ -87,13 +89,14 @@ fn lock(shards: &[(PathBuf, Manifest)]) -> Result<Vec<File>, StudyError> {
     let mut locks = Vec::new();
     for (folder, _) in shards {
         let path = folder.join(JOURNAL_FILE);
-        let file = match File::open(&path) {
+        let file = match open_input(&path) {
             Ok(file) => file,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            Err(error) if error.is_not_found() => {
                 let message = "is not there\nhint: `needlebench study STUDY --shard K/N --resume` computes it again";
                 return Err(StudyError::file(&path, message));
             }
-            Err(error) => return Err(StudyError::io("open", &path)(error)),
+            Err(InputError::Io(error)) => return Err(StudyError::io("open", &path)(error)),
+            Err(error) => return Err(StudyError::file(&path, format!("is no journal: {error}"))),
         };
         match file.try_lock_shared() {
             Ok(()) => locks.push(file),

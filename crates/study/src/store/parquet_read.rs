@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bytes::{Buf, Bytes};
+use needlebench_cell::open_input;
 use needlebench_kinematics::ik::Configuration;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
@@ -454,7 +455,7 @@ const HEAL: &str =
 /// Opens a file and reads its footer.
 fn metadata_of(path: &Path) -> Result<(File, ParquetMetaData), ResultsError> {
     let fail = |message: String| failure(path, message);
-    let mut file = File::open(path).map_err(|error| fail(format!("cannot be opened: {error}")))?;
+    let mut file = open_input(path).map_err(|error| fail(format!("cannot be opened: {error}")))?;
     check_ends(&mut file).map_err(fail)?;
     let metadata = ParquetMetaDataReader::new()
         .parse_and_finish(&file)

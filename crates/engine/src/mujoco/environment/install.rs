@@ -156,6 +156,7 @@ pub(super) fn install_with_pip(
 pub(super) fn install_package(
     venv_python: &Path,
     sources: &[(&str, &str)],
+    target: &Path,
 ) -> Result<(), EnvironmentError> {
     const ASK: &str = "import sysconfig; print(sysconfig.get_path('purelib'))";
     let answer = run(
@@ -163,6 +164,7 @@ pub(super) fn install_package(
         VENV_LIMIT,
     );
     let packages = answer.map_err(|failure| EnvironmentError::Verify {
+        folder: target.to_owned(),
         reason: failure.to_string(),
     })?;
     let package = Path::new(&packages).join("needlebench_harness");

@@ -19,6 +19,7 @@ use super::CompareArguments;
 use super::thresholds::{Given, thresholds};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::output::shown;
 use needlebench_report::table::study_comparison::study_comparison_text;
 use needlebench_report::{study_comparison_junit, study_comparison_markdown, write_atomically};
 
@@ -82,7 +83,7 @@ fn compared(
     arguments: &CompareArguments,
     prepared: &Prepared,
 ) -> Result<StudyComparison, ResultsError> {
-    let names = [&arguments.a, &arguments.b].map(|path| path.display().to_string());
+    let names = [&arguments.a, &arguments.b].map(|path| shown(path));
     let [a, b] = &prepared.results;
     let former = [a, b].map(|results| results.is_former().then(|| FormerResults::new(results)));
     let side = |at: usize| ComparedStudy {

@@ -11,6 +11,7 @@ use super::unit::wrong_unit;
 use crate::Finding;
 use crate::files::ModelSource;
 use crate::files::source_of;
+use crate::input::read_data;
 use crate::scenario::{PartSection, PartTissue};
 use crate::toml_text::TomlText;
 
@@ -47,8 +48,9 @@ pub(super) fn read_part(
             )
             .hint("the position is in millimetres, whatever the file's unit"));
     }
-    let bytes = std::fs::read(&path).map_err(|error| {
-        refused(error.to_string()).hint("the path is relative to the scenario's folder")
+    let bytes = read_data(&path).map_err(|error| {
+        let hint = error.hint("the path is relative to the scenario's folder");
+        refused(error.to_string()).hint(hint)
     })?;
     let in_file = read_stl(&bytes, [1.0; 3])
         .map_err(|why| refused(why.to_string()).hint("parts are STL files, binary or text"))?;

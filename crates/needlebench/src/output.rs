@@ -1,0 +1,81 @@
+//! Standard output and standard error.
+//!
+//! What cannot be written is lost, never a panic: a reader that has gone is its own choice, and a full
+//! standard error has nobody to tell.
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use needlebench_cell::{printable, printable_line};
+
+/// Writes text and a line end to standard output.
+///
+/// A reader that stops reading is no error: what the command found decides its exit status.
+pub(crate) fn print_text(text: &str) -> Result<()> {
+    let mut out = anstream::stdout().lock();
+    let text = without_commands(text);
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("cannot write to standard output"),
+    }
+}
+
+/// Writes a plain text and a line end to standard error.
+pub(crate) fn complain(text: &str) {
+    complain_styled(&printable(text));
+}
+
+/// The same of a text with colours of ours.
+pub(crate) fn complain_styled(text: &str) {
+    let mut error = anstream::stderr().lock();
+    // There is nobody left to tell.
+    let _ = writeln!(error, "{text}").and_then(|()| error.flush());
+}
+
+/// A path in a line of output.
+pub(crate) fn shown(path: &Path) -> String {
+    printable_line(&path.display().to_string())
+}
+
+/// A text with the colours that our tables have, and no other control characters.
+fn without_commands(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find('\u{1b}') {
+        let (before, from) = rest.split_at(at);
+        shown.push_str(&printable(before));
+        let length = colour(from).unwrap_or(1);
+        let (sequence, after) = from.split_at(length);
+        if length > 1 {
+            shown.push_str(sequence);
+        } else {
+            shown.push_str(&printable(sequence));
+        }
+        rest = after;
+    }
+    shown.push_str(&printable(rest));
+    shown
+}
+
+/// Length of the sequence that sets colour or weight (SGR of ECMA-48) with which a text begins.
+fn colour(text: &str) -> Option<usize> {
+    let parameters = text.strip_prefix("\u{1b}[")?;
+    let end = parameters.find(|letter: char| !letter.is_ascii_digit() && letter != ';')?;
+    parameters[end..].starts_with('m').then_some(end + 3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_stay_and_commands_do_not() {
+        let text = "\u{1b}[38;5;9mred\u{1b}[0m \u{1b}]0;title\u{7} \u{1b}[2J \u{1b}";
+        assert_eq!(
+            without_commands(text),
+            "\u{1b}[38;5;9mred\u{1b}[0m \\u{1b}]0;title\\u{7} \\u{1b}[2J \\u{1b}"
+        );
+        assert_eq!(without_commands("\u{1b}[31"), "\\u{1b}[31");
+    }
+}
