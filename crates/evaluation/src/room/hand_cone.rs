@@ -14,7 +14,7 @@ pub const CONE_TOLERANCE_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
 pub const CONE_START_M: f64 = 0.01;
 /// Cells that are looked at before the bound reached until then is taken.
 const MOST_CELLS: usize = 20_000;
-/// Cells smaller than this are not cut further: what is so near counts as touching, m.
+/// Cells smaller than this are not cut further, m: what is so near ends the search from below.
 const SMALLEST_M: f64 = 2.5e-4;
 
 /// The largest free cone.
@@ -100,8 +100,10 @@ impl Cell {
 /// farther than the cell's own radius is free. Cells are taken by their smallest angle, so all
 /// directions within that of the cell in hand are proven free at any time; that is the result, and
 /// it is never too large but for the distances' own error (below 1e-8 m). The smallest angle at
-/// which a solid was met bounds it from the other side; the search ends when both are within
-/// [`CONE_TOLERANCE_RAD`], or when what is left is nearer than 0.5 mm to touching.
+/// which a point was found inside a solid bounds it from the other side, as proven; the search ends
+/// when both are within [`CONE_TOLERANCE_RAD`], or when what is left is nearer than 0.5 mm to
+/// touching. Then a point inside a solid is looked for from there outwards ([`meet_outwards`]): being
+/// near is not being inside, and 0.25 mm beside the guide's entry are more than a degree.
 pub fn hand_cone(
     obstacles: &PlacedObstacles<'_>,
     apex: &Point3<f64>,
@@ -120,13 +122,21 @@ pub fn hand_cone(
         let Some(cell) = heap.pop() else { break };
         let least_rad = cell.angle_rad[0];
         let close_enough = met.0 - least_rad <= CONE_TOLERANCE_RAD;
-        if close_enough || looked_at >= MOST_CELLS {
+        if close_enough {
             return result(obstacles, least_rad.min(met.0), met);
         }
-        let (angle_rad, turn_rad) = (middle(cell.angle_rad), middle(cell.turn_rad));
-        let direction = axis * angle_rad.cos()
-            + (across * turn_rad.cos() + beside * turn_rad.sin()) * angle_rad.sin();
-        let point = apex + direction * middle(cell.distance_m);
+        let point_at = |angle_rad: f64| {
+            let turn_rad = middle(cell.turn_rad);
+            let direction = axis * angle_rad.cos()
+                + (across * turn_rad.cos() + beside * turn_rad.sin()) * angle_rad.sin();
+            apex + direction * middle(cell.distance_m)
+        };
+        if looked_at >= MOST_CELLS {
+            let met = meet_outwards(obstacles, least_rad, met, point_at);
+            return result(obstacles, least_rad.min(met.0), met);
+        }
+        let angle_rad = middle(cell.angle_rad);
+        let point = point_at(angle_rad);
         let reach = cell.reach_m();
         let radius_m: f64 = reach.iter().sum();
         let (nearest, near) = obstacles.within(&cell.near, &point, radius_m);
@@ -137,10 +147,9 @@ pub fn hand_cone(
             met = (angle_rad, Some(index));
         }
         if radius_m <= SMALLEST_M {
-            if least_rad < met.0 {
-                met = (cell.angle_rad[1].min(met.0), Some(index));
-            }
-            return result(obstacles, least_rad, met);
+            let met = meet_outwards(obstacles, least_rad, met, point_at);
+            let blocker = met.1.or(Some(index));
+            return result(obstacles, least_rad.min(met.0), (met.0, blocker));
         }
         let widest = (0..3)
             .max_by(|a, b| reach[*a].total_cmp(&reach[*b]))
@@ -148,6 +157,34 @@ pub fn hand_cone(
         heap.extend(Cell { near, ..cell }.halves(widest));
     }
     result(obstacles, met.0, met)
+}
+
+/// The smallest angle known at which a point is inside a solid, with that solid: `met`, or one that is
+/// found on the way outwards from `from_rad`.
+fn meet_outwards(
+    obstacles: &PlacedObstacles<'_>,
+    from_rad: f64,
+    met: (f64, Option<usize>),
+    point_at: impl Fn(f64) -> Point3<f64>,
+) -> (f64, Option<usize>) {
+    /// Angles that are tried in the first tolerance; then each step is half as long again.
+    const IN_ONE: f64 = 8.0;
+    let everything = obstacles.everything();
+    let mut step_rad = CONE_TOLERANCE_RAD / IN_ONE;
+    let mut angle_rad = from_rad;
+    while angle_rad < met.0 {
+        let (nearest, _) = obstacles.within(&everything, &point_at(angle_rad), 0.0);
+        if let Some((distance_m, index)) = nearest
+            && distance_m <= 0.0
+        {
+            return (angle_rad, Some(index));
+        }
+        if angle_rad - from_rad >= CONE_TOLERANCE_RAD {
+            step_rad *= 1.5;
+        }
+        angle_rad += step_rad;
+    }
+    met
 }
 
 fn result(
