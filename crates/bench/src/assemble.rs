@@ -18,7 +18,7 @@ use needlebench_evaluation::{
     planned_clearance, posture_clearance, tip_of, tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, PostureMargins, Rule};
+use needlebench_planning::{ConfigurationPlan, GoalPlan, Planner, PostureMargins, Rejection, Rule};
 
 use crate::adjudication::Adjudicated;
 use crate::budgets::Budgets;
@@ -199,17 +199,7 @@ fn configuration_report(
     ConfigurationReport {
         label: plan.configuration.label(),
         status: Status::Rejected, // `judge` sets it
-        rejections: plan
-            .rejections
-            .iter()
-            .map(|rejection| RejectionReport {
-                rule: rejection.rule.name(),
-                value: rejection.value,
-                limit: rejection.limit,
-                unit: rejection.unit,
-                detail: rejection.detail.clone(),
-            })
-            .collect(),
+        rejections: plan.rejections.iter().map(rejection_report).collect(),
         joints_rad: candidate.map(|each| each.joints.into()),
         roll_rad: candidate.map(|each| each.roll_rad),
         wrap: candidate.map(|each| each.wrap),
@@ -364,4 +354,15 @@ fn overall_clearance(
         }
     }
     ClearanceReport::new(classes)
+}
+
+/// A broken rule, as a value of the report.
+pub(crate) fn rejection_report(rejection: &Rejection) -> RejectionReport {
+    RejectionReport {
+        rule: rejection.rule.name(),
+        value: rejection.value,
+        limit: rejection.limit,
+        unit: rejection.unit,
+        detail: rejection.detail.clone(),
+    }
 }

@@ -31,7 +31,7 @@ struct Column {
 
 /// Scores nearer than this are even: far above the rounding of values, and far below what one
 /// resolution of any metric changes.
-pub const SAME_SCORE: f64 = 1e-6;
+pub const SAME_SCORE: f64 = 1e-9;
 
 /// Marks the Pareto set of a goal, ranks its configurations and recommends the first.
 ///

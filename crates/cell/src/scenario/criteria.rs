@@ -15,11 +15,11 @@ use super::switch;
 pub struct ClearanceCriteria {
     /// Arm against the skin.
     #[serde(with = "switch")]
-    #[schemars(with = "Option<f64>", range(min = 0.0, max = 300.0), extend("x-off" = true, "x-unit" = "mm"))]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 500.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub robot_phantom: Option<f64>,
     /// Arm and tool against the table.
     #[serde(with = "switch")]
-    #[schemars(with = "Option<f64>", range(min = 0.0, max = 300.0), extend("x-off" = true, "x-unit" = "mm"))]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 500.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub robot_table: Option<f64>,
     /// Arm and tool against the gantry.
     #[serde(with = "switch")]
@@ -27,7 +27,7 @@ pub struct ClearanceCriteria {
     pub robot_gantry: Option<f64>,
     /// Arm and tool against the mount.
     #[serde(with = "switch")]
-    #[schemars(with = "Option<f64>", range(min = 0.0, max = 300.0), extend("x-off" = true, "x-unit" = "mm"))]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 500.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub robot_mount: Option<f64>,
     /// Arm and tool against themselves.
     #[serde(rename = "self", with = "switch")]
@@ -57,24 +57,24 @@ pub struct ClearanceCriteria {
 pub struct CriteriaSection {
     /// Largest settled distance of the needle tip from the target, mm.
     #[serde(with = "switch")]
-    #[schemars(with = "Option<f64>", range(min = 1e-09, max = 100.0), extend("x-off" = true))]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_tip_position_error_mm: Option<f64>,
     /// Largest root mean square distance of the needle's tip from the target over all arms and
     /// patients of `[imperfections]`, mm.
     #[serde(with = "switch")]
-    #[schemars(with = "Option<f64>", range(min = 1e-09, max = 100.0), extend("x-off" = true))]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_tip_rms_mm: Option<f64>,
     /// The same across the needle, mm.
     #[serde(with = "switch")]
-    #[schemars(with = "Option<f64>", range(min = 1e-09, max = 100.0), extend("x-off" = true))]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_tip_lateral_rms_mm: Option<f64>,
     /// Largest settled angle between planned and actual needle, deg.
     #[serde(with = "switch")]
-    #[schemars(with = "Option<f64>", range(min = 1e-09, max = 90.0), extend("x-off" = true))]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 90.0), extend("x-off" = true))]
     pub max_needle_angle_error_deg: Option<f64>,
     /// Largest settled distance of the guide's exit from its planned place, mm.
     #[serde(with = "switch")]
-    #[schemars(with = "Option<f64>", range(min = 1e-09, max = 100.0), extend("x-off" = true))]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_guide_position_error_mm: Option<f64>,
     /// Largest time from the end of the motion until the tip stays within its band, s.
     #[serde(with = "switch")]
@@ -86,7 +86,7 @@ pub struct CriteriaSection {
     pub max_peak_torque_ratio: Option<f64>,
     /// Largest difference of the engines' tips while moving, mm.
     #[serde(with = "switch")]
-    #[schemars(with = "Option<f64>", range(min = 1e-09, max = 100.0), extend("x-off" = true))]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_engine_difference_peak_mm: Option<f64>,
     /// Largest difference of the engines' tips when settled, mm.
     #[serde(with = "switch")]
@@ -106,7 +106,7 @@ pub struct CriteriaSection {
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0), extend("x-off" = true))]
     pub min_free_fraction: Option<f64>,
-    /// Least share of unobstructed lines of sight, 0 to 1.
+    /// Least share of the lines of sight that arm and tool leave, of those that are free without them, 0 to 1.
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0), extend("x-off" = true))]
     pub min_sight_fraction: Option<f64>,

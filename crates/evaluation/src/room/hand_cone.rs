@@ -22,7 +22,7 @@ const SMALLEST_M: f64 = 2.5e-4;
 pub struct HandCone {
     /// Proven lower bound of its half-angle, rad; at most a right angle.
     pub half_angle_rad: f64,
-    /// How much larger the true angle may be, rad.
+    /// How much larger the true angle may be, rad: to a point that is known to be in a solid.
     pub accuracy_rad: f64,
     /// What blocks a larger one; `None` if the whole half space is free.
     pub blocker: Option<String>,
@@ -102,8 +102,8 @@ impl Cell {
 /// it is never too large but for the distances' own error (below 1e-8 m). The smallest angle at
 /// which a point was found inside a solid bounds it from the other side, as proven; the search ends
 /// when both are within [`CONE_TOLERANCE_RAD`], or when what is left is nearer than 0.5 mm to
-/// touching. Then a point inside a solid is looked for from there outwards ([`meet_outwards`]): being
-/// near is not being inside, and 0.25 mm beside the guide's entry are more than a degree.
+/// touching. Then a point of what is so near is the bound ([`touched_rad`]): being near is not being
+/// inside, and 0.25 mm beside the guide's entry are more than a degree.
 pub fn hand_cone(
     obstacles: &PlacedObstacles<'_>,
     apex: &Point3<f64>,
@@ -132,7 +132,6 @@ pub fn hand_cone(
             apex + direction * middle(cell.distance_m)
         };
         if looked_at >= MOST_CELLS {
-            let met = meet_outwards(obstacles, least_rad, met, point_at);
             return result(obstacles, least_rad.min(met.0), met);
         }
         let angle_rad = middle(cell.angle_rad);
@@ -147,9 +146,12 @@ pub fn hand_cone(
             met = (angle_rad, Some(index));
         }
         if radius_m <= SMALLEST_M {
-            let met = meet_outwards(obstacles, least_rad, met, point_at);
-            let blocker = met.1.or(Some(index));
-            return result(obstacles, least_rad.min(met.0), (met.0, blocker));
+            let near = (least_rad, point_at(least_rad));
+            let touched_rad = touched_rad(obstacles, index, (apex, axis), reach_m, near);
+            if touched_rad < met.0 || met.1.is_none() {
+                met = (touched_rad.min(met.0), Some(index));
+            }
+            return result(obstacles, least_rad.min(met.0), met);
         }
         let widest = (0..3)
             .max_by(|a, b| reach[*a].total_cmp(&reach[*b]))
@@ -159,32 +161,42 @@ pub fn hand_cone(
     result(obstacles, met.0, met)
 }
 
-/// The smallest angle known at which a point is inside a solid, with that solid: `met`, or one that is
-/// found on the way outwards from `from_rad`.
-fn meet_outwards(
+/// Smallest angle from the axis that is found of a point of one solid, near a point of the cone of
+/// `from_rad` that nearly touches it.
+///
+/// Nearest points of the solid and of the cone are taken in turn, which leads to where the two are
+/// nearest. Every point that is looked at is on the solid or in it, so the angle is a bound whatever the
+/// turns lead to.
+fn touched_rad(
     obstacles: &PlacedObstacles<'_>,
-    from_rad: f64,
-    met: (f64, Option<usize>),
-    point_at: impl Fn(f64) -> Point3<f64>,
-) -> (f64, Option<usize>) {
-    /// Angles that are tried in the first tolerance; then each step is half as long again.
-    const IN_ONE: f64 = 8.0;
-    let everything = obstacles.everything();
-    let mut step_rad = CONE_TOLERANCE_RAD / IN_ONE;
-    let mut angle_rad = from_rad;
-    while angle_rad < met.0 {
-        let (nearest, _) = obstacles.within(&everything, &point_at(angle_rad), 0.0);
-        if let Some((distance_m, index)) = nearest
-            && distance_m <= 0.0
-        {
-            return (angle_rad, Some(index));
+    index: usize,
+    (apex, axis): (&Point3<f64>, &Vector3<f64>),
+    reach_m: f64,
+    (from_rad, start): (f64, Point3<f64>),
+) -> f64 {
+    const TURNS: usize = 30;
+    let on_cone = |point: &Point3<f64>| {
+        let offset = point - apex;
+        let across = offset - axis * offset.dot(axis);
+        let level = across.try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
+        apex + (axis * from_rad.cos() + level * from_rad.sin()) * offset.norm()
+    };
+    let is_in_reach =
+        |point: &Point3<f64>| (CONE_START_M..=reach_m).contains(&(point - apex).norm());
+    let mut least_rad = FRAC_PI_2;
+    let mut at = start;
+    for _ in 0..TURNS {
+        if is_in_reach(&at) && obstacles.is_inside(index, &at) {
+            return from_rad.min(least_rad);
         }
-        if angle_rad - from_rad >= CONE_TOLERANCE_RAD {
-            step_rad *= 1.5;
+        let touched = obstacles.point_of(index, &at);
+        if is_in_reach(&touched) {
+            least_rad = least_rad.min((touched - apex).angle(axis));
         }
-        angle_rad += step_rad;
+        // As far again into the solid: where cone and solid cross, that is inside both.
+        at = on_cone(&(touched + (touched - at)));
     }
-    met
+    least_rad
 }
 
 fn result(

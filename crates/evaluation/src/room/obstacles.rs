@@ -161,6 +161,19 @@ impl PlacedObstacles<'_> {
         .distance_m
     }
 
+    /// Whether a point is in a solid, or on it.
+    pub(super) fn is_inside(&self, index: usize, point: &Point3<f64>) -> bool {
+        self.distance_m(index, point, 0.0) <= 0.0
+    }
+
+    /// Point of a solid that is nearest to a point.
+    pub(super) fn point_of(&self, index: usize, point: &Point3<f64>) -> Point3<f64> {
+        let placed = &self.solids[index];
+        let at = Pose::translation(point.x, point.y, point.z);
+        let solid = &placed.solid.prepared;
+        separation(self.point, &at, solid, &placed.world_from_shape).point_on_b
+    }
+
     /// Nearest of the solids within `reach_m` of a point: its signed distance and index, and all
     /// that are within reach.
     pub(super) fn within(

@@ -590,20 +590,15 @@ fn two_values_compare_by_their_own_difference() {
     }
 }
 
-/// Values of `table3`, mm: each within 0.5 of the next, the ends 0.73 apart.
+/// Corridors of `table3`, mm: each within 0.5 of the next, the ends 0.73 apart.
 #[test]
 fn steps_below_the_resolution_do_not_chain_to_a_tie() {
-    let corridors_mm = [3.0, 3.3, 3.73];
-    let others = [3.0, 2.0, 1.0];
-    let candidates: Vec<Vec<f64>> = corridors_mm
-        .iter()
-        .zip(others)
-        .map(|(a, b)| vec![*a, b])
-        .collect();
-    let scales = [scale(0.5, true), scale(0.5, true)];
-    // The last is better than the first in the corridor by more than the resolution.
+    let scales = [scale(0.5, true), scale(0.1, true), scale(0.1, true)];
+    let candidates = [[3.0, 3.0, 1.0], [3.3, 3.0, 0.0], [3.73, 2.0, 1.0]].map(Vec::from);
+    // Through the middle one, the last would be even with the first in the corridor, and beaten.
     assert_eq!(pareto_set(&candidates, &scales), [true, false, true]);
     assert!(!dominates(&candidates[0], &candidates[2], &scales));
+    assert!(dominates(&candidates[0], &candidates[1], &scales));
 }
 
 #[test]
