@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 use needlebench_cell::imperfections::{ArmClass, BreathState, Expected};
-use needlebench_cell::{ArmInUse, ClearanceClass, enclosures};
+use needlebench_cell::{ArmInUse, ClearanceClass, Goal, ResolvedScenario, enclosures};
 use needlebench_engine::{EngineIdentity, Recording};
 use needlebench_evaluation::metric::measured;
 use needlebench_evaluation::ranking::rank_goal;
@@ -20,7 +20,8 @@ use needlebench_evaluation::{
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{
-    ConfigurationPlan, GoalPlan, Planner, PostureMargins, Rule, judge_route, needle_route,
+    ConfigurationPlan, GoalPlan, Planner, PostureMargins, Rejection, Rule, judge_route,
+    needle_route,
 };
 
 use crate::adjudication::Adjudicated;
@@ -134,6 +135,18 @@ fn expected_report(expected: &Expected) -> ExpectedReport {
     }
 }
 
+/// How the planned needle of a goal keeps away from what it must not meet.
+pub(crate) fn route_report(resolved: &ResolvedScenario, goal: &Goal) -> Option<RouteReport> {
+    let judged = judge_route(resolved, goal)?;
+    Some(RouteReport {
+        part: judged.nearest.part.name.clone(),
+        tissue: judged.nearest.part.tissue.to_string(),
+        distance_m: judged.distance_m,
+        margin_m: judged.margin_m,
+        kept: judged.is_kept(),
+    })
+}
+
 /// The report of one goal, neither judged nor ranked.
 pub(crate) fn goal_report(
     context: &Context<'_>,
@@ -157,13 +170,7 @@ pub(crate) fn goal_report(
         axis: goal.axis.into_inner().into(),
         insertion_length_m: goal.insertion_length_m,
         standoff_m: goal.standoff_m,
-        needle_route: judge_route(resolved, goal).map(|judged| RouteReport {
-            part: judged.nearest.part.name.clone(),
-            tissue: judged.nearest.part.tissue.to_string(),
-            distance_m: judged.distance_m,
-            margin_m: judged.margin_m,
-            kept: judged.is_kept(),
-        }),
+        needle_route: route_report(resolved, goal),
         configurations: plan
             .configurations
             .iter()
@@ -241,17 +248,7 @@ fn configuration_report(
         label: plan.configuration.label(),
         status: Status::Rejected, // `judge` sets it
         not_judged: 0,            // this too
-        rejections: plan
-            .rejections
-            .iter()
-            .map(|rejection| RejectionReport {
-                rule: rejection.rule.name(),
-                value: rejection.value,
-                limit: rejection.limit,
-                unit: rejection.unit,
-                detail: rejection.detail.clone(),
-            })
-            .collect(),
+        rejections: plan.rejections.iter().map(rejection_report).collect(),
         joints_rad: candidate.map(|each| each.joints.into()),
         roll_rad: candidate.map(|each| each.roll_rad),
         wrap: candidate.map(|each| each.wrap),
@@ -406,4 +403,15 @@ fn overall_clearance(
         }
     }
     ClearanceReport::new(classes)
+}
+
+/// A broken rule, as a value of the report.
+pub(crate) fn rejection_report(rejection: &Rejection) -> RejectionReport {
+    RejectionReport {
+        rule: rejection.rule.name(),
+        value: rejection.value,
+        limit: rejection.limit,
+        unit: rejection.unit,
+        detail: rejection.detail.clone(),
+    }
 }

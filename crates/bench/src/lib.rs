@@ -16,6 +16,7 @@ mod events;
 mod iso9283;
 mod parallel;
 mod plan;
+pub mod preview;
 pub mod progress;
 pub mod provenance;
 mod real_cell;
@@ -29,6 +30,7 @@ pub mod study;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use events::{EngineEvents, EventRun, StagedStop};
+pub use preview::Preview;
 pub use real_cell::servo_of;
 pub use run::{run, run_scenario};
 pub use runnable::Runnable;

@@ -2,48 +2,70 @@
 
 use std::cmp::Ordering;
 
-/// Levels of values of one metric: 0 for the best, and the same level for all that are tied.
-///
-/// Values are tied if a chain of values leads from one to the other in steps of at most
-/// `resolution`. So differences up to the resolution never decide, being tied is transitive, and
-/// the levels depend neither on the order of the values nor on noise far below the resolution.
-/// `more_is_better` says which end is the best. NaN is worse than any number, and tied with NaN.
-pub fn levels(values: &[f64], resolution: f64, more_is_better: bool) -> Vec<usize> {
-    let cost = |index: usize| {
-        let value = values[index];
-        if more_is_better && !value.is_nan() {
-            -value
-        } else {
-            value
+/// How values of one metric compare.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Differences up to this are none.
+    pub resolution: f64,
+    /// Whether more is better.
+    pub more_is_better: bool,
+}
+
+impl Scale {
+    /// `Greater` if `a` is better than `b` by more than the resolution, `Less` if it is worse by more than
+    /// that.
+    ///
+    /// Two values are compared by themselves, whatever lies between them: a chain of small steps never
+    /// makes a large difference vanish. So being even is not transitive. NaN is worse than any number,
+    /// and even with NaN.
+    pub fn compare(&self, a: f64, b: f64) -> Ordering {
+        match (a.is_nan(), b.is_nan()) {
+            (true, true) => Ordering::Equal,
+            (true, false) => Ordering::Less,
+            (false, true) => Ordering::Greater,
+            (false, false) if a == b || (a - b).abs() <= self.resolution => Ordering::Equal,
+            (false, false) if (a > b) == self.more_is_better => Ordering::Greater,
+            (false, false) => Ordering::Less,
         }
-    };
-    // NaN of either sign sorts last.
-    let order_of = |a: f64, b: f64| {
-        a.is_nan()
-            .cmp(&b.is_nan())
-            .then_with(|| a.partial_cmp(&b).unwrap_or(Ordering::Equal))
-    };
-    let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|&a, &b| order_of(cost(a), cost(b)));
-    let mut levels = vec![0; values.len()];
-    for pair in order.windows(2) {
-        let (before, after) = (cost(pair[0]), cost(pair[1]));
-        let tied =
-            before == after || after - before <= resolution || before.is_nan() && after.is_nan();
-        levels[pair[1]] = levels[pair[0]] + usize::from(!tied);
     }
-    levels
 }
 
-/// Whether `a` dominates `b`: at least as good in every metric and better in one.
-pub fn dominates(a: &[usize], b: &[usize]) -> bool {
-    a.iter().zip(b).all(|(a, b)| a <= b) && a.iter().zip(b).any(|(a, b)| a < b)
+/// Whether `a` dominates `b`: worse in no metric and better in one, each beyond its resolution.
+pub fn dominates(a: &[f64], b: &[f64], scales: &[Scale]) -> bool {
+    let mut better = false;
+    for ((a, b), scale) in a.iter().zip(b).zip(scales) {
+        match scale.compare(*a, *b) {
+            Ordering::Less => return false,
+            Ordering::Greater => better = true,
+            Ordering::Equal => {}
+        }
+    }
+    better
 }
 
-/// Members of the Pareto set among candidates, each given by its levels in every metric.
-pub fn pareto_set(candidates: &[Vec<usize>]) -> Vec<bool> {
-    candidates
+/// Members of the Pareto set among candidates, each given by its values in every metric: those that
+/// nothing dominates.
+///
+/// With resolutions candidates may dominate each other in a circle, each in another metric by little.
+/// They are equals, and count as one: all are members unless something outside dominates one of them.
+/// So the set is never empty.
+pub fn pareto_set(candidates: &[Vec<f64>], scales: &[Scale]) -> Vec<bool> {
+    let count = candidates.len();
+    // By pairs: whether a chain of dominance leads from one to the other.
+    let mut beats: Vec<Vec<bool>> = candidates
         .iter()
-        .map(|each| !candidates.iter().any(|other| dominates(other, each)))
+        .map(|a| candidates.iter().map(|b| dominates(a, b, scales)).collect())
+        .collect();
+    for through in 0..count {
+        for from in 0..count {
+            if beats[from][through] {
+                for to in 0..count {
+                    beats[from][to] |= beats[through][to];
+                }
+            }
+        }
+    }
+    (0..count)
+        .map(|each| (0..count).all(|other| !beats[other][each] || beats[each][other]))
         .collect()
 }

@@ -2,15 +2,18 @@
 //!
 //! The score of a configuration is the weighted mean of its utilities,
 //! `sum_k w_k u_k / sum_k w_k`, over the metrics that were measured for *every* configuration that
-//! works: a metric that one of them lacks would compare different sums. Before utilities are taken,
-//! values that are tied (see [`levels`]) are replaced by the best of them, so that neither score
-//! nor order depends on noise, and a configuration never scores above one that beats it in the
-//! same metrics.
+//! works: a metric that one of them lacks would compare different sums. Utilities are those of the
+//! values as measured. Scores that differ by no more than [`SAME_SCORE`] are even, and the first in the
+//! report's order comes first: noise far below every resolution decides nothing. The Pareto set compares
+//! values two by two, each with its resolution ([`crate::pareto`]); a configuration that is beaten there
+//! may score above the one that beats it by what differences below the resolutions add up to.
+
+use std::cmp::Ordering;
 
 use needlebench_cell::ranking::{Aim, RankingSection};
 
 use crate::metric::{Better, Bound, Metric, metrics};
-use crate::pareto::{dominates, levels, pareto_set};
+use crate::pareto::{Scale, dominates, pareto_set};
 pub use crate::ranking_report::{
     Dominance, GoalRanking, RankedMetric, RankingReport, Term, WeightChange,
 };
@@ -21,12 +24,14 @@ use crate::report::{ConfigurationReport, GoalReport, Recommendation, Status};
 struct Column {
     metric: &'static Metric,
     aim: Aim,
+    scale: Scale,
     /// As measured.
     values: Vec<f64>,
-    /// Best of the tied ones.
-    counted_as: Vec<f64>,
-    levels: Vec<usize>,
 }
+
+/// Scores nearer than this are even: far above the rounding of values, and far below what one
+/// resolution of any metric changes.
+pub const SAME_SCORE: f64 = 1e-9;
 
 /// Marks the Pareto set of a goal, ranks its configurations and recommends the first.
 ///
@@ -43,34 +48,37 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
     let label = |at: usize| goal.configurations[working[at]].label;
     let (metrics, columns) = columns(&goal.configurations, &working, ranking);
 
-    let candidates: Vec<Vec<usize>> = (0..working.len())
-        .map(|at| {
-            let decide = columns.iter().filter(|each| each.metric.in_pareto_set);
-            decide.map(|column| column.levels[at]).collect()
-        })
+    let deciding: Vec<&Column> = columns
+        .iter()
+        .filter(|each| each.metric.in_pareto_set)
         .collect();
-    let members = pareto_set(&candidates);
+    let scales: Vec<Scale> = deciding.iter().map(|column| column.scale).collect();
+    let candidates: Vec<Vec<f64>> = (0..working.len())
+        .map(|at| deciding.iter().map(|column| column.values[at]).collect())
+        .collect();
+    let members = pareto_set(&candidates, &scales);
     let scored = scores(&columns, working.len());
-    let mut order: Vec<usize> = (0..working.len()).collect();
-    if let Some(scored) = &scored {
-        // Stable: even scores stay in the order of the report.
-        order.sort_by(|&a, &b| scored[b].score.total_cmp(&scored[a].score));
-    }
+    let order = match &scored {
+        Some(scored) => best_first(scored),
+        None => (0..working.len()).collect(),
+    };
 
     let dominance: Vec<Option<Dominance>> = (0..working.len())
         .map(|at| {
-            let mut better = order
-                .iter()
-                .filter(|&&other| members[other] && dominates(&candidates[other], &candidates[at]));
-            better.next().map(|&other| Dominance {
-                label: label(other).to_owned(),
-                better_in: columns
-                    .iter()
-                    .filter(|column| column.metric.in_pareto_set)
-                    .filter(|column| column.levels[other] < column.levels[at])
-                    .map(|column| column.metric.key)
-                    .collect(),
-            })
+            let beats = |&&other: &&usize| dominates(&candidates[other], &candidates[at], &scales);
+            let beaten = order.iter().filter(|_| !members[at]);
+            // A member, if one does.
+            let better = beaten.clone().filter(|&&other| members[other]).find(beats);
+            better
+                .or_else(|| beaten.clone().find(beats))
+                .map(|&other| Dominance {
+                    label: label(other).to_owned(),
+                    better_in: deciding
+                        .iter()
+                        .filter(|column| column.is_better(other, at))
+                        .map(|column| column.metric.key)
+                        .collect(),
+                })
         })
         .collect();
     let change =
@@ -174,41 +182,51 @@ fn columns(
 }
 
 fn column(metric: &'static Metric, aim: Aim, values: Vec<f64>) -> Column {
-    let more = metric.better == Some(Better::More);
-    // What is better than the best anchor counts no more, here as in the utility.
-    let enough: Vec<f64> = values
-        .iter()
-        .map(|&value| {
-            if more {
-                value.min(aim.best)
-            } else {
-                value.max(aim.best)
-            }
-        })
-        .collect();
-    let levels = levels(&enough, metric.resolution, more);
-    let best_of = |level: usize| {
-        let tied = enough.iter().zip(&levels).filter(|(_, of)| **of == level);
-        let pick = if more { f64::max } else { f64::min };
-        tied.map(|(value, _)| *value).reduce(pick)
-    };
-    let counted_as = levels
-        .iter()
-        .map(|&level| best_of(level).expect("a level has its value"))
-        .collect();
     Column {
         metric,
         aim,
+        scale: Scale {
+            resolution: metric.resolution,
+            more_is_better: metric.better == Some(Better::More),
+        },
         values,
-        counted_as,
-        levels,
     }
 }
 
 impl Column {
     fn utility(&self, at: usize) -> f64 {
-        self.aim.utility(self.counted_as[at])
+        self.aim.utility(self.values[at])
     }
+
+    /// What is better than the best anchor counts no more.
+    fn counted_as(&self, at: usize) -> f64 {
+        let value = self.values[at];
+        if self.scale.more_is_better {
+            value.min(self.aim.best)
+        } else {
+            value.max(self.aim.best)
+        }
+    }
+
+    fn is_better(&self, a: usize, b: usize) -> bool {
+        self.scale.compare(self.values[a], self.values[b]) == Ordering::Greater
+    }
+}
+
+/// Indices by score, best first; of scores that are even with the best that is left, the first in the
+/// report's order is next.
+fn best_first(scored: &[RankingReport]) -> Vec<usize> {
+    let mut left: Vec<usize> = (0..scored.len()).collect();
+    let mut order = Vec::with_capacity(left.len());
+    while !left.is_empty() {
+        let scores = left.iter().map(|&at| scored[at].score);
+        let best = scores.fold(f64::NEG_INFINITY, f64::max);
+        let next = left
+            .iter()
+            .position(|&at| scored[at].score >= best - SAME_SCORE);
+        order.push(left.remove(next.unwrap_or(0)));
+    }
+    order
 }
 
 /// Scores in the order of the columns' values; none if nothing that has a weight was measured.
@@ -223,7 +241,7 @@ fn scores(columns: &[Column], count: usize) -> Option<Vec<RankingReport>> {
             .map(|column| Term {
                 metric: column.metric.key,
                 value: column.values[at],
-                counted_as: column.counted_as[at],
+                counted_as: column.counted_as(at),
                 unit: column.metric.quantity.unit(),
                 utility: column.utility(at),
                 weight: column.aim.weight,

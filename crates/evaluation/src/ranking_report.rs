@@ -20,7 +20,7 @@ pub struct Term {
     pub metric: &'static str,
     /// Value of the configuration.
     pub value: f64,
-    /// Best value that is tied with it.
+    /// The value, or the best anchor where it is better still.
     pub counted_as: f64,
     /// Unit of both.
     pub unit: &'static str,
@@ -32,7 +32,8 @@ pub struct Term {
     pub contribution: f64,
 }
 
-/// A configuration that is at least as good in every metric of the Pareto set and better in some.
+/// A configuration that is worse in no metric of the Pareto set and better in some, each beyond the
+/// metric's resolution.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Dominance {
     /// Its label; of several the one with the best score.

@@ -1,6 +1,7 @@
 //! Why a configuration is recommended, in words.
 
 use crate::metric::Metric;
+use crate::ranking::SAME_SCORE;
 use crate::ranking_report::{GoalRanking, RankingReport, Term};
 use crate::report::ConfigurationReport;
 
@@ -50,7 +51,7 @@ fn against(
         format!("{} has {:.3}", second.label, theirs.score),
     ];
     let (ahead, behind) = differences(mine, theirs);
-    if ahead.is_empty() && behind.is_empty() {
+    if (mine.score - theirs.score).abs() <= SAME_SCORE {
         clauses.push("the two are even and it comes first in the table".to_owned());
     }
     for (words, terms, named) in [
@@ -95,8 +96,8 @@ impl Difference<'_> {
         format!(
             "{} ({} against {}: {:+.3})",
             words(self.mine.metric),
-            text(self.mine.counted_as),
-            text(self.theirs.counted_as),
+            text(self.mine.value),
+            text(self.theirs.value),
             self.lead
         )
     }
@@ -116,7 +117,7 @@ fn differences<'a>(
             theirs,
             lead: mine.contribution - theirs.contribution,
         })
-        .filter(|difference| difference.lead != 0.0)
+        .filter(|difference| difference.lead.abs() > SAME_SCORE)
         .collect();
     let total: f64 = all.iter().map(|difference| difference.lead.abs()).sum();
     all.retain(|difference| difference.lead.abs() >= WORTH_A_WORD * total);

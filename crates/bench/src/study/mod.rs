@@ -24,4 +24,5 @@ pub use planned::planned_rows;
 pub use prepare::{PreparedStudy, in_words, time_per_case};
 pub use robust::{RobustnessResult, robustness_of};
 pub use rows::{CaseRow, StudyColumns, metric_column};
+pub(crate) use static_case::set_clearances;
 pub use static_case::{StaticWorker, invalid_rows, static_rows};

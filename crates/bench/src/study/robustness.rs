@@ -144,14 +144,14 @@ pub fn robustness(
             let row = worker.row(&resolved, configuration);
             (row.outcome != Outcome::Ok).then(|| row.detail.into_owned())
         }
-        Err(findings) => Some(impossible(&findings)),
+        Err(findings) => goal_at_fault(&findings),
     };
     let (shift, tilt) = (mover.shift(&mut aware), mover.tilt(&mut aware));
     let unaware = joints_rad.map(|joints_rad| {
         let q = Joints::from_column_slice(&joints_rad);
         let mut stays = |resolved: Result<ResolvedScenario, Vec<Finding>>| match resolved {
             Ok(resolved) => worker.clearance_broken(&resolved, &q).map(Cow::into_owned),
-            Err(findings) => Some(impossible(&findings)),
+            Err(findings) => goal_at_fault(&findings),
         };
         Unaware {
             joints_deg: joints_rad.map(f64::to_degrees),
@@ -167,10 +167,11 @@ pub fn robustness(
     })
 }
 
-/// The key at fault of a layout that cannot exist.
-fn impossible(findings: &[Finding]) -> String {
-    let key = findings.iter().find_map(|finding| finding.key.clone());
-    key.unwrap_or_else(|| "scenario".to_owned())
+/// The goal's key at fault, where the move leaves the goal without a needle. A place that the phantom
+/// cannot have, in the table or off it, is no evidence of anything: nobody can move it there.
+fn goal_at_fault(findings: &[Finding]) -> Option<String> {
+    let keys = findings.iter().filter_map(|finding| finding.key.clone());
+    keys.into_iter().find(|key| key.starts_with("goals"))
 }
 
 /// Moves the phantom of a layout.

@@ -192,7 +192,7 @@ fn row(
 }
 
 /// The least clearance of each class.
-fn set_clearances(posture: &mut ConfigurationReport, minima: &ClassMinima) {
+pub(crate) fn set_clearances(posture: &mut ConfigurationReport, minima: &ClassMinima) {
     let found = minima.iter();
     posture
         .posture_clearance_m

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::PhantomError;
 use crate::scenario::ChestSize;
-use crate::schema::{FileSchema, NAME};
+use crate::schema::{FileSchema, LONGEST_NAME, NAME};
 
 /// What a parameter file may hold.
 pub(crate) static PARAMETERS: LazyLock<FileSchema> =
@@ -81,7 +81,7 @@ pub struct PhantomParameters {
 #[serde(deny_unknown_fields)]
 pub struct LesionParameters {
     /// Name, unique among lesions: letters, digits, `_` and `-`.
-    #[schemars(regex(pattern = NAME))]
+    #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME))]
     pub name: String,
     /// Centre in the phantom frame (left, posterior, superior), mm.
     #[schemars(inner(range(min = -500.0, max = 500.0)))]
@@ -96,7 +96,7 @@ pub struct LesionParameters {
 #[serde(deny_unknown_fields)]
 pub struct MarkerParameters {
     /// Name, unique among markers: letters, digits, `_` and `-`.
-    #[schemars(regex(pattern = NAME))]
+    #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME))]
     pub name: String,
     /// Direction about z: 0 is anterior, 90 the patient's left, -90 the patient's right, deg.
     #[schemars(range(min = -180.0, max = 180.0))]

@@ -15,6 +15,7 @@ pub mod people;
 mod phantom;
 mod robot;
 mod servo;
+mod standing;
 mod tool;
 
 use std::path::Path;
@@ -22,7 +23,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use needlebench_kinematics::trajectory::{MotionLimits, ProfileLimits};
-use needlebench_kinematics::{JOINT_LABELS, Joints, Pose, UrGeometry};
+use needlebench_kinematics::{JOINT_LABELS, Joints, Pose};
 
 use crate::engine_name::check_engine_names;
 use crate::files::ModelSource;
@@ -48,6 +49,9 @@ use phantom::place_phantom;
 pub use robot::load_robot;
 pub use servo::ServoSettings;
 use servo::servo_settings;
+use standing::{
+    Standing, check_distance, check_floor, check_start, note_crowds, note_idle_criteria,
+};
 
 /// Standard gravity, m/s^2.
 const GRAVITY_M_S2: f64 = 9.80665;
@@ -177,10 +181,12 @@ pub(crate) fn resolve(
         .map(|section| resolve_iso9283(toml, section, &robot, &mut tool, &mut notes))
         .transpose()
         .map_err(one)?;
+    check_floor(toml, &robot).map_err(one)?;
     let [table, gantry, mount] = library
         .fixtures(toml, &scenario, &world_from_base_link)
         .map_err(one)?;
     let (mut phantom, mut phantom_source, mut phantom_parts) = (None, None, Vec::new());
+    let mut lying = None;
     if let Some(section) = &scenario.phantom {
         let unplaced = library.phantom(toml, section, base)?;
         notes.extend(unplaced.notes.iter().cloned());
@@ -191,6 +197,7 @@ pub(crate) fn resolve(
         });
         phantom_source.clone_from(&unplaced.model);
         phantom_parts.clone_from(&unplaced.parts);
+        lying = Some(unplaced);
     }
 
     let route = &scenario.planning.needle_route;
@@ -214,7 +221,15 @@ pub(crate) fn resolve(
         }
     }
 
-    check_base(toml, &robot, &surroundings).map_err(one)?;
+    let standing = Standing {
+        toml,
+        scenario: &scenario,
+        robot: &robot,
+        fixtures: &fixtures,
+        phantom: phantom.as_ref().zip(lying.as_deref()),
+    };
+    standing.check(&mut notes).map_err(one)?;
+    note_idle_criteria(&scenario, &mut notes);
     let goals = {
         let context = Surroundings {
             robot: &robot,
@@ -236,6 +251,7 @@ pub(crate) fn resolve(
         if !findings.is_empty() {
             return Err(findings);
         }
+        check_distance(toml, &scenario, &robot, &tool, &goals).map_err(one)?;
         goals
     };
 
@@ -262,6 +278,7 @@ pub(crate) fn resolve(
         };
         resolve_people(toml, &scenario.people, &goals, &room).map_err(one)?
     };
+    note_crowds(&people, &goals, &mut notes);
     if let Some(joint) = robot.limits.first_violation(&start) {
         let limit = robot.limits.0[joint];
         return Err(one(toml.finding(
@@ -275,6 +292,7 @@ pub(crate) fn resolve(
             ),
         )));
     }
+    check_start(toml, &robot, &start).map_err(one)?;
     let motion = motion_limits(&scenario, &robot.limits.velocities_rad_s());
     let corridor = NeedleCorridor {
         radius_m: scenario.tool.corridor_radius_mm * 1e-3,
@@ -348,33 +366,6 @@ fn pose_of(position_mm: [f64; 3], rpy_deg: [f64; 3]) -> Pose {
         Translation3::from(Vector3::from(position_mm) * 1e-3),
         UnitQuaternion::from_euler_angles(roll, pitch, yaw),
     )
-}
-
-/// Refuses a base that stands inside something: the fixed link is in no pair that is checked later.
-fn check_base(
-    toml: &TomlText<'_>,
-    robot: &Robot,
-    surroundings: &[CollisionBody],
-) -> Result<(), Finding> {
-    // The base with the shoulder on it.
-    let height_m = UrGeometry::of_chain(&robot.chain).map_or(0.0, |geometry| geometry.d1);
-    let inside = |body: &&CollisionBody| {
-        body.kind != BodyKind::Mount
-            && (0..=5).any(|k| {
-                let height_m = height_m * (f64::from(k) + 0.1) / 5.1;
-                let point = robot.world_from_base_link * Point3::new(0.0, 0.0, height_m);
-                body.solids.iter().any(|solid| solid.contains(&point))
-            })
-    };
-    match surroundings.iter().find(inside) {
-        None => Ok(()),
-        Some(body) => Err(toml
-            .finding(
-                "robot.base_position_mm",
-                format!("the robot's base stands inside the {}", body.name),
-            )
-            .hint("the position is in the world: z up, floor at 0, in millimetres")),
-    }
 }
 
 fn motion_limits(scenario: &Scenario, urdf_velocity: &Joints) -> MotionLimits {

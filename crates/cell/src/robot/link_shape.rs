@@ -14,6 +14,9 @@ const MENDABLE: f64 = 0.01;
 /// Size of a link above which its mesh is in another unit, m: the largest arm reaches 1.75 m.
 const LARGEST_LINK_M: f64 = 3.0;
 
+/// Size of a link below which its mesh is in another unit, m: less than any part that one collides with.
+const SMALLEST_LINK_M: f64 = 1e-3;
+
 /// Why a mesh is no shape of a link.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub(crate) enum LinkShapeError {
@@ -21,6 +24,8 @@ pub(crate) enum LinkShapeError {
         "it is {largest_m:.1} m large: is it in millimetres? Then set scale=\"0.001 0.001 0.001\""
     )]
     TooLarge { largest_m: f64 },
+    #[error("it is {largest_mm:.4} mm large: is it in metres already? Then leave the scale out")]
+    TooSmall { largest_mm: f64 },
     #[error(transparent)]
     Hull(#[from] HullError),
 }
@@ -37,6 +42,11 @@ pub(crate) fn shape_of_link(
     let largest_m = size_m(mesh).max();
     if largest_m > LARGEST_LINK_M {
         return Err(LinkShapeError::TooLarge { largest_m });
+    }
+    if largest_m < SMALLEST_LINK_M {
+        return Err(LinkShapeError::TooSmall {
+            largest_mm: largest_m * 1e3,
+        });
     }
     let hull_of = |mesh: &TriangleMesh, why: String| {
         let hull = convex_hull(&mesh.vertices_m)?;

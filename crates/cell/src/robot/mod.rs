@@ -1,5 +1,6 @@
 //! The arm, from any URDF with the UR joint names.
 
+mod arm_checks;
 mod calibration;
 mod enclosure;
 mod link_shape;
@@ -17,13 +18,14 @@ use nalgebra::Vector3;
 use needlebench_geometry::mesh::read_stl;
 use needlebench_geometry::{Shape, Solid, TriangleMesh, Visual};
 use needlebench_kinematics::{
-    Body, Chain, ChainJoint, JOINT_COUNT, JOINT_NAMES, JointLimit, JointLimits, Pose, UrGeometry,
+    Body, Chain, ChainJoint, JOINT_COUNT, JOINT_NAMES, JointLimits, Pose, UrGeometry,
 };
 
 use crate::arm::{Arm, Recognition, choose_arm, note_on_no_arm};
 use crate::files::{Location, ModelSource, source_of};
 use crate::model::{ArmInUse, LinkMember};
 use crate::{Finding, Link, PackagePaths, Robot, nearest_name};
+use arm_checks::{check_body, check_origin, joint_limit};
 pub use calibration::{Calibration, OriginDeviation};
 pub use enclosure::{LinkEnclosure, enclosures};
 use link_shape::shape_of_link;
@@ -62,6 +64,9 @@ pub(crate) fn read_robot(
     let mut chain_joints = Vec::with_capacity(JOINT_COUNT);
     let mut limits = Vec::with_capacity(JOINT_COUNT);
     let mut parent = "base_link";
+    for joint in urdf.joints_between("base_link", &tip).into_iter().flatten() {
+        check_origin(&urdf, joint)?;
+    }
     for joint in &joints {
         let between = urdf
             .joints_between(parent, &joint.child)
@@ -128,7 +133,11 @@ pub(crate) fn read_robot(
             continue;
         };
         bodies.push(match body_of(members) {
-            Ok(body) => body,
+            Ok(body) => {
+                let links: Vec<&UrdfLink> = members.iter().map(|(link, _)| *link).collect();
+                check_body(&urdf, label, &links, &body)?;
+                body
+            }
             Err(what) => {
                 let link = &joints[joint].child;
                 let (arm, nominal) = missing_inertia
@@ -299,52 +308,6 @@ fn owner_of(urdf: &Urdf, joints: &[&UrdfJoint], link: &str) -> (usize, Pose) {
         owner_from_link = joint.parent_from_joint * owner_from_link;
         at = &joint.parent;
     }
-}
-
-fn joint_limit(urdf: &Urdf, joint: &UrdfJoint) -> Result<JointLimit, Finding> {
-    let Some(limit) = joint.limit else {
-        return Err(urdf
-            .finding(
-                &joint.span,
-                format!("joint '{}' has no <limit>", joint.name),
-            )
-            .hint(
-                "it needs effort (N m), velocity (rad/s) and, if revolute, lower and upper (rad)",
-            ));
-    };
-    let (lower_rad, upper_rad) = match joint.kind {
-        JointKind::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
-        _ => (limit.lower, limit.upper),
-    };
-    for (name, value, unit) in [
-        ("velocity", limit.velocity, "rad/s"),
-        ("effort", limit.effort, "N m"),
-    ] {
-        if value <= 0.0 {
-            return Err(urdf.finding(
-                &joint.span,
-                format!(
-                    "the {name} limit of joint '{}' is {value} {unit}",
-                    joint.name
-                ),
-            ));
-        }
-    }
-    if lower_rad >= upper_rad {
-        return Err(urdf.finding(
-            &joint.span,
-            format!(
-                "the limits of joint '{}' leave no range: {lower_rad} to {upper_rad} rad",
-                joint.name
-            ),
-        ));
-    }
-    Ok(JointLimit {
-        lower_rad,
-        upper_rad,
-        velocity_rad_s: limit.velocity,
-        effort_nm: limit.effort,
-    })
 }
 
 /// Mass properties of a moving link and all that is fixed to it; says what it lacks.

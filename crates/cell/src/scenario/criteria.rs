@@ -1,73 +1,96 @@
 //! What every working configuration has to reach: `[criteria]`.
+//!
+//! A criterion is switched off by its name, `max_settling_time_s = "off"`, and by nothing else: the ranges
+//! leave out what nothing could reach, such as a negative error, and what nothing could miss, such as a
+//! clearance below 0 or of many metres.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Least clearances, mm; a class that is left out is not judged.
+use super::switch;
+
+/// Least clearances, mm; a class that is left out or `"off"` is not judged.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ClearanceCriteria {
     /// Arm against the skin.
-    #[schemars(range(min = -1e4, max = 1e4), extend("x-unit" = "mm"))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 500.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub robot_phantom: Option<f64>,
     /// Arm and tool against the table.
-    #[schemars(range(min = -1e4, max = 1e4), extend("x-unit" = "mm"))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 500.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub robot_table: Option<f64>,
     /// Arm and tool against the gantry.
-    #[schemars(range(min = -1e4, max = 1e4), extend("x-unit" = "mm"))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1000.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub robot_gantry: Option<f64>,
     /// Arm and tool against the mount.
-    #[schemars(range(min = -1e4, max = 1e4), extend("x-unit" = "mm"))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 500.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub robot_mount: Option<f64>,
     /// Arm and tool against themselves.
-    #[serde(rename = "self")]
-    #[schemars(range(min = -1e4, max = 1e4), extend("x-unit" = "mm"))]
+    #[serde(rename = "self", with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 100.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub self_collision: Option<f64>,
     /// Tool, without its guide tube, against the skin.
-    #[schemars(range(min = -1e4, max = 1e4), extend("x-unit" = "mm"))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 200.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub tool_phantom: Option<f64>,
     /// Guide tube against the skin.
-    #[schemars(range(min = -1e4, max = 1e4), extend("x-unit" = "mm"))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 200.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub guide_standoff: Option<f64>,
     /// Volume behind the guide against everything else.
-    #[schemars(range(min = -1e4, max = 1e4), extend("x-unit" = "mm"))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 300.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub needle_corridor: Option<f64>,
     /// Planned needle against bone, vessel and organ.
-    #[schemars(range(min = -1e4, max = 1e4), extend("x-unit" = "mm"))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 100.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub needle_route: Option<f64>,
 }
 
-/// What every working configuration has to reach, in each engine.
+/// What every working configuration has to reach, in each engine; what is `"off"` is not judged.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CriteriaSection {
     /// Largest settled distance of the needle tip from the target, mm.
-    #[schemars(range(min = 0.0, max = 1e6))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_tip_position_error_mm: Option<f64>,
     /// Largest root mean square distance of the needle's tip from the target over all arms and
     /// patients of `[imperfections]`, mm.
-    #[schemars(range(min = 0.0, max = 1e6))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_tip_rms_mm: Option<f64>,
     /// The same across the needle, mm.
-    #[schemars(range(min = 0.0, max = 1e6))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_tip_lateral_rms_mm: Option<f64>,
     /// Largest settled angle between planned and actual needle, deg.
-    #[schemars(range(min = 0.0, max = 360.0))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 90.0), extend("x-off" = true))]
     pub max_needle_angle_error_deg: Option<f64>,
     /// Largest settled distance of the guide's exit from its planned place, mm.
-    #[schemars(range(min = 0.0, max = 1e6))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_guide_position_error_mm: Option<f64>,
     /// Largest time from the end of the motion until the tip stays within its band, s.
-    #[schemars(range(min = 0.0, max = 1e6))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 60.0), extend("x-off" = true))]
     pub max_settling_time_s: Option<f64>,
-    /// Largest share of a joint's torque limit that is used.
-    #[schemars(range(min = 0.0, max = 1e6))]
+    /// Largest share of a joint's torque limit that is used; the drives give no more than all of it.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.001, max = 1.0), extend("x-off" = true))]
     pub max_peak_torque_ratio: Option<f64>,
     /// Largest difference of the engines' tips while moving, mm.
-    #[schemars(range(min = 0.0, max = 1e6))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_engine_difference_peak_mm: Option<f64>,
     /// Largest difference of the engines' tips when settled, mm.
-    #[schemars(range(min = 0.0, max = 1e6))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_engine_difference_settled_mm: Option<f64>,
     /// Whether arm or tool may touch anything.
     pub allow_contact: bool,
@@ -80,13 +103,16 @@ pub struct CriteriaSection {
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub settling_band_mm: f64,
     /// Least share of the room about the entry point that is free of arm and tool, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0), extend("x-off" = true))]
     pub min_free_fraction: Option<f64>,
-    /// Least share of unobstructed lines of sight, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    /// Least share of the lines of sight that arm and tool leave, of those that are free without them, 0 to 1.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1.0), extend("x-off" = true))]
     pub min_sight_fraction: Option<f64>,
     /// Least half-angle of the free cone behind the guide, deg.
-    #[schemars(range(min = 0.0, max = 90.0))]
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 90.0), extend("x-off" = true))]
     pub min_hand_cone_deg: Option<f64>,
 }
 

@@ -7,7 +7,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::Finding;
-use crate::schema::NAME;
+use crate::schema::{LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
 
 /// Rules that reject configurations: the words that `expected` may use.
@@ -48,7 +48,7 @@ pub struct FlangePose {
 #[serde(deny_unknown_fields)]
 pub struct GoalSection {
     /// Name in reports: letters, digits, `-` and `_`.
-    #[schemars(regex(pattern = NAME), extend("x-hint" = "names become file names"))]
+    #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME), extend("x-hint" = "names become file names"))]
     pub name: String,
     /// Entry point on the skin, phantom frame (left, posterior, superior), mm. A point within
     /// 5 mm of the skin is moved onto it along the needle.

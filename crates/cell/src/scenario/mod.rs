@@ -22,6 +22,7 @@ mod planning;
 pub mod ranking;
 mod recording;
 mod robot;
+mod switch;
 mod tool;
 
 use std::sync::LazyLock;
@@ -31,7 +32,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Finding;
 pub use crate::engine_name::EngineName;
-use crate::schema::{FileSchema, NAME};
+use crate::schema::{FileSchema, LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
 
 pub use controller::ControllerSection;
@@ -62,6 +63,7 @@ pub use planning::{NeedleRouteSection, PlanningSection, RollAim};
 pub use ranking::RankingSection;
 pub use recording::RecordingSection;
 pub use robot::RobotSection;
+pub(crate) use switch::OFF;
 pub(crate) use tool::NEEDLE_OUTER_DIAMETER_MM;
 pub use tool::ToolSection;
 
@@ -73,7 +75,7 @@ pub(crate) static FILE: LazyLock<FileSchema> = LazyLock::new(FileSchema::of::<Sc
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Name in reports and of the results folder: letters, digits, `-` and `_`.
-    #[schemars(regex(pattern = NAME), extend("x-hint" = "names become file names"))]
+    #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME), extend("x-hint" = "names become file names"))]
     pub name: String,
     /// What the scenario is for, in a sentence or two.
     #[serde(default)]

@@ -4,7 +4,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
 use super::models::reference_schema;
-use crate::schema::NAME;
+use crate::schema::{LONGEST_NAME, NAME};
 
 /// Value of `model` for a phantom of the user's parts alone.
 pub(crate) const NO_MODEL: &str = "none";
@@ -127,7 +127,7 @@ pub enum PartTissue {
 #[serde(deny_unknown_fields)]
 pub struct PartSection {
     /// Name in reports, and of a lesion in goals: letters, digits, `-` and `_`.
-    #[schemars(regex(pattern = NAME))]
+    #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME))]
     pub name: String,
     /// STL file, relative to this file: a closed surface, its triangles counter-clockwise seen
     /// from outside.

@@ -98,11 +98,11 @@ impl Default for NeedleRouteSection {
 pub struct PlanningSection {
     /// Clearance of arm and tool from their surroundings below which a posture or motion is
     /// rejected, mm.
-    #[schemars(range(min = -10.0, max = 500.0))]
+    #[schemars(range(min = 0.0, max = 200.0))]
     pub min_clearance_mm: f64,
     /// Clearance of arm and tool from themselves below which a posture or motion is rejected, mm.
     /// Forearm and wrist 2 are about 10 mm apart in most postures.
-    #[schemars(range(min = -10.0, max = 500.0))]
+    #[schemars(range(min = 0.0, max = 200.0))]
     pub min_self_clearance_mm: f64,
     /// `|sin q5|` and `|sin q3|` below which the final posture is rejected as singular.
     #[schemars(range(min = 0.0, max = 0.9))]

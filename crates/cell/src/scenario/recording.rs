@@ -39,7 +39,10 @@ pub(super) fn check(
         findings.push(
             toml.finding(
                 "recording.period_ms",
-                format!("`recording.period_ms` is {period_ms} ms, outside {timestep_ms} to 1000"),
+                format!(
+                    "`recording.period_ms` is {period_ms} ms, less than the time step of \
+                     {timestep_ms} ms"
+                ),
             )
             .hint("nothing happens between two time steps: `timestep_ms` under [engines]"),
         );

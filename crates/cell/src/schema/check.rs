@@ -7,6 +7,7 @@ use toml::Value;
 use super::node::{Limits, List, Node, Table, Text};
 use super::unit::{in_words, quantity, unit_of};
 use crate::nearest_name;
+use crate::scenario::OFF;
 
 /// One thing that does not fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,6 +76,7 @@ impl Node {
     pub fn check(&self, at: Path<'_>, value: &Value, found: &mut Vec<Misfit>) {
         match (self, value) {
             (Self::Anything, _) | (Self::Truth, Value::Boolean(_)) => {}
+            (Self::Number(limits), Value::String(word)) if limits.or_off && word == OFF => {}
             (Self::Number(limits), Value::Float(number)) => limits.check(at, *number, found),
             (Self::Number(limits), Value::Integer(number)) => {
                 limits.check(at, *number as f64, found);
@@ -91,6 +93,7 @@ impl Node {
         let expected = match self {
             Self::Anything => "a value",
             Self::Truth => "true or false",
+            Self::Number(limits) if limits.or_off => "a number or \"off\"",
             Self::Number(_) => "a number",
             Self::Whole(_) => "a whole number",
             Self::Text(_) => "a string",
@@ -98,6 +101,9 @@ impl Node {
             Self::Table(_) => "a table",
         };
         let hint = match self {
+            Self::Number(limits) if limits.or_off => {
+                Some(format!("a word is \"{OFF}\", which switches it off"))
+            }
             Self::Number(_) => Some(match in_words(unit_of(at.name())) {
                 "" => "give a plain number, in the unit in its name".to_owned(),
                 unit => format!("give a plain number, in {unit}"),
@@ -133,6 +139,10 @@ fn shown(value: &Value) -> String {
 pub(crate) trait Limited: Copy + PartialOrd + fmt::Display {
     fn is_finite(self) -> bool;
     fn times(self, factor: i32) -> Self;
+    /// As a message writes it.
+    fn written(self) -> String {
+        self.to_string()
+    }
 }
 
 impl Limited for f64 {
@@ -141,6 +151,19 @@ impl Limited for f64 {
     }
     fn times(self, factor: i32) -> Self {
         self * f64::from(factor)
+    }
+    fn written(self) -> String {
+        written(self)
+    }
+}
+
+/// A number with all its digits and no more zeros than one can count: 1e308, 0.5, 1e-9.
+pub(crate) fn written(number: f64) -> String {
+    let is_short = number == 0.0 || (1e-4..1e7).contains(&number.abs());
+    if is_short || !number.is_finite() {
+        number.to_string()
+    } else {
+        format!("{number:e}")
     }
 }
 
@@ -181,14 +204,17 @@ impl<N: Limited> Limits<N> {
         let Self { least, most, .. } = self;
         let space = if self.unit.is_empty() { "" } else { " " };
         let without = if self.above_least {
-            format!(", without {least} itself")
+            format!(", without {} itself", least.written())
         } else {
             String::new()
         };
         found.push(misfit(
             format!(
-                "`{at}` is {number}{space}{}, outside {least} to {most}{without}",
-                self.unit
+                "`{at}` is {}{space}{}, outside {} to {}{without}",
+                number.written(),
+                self.unit,
+                least.written(),
+                most.written()
             ),
             self.hint_about(number),
         ));
@@ -197,6 +223,13 @@ impl<N: Limited> Limits<N> {
     fn hint_about(&self, number: N) -> String {
         if let Some(hint) = &self.hint {
             return hint.clone();
+        }
+        if self.or_off {
+            let unit = match self.unit.as_str() {
+                "" => "it is a plain number".to_owned(),
+                unit => format!("the value is in {unit}"),
+            };
+            return format!("{unit}; \"{OFF}\" in its place switches it off");
         }
         let meant = |factor: i32| self.unit == "mm" && self.holds(number.times(factor));
         match self.unit.as_str() {
@@ -226,6 +259,21 @@ impl Text {
         } else if let Some(more) = &self.name_with {
             let may_be = |c: char| c.is_ascii_alphanumeric() || more.contains(c);
             if !value.is_empty() && value.chars().all(may_be) {
+                let letters = value.chars().count();
+                if letters > self.longest {
+                    let why = self.hint.as_ref();
+                    found.push(Misfit {
+                        key: at.to_string(),
+                        kind: MisfitKind::Type,
+                        message: format!(
+                            "`{at}` has {letters} characters, more than {}",
+                            self.longest
+                        ),
+                        hint: Some(
+                            why.map_or("shorten it".to_owned(), |why| format!("shorten it: {why}")),
+                        ),
+                    });
+                }
                 return;
             }
             let hint = match more.as_str() {

@@ -18,7 +18,7 @@ use schemars::JsonSchema;
 use serde_json::Value;
 
 use check::unknown_key_hint;
-pub(crate) use check::{Misfit, MisfitKind, Path};
+pub(crate) use check::{Misfit, MisfitKind, Path, written};
 pub(crate) use node::Node;
 pub(crate) use unit::unit_of;
 
@@ -27,6 +27,13 @@ pub(crate) const UNIT: &str = "x-unit";
 
 /// How to mend a value out of its range, where there is more to say than its unit.
 pub(crate) const HINT: &str = "x-hint";
+
+/// Whether a number may be switched off by the word "off".
+pub(crate) const OFF: &str = "x-off";
+
+/// Longest name: file systems take 255 bytes, some 143, and a name gets endings such as
+/// `.ranking.svg` and the name of a configuration beside it.
+pub(crate) const LONGEST_NAME: usize = 100;
 
 /// Names that become file names.
 pub(crate) const NAME: &str = "^[A-Za-z0-9_-]+$";

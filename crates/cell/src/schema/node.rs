@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use super::unit::written_after;
-use super::{HINT, UNIT};
+use super::{HINT, OFF, UNIT};
 
 /// What a value may be.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,18 +33,22 @@ pub(crate) struct Limits<N> {
     pub most: N,
     /// The least value itself is left out.
     pub above_least: bool,
+    /// The word "off" may stand in its place.
+    pub or_off: bool,
     /// As written after a number; empty for plain numbers.
     pub unit: String,
     /// How to mend what is outside, if there is more to say than the unit.
     pub hint: Option<String>,
 }
 
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Text {
     /// All that it may be, unless empty.
     pub one_of: Vec<String>,
     /// Characters that a name may have besides letters and digits; any text if there is none.
     pub name_with: Option<String>,
+    /// Characters that it may have at most.
+    pub longest: usize,
     pub hint: Option<String>,
 }
 
@@ -123,6 +127,10 @@ impl Node {
             Some("string") => Self::Text(Text {
                 one_of: Vec::new(),
                 name_with: here["pattern"].as_str().map(characters_of_names),
+                longest: here["maxLength"]
+                    .as_u64()
+                    .and_then(|most| usize::try_from(most).ok())
+                    .unwrap_or(usize::MAX),
                 hint: under.hint.map(str::to_owned),
             }),
             Some("array") => {
@@ -159,8 +167,21 @@ impl<N: Copy> Limits<N> {
             least: above.or_else(|| read(&here["minimum"])).unwrap_or(-most),
             most: read(&here["maximum"]).unwrap_or(most),
             above_least: above.is_some(),
+            or_off: here[OFF] == true,
             unit: under.unit.to_owned(),
             hint: under.hint.map(str::to_owned),
+        }
+    }
+}
+
+impl Default for Text {
+    /// Any text.
+    fn default() -> Self {
+        Self {
+            one_of: Vec::new(),
+            name_with: None,
+            longest: usize::MAX,
+            hint: None,
         }
     }
 }
@@ -182,6 +203,7 @@ impl Text {
         Self {
             one_of,
             name_with: None,
+            longest: usize::MAX,
             hint: under.hint.map(str::to_owned),
         }
     }

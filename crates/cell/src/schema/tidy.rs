@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{HINT, UNIT};
+use super::{HINT, OFF, UNIT};
 
 /// Of everything in a schema.
 pub(super) fn tidy(schema: &mut Value) {
@@ -31,6 +31,14 @@ pub(super) fn without_own_words(schema: &mut Value) {
     each_object(schema, &mut |object| {
         object.remove(UNIT);
         object.remove(HINT);
+        if object.remove(OFF).is_some() {
+            let words = ["type", "minimum", "exclusiveMinimum", "maximum"];
+            let number: Map<String, Value> = words
+                .into_iter()
+                .filter_map(|word| Some((word.to_owned(), object.remove(word)?)))
+                .collect();
+            object.insert("anyOf".to_owned(), json!([number, { "enum": ["off"] }]));
+        }
     });
 }
 

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
 use crate::input::read_text;
 use crate::scenario::EngineName;
-use crate::schema::{COLUMN, FileSchema, NAME};
+use crate::schema::{COLUMN, FileSchema, LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
 use crate::{Finding, ModelSource, Overrides};
 use criteria::StudyCriteria;
@@ -28,7 +28,7 @@ pub(crate) static FILE: LazyLock<FileSchema> = LazyLock::new(FileSchema::of::<St
 #[serde(deny_unknown_fields)]
 pub struct StudyFile {
     /// Name in reports and of the results folder: letters, digits, `-` and `_`.
-    #[schemars(regex(pattern = NAME), extend("x-hint" = "names become file names"))]
+    #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME), extend("x-hint" = "names become file names"))]
     pub name: String,
     /// The question that the study answers, in a sentence or two.
     #[serde(default)]
@@ -154,7 +154,7 @@ pub enum Role {
 #[serde(deny_unknown_fields)]
 pub struct FactorSection {
     /// Name of its column in the results: letters, digits and `_`.
-    #[schemars(regex(pattern = COLUMN), extend("x-hint" = "it is the name of a column"))]
+    #[schemars(regex(pattern = COLUMN), length(max = LONGEST_NAME), extend("x-hint" = "it is the name of a column"))]
     pub name: String,
     /// Key of the scenario that it sets, such as `phantom.position_mm[0]`, `tool.urdf`, `seed` or
     /// `goal.roll_deg`, where `goal` is whichever goal a case has. Not used with `levels`.

@@ -6,6 +6,7 @@ mod calibration;
 mod family;
 mod foreign_urdf;
 mod goal_direction;
+mod layouts;
 mod pair_classes;
 mod schema;
 mod schema_probes;

@@ -100,6 +100,9 @@ impl Root<'_> {
     /// A small value that fits.
     fn sample(&self, here: &Schema) -> Value {
         let here = self.plain(here);
+        if let Some(number) = number_of(here) {
+            return self.sample(number);
+        }
         if let Some(choice) = texts(here).first() {
             return Value::String(choice.clone());
         }
@@ -180,6 +183,14 @@ impl Root<'_> {
             return;
         }
         let choices = texts(here);
+        if let Some(number) = number_of(here) {
+            for choice in choices {
+                add(choice.into(), true);
+            }
+            add("no such word".into(), false);
+            self.visit(number, steps, trials);
+            return;
+        }
         if !choices.is_empty() {
             add(Value::Integer(1), false);
             if here["anyOf"].is_null() {
@@ -244,6 +255,9 @@ impl Root<'_> {
                     {
                         add(name.into(), fits);
                     }
+                    let longest = length(here, "maxLength").expect("names have an end");
+                    add("a".repeat(longest).into(), true);
+                    add("a".repeat(longest + 1).into(), false);
                 }
             }
             other => panic!("{}: {other:?}", key(steps)),
@@ -344,6 +358,12 @@ fn texts(here: &Schema) -> Vec<String> {
     let mut texts = listed(here);
     texts.extend(choices.flatten().flat_map(listed));
     texts
+}
+
+/// The number that a value may be instead of a word.
+fn number_of(here: &Schema) -> Option<&Schema> {
+    let choices = here["anyOf"].as_array()?;
+    choices.iter().find(|each| each["type"] == "number")
 }
 
 fn middle(here: &Schema) -> f64 {

@@ -151,6 +151,76 @@ fn numbers_are_counted_and_read_as_such() {
     );
 }
 
+/// Slips of a unit, and numbers that no robot has.
+#[test]
+fn numbers_that_no_robot_has_are_refused_at_their_line() {
+    let origin = r#"<origin xyz="0 0 0.1219""#;
+    let limit = r#"<limit lower="-6.2" upper="6.1" effort="61" velocity="2.9"/>"#;
+    let mass = r#"<mass value="2.3"/>"#;
+    let sphere = r#"<sphere radius="0.03"/>"#;
+    for (from, to, words) in [
+        (
+            origin,
+            r#"<origin xyz="0 0 121.9""#,
+            ["has 121.9 m, outside -10 to 10", "millimetres"],
+        ),
+        (
+            origin,
+            r#"<origin xyz="0 0 1e200""#,
+            ["has 1e200 m", "metres"],
+        ),
+        (
+            origin,
+            r#"<origin xyz="0 0 2.4""#,
+            ["is 2.400 m from its parent's", "metres"],
+        ),
+        (
+            limit,
+            r#"<limit lower="-360" upper="360" effort="61" velocity="2.9"/>"#,
+            ["has -360 rad", "degrees"],
+        ),
+        (
+            limit,
+            r#"<limit upper="6.1" effort="61" velocity="2.9"/>"#,
+            ["has no `lower`", "lower and upper"],
+        ),
+        (
+            limit,
+            r#"<limit lower="-6.2" upper="6.1" effort="1e300" velocity="2.9"/>"#,
+            ["1e300 N m, outside 0.1 to 2000", "N m"],
+        ),
+        (
+            limit,
+            r#"<limit lower="-6.2" upper="6.1" effort="61" velocity="180"/>"#,
+            ["180 rad/s, outside", "degrees"],
+        ),
+        (
+            limit,
+            r#"<limit lower="-6.2" upper="6.1" effort="61" velocity="0"/>"#,
+            ["0 rad/s, outside", "rad/s"],
+        ),
+        (mass, r#"<mass value="2300"/>"#, ["has 2300 kg", "grams"]),
+        (mass, r#"<mass value="230"/>"#, ["weighs 23", "kilograms"]),
+        (
+            sphere,
+            r#"<sphere radius="30"/>"#,
+            ["has 30 m, outside 1e-5 to 3", "millimetres"],
+        ),
+        (
+            sphere,
+            r#"<cylinder radius="0.03" length="64"/>"#,
+            ["has 64 m", "millimetres"],
+        ),
+        (
+            sphere,
+            r#"<box size="0.1 0.1 1e-9"/>"#,
+            ["has 1e-9 m", "metres"],
+        ),
+    ] {
+        says(&refused(from, to), &words);
+    }
+}
+
 #[test]
 fn elements_are_there_as_often_as_they_should_be() {
     let mass = r#"<mass value="2.3"/>"#;

@@ -14,7 +14,7 @@ pub const CONE_TOLERANCE_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
 pub const CONE_START_M: f64 = 0.01;
 /// Cells that are looked at before the bound reached until then is taken.
 const MOST_CELLS: usize = 20_000;
-/// Cells smaller than this are not cut further: what is so near counts as touching, m.
+/// Cells smaller than this are not cut further, m: what is so near ends the search from below.
 const SMALLEST_M: f64 = 2.5e-4;
 
 /// The largest free cone.
@@ -22,7 +22,7 @@ const SMALLEST_M: f64 = 2.5e-4;
 pub struct HandCone {
     /// Proven lower bound of its half-angle, rad; at most a right angle.
     pub half_angle_rad: f64,
-    /// How much larger the true angle may be, rad.
+    /// How much larger the true angle may be, rad: to a point that is known to be in a solid.
     pub accuracy_rad: f64,
     /// What blocks a larger one; `None` if the whole half space is free.
     pub blocker: Option<String>,
@@ -100,8 +100,10 @@ impl Cell {
 /// farther than the cell's own radius is free. Cells are taken by their smallest angle, so all
 /// directions within that of the cell in hand are proven free at any time; that is the result, and
 /// it is never too large but for the distances' own error (below 1e-8 m). The smallest angle at
-/// which a solid was met bounds it from the other side; the search ends when both are within
-/// [`CONE_TOLERANCE_RAD`], or when what is left is nearer than 0.5 mm to touching.
+/// which a point was found inside a solid bounds it from the other side, as proven; the search ends
+/// when both are within [`CONE_TOLERANCE_RAD`], or when what is left is nearer than 0.5 mm to
+/// touching. Then a point of what is so near is the bound ([`touched_rad`]): being near is not being
+/// inside, and 0.25 mm beside the guide's entry are more than a degree.
 pub fn hand_cone(
     obstacles: &PlacedObstacles<'_>,
     apex: &Point3<f64>,
@@ -120,13 +122,20 @@ pub fn hand_cone(
         let Some(cell) = heap.pop() else { break };
         let least_rad = cell.angle_rad[0];
         let close_enough = met.0 - least_rad <= CONE_TOLERANCE_RAD;
-        if close_enough || looked_at >= MOST_CELLS {
+        if close_enough {
             return result(obstacles, least_rad.min(met.0), met);
         }
-        let (angle_rad, turn_rad) = (middle(cell.angle_rad), middle(cell.turn_rad));
-        let direction = axis * angle_rad.cos()
-            + (across * turn_rad.cos() + beside * turn_rad.sin()) * angle_rad.sin();
-        let point = apex + direction * middle(cell.distance_m);
+        let point_at = |angle_rad: f64| {
+            let turn_rad = middle(cell.turn_rad);
+            let direction = axis * angle_rad.cos()
+                + (across * turn_rad.cos() + beside * turn_rad.sin()) * angle_rad.sin();
+            apex + direction * middle(cell.distance_m)
+        };
+        if looked_at >= MOST_CELLS {
+            return result(obstacles, least_rad.min(met.0), met);
+        }
+        let angle_rad = middle(cell.angle_rad);
+        let point = point_at(angle_rad);
         let reach = cell.reach_m();
         let radius_m: f64 = reach.iter().sum();
         let (nearest, near) = obstacles.within(&cell.near, &point, radius_m);
@@ -137,10 +146,12 @@ pub fn hand_cone(
             met = (angle_rad, Some(index));
         }
         if radius_m <= SMALLEST_M {
-            if least_rad < met.0 {
-                met = (cell.angle_rad[1].min(met.0), Some(index));
+            let near = (least_rad, point_at(least_rad));
+            let touched_rad = touched_rad(obstacles, index, (apex, axis), reach_m, near);
+            if touched_rad < met.0 || met.1.is_none() {
+                met = (touched_rad.min(met.0), Some(index));
             }
-            return result(obstacles, least_rad, met);
+            return result(obstacles, least_rad.min(met.0), met);
         }
         let widest = (0..3)
             .max_by(|a, b| reach[*a].total_cmp(&reach[*b]))
@@ -148,6 +159,44 @@ pub fn hand_cone(
         heap.extend(Cell { near, ..cell }.halves(widest));
     }
     result(obstacles, met.0, met)
+}
+
+/// Smallest angle from the axis that is found of a point of one solid, near a point of the cone of
+/// `from_rad` that nearly touches it.
+///
+/// Nearest points of the solid and of the cone are taken in turn, which leads to where the two are
+/// nearest. Every point that is looked at is on the solid or in it, so the angle is a bound whatever the
+/// turns lead to.
+fn touched_rad(
+    obstacles: &PlacedObstacles<'_>,
+    index: usize,
+    (apex, axis): (&Point3<f64>, &Vector3<f64>),
+    reach_m: f64,
+    (from_rad, start): (f64, Point3<f64>),
+) -> f64 {
+    const TURNS: usize = 30;
+    let on_cone = |point: &Point3<f64>| {
+        let offset = point - apex;
+        let across = offset - axis * offset.dot(axis);
+        let level = across.try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
+        apex + (axis * from_rad.cos() + level * from_rad.sin()) * offset.norm()
+    };
+    let is_in_reach =
+        |point: &Point3<f64>| (CONE_START_M..=reach_m).contains(&(point - apex).norm());
+    let mut least_rad = FRAC_PI_2;
+    let mut at = start;
+    for _ in 0..TURNS {
+        if is_in_reach(&at) && obstacles.is_inside(index, &at) {
+            return from_rad.min(least_rad);
+        }
+        let touched = obstacles.point_of(index, &at);
+        if is_in_reach(&touched) {
+            least_rad = least_rad.min((touched - apex).angle(axis));
+        }
+        // As far again into the solid: where cone and solid cross, that is inside both.
+        at = on_cone(&(touched + (touched - at)));
+    }
+    least_rad
 }
 
 fn result(

@@ -24,8 +24,8 @@ pub use hand_cone::{CONE_START_M, CONE_TOLERANCE_RAD, HandCone, hand_cone};
 pub use obstacles::{Obstacles, PlacedObstacles};
 pub use sector::Sector;
 pub use sight::{
-    ENTRY_DISC_HEIGHT_M, ENTRY_DISC_RADIUS_M, SIGHT_SEGMENTS, Sight, SightTargets, measure_sight,
-    sight_segments,
+    ENTRY_DISC_HEIGHT_M, ENTRY_DISC_RADIUS_M, SIGHT_SEGMENTS, SIGHT_SERIES, Sight, SightTargets,
+    measure_sight, sight_segments,
 };
 
 /// Radius of the half ball about the entry point that is asked for free space, m: as far as a
@@ -53,13 +53,14 @@ pub struct RoomReport {
     /// Half-angle of the largest cone behind the guide, about the needle, that is free of arm, tool
     /// and surroundings; a proven lower bound, at most a right angle.
     pub hand_cone_half_angle_rad: f64,
-    /// How much larger the true angle may be.
+    /// How much larger the true angle may be, at most: proven by a point inside a solid.
     pub hand_cone_accuracy_rad: f64,
     /// Length of the cone from the guide's entry.
     pub hand_cone_length_m: f64,
     /// The solid that blocks a larger cone.
     pub hand_cone_blocker: Option<String>,
-    /// Whether the elbow is above the line from shoulder to wrist, in the world.
+    /// Whether the elbow is above the line from shoulder to wrist in the plane of upper arm and forearm,
+    /// in the world: of the two ways to bend the elbow for one place of the wrist exactly one is up.
     pub elbow_up: bool,
     /// Height of the elbow's axis over the entry point.
     pub elbow_over_entry_m: f64,
@@ -85,11 +86,18 @@ pub struct SightReport {
     pub eyes_m: [f64; 3],
     /// Mean of the two below.
     pub fraction: f64,
-    /// Share of free lines to the skin within 30 mm of the entry point.
+    /// What arm and tool leave of the lines to the skin within 30 mm of the entry point that phantom,
+    /// table, gantry and mount leave free: 1 if the robot takes nothing. 0 where nothing can be seen
+    /// without the robot either.
     pub entry_fraction: f64,
-    /// Share of free lines to the needle between guide and hub.
+    /// The same of the lines to the needle between guide and hub.
     pub needle_fraction: f64,
-    /// The solid that is in the way of most of the blocked lines.
+    /// Share of all lines that are free without the robot: what the patient's own body and the table
+    /// leave.
+    pub without_robot_fraction: f64,
+    /// Half-width of the 95 % interval of `fraction`, estimated from eight shifted series of lines.
+    pub accuracy: f64,
+    /// The solid of the robot that is in the way of most of the lines.
     pub blocker: Option<String>,
     /// Free share of the half of the sector on the side of the person's better hand.
     pub hand_side_free_fraction: Option<f64>,
@@ -214,12 +222,14 @@ impl<'a> RoomModel<'a> {
         let all = self.obstacles.all(q);
         let targets = self.targets(goal, q);
         let people = &self.resolved.people;
+        let (robot, surroundings) = (self.obstacles.robot(q), self.obstacles.surroundings());
         let mut sight = Vec::new();
         for person in &people.by_goal[goal] {
             let hand_side = sector.free_towards(&taken, &hand_side(person, &sector.center_m));
             for &stature_m in &person.statures_m {
                 let eyes_m = person.eyes_m(stature_m);
-                let seen = measure_sight(&all, &eyes_m, person.head_movement_m, &targets);
+                let moves_m = person.head_movement_m;
+                let seen = measure_sight(&robot, &surroundings, &eyes_m, moves_m, &targets);
                 sight.push(SightReport {
                     person: person.name.clone(),
                     stature_m,
@@ -228,6 +238,8 @@ impl<'a> RoomModel<'a> {
                     fraction: 0.5 * (seen.entry_fraction + seen.needle_fraction),
                     entry_fraction: seen.entry_fraction,
                     needle_fraction: seen.needle_fraction,
+                    without_robot_fraction: seen.without_robot_fraction,
+                    accuracy: seen.accuracy,
                     blocker: seen.blocker,
                     hand_side_free_fraction: hand_side,
                 });
@@ -238,7 +250,8 @@ impl<'a> RoomModel<'a> {
         let behind = -(entry.rotation * Vector3::z());
         let cone = hand_cone(&all, &entry.translation.vector.into(), &behind, reach_m);
         let links = self.resolved.cell.robot.world_from_links(q);
-        let elbow_up = elbow_is_up(&links);
+        let elbow_axis = self.resolved.cell.robot.chain.joints[2].axis;
+        let elbow_up = elbow_is_up(&links, &(links[2].rotation * elbow_axis.into_inner()));
         RoomReport {
             free_fraction: sector.free_fraction(&taken),
             sight_fraction: mean_sight(&sight, people.prefer_side),
@@ -348,12 +361,25 @@ fn mean_sight(sight: &[SightReport], prefer_side: Option<Side>) -> f64 {
     counted.iter().sum::<f64>() / counted.len() as f64
 }
 
-/// Whether the elbow's axis is above the line from the shoulder's to the wrist's.
-fn elbow_is_up(links: &[Pose; 6]) -> bool {
+/// Whether the elbow's axis is above the line from the shoulder's to the wrist's, all seen along the
+/// elbow's axis.
+///
+/// The wrist's frame lies beside the plane in which upper arm and forearm turn, by 0.1 m in a UR3: without
+/// that, the line of a folded arm would run across the plane, and both ways to bend the elbow would be
+/// below it. Where the line is vertical neither way is higher: the one that bends about the elbow's axis
+/// forwards is called up.
+fn elbow_is_up(links: &[Pose; 6], elbow_axis: &Vector3<f64>) -> bool {
+    /// Heights nearer than this are even, m: rounding of a pose.
+    const EVEN_M: f64 = 1e-9;
+    let in_plane = |vector: Vector3<f64>| vector - elbow_axis * vector.dot(elbow_axis);
     let [shoulder, elbow, wrist] = [1, 2, 3].map(|link: usize| links[link].translation.vector);
-    let line = wrist - shoulder;
-    let along = (elbow - shoulder).dot(&line) / line.norm_squared().max(f64::MIN_POSITIVE);
-    elbow.z > (shoulder + line * along).z
+    let (upper, line) = (in_plane(elbow - shoulder), in_plane(wrist - shoulder));
+    let along = upper.dot(&line) / line.norm_squared().max(f64::MIN_POSITIVE);
+    let over_m = (upper - line * along).z;
+    if over_m.abs() <= EVEN_M {
+        return elbow_axis.dot(&line.cross(&upper)) > 0.0;
+    }
+    over_m > 0.0
 }
 
 /// Points on all edges of a surface, no farther apart than [`SURFACE_SPACING_M`].
@@ -380,4 +406,73 @@ fn edge_points(
         }
     }
     points
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use needlebench_cell::{Overrides, load_scenario};
+
+    use super::*;
+
+    /// The other way to bend the elbow for the same place of the wrist is the mirror image about the line
+    /// from shoulder to wrist; the one with the higher elbow is up, and no other.
+    #[test]
+    fn of_two_ways_to_bend_the_elbow_the_higher_one_is_up() {
+        /// Heights that are nearer say nothing, m.
+        const EVEN_M: f64 = 1e-6;
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/table3.toml");
+        let robot = load_scenario(&path, &Overrides::default())
+            .unwrap()
+            .cell
+            .robot;
+        let axis = robot.chain.joints[2].axis.into_inner();
+        let up = |q: &Joints| {
+            let links = robot.world_from_links(q);
+            elbow_is_up(&links, &(links[2].rotation * axis))
+        };
+        let at = |q: &Joints, link: usize| robot.world_from_links(q)[link].translation.vector;
+        // In the plane, from the origins of the chain: upper arm along -x by a2, forearm by a3.
+        let lengths = [2, 3].map(|joint: usize| {
+            let origin = robot.chain.joints[joint]
+                .parent_from_joint
+                .translation
+                .vector;
+            origin.xy().norm()
+        });
+        let mut state = 3_u64;
+        let mut angle = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * std::f64::consts::TAU
+        };
+        let (mut folded, mut compared) = (0, 0);
+        for _ in 0..2000 {
+            let (lift, elbow) = (angle(), angle());
+            // Angle of the wrist's direction from the upper arm's, by the law of cosines.
+            let (far, across) = (
+                lengths[0] + lengths[1] * elbow.cos(),
+                lengths[1] * elbow.sin(),
+            );
+            let towards = lift + across.atan2(far);
+            let one = Joints::new(0.4, lift, elbow, 0.2, 0.3, 0.1);
+            let other = Joints::new(0.4, 2.0 * towards - lift, -elbow, 0.2, 0.3, 0.1);
+            let apart_m = (at(&one, 3) - at(&other, 3)).norm();
+            assert!(apart_m < 1e-12, "the wrist moves by {apart_m}");
+            let higher_m = at(&one, 2).z - at(&other, 2).z;
+            if higher_m.abs() < EVEN_M {
+                continue;
+            }
+            compared += 1;
+            folded += usize::from(elbow.cos() < -0.9);
+            assert_eq!(
+                [up(&one), up(&other)],
+                [higher_m > 0.0, higher_m < 0.0],
+                "{lift} {elbow}"
+            );
+        }
+        assert!(compared > 1900 && folded > 200, "{compared} {folded}");
+    }
 }

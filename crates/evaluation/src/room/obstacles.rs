@@ -103,6 +103,26 @@ impl<'c> Obstacles<'c> {
     }
 }
 
+impl Placed<'_> {
+    /// Parameter, 0 at `from` and 1 at `to`, of the first point of a segment in the solid.
+    fn hit(&self, from: &Point3<f64>, to: &Point3<f64>) -> Option<f64> {
+        let along = to - from;
+        let length_squared = along.norm_squared().max(f64::MIN_POSITIVE);
+        let to_center = self.ball_center_m - from;
+        let nearest = (to_center.dot(&along) / length_squared).clamp(0.0, 1.0);
+        let radius_m = self.solid.ball_radius_m;
+        if (to_center - along * nearest).norm_squared() > radius_m * radius_m {
+            return None;
+        }
+        let from = self.shape_from_world * from;
+        let to = self.shape_from_world * to;
+        match self.solid.prepared.surface() {
+            Some(surface) => surface.first_hit(&from, &(to - from)),
+            None => first_hit(self.solid.shape, &from, &to),
+        }
+    }
+}
+
 /// Solids at their places.
 #[derive(Debug, Clone)]
 pub struct PlacedObstacles<'o> {
@@ -141,6 +161,19 @@ impl PlacedObstacles<'_> {
         .distance_m
     }
 
+    /// Whether a point is in a solid, or on it.
+    pub(super) fn is_inside(&self, index: usize, point: &Point3<f64>) -> bool {
+        self.distance_m(index, point, 0.0) <= 0.0
+    }
+
+    /// Point of a solid that is nearest to a point.
+    pub(super) fn point_of(&self, index: usize, point: &Point3<f64>) -> Point3<f64> {
+        let placed = &self.solids[index];
+        let at = Pose::translation(point.x, point.y, point.z);
+        let solid = &placed.solid.prepared;
+        separation(self.point, &at, solid, &placed.world_from_shape).point_on_b
+    }
+
     /// Nearest of the solids within `reach_m` of a point: its signed distance and index, and all
     /// that are within reach.
     pub(super) fn within(
@@ -166,22 +199,9 @@ impl PlacedObstacles<'_> {
     /// First solid on the way from one point to another: parameter of the place, 0 at `from` and 1
     /// at `to`, and the solid's index.
     pub fn first_on_the_way(&self, from: &Point3<f64>, to: &Point3<f64>) -> Option<(f64, usize)> {
-        let along = to - from;
-        let length_squared = along.norm_squared().max(f64::MIN_POSITIVE);
         let mut first: Option<(f64, usize)> = None;
         for (index, placed) in self.solids.iter().enumerate() {
-            let to_center = placed.ball_center_m - from;
-            let nearest = (to_center.dot(&along) / length_squared).clamp(0.0, 1.0);
-            let radius_m = placed.solid.ball_radius_m;
-            if (to_center - along * nearest).norm_squared() > radius_m * radius_m {
-                continue;
-            }
-            let from = placed.shape_from_world * from;
-            let to = placed.shape_from_world * to;
-            let hit = match placed.solid.prepared.surface() {
-                Some(surface) => surface.first_hit(&from, &(to - from)),
-                None => first_hit(placed.solid.shape, &from, &to),
-            };
+            let hit = placed.hit(from, to);
             if let Some(t) = hit
                 && first.is_none_or(|(known, _)| t < known)
             {
@@ -189,6 +209,13 @@ impl PlacedObstacles<'_> {
             }
         }
         first
+    }
+
+    /// Whether anything is between two points.
+    pub fn is_in_the_way(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
+        self.solids
+            .iter()
+            .any(|placed| placed.hit(from, to).is_some())
     }
 
     /// Voxels whose centre is nearer to a solid than the margin, in the grid's order.

@@ -7,8 +7,13 @@ use nalgebra::{Point3, Vector3};
 use super::hand_cone::frame_about;
 use super::obstacles::PlacedObstacles;
 
-/// Segments per person and stature to the skin about the entry point, and as many to the needle.
+/// Segments of one series, to the skin about the entry point and as many to the needle.
 pub const SIGHT_SEGMENTS: u32 = 512;
+/// Series of segments per person and stature, each evenly spread and shifted at random against the
+/// others: what they differ by says how far their mean may be off.
+pub const SIGHT_SERIES: u32 = 8;
+/// Quantile of Student's t distribution for 95 % and seven degrees of freedom.
+const STUDENT_95: f64 = 2.365;
 /// Radius of the piece of skin about the entry point that is looked at, m.
 pub const ENTRY_DISC_RADIUS_M: f64 = 0.03;
 /// Height of that piece over the skin, m: a line to the skin itself would graze it.
@@ -25,25 +30,48 @@ pub struct SightTargets {
     pub needle_m: [Point3<f64>; 2],
 }
 
-/// Which part of the sight is free.
+/// Which part of the sight the robot leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sight {
-    /// Share of free segments to the skin about the entry point.
+    /// Of the segments to the skin about the entry point that phantom, table, gantry and mount leave
+    /// free, the share that arm and tool leave free too; 0 where nothing is to be seen at all.
     pub entry_fraction: f64,
-    /// Share of free segments to the needle behind the guide.
+    /// The same of the segments to the needle behind the guide.
     pub needle_fraction: f64,
-    /// The solid that is first in the way of most of the blocked ones.
+    /// Mean of the two shares of all segments that are free without the robot.
+    pub without_robot_fraction: f64,
+    /// 95 of 100 such means of the two fractions lie within this of the true one: estimated from how
+    /// much the series differ. At least the share of one segment.
+    pub accuracy: f64,
+    /// The solid of the robot that is in the way of most of the segments.
     pub blocker: Option<String>,
 }
 
 /// Point `index` of a sequence that fills the unit cube of five dimensions evenly: multiples of
-/// powers of the inverse of the positive root of `x^6 = x + 1` (Roberts, 2018), from the middle.
-fn even_point(index: u32) -> [f64; 5] {
+/// powers of the inverse of the positive root of `x^6 = x + 1` (Roberts, 2018), from `start`.
+fn even_point(index: u32, start: &[f64; 5]) -> [f64; 5] {
     const ROOT: f64 = 1.134_724_138_401_519;
     let mut step = 1.0;
-    std::array::from_fn(|_| {
+    start.map(|start| {
         step /= ROOT;
-        (0.5 + f64::from(index + 1) * step).fract()
+        (start + f64::from(index + 1) * step).fract()
+    })
+}
+
+/// Where the series start: the first in the middle of the cube, the others at random, always the same.
+fn starts() -> impl Iterator<Item = [f64; 5]> {
+    // Steele, Lea and Flood, Fast splittable pseudorandom number generators (2014).
+    let mut state = 0x0005_1947_u64;
+    let mut uniform = move || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = state;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..SIGHT_SERIES).map(move |series| match series {
+        0 => [0.5; 5],
+        _ => std::array::from_fn(|_| uniform()),
     })
 }
 
@@ -55,11 +83,21 @@ pub fn sight_segments(
     targets: &SightTargets,
     count: u32,
 ) -> impl Iterator<Item = [Point3<f64>; 2]> {
+    series(eyes_m, head_movement_m, targets, count, [0.5; 5])
+}
+
+fn series(
+    eyes_m: &Point3<f64>,
+    head_movement_m: f64,
+    targets: &SightTargets,
+    count: u32,
+    start: [f64; 5],
+) -> impl Iterator<Item = [Point3<f64>; 2]> + use<> {
     let [across, beside] = frame_about(&targets.outwards);
     let targets = *targets;
     let eyes_m = *eyes_m;
     (0..2 * count).map(move |index| {
-        let [far, height, turn, out, about] = even_point(index / 2);
+        let [far, height, turn, out, about] = even_point(index / 2, &start);
         // Even in the ball: the cube root spreads the radius, the height is even by Archimedes.
         let radius_m = head_movement_m * far.cbrt();
         let up = 2.0 * height - 1.0;
@@ -78,36 +116,65 @@ pub fn sight_segments(
     })
 }
 
-/// Measures the sight of one person of one stature.
+/// Measures what a robot leaves of the sight of one person of one stature; `surroundings` is what is in
+/// the way without it.
 ///
-/// [`SIGHT_SEGMENTS`] segments each to skin and needle, the same for every configuration, so that
-/// differences come from the arm alone. Against half planes the shares are within 0.01 of the true
-/// ones (`tests/room.rs`).
+/// [`SIGHT_SERIES`] times [`SIGHT_SEGMENTS`] segments each to skin and needle, the same for every
+/// configuration, so that differences come from the arm alone. [`Sight::accuracy`] says how far the
+/// shares may be from the true ones.
 pub fn measure_sight(
-    obstacles: &PlacedObstacles<'_>,
+    robot: &PlacedObstacles<'_>,
+    surroundings: &PlacedObstacles<'_>,
     eyes_m: &Point3<f64>,
     head_movement_m: f64,
     targets: &SightTargets,
 ) -> Sight {
-    let mut free = [0_u32; 2];
+    /// Segments that the surroundings leave, and those of them that the robot leaves; to skin and needle.
+    type Counts = [[u32; 2]; 2];
+    let share = |of: f64, all: f64| if all > 0.0 { of / all } else { 0.0 };
+    let fractions =
+        |counts: &Counts| counts.map(|[open, free]| share(f64::from(free), f64::from(open)));
     let mut blocked: Vec<(usize, u32)> = Vec::new();
-    let segments = sight_segments(eyes_m, head_movement_m, targets, SIGHT_SEGMENTS);
-    for (index, [eye, target]) in segments.enumerate() {
-        match obstacles.first_on_the_way(&eye, &target) {
-            None => free[index % 2] += 1,
-            Some((_, solid)) => match blocked.iter_mut().find(|(known, _)| *known == solid) {
-                Some((_, count)) => *count += 1,
-                None => blocked.push((solid, 1)),
-            },
+    let mut all: Counts = [[0; 2]; 2];
+    let mut means = Vec::new();
+    for start in starts() {
+        let mut counts: Counts = [[0; 2]; 2];
+        let segments = series(eyes_m, head_movement_m, targets, SIGHT_SEGMENTS, start);
+        for (index, [eye, target]) in segments.enumerate() {
+            if surroundings.is_in_the_way(&eye, &target) {
+                continue;
+            }
+            let [open, free] = &mut counts[index % 2];
+            *open += 1;
+            match robot.first_on_the_way(&eye, &target) {
+                None => *free += 1,
+                Some((_, solid)) => match blocked.iter_mut().find(|(known, _)| *known == solid) {
+                    Some((_, count)) => *count += 1,
+                    None => blocked.push((solid, 1)),
+                },
+            }
+        }
+        let [entry, needle] = fractions(&counts);
+        means.push(0.5 * (entry + needle));
+        for (sum, of_series) in all.iter_mut().flatten().zip(counts.iter().flatten()) {
+            *sum += of_series;
         }
     }
     let worst = blocked
         .iter()
         .max_by_key(|(solid, count)| (*count, std::cmp::Reverse(*solid)));
-    let share = |count: u32| f64::from(count) / f64::from(SIGHT_SEGMENTS);
+    let series = f64::from(SIGHT_SERIES);
+    let mean = means.iter().sum::<f64>() / series;
+    let squares: f64 = means.iter().map(|each| (each - mean) * (each - mean)).sum();
+    let standard_error = (squares / (series - 1.0) / series).sqrt();
+    let [entry_fraction, needle_fraction] = fractions(&all);
+    let segments = series * f64::from(SIGHT_SEGMENTS);
+    let open: f64 = all.iter().map(|[open, _]| f64::from(*open)).sum();
     Sight {
-        entry_fraction: share(free[0]),
-        needle_fraction: share(free[1]),
-        blocker: worst.map(|(solid, _)| obstacles.name(*solid).to_owned()),
+        entry_fraction,
+        needle_fraction,
+        without_robot_fraction: 0.5 * open / segments,
+        accuracy: (STUDENT_95 * standard_error).max(1.0 / segments),
+        blocker: worst.map(|(solid, _)| robot.name(*solid).to_owned()),
     }
 }

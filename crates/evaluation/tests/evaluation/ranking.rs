@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use needlebench_cell::ranking::{MetricRanking, RankingSection};
 use needlebench_evaluation::metric::{Metric, metrics};
-use needlebench_evaluation::pareto::{dominates, levels, pareto_set};
+use needlebench_evaluation::pareto::{Scale, dominates, pareto_set};
+use needlebench_evaluation::ranking::SAME_SCORE;
 use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
     ClassClearance, ClearanceReport, ConfigurationReport, EngineReport, GoalReport, MarginsReport,
@@ -407,7 +408,7 @@ fn noise_decides_nothing() {
     ]);
     assert!(goal.configurations.iter().all(|each| each.pareto));
     let scores = [0, 1].map(|at| goal.configurations[at].ranking.as_ref().unwrap().score);
-    assert_eq!(scores[0], scores[1]);
+    assert!((scores[0] - scores[1]).abs() < SAME_SCORE);
     assert_eq!(chosen(&goal), "Right-Down-Fold");
     let reason = &goal.recommended.as_ref().unwrap().reason;
     assert!(reason.contains("the two are even"), "{reason}");
@@ -428,8 +429,32 @@ fn ample_clearance_is_ample() {
     }
     let goal = ranked(made);
     assert_eq!(chosen(&goal), "Right-Up-Fold");
-    let dominance = goal.configurations[0].dominated_by.as_ref().unwrap();
-    assert_eq!(dominance.better_in, ["joint_margin"]);
+    let term = |at: usize| -> needlebench_evaluation::ranking::Term {
+        let ranking = goal.configurations[at].ranking.as_ref().unwrap();
+        let mut terms = ranking.terms.iter();
+        terms
+            .find(|term| term.metric == "clearance")
+            .unwrap()
+            .clone()
+    };
+    assert_eq!(term(0).utility, term(1).utility);
+    assert!(term(0).value > term(1).value && term(0).counted_as == term(1).counted_as);
+    // A difference is a difference, however ample: neither beats the other.
+    assert!(goal.configurations.iter().all(|each| each.pareto));
+}
+
+#[test]
+fn reason_prints_what_was_measured_and_not_what_counts() {
+    // Both are beyond the best anchor of 100 mm.
+    let goal = ranked(vec![
+        with_clearance(with_margin(0, 0.4), 0.03),
+        with_clearance(with_margin(1, 0.4), 0.02),
+    ]);
+    let reason = &goal.recommended.as_ref().unwrap().reason;
+    for term in &goal.configurations[0].ranking.as_ref().unwrap().terms {
+        assert!(term.utility <= 1.0);
+    }
+    assert!(reason.contains("(30.0 mm against 20.0 mm"), "{reason}");
 }
 
 #[test]
@@ -534,14 +559,64 @@ fn nothing_measured_is_said_and_not_scored() {
     assert!(reason.contains("nothing that has a weight"), "{reason}");
 }
 
+/// Resolution of all metrics below: above the noise, below the grid.
+const RESOLUTION: f64 = 1e-3;
+
+fn scale(resolution: f64, more_is_better: bool) -> Scale {
+    Scale {
+        resolution,
+        more_is_better,
+    }
+}
+
 #[test]
-fn tied_values_share_a_level_and_the_best_is_level_0() {
-    assert_eq!(levels(&[1.0, 3.0, 2.9, 0.0], 0.15, true), [1, 0, 0, 2]);
-    assert_eq!(levels(&[1.0, 3.0, 2.9, 0.0], 0.15, false), [1, 2, 2, 0]);
-    assert_eq!(levels(&[f64::NAN, 1.0, -f64::NAN], 0.1, true), [1, 0, 1]);
+fn two_values_compare_by_their_own_difference() {
+    use std::cmp::Ordering::{Equal, Greater, Less};
+    let more = scale(0.5, true);
+    for (a, b, expected) in [
+        (1.0, 1.5, Equal),
+        (1.5, 1.0, Equal),
+        (1.0, 1.6, Less),
+        (1.6, 1.0, Greater),
+        (f64::NAN, 1.0, Less),
+        (-f64::NAN, f64::NAN, Equal),
+        (f64::INFINITY, f64::INFINITY, Equal),
+        (f64::INFINITY, 1.0, Greater),
+    ] {
+        assert_eq!(more.compare(a, b), expected, "{a} {b}");
+        let other_way = if a.is_nan() || b.is_nan() {
+            expected
+        } else {
+            expected.reverse()
+        };
+        assert_eq!(scale(0.5, false).compare(a, b), other_way, "{a} {b}");
+    }
+}
+
+/// Corridors of `table3`, mm: each within 0.5 of the next, the ends 0.73 apart.
+#[test]
+fn steps_below_the_resolution_do_not_chain_to_a_tie() {
+    let scales = [scale(0.5, true), scale(0.1, true), scale(0.1, true)];
+    let candidates = [[3.0, 3.0, 1.0], [3.3, 3.0, 0.0], [3.73, 2.0, 1.0]].map(Vec::from);
+    // Through the middle one, the last would be even with the first in the corridor, and beaten.
+    assert_eq!(pareto_set(&candidates, &scales), [true, false, true]);
+    assert!(!dominates(&candidates[0], &candidates[2], &scales));
+    assert!(dominates(&candidates[0], &candidates[1], &scales));
+}
+
+#[test]
+fn those_who_beat_each_other_in_a_circle_are_equals() {
+    let circle = [[0.0, 0.7, 1.4], [1.4, 0.0, 0.7], [0.7, 1.4, 0.0]].map(Vec::from);
+    let scales = [scale(1.0, true); 3];
+    let [a, b, c] = &circle;
+    assert!(dominates(a, b, &scales) || dominates(b, a, &scales));
+    assert!(dominates(b, c, &scales) || dominates(c, b, &scales));
+    assert!(dominates(a, c, &scales) || dominates(c, a, &scales));
+    assert_eq!(pareto_set(&circle, &scales), [true; 3]);
+    let with_better = [circle.to_vec(), vec![vec![3.0; 3]]].concat();
     assert_eq!(
-        levels(&[f64::INFINITY, f64::INFINITY, 0.0], 0.1, true),
-        [0, 0, 1]
+        pareto_set(&with_better, &scales),
+        [false, false, false, true]
     );
 }
 
@@ -551,41 +626,29 @@ fn values() -> impl Strategy<Value = Vec<Vec<f64>>> {
     prop::collection::vec(prop::collection::vec(value, 4), 1..=8)
 }
 
-/// Resolution of all metrics of [`values`]: above the noise, below the grid.
-const RESOLUTION: f64 = 1e-3;
-
-fn leveled(values: &[Vec<f64>]) -> Vec<Vec<usize>> {
-    let of_metric: Vec<Vec<usize>> = (0..4)
-        .map(|metric| {
-            let column: Vec<f64> = values.iter().map(|each| each[metric]).collect();
-            levels(&column, RESOLUTION, metric % 2 == 0)
-        })
-        .collect();
-    (0..values.len())
-        .map(|at| of_metric.iter().map(|column| column[at]).collect())
-        .collect()
+fn four_scales() -> [Scale; 4] {
+    std::array::from_fn(|metric| scale(RESOLUTION, metric % 2 == 0))
 }
 
 proptest! {
     #[test]
-    fn no_member_is_dominated_and_every_other_is_by_a_member(values in values()) {
-        let candidates = leveled(&values);
-        let members = pareto_set(&candidates);
+    fn members_are_those_that_nothing_beats_by_the_definition(values in values()) {
+        let scales = four_scales();
+        let members = pareto_set(&values, &scales);
         prop_assert!(members.iter().any(|member| *member));
-        for (at, each) in candidates.iter().enumerate() {
-            let by_any = candidates.iter().any(|other| dominates(other, each));
-            let by_member = candidates
-                .iter()
-                .zip(&members)
-                .any(|(other, member)| *member && dominates(other, each));
-            prop_assert_eq!(members[at], !by_any);
-            prop_assert_eq!(by_any, by_member);
+        // From the words of the definition, metric by metric.
+        let beats = |a: &[f64], b: &[f64]| {
+            let lead = |metric: usize| if metric % 2 == 0 { a[metric] - b[metric] } else { b[metric] - a[metric] };
+            (0..4).all(|metric| lead(metric) >= -RESOLUTION) && (0..4).any(|metric| lead(metric) > RESOLUTION)
+        };
+        for (at, each) in values.iter().enumerate() {
+            prop_assert_eq!(members[at], !values.iter().any(|other| beats(other, each)));
         }
     }
 
     #[test]
     fn pareto_set_is_the_same_in_any_order(values in values(), turn in 0..8_usize) {
-        let members = pareto_set(&leveled(&values));
+        let members = pareto_set(&values, &four_scales());
         let turn = turn % values.len();
         let mut turned = values.clone();
         turned.rotate_left(turn);
@@ -593,11 +656,11 @@ proptest! {
         let mut expected = members;
         expected.rotate_left(turn);
         expected.reverse();
-        prop_assert_eq!(pareto_set(&leveled(&turned)), expected);
+        prop_assert_eq!(pareto_set(&turned, &four_scales()), expected);
     }
 
     #[test]
-    fn noise_below_the_resolution_changes_no_level(values in values(), seed in any::<u64>()) {
+    fn noise_below_the_resolution_changes_no_member(values in values(), seed in any::<u64>()) {
         let mut state = seed;
         let mut noise = || {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -607,11 +670,11 @@ proptest! {
             .iter()
             .map(|each| each.iter().map(|value| value + noise()).collect())
             .collect();
-        prop_assert_eq!(leveled(&noisy), leveled(&values));
+        prop_assert_eq!(pareto_set(&noisy, &four_scales()), pareto_set(&values, &four_scales()));
     }
 
     #[test]
-    fn what_is_dominated_in_all_that_is_ranked_never_scores_higher(
+    fn what_is_dominated_scores_higher_by_no_more_than_resolutions_are_worth(
         margins in prop::collection::vec((0.0..0.6, 0.0..0.05), 2..=8)
     ) {
         // Joint margin and clearance differ, and both decide on the Pareto set.
@@ -628,8 +691,15 @@ proptest! {
             prop_assert_eq!(each.pareto, each.dominated_by.is_none());
             if let Some(dominance) = &each.dominated_by {
                 let other = goal.configurations.iter().find(|o| o.label == dominance.label).unwrap();
-                prop_assert!(other.pareto);
-                prop_assert!(score(other) + ROUNDING >= score(each));
+                prop_assert!(!each.pareto);
+                let columns = &goal.ranking.as_ref().unwrap().metrics;
+                let total: f64 = columns.iter().map(|metric| metric.weight).sum();
+                // The steepest piece of a utility is half of it between two anchors.
+                let worth = columns.iter().map(|metric| {
+                    let step = (metric.half - metric.worst).abs().min((metric.best - metric.half).abs());
+                    metric.weight / total * 0.5 * metric.resolution / step
+                });
+                prop_assert!(score(other) + worth.sum::<f64>() + ROUNDING >= score(each));
             }
         }
         // The order of the configurations decides between even scores alone.

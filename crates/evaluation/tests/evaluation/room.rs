@@ -164,7 +164,39 @@ fn hand_cone_is_a_half_space_where_nothing_stands_and_none_with_the_axis_blocked
     assert!(blocked.abs() < f64::EPSILON);
 }
 
-/// 512 segments of an even sequence.
+#[test]
+fn true_hand_cone_lies_between_the_bound_and_what_it_may_be_larger_by() {
+    /// Rounding of closed form and distances, rad.
+    const ROUNDING_RAD: f64 = 1e-6;
+    let mut wide = 0;
+    for k in 0..32_u32 {
+        // Balls at 20 to 115 mm from the guide's entry, about the axis at 14 to 80 degrees.
+        let (part, turn) = (f64::from(k) / 31.0, f64::from(k) * 2.4);
+        let distance_m = 0.02 + 0.095 * part;
+        let tilt = 0.25 + 1.15 * (f64::from(k) * 0.618).fract();
+        let radius_m = 0.6 * distance_m * tilt.sin().min(0.8);
+        let at =
+            Vector3::new(tilt.sin() * turn.cos(), tilt.sin() * turn.sin(), tilt.cos()) * distance_m;
+        let touches_m = (distance_m * distance_m - radius_m * radius_m).sqrt();
+        assert!(touches_m > 0.01, "the hand's cone begins at 10 mm");
+        let truth = tilt - f64::atan2(radius_m, touches_m);
+        let cell = cell_with(
+            BodyKind::Table,
+            Shape::Sphere { radius_m },
+            Pose::translation(at.x, at.y, at.z),
+        );
+        let obstacles = Obstacles::new(&cell);
+        let all = obstacles.all(&Joints::zeros());
+        let found = hand_cone(&all, &Point3::origin(), &Vector3::z(), 0.2);
+        let [low, high] = [0.0, found.accuracy_rad].map(|more| found.half_angle_rad + more);
+        assert!(low <= truth + ROUNDING_RAD, "{k}: {low} {truth}");
+        assert!(truth <= high + ROUNDING_RAD, "{k}: {truth} {high}");
+        wide += usize::from(found.accuracy_rad > 2.0 * CONE_TOLERANCE_RAD);
+    }
+    assert!(wide <= 3, "{wide} of 32 are hardly known");
+}
+
+/// Series of 512 segments of an even sequence.
 const SIGHT_ERROR: f64 = 0.01;
 
 #[test]
@@ -181,13 +213,14 @@ fn sight_past_a_half_plane_is_the_share_of_the_disc_beyond_it() {
             half_extents_m: Vector3::new(0.5, 0.5, 1e-6),
         };
         let cell = cell_with(
-            BodyKind::Table,
+            BodyKind::Base,
             plate,
             Pose::translation(edge_m - 0.5, 0.0, 0.5),
         );
         let obstacles = Obstacles::new(&cell);
         let seen = measure_sight(
-            &obstacles.all(&Joints::zeros()),
+            &obstacles.robot(&Joints::zeros()),
+            &obstacles.surroundings(),
             &Point3::new(0.0, 0.0, 1.0),
             0.0,
             &targets,
@@ -225,10 +258,11 @@ fn eyes_that_move_are_spread_over_a_ball() {
             half_extents_m: Vector3::new(1.0, 1.0, 1e-3),
         };
         let at = Pose::translation(edge_m - 1.0, 0.0, -0.2);
-        let cell = cell_with(BodyKind::Table, plate, at);
+        let cell = cell_with(BodyKind::Base, plate, at);
         let obstacles = Obstacles::new(&cell);
         let seen = measure_sight(
-            &obstacles.all(&Joints::zeros()),
+            &obstacles.robot(&Joints::zeros()),
+            &obstacles.surroundings(),
             &Point3::origin(),
             0.1,
             &targets,
@@ -280,4 +314,144 @@ fn an_unfolded_left_arm_stands_in_the_way_of_the_hand() {
             .hand_cone_blocker
             .is_some_and(|name| name.starts_with("forearm"))
     );
+}
+
+#[test]
+fn what_the_surroundings_hide_is_not_taken_by_the_robot() {
+    let targets = SightTargets {
+        entry_m: Point3::new(0.0, 0.0, -ENTRY_DISC_HEIGHT_M),
+        outwards: Vector3::z(),
+        needle_m: [Point3::new(-0.03, 0.0, 0.0), Point3::new(0.03, 0.0, 0.0)],
+    };
+    let plate = |at_m: f64| {
+        let half_extents_m = Vector3::new(0.5, 0.5, 1e-6);
+        (
+            Shape::Cuboid { half_extents_m },
+            Pose::translation(at_m, 0.0, 0.5),
+        )
+    };
+    let (shape, at) = plate(-0.5);
+    let mut cell = cell_with(BodyKind::Table, shape, at);
+    let eye = Point3::new(0.0, 0.0, 1.0);
+    let seen = |cell: &Cell| {
+        let obstacles = Obstacles::new(cell);
+        let robot = obstacles.robot(&Joints::zeros());
+        measure_sight(&robot, &obstacles.surroundings(), &eye, 0.0, &targets)
+    };
+    let alone = seen(&cell);
+    assert!(
+        (alone.without_robot_fraction - 0.5).abs() < SIGHT_ERROR,
+        "{alone:?}"
+    );
+    assert_eq!([alone.entry_fraction, alone.needle_fraction], [1.0, 1.0]);
+    assert_eq!(alone.blocker, None);
+    // A robot behind the table takes nothing, one beside it half of what is left of the needle.
+    for (at_m, needle) in [(-0.5, 1.0), (-0.4925, 0.5)] {
+        let (shape, at) = plate(at_m);
+        cell.bodies.truncate(1);
+        cell.bodies.push(CollisionBody {
+            name: "robot".into(),
+            kind: BodyKind::Base,
+            frame: Frame::World,
+            solids: vec![Solid {
+                name: "robot.0".into(),
+                shape,
+                parent_from_shape: Pose::translation(0.0, 0.0, -1e-3) * at,
+            }],
+        });
+        let both = seen(&cell);
+        assert!(
+            (both.needle_fraction - needle).abs() < 2.0 * SIGHT_ERROR,
+            "{both:?}"
+        );
+        assert!(
+            (both.without_robot_fraction - 0.5).abs() < SIGHT_ERROR,
+            "{both:?}"
+        );
+    }
+}
+
+#[test]
+fn shares_of_sight_are_as_near_to_the_true_ones_as_they_say() {
+    /// Rays of the independent estimate, and its standard error at the worst share.
+    const RAYS: u32 = 4000;
+    let resolved = table3();
+    let room = RoomModel::new(&resolved);
+    let (mut compared, mut beyond) = (0, 0);
+    for joints in [&EIGHT[1], &EIGHT[7]] {
+        let q = Joints::from_column_slice(joints);
+        let report = room.measure(0, &q);
+        let robot = room.obstacles().robot(&q);
+        let surroundings = room.obstacles().surroundings();
+        let targets = room.targets(0, &q);
+        let people = &resolved.people.by_goal[0];
+        let mut sights = report.sight.iter();
+        for person in people {
+            for &stature_m in &person.statures_m {
+                let said = sights.next().unwrap();
+                let eyes_m = person.eyes_m(stature_m);
+                let mut state = 7_u64;
+                let mut uniform = || {
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1_442_695_040_888_963_407);
+                    (state >> 11) as f64 / (1_u64 << 53) as f64
+                };
+                let mut counts = [[0_u32; 2]; 2];
+                for ray in 0..2 * RAYS {
+                    // By rejection, not by the way of the series.
+                    let eye = loop {
+                        let at = Vector3::from_fn(|_, _| 2.0 * uniform() - 1.0);
+                        if at.norm() <= 1.0 {
+                            break eyes_m + at * person.head_movement_m;
+                        }
+                    };
+                    let target = if ray % 2 == 0 {
+                        let across = targets
+                            .outwards
+                            .cross(&Vector3::new(0.3, 0.5, 0.7))
+                            .normalize();
+                        let beside = targets.outwards.cross(&across);
+                        loop {
+                            let [a, b] = [2.0 * uniform() - 1.0, 2.0 * uniform() - 1.0];
+                            if a.hypot(b) <= 1.0 {
+                                break targets.entry_m
+                                    + targets.outwards * ENTRY_DISC_HEIGHT_M
+                                    + (across * a + beside * b) * 0.03;
+                            }
+                        }
+                    } else {
+                        targets.needle_m[0]
+                            + (targets.needle_m[1] - targets.needle_m[0]) * uniform()
+                    };
+                    if surroundings.first_on_the_way(&eye, &target).is_none() {
+                        let [open, free] = &mut counts[(ray % 2) as usize];
+                        *open += 1;
+                        *free += u32::from(robot.first_on_the_way(&eye, &target).is_none());
+                    }
+                }
+                let share = |[open, free]: [u32; 2]| f64::from(free) / f64::from(open.max(1));
+                let truth = 0.5 * (share(counts[0]) + share(counts[1]));
+                // Binomial, of the few lines that the surroundings leave.
+                let error = 0.5
+                    * counts
+                        .map(|each| {
+                            let (share, open) = (share(each), f64::from(each[0].max(1)));
+                            share * (1.0 - share) / open
+                        })
+                        .iter()
+                        .sum::<f64>()
+                        .sqrt();
+                compared += 1;
+                let apart = (said.fraction - truth).abs();
+                beyond += usize::from(apart > said.accuracy.hypot(2.0 * error));
+                assert!(
+                    apart < 2.5 * said.accuracy.hypot(2.0 * error),
+                    "{said:?} {truth}"
+                );
+            }
+        }
+    }
+    // 95 of 100 are within: of twelve hardly ever more than two are not.
+    assert!(compared == 12 && beyond <= 2, "{beyond} of {compared}");
 }

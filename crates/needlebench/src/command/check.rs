@@ -4,9 +4,14 @@ use crate::arguments::RobotArguments;
 use crate::output::shown;
 use anyhow::Result;
 use clap::Args;
-use needlebench_cell::Finding;
+use needlebench_bench::Preview;
+use needlebench_bench::preview::BASIS;
+use needlebench_cell::{Finding, ResolvedScenario};
+use needlebench_report::number::value_and_limit;
+use needlebench_report::table::route_in_words;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 
 use super::{load_checked, overrides, print_json, print_text};
 
@@ -31,38 +36,46 @@ struct CheckAnswer {
     ok: bool,
     findings: Vec<Finding>,
     notes: Vec<String>,
+    /// Of each file that can be read, in order.
+    scenarios: Vec<CheckedScenario>,
 }
 
-/// Parses, resolves and validates scenarios.
+#[derive(Serialize)]
+struct CheckedScenario {
+    file: String,
+    name: String,
+    #[serde(flatten)]
+    preview: Preview,
+}
+
+/// Parses, resolves and validates scenarios, and says what can be known of them without a simulation.
 pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
     let mut findings = Vec::new();
     let mut notes = Vec::new();
+    let mut scenarios = Vec::new();
     match overrides(&arguments.robot) {
         Err(finding) => findings.push(finding),
         Ok(overrides) => {
             for path in &arguments.scenarios {
-                match load_checked(path, &overrides) {
-                    Ok(runnable) => {
-                        let resolved = runnable.into_scenario();
-                        if !arguments.json {
-                            let purpose = match resolved.iso9283 {
-                                Some(_) => "test by ISO 9283".to_owned(),
-                                None => format!("{} goals", resolved.goals.len()),
-                            };
-                            print_text(&format!(
-                                "{}: ok ({purpose}, {} bodies, {} pairs)",
-                                shown(path),
-                                resolved.cell.bodies.len(),
-                                resolved.cell.pairs.len()
-                            ))?;
-                            for note in &resolved.notes {
-                                print_text(&format!("  note: {note}"))?;
-                            }
-                        }
-                        notes.extend(resolved.notes);
+                let resolved = match load_checked(path, &overrides) {
+                    Ok(runnable) => runnable.into_scenario(),
+                    Err(found) => {
+                        findings.extend(found.into_iter().map(|finding| placed(path, finding)));
+                        continue;
                     }
-                    Err(found) => findings.extend(found),
+                };
+                let (preview, found) = Preview::of(&resolved)?;
+                if !arguments.json {
+                    let is_ok = found.is_empty();
+                    print_text(&in_words(path, &resolved, &preview, is_ok)?)?;
                 }
+                findings.extend(found.into_iter().map(|finding| placed(path, finding)));
+                scenarios.push(CheckedScenario {
+                    file: resolved.source.file.clone(),
+                    name: resolved.scenario.name.clone(),
+                    preview,
+                });
+                notes.extend(resolved.notes);
             }
         }
     }
@@ -73,6 +86,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
             ok,
             findings,
             notes,
+            scenarios,
         })?;
     } else {
         print_findings(&findings);
@@ -82,4 +96,93 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
     } else {
         ExitStatus::BadInput
     })
+}
+
+/// With its line, where it is about a key of the scenario's file.
+fn placed(path: &Path, finding: Finding) -> Finding {
+    if finding.line.is_some() || finding.file != path.display().to_string() {
+        return finding;
+    }
+    match std::fs::read_to_string(path) {
+        Ok(text) => finding.placed_in(&text),
+        Err(_) => finding,
+    }
+}
+
+/// What is known of a scenario, for people.
+fn in_words(
+    path: &Path,
+    resolved: &ResolvedScenario,
+    preview: &Preview,
+    is_ok: bool,
+) -> Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    let purpose = match resolved.iso9283 {
+        Some(_) => "test by ISO 9283".to_owned(),
+        None => format!("{} goals", resolved.goals.len()),
+    };
+    write!(
+        text,
+        "{}: {} ({purpose}, {} bodies, {} pairs)",
+        shown(path),
+        if is_ok { "ok" } else { "not ok" },
+        resolved.cell.bodies.len(),
+        resolved.cell.pairs.len()
+    )?;
+    if let (Some(least_m), Some([a, b])) = (preview.start.least_clearance_m, &preview.start.pair)
+        && resolved.iso9283.is_none()
+    {
+        write!(
+            text,
+            "\n  start posture: within the limits, {:.1} mm clearance ({a} to {b})",
+            least_m * 1e3
+        )?;
+    }
+    for goal in &preview.goals {
+        write!(
+            text,
+            "\n  goal {}: {} of 8 configurations can work ({BASIS})",
+            goal.name, goal.working
+        )?;
+        for each in goal.configurations.iter().filter(|each| !each.works) {
+            write!(text, "\n    {}: ", each.label)?;
+            match each.rejections.first() {
+                Some(rejection) => {
+                    let (value, limit) =
+                        value_and_limit(rejection.value, rejection.limit, rejection.unit);
+                    write!(
+                        text,
+                        "{}: {value} (limit {limit}): {}",
+                        rejection.rule, rejection.detail
+                    )?;
+                }
+                None => text += each.missed.unwrap_or("does not work"),
+            }
+        }
+        if let Some(route) = &goal.needle_route {
+            write!(text, "\n    {}", route_in_words(route))?;
+        }
+        let target = &goal.target;
+        let lesion = target.lesion.as_ref().map(|name| format!("lesion {name}"));
+        let organ = target.organ.as_ref().map(|name| format!("in {name}"));
+        let holds: Vec<String> = lesion.into_iter().chain(organ).collect();
+        if let Some(beyond_m) = target.beyond_lesion_m {
+            write!(
+                text,
+                "\n    target: {:.1} mm outside its lesion",
+                beyond_m * 1e3
+            )?;
+        } else if !holds.is_empty() {
+            write!(text, "\n    target: {}", holds.join(" "))?;
+        } else if resolved.phantom.is_some() {
+            write!(
+                text,
+                "\n    target: in no lesion and no organ of the phantom"
+            )?;
+        }
+    }
+    for note in &resolved.notes {
+        write!(text, "\n  note: {note}")?;
+    }
+    Ok(text)
 }

@@ -1,6 +1,6 @@
 //! `check`.
 
-use crate::support::{Bench, SMALL, files, has_keys, with_edit};
+use crate::support::{Bench, SMALL, files, has_keys, with_edit, workspace};
 
 #[test]
 fn every_shipped_scenario_is_sound() {
@@ -107,4 +107,121 @@ fn every_command_that_reads_scenarios_refuses_a_bad_one_alike() {
         assert_eq!(answer.stdout, "", "{arguments:?}");
     }
     assert!(!bench.path("out").exists(), "a refused run writes nothing");
+}
+
+/// The text of a shipped scenario with one part changed.
+fn shipped(name: &str, from: &str, to: &str) -> String {
+    let path = workspace().join("scenarios").join(name);
+    with_edit(&std::fs::read_to_string(path).unwrap(), from, to)
+}
+
+#[test]
+fn reach_route_start_and_target_are_known_without_a_simulation() {
+    let bench = Bench::with_scenario(&shipped("supine_suite.toml", "seed = 1", "seed = 2"));
+    let answer = bench
+        .run(&["check", "s.toml", "--json"])
+        .exits_with(0)
+        .json();
+    let scenario = &answer["scenarios"][0];
+    assert_eq!(scenario["basis"], "postures only, motions not planned");
+    assert!(scenario["start"]["least_clearance_m"].as_f64().unwrap() > 0.0);
+    let goals = scenario["goals"].as_array().unwrap();
+    assert_eq!(goals.len(), 4);
+    for goal in goals {
+        let all = goal["configurations"].as_array().unwrap();
+        let works = |each: &&serde_json::Value| each["works"] == true;
+        assert_eq!(all.len(), 8);
+        assert_eq!(goal["working"], all.iter().filter(works).count());
+        assert!(
+            goal["working"].as_u64().unwrap() >= 4,
+            "as the scenario wants"
+        );
+        for each in all {
+            let says_why =
+                !each["rejections"].as_array().unwrap().is_empty() || each["missed"].is_string();
+            assert_eq!(each["works"] == false, says_why, "{each}");
+        }
+        // What its comments say: ribs are 4.7 mm away and more.
+        assert!(goal["route"]["clearance_m"].as_f64().unwrap() > 4e-3);
+        assert!(goal["target"]["lesion"].is_string());
+    }
+    let text = bench.run(&["check", "s.toml"]).exits_with(0).stdout;
+    assert!(
+        text.contains("8 configurations can work (postures only, motions not planned)"),
+        "{text}"
+    );
+    assert!(text.contains("needle route: "), "{text}");
+}
+
+#[test]
+fn a_goal_out_of_reach_is_a_finding_with_what_is_missing() {
+    let text = shipped(
+        "supine_suite.toml",
+        "[-280, 350, 1050]",
+        "[-280, 900, 1050]",
+    );
+    let bench = Bench::with_scenario(&text);
+    let answer = bench
+        .run(&["check", "s.toml", "--json"])
+        .exits_with(2)
+        .json();
+    assert_eq!(answer["ok"], false);
+    let findings = answer["findings"].as_array().unwrap();
+    assert_eq!(findings.len(), 4, "{findings:?}");
+    let line = 1 + text
+        .lines()
+        .position(|line| line.starts_with("entry_mm"))
+        .unwrap();
+    let message = findings[0]["message"].as_str().unwrap();
+    assert!(
+        message.contains("out of reach") && message.contains("mm or more are missing"),
+        "{message}"
+    );
+    assert_eq!(findings[0]["key"], "goals[0].entry_mm");
+    assert_eq!(findings[0]["line"], line);
+    // A run says the same, configuration by configuration.
+    let report = bench.run(&[
+        "run",
+        "s.toml",
+        "--engine",
+        "rapier",
+        "--json",
+        "--no-pictures",
+    ]);
+    let report = report.exits_with(1).json();
+    let least_m = report["goals"][0]["configurations"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|each| {
+            assert_eq!(each["rejections"][0]["rule"], "unreachable");
+            each["rejections"][0]["value"].as_f64().unwrap()
+        })
+        .fold(f64::INFINITY, f64::min);
+    assert!(
+        message.contains(&format!("{:.1} mm or more", least_m * 1e3)),
+        "{message} {least_m}"
+    );
+}
+
+#[test]
+fn a_route_through_bone_is_a_finding() {
+    // Straight through rib 3 instead of between the ribs.
+    let text = shipped(
+        "supine_suite.toml",
+        "[-98.7, -89.8, 88.2]",
+        "[-98.7, -89.8, 78.2]",
+    );
+    let bench = Bench::with_scenario(&text);
+    let answer = bench
+        .run(&["check", "s.toml", "--json"])
+        .exits_with(2)
+        .json();
+    let findings = answer["findings"].as_array().unwrap();
+    let message = findings[0]["message"].as_str().unwrap();
+    assert!(
+        message.contains("needle") && message.contains("rib_"),
+        "{message}"
+    );
+    assert_eq!(findings[0]["key"], "goals[0].entry_mm");
 }

@@ -362,7 +362,7 @@ fn several_scenarios_come_in_one_document_and_the_worst_status_counts() {
     let text = with_edit(SMALL, "name = \"small\"", "name = \"strict\"");
     let strict = with_edit(
         &text,
-        "max_peak_torque_ratio = 10",
+        "max_peak_torque_ratio = 1",
         "max_peak_torque_ratio = 0.01",
     );
     bench.write("strict.toml", strict);
@@ -433,7 +433,7 @@ fn robot_of_the_command_line_is_the_one_that_is_reported() {
 fn reader_that_stops_reading_changes_neither_status_nor_files() {
     let text = with_edit(
         SMALL,
-        "max_peak_torque_ratio = 10",
+        "max_peak_torque_ratio = 1",
         "max_peak_torque_ratio = 0.01",
     );
     let bench = Bench::with_scenario(&text);

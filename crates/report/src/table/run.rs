@@ -458,7 +458,7 @@ fn write_missed(out: &mut String, report: &Report, goal: &str) -> std::fmt::Resu
 }
 
 /// How the planned needle keeps away from what it must not meet, in a sentence.
-pub(crate) fn route_in_words(route: &RouteReport) -> String {
+pub fn route_in_words(route: &RouteReport) -> String {
     let mm = 1e3 * route.distance_m;
     let RouteReport { part, tissue, .. } = route;
     let where_it_goes = if mm < 0.0 {

@@ -63,7 +63,10 @@ fn jacobians_and_ten_thousand_draws_agree_for_every_source_and_for_all() {
 /// A sanity check of scale: nine real arms are off by millimetres at a tip in front of the flange.
 #[test]
 fn the_tip_of_an_uncalibrated_arm_is_off_by_one_to_four_millimetres() {
-    for budget in budgets("[imperfections.calibration]\nclass = \"nominal_kinematics\"\n", 0) {
+    for budget in budgets(
+        "[imperfections.calibration]\nclass = \"nominal_kinematics\"\n",
+        0,
+    ) {
         let rms_m = budget.total.at_target.analytic.rms_m;
         assert!((1e-3..4e-3).contains(&rms_m), "{rms_m}");
         assert!(budget.total.at_target.monte_carlo.is_none());
@@ -95,11 +98,23 @@ fn sag_that_a_calibration_has_taken_for_geometry_is_not_counted_twice() {
             );
             let of_gears = |budget: &ErrorBudget| {
                 let source = |each: &&SourceBudget| each.source == Some(Source::Elasticity);
-                budget.sources.iter().find(source).unwrap().at_target.analytic.rms_m
+                budget
+                    .sources
+                    .iter()
+                    .find(source)
+                    .unwrap()
+                    .at_target
+                    .analytic
+                    .rms_m
             };
             budgets(&blocks, 0).iter().map(of_gears).sum()
         };
-        assert!(sag(true) < 0.9 * sag(false), "{class}: {} {}", sag(true), sag(false));
+        assert!(
+            sag(true) < 0.9 * sag(false),
+            "{class}: {} {}",
+            sag(true),
+            sag(false)
+        );
     }
 }
 
@@ -108,8 +123,15 @@ fn sag_that_a_calibration_has_taken_for_geometry_is_not_counted_twice() {
 fn needle_bends_as_a_cantilever_does() {
     let budget = &budgets("[imperfections.needle]\n", 0)[0];
     let at_target = budget.total.at_target.analytic;
-    assert!((at_target.rms_m - 0.8302e-3).abs() < 1e-6, "{}", at_target.rms_m);
-    assert!(at_target.lateral_rms_m == at_target.rms_m, "across the needle alone");
+    assert!(
+        (at_target.rms_m - 0.8302e-3).abs() < 1e-6,
+        "{}",
+        at_target.rms_m
+    );
+    assert!(
+        at_target.lateral_rms_m == at_target.rms_m,
+        "across the needle alone"
+    );
 }
 
 #[test]

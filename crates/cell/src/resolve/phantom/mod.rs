@@ -4,9 +4,10 @@ mod mesh_parts;
 mod place;
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::Vector3;
+use needlebench_geometry::PreparedShape;
 
 use crate::files::ModelSource;
 use crate::files::{Location, source_of};
@@ -29,6 +30,16 @@ pub(crate) struct UnplacedPhantom {
     /// Files of the user's parts.
     pub parts: Vec<ModelSource>,
     pub notes: Vec<String>,
+    /// The skin, ready for distances: see [`UnplacedPhantom::skin`].
+    prepared_skin: OnceLock<PreparedShape>,
+}
+
+impl UnplacedPhantom {
+    /// The skin, ready for distances, in its own frame.
+    pub fn skin(&self) -> &PreparedShape {
+        self.prepared_skin
+            .get_or_init(|| PreparedShape::new(&self.phantom.skin().shape))
+    }
 }
 
 /// The scenario's phantom.
@@ -61,6 +72,7 @@ pub(super) fn scenario_phantom(
         model,
         parts,
         notes,
+        prepared_skin: OnceLock::new(),
     })
 }
 

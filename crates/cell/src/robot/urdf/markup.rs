@@ -4,8 +4,11 @@ use std::ops::Range;
 
 use roxmltree::Node;
 
-use super::vocabulary::{Attribute, Count, Form, Kind, NEEDLE_GUIDE_TAG, QUATERNION, ROBOT};
+use super::vocabulary::{
+    Attribute, Count, Form, Kind, NEEDLE_GUIDE_TAG, Plausible, QUATERNION, ROBOT,
+};
 use super::{JOINT_TYPES, NeedleGuide};
+use crate::schema::written;
 use crate::{Finding, nearest_name};
 
 /// Likeness from which on an unknown name is taken for a known one misspelt, where other programs may
@@ -45,7 +48,12 @@ pub(super) struct LinkPlace {
 #[derive(Debug)]
 pub(super) struct JointPlace {
     pub span: Range<usize>,
-    pub has_limit: bool,
+    /// Of its `<origin>`; the joint's own if it has none.
+    pub origin: Range<usize>,
+    /// Of its `<limit>`, if it has one.
+    pub limit: Option<Range<usize>>,
+    /// Whether the limit says where the joint's range begins and ends.
+    pub has_range: [bool; 2],
 }
 
 /// Reads the markup of a URDF and checks every element and attribute that stands for something.
@@ -86,7 +94,11 @@ pub(super) fn read_markup(file: &str, text: &str) -> Result<Markup, Finding> {
                 reader.check_joint_type(node)?;
                 reader.markup.joints.push(JointPlace {
                     span: opening_tag(node),
-                    has_limit: child(node, "limit").is_some(),
+                    origin: opening_tag(child(node, "origin").unwrap_or(node)),
+                    limit: child(node, "limit").map(opening_tag),
+                    has_range: ["lower", "upper"].map(|name| {
+                        child(node, "limit").is_some_and(|limit| limit.has_attribute(name))
+                    }),
                 });
             }
             NEEDLE_GUIDE_TAG => reader.markup.needle_guide = Some(reader.needle_guide(node)?),
@@ -232,17 +244,9 @@ impl Reader<'_> {
             Form::Text => Ok(()),
             Form::Number => self.numbers(node, name, text, 1),
             Form::Numbers(count) => self.numbers(node, name, text, count),
-            Form::Positive => {
-                self.numbers(node, name, text, 1)?;
-                if text.trim().parse::<f64>().is_ok_and(|value| value > 0.0) {
-                    return Ok(());
-                }
-                let message = format!(
-                    "`{name}` of <{}> is {}, but has to be positive",
-                    tag(node),
-                    text.trim()
-                );
-                Err(self.finding(node, message))
+            Form::Plausible(count, range) => {
+                self.numbers(node, name, text, count)?;
+                self.plausible(node, name, text, range)
             }
         }
     }
@@ -276,6 +280,51 @@ impl Reader<'_> {
             return bad(format!("has more than {count} numbers"));
         }
         Ok(())
+    }
+
+    /// Refuses numbers that no robot has.
+    fn plausible(
+        &self,
+        node: Node<'_, '_>,
+        name: &str,
+        text: &str,
+        range: &Plausible,
+    ) -> Result<(), Finding> {
+        let holds = |word: &&str| {
+            let number = word.parse::<f64>();
+            number.is_ok_and(|number| (range.least..=range.most).contains(&number))
+        };
+        let Some(word) = text.split_whitespace().find(|word| !holds(word)) else {
+            return Ok(());
+        };
+        if range.least > 0.0 && word.parse::<f64>().is_ok_and(|number| number <= 0.0) {
+            let message = format!(
+                "`{name}` of <{}> is {word}, but has to be positive",
+                tag(node)
+            );
+            return Err(self.finding(node, message));
+        }
+        let space = if range.unit.is_empty() { "" } else { " " };
+        let of = node
+            .ancestors()
+            .find(|above| matches!(tag(*above), "joint" | "link"));
+        let of = of.map(label);
+        let place = of.as_ref().map_or(String::new(), |of| format!(" of {of}"));
+        let finding = self.finding(
+            node,
+            format!(
+                "`{name}` of <{}>{place} has {word}{space}{}, outside {} to {}",
+                tag(node),
+                range.unit,
+                written(range.least),
+                written(range.most)
+            ),
+        );
+        let finding = finding.hint(range.hint);
+        Err(match of {
+            Some(of) => finding.key(of),
+            None => finding,
+        })
     }
 
     /// urdf-rs drops a quaternion in silence where the file is of version 1.0.

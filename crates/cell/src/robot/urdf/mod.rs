@@ -27,6 +27,9 @@ const JOINT_TYPES: [&str; 6] = [
     "planar",
 ];
 
+/// Largest radius of gyration of a link, m: that of a rod of 5 m, about its middle.
+const FARTHEST_GYRATION_M: f64 = 1.5;
+
 /// Geometry element of a link.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Geometry {
@@ -49,6 +52,8 @@ pub(crate) struct Element {
 pub(crate) struct UrdfLink {
     pub name: String,
     pub inertial: Option<Body>,
+    /// Of its mass, or its own.
+    pub mass_span: Range<usize>,
     pub collisions: Vec<Element>,
     pub visuals: Vec<Element>,
     pub span: Range<usize>,
@@ -66,6 +71,8 @@ pub(crate) enum JointKind {
 pub(crate) struct Limit {
     pub lower: f64,
     pub upper: f64,
+    /// Whether the file gives lower and upper: 0 if not.
+    pub has_range: [bool; 2],
     pub effort: f64,
     pub velocity: f64,
 }
@@ -80,6 +87,10 @@ pub(crate) struct UrdfJoint {
     pub axis: UnitVector3<f64>,
     pub limit: Option<Limit>,
     pub span: Range<usize>,
+    /// Of its `<origin>`, or its own.
+    pub origin_span: Range<usize>,
+    /// Of its `<limit>`, or its own.
+    pub limit_span: Range<usize>,
 }
 
 /// needlebench's extension element `<needle_guide .../>` of a tool.
@@ -202,6 +213,10 @@ impl Reader<'_> {
                 .as_ref()
                 .map(|places| self.inertial(&link.inertial, places))
                 .transpose()?,
+            mass_span: match &place.inertial {
+                Some([mass, _]) => mass.clone(),
+                None => place.span.clone(),
+            },
             collisions: collisions
                 .map(|(each, span)| {
                     self.element(each.name.as_ref(), &each.origin, &each.geometry, None, span)
@@ -253,6 +268,22 @@ impl Reader<'_> {
                     ),
                 )
                 .hint("moments are positive and none exceeds the sum of the other two"));
+        }
+        let gyration_m = (principal.max() / mass_kg).sqrt();
+        if mass_kg > 0.0 && gyration_m > FARTHEST_GYRATION_M {
+            return Err(self
+                .finding(
+                    moments,
+                    format!(
+                        "{mass_kg} kg with a moment of {:.3e} kg m^2 would lie {gyration_m:.3e} m \
+                         from their centre",
+                        principal.max()
+                    ),
+                )
+                .hint(
+                    "the radius of gyration, sqrt(moment / mass), is less than a link is long: did \
+                     you give kg mm^2?",
+                ));
         }
         Ok(Body {
             mass_kg,
@@ -321,13 +352,16 @@ impl Reader<'_> {
             child: joint.child.link.clone(),
             parent_from_joint: pose_of(&joint.origin),
             axis,
-            limit: place.has_limit.then_some(Limit {
+            limit: place.limit.is_some().then_some(Limit {
                 lower: limit.lower,
                 upper: limit.upper,
+                has_range: place.has_range,
                 effort: limit.effort,
                 velocity: limit.velocity,
             }),
             span: place.span.clone(),
+            origin_span: place.origin.clone(),
+            limit_span: place.limit.clone().unwrap_or_else(|| place.span.clone()),
         })
     }
 }

@@ -4,18 +4,106 @@
 //! origin at zero. Everything that is not in here is refused, or said in a note where it may belong to
 //! another program.
 
+use std::f64::consts::PI;
+
 /// How an attribute's value is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Form {
     /// Any text.
     Text,
     /// A finite number.
     Number,
-    /// A finite number above 0.
-    Positive,
     /// So many finite numbers.
     Numbers(usize),
+    /// So many numbers that a robot can have.
+    Plausible(usize, &'static Plausible),
 }
+
+/// What numbers of one kind can be in a robot or a tool: limits far outside what any arm has, and far
+/// inside what a slip of the unit makes.
+#[derive(Debug, PartialEq)]
+pub(super) struct Plausible {
+    pub least: f64,
+    pub most: f64,
+    pub unit: &'static str,
+    /// The likeliest slip.
+    pub hint: &'static str,
+}
+
+/// Places of frames. The largest arm reaches 1.75 m; a link above `base_link` may place it in a room.
+static PLACE: Plausible = Plausible {
+    least: -10.0,
+    most: 10.0,
+    unit: "m",
+    hint: METRES,
+};
+
+/// Angles of frames: two turns.
+static ANGLE: Plausible = Plausible {
+    least: -4.0 * PI,
+    most: 4.0 * PI,
+    unit: "rad",
+    hint: RADIANS,
+};
+
+/// Sizes of shapes: from a hundredth of a millimetre to longer than any arm.
+static SIZE: Plausible = Plausible {
+    least: 1e-5,
+    most: 3.0,
+    unit: "m",
+    hint: METRES,
+};
+
+/// Masses of links. A UR20 weighs 64 kg as a whole; a pedestal may belong to the base.
+static MASS_KG: Plausible = Plausible {
+    least: 0.0,
+    most: 1000.0,
+    unit: "kg",
+    hint: "masses of a URDF are in kilograms: did you give grams?",
+};
+
+/// Moments of inertia: those of the heaviest such link, a metre across.
+static MOMENT: Plausible = Plausible {
+    least: -1000.0,
+    most: 1000.0,
+    unit: "kg m^2",
+    hint: "moments of a URDF are in kg m^2: did you give kg mm^2 or g mm^2?",
+};
+
+/// Limits of joints: UR arms turn once each way, other arms not more than twice.
+static LIMIT_RAD: Plausible = Plausible {
+    least: -4.0 * PI,
+    most: 4.0 * PI,
+    unit: "rad",
+    hint: RADIANS,
+};
+
+/// Scales of meshes: from micrometres to kilometres; below 0 a mesh is mirrored.
+static SCALE: Plausible = Plausible {
+    least: -1e3,
+    most: 1e3,
+    unit: "",
+    hint: "0.001 is the scale of a mesh in millimetres",
+};
+
+/// Lengths of a needle and its guide.
+static NEEDLE_MM: Plausible = Plausible {
+    least: 0.1,
+    most: 1000.0,
+    unit: "mm",
+    hint: "lengths of <needle_guide> are in millimetres: did you give metres?",
+};
+
+/// Diameters of a needle and its bore: a needle of 34 gauge has 0.18 mm.
+static DIAMETER_MM: Plausible = Plausible {
+    least: 0.1,
+    most: 20.0,
+    unit: "mm",
+    hint: "diameters of <needle_guide> are in millimetres",
+};
+
+const METRES: &str = "lengths of a URDF are in metres: did you give millimetres?";
+const RADIANS: &str = "angles of a URDF are in radians: did you give degrees?";
 
 /// An attribute of an element.
 #[derive(Debug)]
@@ -133,8 +221,8 @@ static JOINT: Kind = Kind {
 };
 
 static ORIGIN: Kind = leaf(&[
-    optional("xyz", Form::Numbers(3)),
-    optional("rpy", Form::Numbers(3)),
+    optional("xyz", Form::Plausible(3, &PLACE)),
+    optional("rpy", Form::Plausible(3, &ANGLE)),
     optional(QUATERNION, Form::Numbers(4)),
 ]);
 
@@ -143,8 +231,8 @@ static LINK_NAME: Kind = leaf(&[required("link", Form::Text)]);
 static AXIS: Kind = leaf(&[required("xyz", Form::Numbers(3))]);
 
 static LIMIT: Kind = leaf(&[
-    optional("lower", Form::Number),
-    optional("upper", Form::Number),
+    optional("lower", Form::Plausible(1, &LIMIT_RAD)),
+    optional("upper", Form::Plausible(1, &LIMIT_RAD)),
     required("effort", Form::Number),
     required("velocity", Form::Number),
     optional("acceleration", Form::Number),
@@ -163,15 +251,15 @@ static INERTIAL: Kind = Kind {
     open: false,
 };
 
-static MASS: Kind = leaf(&[required("value", Form::Number)]);
+static MASS: Kind = leaf(&[required("value", Form::Plausible(1, &MASS_KG))]);
 
 static INERTIA: Kind = leaf(&[
-    required("ixx", Form::Number),
-    required("ixy", Form::Number),
-    required("ixz", Form::Number),
-    required("iyy", Form::Number),
-    required("iyz", Form::Number),
-    required("izz", Form::Number),
+    required("ixx", Form::Plausible(1, &MOMENT)),
+    required("ixy", Form::Plausible(1, &MOMENT)),
+    required("ixz", Form::Plausible(1, &MOMENT)),
+    required("iyy", Form::Plausible(1, &MOMENT)),
+    required("iyz", Form::Plausible(1, &MOMENT)),
+    required("izz", Form::Plausible(1, &MOMENT)),
 ]);
 
 static COLLISION: Kind = Kind {
@@ -208,18 +296,18 @@ static GEOMETRY: Kind = Kind {
     open: false,
 };
 
-static BOX: Kind = leaf(&[required("size", Form::Numbers(3))]);
+static BOX: Kind = leaf(&[required("size", Form::Plausible(3, &SIZE))]);
 
 static CYLINDER: Kind = leaf(&[
-    required("radius", Form::Positive),
-    required("length", Form::Positive),
+    required("radius", Form::Plausible(1, &SIZE)),
+    required("length", Form::Plausible(1, &SIZE)),
 ]);
 
-static SPHERE: Kind = leaf(&[required("radius", Form::Positive)]);
+static SPHERE: Kind = leaf(&[required("radius", Form::Plausible(1, &SIZE))]);
 
 static MESH: Kind = leaf(&[
     required("filename", Form::Text),
-    optional("scale", Form::Numbers(3)),
+    optional("scale", Form::Plausible(3, &SCALE)),
 ]);
 
 static MATERIAL: Kind = Kind {
@@ -235,11 +323,11 @@ static COLOR: Kind = leaf(&[required("rgba", Form::Numbers(4))]);
 pub(super) const NEEDLE_GUIDE_TAG: &str = "needle_guide";
 
 static NEEDLE_GUIDE: Kind = leaf(&[
-    required("bore_mm", Form::Positive),
-    required("guide_length_mm", Form::Positive),
+    required("bore_mm", Form::Plausible(1, &DIAMETER_MM)),
+    required("guide_length_mm", Form::Plausible(1, &NEEDLE_MM)),
     required("needle_gauge", Form::Text),
-    required("needle_od_mm", Form::Positive),
-    required("needle_length_mm", Form::Positive),
+    required("needle_od_mm", Form::Plausible(1, &DIAMETER_MM)),
+    required("needle_length_mm", Form::Plausible(1, &NEEDLE_MM)),
 ]);
 
 /// Attribute of an `<origin>` that counts from version 1.1 of the format on.

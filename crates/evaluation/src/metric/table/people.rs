@@ -26,7 +26,7 @@ pub(super) const PEOPLE: &[Metric] = &[
     Metric::new(
         "sight_fraction",
         "line of sight",
-        "unobstructed share of the lines of sight to the entry point",
+        "share of people's lines of sight to entry point and needle that arm and tool leave, of those that are free without them",
         Ratio,
         Configuration(|each| room(each, |room| room.sight_fraction)),
     )

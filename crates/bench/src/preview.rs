@@ -1,0 +1,279 @@
+//! What is known of a scenario before any motion is planned and any engine runs: which configurations can
+//! reach each goal and why not else, what the needle passes, where its target lies, how free the start is.
+//!
+//! Final postures are those that a plan tries first, under the rules of a plan and the criteria on
+//! clearances. Motions and engines can only take configurations away, so a goal for which too few are left
+//! here fails in every run.
+
+use needlebench_cell::{ClearanceClass, Finding, Goal, ResolvedScenario};
+use needlebench_clearance::ClearanceModel;
+use needlebench_evaluation::report::{ConfigurationReport, RejectionReport, RouteReport};
+use needlebench_evaluation::{first_missed_by_posture, route_is_expected};
+use needlebench_kinematics::NotUrGeometry;
+use needlebench_kinematics::ik::Configuration;
+use needlebench_planning::{Member, Planner, Rule};
+use serde::Serialize;
+
+use crate::assemble::{rejection_report, route_report};
+use crate::study::set_clearances;
+
+/// What all of it rests on, for people.
+pub const BASIS: &str = "postures only, motions not planned";
+
+/// What is known of a scenario.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Preview {
+    /// [`BASIS`].
+    pub basis: &'static str,
+    /// The start posture.
+    pub start: StartPreview,
+    /// Goal by goal.
+    pub goals: Vec<GoalPreview>,
+}
+
+/// The start posture, which is within the limits of the joints and free.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StartPreview {
+    /// Least clearance of arm and tool, m; none if there is nothing to be near to.
+    pub least_clearance_m: Option<f64>,
+    /// The two solids.
+    pub pair: Option<[String; 2]>,
+}
+
+/// What is known of a goal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GoalPreview {
+    /// Its name.
+    pub name: String,
+    /// Configurations whose final posture breaks no rule and no criterion on clearances.
+    pub working: usize,
+    /// All eight.
+    pub configurations: Vec<ConfigurationPreview>,
+    /// How the needle keeps away from bone, vessels and organs; none where there is nothing to keep away
+    /// from. Configurations are looked at as if it did.
+    pub needle_route: Option<RouteReport>,
+    /// Where the target lies.
+    pub target: TargetPreview,
+}
+
+/// One configuration of a goal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ConfigurationPreview {
+    /// Its label.
+    pub label: &'static str,
+    /// Its final posture breaks nothing.
+    pub works: bool,
+    /// Rules that it breaks, the first failing one first.
+    pub rejections: Vec<RejectionReport>,
+    /// The first criterion that it misses, if it breaks no rule.
+    pub missed: Option<&'static str>,
+    /// The posture that was looked at, if the pose is in reach.
+    pub joints_rad: Option<[f64; 6]>,
+}
+
+/// The place of a target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TargetPreview {
+    /// The lesion that holds it, if one does.
+    pub lesion: Option<String>,
+    /// How far outside it is of the lesion that the goal names, m.
+    pub beyond_lesion_m: Option<f64>,
+    /// The organ that holds it.
+    pub organ: Option<String>,
+}
+
+impl Preview {
+    /// What is known of a scenario, and what of it is wrong.
+    ///
+    /// # Errors
+    /// [`NotUrGeometry`] if the robot is not a UR arm.
+    pub fn of(resolved: &ResolvedScenario) -> Result<(Self, Vec<Finding>), NotUrGeometry> {
+        let model = ClearanceModel::new(&resolved.cell);
+        let planner = Planner::new(resolved, &model)?;
+        let mut findings = Vec::new();
+        let mut goals = Vec::new();
+        for (index, goal) in resolved.goals.iter().enumerate() {
+            let preview = goal_preview(&planner, resolved, goal);
+            findings.extend(reach_finding(resolved, index, &preview));
+            findings.extend(route_finding(resolved, index, &preview));
+            goals.push(preview);
+        }
+        let (minima, _) = planner.clearance_rules(&resolved.start);
+        let nearest = minima
+            .iter()
+            .filter(|pair| pair.class != ClearanceClass::NeedleCorridor)
+            .min_by(|a, b| a.separation.distance_m.total_cmp(&b.separation.distance_m));
+        let start = StartPreview {
+            least_clearance_m: nearest.map(|pair| pair.separation.distance_m),
+            pair: nearest.map(|pair| {
+                let (a, b) = pair.solid_names(&resolved.cell);
+                [a.to_owned(), b.to_owned()]
+            }),
+        };
+        let preview = Self {
+            basis: BASIS,
+            start,
+            goals,
+        };
+        Ok((preview, findings))
+    }
+}
+
+fn goal_preview(planner: &Planner<'_>, resolved: &ResolvedScenario, goal: &Goal) -> GoalPreview {
+    // What a refused route says of all alike is said once.
+    let members = planner.postures(goal).map(|mut member| {
+        member
+            .rejections
+            .retain(|each| each.rule != Rule::NeedleRoute);
+        member
+    });
+    let configurations: Vec<ConfigurationPreview> = Configuration::ALL
+        .into_iter()
+        .zip(&members)
+        .map(|(configuration, member)| configuration_preview(resolved, configuration, member))
+        .collect();
+    GoalPreview {
+        name: goal.name.clone(),
+        working: configurations.iter().filter(|each| each.works).count(),
+        configurations,
+        needle_route: route_report(resolved, goal),
+        target: target_preview(resolved, goal),
+    }
+}
+
+fn configuration_preview(
+    resolved: &ResolvedScenario,
+    configuration: Configuration,
+    member: &Member,
+) -> ConfigurationPreview {
+    let missed = member.candidate.as_ref().and_then(|candidate| {
+        let mut posture = ConfigurationReport::new(configuration.label());
+        set_clearances(&mut posture, &candidate.clearance);
+        first_missed_by_posture(&posture, &resolved.scenario.criteria)
+    });
+    let missed = missed.filter(|_| member.works());
+    ConfigurationPreview {
+        label: configuration.label(),
+        works: member.works() && missed.is_none(),
+        rejections: member.rejections.iter().map(rejection_report).collect(),
+        missed,
+        joints_rad: member.candidate.as_ref().map(|each| each.joints.into()),
+    }
+}
+
+fn target_preview(resolved: &ResolvedScenario, goal: &Goal) -> TargetPreview {
+    let Some(placed) = &resolved.phantom else {
+        return TargetPreview {
+            lesion: None,
+            beyond_lesion_m: None,
+            organ: None,
+        };
+    };
+    let target = placed.world_from_phantom.inverse() * goal.target_m;
+    let lesions = placed.phantom.lesions.iter().map(|lesion| {
+        let beyond_m = (target - lesion.center_m).norm() - 0.5 * lesion.diameter_m;
+        (lesion.name.as_str(), beyond_m)
+    });
+    let holds = lesions.clone().find(|(_, beyond_m)| *beyond_m <= 0.0);
+    let aimed_at = lesions
+        .filter(|(name, beyond_m)| goal.lesion.as_deref() == Some(name) && *beyond_m > 0.0)
+        .map(|(_, beyond_m)| beyond_m)
+        .next();
+    TargetPreview {
+        lesion: holds.map(|(name, _)| name.to_owned()),
+        beyond_lesion_m: aimed_at,
+        organ: goal.target_organ.clone(),
+    }
+}
+
+/// The key that places a goal.
+fn goal_key(resolved: &ResolvedScenario, index: usize) -> String {
+    let section = &resolved.scenario.goals[index];
+    let key = if section.flange_pose.is_some() {
+        "flange_pose"
+    } else if section.entry_direction_deg.is_some() {
+        "entry_direction_deg"
+    } else {
+        "entry_mm"
+    };
+    format!("goals[{index}].{key}")
+}
+
+/// A goal for which fewer configurations are left than the scenario wants.
+fn reach_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) -> Option<Finding> {
+    let wanted = resolved.scenario.criteria.min_working_configurations as usize;
+    if goal.working >= wanted {
+        return None;
+    }
+    let first = |each: &ConfigurationPreview| each.rejections.first().cloned();
+    let missing_m = goal.configurations.iter().map(|each| {
+        first(each)
+            .filter(|rejection| rejection.rule == Rule::Unreachable.name())
+            .map(|rejection| rejection.value)
+    });
+    let missing_m: Option<Vec<f64>> = missing_m.collect();
+    let message = if let Some(missing_m) = missing_m {
+        let least_m = missing_m.into_iter().fold(f64::INFINITY, f64::min);
+        format!(
+            "goal `{}` is out of reach: in every configuration {:.1} mm or more are missing ({BASIS})",
+            goal.name,
+            least_m * 1e3
+        )
+    } else {
+        let mut reasons: Vec<String> = Vec::new();
+        for each in goal.configurations.iter().filter(|each| !each.works) {
+            let rule = first(each).map(|rejection| rejection.rule.to_owned());
+            let reason = rule.or(each.missed.map(str::to_owned)).unwrap_or_default();
+            if !reasons.contains(&reason) {
+                reasons.push(reason);
+            }
+        }
+        format!(
+            "{} of 8 configurations can work for goal `{}`, and {wanted} are wanted: {} ({BASIS})",
+            goal.working,
+            goal.name,
+            reasons.join(", ")
+        )
+    };
+    Some(
+        Finding::new(&resolved.source.file, message)
+            .key(goal_key(resolved, index))
+            .hint(
+                "move the base, the patient or the entry; `min_working_configurations` under [criteria] is \
+                 how many have to work",
+            ),
+    )
+}
+
+/// A needle that does not keep away from what it should, unless just that is expected.
+fn route_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) -> Option<Finding> {
+    let route = goal.needle_route.as_ref()?;
+    let wanted_mm = resolved.scenario.criteria.min_clearance_mm.needle_route;
+    let limit_m = wanted_mm.map_or(route.margin_m, |mm| route.margin_m.max(mm * 1e-3));
+    let is_expected = route_is_expected(&resolved.goals[index]) && !route.kept;
+    if route.distance_m >= limit_m || is_expected {
+        return None;
+    }
+    let RouteReport { part, tissue, .. } = route;
+    let mm = route.distance_m * 1e3;
+    let message = if mm < 0.0 {
+        format!(
+            "the needle of goal `{}` goes {:.1} mm deep through {part} ({tissue})",
+            goal.name, -mm
+        )
+    } else {
+        format!(
+            "the needle of goal `{}` passes {part} ({tissue}) at {mm:.1} mm, nearer than {:.1} mm",
+            goal.name,
+            limit_m * 1e3
+        )
+    };
+    Some(
+        Finding::new(&resolved.source.file, message)
+            .key(goal_key(resolved, index))
+            .hint(
+                "choose another entry, or another direction to the target; `off` under \
+                 [planning.needle_route] names what the needle may pass",
+            ),
+    )
+}
