@@ -167,10 +167,7 @@ fn a_percent_of_mass_or_gravity_shows_under_held_torques_whatever_the_servo() {
         let mut gains = soft.gains;
         gains.kp_nm_per_rad = gains.kp_nm_per_rad.map(|kp| 16.0 * kp);
         gains.kd_nms_per_rad = gains.kd_nms_per_rad.map(|kd| 4.0 * kd);
-        Servo {
-            gains,
-            ..soft.clone()
-        }
+        Servo { gains, ..soft }
     };
     let closed_loop_m = |recording: &Recording, servo: &Servo| {
         let mut plant = referee(&cell, timestep_s, TorqueHold::default());
