@@ -3,15 +3,15 @@
 use needlebench_cell::Goal;
 use needlebench_engine::{
     Engine, EngineError, EngineIdentity, EnginePool, Hooks, MotionJob, MotionSettings, Plant,
-    REFEREE, Recording, RefereePlant, RefereeSettings, retrace, run_motions,
+    REFEREE, Recording, RefereePlant, RefereeSettings, run_motions,
 };
 use needlebench_evaluation::adjudication::{
     Adjudication, Evidence, PairConvergence, adjudicate, judge_differences,
 };
 use needlebench_evaluation::pairs;
 use needlebench_evaluation::referee::{
-    RefereeComparison, RefereeReport, StepDifference, TipDifference, TipPath, measured_order,
-    steps_before_contact, time_until_lost, tip_difference,
+    HELD_WINDOW_S, HeldTorques, RefereeComparison, RefereeReport, StepDifference, TipPath,
+    measured_order, steps_before_contact, tip_difference,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::GoalPlan;
@@ -84,24 +84,23 @@ struct Case<'a> {
     runs: &'a [EngineRun],
 }
 
-/// Tips of a case at one step.
+/// A case at one step.
 struct AtStep {
     timestep_s: f64,
     referee: TipPath,
     /// By engine, in the order of the case's runs.
-    engines: Vec<TipPath>,
+    engines: Vec<Traced>,
+}
+
+/// What is kept of a motion: recordings themselves would fill the memory.
+struct Traced {
+    tip: TipPath,
+    /// The referee under the motion's torques; none if it is too short for that.
+    held: Option<HeldTorques>,
 }
 
 /// What the referee says of a case: of each engine, and of pairs of them.
 type Verdict = (RefereeReport, Vec<PairConvergence>);
-
-/// A run's motion with the referee in the engine's place.
-struct Retraced {
-    /// Held back to the engine's motion.
-    held: TipDifference,
-    /// Until when it stays near it on its own.
-    unaided_until_s: Option<f64>,
-}
 
 impl Adjudicator<'_> {
     /// Judges every configuration that several engines simulated, and calls the referee where asked
@@ -195,18 +194,19 @@ impl Adjudicator<'_> {
         cases: &[Case<'_>],
         control: &Control<'_>,
     ) -> Result<(EngineIdentity, Vec<Verdict>), EngineError> {
-        let whole_s = self.setup.motion_settings().timestep_s;
         let mut by_case: Vec<Vec<AtStep>> = cases.iter().map(|_| Vec::new()).collect();
         for divisor in STEP_DIVISORS {
-            let timestep_s = whole_s / f64::from(divisor);
+            let timestep_s = self.whole_s() / f64::from(divisor);
             let engines = if divisor == 1 {
-                cases.iter().map(|case| self.recorded(case)).collect()
+                let recorded = in_parallel(control.threads, cases, |case| self.recorded(case));
+                recorded.into_iter().collect::<Result<_, EngineError>>()?
             } else {
                 self.at_smaller_step(cases, timestep_s, control)?
             };
             let referee = in_parallel(control.threads, cases, |case| {
                 let pool = EnginePool::new(&[REFEREE]);
-                let mut tips = self.tips(&pool, REFEREE, &[*case], timestep_s, control)?;
+                let tip = |case: &Case<'_>, recording: &Recording| Ok(self.tip(case, recording));
+                let mut tips = self.moved(&pool, REFEREE, &[*case], timestep_s, control, tip)?;
                 Ok::<_, EngineError>(tips.remove(0))
             });
             for ((of_case, engines), referee) in by_case.iter_mut().zip(engines).zip(referee) {
@@ -217,22 +217,17 @@ impl Adjudicator<'_> {
                 });
             }
         }
-        let retraced = in_parallel(control.threads, cases, |case| self.retraced(case, whole_s));
-        let mut reports = Vec::new();
-        for ((case, steps), retraced) in cases.iter().zip(&by_case).zip(retraced) {
-            reports.push((
-                self.report(case, steps, retraced?),
-                convergence(case, steps),
-            ));
-        }
-        Ok((self.referee_plant(whole_s)?.identity(), reports))
+        let reports = cases.iter().zip(&by_case);
+        let reports =
+            reports.map(|(case, steps)| (self.report(case, steps), convergence(case, steps)));
+        Ok((self.referee_plant()?.identity(), reports.collect()))
     }
 
-    fn report(&self, case: &Case<'_>, steps: &[AtStep], retraced: Vec<Retraced>) -> RefereeReport {
+    fn report(&self, case: &Case<'_>, steps: &[AtStep]) -> RefereeReport {
         let mut report = RefereeReport::default();
-        for (which, (run, retraced)) in case.runs.iter().zip(retraced).enumerate() {
+        for (which, run) in case.runs.iter().enumerate() {
             let closed_loop = |step: &AtStep| {
-                let engine = &step.engines[which];
+                let engine = &step.engines[which].tip;
                 tip_difference(engine, &step.referee, engine.steps_before_contact)
             };
             let convergence: Vec<StepDifference> = steps
@@ -248,8 +243,7 @@ impl Adjudicator<'_> {
                 RefereeComparison {
                     until_s: run.recording.time_s[until],
                     closed_loop: closed_loop(&steps[0]),
-                    same_torques: retraced.held,
-                    unaided_until_s: retraced.unaided_until_s,
+                    held_torques: held_torques(steps, which),
                     order: measured_order(&convergence),
                     convergence,
                     documented_order: self.engine(run).documented_order(),
@@ -267,40 +261,70 @@ impl Adjudicator<'_> {
         *named.expect("a run is that of one of the engines")
     }
 
-    fn referee_plant(&self, timestep_s: f64) -> Result<RefereePlant, EngineError> {
+    /// The scenario's own step in seconds.
+    fn whole_s(&self) -> f64 {
+        self.setup.motion_settings().timestep_s
+    }
+
+    fn referee_plant(&self) -> Result<RefereePlant, EngineError> {
         RefereePlant::new(
             self.setup.real.cell(),
-            timestep_s,
+            self.whole_s(),
             &RefereeSettings::default(),
         )
     }
 
-    /// Tips of the recordings that there are.
-    fn recorded(&self, case: &Case<'_>) -> Vec<TipPath> {
-        let cell = self.setup.real.cell();
-        let tips = case
-            .runs
-            .iter()
-            .map(|run| TipPath::of(cell, case.goal, &run.recording));
-        tips.collect()
+    fn tip(&self, case: &Case<'_>, recording: &Recording) -> TipPath {
+        TipPath::of(self.setup.real.cell(), case.goal, recording)
     }
 
-    /// Tips of all cases in all of their engines at another step, by case and in the order of its
-    /// runs.
+    /// A motion, and the referee under its torques.
+    fn traced(&self, case: &Case<'_>, recording: &Recording) -> Result<Traced, EngineError> {
+        let tip = self.tip(case, recording);
+        let windows = self.referee_plant()?.held_windows(
+            recording,
+            tip.steps_before_contact,
+            self.window_steps(recording.timestep_s),
+        )?;
+        Ok(Traced {
+            tip,
+            held: HeldTorques::of(self.setup.real.cell(), case.goal, recording, &windows),
+        })
+    }
+
+    /// Steps of a window: at smaller steps it lasts as long as at the scenario's own.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a window is some steps long"
+    )]
+    fn window_steps(&self, timestep_s: f64) -> usize {
+        let whole = (HELD_WINDOW_S / self.whole_s()).round().max(1.0);
+        whole as usize * (self.whole_s() / timestep_s).round() as usize
+    }
+
+    /// The recordings that there are.
+    fn recorded(&self, case: &Case<'_>) -> Result<Vec<Traced>, EngineError> {
+        let runs = case.runs.iter();
+        runs.map(|run| self.traced(case, &run.recording)).collect()
+    }
+
+    /// All cases in all of their engines at another step, by case and in the order of its runs.
     fn at_smaller_step(
         &self,
         cases: &[Case<'_>],
         timestep_s: f64,
         control: &Control<'_>,
-    ) -> Result<Vec<Vec<TipPath>>, EngineError> {
+    ) -> Result<Vec<Vec<Traced>>, EngineError> {
         let by_engine = in_parallel(control.threads, self.engines, |engine| {
             let ran = |case: &&Case<'_>| case.runs.iter().any(|run| run.engine == engine.name());
             let own: Vec<Case<'_>> = cases.iter().filter(ran).copied().collect();
-            self.tips(self.pool, *engine, &own, timestep_s, control)
+            let traced = |case: &Case<'_>, recording: &Recording| self.traced(case, recording);
+            self.moved(self.pool, *engine, &own, timestep_s, control, traced)
         });
         let mut by_engine = by_engine
             .into_iter()
-            .map(|tips| Ok(tips?.into_iter()))
+            .map(|traced| Ok(traced?.into_iter()))
             .collect::<Result<Vec<_>, EngineError>>()?;
         let mut next = |run: &EngineRun| {
             let at = self
@@ -310,22 +334,24 @@ impl Adjudicator<'_> {
             by_engine[at?].next()
         };
         let of_case = |case: &Case<'_>| {
-            let tips = case.runs.iter().map(&mut next);
-            tips.map(|tips| tips.expect("every run was made again"))
+            let traced = case.runs.iter().map(&mut next);
+            traced
+                .map(|traced| traced.expect("every run was made again"))
                 .collect()
         };
         Ok(cases.iter().map(of_case).collect())
     }
 
-    /// Tips of motions in one engine.
-    fn tips(
+    /// What `keep` makes of the cases' motions in one engine.
+    fn moved<T>(
         &self,
         pool: &EnginePool,
         engine: &dyn Engine,
         cases: &[Case<'_>],
         timestep_s: f64,
         control: &Control<'_>,
-    ) -> Result<Vec<TipPath>, EngineError> {
+        keep: impl Fn(&Case<'_>, &Recording) -> Result<T, EngineError>,
+    ) -> Result<Vec<T>, EngineError> {
         let jobs: Vec<MotionJob<'_>> = cases
             .iter()
             .map(|case| self.setup.job(case.trajectory))
@@ -338,10 +364,7 @@ impl Adjudicator<'_> {
             cancel: Some(control.cancel),
             progress: None,
         };
-        let cell = self.setup.real.cell();
-        let mut ended: Vec<Option<Result<TipPath, EngineError>>> =
-            cases.iter().map(|_| None).collect();
-        // The recordings themselves would fill the memory.
+        let mut ended: Vec<Option<Result<T, EngineError>>> = cases.iter().map(|_| None).collect();
         let done = run_motions(
             pool,
             engine,
@@ -349,8 +372,7 @@ impl Adjudicator<'_> {
             settings,
             hooks,
             &mut |index, result| {
-                let goal = cases[index].goal;
-                ended[index] = Some(result.map(|recording| TipPath::of(cell, goal, &recording)));
+                ended[index] = Some(result.and_then(|recording| keep(&cases[index], &recording)));
             },
         );
         if let Some(error) = done.error {
@@ -360,30 +382,25 @@ impl Adjudicator<'_> {
         each.map(|ended| ended.expect("the engine went on to the end"))
             .collect()
     }
+}
 
-    /// The referee under the torques of each run, held back and not.
-    fn retraced(&self, case: &Case<'_>, timestep_s: f64) -> Result<Vec<Retraced>, EngineError> {
-        let gains = self.setup.servo.gains;
-        let cell = self.setup.real.cell();
-        let mut plant = self.referee_plant(timestep_s)?;
-        case.runs
-            .iter()
-            .map(|run| {
-                let engine = TipPath::of(cell, case.goal, &run.recording);
-                let steps = engine.steps_before_contact;
-                let mut retrace = |hold_back| {
-                    let states = retrace(&mut plant, &run.recording, steps, hold_back)?;
-                    let tips = TipPath::of_states(cell, case.goal, timestep_s, &states);
-                    Ok::<_, EngineError>(tips)
-                };
-                let (held, free) = (retrace(Some(&gains))?, retrace(None)?);
-                Ok(Retraced {
-                    held: tip_difference(&engine, &held, steps),
-                    unaided_until_s: time_until_lost(&engine, &free),
-                })
+/// One engine under held torques at the scenario's step, with what smaller steps make of it.
+fn held_torques(steps: &[AtStep], engine: usize) -> Option<HeldTorques> {
+    let at = |step: &AtStep| step.engines[engine].held.clone();
+    let convergence: Vec<StepDifference> = steps
+        .iter()
+        .filter_map(|step| {
+            Some(StepDifference {
+                timestep_s: step.timestep_s,
+                peak_tip_m: at(step)?.peak_tip_m,
             })
-            .collect()
-    }
+        })
+        .collect();
+    Some(HeldTorques {
+        order: measured_order(&convergence),
+        convergence,
+        ..at(steps.first()?)?
+    })
 }
 
 /// How the engines of a case differ from each other before any contact, by step.
@@ -395,7 +412,7 @@ fn convergence(case: &Case<'_>, steps: &[AtStep]) -> Vec<PairConvergence> {
             steps: steps
                 .iter()
                 .map(|step| {
-                    let [a, b] = [a, b].map(|each| &step.engines[*each]);
+                    let [a, b] = [a, b].map(|each| &step.engines[*each].tip);
                     let free = a.steps_before_contact.min(b.steps_before_contact);
                     StepDifference {
                         timestep_s: step.timestep_s,

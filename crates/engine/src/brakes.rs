@@ -23,7 +23,10 @@
 //! dynamics that is given, stretched out level, with the load at the flange. Where the maker does not say
 //! which way the joint moves, *assumed* is the worse one, downwards, so the constant torque is `c` plus
 //! gravity's half way down. A joint without figures has another one's brake by the ratio of their torque
-//! limits. A brake that stands holds a multiple of what it has while it slips; the data say which.
+//! limits. So both
+//! parameters of a joint's brake are fitted to its two figures: stops that engines make with them show how good the
+//! closed form is, not how good the model is. Of other speeds, loads and postures no maker has published
+//! figures of an arm that ships. A brake that stands holds a multiple of what it has while it slips; the data say which.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use needlebench_cell::arm::{BrakeFigure, BrakeFigures};

@@ -92,6 +92,7 @@ impl<'a> Drive<'a> {
             recording: Recording {
                 engine,
                 timestep_s,
+                velocity_age_s,
                 time_s: Vec::with_capacity(steps + 1),
                 state: Vec::with_capacity(steps + 1),
                 reference: Vec::with_capacity(steps + 1),

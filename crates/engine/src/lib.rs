@@ -47,7 +47,7 @@ pub use plant::Plant;
 pub use pool::EnginePool;
 pub use rapier::{RapierPlant, RapierSettings};
 pub use recording::{Cost, Recording, Saturation};
-pub use referee::{REFEREE, RefereePlant, RefereeSettings, TorqueHold, retrace};
+pub use referee::{HeldWindow, REFEREE, RefereePlant, RefereeSettings, TorqueHold};
 pub use registry::{ENGINES, UnknownEngine, choose_engines, engine_names};
 pub use servo::{Servo, ServoGains, ServoOutput};
 pub use simulate::{Hooks, simulate, simulate_fleet, simulate_motion};

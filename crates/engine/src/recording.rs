@@ -17,6 +17,9 @@ pub struct Recording {
     pub engine: EngineIdentity,
     /// Length of a step, s.
     pub timestep_s: f64,
+    /// How long before the time of a state its velocity was, s; see
+    /// [`Plant::velocity_age_s`](crate::Plant::velocity_age_s).
+    pub velocity_age_s: f64,
     /// Time of each state, s.
     pub time_s: Vec<f64>,
     /// Observed states.

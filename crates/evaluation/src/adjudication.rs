@@ -459,22 +459,24 @@ fn first_saturation(
         })
 }
 
-/// The engine of a pair whose closed loop stays nearer to the referee's.
+/// The engine of a pair that stays nearer to the referee under held torques: in closed loop a servo
+/// hides most of what an engine gets wrong. None where one of them was not held against it.
 fn nearer(cause: Cause, pair: [&Recording; 2], evidence: Evidence<'_>) -> Option<String> {
     if matches!(cause, Cause::ContactOnset | Cause::ContactSoftness) {
         return None;
     }
-    evidence
-        .referee?
-        .engines
-        .iter()
-        .filter(|(name, _)| pair.iter().any(|each| each.engine.name == name.as_str()))
-        .min_by(|(_, a), (_, b)| {
-            a.closed_loop
-                .peak_tip_m
-                .total_cmp(&b.closed_loop.peak_tip_m)
-        })
-        .map(|(name, _)| name.clone())
+    let referee = evidence.referee?;
+    let apart_m = |each: &Recording| {
+        let found = referee.engines.get(each.engine.name)?;
+        Some(found.held_torques.as_ref()?.peak_tip_m)
+    };
+    let [one, other] = pair;
+    let nearer = if apart_m(one)? <= apart_m(other)? {
+        one
+    } else {
+        other
+    };
+    Some(nearer.engine.name.to_owned())
 }
 
 /// A breach in one sentence, for the report's remarks; none where the limit is kept.

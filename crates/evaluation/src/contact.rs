@@ -31,9 +31,10 @@ pub struct ContactEpisode {
     /// Speed at which they came together, m/s: of the nearest points, along the normal, in the state
     /// before the touch. None where the motion starts in contact.
     pub approach_speed_m_s: Option<f64>,
-    /// Largest sum of normal forces, N.
+    /// Largest sum of normal forces against a rigid surface, N.
     pub peak_force_n: f64,
-    /// Sum of normal forces when the reference has stood long enough, N; none if it never does.
+    /// Sum of normal forces when the reference has stood long enough, N: the servo's stiffness times the depth that
+    /// it is commanded into a rigid surface, and no force on a patient; none if it never stands.
     pub settled_force_n: Option<f64>,
     /// Integral of the sum of normal forces, N s.
     pub impulse_ns: f64,

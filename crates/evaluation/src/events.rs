@@ -11,7 +11,9 @@ use needlebench_cell::arm::BrakeFigures;
 use serde::Serialize;
 
 pub use envelope::{StopEnvelope, stopping_envelope};
-pub use press::{PressEngineReport, PressReport, measure_press, press_difference};
+pub use press::{
+    PressEngineReport, PressReport, RIGID_FORCE_MEANS, measure_press, press_difference,
+};
 pub use retract::{RetractionEngineReport, measure_retraction};
 pub use stop::{StopEngineReport, measure_stop};
 
@@ -51,12 +53,18 @@ pub struct StopReport {
     pub brakes: Option<StopBrakes>,
 }
 
+/// How far brakes that are derived from published stops are tested, in the words of reports.
+pub const BRAKES_FIT: &str = "two torques of each joint are fitted to its two published figures: no published stop is \
+                              left to test them by";
+
 /// Brakes of the joints, derived from an arm's published stops.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StopBrakes {
     /// The published stops, whose they are and where they are from.
     #[serde(flatten)]
     pub figures: BrakeFigures,
+    /// How far they are tested: [`BRAKES_FIT`].
+    pub fit: &'static str,
     /// Torque of each slipping brake at no speed, N m.
     pub coulomb_nm: [f64; 6],
     /// Torque of each by speed, N m s/rad.

@@ -22,7 +22,7 @@ pub struct ContactMeasurement {
     pub first_phase: Option<&'static str>,
     /// Bodies that touched first.
     pub first_pair: Option<[String; 2]>,
-    /// Largest sum of normal forces, N.
+    /// Largest sum of normal forces against rigid surfaces, N.
     pub peak_force_n: f64,
     /// Integral of the sum of normal forces, N s.
     pub impulse_ns: f64,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 use needlebench_cell::{Cell, Goal};
-use needlebench_engine::{PlantState, Recording};
+use needlebench_engine::{HeldWindow, PlantState, Recording};
 use serde::Serialize;
 
 use crate::needle::tip_of;
@@ -34,12 +34,9 @@ pub struct RefereeComparison {
     pub until_s: f64,
     /// Engine and referee, each in a closed loop with its own servo.
     pub closed_loop: TipDifference,
-    /// The referee under the engine's recorded torques, what it differs by held back with the
-    /// servo's gains.
-    pub same_torques: TipDifference,
-    /// The same with nothing held back, which leaves the engine's error to gravity: when the tips
-    /// are first a millimetre apart. None if they never are.
-    pub unaided_until_s: Option<f64>,
+    /// The referee from the engine's own states under the engine's recorded torques, window by window; none
+    /// where the motion is shorter than a window.
+    pub held_torques: Option<HeldTorques>,
     /// The closed loop again at smaller steps, the first entry at the scenario's own.
     pub convergence: Vec<StepDifference>,
     /// Order of convergence from the two smallest steps; none where the differences are rounding.
@@ -49,10 +46,60 @@ pub struct RefereeComparison {
 }
 
 impl RefereeComparison {
-    /// Whether the measured order, if there is one, is the documented one.
-    pub fn order_is_documented(&self) -> bool {
-        self.order
-            .is_none_or(|order| (order - self.documented_order).abs() <= ORDER_TOLERANCE)
+    /// Whether a measured order, if there is one, is the documented one.
+    pub fn is_documented(&self, order: Option<f64>) -> bool {
+        order.is_none_or(|order| (order - self.documented_order).abs() <= ORDER_TOLERANCE)
+    }
+}
+
+/// Length of a window of held torques, s: long enough for a wrong force to move the tip (1 % of gravity by
+/// some 0.1 mm), short enough for a difference to grow by gravity no more than some per cent.
+pub const HELD_WINDOW_S: f64 = 0.05;
+
+/// An engine beside the referee over windows of truly held torques, without any servo.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct HeldTorques {
+    /// Length of a window, s.
+    pub window_s: f64,
+    /// How many there were.
+    pub windows: usize,
+    /// Largest distance of the tips at the end of a window, m.
+    pub peak_tip_m: f64,
+    /// End of that window, s.
+    pub peak_time_s: f64,
+    /// How many times as large gravity makes a difference over a window, at most.
+    pub growth: f64,
+    /// The largest distance at smaller steps, the first entry at the scenario's own.
+    pub convergence: Vec<StepDifference>,
+    /// Order of convergence from the two smallest steps; none where the distances are rounding.
+    pub order: Option<f64>,
+}
+
+impl HeldTorques {
+    /// One step's windows; none if there were none.
+    pub fn of(
+        cell: &Cell,
+        goal: &Goal,
+        recording: &Recording,
+        windows: &[HeldWindow],
+    ) -> Option<Self> {
+        let first = windows.first()?;
+        let mut found = Self {
+            window_s: (first.last - first.first) as f64 * recording.timestep_s,
+            windows: windows.len(),
+            ..Self::default()
+        };
+        for window in windows {
+            let [engine, referee] = [&recording.state[window.last], &window.state]
+                .map(|state| tip_of(cell, goal, &state.world_from_flange));
+            let apart_m = (engine - referee).norm();
+            if apart_m > found.peak_tip_m {
+                found.peak_tip_m = apart_m;
+                found.peak_time_s = recording.time_s[window.last];
+            }
+            found.growth = found.growth.max(window.growth);
+        }
+        Some(found)
     }
 }
 
@@ -75,9 +122,6 @@ pub struct StepDifference {
     /// Largest distance of the tips.
     pub peak_tip_m: f64,
 }
-
-/// Distance of the tips at which a motion that is not held back counts as lost, m.
-const LOST_M: f64 = 1e-3;
 
 /// Where the needle's tip was in every state of a motion, world: all that is compared.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,14 +164,6 @@ impl TipPath {
     fn time_s(&self, state: usize) -> f64 {
         state as f64 * self.timestep_s
     }
-}
-
-/// When the tips are first a millimetre apart, s.
-pub fn time_until_lost(engine: &TipPath, referee: &TipPath) -> Option<f64> {
-    let state = engine
-        .distances_m(referee)
-        .position(|apart_m| apart_m > LOST_M)?;
-    Some(engine.time_s(state))
 }
 
 /// Number of steps before the first contact of a recording; all of them without one.

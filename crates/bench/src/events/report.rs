@@ -6,8 +6,8 @@ use needlebench_cell::scenario::PressSection;
 use needlebench_cell::{Goal, ResolvedScenario};
 use needlebench_engine::Recording;
 use needlebench_evaluation::events::{
-    EventsReport, PressReport, StopBrakes, StopReport, measure_press, measure_retraction,
-    measure_stop, press_difference,
+    BRAKES_FIT, EventsReport, PressReport, RIGID_FORCE_MEANS, StopBrakes, StopReport,
+    measure_press, measure_retraction, measure_stop, press_difference,
 };
 use needlebench_evaluation::largest_over_pairs;
 use needlebench_evaluation::report::Judged;
@@ -75,6 +75,7 @@ pub fn events_report(
             brakes: match (&stop.figures, &stop.brakes) {
                 (Some(figures), Some((_, brakes))) => Some(StopBrakes {
                     figures: figures.clone(),
+                    fit: BRAKES_FIT,
                     coulomb_nm: brakes.coulomb_nm.into(),
                     viscous_nms_per_rad: brakes.viscous_nms_per_rad.into(),
                 }),
@@ -123,6 +124,7 @@ fn press_report(
         depth_m: asked.depth_mm * 1e-3,
         displacement_m: None,
         friction,
+        force_means: RIGID_FORCE_MEANS,
         not_staged: None,
         engines: BTreeMap::new(),
         force_difference: None,

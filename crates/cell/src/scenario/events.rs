@@ -78,6 +78,8 @@ pub struct PressSection {
     /// What touches what.
     pub class: PressClass,
     /// How far the planned posture lies in the obstacle, mm. Default 1, assumed: 10 to 50 N.
+    /// Everything is rigid: the settled force is the servo's stiffness times this depth, and no force on
+    /// a patient.
     #[serde(default = "default_depth_mm")]
     #[schemars(range(min = 0.01, max = 20.0))]
     pub depth_mm: f64,

@@ -1,7 +1,7 @@
 //! The arm by our own equations of motion, integrated to rounding: the referee of the engines.
 
 mod engine;
-mod retrace;
+mod held;
 
 use nalgebra::SVector;
 use needlebench_cell::Cell;
@@ -9,7 +9,7 @@ use needlebench_kinematics::{Dynamics, JOINT_COUNT, JOINT_LABELS, Joints, Pose, 
 use serde::{Deserialize, Serialize};
 
 pub use engine::REFEREE;
-pub use retrace::retrace;
+pub use held::HeldWindow;
 
 use crate::error::check_bodies;
 use crate::plant::checked_timestep_s;

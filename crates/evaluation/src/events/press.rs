@@ -17,7 +17,14 @@ use crate::needle::tip_of;
 /// Time before the settled force in which its ripple is taken, s.
 const RIPPLE_S: f64 = 0.05;
 
+/// What the forces of a staged contact mean, in the words of reports.
+pub const RIGID_FORCE_MEANS: &str = "servo stiffness times depth, against a rigid surface: not the force on a patient, \
+                                     whose tissue yields";
+
 /// A contact that was asked for, in all engines.
+///
+/// The phantom is rigid and so are table and gantry. What an arm that is commanded a depth into them presses with is
+/// the stiffness of its servo times that depth: a check of engines and torques, and no force on a patient.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PressReport {
     /// Class of the contact.
@@ -30,6 +37,8 @@ pub struct PressReport {
     pub displacement_m: Option<[f64; 3]>,
     /// Coulomb friction.
     pub friction: f64,
+    /// What all forces here mean: [`RIGID_FORCE_MEANS`].
+    pub force_means: &'static str,
     /// Why it could not be staged, if it could not.
     pub not_staged: Option<String>,
     /// What the engines measured.
@@ -48,7 +57,8 @@ pub struct PressReport {
 pub struct PressEngineReport {
     /// All contacts of the motion; a guide that bounces has several.
     pub episodes: Vec<ContactEpisode>,
-    /// Settled sum of normal forces, N; none without contact while the reference stood.
+    /// Settled sum of normal forces, N: the servo's stiffness times a depth, against a rigid surface; none
+    /// without contact while the reference stood.
     pub settled_force_n: Option<f64>,
     /// The same from the joints' torques.
     pub balance: Option<ForceBalance>,

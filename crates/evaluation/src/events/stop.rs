@@ -125,6 +125,7 @@ fn since(recording: &Recording, from: usize) -> Recording {
     Recording {
         engine: recording.engine.clone(),
         timestep_s: recording.timestep_s,
+        velocity_age_s: recording.velocity_age_s,
         time_s: recording.time_s[from..].to_vec(),
         state: recording.state[from..].to_vec(),
         reference: recording.reference[from..].to_vec(),

@@ -10,8 +10,8 @@ use needlebench_evaluation::adjudication::{
     sentence,
 };
 use needlebench_evaluation::referee::{
-    DOCUMENTED_ORDER, RefereeComparison, RefereeReport, StepDifference, TipDifference, TipPath,
-    steps_before_contact, tip_difference,
+    DOCUMENTED_ORDER, HeldTorques, RefereeComparison, RefereeReport, StepDifference, TipDifference,
+    TipPath, steps_before_contact, tip_difference,
 };
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::JointState;
@@ -58,6 +58,7 @@ fn recording(
             settings: Vec::new(),
         },
         timestep_s: TIMESTEP_S,
+        velocity_age_s: 0.5 * TIMESTEP_S,
         state: times.iter().map(|time_s| state(*time_s)).collect(),
         reference: vec![JointState::at_rest(resolved.start); times.len()],
         torque_nm: times[1..]
@@ -87,15 +88,15 @@ fn steps(peaks_m: [f64; 2]) -> Vec<StepDifference> {
         .collect()
 }
 
+/// Distances from the referee under held torques. In closed loop the engines are as far from it as each other.
 fn referee(rapier_m: f64, mujoco_m: f64) -> RefereeReport {
     let comparison = |peak_tip_m| RefereeComparison {
         until_s: 1.0,
-        closed_loop: TipDifference {
+        closed_loop: TipDifference::default(),
+        held_torques: Some(HeldTorques {
             peak_tip_m,
-            ..TipDifference::default()
-        },
-        same_torques: TipDifference::default(),
-        unaided_until_s: None,
+            ..HeldTorques::default()
+        }),
         convergence: Vec::new(),
         order: None,
         documented_order: DOCUMENTED_ORDER,
@@ -307,7 +308,7 @@ fn of_three_engines_the_pair_that_differs_most_is_judged() {
     ];
     let mut referee = referee(2e-6, 1e-6);
     let mut of_third = referee.engines["rapier"].clone();
-    of_third.closed_loop.peak_tip_m = 5e-6;
+    of_third.held_torques.as_mut().unwrap().peak_tip_m = 5e-6;
     referee.engines.insert("third".to_owned(), of_third);
     let evidence = Evidence {
         referee: Some(&referee),

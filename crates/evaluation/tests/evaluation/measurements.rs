@@ -131,6 +131,7 @@ fn recording(
             settings: Vec::new(),
         },
         timestep_s,
+        velocity_age_s: 0.5 * timestep_s,
         time_s: Vec::new(),
         state: Vec::new(),
         reference: Vec::new(),

@@ -94,6 +94,9 @@ fn contacts_of_the_tool_agree_between_engines_and_with_the_joints_torques() {
         );
         for engine in engines(press) {
             assert!(number(&engine["settled_force_n"]) > 1.0, "{press:#}");
+            // No reader of the file alone takes it for a force on a patient.
+            let means = press["force_means"].as_str().unwrap();
+            assert!(means.contains("rigid") && means.contains("not the force on a patient"));
             assert!(
                 number(&engine["balance_difference"]) < FORCE_SHARE,
                 "{press:#}"

@@ -85,7 +85,7 @@ fn chart(title: &str, duration_s: f64, phases: &[Phase], curves: &[Curves]) -> C
         .map(|(index, each)| (Sample::Line(overlay.stroke(index)), each.engine));
     legend(&mut chart, [LEFT_PX, 58.0], PANEL_PX[0], entries);
     let panels: [(&str, Values); 2] = [
-        ("normal force (N)", |curves| &curves.force_n),
+        ("force on rigid surface (N)", |curves| &curves.force_n),
         ("clearance (mm)", |curves| &curves.clearance_mm),
     ];
     for ((label, points), top) in panels.into_iter().zip(TOPS_PX) {

@@ -33,7 +33,7 @@ pub fn recording_csv(run: &EngineRun, trajectory: &JointTrajectory, period_s: f6
         }
     }
     out.push_str(",flange_x_m,flange_y_m,flange_z_m,flange_qw,flange_qx,flange_qy,flange_qz");
-    out.push_str(",contact_force_n,penetration_m");
+    out.push_str(",rigid_contact_force_n,penetration_m");
     for class in run.clearance.distance_m.keys() {
         let _ = write!(out, ",{}_m", class.name());
     }

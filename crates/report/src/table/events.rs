@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use comfy_table::{Cell, CellAlignment, Table};
-use needlebench_evaluation::events::PressEngineReport;
+use needlebench_evaluation::events::{PressEngineReport, RIGID_FORCE_MEANS};
 use needlebench_evaluation::report::GoalReport;
 
 use super::plain_table;
@@ -16,9 +16,12 @@ pub fn events_text(goal: &GoalReport) -> Option<String> {
         .find(|each| each.events.is_some())?;
     let mut text = String::new();
     let tables = [
-        ("contacts that were asked for", press_table(goal)),
-        ("emergency stop", stop_table(goal)),
-        ("way back along the needle", retract_table(goal)),
+        (
+            format!("contacts that were asked for; forces: {RIGID_FORCE_MEANS}"),
+            press_table(goal),
+        ),
+        ("emergency stop".to_owned(), stop_table(goal)),
+        ("way back along the needle".to_owned(), retract_table(goal)),
     ];
     for (heading, table) in tables {
         if table.row_count() > 0 {
@@ -53,8 +56,8 @@ fn press_table(goal: &GoalReport) -> Table {
         "engine",
         "onset\n(s)",
         "at\n(mm/s)",
-        "peak\n(N)",
-        "settled\n(N)",
+        "rigid\npeak (N)",
+        "servo on\nrigid (N)",
         "impulse\n(N s)",
         "off\nbalance",
         "deepest",

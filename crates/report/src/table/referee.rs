@@ -14,10 +14,11 @@ pub(super) fn referee_table(goal: &GoalReport) -> Option<Table> {
         "engine",
         "closed loop\npeak",
         "\nsettled",
-        "same torques\npeak",
-        "unaided\nlost after",
         "at smaller steps\npeak",
-        "order\n(documented)",
+        "\norder",
+        "held torques\nper window",
+        "\norder",
+        "documented\norder",
         "compared\nto (s)",
     ];
     let mut table = plain_table(&header);
@@ -32,26 +33,35 @@ pub(super) fn referee_table(goal: &GoalReport) -> Option<Table> {
                     .closed_loop
                     .settled_tip_m
                     .map_or("-".to_owned(), small_length),
-                small_length(found.same_torques.peak_tip_m),
-                found
-                    .unaided_until_s
-                    .map_or("-".to_owned(), |time_s| format!("{time_s:.2} s")),
                 smaller_steps(found),
             ];
             cells.extend(numbers.map(right));
-            let order = found.order.map_or("-".to_owned(), |order| {
-                format!("{order:.2} ({})", found.documented_order)
-            });
-            cells.push(if found.order_is_documented() {
-                right(order)
-            } else {
-                right(format!("{order}*")).fg(Color::Red)
-            });
+            cells.push(order(found, found.order));
+            let held = found.held_torques.as_ref();
+            cells.push(right(held.map_or("-".to_owned(), |held| {
+                format!(
+                    "{} in {:.0} ms",
+                    small_length(held.peak_tip_m),
+                    held.window_s * 1e3
+                )
+            })));
+            cells.push(order(found, held.and_then(|held| held.order)));
+            cells.push(right(found.documented_order.to_string()));
             cells.push(right(format!("{:.2}", found.until_s)));
             table.add_row(cells);
         }
     }
     has_rows.then_some(table)
+}
+
+/// An order that was measured, marked where it is not the documented one.
+fn order(found: &RefereeComparison, measured: Option<f64>) -> Cell {
+    let text = measured.map_or("-".to_owned(), |order| format!("{order:.2}"));
+    if found.is_documented(measured) {
+        right(text)
+    } else {
+        right(format!("{text}*")).fg(Color::Red)
+    }
 }
 
 fn right(text: String) -> Cell {

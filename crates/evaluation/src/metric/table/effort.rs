@@ -75,7 +75,8 @@ pub(super) const EFFORT: &[Metric] = &[
     Metric::new(
         "contact_force",
         "peak contact force",
-        "largest sum of normal forces between arm, tool and what stands around them",
+        "largest sum of normal forces between arm, tool and what stands around them, all of it rigid: not \
+         the force on a patient",
         Force,
         Engines(|each| Some(contact_force(each))),
     )

@@ -1,0 +1,380 @@
+"""What makes an arm and a patient differ from the plan: each source is one function.
+
+A source draws what it is of (`Truth`), as README and schema of the scenario describe it. What follows from
+it - where the arm comes to rest, where the needle and the target are - is `errors`.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from model import (
+    Arm,
+    Array,
+    Chain,
+    flange,
+    gravity_torque,
+    mass_matrix,
+    moved,
+    posture,
+)
+
+# Fixed-point steps of the balance of torques: each contracts by what a radian changes the weight's torque by, over
+# the stiffness: 1e-2.
+BALANCE_STEPS = 4
+# Halvings of the way that a joint springs back: a way of a milliradian to rounding.
+HALVINGS = 50
+
+
+@dataclass(frozen=True)
+class Case:
+    """One configuration of one goal."""
+
+    arm: Arm
+    target: Array  # joint positions that the controller holds
+    depths: tuple[
+        float, float
+    ]  # of the needle beyond the guide at the skin and at the target
+    axes: Array  # rows: across the needle towards the head, across, along
+    phantom_turn: Array
+    phantom_place: Array
+    real_arms: Array  # deviations: arms, joints, 6
+    times: Array  # of the planned motion's last phase
+    path: Array  # joint positions at these times
+    timestep: float
+
+
+@dataclass
+class Truth:
+    """Rows of arms and patients; what no source touches is as planned."""
+
+    count: int
+    chain: Chain
+    tool_mass: Array
+    tool_com: Array
+    compliance: Array
+    reading: Array  # of the encoders at rest, beyond the motor's angle
+    noise: Array | None = None  # standard deviation of a reading
+    friction: dict | None = (
+        None  # with the factor of the true friction on the believed one
+    )
+    in_guide: Array = field(
+        default_factory=lambda: np.zeros((1, 2, 2))
+    )  # needle at entry and exit
+    shift_turn: Array = field(
+        default_factory=lambda: np.eye(3)[None]
+    )  # true place on planned one
+    shift_place: Array = field(default_factory=lambda: np.zeros((1, 3)))
+    breath: Array = field(
+        default_factory=lambda: np.zeros((2, 1, 3))
+    )  # of skin and target
+
+
+def as_planned(case: Case, count: int) -> Truth:
+    """The nominal arm and patient."""
+    body = case.arm.tool.body
+    zero = np.zeros((1, 6))
+    return Truth(
+        count, case.arm.chain, np.array([body.mass]), body.com[None], zero, zero
+    )
+
+
+def calibration(
+    case: Case, block: dict, random: np.random.Generator, truth: Truth
+) -> None:
+    """An arm of the normal distribution with mean and covariance of the real arms."""
+    arms = case.real_arms.reshape(len(case.real_arms), -1) * block["scale"]
+    spread = np.cov(arms, rowvar=False)
+    drawn = random.multivariate_normal(
+        arms.mean(axis=0), spread, truth.count, method="eigh"
+    )
+    truth.chain = moved(case.arm.chain, drawn.reshape(-1, 6, 6))
+
+
+def encoder(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
+    """Zero, rounding and noise of the encoders."""
+    resolution, noise, zeros = (
+        np.radians(block[key])
+        for key in ("resolution_deg", "noise_deg", "zero_spread_deg")
+    )
+    rounding = resolution * random.uniform(-0.5, 0.5, (truth.count, 6))
+    truth.reading = zeros * random.standard_normal((truth.count, 6)) + rounding
+    truth.noise = noise
+
+
+def elasticity(
+    case: Case, block: dict, random: np.random.Generator, truth: Truth
+) -> None:
+    """Gears that twist by the torque that they carry."""
+    stiffness = np.array(
+        block.get("stiffness_nm_rad") or case.arm.data["gears"]["stiffness_nm_rad"]
+    )
+    factor = 1.0 + block["spread"] * random.standard_normal((truth.count, 6))
+    truth.compliance = factor / stiffness
+
+
+def payload(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
+    """A tool that is heavier than believed, or heavy elsewhere."""
+    body = case.arm.tool.body
+    error = block["mass_error_kg"] + block["mass_spread_kg"] * random.standard_normal(
+        truth.count
+    )
+    off = np.array(block["com_error_mm"]) + block[
+        "com_spread_mm"
+    ] * random.standard_normal((truth.count, 3))
+    truth.tool_mass = body.mass + error
+    truth.tool_com = body.com + off * 1e-3
+
+
+def friction(
+    case: Case, block: dict, random: np.random.Generator, truth: Truth
+) -> None:
+    """LuGre friction of which the believed part is compensated while the joint moves."""
+    own = case.arm.data["friction"]
+    values = {
+        key: np.array(block.get(key) or own[key]) for key in own if key != "source"
+    }
+    values["compensation"] = block["compensation"]
+    values["factor"] = 1.0 + block["spread"] * random.standard_normal((truth.count, 6))
+    truth.friction = values
+
+
+def guide(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
+    """The needle's axis anywhere in a disc at each end of the guide."""
+    tool = case.arm.tool
+    given = block.get("diametral_clearance_mm")
+    clearance = tool.bore - tool.needle if given is None else given * 1e-3
+    radius = 0.5 * clearance * np.sqrt(random.random((truth.count, 2)))
+    angle = random.uniform(0.0, 2.0 * np.pi, (truth.count, 2))
+    truth.in_guide = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+def registration(
+    case: Case, block: dict, random: np.random.Generator, truth: Truth
+) -> None:
+    """Markers seen with an error, and the rigid least-squares fit to them (Kabsch, by SVD).
+
+    The phantom is planned where the fit has it. So it really is where the fit's inverse leads from there.
+    """
+    markers = np.array(block["markers_mm"]) * 1e-3
+    sigma = block["localisation_error_mm"] * 1e-3 / np.sqrt(3.0)
+    seen = markers + sigma * random.standard_normal((truth.count, *markers.shape))
+    middle, seen_middle = markers.mean(axis=0), seen.mean(axis=1)
+    products = np.einsum("ki,nkj->nij", markers - middle, seen - seen_middle[:, None])
+    left, _, right = np.linalg.svd(products)
+    turn = right.transpose(0, 2, 1) @ left.transpose(0, 2, 1)
+    mirror = np.ones((truth.count, 3))
+    mirror[:, 2] = np.linalg.det(turn)
+    turn = right.transpose(0, 2, 1) @ (mirror[..., None] * left.transpose(0, 2, 1))
+    place = seen_middle - turn @ middle
+    # Back: x_true = turn^T (x_planned - place), in the phantom's frame; then as seen in the world.
+    back = turn.transpose(0, 2, 1)
+    back_place = -(back @ place[..., None])[..., 0]
+    own, at = case.phantom_turn, case.phantom_place
+    truth.shift_turn = own @ back @ own.T
+    truth.shift_place = at + back_place @ own.T - truth.shift_turn @ at
+
+
+def breathing(
+    case: Case, block: dict, random: np.random.Generator, truth: Truth
+) -> None:
+    """Skin and target move by `sin^4(pi phase)` of their amplitudes (Lujan 1999)."""
+    if block["free"]:
+        phase = random.random(truth.count)
+    else:
+        phase = block["phase"] + block["phase_spread"] * random.standard_normal(
+            truth.count
+        )
+    share = np.sin(np.pi * phase) ** 4
+    moves = (np.array(block[key]) * 1e-3 for key in ("skin_mm", "target_mm"))
+    truth.breath = np.array(
+        [share[:, None] * (case.phantom_turn @ each) for each in moves]
+    )
+
+
+# By the name of the block and of the report's source: section of the schema, and what it does. In this order.
+SOURCES = {
+    "calibration": ("CalibrationBlock", calibration),
+    "encoder": ("EncoderBlock", encoder),
+    "elasticity": ("ElasticityBlock", elasticity),
+    "payload": ("PayloadBlock", payload),
+    "friction": ("FrictionBlock", friction),
+    "guide": ("GuideBlock", guide),
+    "registration": ("RegistrationBlock", registration),
+    "breathing": ("BreathingBlock", breathing),
+}
+# Blocks that leave nothing at an arm that has come to rest.
+WITHOUT_REST = {"control", "torque_limits"}
+
+
+def spline(times: Array, values: Array, at: Array) -> tuple[Array, Array]:
+    """Cubic spline through values, at rest at both ends: position and speed."""
+    step = np.diff(times)
+    slope = np.diff(values, axis=0) / step[:, None]
+    count = len(times)
+    matrix = np.zeros((count, count))
+    right = np.zeros((count, values.shape[1]))
+    matrix[0, :2] = 2.0 * step[0], step[0]
+    matrix[-1, -2:] = step[-1], 2.0 * step[-1]
+    right[0], right[-1] = 6.0 * slope[0], -6.0 * slope[-1]
+    for i in range(1, count - 1):
+        matrix[i, i - 1 : i + 2] = step[i - 1], 2.0 * (step[i - 1] + step[i]), step[i]
+        right[i] = 6.0 * (slope[i] - slope[i - 1])
+    bend = np.linalg.solve(matrix, right)
+    i = np.clip(np.searchsorted(times, at, side="right") - 1, 0, count - 2)
+    h = step[i, None]
+    a, b = (times[i + 1] - at)[:, None], (at - times[i])[:, None]
+    first, second = (
+        values[i] / h - bend[i] * h / 6.0,
+        values[i + 1] / h - bend[i + 1] * h / 6.0,
+    )
+    place = (bend[i] * a**3 + bend[i + 1] * b**3) / (6.0 * h) + first * a + second * b
+    speed = (bend[i + 1] * b**2 - bend[i] * a**2) / (2.0 * h) - first + second
+    return place, speed
+
+
+def bristles_at_the_end(case: Case, model: dict, factors: Array) -> Array:
+    """What bent bristles hold when the motion has ended, for factors (rows) on each joint's friction.
+
+    `dz = dq - |dq| sigma z / g(v)`, solved exactly over steps in which the speed is constant.
+    """
+    end = case.times[-1]
+    coarse = np.arange(case.times[0], end - 0.08, 2e-3)
+    fine = end - 0.08 * np.linspace(1.0, 0.0, 2001) ** 2
+    at = np.concatenate([coarse, fine])
+    place, speed = spline(case.times, case.path, at)
+    stiffness = model["bristle_stiffness_nm_rad"]
+    z = np.zeros_like(factors)
+    for k in range(len(at) - 1):
+        way = place[k + 1] - place[k]
+        ratio = 0.5 * (speed[k] + speed[k + 1]) / np.radians(model["stribeck_deg_s"])
+        slip = model["coulomb_nm"] + (
+            model["stiction_nm"] - model["coulomb_nm"]
+        ) * np.exp(-(ratio**2))
+        full = np.sign(way) * factors * slip / stiffness
+        z = full + (z - full) * np.exp(-np.abs(way) * stiffness / (factors * slip))
+    return stiffness * z
+
+
+def friction_error(case: Case, truth: Truth) -> Array:
+    """Reference minus position that friction leaves.
+
+    While the joint creeps to its end, the servo's error holds what friction has beyond its compensation:
+    `kp x = F - c`. Then the compensation goes, and the joint springs back by the way `d` that balances
+    `kp (x + d) = F'`, on which the bristles unbend by the same law, from `F` towards `-F_s`.
+    """
+    model = truth.friction
+    # The held torque is a smooth function of the factor alone: on a grid, then between.
+    grid = np.linspace(0.05, 2.0, 79)
+    held_on_grid = bristles_at_the_end(case, model, np.repeat(grid[:, None], 6, axis=1))
+    factor = model["factor"]
+    held = np.stack(
+        [np.interp(factor[:, i], grid, held_on_grid[:, i]) for i in range(6)], axis=-1
+    )
+    kp = np.array(case.arm.data["servo"]["stiffness_nm_rad"])
+    stiffness, sticking = model["bristle_stiffness_nm_rad"], model["stiction_nm"]
+    direction = np.sign(held)
+    compensated = model["compensation"] * sticking * direction
+    full = factor * sticking / stiffness
+    z = np.abs(held) / stiffness
+    low, high = np.zeros_like(held), np.abs(compensated) / kp
+    for _ in range(HALVINGS):
+        way = 0.5 * (low + high)
+        left = stiffness * ((z + full) * np.exp(-way / full) - full)
+        balance = np.abs(held) - left + kp * way - np.abs(compensated)
+        low, high = (
+            np.where(balance < 0.0, way, low),
+            np.where(balance < 0.0, high, way),
+        )
+    return (held - compensated) / kp + direction * 0.5 * (low + high)
+
+
+def noise_covariance(case: Case, truth: Truth) -> Array:
+    """Covariance of the joints that follow noisy encoders, one servo step after another.
+
+    The loop about rest: `v += -h M^-1 (kp (x + n) + kd v + friction) / (1 + kp C)`, `x += h v`; what all noise so
+    far has led to is the sum of the loop's responses to it.
+    """
+    servo = case.arm.data["servo"]
+    kp, kd = np.array(servo["stiffness_nm_rad"]), np.array(servo["damping_nms_rad"])
+    soft = 1.0 + kp * truth.compliance.mean(axis=0)
+    inverse = np.linalg.inv(mass_matrix(case.arm, case.target))
+    own = truth.friction
+    stiff, damped = kp.copy(), kd.copy()
+    if own is not None:
+        stiff = stiff + own["bristle_stiffness_nm_rad"]
+        damped = damped + own["bristle_damping_nms_rad"] + own["viscous_nms_rad"]
+    h = case.timestep
+    from_x, from_v = (-h * inverse * (gain / soft) for gain in (stiff, damped))
+    to_v = np.hstack([from_x, np.eye(6) + from_v])
+    step = np.vstack([np.hstack([np.eye(6), np.zeros((6, 6))]) + h * to_v, to_v])
+    kick = -h * inverse * (kp / soft) * truth.noise
+    response = np.vstack([h * kick, kick])
+    total = np.zeros((12, 12))
+    for _ in range(3000):
+        total += response @ response.T
+        response = step @ response
+    return total[:6, :6]
+
+
+def rest(case: Case, truth: Truth, random: np.random.Generator) -> Array:
+    """Joint positions at which the arms come to rest.
+
+    The servo holds `kp (reference - reading)` beyond the weight that it believes in; the gear twists by what it
+    carries; the reading is the motor's angle and its error.
+    """
+    arm, target = case.arm, case.target[None]
+    kp = np.array(arm.data["servo"]["stiffness_nm_rad"])
+    body = arm.tool.body
+    believed = gravity_torque(
+        arm, arm.chain, target, np.array([body.mass]), body.com[None]
+    )
+    stuck = friction_error(case, truth) if truth.friction is not None else 0.0
+    q = target
+    for _ in range(BALANCE_STEPS):
+        load = gravity_torque(arm, truth.chain, q, truth.tool_mass, truth.tool_com)
+        q = (
+            target
+            - (load - believed) / kp
+            - stuck
+            - truth.reading
+            - truth.compliance * load
+        )
+    if truth.noise is not None and truth.noise.any():
+        spread = noise_covariance(case, truth)
+        q = q + random.multivariate_normal(
+            np.zeros(6), spread, truth.count, method="eigh"
+        )
+    return q
+
+
+def planned(case: Case) -> list[Array]:
+    """Where the needle should be at the skin and at the target."""
+    at = posture(case.arm, case.arm.chain, case.target[None])
+    turn, place = flange(case.arm.chain, at)
+    exit_turn = turn[0] @ case.arm.tool.exit_turn
+    exit_place = place[0] + turn[0] @ case.arm.tool.exit_place
+    return [exit_place + depth * exit_turn[:, 2] for depth in case.depths]
+
+
+def errors(case: Case, truth: Truth, random: np.random.Generator) -> list[Array]:
+    """Needle minus where it should be, at skin and target, in the goal's axes."""
+    tool = case.arm.tool
+    at = posture(case.arm, truth.chain, rest(case, truth, random))
+    turn, place = flange(truth.chain, at)
+    entry, leave = truth.in_guide[:, 0], truth.in_guide[:, 1]
+    across = leave - entry
+    along = np.column_stack([across, np.full(len(across), tool.guide_length)])
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    start = np.column_stack([leave, np.zeros(len(leave))])
+    found = []
+    for wanted, depth, breath in zip(
+        planned(case), case.depths, truth.breath, strict=True
+    ):
+        in_tool = (start + depth * along) @ tool.exit_turn.T + tool.exit_place
+        needle = place + (turn @ in_tool[..., None])[..., 0]
+        # Breath moves the patient as he really lies.
+        moved_by = (truth.shift_turn @ breath[..., None])[..., 0]
+        really = truth.shift_turn @ wanted + truth.shift_place + moved_by
+        error = (needle - really) @ case.axes.T
+        found.append(np.broadcast_to(error, (truth.count, 3)))
+    return found
