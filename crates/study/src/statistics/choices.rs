@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::axis::Axis;
 use super::evidence::push_first;
-use super::interval::{Interval, Rate, about_mean};
+use super::interval::{Interval, Rate, TAIL, about_mean};
 use super::layout::Layout;
 use super::moments::{Grouped, Points, combinations};
 use super::selection::Quantiles;
@@ -149,14 +149,7 @@ impl ChoiceCounter {
                 FactorKind::Continuous { .. } => Axis::new(index, factor, bins),
             })
             .collect();
-        let any_sampled = factors
-            .iter()
-            .any(|factor| matches!(factor.kind, FactorKind::Continuous { .. }));
-        let repeats = if any_sampled {
-            combinations(factors, |factor| factor.role == Role::Circumstance)
-        } else {
-            1
-        };
+        let repeats = Points::of_one_choice(factors).repeats;
         let count = axes.iter().map(Axis::len).product();
         let quantiles = |p: f64| Quantiles::new(Rc::from([p]), repeats);
         let counter = || Counter {
@@ -250,8 +243,8 @@ impl ChoiceCounter {
             }
         });
         let rate = |successes, grouped: &Grouped| {
-            let effect = grouped.design_effect_of_rate(self.repeats);
-            Rate::new(successes, cell.cases - cell.invalid, effect)
+            let size = grouped.effective_size(self.repeats, TAIL);
+            Rate::new(successes, cell.cases - cell.invalid, size)
         };
         let quantile = |quantiles: &Quantiles, p: f64| {
             let interval = quantiles.interval(p);

@@ -118,7 +118,11 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
     }
     if let Some(limit) = criteria.max_invalid_layouts {
         // Layouts of one sampled point are taken for one: no more is known of how alike they are.
-        let rate = Rate::new(overall.invalid, overall.cases, summary.repeats as f64);
+        let rate = Rate::new(
+            overall.invalid,
+            overall.cases,
+            overall.cases as f64 / summary.repeats as f64,
+        );
         let what = "layouts that cannot exist".to_owned();
         judged.push(Judged {
             limit: Limit {

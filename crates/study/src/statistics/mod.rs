@@ -5,8 +5,11 @@
 //! alone. Lengths are in mm and angles in degrees, as in the table; shares are 0 to 1.
 
 mod axis;
+mod beta;
 mod choices;
 mod counts;
+#[cfg(test)]
+mod coverage;
 mod effects;
 mod evidence;
 mod interval;
@@ -32,13 +35,14 @@ pub use choices::{Choice, ChoiceRanking, Difference};
 pub use counts::{ConfigurationCounts, Counts, DetailCount};
 pub use effects::{BinMean, Effects, Interaction, MainEffect, ResponseEffects};
 pub use evidence::{CaseValue, ConfigurationEvidence, Evidence, MOST_CASES, WorstCases};
-pub use interval::{CONFIDENCE, Interval, Rate, mcnemar, wilson};
+pub use interval::{CONFIDENCE, Interval, Rate, clopper_pearson, mcnemar};
 pub use judge::{CriterionResult, judge_study};
 pub use methods::Method;
 pub use regions::{RegionCell, RegionMap, Regions};
 pub use spread::{BEST, PROBABILITIES, QuantileValue, Spread};
 
 pub(crate) use evidence::Largest;
+use interval::TAIL;
 pub(crate) use interval::about_mean;
 pub(crate) use layout::{CONFIGURATIONS, Layout, has_numbers};
 pub(crate) use moments::{Grouped, Points};
@@ -198,7 +202,7 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
     probabilities.sort_by(f64::total_cmp);
     probabilities.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
     let columns = results.columns();
-    let mut spreads = Spreads::new(Rc::from(probabilities), points.repeats, columns);
+    let mut spreads = Spreads::new(Rc::from(probabilities), points.repeats, TAIL, columns);
     let mut evidence = Collector::new(columns);
     let considered = if options.factors { factors } else { &[] };
     let mut main = MainEffects::new(
@@ -265,7 +269,7 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
     }
     let effect = all.design_effect_of_best(points.repeats);
     let per_goal = points.repeats / goals.len().max(1) as u64;
-    let overall = all.finish(None, points.repeats);
+    let overall = all.finish(None, points.repeats, TAIL);
     let goals = goals.into_iter().zip(&counters);
     let mut summary = Summary {
         schema_version: SUMMARY_VERSION,
@@ -274,12 +278,12 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
         repeats: points.repeats,
         overall,
         goals: goals
-            .map(|(goal, counter)| counter.finish(Some(goal), per_goal))
+            .map(|(goal, counter)| counter.finish(Some(goal), per_goal, TAIL))
             .collect(),
         metrics: columns.iter().filter(|each| each.spread).cloned().collect(),
         spreads: spreads.finish(columns),
         effects: main.finish(&interactions),
-        regions: regions.finish(effect),
+        regions: regions.finish(effect, points.repeats),
         choices: choices.map(|choices| choices.finish()),
         evidence: evidence.finish(),
         notes: Vec::new(),

@@ -28,6 +28,7 @@ impl Synthetic {
             name: name.to_owned(),
             unit: String::new(),
             role,
+            sampled: false,
             kind: FactorKind::Levels(
                 labels
                     .iter()
@@ -42,6 +43,7 @@ impl Synthetic {
             name: name.to_owned(),
             unit: unit.to_owned(),
             role: Role::Circumstance,
+            sampled: false,
             kind: FactorKind::Continuous { low, high },
         };
         let factors = vec![
