@@ -189,6 +189,12 @@ impl Grouped {
         self.sum.iter().sum()
     }
 
+    /// Count and sum of every other group: of the even ones, or of the odd ones.
+    pub(crate) fn of_half(&self, half: usize) -> [f64; 2] {
+        let sum = |values: &[f64]| values.iter().skip(half).step_by(2).sum();
+        [sum(&self.count), sum(&self.sum)]
+    }
+
     /// How much larger the variance of the mean is than that of as many independent cases: from the
     /// spread of the groups, at least 1. A sample of which no point appears twice has 1; where nothing
     /// can be seen of the repetition, all cases of a point are one.
