@@ -8,6 +8,8 @@ use crate::support::{Bench, SMALL, has_keys, workspace};
 const STUDY: &str = r#"
 name = "moved"
 scenario = "s.toml"
+mode = "static"
+replanned_cases = 4
 seed = 1
 [sampling]
 samples = 16

@@ -1,6 +1,7 @@
 //! What a study leaves besides its table.
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use needlebench_bench::study::{PreparedStudy, RobustnessResult, StudyCase, robustness_of};
 use needlebench_study::ParquetResults;
@@ -12,11 +13,13 @@ use serde::Serialize;
 use super::atomic::write_atomically;
 use super::error::FilesError;
 use super::folder::Folder;
+use super::replan::{Replanned, replan};
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
 use crate::page::study::{CasePlaces, StudyPage};
 use crate::table::study::document::blocks;
-use crate::table::study::robustness::robustness_blocks;
+use crate::table::study::postures::{Postures, postures_blocks, postures_headline};
+use crate::table::study::robustness::{robustness_blocks, robustness_method};
 use crate::table::study::text::summary_text;
 use needlebench_bench::progress::Progress;
 
@@ -34,6 +37,17 @@ pub struct StudySummary {
     study_id: String,
     /// Number of cases.
     cases: u64,
+    /// What is computed of a case, unless a level of a factor says otherwise.
+    mode: &'static str,
+    /// Whether all cases, some of them or none are of postures only: whether a motion gets there is then
+    /// not known.
+    postures_only: &'static str,
+    /// Postures only, in a sentence; none where all cases have motions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    headline: Option<String>,
+    /// How much the postures alone overstate; none where all cases have motions, or none was to be planned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    replanned: Option<Replanned>,
     /// `pass` if all criteria are met.
     verdict: &'static str,
     /// Criteria of the study.
@@ -56,6 +70,8 @@ pub struct StudyOutput<'a> {
     pub page: bool,
     /// Threads for what is computed on the way.
     pub threads: usize,
+    /// Ends it where it is long.
+    pub cancel: Option<&'a AtomicBool>,
 }
 
 /// What was written.
@@ -79,17 +95,22 @@ pub fn write_study(
     progress.message("statistics");
     let options = SummaryOptions {
         sampling: file.sampling.method,
-        working_configurations: file.criteria.working_configurations.unwrap_or(2) as usize,
-        more_quantiles: file
-            .criteria
-            .quantiles()
-            .iter()
-            .map(|each| each.quantile)
-            .collect(),
-        factors: true,
+        ..SummaryOptions::default()
     };
-    let statistics = summarise(results, &options)?;
+    let options = options.judged_by(&file.criteria);
+    let mut statistics = summarise(results, &options)?;
     let criteria = judge_study(&statistics, &file.criteria);
+    let replanned = replan(
+        prepared,
+        results,
+        &statistics,
+        Folder(output.folder),
+        output.threads,
+        output.cancel,
+        progress,
+    )?;
+    let postures = Postures::of(prepared);
+    let headline = postures_headline(postures, replanned.as_ref());
     let robustness = file
         .robustness
         .as_ref()
@@ -99,12 +120,18 @@ pub fn write_study(
             let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
             FilesError::Robustness(texts.join("; "))
         })?;
+    let of_radii = robustness.as_deref().and_then(robustness_method);
+    statistics.methods.extend(of_radii);
     let passed = criteria.iter().all(|criterion| criterion.pass);
     let summary = StudySummary {
         name: file.name.clone(),
         description: file.description.clone(),
         study_id: prepared.identity.id.clone(),
         cases: prepared.design.cases(),
+        mode: prepared.study.mode.name(),
+        postures_only: postures.name(),
+        headline,
+        replanned,
         verdict: if passed { "pass" } else { "fail" },
         criteria,
         robustness,
@@ -113,19 +140,23 @@ pub fn write_study(
     let folder = Folder(output.folder);
     let json = serde_json::to_string_pretty(&summary)?;
     folder.write("summary.json", json)?;
-    let more = file
+    let more = summary
         .robustness
         .as_ref()
-        .zip(summary.robustness.as_ref())
-        .map_or_else(Vec::new, |(section, results)| {
-            robustness_blocks(section, results)
-        });
-    let blocks = blocks(&summary.statistics, &summary.criteria, more);
-    let markdown = summary_markdown(&file.name, &summary.criteria, &blocks);
+        .map_or_else(Vec::new, |results| robustness_blocks(results));
+    let headline = summary.headline.as_deref();
+    let mut blocks = blocks(&summary.statistics, &summary.criteria, more);
+    let head = postures_blocks(headline, summary.replanned.as_ref());
+    blocks.splice(0..0, head);
+    let title = match postures {
+        Postures::All => format!("{} (postures only)", file.name),
+        Postures::Some | Postures::None => file.name.clone(),
+    };
+    let markdown = summary_markdown(&title, &summary.criteria, &blocks);
     folder.write("summary.md", markdown)?;
     let text = summary_text(&blocks);
     if let Some(path) = output.junit {
-        let document = study_junit(&file.name, &summary.criteria)?;
+        let document = study_junit(&file.name, headline, &summary.criteria)?;
         write_atomically(path, document.as_bytes()).map_err(|source| FilesError::Write {
             path: path.to_owned(),
             source,

@@ -52,6 +52,16 @@ pub struct ChoiceRanking {
     pub choices: Vec<Choice>,
 }
 
+impl ChoiceRanking {
+    /// Whether a case is one of the best choice.
+    pub fn is_best(&self, values: &[FactorValue]) -> bool {
+        self.choices.first().is_some_and(|best| {
+            let mut bins = self.axes.iter().zip(&best.bins);
+            bins.all(|(axis, &bin)| axis.bin(values[axis.factor]) == bin)
+        })
+    }
+}
+
 /// One combination of what is ours to choose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Choice {

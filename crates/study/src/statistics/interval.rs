@@ -92,7 +92,7 @@ pub fn clopper_pearson(share: f64, size: f64) -> Interval {
 }
 
 /// The same with another chance that the truth is beyond each end.
-fn clopper_pearson_with(share: f64, size: f64, tail: f64) -> Interval {
+pub(crate) fn clopper_pearson_with(share: f64, size: f64, tail: f64) -> Interval {
     let share = share.clamp(0.0, 1.0);
     if size <= 0.0 || size.is_nan() {
         return Interval {

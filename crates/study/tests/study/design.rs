@@ -4,7 +4,7 @@ use needlebench_cell::study::{
     Distribution, FactorValues, Role, SamplingMethod, StudyFactor, StudyLevel,
 };
 use needlebench_cell::{Change, KeyPath, Setting};
-use needlebench_study::{Design, DesignError, FactorValue};
+use needlebench_study::{Design, DesignError, Factor, FactorValue};
 
 fn key() -> KeyPath {
     KeyPath::parse("phantom.position_mm[0]").unwrap()
@@ -186,11 +186,7 @@ fn what_is_drawn_is_known_as_sampled() {
     };
     let of = |factors: &[StudyFactor]| -> Vec<bool> {
         let design = Design::of(&goals(), factors, SamplingMethod::Sobol, Some(4), 1).unwrap();
-        design
-            .factors()
-            .iter()
-            .map(|each| each.is_sampled())
-            .collect()
+        design.factors().iter().map(Factor::is_sampled).collect()
     };
     let crossed = levels("tool", 3, false);
     let sampled = [levels("size", 3, true), uniform("along")];

@@ -71,7 +71,21 @@ NB.StudyPage = class extends NB.StudyPlots {
     return NB.el('div', { class: 'bar' },
       Array.isArray(criteria) && criteria.length ? NB.el('span', { class: `chip ${met === criteria.length ? 'good' : 'bad'}`, text: met === criteria.length ? '\u2713 passed' : '\u2717 failed' }) : null,
       NB.el('span', { text: `${group(cases)} cases of 8 configurations` }),
+      this.page.summary?.headline ? NB.el('strong', { class: 'headline', text: this.page.summary.headline.charAt(0).toUpperCase() + this.page.summary.headline.slice(1) }) : null,
+      this.choiceText() ? NB.el('strong', { class: 'headline', text: this.choiceText() }) : null,
       kept < cases ? NB.el('strong', { text: `The plots show ${group(kept)} of them: one of each block of successive cases, drawn by a fixed rule, and those that the statistics name. All tables of statistics are of all cases.` }) : null);
+  }
+
+  /** Of which choice the statistics are, in a sentence; empty where nothing is chosen. */
+  choiceText() {
+    const best = this.page.summary?.of_choice;
+    if (this.page.summary?.not_ranked) return `Not judged: ${this.page.summary.not_ranked}`;
+    if (!best) return '';
+    const rate = this.page.summary.overall?.at_least?.[0];
+    const heldOut = best.held_out === null || best.held_out === undefined ? ''
+      : `; picked on one half of the points, a choice works in ${NB.fixed(100 * best.held_out, 1)} % of the other half`;
+    const share = rate?.rate === null || rate?.rate === undefined ? '' : ` At least one configuration is ok in ${NB.fixed(100 * rate.rate, 1)} %${rate.interval ? ` (${NB.fixed(100 * rate.interval.low, 1)} to ${NB.fixed(100 * rate.interval.high, 1)}, which holds for all choices at once)` : ''} of its valid layouts${heldOut}.`;
+    return `Rates and criteria are of the best of ${best.of} choices, ${best.label}, by ${best.by}.${share}`;
   }
 
   build(app) {
@@ -120,7 +134,7 @@ NB.StudyPage = class extends NB.StudyPlots {
     const metricSelect = NB.select('metric', metricOptions, this.state.metric, redraw((value) => { this.state.metric = value; this.sorted = null; }));
     app.append(
       figure('How often each configuration works', this.page.summary?.overall
-        ? `Share of valid cases in which it is ok, with ${Math.round(100 * (this.page.summary.confidence || 0.95))} % interval; of all cases.`
+        ? `Share of valid cases in which it is ok, with ${Math.round(100 * (this.page.summary.confidence || 0.95))} % interval; ${this.page.summary.of_choice ? `of the best choice, ${this.page.summary.of_choice.label}` : 'of all cases'}.`
         : 'Share of the valid cases on this page in which it is ok.', this.strip.element),
       controls, this.shown,
       NB.el('div', { class: 'grid cases' },
