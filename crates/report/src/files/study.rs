@@ -16,7 +16,7 @@ use super::folder::Folder;
 use super::replan::{Replanned, replan};
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
-use crate::page::study::{CasePlaces, StudyPage};
+use crate::page::study::StudyPage;
 use crate::table::study::document::blocks;
 use crate::table::study::postures::{Postures, postures_blocks, postures_headline};
 use crate::table::study::robustness::{robustness_blocks, robustness_method};
@@ -164,13 +164,9 @@ pub fn write_study(
     }
     if output.page {
         progress.message("writing the page");
-        let places = |case: u64| {
+        let scenarios = |case: u64| {
             let layout = StudyCase::new(&prepared.study, &prepared.design, case);
-            let resolved = layout.scenario(&prepared.study).ok()?;
-            Some(CasePlaces {
-                world_from_base_link: resolved.cell.robot.world_from_base_link,
-                world_from_phantom: resolved.phantom.map(|placed| placed.world_from_phantom),
-            })
+            layout.scenario(&prepared.study).ok()
         };
         let page = StudyPage {
             name: &file.name,
@@ -180,7 +176,7 @@ pub fn write_study(
             summary: &serde_json::to_value(&summary)?,
             manifest: &serde_json::to_value(prepared.manifest(None))?,
             base: Some(prepared.study.family.base()),
-            places: Some(&places),
+            scenarios: Some(&scenarios),
         };
         folder.write(PAGE_FILE, page.html()?)?;
     } else {

@@ -179,7 +179,7 @@ fn page(results: &Synthetic, summary: &Value) -> String {
         summary,
         manifest: &json!({"seed": 1}),
         base: None,
-        places: None,
+        scenarios: None,
     };
     page.html().unwrap()
 }
@@ -322,7 +322,7 @@ fn a_page_of_a_hundred_thousand_cases_for_the_browser() {
         summary: &summary(&results),
         manifest: &json!({"seed": 1}),
         base: Some(&base),
-        places: None,
+        scenarios: None,
     };
     std::fs::write(path, page.html().unwrap()).unwrap();
 }
