@@ -18,8 +18,19 @@ pub struct Factor {
     pub unit: String,
     /// Whether it is ours to choose.
     pub role: Role,
+    /// Whether its values are a sample: drawn by the sampling, or seeds of draws. A continuum always is;
+    /// tables of older versions do not say it of levels.
+    #[serde(default)]
+    pub sampled: bool,
     /// Its values.
     pub kind: FactorKind,
+}
+
+impl Factor {
+    /// Whether its values are a sample.
+    pub fn is_sampled(&self) -> bool {
+        self.sampled || matches!(self.kind, FactorKind::Continuous { .. })
+    }
 }
 
 /// Values of a factor.
@@ -148,6 +159,7 @@ impl Design {
             name: "goal".to_owned(),
             unit: String::new(),
             role: Role::Circumstance,
+            sampled: false,
             kind: FactorKind::Levels(
                 goals
                     .iter()
@@ -158,7 +170,7 @@ impl Design {
                     .collect(),
             ),
         };
-        let described = factors.iter().map(described);
+        let described = factors.iter().map(|factor| described(factor, sampled > 0));
         let descriptions: Vec<Factor> = std::iter::once(goal).chain(described).collect();
         let mut next_dimension = 0;
         let mut sources: Vec<Source> = Vec::with_capacity(descriptions.len());
@@ -255,11 +267,23 @@ fn index(number: u64) -> usize {
     usize::try_from(number).expect("a level's index")
 }
 
-fn described(factor: &StudyFactor) -> Factor {
+/// Key of the scenario's seed.
+const SEED: &str = "seed";
+
+fn described(factor: &StudyFactor, any_sampled: bool) -> Factor {
+    // Crossed seeds are draws too. Beside a sampling they are crossed with its points: those count.
+    let sets_seed = match &factor.values {
+        FactorValues::Levels(levels) => levels
+            .iter()
+            .flat_map(|level| &level.changes)
+            .any(|(key, _)| key.to_string() == SEED),
+        FactorValues::Continuum { .. } => false,
+    };
     Factor {
         name: factor.name.clone(),
         unit: factor.unit.clone(),
         role: factor.role,
+        sampled: factor.sampled || sets_seed && !any_sampled,
         kind: match &factor.values {
             FactorValues::Levels(levels) => FactorKind::Levels(
                 levels

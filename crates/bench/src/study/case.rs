@@ -62,7 +62,7 @@ impl StudyCase {
             goal: study.goals[goal].clone(),
             values,
             changes,
-            mode: mode.unwrap_or(study.file.mode),
+            mode: mode.unwrap_or(study.mode),
             engines,
         }
     }

@@ -53,7 +53,12 @@ impl PreparedStudy {
     /// Everything that is computed of any case.
     pub fn most_costly_mode(&self) -> StudyMode {
         let of_levels = levels(&self.study).filter_map(|level| level.mode);
-        of_levels.fold(self.study.file.mode, StudyMode::max)
+        of_levels.fold(self.study.mode, StudyMode::max)
+    }
+
+    /// What is computed of some case.
+    pub fn modes(&self) -> BTreeSet<StudyMode> {
+        modes(&self.study)
     }
 
     /// What the folder's results are results of.
@@ -81,7 +86,7 @@ impl PreparedStudy {
                 "inputs": self.identity.inputs,
                 "seed": file.seed,
                 "sampling": { "method": file.sampling.method.name(), "samples": self.design.samples() },
-                "mode": file.mode.name(),
+                "mode": self.study.mode.name(),
                 "goals": self.study.goals,
                 "description": file.description,
             }),
@@ -115,11 +120,23 @@ fn levels(study: &ResolvedStudy) -> impl Iterator<Item = &StudyLevel> {
         })
 }
 
+/// What is computed of some case. The study's own mode is of cases of which no level says another.
+fn modes(study: &ResolvedStudy) -> BTreeSet<StudyMode> {
+    let mut modes: BTreeSet<StudyMode> = levels(study).filter_map(|level| level.mode).collect();
+    let always_said = study.factors.iter().any(|factor| match &factor.values {
+        FactorValues::Levels(levels) => levels.iter().all(|level| level.mode.is_some()),
+        FactorValues::Continuum { .. } => false,
+    });
+    if !always_said {
+        modes.insert(study.mode);
+    }
+    modes
+}
+
 /// The columns of all that may be computed of any case.
 fn columns(study: &ResolvedStudy) -> StudyColumns {
     let file = &study.file;
-    let mut modes: BTreeSet<StudyMode> = levels(study).filter_map(|level| level.mode).collect();
-    modes.insert(file.mode);
+    let modes = modes(study);
     let of_scenario = study.family.base().scenario.engines.run.as_ref();
     let named = file.engines.as_ref().or(of_scenario);
     let of_levels = levels(study).filter_map(|level| level.engines.as_ref());

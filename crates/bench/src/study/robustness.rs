@@ -11,14 +11,20 @@
 //!
 //! # Method
 //!
-//! Along each of a fixed set of directions the first break is looked for in steps of a stated length,
-//! never beyond the nearest break known, and bisected. Around the direction of the nearest one a pattern
-//! search then looks for nearer ones. Along the directions looked at no break is missed that lasts
-//! longer than a step; between them a break on a narrow cone of directions may be.
+//! What is found is the nearest break of those that were looked at, not a bound: a radius is an upper bound
+//! of the distance within which something breaks, and no proof that nothing does.
+//!
+//! Along each of a fixed set of directions the first break is looked for in steps of a stated length, and
+//! bisected. Around the directions of the nearest ones a pattern search looks for nearer ones. Then evenly
+//! spread points of the ball within the nearest break are looked at; if one breaks, the search goes on about
+//! it, until a sweep of as many points finds none. How many directions and points there were, and how many of
+//! the last sweep's layouts cannot exist, is part of the result.
+//!
+//! A layout that cannot exist, such as a patient within the table, is neither a break nor a place where
+//! nothing breaks.
 
 mod search;
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use needlebench_cell::{Change, Finding, KeyPath, ResolvedScenario, ScenarioFamily};
@@ -28,7 +34,7 @@ use needlebench_study::Outcome;
 use serde::Serialize;
 
 use super::static_case::StaticWorker;
-use search::{Search, nearest_break};
+use search::{Search, Verdict, nearest_break};
 
 /// How far and how finely breaks are looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +51,8 @@ pub struct RobustnessSettings {
     pub shift_directions: u32,
     /// Directions of turns.
     pub tilt_directions: u32,
+    /// Points of the ball within the nearest break, none of which may break.
+    pub points: u32,
 }
 
 impl Default for RobustnessSettings {
@@ -54,8 +62,9 @@ impl Default for RobustnessSettings {
             max_tilt_deg: 20.0,
             step_mm: 2.0,
             step_deg: 1.0,
-            shift_directions: 32,
+            shift_directions: 64,
             tilt_directions: 16,
+            points: 4096,
         }
     }
 }
@@ -77,13 +86,30 @@ pub struct Breaking {
     pub detail: String,
 }
 
-/// How far the phantom may be moved; `None` where nothing breaks within the limits.
+/// The smallest move that was found to break a configuration, and how it was searched for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SmallestFound {
+    /// The break; none where none was found within the limit.
+    pub found: Option<Breaking>,
+    /// Farthest distance that was looked at, mm or deg.
+    pub limit: f64,
+    /// Directions that were scanned.
+    pub directions: u32,
+    /// Evenly spread points within the radius, or the limit, that were looked at last: none breaks.
+    pub points: u32,
+    /// Those of them whose layout cannot exist: nothing is known there, because there is nothing.
+    pub impossible: u32,
+    /// Whether the search came to its end: otherwise nearer breaks were still found when it was given up.
+    pub settled: bool,
+}
+
+/// How far the phantom may be moved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Robustness {
-    /// Smallest shift that breaks the configuration, posture solved anew; length of the vector.
-    pub shift: Option<Breaking>,
-    /// Smallest turn about the vertical and the body's long axis, `sqrt(yaw^2 + roll^2)`.
-    pub tilt: Option<Breaking>,
+    /// Smallest shift found that breaks the configuration, posture solved anew; length of the vector.
+    pub shift: SmallestFound,
+    /// Smallest turn found about the vertical and the body's long axis, `sqrt(yaw^2 + roll^2)`.
+    pub tilt: SmallestFound,
     /// The same with the arm left where it stands; none where it stands in no posture at all.
     pub unaware: Option<Unaware>,
     /// Layouts that were looked at.
@@ -95,10 +121,10 @@ pub struct Robustness {
 pub struct Unaware {
     /// Final positions of the joints, deg.
     pub joints_deg: [f64; 6],
-    /// Smallest shift.
-    pub shift: Option<Breaking>,
-    /// Smallest turn.
-    pub tilt: Option<Breaking>,
+    /// Smallest shift found.
+    pub shift: SmallestFound,
+    /// Smallest turn found.
+    pub tilt: SmallestFound,
 }
 
 /// Keys of a shift and of a turn.
@@ -142,16 +168,24 @@ pub fn robustness(
     let mut aware = |resolved: Result<ResolvedScenario, Vec<Finding>>| match resolved {
         Ok(resolved) => {
             let row = worker.row(&resolved, configuration);
-            (row.outcome != Outcome::Ok).then(|| row.detail.into_owned())
+            match row.outcome {
+                Outcome::Ok => Verdict::Holds,
+                Outcome::Failed | Outcome::Rejected => Verdict::Breaks(row.detail.into_owned()),
+                Outcome::Invalid => Verdict::Impossible,
+            }
         }
-        Err(findings) => goal_at_fault(&findings),
+        Err(findings) => goal_at_fault(&findings).map_or(Verdict::Impossible, Verdict::Breaks),
     };
     let (shift, tilt) = (mover.shift(&mut aware), mover.tilt(&mut aware));
     let unaware = joints_rad.map(|joints_rad| {
         let q = Joints::from_column_slice(&joints_rad);
         let mut stays = |resolved: Result<ResolvedScenario, Vec<Finding>>| match resolved {
-            Ok(resolved) => worker.clearance_broken(&resolved, &q).map(Cow::into_owned),
-            Err(findings) => goal_at_fault(&findings),
+            Ok(resolved) => match worker.clearance_broken(&resolved, &q) {
+                Ok(None) => Verdict::Holds,
+                Ok(Some(detail)) => Verdict::Breaks(detail.into_owned()),
+                Err(_) => Verdict::Impossible,
+            },
+            Err(findings) => goal_at_fault(&findings).map_or(Verdict::Impossible, Verdict::Breaks),
         };
         Unaware {
             joints_deg: joints_rad.map(f64::to_degrees),
@@ -183,25 +217,27 @@ struct Mover<'a> {
     evaluations: u64,
 }
 
-/// What breaks in a layout, if anything does.
-type Judge<'j> = dyn FnMut(Result<ResolvedScenario, Vec<Finding>>) -> Option<String> + 'j;
+/// What is seen in a layout.
+type Judge<'j> = dyn FnMut(Result<ResolvedScenario, Vec<Finding>>) -> Verdict + 'j;
 
 impl Mover<'_> {
-    fn shift(&mut self, judge: &mut Judge<'_>) -> Option<Breaking> {
+    fn shift(&mut self, judge: &mut Judge<'_>) -> SmallestFound {
         let search = Search {
             limit: self.settings.max_shift_mm,
             step: self.settings.step_mm,
             resolution: RESOLUTION,
+            points: self.settings.points,
         };
         let directions = search::on_sphere(self.settings.shift_directions);
         self.nearest(&search, &directions, &SHIFT_KEYS, judge)
     }
 
-    fn tilt(&mut self, judge: &mut Judge<'_>) -> Option<Breaking> {
+    fn tilt(&mut self, judge: &mut Judge<'_>) -> SmallestFound {
         let search = Search {
             limit: self.settings.max_tilt_deg,
             step: self.settings.step_deg,
             resolution: RESOLUTION,
+            points: self.settings.points,
         };
         let directions = search::on_circle(self.settings.tilt_directions);
         self.nearest(&search, &directions, &TILT_KEYS, judge)
@@ -213,21 +249,31 @@ impl Mover<'_> {
         directions: &[[f64; N]],
         keys: &[&str; N],
         judge: &mut Judge<'_>,
-    ) -> Option<Breaking> {
+    ) -> SmallestFound {
         let paths = keys.map(|key| KeyPath::parse(key).expect("a path"));
         let mut evaluations = 0;
-        let (radius, offset, detail) = nearest_break(search, directions, |offset| {
+        let found = nearest_break(search, directions, |offset| {
             evaluations += 1;
             judge(self.moved(&paths, offset))
-        })?;
+        });
         self.evaluations += evaluations;
-        let moved = self.moved(&paths, &offset);
-        Some(Breaking {
-            radius,
-            offset: offset.to_vec(),
-            keys: self.values(moved.as_ref().ok(), keys, &offset),
-            detail,
-        })
+        let breaking = found.nearest.map(|(radius, offset, detail)| {
+            let moved = self.moved(&paths, &offset);
+            Breaking {
+                radius,
+                offset: offset.to_vec(),
+                keys: self.values(moved.as_ref().ok(), keys, &offset),
+                detail,
+            }
+        });
+        SmallestFound {
+            found: breaking,
+            limit: search.limit,
+            directions: u32::try_from(directions.len()).unwrap_or(u32::MAX),
+            points: found.points,
+            impossible: found.impossible,
+            settled: found.settled,
+        }
     }
 
     fn moved<const N: usize>(

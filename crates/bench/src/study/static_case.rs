@@ -86,21 +86,21 @@ impl StaticWorker {
         .unwrap_or_else(|key| CaseRow::new(configuration, StudyMode::Static, Outcome::Invalid, key))
     }
 
-    /// The first rule or criterion about clearances that a posture breaks in a layout.
+    /// The first rule or criterion about clearances that a posture breaks in a layout; the key at fault of a
+    /// layout that cannot be.
     pub(super) fn clearance_broken(
         &mut self,
         resolved: &ResolvedScenario,
         q: &Joints,
-    ) -> Option<Cow<'static, str>> {
-        let broken = self.evaluate(resolved, |planner, _, _| {
+    ) -> Result<Option<Cow<'static, str>>, &'static str> {
+        self.evaluate(resolved, |planner, _, _| {
             let (clearance, rejections) = planner.clearance_rules(q);
             broken_rule(&rejections).or_else(|| {
                 let mut posture = ConfigurationReport::new("");
                 set_clearances(&mut posture, &clearance);
                 first_missed_by_posture(&posture, &resolved.scenario.criteria).map(Cow::from)
             })
-        });
-        broken.unwrap_or_else(|key| Some(key.into()))
+        })
     }
 
     /// Does something with a layout that is ready for it; the key at fault where it cannot be.

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use needlebench_cell::study::StudyMode;
+use needlebench_cell::study::{
+    Distribution, FactorValues, Role, SamplingMethod, StudyFactor, StudyMode,
+};
 use needlebench_cell::{
     Change, ClearanceClass, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting,
 };
@@ -10,9 +12,9 @@ use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{Planner, needle_route};
-use needlebench_study::Outcome;
+use needlebench_study::{Design, FactorValue, Outcome};
 
-use super::robustness::{RobustnessSettings, robustness};
+use super::robustness::{RESOLUTION, RobustnessSettings, robustness};
 use super::{CaseRow, StaticWorker, StudyColumns, invalid_rows, static_rows};
 use crate::real_cell::RealCell;
 
@@ -258,11 +260,12 @@ fn an_arm_that_stays_is_met_after_its_clearance() {
     let settings = RobustnessSettings {
         max_tilt_deg: 0.0,
         shift_directions: 12,
+        points: 256,
         ..RobustnessSettings::default()
     };
     let configuration = Configuration::ALL[index];
     let found = robustness(&family, "pose", &changes, configuration, &settings).unwrap();
-    let stays = found.unaware.unwrap().shift.unwrap();
+    let stays = found.unaware.unwrap().shift.found.unwrap();
     assert!(
         (stays.radius - least_mm).abs() < RADIUS_TOLERANCE_MM,
         "{} and {least_mm}",
@@ -291,13 +294,14 @@ fn the_breaking_case_breaks_and_half_of_it_does_not() {
         shift_directions: 6,
         tilt_directions: 4,
         max_tilt_deg: 5.0,
+        points: 64,
         ..RobustnessSettings::default()
     };
     let configuration = Configuration::ALL[index];
     let found = robustness(&family, goal, &changes, configuration, &settings).unwrap();
     let again = robustness(&family, goal, &changes, configuration, &settings).unwrap();
     assert_eq!(found, again);
-    let shift = found.shift.expect("an arm does not reach everywhere");
+    let shift = found.shift.found.expect("an arm does not reach everywhere");
     let outcome = |share: f64| {
         let mut moved = changes.to_vec();
         for (k, by) in shift.offset.iter().enumerate() {
@@ -306,10 +310,8 @@ fn the_breaking_case_breaks_and_half_of_it_does_not() {
         let resolved = family.vary(goal, &moved);
         resolved.map(|resolved| StaticWorker::default().row(&resolved, configuration))
     };
-    match outcome(1.0) {
-        Ok(row) => assert_eq!(row.detail, shift.detail),
-        Err(findings) => assert_eq!(findings[0].key.as_deref(), Some(shift.detail.as_str())),
-    }
+    // A layout that exists.
+    assert_eq!(outcome(1.0).unwrap().detail, shift.detail);
     assert_eq!(outcome(0.5).unwrap().outcome, Outcome::Ok);
     // The keys are the same case.
     let mut by_keys = changes.to_vec();
@@ -318,6 +320,84 @@ fn the_breaking_case_breaks_and_half_of_it_does_not() {
         let row = StaticWorker::default().row(&a, configuration);
         assert_eq!(row.detail, b.detail);
     }
+}
+
+/// Sobol points of the cube about a layout, moved by `radius` at most.
+fn sobol_points_of_a_ball(radius: f64) -> Vec<[f64; 3]> {
+    let factor = |name: &str| StudyFactor {
+        name: name.to_owned(),
+        unit: "mm".to_owned(),
+        role: Role::Circumstance,
+        sampled: true,
+        values: FactorValues::Continuum {
+            key: key("phantom.position_mm[0]"),
+            relative: true,
+            distribution: Distribution::Uniform {
+                low: -radius,
+                high: radius,
+            },
+        },
+    };
+    let factors = ["x", "y", "z"].map(factor);
+    let goals = ["g".to_owned()];
+    let design = Design::of(&goals, &factors, SamplingMethod::Sobol, Some(2048), 77).unwrap();
+    let points = (0..design.cases()).map(|case| match design.values(case)[1..] {
+        [
+            FactorValue::Number(x),
+            FactorValue::Number(y),
+            FactorValue::Number(z),
+        ] => [x, y, z],
+        _ => unreachable!("three continua"),
+    });
+    let inside = |point: &[f64; 3]| point.iter().map(|x| x * x).sum::<f64>() < radius * radius;
+    points.filter(inside).collect()
+}
+
+#[test]
+fn sobol_points_of_the_ball_refute_no_radius() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/studies/chest.toml");
+    let family = ScenarioFamily::load(&path, &Overrides::default()).unwrap();
+    let settings = RobustnessSettings {
+        max_shift_mm: 150.0,
+        max_tilt_deg: 0.0,
+        ..RobustnessSettings::default()
+    };
+    let goal = "left_upper_anterior";
+    let mut looked_at = 0;
+    for configuration in Configuration::ALL {
+        let found = robustness(&family, goal, &[], configuration, &settings).unwrap();
+        let shift = found.shift;
+        assert!(shift.settled);
+        let Some(smallest) = shift.found.filter(|found| found.radius > 0.0) else {
+            continue;
+        };
+        assert!(shift.points == settings.points && shift.directions > 64);
+        let mut worker = StaticWorker::default();
+        // What is within the width of the bisection is the break itself.
+        let points = sobol_points_of_a_ball(smallest.radius - RESOLUTION);
+        assert!(points.len() > 1000);
+        for point in points {
+            let moves: Vec<_> = (0..3)
+                .map(|axis| add(&format!("phantom.position_mm[{axis}]"), point[axis]))
+                .collect();
+            let Ok(resolved) = family.vary(goal, &moves) else {
+                continue;
+            };
+            let row = worker.row(&resolved, configuration);
+            assert!(
+                matches!(row.outcome, Outcome::Ok | Outcome::Invalid),
+                "{}: {} at {point:?}, within {}",
+                configuration.label(),
+                row.detail,
+                smallest.radius
+            );
+        }
+        looked_at += 1;
+        if looked_at == 2 {
+            break;
+        }
+    }
+    assert_eq!(looked_at, 2, "there are radii to refute");
 }
 
 #[test]

@@ -40,9 +40,15 @@ pub struct StudyFile {
     #[serde(default)]
     pub seed: u64,
     /// What is computed of a case: `static`, `planned` or `dynamic`. A level of a factor may say
-    /// otherwise.
+    /// otherwise. If left out: `planned` for up to 512 cases, which is a matter of minutes, and `static`,
+    /// postures only, for more.
     #[serde(default)]
-    pub mode: StudyMode,
+    pub mode: Option<StudyMode>,
+    /// Static cases that are planned too, drawn at random by the `seed`, to say how much a study of
+    /// postures alone overstates; 0 for none. Of a study with factors to choose, cases of the best choice.
+    #[serde(default = "replanned_cases")]
+    #[schemars(range(max = 10_000))]
+    pub replanned_cases: u32,
     /// Engines of dynamic cases; the scenario's if left out.
     #[serde(default)]
     pub engines: Option<Vec<EngineName>>,
@@ -63,6 +69,14 @@ pub struct StudyFile {
     #[serde(default)]
     pub robustness: Option<RobustnessSection>,
 }
+
+fn replanned_cases() -> u32 {
+    32
+}
+
+/// Most cases of a study that are planned where it does not say what is computed: each takes a second or
+/// so of one thread, 0.4 to 1 s for the shipped ones, so that all take some minutes.
+const MOST_PLANNED_BY_DEFAULT: u64 = 512;
 
 /// What is computed of a case.
 #[derive(
@@ -330,6 +344,8 @@ pub struct ResolvedStudy {
     pub goals: Vec<String>,
     /// The factors.
     pub factors: Vec<StudyFactor>,
+    /// What is computed of a case, unless a level says otherwise.
+    pub mode: StudyMode,
 }
 
 /// Reads and checks a study file and the scenario that it varies.

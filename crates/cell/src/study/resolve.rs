@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::{
-    Distribution, FILE, FactorSection, FactorValues, GridSection, NormalSection, ResolvedStudy,
-    StudyFactor, StudyFile, StudyLevel, StudyMode,
+    Distribution, FILE, FactorSection, FactorValues, GridSection, MOST_PLANNED_BY_DEFAULT,
+    NormalSection, ResolvedStudy, StudyFactor, StudyFile, StudyLevel, StudyMode,
 };
 use crate::engine_name::{EngineName, check_engine_names};
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
@@ -62,11 +62,34 @@ pub(super) fn resolve(
     }
     Ok(ResolvedStudy {
         source: source_of(file.to_owned(), text.as_bytes()),
+        mode: study
+            .mode
+            .unwrap_or_else(|| default_mode(&study, &goals, &factors)),
         family,
         goals,
         factors,
         file: study,
     })
+}
+
+/// What is computed where the study does not say it: motions too, as far as that is affordable.
+fn default_mode(study: &StudyFile, goals: &[String], factors: &[StudyFactor]) -> StudyMode {
+    let crossed = factors.iter().filter(|factor| !factor.sampled);
+    let levels = crossed.map(|factor| match &factor.values {
+        FactorValues::Levels(levels) => levels.len() as u64,
+        FactorValues::Continuum { .. } => 1,
+    });
+    let samples = study.sampling.samples;
+    let samples = samples.filter(|_| factors.iter().any(|factor| factor.sampled));
+    let cases = levels.fold(
+        samples.unwrap_or(1).saturating_mul(goals.len() as u64),
+        u64::saturating_mul,
+    );
+    if cases <= MOST_PLANNED_BY_DEFAULT {
+        StudyMode::Planned
+    } else {
+        StudyMode::Static
+    }
 }
 
 fn check_head(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Finding>) {
@@ -559,7 +582,7 @@ fn check_together(
         }
         setters.extend(own.into_iter().map(|key| (key.to_owned(), index)));
     }
-    let some_dynamic = study.mode == StudyMode::Dynamic
+    let some_dynamic = study.mode == Some(StudyMode::Dynamic)
         || factors.iter().any(|factor| match &factor.values {
             FactorValues::Levels(levels) => levels
                 .iter()

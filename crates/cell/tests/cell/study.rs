@@ -251,3 +251,22 @@ fn engines_are_those_that_there_are() {
         load(lines).unwrap();
     }
 }
+
+#[test]
+fn motions_are_planned_by_default_as_far_as_that_is_affordable() {
+    let mode = |lines: &str| load(lines).unwrap().mode;
+    let grid = |steps: u32| format!("{SHIFT}grid = {{ from = -30, to = 30, steps = {steps} }}\n");
+    let one = "goals = [\"left_upper_anterior\"]\n";
+    assert_eq!(mode(&format!("{one}{}", grid(512))), StudyMode::Planned);
+    assert_eq!(mode(&format!("{one}{}", grid(513))), StudyMode::Static);
+    // Samples multiply, and goals.
+    let sampled =
+        |samples: u32| format!("[sampling]\nsamples = {samples}\n{SHIFT}range = [-30, 30]\n");
+    assert_eq!(mode(&format!("{one}{}", sampled(512))), StudyMode::Planned);
+    assert_eq!(mode(&sampled(512)), StudyMode::Static);
+    // What is said counts.
+    let said = format!("mode = \"static\"\n{one}{}", grid(2));
+    assert_eq!(mode(&said), StudyMode::Static);
+    let study = load(&said).unwrap();
+    assert_eq!(study.file.replanned_cases, 32);
+}

@@ -27,7 +27,7 @@ pub(crate) use arguments::{MergeArguments, STUDY_HELP, StudyArguments};
 use needlebench_bench::progress::Progress as _;
 use needlebench_bench::study::{PreparedStudy, StudyCase, StudyEvaluator, in_words, time_per_case};
 use needlebench_bench::{RunOptions, Runnable};
-use needlebench_report::files::{StudyOutput, write_study};
+use needlebench_report::files::{FilesError, StudyOutput, write_study};
 use needlebench_report::table::study::{CaseReport, case_text};
 
 /// Longest time that a study is expected to take and starts without `--yes`.
@@ -95,7 +95,13 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
         Ok(RunEnd::Finished {
             results: Some(results),
             ..
-        }) => finish(&prepared, &folder, &results, &arguments.results),
+        }) => finish(
+            &prepared,
+            &folder,
+            &results,
+            &arguments.results,
+            Some(&cancel),
+        ),
     }
 }
 
@@ -123,7 +129,7 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
         Ok(RunEnd::Finished {
             results: Some(results),
             ..
-        }) => finish(&prepared, &folder, &results, &arguments.results),
+        }) => finish(&prepared, &folder, &results, &arguments.results, None),
         Ok(_) => unreachable!("a merge writes a table or fails"),
     }
 }
@@ -239,6 +245,7 @@ fn finish(
     folder: &Path,
     results: &Path,
     arguments: &StudyResultArguments,
+    cancel: Option<&AtomicBool>,
 ) -> Result<ExitStatus> {
     let threads = threads(arguments.jobs);
     let progress = TerminalProgress::new(arguments.quiet);
@@ -257,9 +264,17 @@ fn finish(
         junit: arguments.junit.as_deref(),
         page: !arguments.no_page,
         threads,
+        cancel,
     };
     let written = write_study(prepared, &results, &output, &progress);
     progress.finish();
+    if matches!(written, Err(FilesError::Interrupted)) {
+        anstream::eprintln!(
+            "interrupted: all cases are in {}, their summary is not; --resume goes on",
+            folder.display()
+        );
+        return Ok(ExitStatus::Interrupted);
+    }
     let finished =
         written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
     if arguments.json {

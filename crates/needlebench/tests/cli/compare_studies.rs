@@ -9,6 +9,8 @@ use crate::support::{Answer, Bench, SMALL, has_keys, with_edit};
 const STUDY: &str = r#"
 name = "shifted"
 scenario = "s.toml"
+mode = "static"
+replanned_cases = 4
 seed = 1
 [sampling]
 method = "sobol"

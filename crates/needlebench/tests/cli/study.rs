@@ -8,6 +8,8 @@ use crate::support::{Bench, SMALL, has_keys, workspace};
 const STUDY: &str = r#"
 name = "moved"
 scenario = "s.toml"
+mode = "static"
+replanned_cases = 4
 seed = 1
 [sampling]
 samples = 16
@@ -66,6 +68,68 @@ fn a_study_leaves_a_table_a_summary_and_a_page() {
         ],
     );
     assert_eq!(summary["cases"], 96);
+}
+
+#[test]
+fn a_study_of_postures_says_so_everywhere_and_what_they_overstate() {
+    let bench = bench(&format!("{STUDY}[criteria]\nmin_layouts_working = 0.0\n"));
+    let answer = run(&bench, &["--junit", "junit.xml"]).exits_with(0);
+    assert!(
+        answer.stdout.starts_with("POSTURES only: "),
+        "{}",
+        answer.stdout
+    );
+    let markdown = String::from_utf8(bench.read("out/moved/summary.md")).unwrap();
+    assert!(markdown.starts_with("# moved (postures only): pass\n\n- POSTURES only: "));
+    let summary: Value = serde_json::from_slice(&bench.read("out/moved/summary.json")).unwrap();
+    assert_eq!(summary["postures_only"], "all");
+    let headline = summary["headline"].as_str().unwrap();
+    assert!(
+        headline.starts_with("postures only: ") && headline.contains("Of 4 cases"),
+        "{headline}"
+    );
+    // Of the best choice alone, which has a third of the cases.
+    assert_eq!(summary["replanned"]["cases"], 4);
+    assert!(summary["replanned"]["of"].as_u64().unwrap() <= 32);
+    let drawn = summary["replanned"]["drawn"].as_array().unwrap();
+    for of in summary["replanned"]["gaps"].as_array().unwrap() {
+        assert!(of["interval"]["low"].is_number(), "{of}");
+    }
+    // A case that was drawn has the postures of its rows, and the motions of the case planned by itself.
+    let case = &drawn[0];
+    let bits = |mode: &str| {
+        bench.write("alone.toml", &STUDY.replace("mode = \"static\"", mode));
+        let number = case["case"].to_string();
+        let arguments = ["study", "alone.toml", "--case", &number, "--json"];
+        let alone = bench.run(&arguments).exits_with(0).json();
+        let rows = alone["rows"].as_array().unwrap().iter().enumerate();
+        let ok = rows.filter(|(_, row)| row["outcome"] == "ok");
+        ok.fold(0_u64, |bits, (index, _)| bits | 1 << index)
+    };
+    assert_eq!(case["static"], bits("mode = \"static\""));
+    assert_eq!(case["planned"], bits("mode = \"planned\""));
+    let junit = String::from_utf8(bench.read("junit.xml")).unwrap();
+    for words in ["postures only: ", "name=\"choice\"", "best of 3 choices"] {
+        assert!(junit.contains(words), "{junit}");
+    }
+    let page = String::from_utf8(bench.read("out/moved/report.html")).unwrap();
+    assert!(page.contains("summary?.headline"));
+}
+
+#[test]
+fn what_was_planned_for_the_gap_is_not_planned_again() {
+    let bench = bench(STUDY);
+    run(&bench, &["--no-page"]).exits_with(0);
+    let whole = bench.read("out/moved/summary.json");
+    let kept = String::from_utf8(bench.read("out/moved/replanned.txt")).unwrap();
+    // Damage is seen, and made good.
+    bench.write(
+        "out/moved/replanned.txt",
+        &kept.replacen("\nstudy", "\nStudy", 1),
+    );
+    run(&bench, &["--no-page", "--resume"]).exits_with(0);
+    assert_eq!(bench.read("out/moved/summary.json"), whole);
+    assert_eq!(bench.read("out/moved/replanned.txt"), kept.as_bytes());
 }
 
 #[test]

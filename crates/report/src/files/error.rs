@@ -41,4 +41,10 @@ pub enum FilesError {
     /// The robustness of a study's base scenario cannot be computed.
     #[error("robustness: {0}")]
     Robustness(String),
+    /// A static case of a study cannot be planned.
+    #[error("planning some cases: {0}")]
+    Replan(String),
+    /// The user ended it.
+    #[error("interrupted")]
+    Interrupted,
 }

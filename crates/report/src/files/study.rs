@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use needlebench_bench::study::{
     ENGINE_FAILURE, PreparedStudy, RobustnessResult, StudyCase, robustness_of,
@@ -16,11 +17,13 @@ use serde::Serialize;
 use super::atomic::write_atomically;
 use super::error::FilesError;
 use super::folder::Folder;
+use super::replan::{Replanned, replan};
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
-use crate::page::study::{CasePlaces, StudyPage};
+use crate::page::study::StudyPage;
 use crate::table::study::document::{Block, blocks};
-use crate::table::study::robustness::robustness_blocks;
+use crate::table::study::postures::{Postures, postures_blocks, postures_headline};
+use crate::table::study::robustness::{robustness_blocks, robustness_method};
 use crate::table::study::text::summary_text;
 use crate::table::verdict::capitals;
 use needlebench_bench::progress::Progress;
@@ -39,6 +42,17 @@ pub struct StudySummary {
     study_id: String,
     /// Number of cases.
     cases: u64,
+    /// What is computed of a case, unless a level of a factor says otherwise.
+    mode: &'static str,
+    /// Whether all cases, some of them or none are of postures only: whether a motion gets there is then
+    /// not known.
+    postures_only: &'static str,
+    /// Postures only, in a sentence; none where all cases have motions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    headline: Option<String>,
+    /// How much the postures alone overstate; none where all cases have motions, or none was to be planned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    replanned: Option<Replanned>,
     /// `pass`, `fail` or `incomplete`.
     verdict: Verdict,
     /// Criteria of the study.
@@ -63,6 +77,8 @@ pub struct StudyOutput<'a> {
     pub page: bool,
     /// Threads for what is computed on the way.
     pub threads: usize,
+    /// Ends it where it is long.
+    pub cancel: Option<&'a AtomicBool>,
 }
 
 /// What was written.
@@ -86,17 +102,22 @@ pub fn write_study(
     progress.message("statistics");
     let options = SummaryOptions {
         sampling: file.sampling.method,
-        working_configurations: file.criteria.working_configurations.unwrap_or(2) as usize,
-        more_quantiles: file
-            .criteria
-            .quantiles()
-            .iter()
-            .map(|each| each.quantile)
-            .collect(),
-        factors: true,
+        ..SummaryOptions::default()
     };
-    let statistics = summarise(results, &options)?;
+    let options = options.judged_by(&file.criteria);
+    let mut statistics = summarise(results, &options)?;
     let criteria = judge_study(&statistics, &file.criteria);
+    let replanned = replan(
+        prepared,
+        results,
+        &statistics,
+        Folder(output.folder),
+        output.threads,
+        output.cancel,
+        progress,
+    )?;
+    let postures = Postures::of(prepared);
+    let headline = postures_headline(postures, replanned.as_ref());
     let robustness = file
         .robustness
         .as_ref()
@@ -106,6 +127,8 @@ pub fn write_study(
             let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
             FilesError::Robustness(texts.join("; "))
         })?;
+    let of_radii = robustness.as_deref().and_then(robustness_method);
+    statistics.methods.extend(of_radii);
     let not_judged = not_judged(&statistics, &criteria);
     let missed = criteria.iter().filter(|each| each.is_missed()).count();
     let verdict = Verdict::of(missed > 0, !not_judged.is_empty());
@@ -114,6 +137,10 @@ pub fn write_study(
         description: file.description.clone(),
         study_id: prepared.identity.id.clone(),
         cases: prepared.design.cases(),
+        mode: prepared.study.mode.name(),
+        postures_only: postures.name(),
+        headline,
+        replanned,
         verdict,
         criteria,
         not_judged,
@@ -123,21 +150,25 @@ pub fn write_study(
     let folder = Folder(output.folder);
     let json = serde_json::to_string_pretty(&summary)?;
     folder.write("summary.json", json)?;
-    let more = file
+    let more = summary
         .robustness
         .as_ref()
-        .zip(summary.robustness.as_ref())
-        .map_or_else(Vec::new, |(section, results)| {
-            robustness_blocks(section, results)
-        });
+        .map_or_else(Vec::new, |results| robustness_blocks(results));
+    let headline = summary.headline.as_deref();
     let mut blocks = blocks(&summary.statistics, &summary.criteria, more);
+    let head = postures_blocks(headline, summary.replanned.as_ref());
+    blocks.splice(0..0, head);
     blocks.extend(last_line(&summary).map(|line| Block::Lines(vec![line])));
+    let title = match postures {
+        Postures::All => format!("{} (postures only)", file.name),
+        Postures::Some | Postures::None => file.name.clone(),
+    };
     let verdict = last_line(&summary).map(|_| summary.verdict);
-    let markdown = summary_markdown(&file.name, verdict, &blocks);
+    let markdown = summary_markdown(&title, verdict, &blocks);
     folder.write("summary.md", markdown)?;
     let text = summary_text(&blocks);
     if let Some(path) = output.junit {
-        let document = study_junit(&file.name, &summary.criteria)?;
+        let document = study_junit(&file.name, headline, &summary.criteria)?;
         write_atomically(path, document.as_bytes()).map_err(|source| FilesError::Write {
             path: path.to_owned(),
             source,
@@ -145,13 +176,9 @@ pub fn write_study(
     }
     if output.page {
         progress.message("writing the page");
-        let places = |case: u64| {
+        let scenarios = |case: u64| {
             let layout = StudyCase::new(&prepared.study, &prepared.design, case);
-            let resolved = layout.scenario(&prepared.study).ok()?;
-            Some(CasePlaces {
-                world_from_base_link: resolved.cell.robot.world_from_base_link,
-                world_from_phantom: resolved.phantom.map(|placed| placed.world_from_phantom),
-            })
+            layout.scenario(&prepared.study).ok()
         };
         let page = StudyPage {
             name: &file.name,
@@ -161,7 +188,7 @@ pub fn write_study(
             summary: &serde_json::to_value(&summary)?,
             manifest: &serde_json::to_value(prepared.manifest(None))?,
             base: Some(prepared.study.family.base()),
-            places: Some(&places),
+            scenarios: Some(&scenarios),
         };
         folder.write(PAGE_FILE, page.html()?)?;
     } else {

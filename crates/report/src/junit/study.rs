@@ -5,10 +5,20 @@ use quick_junit::{SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::failure::{failure, not_judged};
 
-/// The criteria of a study as one JUnit document.
-pub fn study_junit(name: &str, criteria: &[CriterionResult]) -> Result<String, SerializeError> {
+/// The criteria of a study as one JUnit document; `headline` says what the study is no answer to.
+pub fn study_junit(
+    name: &str,
+    headline: Option<&str>,
+    criteria: &[CriterionResult],
+) -> Result<String, SerializeError> {
     let mut document = quick_junit::Report::new("needlebench study");
     let mut suite = TestSuite::new(name.to_owned());
+    if let Some(headline) = headline {
+        suite.add_property(("headline", headline));
+    }
+    if let Some(choice) = criteria.iter().find_map(|each| each.choice.as_deref()) {
+        suite.add_property(("choice", choice));
+    }
     for criterion in criteria {
         let of = criterion
             .of
@@ -29,6 +39,10 @@ pub fn study_junit(name: &str, criteria: &[CriterionResult]) -> Result<String, S
         };
         let mut case = TestCase::new(format!("{}{of}", criterion.criterion), status);
         case.set_classname(name.to_owned());
+        case.set_system_out(match headline {
+            Some(headline) => format!("{}\n{headline}", criterion.detail),
+            None => criterion.detail.clone(),
+        });
         suite.add_test_case(case);
     }
     document.add_test_suite(suite);

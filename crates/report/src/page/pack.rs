@@ -23,6 +23,11 @@ pub(super) struct Pack {
 }
 
 impl Pack {
+    /// Bytes so far.
+    pub fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
     fn place(&mut self, kind: &str, count: usize) -> Value {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         json!({"at": self.bytes.len(), "n": count, "t": kind})

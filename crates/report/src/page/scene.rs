@@ -1,13 +1,13 @@
 //! The cell as surfaces, and the arm's chain.
 
 use needlebench_cell::fixtures::FixtureKind;
-use needlebench_cell::phantom::Tissue;
-use needlebench_cell::{BodyKind, Frame, ResolvedScenario};
+use needlebench_cell::phantom::{Phantom, Tissue};
+use needlebench_cell::{BodyKind, Frame, ResolvedScenario, Tool};
 use needlebench_geometry::{Shape, Solid, TriangleMesh, Visual};
 use needlebench_kinematics::{Chain, Pose};
 use serde_json::{Value, json};
 
-use super::mesh::{append, joined, surface};
+use super::mesh::{MOST_TRIANGLES, append, joined, surface, thinned};
 use super::pack::Pack;
 
 /// Fineness of curved surfaces, m.
@@ -104,6 +104,52 @@ impl Surfaces {
         }
     }
 
+    fn add_tool(&mut self, tool: &Tool) {
+        let here = Pose::identity();
+        if tool.visuals.is_empty() {
+            self.add_solids("tool", FLANGE, TOOL, &tool.solids, &here);
+            self.add_solids("tool", FLANGE, TOOL, &tool.guide_solids, &here);
+        } else {
+            self.add_body("tool", FLANGE, &tool.visuals, &[], &here);
+        }
+    }
+
+    fn add_phantom(&mut self, phantom: &Phantom, place: &Pose) {
+        for part in &phantom.parts {
+            let (group, opacity) = match part.tissue {
+                Tissue::Skin => ("skin", 0.22),
+                Tissue::Organ => ("organ", 0.4),
+                Tissue::Bone => ("bone", 1.0),
+                Tissue::Vessel => ("vessel", 1.0),
+                Tissue::Lesion => ("lesion", 1.0),
+                Tissue::Marker => ("marker", 1.0),
+            };
+            let mut color_rgba = part.color_rgba;
+            color_rgba[3] = opacity;
+            self.add_solids(
+                group,
+                WORLD,
+                color_rgba,
+                std::slice::from_ref(&part.solid),
+                place,
+            );
+        }
+    }
+
+    /// The surfaces, each with at most so many triangles.
+    fn finish(self, pack: &mut Pack, most: usize) -> Vec<Value> {
+        let parts = self.0.into_iter().map(|each| {
+            let mesh = thinned(&each.mesh, most);
+            json!({
+                "group": each.group,
+                "frame": each.frame,
+                "color": each.color_rgba,
+                "surface": surface(pack, &mesh),
+            })
+        });
+        parts.collect()
+    }
+
     fn add_solids(
         &mut self,
         group: &'static str,
@@ -141,12 +187,7 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
     }
     let tool = &cell.tool;
     let here = Pose::identity();
-    if tool.visuals.is_empty() {
-        surfaces.add_solids("tool", FLANGE, TOOL, &tool.solids, &here);
-        surfaces.add_solids("tool", FLANGE, TOOL, &tool.guide_solids, &here);
-    } else {
-        surfaces.add_body("tool", FLANGE, &tool.visuals, &[], &here);
-    }
+    surfaces.add_tool(tool);
     for fixture in &resolved.fixtures {
         let group = match fixture.kind {
             FixtureKind::Table => "table",
@@ -169,20 +210,7 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
         surfaces.add(group, WORLD, color_rgba, &joined(&solids), &here);
     }
     if let Some(placed) = &resolved.phantom {
-        for part in &placed.phantom.parts {
-            let (group, opacity) = match part.tissue {
-                Tissue::Skin => ("skin", 0.22),
-                Tissue::Organ => ("organ", 0.4),
-                Tissue::Bone => ("bone", 1.0),
-                Tissue::Vessel => ("vessel", 1.0),
-                Tissue::Lesion => ("lesion", 1.0),
-                Tissue::Marker => ("marker", 1.0),
-            };
-            let mut color_rgba = part.color_rgba;
-            color_rgba[3] = opacity;
-            let solids = std::slice::from_ref(&part.solid);
-            surfaces.add_solids(group, WORLD, color_rgba, solids, &placed.world_from_phantom);
-        }
+        surfaces.add_phantom(&placed.phantom, &placed.world_from_phantom);
     }
     for body in &cell.bodies {
         let (group, color_rgba) = match body.kind {
@@ -198,22 +226,29 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
         };
         surfaces.add_solids(group, frame, color_rgba, &body.solids, &here);
     }
-    let parts: Vec<Value> = surfaces
-        .0
-        .into_iter()
-        .map(|each| {
-            json!({
-                "group": each.group,
-                "frame": each.frame,
-                "color": each.color_rgba,
-                "surface": surface(pack, &each.mesh),
-            })
-        })
-        .collect();
+    let parts = surfaces.finish(pack, MOST_TRIANGLES);
     json!({
         "chain": chain(&robot.world_from_base_link, &robot.chain),
         "guide": [pose(&tool.flange_from_guide_entry), pose(&tool.flange_from_guide_exit)],
         "needleLength": tool.needle.length_m,
         "parts": parts,
+    })
+}
+
+/// Triangles of a surface of a further tool or phantom: there may be many of them on a page.
+const MOST_TRIANGLES_OF_A_LOOK: usize = 3000;
+
+/// Tool and phantom of another case than the one that a page's surroundings are of. The phantom is in its
+/// own frame.
+pub(super) fn look(resolved: &ResolvedScenario, pack: &mut Pack) -> Value {
+    let tool = &resolved.cell.tool;
+    let mut surfaces = Surfaces::default();
+    surfaces.add_tool(tool);
+    if let Some(placed) = &resolved.phantom {
+        surfaces.add_phantom(&placed.phantom, &Pose::identity());
+    }
+    json!({
+        "guide": [pose(&tool.flange_from_guide_entry), pose(&tool.flange_from_guide_exit)],
+        "parts": surfaces.finish(pack, MOST_TRIANGLES_OF_A_LOOK),
     })
 }

@@ -578,8 +578,8 @@ fn value(
     match compared {
         Compared::Unknown(..) => (None, None),
         Compared::Rate(rate) if rate == INVALID_LAYOUTS => {
-            let repeats = summary.repeats as f64;
-            of_rate(&Rate::new(overall.invalid, overall.cases, repeats))
+            let points = overall.cases as f64 / summary.repeats as f64;
+            of_rate(&Rate::new(overall.invalid, overall.cases, points))
         }
         Compared::Rate(rate) if rate == WORKING_LAYOUTS => of_rate(&overall.at_least[0]),
         Compared::Rate(_) => {

@@ -166,6 +166,7 @@ mod tests {
                 name: "x".to_owned(),
                 unit: String::new(),
                 role: Role::Choice,
+                sampled: false,
                 kind: FactorKind::Levels(levels.collect()),
             };
             let axis = Axis::new(0, &factor, bins);
@@ -182,6 +183,7 @@ mod tests {
             name: "x".to_owned(),
             unit: "mm".to_owned(),
             role: Role::Circumstance,
+            sampled: false,
             kind: FactorKind::Continuous {
                 low: -10.0,
                 high: 10.0,

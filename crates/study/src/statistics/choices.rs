@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::axis::Axis;
 use super::evidence::push_first;
-use super::interval::{Interval, Rate, about_mean};
+use super::interval::{Interval, Rate, TAIL, about_mean};
 use super::layout::Layout;
 use super::moments::{Grouped, Points, combinations};
 use super::selection::Quantiles;
@@ -36,14 +36,30 @@ pub struct ChoiceRanking {
     pub axes: Vec<Axis>,
     /// Configurations that have to be ok, of [`Choice::works_k`].
     pub working_configurations: usize,
+    /// By what they are ranked, in words.
+    pub ranked_by: String,
+    /// Share of the valid layouts that work with a choice that was picked on one half of the points, on
+    /// the other half: what picking the best of so many makes of its share is not in it. None where there
+    /// are too few points.
+    pub held_out: Option<f64>,
     /// Whether all choices met the same circumstances.
     pub paired: bool,
     /// Whether the choices differ in which layouts can exist at all, so that their rates are not of
     /// the same layouts.
     pub validity_differs: bool,
-    /// By the share of layouts in which at least one configuration is ok, then by the 5 % quantile of
+    /// By the share of their cases that work, those that cannot exist included, then by the 5 % quantile of
     /// the best clearance, then by the median tip error.
     pub choices: Vec<Choice>,
+}
+
+impl ChoiceRanking {
+    /// Whether a case is one of the best choice.
+    pub fn is_best(&self, values: &[FactorValue]) -> bool {
+        self.choices.first().is_some_and(|best| {
+            let mut bins = self.axes.iter().zip(&best.bins);
+            bins.all(|(axis, &bin)| axis.bin(values[axis.factor]) == bin)
+        })
+    }
 }
 
 /// One combination of what is ours to choose.
@@ -85,6 +101,8 @@ pub struct Difference {
 struct Counter {
     cases: u64,
     invalid: u64,
+    /// Whether it works, case by case: what cannot exist with a choice does not work with it.
+    serves: Grouped,
     works: Grouped,
     works_k: Grouped,
     working: u64,
@@ -100,6 +118,8 @@ struct Counter {
 pub(crate) struct ChoiceCounter {
     axes: Vec<Axis>,
     k: usize,
+    /// Configurations that have to be ok for a layout to count as one that works.
+    ranked_k: usize,
     repeats: u64,
     cells: Vec<Counter>,
     circumstances: Points,
@@ -107,7 +127,11 @@ pub(crate) struct ChoiceCounter {
 
 impl ChoiceCounter {
     /// None where nothing is ours to choose; an error in words where there is too much.
-    pub(crate) fn new(factors: &[Factor], k: usize) -> Option<Result<Self, String>> {
+    pub(crate) fn new(
+        factors: &[Factor],
+        k: usize,
+        ranked_k: usize,
+    ) -> Option<Result<Self, String>> {
         let chosen: Vec<(usize, &Factor)> = factors
             .iter()
             .enumerate()
@@ -149,19 +173,13 @@ impl ChoiceCounter {
                 FactorKind::Continuous { .. } => Axis::new(index, factor, bins),
             })
             .collect();
-        let any_sampled = factors
-            .iter()
-            .any(|factor| matches!(factor.kind, FactorKind::Continuous { .. }));
-        let repeats = if any_sampled {
-            combinations(factors, |factor| factor.role == Role::Circumstance)
-        } else {
-            1
-        };
+        let repeats = Points::of_one_choice(factors).repeats;
         let count = axes.iter().map(Axis::len).product();
         let quantiles = |p: f64| Quantiles::new(Rc::from([p]), repeats);
         let counter = || Counter {
             cases: 0,
             invalid: 0,
+            serves: Grouped::default(),
             works: Grouped::default(),
             works_k: Grouped::default(),
             working: 0,
@@ -174,13 +192,15 @@ impl ChoiceCounter {
         Some(Ok(Self {
             axes,
             k,
+            ranked_k,
             repeats,
             cells: std::iter::repeat_with(counter).take(count).collect(),
             circumstances: Points::of_circumstances(factors),
         }))
     }
 
-    fn cell(&self, values: &[FactorValue]) -> usize {
+    /// Index of the choice of a case.
+    pub(crate) fn cell(&self, values: &[FactorValue]) -> usize {
         self.axes.iter().fold(0, |index, axis| {
             index * axis.len() + axis.bin(values[axis.factor])
         })
@@ -196,8 +216,10 @@ impl ChoiceCounter {
     ) {
         let cell = self.cell(values);
         let circumstances = self.circumstances.hash(values);
-        let (k, cell) = (self.k, &mut self.cells[cell]);
+        let (k, ranked_k, cell) = (self.k, self.ranked_k, &mut self.cells[cell]);
         if pass == 0 {
+            let serves = layout.is_some_and(|layout| layout.working() >= ranked_k);
+            cell.serves.push(group, f64::from(u8::from(serves)));
             cell.cases += 1;
             cell.circumstances = cell.circumstances.wrapping_add(circumstances);
         }
@@ -250,8 +272,8 @@ impl ChoiceCounter {
             }
         });
         let rate = |successes, grouped: &Grouped| {
-            let effect = grouped.design_effect_of_rate(self.repeats);
-            Rate::new(successes, cell.cases - cell.invalid, effect)
+            let size = grouped.effective_size(self.repeats, TAIL);
+            Rate::new(successes, cell.cases - cell.invalid, size)
         };
         let quantile = |quantiles: &Quantiles, p: f64| {
             let interval = quantiles.interval(p);
@@ -279,20 +301,17 @@ impl ChoiceCounter {
     }
 
     fn difference(&self, first: usize, other: usize) -> Option<Difference> {
-        let (a, b) = (&self.cells[first], &self.cells[other]);
-        let (size_a, size_b) = (a.cases - a.invalid, b.cases - b.invalid);
-        if size_a == 0 || size_b == 0 {
+        let (a, b) = (&self.cells[first].serves, &self.cells[other].serves);
+        let (size_a, size_b) = (a.count(), b.count());
+        if size_a == 0.0 || size_b == 0.0 {
             return None;
         }
-        let (share_a, share_b) = (
-            a.working as f64 / size_a as f64,
-            b.working as f64 / size_b as f64,
-        );
+        let (share_a, share_b) = (a.total() / size_a, b.total() / size_b);
         let difference = share_a - share_b;
-        let spread = Grouped::squared_error_of_difference(&a.works, &b.works);
+        let spread = Grouped::squared_error_of_difference(a, b);
         let interval =
             spread.map(|(square, freedom)| about_mean(difference, square.sqrt(), freedom));
-        let layouts = difference.abs() * size_a.min(size_b) as f64;
+        let layouts = difference.abs() * size_a.min(size_b);
         Some(Difference {
             difference,
             interval,
@@ -301,20 +320,52 @@ impl ChoiceCounter {
         })
     }
 
-    pub(crate) fn finish(&self) -> ChoiceRanking {
+    /// Share of the cases of a choice that work.
+    fn share(&self, index: usize) -> f64 {
+        let serves = &self.cells[index].serves;
+        serves.total() / serves.count().max(1.0)
+    }
+
+    /// What a choice is worth that was picked on one half of the points, on the other half, and the other
+    /// way round.
+    fn held_out(&self) -> Option<f64> {
+        let (mut working, mut of) = (0.0, 0.0);
+        for half in 0..2 {
+            let share = |index: usize, half: usize| {
+                let [count, sum] = self.cells[index].serves.of_half(half);
+                (count > 0.0).then(|| sum / count)
+            };
+            // The first of equal ones: their order knows nothing of the other half.
+            let picked = (0..self.cells.len())
+                .filter_map(|index| Some((index, share(index, half)?)))
+                .reduce(|best, other| if other.1 > best.1 { other } else { best })?;
+            let cell = &self.cells[picked.0];
+            let grouped = if self.ranked_k > 1 {
+                &cell.works_k
+            } else {
+                &cell.works
+            };
+            let [count, sum] = grouped.of_half(1 - half);
+            working += sum;
+            of += count;
+        }
+        (of > 0.0).then(|| working / of)
+    }
+
+    /// The ranking, and the index of its first choice.
+    pub(crate) fn finish(&self) -> (ChoiceRanking, Option<usize>) {
         let used = (0..self.cells.len()).filter(|&index| self.cells[index].cases > 0);
         let mut choices: Vec<(usize, Choice)> =
             used.map(|index| (index, self.choice(index))).collect();
         let quantile = |found: &Option<QuantileValue>, none: f64| {
             found.as_ref().map_or(none, |found| found.value)
         };
-        choices.sort_by(|(_, a), (_, b)| {
-            let share = |choice: &Choice| choice.works.rate.unwrap_or(-1.0);
+        choices.sort_by(|(i, a), (j, b)| {
             let clearance =
                 |choice: &Choice| quantile(&choice.best_clearance_mm, f64::NEG_INFINITY);
             let error = |choice: &Choice| quantile(&choice.tip_error_mm, f64::INFINITY);
-            share(b)
-                .total_cmp(&share(a))
+            self.share(*j)
+                .total_cmp(&self.share(*i))
                 .then(clearance(b).total_cmp(&clearance(a)))
                 .then(error(a).total_cmp(&error(b)))
         });
@@ -330,12 +381,27 @@ impl ChoiceCounter {
         let validity_differs = choices
             .iter()
             .any(|(_, choice)| invalid(choice) != invalid(&choices[0].1));
-        ChoiceRanking {
+        let works = match self.ranked_k {
+            1 => "at least one configuration is".to_owned(),
+            k => format!("at least {k} configurations are"),
+        };
+        let ranking = ChoiceRanking {
             axes: self.axes.clone(),
             working_configurations: self.k,
+            ranked_by: format!(
+                "the share of its cases in which {works} ok, layouts that cannot exist counting against \
+                 it; of equal ones the 5 % quantile of the best clearance, then the median tip error"
+            ),
+            held_out: self.held_out(),
             paired,
             validity_differs,
             choices: choices.into_iter().map(|(_, choice)| choice).collect(),
-        }
+        };
+        (ranking, first)
+    }
+
+    /// Cases of a choice, with the points that they repeat.
+    pub(crate) fn cases(&self, index: usize) -> u64 {
+        self.cells[index].cases
     }
 }

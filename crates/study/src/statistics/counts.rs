@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use needlebench_kinematics::ik::Configuration;
 use serde::{Deserialize, Serialize};
 
-use super::interval::Rate;
+use super::interval::{Rate, TAIL};
 use super::layout::{CONFIGURATIONS, Layout};
 use super::moments::Grouped;
 use crate::{CaseResult, Outcome};
@@ -155,16 +155,20 @@ impl Counter {
     /// Largest design effect of the shares in which the configurations are the best.
     pub(crate) fn design_effect_of_best(&self, repeats: u64) -> f64 {
         let effects = self.is_best.iter();
+        // Of those that ever are.
+        let effects = effects.filter(|grouped| grouped.total() > 0.0);
         effects
-            .map(|grouped| grouped.design_effect_of_rate(repeats))
+            .map(|grouped| grouped.count() / grouped.effective_size(repeats, TAIL))
             .fold(1.0, f64::max)
     }
 
-    /// The numbers of a goal, or of all; `repeats` cases come from each sampled point.
-    pub(crate) fn finish(&self, goal: Option<String>, repeats: u64) -> Counts {
+    /// The numbers of a goal, or of all; `repeats` cases come from each sampled point, and the truth is
+    /// beyond an end of an interval with the chance `tail`.
+    pub(crate) fn finish(&self, goal: Option<String>, repeats: u64, tail: f64) -> Counts {
         let layouts: u64 = self.working.iter().sum();
         let rate = |successes, grouped: &Grouped| {
-            Rate::new(successes, layouts, grouped.design_effect_of_rate(repeats))
+            let size = grouped.effective_size(repeats, tail);
+            Rate::with_tail(successes, layouts, size, tail)
         };
         let configurations = Configuration::ALL.iter().enumerate();
         Counts {

@@ -4,7 +4,7 @@ use needlebench_kinematics::ik::Configuration;
 use serde::{Deserialize, Serialize};
 
 use super::axis::Axis;
-use super::interval::{Interval, about_mean, wilson};
+use super::interval::{Interval, TAIL, about_mean, clopper_pearson};
 use super::layout::{CONFIGURATIONS, Layout};
 use super::moments::{Grouped, Moments};
 use crate::FactorValue;
@@ -60,7 +60,7 @@ pub struct BinMean {
     pub count: u64,
     /// Mean; none of no layouts.
     pub mean: Option<f64>,
-    /// Its interval: Wilson's of a share, Student's of a mean; none of a single number.
+    /// Its interval: Clopper and Pearson's of a share, Student's of a mean; none of a single number.
     pub interval: Option<Interval>,
     /// Whether there are fewer than 30 independent layouts.
     pub small: bool,
@@ -152,6 +152,15 @@ impl MainEffects {
     /// Design effect of the mean of a response.
     fn design_effect(&self, response: usize) -> f64 {
         let all = &self.all[response];
+        if is_rate(response) {
+            let groups = &self.groups[response];
+            let size = groups.effective_size(self.repeats, TAIL);
+            return if size > 0.0 {
+                groups.count() / size
+            } else {
+                1.0
+            };
+        }
         let variance = all.deviations() / all.count().max(1) as f64;
         self.groups[response].design_effect(variance, self.repeats)
     }
@@ -175,6 +184,7 @@ impl MainEffects {
         } else {
             (1.0, alike(self.repeats, &[&self.axes[axis]]))
         };
+        let in_bin = alike(self.repeats, &[&self.axes[axis]]);
         let shares = table.share(inflation).map(|(share, unit, cells)| {
             let noise = noise(cells - 1.0, unit, worst / inflation);
             (share, noise)
@@ -183,7 +193,9 @@ impl MainEffects {
             axis,
             share: shares.map(|shares| shares.0),
             noise: shares.map(|shares| shares.1),
-            bins: bins.map(|bin| bin_mean(bin, response, effect)).collect(),
+            bins: bins
+                .map(|bin| bin_mean(bin, response, effect.min(in_bin), in_bin))
+                .collect(),
         }
     }
 
@@ -226,11 +238,13 @@ impl MainEffects {
     }
 }
 
-fn bin_mean(bin: &Moments, response: usize, effect: f64) -> BinMean {
-    let size = bin.count() as f64 / effect;
+/// `most` layouts of a point are in the bin: where a share is 0 or 1 they count as one.
+fn bin_mean(bin: &Moments, response: usize, effect: f64, most: f64) -> BinMean {
+    let extreme = is_rate(response) && bin.mean().is_some_and(|mean| mean <= 0.0 || mean >= 1.0);
+    let size = bin.count() as f64 / if extreme { most } else { effect };
     let interval = bin.mean().and_then(|mean| {
         if is_rate(response) {
-            return Some(wilson(mean, size));
+            return Some(clopper_pearson(mean, size));
         }
         #[expect(
             clippy::cast_possible_truncation,
@@ -250,7 +264,7 @@ fn bin_mean(bin: &Moments, response: usize, effect: f64) -> BinMean {
 }
 
 /// Layouts of a sampled point that fall into one cell of crossed factors, at most all alike.
-fn alike(repeats: u64, axes: &[&Axis]) -> f64 {
+pub(crate) fn alike(repeats: u64, axes: &[&Axis]) -> f64 {
     let told_apart: u64 = axes.iter().map(|axis| axis.crossed()).product();
     (repeats as f64 / told_apart as f64).max(1.0)
 }

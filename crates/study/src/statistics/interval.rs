@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::beta::beta_quantile;
+
 /// Confidence of every interval.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// 97.5 % quantile of the standard normal distribution.
-const Z: f64 = 1.959_963_984_540_054;
+/// Chance that the truth is beyond one end of an interval.
+pub(crate) const TAIL: f64 = 0.5 * (1.0 - CONFIDENCE);
 
 /// Below this many layouts a rate is called a small sample.
 pub const SMALL_SAMPLE: f64 = 30.0;
@@ -39,7 +41,7 @@ pub struct Rate {
     pub of: u64,
     /// The share, 0 to 1; none of no layouts.
     pub rate: Option<f64>,
-    /// Wilson score interval of the share.
+    /// Clopper and Pearson's interval of the share, of [`Rate::effective_size`] trials.
     pub interval: Option<Interval>,
     /// Independent layouts that tell as much: less than `of` where the same sampled points appear
     /// in several layouts.
@@ -49,9 +51,14 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// A rate of layouts that are `design_effect` times less worth than independent ones.
-    pub fn new(successes: u64, of: u64, design_effect: f64) -> Self {
-        let effective_size = of as f64 / design_effect.max(1.0);
+    /// A rate of layouts that tell as much as `effective_size` independent ones.
+    pub fn new(successes: u64, of: u64, effective_size: f64) -> Self {
+        Self::with_tail(successes, of, effective_size, TAIL)
+    }
+
+    /// The same with another chance that the truth is beyond each end of the interval.
+    pub(crate) fn with_tail(successes: u64, of: u64, effective_size: f64, tail: f64) -> Self {
+        let effective_size = effective_size.min(of as f64);
         let rate = (of > 0).then(|| successes as f64 / of as f64);
         let failures = of - successes;
         let remark = if of == 0 {
@@ -71,58 +78,56 @@ impl Rate {
             successes,
             of,
             rate,
-            interval: rate.map(|rate| wilson(rate, effective_size)),
+            interval: rate.map(|rate| clopper_pearson_with(rate, effective_size, tail)),
             effective_size,
             remark,
         }
     }
 }
 
-/// Wilson's score interval of a share that was seen in `size` independent trials.
-pub fn wilson(share: f64, size: f64) -> Interval {
-    if size <= 0.0 {
+/// Clopper and Pearson's interval of a share that was seen in `size` independent trials, which need
+/// not be a whole number: Biometrika 26 (1934) 404, by quantiles of the beta distribution.
+pub fn clopper_pearson(share: f64, size: f64) -> Interval {
+    clopper_pearson_with(share, size, TAIL)
+}
+
+/// The same with another chance that the truth is beyond each end.
+pub(crate) fn clopper_pearson_with(share: f64, size: f64, tail: f64) -> Interval {
+    let share = share.clamp(0.0, 1.0);
+    if size <= 0.0 || size.is_nan() {
         return Interval {
             low: 0.0,
             high: 1.0,
         };
     }
-    let z2 = Z * Z;
-    let scale = 1.0 + z2 / size;
-    let centre = (share + z2 / (2.0 * size)) / scale;
-    let half = Z / scale * (share * (1.0 - share) / size + z2 / (4.0 * size * size)).sqrt();
-    // Rounding must not push the end of an observed 0 or 1 off it.
+    let (successes, failures) = (share * size, (1.0 - share) * size);
     Interval {
         low: if share <= 0.0 {
             0.0
         } else {
-            (centre - half).max(0.0)
+            beta_quantile(successes, failures + 1.0, tail)
         },
         high: if share >= 1.0 {
             1.0
         } else {
-            (centre + half).min(1.0)
+            1.0 - beta_quantile(failures, successes + 1.0, tail)
         },
     }
 }
 
-/// 97.5 % quantile of Student's distribution. Tabulated to 10 degrees of freedom, above that the
-/// expansion of Abramowitz and Stegun 26.7.5 to its third term, right to 1e-4.
+/// 97.5 % quantile of Student's distribution.
 pub(crate) fn student(degrees_of_freedom: usize) -> f64 {
-    const TABLE: [f64; 10] = [
-        12.7062, 4.3027, 3.1824, 2.7764, 2.5706, 2.4469, 2.3646, 2.3060, 2.2622, 2.2281,
-    ];
-    if degrees_of_freedom == 0 {
+    student_with(degrees_of_freedom as f64, TAIL)
+}
+
+/// The value that Student's distribution exceeds with a probability below one half.
+pub(crate) fn student_with(degrees_of_freedom: f64, tail: f64) -> f64 {
+    if degrees_of_freedom <= 0.0 {
         return f64::INFINITY;
     }
-    if let Some(value) = TABLE.get(degrees_of_freedom - 1) {
-        return *value;
-    }
-    let n = degrees_of_freedom as f64;
-    let z = Z;
-    let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
-    z + (z3 + z) / (4.0 * n)
-        + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n * n)
-        + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n * n * n)
+    // Abramowitz and Stegun 26.7.1: df / (df + t^2) is of the beta distribution.
+    let x = beta_quantile(0.5 * degrees_of_freedom, 0.5, 2.0 * tail);
+    (degrees_of_freedom * (1.0 - x) / x).sqrt()
 }
 
 /// Interval of a mean from its standard error.
@@ -185,10 +190,9 @@ pub fn mcnemar(one_way: u64, other_way: u64) -> f64 {
 }
 
 /// Ranks, from 1, of the order statistics of `n` independent values between which the quantile lies
-/// with at least 95 %: each end is outside with at most 2.5 %. None for an end that the sample is
-/// too small for.
-pub(crate) fn quantile_ranks(n: u64, p: f64) -> (Option<u64>, Option<u64>) {
-    const TAIL: f64 = 0.5 * (1.0 - CONFIDENCE);
+/// but for a chance of at most `tail` beyond each end. None for an end that the sample is too small
+/// for.
+pub(crate) fn quantile_ranks(n: u64, p: f64, tail: f64) -> (Option<u64>, Option<u64>) {
     if n == 0 || p <= 0.0 || p >= 1.0 {
         return (None, None);
     }
@@ -201,7 +205,7 @@ pub(crate) fn quantile_ranks(n: u64, p: f64) -> (Option<u64>, Option<u64>) {
     let mut low = None;
     for (k, term) in &terms {
         below += term / all;
-        if below > TAIL {
+        if below > tail {
             break;
         }
         low = Some(k + 1);
@@ -211,7 +215,7 @@ pub(crate) fn quantile_ranks(n: u64, p: f64) -> (Option<u64>, Option<u64>) {
     let mut high = None;
     for (k, term) in terms.iter().rev() {
         above += term / all;
-        if above > TAIL {
+        if above > tail {
             break;
         }
         high = Some(*k);
@@ -224,35 +228,48 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wilson_is_that_of_the_literature() {
-        // Newcombe, Statistics in Medicine 17 (1998), Table I, method 3: to its four digits.
+    fn clopper_and_pearson_are_those_of_the_literature() {
+        // Newcombe, Statistics in Medicine 17 (1998), Table I, method 5: to its four digits.
         for (successes, of, low, high) in [
-            (81, 263, 0.2553, 0.3662),
-            (15, 148, 0.0624, 0.1605),
-            (0, 20, 0.0, 0.1611),
-            (1, 29, 0.0061, 0.1718),
+            (81, 263, 0.2527, 0.3676),
+            (15, 148, 0.0578, 0.1617),
+            (0, 20, 0.0, 0.1684),
+            (1, 29, 0.0009, 0.1776),
         ] {
-            let found = wilson(f64::from(successes) / f64::from(of), f64::from(of));
+            let found = clopper_pearson(f64::from(successes) / f64::from(of), f64::from(of));
             assert!((found.low - low).abs() < 5e-5, "{found:?}");
             assert!((found.high - high).abs() < 5e-5, "{found:?}");
         }
     }
 
     #[test]
+    fn ends_are_where_the_binomial_distribution_has_its_tails() {
+        // By the sum of the distribution's terms, which know no beta function.
+        const ROUNDING: f64 = 1e-9;
+        for (k, n) in [(1, 3), (7, 16), (31, 32), (200, 256), (1535, 1536)] {
+            let found = clopper_pearson(k as f64 / n as f64, n as f64);
+            let above = 1.0 - binomial_at_most(k - 1, n, found.low);
+            let below = binomial_at_most(k, n, found.high);
+            assert!((above - TAIL).abs() < ROUNDING, "{k} of {n}: {above}");
+            assert!((below - TAIL).abs() < ROUNDING, "{k} of {n}: {below}");
+        }
+    }
+
+    #[test]
     fn small_samples_are_called_so() {
-        let remark = |successes, of, effect| Rate::new(successes, of, effect).remark;
-        assert_eq!(remark(50, 100, 1.0), None);
-        assert!(remark(10, 20, 1.0).unwrap().contains("20 independent"));
+        let remark = |successes, of, size| Rate::new(successes, of, size).remark;
+        assert_eq!(remark(50, 100, 100.0), None);
+        assert!(remark(10, 20, 20.0).unwrap().contains("20 independent"));
         assert!(remark(50, 100, 10.0).unwrap().contains("10 independent"));
-        assert!(remark(99, 100, 1.0).unwrap().contains("1 failures"));
-        assert!(remark(2, 100, 1.0).unwrap().contains("2 successes"));
-        assert_eq!(Rate::new(0, 0, 1.0).rate, None);
+        assert!(remark(99, 100, 100.0).unwrap().contains("1 failures"));
+        assert!(remark(2, 100, 100.0).unwrap().contains("2 successes"));
+        assert_eq!(Rate::new(0, 0, 0.0).rate, None);
     }
 
     #[test]
     fn student_is_that_of_the_tables() {
         for (n, expected) in [(1, 12.7062), (11, 2.2010), (30, 2.0423), (63, 1.9983)] {
-            assert!((student(n) - expected).abs() < 2e-4, "{n}: {}", student(n));
+            assert!((student(n) - expected).abs() < 5e-5, "{n}: {}", student(n));
         }
     }
 
@@ -269,12 +286,12 @@ mod tests {
     #[test]
     fn ranks_of_the_median_are_those_of_the_literature() {
         // Conover, Practical Nonparametric Statistics, Table A3: n = 20: 6 and 15.
-        assert_eq!(quantile_ranks(20, 0.5), (Some(6), Some(15)));
+        assert_eq!(quantile_ranks(20, 0.5, TAIL), (Some(6), Some(15)));
         // (1 - 0.05)^72 = 0.0249 is the first below 2.5 %.
-        assert_eq!(quantile_ranks(71, 0.05).0, None);
-        assert_eq!(quantile_ranks(72, 0.05).0, Some(1));
-        assert_eq!(quantile_ranks(5, 0.5), (None, None));
-        let (low, high) = quantile_ranks(1_000_000, 0.5);
+        assert_eq!(quantile_ranks(71, 0.05, TAIL).0, None);
+        assert_eq!(quantile_ranks(72, 0.05, TAIL).0, Some(1));
+        assert_eq!(quantile_ranks(5, 0.5, TAIL), (None, None));
+        let (low, high) = quantile_ranks(1_000_000, 0.5, TAIL);
         // Normal approximation 500 000 -+ 980.
         assert!(low.unwrap().abs_diff(499_020) < 3 && high.unwrap().abs_diff(500_981) < 3);
     }

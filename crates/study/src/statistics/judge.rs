@@ -16,6 +16,8 @@ pub struct CriterionResult {
     pub criterion: String,
     /// Configuration that it is about, or `best`; none of the layouts as such.
     pub of: Option<String>,
+    /// Label of the choice that it is judged on, the best one; none where nothing is ours to choose.
+    pub choice: Option<String>,
     /// Whether it is met.
     pub pass: bool,
     /// The estimate; none where there is nothing to estimate it from.
@@ -80,6 +82,7 @@ impl Judged {
         CriterionResult {
             criterion: self.criterion.to_owned(),
             of: self.of,
+            choice: None,
             pass: self.limit.is_met_by(judged),
             value: self.value,
             interval: self.interval,
@@ -92,7 +95,7 @@ impl Judged {
     }
 }
 
-/// Judges a study. One result per criterion, or per configuration of a criterion on `every`, in the
+/// Judges a study: where something is ours to choose, with the best choice alone. One result per criterion, or per configuration of a criterion on `every`, in the
 /// order of the keys.
 pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<CriterionResult> {
     let mut judged = Vec::new();
@@ -130,7 +133,11 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
     }
     if let Some(limit) = criteria.max_invalid_layouts {
         // Layouts of one sampled point are taken for one: no more is known of how alike they are.
-        let rate = Rate::new(overall.invalid, overall.cases, summary.repeats as f64);
+        let rate = Rate::new(
+            overall.invalid,
+            overall.cases,
+            overall.cases as f64 / summary.repeats as f64,
+        );
         let what = "layouts that cannot exist".to_owned();
         judged.push(Judged {
             limit: Limit {
@@ -168,9 +175,33 @@ pub fn judge_study(summary: &Summary, criteria: &StudyCriteria) -> Vec<Criterion
             judged.extend(of_column(summary, &criterion, column));
         }
     }
+    let on = summary.of_choice.as_ref().map(|choice| {
+        let held_out = choice.held_out.map_or(String::new(), |share| {
+            format!(
+                "; picked on one half of the points, a choice works in {:.1} % of the other half",
+                100.0 * share
+            )
+        });
+        format!(
+            "with the best of {} choices, {}, picked on the same layouts{held_out}",
+            choice.of, choice.label
+        )
+    });
     judged
         .into_iter()
-        .map(|each| each.verdict(criteria.confidence))
+        .map(|mut each| {
+            if let Some(why) = &summary.not_ranked {
+                // Of all choices together a number answers no question.
+                (each.value, each.interval) = (None, None);
+                each.cases = Vec::new();
+                each.what = format!("{} with the best choice; {why}", each.what);
+            } else if let Some(on) = &on {
+                each.what = format!("{}, {on}", each.what);
+            }
+            let mut result = each.verdict(criteria.confidence);
+            result.choice = summary.of_choice.as_ref().map(|best| best.label.clone());
+            result
+        })
         .collect()
 }
 

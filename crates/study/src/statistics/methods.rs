@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Sampling, Summary, varies};
-use crate::{Factor, FactorKind};
+use crate::Factor;
 
 /// How numbers were found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,14 +19,16 @@ pub struct Method {
 const METHODS: [[&str; 3]; 9] = [
     [
         "intervals of rates",
-        "Wilson score interval, 95 %, of the effective number of layouts",
-        "Wilson, J. Am. Stat. Assoc. 22 (1927) 209; Brown, Cai, DasGupta, Stat. Sci. 16 (2001) 101",
+        "Clopper and Pearson's, 95 %, of the effective number of layouts",
+        "Clopper, Pearson, Biometrika 26 (1934) 404; Korn, Graubard, Surv. Methodol. 24 (1998) 193",
     ],
     [
         "effective number of layouts",
-        "layouts over the design effect, from the spread of 64 random groups of the sampled points, \
-         between 1 and the number of layouts of a point",
-        "Kish, Survey Sampling (1965); Wolter, Introduction to Variance Estimation (2007), chapter 2",
+        "layouts over the design effect, from the spread of 256 random groups of the sampled points and one \
+         point more that has the rarer outcome as a whole, times the squared ratio of Student's quantiles \
+         with as many degrees of freedom as layouts and as groups, less one each; never fewer than the \
+         points, which are counted where all layouts work or none does",
+        "Korn, Graubard (1998); Kish, Survey Sampling (1965); the coverage is simulated in the tests",
     ],
     [
         "quantiles",
@@ -54,7 +56,7 @@ const METHODS: [[&str; 3]; 9] = [
     ],
     [
         "maps",
-        "a configuration wins a cell where the Wilson interval of its share of best clearances is above \
+        "a configuration wins a cell where the interval of its share of best clearances is above \
          that of every other",
         "as the intervals of rates; not corrected for the number of cells",
     ],
@@ -88,7 +90,7 @@ pub(crate) fn notes(summary: &Summary, factors: &[Factor], paired: usize) -> Vec
     let mut notes = Vec::new();
     let sampled = factors
         .iter()
-        .any(|factor| matches!(factor.kind, FactorKind::Continuous { .. }) && varies(factor));
+        .any(|factor| factor.is_sampled() && varies(factor));
     match summary.sampling {
         _ if !sampled => notes.push(
             "nothing is sampled: rates are exact for this grid, and their intervals are those of as \

@@ -5,10 +5,14 @@
 //! alone. Lengths are in mm and angles in degrees, as in the table; shares are 0 to 1.
 
 mod axis;
+mod beta;
 mod choices;
 mod counts;
+#[cfg(test)]
+mod coverage;
 mod effects;
 mod evidence;
+mod gap;
 mod interval;
 mod judge;
 mod layout;
@@ -32,13 +36,15 @@ pub use choices::{Choice, ChoiceRanking, Difference};
 pub use counts::{ConfigurationCounts, Counts, DetailCount};
 pub use effects::{BinMean, Effects, Interaction, MainEffect, ResponseEffects};
 pub use evidence::{CaseValue, ConfigurationEvidence, Evidence, MOST_CASES, WorstCases};
-pub use interval::{CONFIDENCE, Interval, Rate, mcnemar, wilson};
+pub use gap::{ANY, Gap, ReplannedCase, gaps};
+pub use interval::{CONFIDENCE, Interval, Rate, clopper_pearson, mcnemar};
 pub use judge::{CriterionResult, judge_study};
 pub use methods::Method;
 pub use regions::{RegionCell, RegionMap, Regions};
 pub use spread::{BEST, PROBABILITIES, QuantileValue, Spread};
 
 pub(crate) use evidence::Largest;
+use interval::TAIL;
 pub(crate) use interval::about_mean;
 pub(crate) use layout::{CONFIGURATIONS, Layout, has_numbers};
 pub(crate) use moments::{Grouped, Points};
@@ -54,7 +60,7 @@ use regions::RegionCounter;
 use spread::Spreads;
 
 /// Version of the keys of a [`Summary`].
-pub const SUMMARY_VERSION: u32 = 1;
+pub const SUMMARY_VERSION: u32 = 2;
 
 /// Bins of a factor in its effects, at most.
 const MOST_EFFECT_BINS: usize = 16;
@@ -72,6 +78,8 @@ pub struct SummaryOptions {
     pub sampling: Sampling,
     /// Configurations that have to be ok in [`Choice::works_k`], 1 to 8.
     pub working_configurations: usize,
+    /// Configurations that have to be ok for choices to be ranked by it, 1 to 8.
+    pub ranked_configurations: usize,
     /// Quantiles to give beside [`PROBABILITIES`], such as those of criteria.
     pub more_quantiles: Vec<f64>,
     /// Whether to give effects, maps and the ranking of choices.
@@ -83,6 +91,7 @@ impl Default for SummaryOptions {
         Self {
             sampling: Sampling::Random,
             working_configurations: 2,
+            ranked_configurations: 1,
             more_quantiles: Vec::new(),
             factors: true,
         }
@@ -95,6 +104,7 @@ impl SummaryOptions {
     pub fn judged_by(mut self, criteria: &StudyCriteria) -> Self {
         if let Some(count) = criteria.working_configurations.filter(|count| *count > 1) {
             self.working_configurations = count as usize;
+            self.ranked_configurations = count as usize;
         }
         let quantiles = criteria.quantiles().into_iter();
         self.more_quantiles
@@ -114,10 +124,18 @@ pub struct Summary {
     pub sampling: Sampling,
     /// Cases that each sampled point appears in: once in each combination of the crossed factors.
     pub repeats: u64,
-    /// What became of all cases.
+    /// The choice that `overall`, `goals`, `spreads` and `evidence` are of; none where nothing is ours to
+    /// choose, or where there is too much of it to be ranked.
+    pub of_choice: Option<ChosenChoice>,
+    /// Why choices are not ranked, in words: `overall` and the others are then of all choices together,
+    /// which answers no question, and no criterion is judged by them.
+    pub not_ranked: Option<String>,
+    /// What became of all cases, of all those of the best choice.
     pub overall: Counts,
     /// The same by goal.
     pub goals: Vec<Counts>,
+    /// What became of the cases of all choices together; none where nothing is ours to choose.
+    pub over_all_choices: Option<Counts>,
     /// The metrics that are summed up.
     pub metrics: Vec<MetricColumn>,
     /// Their spread, configuration by configuration, the best of each layout last.
@@ -134,6 +152,24 @@ pub struct Summary {
     pub notes: Vec<String>,
     /// How the numbers were found, with sources.
     pub methods: Vec<Method>,
+}
+
+/// The choice that a summary is of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChosenChoice {
+    /// In tables.
+    pub label: String,
+    /// Number of choices that it is the best of.
+    pub of: u64,
+    /// Choices that cannot be told apart from it.
+    pub as_good: u64,
+    /// Confidence of its intervals: that they hold for all choices at once is 95 % (Bonferroni), so that
+    /// picking the best does not flatter it.
+    pub confidence_each: f64,
+    /// As [`ChoiceRanking::ranked_by`].
+    pub by: String,
+    /// As [`ChoiceRanking::held_out`].
+    pub held_out: Option<f64>,
 }
 
 impl Summary {
@@ -198,7 +234,12 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
     probabilities.sort_by(f64::total_cmp);
     probabilities.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
     let columns = results.columns();
-    let mut spreads = Spreads::new(Rc::from(probabilities), points.repeats, columns);
+    let mut spreads = Spreads::new(
+        Rc::from(probabilities.clone()),
+        points.repeats,
+        TAIL,
+        columns,
+    );
     let mut evidence = Collector::new(columns);
     let considered = if options.factors { factors } else { &[] };
     let mut main = MainEffects::new(
@@ -207,7 +248,11 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
         points.repeats,
     );
     let k = options.working_configurations.clamp(1, CONFIGURATIONS);
-    let (mut choices, too_many) = match ChoiceCounter::new(considered, k) {
+    let (mut choices, too_many) = match ChoiceCounter::new(
+        considered,
+        k,
+        options.ranked_configurations.clamp(1, CONFIGURATIONS),
+    ) {
         None => (None, None),
         Some(Ok(choices)) => (Some(choices), None),
         Some(Err(message)) => (None, Some(message)),
@@ -264,30 +309,133 @@ pub fn summarise(results: &dyn Results, options: &SummaryOptions) -> Result<Summ
         all.add(counter);
     }
     let effect = all.design_effect_of_best(points.repeats);
-    let per_goal = points.repeats / goals.len().max(1) as u64;
-    let overall = all.finish(None, points.repeats);
-    let goals = goals.into_iter().zip(&counters);
     let mut summary = Summary {
         schema_version: SUMMARY_VERSION,
         confidence: CONFIDENCE,
         sampling: options.sampling,
         repeats: points.repeats,
-        overall,
-        goals: goals
-            .map(|(goal, counter)| counter.finish(Some(goal), per_goal))
-            .collect(),
+        of_choice: None,
+        not_ranked: too_many,
+        overall: all.finish(None, points.repeats, TAIL),
+        goals: by_goal(goals.clone(), &counters, points.repeats, TAIL),
+        over_all_choices: None,
         metrics: columns.iter().filter(|each| each.spread).cloned().collect(),
         spreads: spreads.finish(columns),
         effects: main.finish(&interactions),
-        regions: regions.finish(effect),
-        choices: choices.map(|choices| choices.finish()),
+        regions: regions.finish(effect, points.repeats),
+        choices: None,
         evidence: evidence.finish(),
         notes: Vec::new(),
         methods: methods::methods(),
     };
+    if let Some(counter) = &choices {
+        let (ranking, first) = counter.finish();
+        if let Some(first) = first {
+            let of_best = OneChoice {
+                results,
+                counter,
+                cell: first,
+            };
+            narrow(&mut summary, &of_best, &ranking, goals, probabilities)?;
+        }
+        summary.choices = Some(ranking);
+    }
     summary.notes = methods::notes(&summary, factors, strongest.len());
-    summary.notes.extend(too_many);
+    let not_ranked = summary.not_ranked.clone();
+    summary.notes.extend(not_ranked);
     Ok(summary)
+}
+
+fn by_goal(goals: Vec<String>, counters: &[Counter], repeats: u64, tail: f64) -> Vec<Counts> {
+    let per_goal = repeats / goals.len().max(1) as u64;
+    let goals = goals.into_iter().zip(counters);
+    goals
+        .map(|(goal, counter)| counter.finish(Some(goal), per_goal, tail))
+        .collect()
+}
+
+/// The cases of one choice.
+struct OneChoice<'a> {
+    results: &'a dyn Results,
+    counter: &'a ChoiceCounter,
+    cell: usize,
+}
+
+impl Results for OneChoice<'_> {
+    fn factors(&self) -> &[Factor] {
+        self.results.factors()
+    }
+
+    fn columns(&self) -> &[MetricColumn] {
+        self.results.columns()
+    }
+
+    fn cases(&self) -> u64 {
+        self.counter.cases(self.cell)
+    }
+
+    fn visit(
+        &self,
+        visit: &mut dyn FnMut(&[FactorValue], &crate::CaseResult),
+    ) -> Result<(), ResultsError> {
+        self.results.visit(&mut |values, result| {
+            if self.counter.cell(values) == self.cell {
+                visit(values, result);
+            }
+        })
+    }
+}
+
+/// Makes the head of a summary that of the best choice.
+fn narrow(
+    summary: &mut Summary,
+    results: &OneChoice<'_>,
+    ranking: &ChoiceRanking,
+    goals: Vec<String>,
+    probabilities: Vec<f64>,
+) -> Result<(), ResultsError> {
+    let number = ranking.choices.len() as u64;
+    let tail = TAIL / number as f64;
+    let points = Points::of_one_choice(results.factors());
+    let columns = results.columns();
+    let mut counters = vec![Counter::default(); goals.len()];
+    let mut spreads = Spreads::new(Rc::from(probabilities), points.repeats, tail, columns);
+    let mut evidence = Collector::new(columns);
+    for pass in 0..PASSES {
+        visit_goals(results, |goal, values, result, layout| {
+            if pass == 0 {
+                counters[goal].push(result, layout, points.group(values));
+                evidence.push(result, layout);
+            }
+            if let Some(layout) = layout {
+                spreads.push(result, layout, pass);
+            }
+        })?;
+        spreads.next_pass();
+    }
+    let mut all = Counter::default();
+    for counter in &counters {
+        all.add(counter);
+    }
+    let as_good = ranking.choices.iter().filter(|choice| {
+        let against = &choice.against_first;
+        against.as_ref().is_some_and(|found| !found.distinguishable)
+    });
+    let overall = all.finish(None, points.repeats, tail);
+    summary.over_all_choices = Some(std::mem::replace(&mut summary.overall, overall));
+    summary.goals = by_goal(goals, &counters, points.repeats, tail);
+    summary.spreads = spreads.finish(columns);
+    summary.evidence = evidence.finish();
+    summary.repeats = points.repeats;
+    summary.of_choice = ranking.choices.first().map(|first| ChosenChoice {
+        label: first.label.clone(),
+        of: number,
+        as_good: as_good.count() as u64,
+        confidence_each: 1.0 - 2.0 * tail,
+        by: ranking.ranked_by.clone(),
+        held_out: ranking.held_out,
+    });
+    Ok(())
 }
 
 /// Visits all cases with their goals.

@@ -1,5 +1,6 @@
 //! Means, variances, and what repeated points make of them.
 
+use super::interval::student_with;
 use crate::{Factor, FactorKind, FactorValue, Role};
 
 /// Count, mean and variance of a stream, about its first value so that nothing cancels.
@@ -45,7 +46,7 @@ impl Moments {
 }
 
 /// Random groups that the sampled points are put into.
-pub(crate) const GROUPS: usize = 64;
+pub(crate) const GROUPS: usize = 256;
 
 /// Which cases come from the same sampled point, and how many there are of each.
 #[derive(Debug, Clone)]
@@ -57,23 +58,33 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    /// Points of sampled circumstances; without such, of all circumstances; without any, of all
-    /// factors. Sampled factors have the same points in each combination of the crossed ones, so
-    /// that each point appears in as many cases as there are combinations.
+    /// Points of sampled circumstances; without such, of whatever is sampled; without any, of all
+    /// circumstances, or of all factors. Sampled factors have the same points in each combination of the
+    /// crossed ones, so that each point appears in as many cases as there are combinations.
     pub(crate) fn new(factors: &[Factor]) -> Self {
+        Self::repeated(factors, |_| true)
+    }
+
+    /// The points of the cases of one choice.
+    pub(crate) fn of_one_choice(factors: &[Factor]) -> Self {
+        Self::repeated(factors, |factor| factor.role == Role::Circumstance)
+    }
+
+    /// Points that are repeated in the combinations of those crossed factors that vary.
+    fn repeated(factors: &[Factor], vary: impl Fn(&Factor) -> bool) -> Self {
         let some = |wanted: &dyn Fn(&Factor) -> bool| -> Vec<usize> {
             let found = factors.iter().enumerate().filter(|(_, each)| wanted(each));
             found.map(|(index, _)| index).collect()
         };
-        let sampled = |factor: &Factor| matches!(factor.kind, FactorKind::Continuous { .. });
         let circumstance = |factor: &Factor| factor.role == Role::Circumstance;
-        let repeats = if factors.iter().any(sampled) {
-            combinations(factors, |_| true)
+        let repeats = if factors.iter().any(Factor::is_sampled) {
+            combinations(factors, |factor| !factor.is_sampled() && vary(factor))
         } else {
             1
         };
         let keys = [
-            some(&|factor| sampled(factor) && circumstance(factor)),
+            some(&|factor| factor.is_sampled() && circumstance(factor)),
+            some(&Factor::is_sampled),
             some(&circumstance),
             some(&|_| true),
         ];
@@ -106,7 +117,7 @@ impl Points {
 
     /// Group of a case: the same for all cases of a point.
     pub(crate) fn group(&self, values: &[FactorValue]) -> usize {
-        usize::try_from(self.hash(values) % GROUPS as u64).expect("below 64")
+        usize::try_from(self.hash(values) % GROUPS as u64).expect("below the number of groups")
     }
 
     /// What identifies the point of a case.
@@ -168,25 +179,74 @@ impl Grouped {
         }
     }
 
+    /// Number of cases.
+    pub(crate) fn count(&self) -> f64 {
+        self.count.iter().sum()
+    }
+
+    /// Sum of their values.
+    pub(crate) fn total(&self) -> f64 {
+        self.sum.iter().sum()
+    }
+
+    /// Count and sum of every other group: of the even ones, or of the odd ones.
+    pub(crate) fn of_half(&self, half: usize) -> [f64; 2] {
+        let sum = |values: &[f64]| values.iter().skip(half).step_by(2).sum();
+        [sum(&self.count), sum(&self.sum)]
+    }
+
     /// How much larger the variance of the mean is than that of as many independent cases: from the
-    /// spread of the groups, at least 1. A sample of which no point appears twice has 1.
+    /// spread of the groups, at least 1. A sample of which no point appears twice has 1; where nothing
+    /// can be seen of the repetition, all cases of a point are one.
     pub(crate) fn design_effect(&self, variance: f64, repeats: u64) -> f64 {
-        let count: f64 = self.count.iter().sum();
-        if repeats <= 1 || count < 2.0 || variance <= 0.0 {
+        let count = self.count();
+        if repeats <= 1 || count < 2.0 {
             return 1.0;
         }
         let Some((squared_error, _)) = self.squared_error() else {
             // All that there is comes from one point.
             return count;
         };
+        if variance <= 0.0 {
+            return repeats as f64;
+        }
         (squared_error / (variance / count)).clamp(1.0, repeats as f64)
     }
 
-    /// The same for a share, whose variance is its own.
-    pub(crate) fn design_effect_of_rate(&self, repeats: u64) -> f64 {
-        let count: f64 = self.count.iter().sum();
-        let rate = self.sum.iter().sum::<f64>() / count.max(1.0);
-        self.design_effect(rate * (1.0 - rate), repeats)
+    /// Independent cases that tell as much about a share as these, of which `repeats` come from each
+    /// point. Never more than the cases, never fewer than the points.
+    ///
+    /// Korn and Graubard's: cases over the design effect, times the squared ratio of Student's quantiles,
+    /// which makes up for the few points that the design effect is estimated from. It is estimated with
+    /// one more point, all of whose cases have the rarer outcome: that a sample shows no point that fails
+    /// as a whole does not mean that there is none. Agresti and Coull add such trials to a binomial sample,
+    /// Am. Stat. 52 (1998) 119. Where a share is 0 or 1 this counts points.
+    pub(crate) fn effective_size(&self, repeats: u64, tail: f64) -> f64 {
+        let count = self.count();
+        if repeats <= 1 || count < 2.0 {
+            return count;
+        }
+        let of_point = (repeats as f64).min(count);
+        let points = count / of_point;
+        let added = if 2.0 * self.total() < count {
+            of_point
+        } else {
+            0.0
+        };
+        let all = count + of_point;
+        let share = (self.total() + added) / all;
+        let groups = self.count.iter().zip(&self.sum);
+        let groups = groups.filter(|(count, _)| **count > 0.0);
+        let squares = groups
+            .clone()
+            .map(|(count, sum)| (sum - share * count).powi(2))
+            .sum::<f64>()
+            + (added - share * of_point).powi(2);
+        let groups = groups.count() as f64;
+        let squared_error = (groups + 1.0) / groups * squares / (all * all);
+        let effect = (squared_error * all / (share * (1.0 - share))).clamp(1.0, of_point);
+        let small = student_with(count - 1.0, tail) / student_with(groups - 1.0, tail);
+        (count / effect * small * small).clamp(points, count)
     }
 
     /// Squared standard error of the mean, from the spread of the groups, with its degrees of

@@ -4,8 +4,8 @@ use needlebench_kinematics::ik::Configuration;
 use serde::{Deserialize, Serialize};
 
 use super::axis::Axis;
-use super::effects::pairs;
-use super::interval::wilson;
+use super::effects::{alike, pairs};
+use super::interval::clopper_pearson;
 use super::layout::{CONFIGURATIONS, Layout};
 use crate::FactorValue;
 
@@ -63,12 +63,21 @@ impl Counter {
         }
     }
 
-    fn winner(&self, design_effect: f64) -> Option<String> {
+    /// `most` layouts of a point are in the cell, and layouts are `design_effect` times less worth than
+    /// independent ones.
+    fn winner(&self, design_effect: f64, most: f64) -> Option<String> {
         let mut order: Vec<usize> = (0..CONFIGURATIONS).collect();
         order.sort_by_key(|&index| std::cmp::Reverse(self.best[index]));
         let interval = |index: usize| {
             let layouts = self.layouts as f64;
-            wilson(self.best[index] as f64 / layouts, layouts / design_effect)
+            // Where it is all or none, nothing is seen of how alike they are.
+            let extreme = self.best[index] == 0 || self.best[index] == self.layouts;
+            let effect = if extreme {
+                most
+            } else {
+                design_effect.min(most)
+            };
+            clopper_pearson(self.best[index] as f64 / layouts, layouts / effect)
         };
         let clear = self.best[order[0]] > 0 && !interval(order[0]).overlaps(interval(order[1]));
         clear.then(|| Configuration::ALL[order[0]].label().to_owned())
@@ -112,10 +121,11 @@ impl RegionCounter {
         }
     }
 
-    /// The maps; a cell's layouts are `design_effect` times less worth than independent ones.
-    pub(crate) fn finish(self, design_effect: f64) -> Regions {
+    /// The maps; `repeats` layouts come from each sampled point, and layouts are `design_effect` times less
+    /// worth than independent ones.
+    pub(crate) fn finish(self, design_effect: f64, repeats: u64) -> Regions {
+        let (kept, all) = (self.axes.clone(), &self.axes);
         let map = |axes: Vec<usize>, cells: Vec<Counter>| RegionMap {
-            axes,
             cells: cells
                 .into_iter()
                 .map(|cell| RegionCell {
@@ -123,9 +133,13 @@ impl RegionCounter {
                     working: cell.working,
                     ok: cell.ok,
                     best: cell.best,
-                    winner: cell.winner(design_effect),
+                    winner: cell.winner(design_effect, {
+                        let of_map: Vec<&Axis> = axes.iter().map(|&axis| &all[axis]).collect();
+                        alike(repeats, &of_map)
+                    }),
                 })
                 .collect(),
+            axes,
         };
         let mut maps = Vec::new();
         for (axis, cells) in self.single.into_iter().enumerate() {
@@ -134,9 +148,6 @@ impl RegionCounter {
         for ((a, b), cells) in pairs(self.paired.len()).zip(self.double) {
             maps.push(map(vec![self.paired[a], self.paired[b]], cells));
         }
-        Regions {
-            axes: self.axes,
-            maps,
-        }
+        Regions { axes: kept, maps }
     }
 }

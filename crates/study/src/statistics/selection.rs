@@ -7,7 +7,7 @@
 
 use std::rc::Rc;
 
-use super::interval::{Interval, quantile_ranks};
+use super::interval::{Interval, TAIL, quantile_ranks};
 
 /// Times that a selector has to see all values.
 pub(crate) const PASSES: usize = 3;
@@ -177,15 +177,23 @@ pub(crate) struct Quantiles {
     probabilities: Rc<[f64]>,
     /// Rows that a sampled point appears in.
     repeats: u64,
+    /// Chance that a quantile is beyond an end of its interval.
+    tail: f64,
 }
 
 impl Quantiles {
     /// Quantiles of values of which up to `repeats` come from the same sampled point.
     pub(crate) fn new(probabilities: Rc<[f64]>, repeats: u64) -> Self {
+        Self::with_tail(probabilities, repeats, TAIL)
+    }
+
+    /// The same with another chance that the truth is beyond each end of an interval.
+    pub(crate) fn with_tail(probabilities: Rc<[f64]>, repeats: u64, tail: f64) -> Self {
         Self {
             selector: Selector::new(),
             probabilities,
             repeats: repeats.max(1),
+            tail,
         }
     }
 
@@ -198,13 +206,14 @@ impl Quantiles {
     }
 
     pub(crate) fn next_pass(&mut self) {
-        let (probabilities, repeats) = (Rc::clone(&self.probabilities), self.repeats);
+        let probabilities = Rc::clone(&self.probabilities);
+        let (repeats, tail) = (self.repeats, self.tail);
         self.selector.next_pass(|count| {
             let mut ranks = Vec::new();
             for &p in probabilities.iter() {
                 let (low, _) = type_7(count, p);
                 ranks.extend([low, low + 1]);
-                let (low, high) = interval_ranks(count, p, repeats);
+                let (low, high) = interval_ranks(count, p, repeats, tail);
                 ranks.extend([low, high].into_iter().flatten());
             }
             ranks
@@ -223,7 +232,7 @@ impl Quantiles {
 
     /// Interval of a quantile; none where the sample is too small for one.
     pub(crate) fn interval(&self, p: f64) -> Option<Interval> {
-        let (low, high) = interval_ranks(self.count(), p, self.repeats);
+        let (low, high) = interval_ranks(self.count(), p, self.repeats, self.tail);
         Some(Interval {
             low: f64::from(self.selector.value(low?)?),
             high: f64::from(self.selector.value(high?)?),
@@ -245,12 +254,12 @@ fn type_7(count: u64, p: f64) -> (u64, f64) {
 
 /// Ranks, from 0, of the ends of a quantile's interval. Values of one sampled point are counted as
 /// one, which is as little as they can tell.
-fn interval_ranks(count: u64, p: f64, repeats: u64) -> (Option<u64>, Option<u64>) {
+fn interval_ranks(count: u64, p: f64, repeats: u64, tail: f64) -> (Option<u64>, Option<u64>) {
     let points = count / repeats;
     if points == 0 {
         return (None, None);
     }
-    let (low, high) = quantile_ranks(points, p);
+    let (low, high) = quantile_ranks(points, p, tail);
     let scaled = |rank: u64| u128::from(rank) * u128::from(count);
     let points = u128::from(points);
     let low = low.map(|low| u64::try_from(scaled(low) / points).unwrap_or(count) - 1);

@@ -67,11 +67,16 @@ pub(crate) struct Spreads {
 }
 
 impl Spreads {
-    pub(crate) fn new(probabilities: Rc<[f64]>, repeats: u64, columns: &[MetricColumn]) -> Self {
+    pub(crate) fn new(
+        probabilities: Rc<[f64]>,
+        repeats: u64,
+        tail: f64,
+        columns: &[MetricColumn],
+    ) -> Self {
         let columns = indices(columns, |column| column.spread);
         let stream = (
             Moments::default(),
-            Quantiles::new(Rc::clone(&probabilities), repeats),
+            Quantiles::with_tail(Rc::clone(&probabilities), repeats, tail),
         );
         Self {
             probabilities,

@@ -77,6 +77,7 @@ pub(crate) fn levels(name: &str, role: Role, labels: &[&str]) -> Factor {
         name: name.to_owned(),
         unit: String::new(),
         role,
+        sampled: false,
         kind: FactorKind::Levels(labels.iter().map(level).collect()),
     }
 }
@@ -90,6 +91,7 @@ pub(crate) fn continuous(name: &str, role: Role, low: f64, high: f64) -> Factor 
         name: name.to_owned(),
         unit: "mm".to_owned(),
         role,
+        sampled: false,
         kind: FactorKind::Continuous { low, high },
     }
 }

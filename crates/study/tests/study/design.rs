@@ -4,7 +4,7 @@ use needlebench_cell::study::{
     Distribution, FactorValues, Role, SamplingMethod, StudyFactor, StudyLevel,
 };
 use needlebench_cell::{Change, KeyPath, Setting};
-use needlebench_study::{Design, DesignError, FactorValue};
+use needlebench_study::{Design, DesignError, Factor, FactorValue};
 
 fn key() -> KeyPath {
     KeyPath::parse("phantom.position_mm[0]").unwrap()
@@ -167,4 +167,31 @@ fn more_cases_than_numbers_are_refused() {
         )
         .is_ok()
     );
+}
+
+#[test]
+fn what_is_drawn_is_known_as_sampled() {
+    let seed = StudyFactor {
+        values: FactorValues::Levels(vec![StudyLevel {
+            label: "1".to_owned(),
+            number: Some(1.0),
+            changes: vec![(
+                KeyPath::parse("seed").unwrap(),
+                Change::Set(Setting::from(1.0)),
+            )],
+            mode: None,
+            engines: None,
+        }]),
+        ..levels("draw", 1, false)
+    };
+    let of = |factors: &[StudyFactor]| -> Vec<bool> {
+        let design = Design::of(&goals(), factors, SamplingMethod::Sobol, Some(4), 1).unwrap();
+        design.factors().iter().map(Factor::is_sampled).collect()
+    };
+    let crossed = levels("tool", 3, false);
+    let sampled = [levels("size", 3, true), uniform("along")];
+    assert_eq!(of(&[crossed.clone(), seed.clone()]), [false, false, true]);
+    // Crossed with sampled points, seeds are no further points.
+    let all = [&[crossed, seed][..], &sampled].concat();
+    assert_eq!(of(&all), [false, false, false, true, true]);
 }

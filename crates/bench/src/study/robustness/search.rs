@@ -2,48 +2,146 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// How a break is looked for along a direction.
+/// How a break is looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Search {
     /// Farthest distance.
     pub limit: f64,
-    /// Distance of two places that are looked at.
+    /// Distance of two places that are looked at along a direction.
     pub step: f64,
     /// Width within which a break is located.
     pub resolution: f64,
+    /// Points of the ball within the nearest break that are looked at, over and over until none breaks.
+    pub points: u32,
+}
+
+/// What is seen at a place.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Verdict {
+    /// It holds.
+    Holds,
+    /// It breaks, and what does.
+    Breaks(String),
+    /// There is no such place: neither a break nor a sign that it holds.
+    Impossible,
+}
+
+/// What a search found.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Found<const N: usize> {
+    /// The nearest break: its distance, its place, and what breaks; none within the limit.
+    pub nearest: Option<(f64, [f64; N], String)>,
+    /// Points of the last sweep of the ball within it, none of which breaks.
+    pub points: u32,
+    /// Those of them that are no places.
+    pub impossible: u32,
+    /// Whether the last sweep found nothing: otherwise the search was given up.
+    pub settled: bool,
 }
 
 /// Halvings of the angle in which the pattern search turns the direction.
 const REFINEMENTS: u32 = 8;
 
-/// The nearest break: its distance, its place, and what breaks; `None` within the limit.
-///
-/// `breaks` says what breaks at an offset, if anything does.
+/// Directions whose breaks are the nearest, about each of which the pattern search starts.
+const STARTS: usize = 4;
+
+/// Sweeps after which the search is given up; each ends with a break that is nearer by a resolution, and
+/// many of them by much more.
+const MOST_SWEEPS: u32 = 64;
+
+/// The nearest break that is found: along directions, about those with the nearest ones, and by even points
+/// of the ball within.
 pub(super) fn nearest_break<const N: usize>(
     search: &Search,
     directions: &[[f64; N]],
-    mut breaks: impl FnMut(&[f64; N]) -> Option<String>,
-) -> Option<(f64, [f64; N], String)> {
-    if let Some(detail) = breaks(&[0.0; N]) {
-        return Some((0.0, [0.0; N], detail));
+    mut look: impl FnMut(&[f64; N]) -> Verdict,
+) -> Found<N> {
+    let mut found = Found {
+        nearest: None,
+        points: 0,
+        impossible: 0,
+        settled: true,
+    };
+    if let Verdict::Breaks(detail) = look(&[0.0; N]) {
+        found.nearest = Some((0.0, [0.0; N], detail));
+        return found;
     }
-    let mut best: Option<(f64, [f64; N], String)> = None;
+    if search.limit <= 0.0 {
+        return found;
+    }
+    // By direction, the nearest first.
+    let mut breaks: Vec<(f64, [f64; N], String)> = Vec::new();
     for direction in directions {
-        let limit = best.as_ref().map_or(search.limit, |(radius, ..)| *radius);
-        if let Some((radius, detail)) = first_break(search, direction, limit, &mut breaks) {
-            best = Some((radius, *direction, detail));
+        // Some farther ones are kept: another cone may begin behind the nearest break of the directions.
+        let kept = breaks.get(STARTS - 1);
+        let limit = kept.map_or(search.limit, |(radius, ..)| *radius);
+        if let Some((radius, detail)) = first_break(search, direction, limit, &mut look) {
+            let at = breaks.partition_point(|known| known.0 <= radius);
+            breaks.insert(at, (radius, *direction, detail));
+            breaks.truncate(STARTS);
         }
     }
-    let (mut radius, mut direction, mut detail) = best?;
     // As wide as the directions are apart at first.
-    let mut angle_rad = PI / (directions.len() as f64).powf(1.0 / (N as f64 - 1.0));
+    let wide_rad = PI / (directions.len() as f64).powf(1.0 / (N as f64 - 1.0));
+    let mut best: Option<(f64, [f64; N], String)> = None;
+    for start in breaks {
+        let refined = refine(search, start, wide_rad, &mut look);
+        if best.as_ref().is_none_or(|best| refined.0 < best.0) {
+            best = Some(refined);
+        }
+    }
+    for sweep in 0..MOST_SWEEPS {
+        let radius = best.as_ref().map_or(search.limit, |best| best.0);
+        let inner = radius
+            - if best.is_some() {
+                search.resolution
+            } else {
+                0.0
+            };
+        (found.points, found.impossible, found.settled) = (0, 0, true);
+        for point in 0..search.points {
+            let offset = in_ball::<N>(sweep * search.points + point, inner);
+            found.points += 1;
+            match look(&offset) {
+                Verdict::Holds => {}
+                Verdict::Impossible => found.impossible += 1,
+                Verdict::Breaks(detail) => {
+                    let distance = dot(&offset, &offset).sqrt();
+                    let direction = offset.map(|share| share / distance);
+                    // The first one on the way there, if there is another.
+                    let (distance, detail) = first_break(search, &direction, distance, &mut look)
+                        .unwrap_or((distance, detail));
+                    let start = (distance, direction, detail);
+                    best = Some(refine(search, start, wide_rad, &mut look));
+                    found.settled = false;
+                    break;
+                }
+            }
+        }
+        if found.settled {
+            break;
+        }
+    }
+    found.nearest = best
+        .map(|(radius, direction, detail)| (radius, direction.map(|share| share * radius), detail));
+    found
+}
+
+/// Turns a direction with a break towards nearer ones.
+fn refine<const N: usize>(
+    search: &Search,
+    (mut radius, mut direction, mut detail): (f64, [f64; N], String),
+    wide_rad: f64,
+    look: &mut impl FnMut(&[f64; N]) -> Verdict,
+) -> (f64, [f64; N], String) {
+    let mut angle_rad = wide_rad;
     for _ in 0..REFINEMENTS {
         let mut found = true;
         while found {
             found = false;
             for turned in turned(&direction, angle_rad) {
                 let limit = radius - search.resolution;
-                if let Some((nearer, what)) = first_break(search, &turned, limit, &mut breaks) {
+                if let Some((nearer, what)) = first_break(search, &turned, limit, look) {
                     (radius, direction, detail) = (nearer, turned, what);
                     found = true;
                     break;
@@ -52,33 +150,58 @@ pub(super) fn nearest_break<const N: usize>(
         }
         angle_rad *= 0.5;
     }
-    Some((radius, direction.map(|share| share * radius), detail))
+    (radius, direction, detail)
 }
 
-/// Distance of the first break along a direction, not beyond the limit.
+/// Distance of the first break along a direction, not beyond the limit. Where there is no place it is
+/// looked on behind it.
 fn first_break<const N: usize>(
     search: &Search,
     direction: &[f64; N],
     limit: f64,
-    breaks: &mut impl FnMut(&[f64; N]) -> Option<String>,
+    look: &mut impl FnMut(&[f64; N]) -> Verdict,
 ) -> Option<(f64, String)> {
-    let mut at = |radius: f64| breaks(&direction.map(|share| share * radius));
-    let mut good = 0.0;
-    while good < limit {
-        let mut bad = (good + search.step).min(limit);
-        if let Some(mut detail) = at(bad) {
-            while bad - good > search.resolution {
-                let middle = f64::midpoint(good, bad);
+    let mut at = |radius: f64| look(&direction.map(|share| share * radius));
+    let mut before = 0.0;
+    while before < limit {
+        let mut bad = (before + search.step).min(limit);
+        if let Verdict::Breaks(mut detail) = at(bad) {
+            while bad - before > search.resolution {
+                let middle = f64::midpoint(before, bad);
                 match at(middle) {
-                    Some(here) => (bad, detail) = (middle, here),
-                    None => good = middle,
+                    Verdict::Breaks(here) => (bad, detail) = (middle, here),
+                    Verdict::Holds | Verdict::Impossible => before = middle,
                 }
             }
             return Some((bad, detail));
         }
-        good = bad;
+        before = bad;
     }
     None
+}
+
+/// A point of an evenly spread sequence in a ball: Roberts' additive recurrence on the positive root of
+/// `x^(N+1) = x + 1` (2018), mapped so that equal volumes have equal numbers of points.
+fn in_ball<const N: usize>(number: u32, radius: f64) -> [f64; N] {
+    // The root, by iteration: each step halves the error and more.
+    let root = (0..64).fold(2.0_f64, |x, _| (1.0 + x).powf(1.0 / (N as f64 + 1.0)));
+    let mut power = 1.0;
+    let coordinates: [f64; N] = std::array::from_fn(|_| {
+        power /= root;
+        (0.5 + power * (f64::from(number) + 1.0)).fract()
+    });
+    let far = radius * coordinates[0].powf(1.0 / N as f64);
+    let turn = TAU * coordinates[N - 1];
+    let mut point = [0.0; N];
+    let across = if N == 3 {
+        let z = 2.0 * coordinates[1] - 1.0;
+        point[2] = far * z;
+        far * (1.0 - z * z).max(0.0).sqrt()
+    } else {
+        far
+    };
+    (point[0], point[1]) = (across * turn.cos(), across * turn.sin());
+    point
 }
 
 /// A direction turned by an angle both ways towards each direction of a basis across it.
@@ -149,20 +272,25 @@ mod tests {
         limit: 50.0,
         step: 2.0,
         resolution: 0.01,
+        points: 2048,
     };
 
     /// The last refinement turns by less than 0.3 degrees, and the distance grows by the angle squared.
     const TOLERANCE: f64 = 0.015;
 
-    fn when(is_broken: bool) -> Option<String> {
-        is_broken.then(|| "broken".to_owned())
+    fn when(is_broken: bool) -> Verdict {
+        if is_broken {
+            Verdict::Breaks("broken".to_owned())
+        } else {
+            Verdict::Holds
+        }
     }
 
     #[test]
     fn the_distance_of_a_plane_is_found_whatever_its_direction() {
         for normal in on_sphere(25) {
             let found = nearest_break(&SEARCH, &on_sphere(32), |at| when(dot(at, &normal) > 17.3));
-            let (radius, offset, _) = found.unwrap();
+            let (radius, offset, _) = found.nearest.unwrap();
             assert!((0.0..TOLERANCE).contains(&(radius - 17.3)), "{radius}");
             assert!(dot(&offset, &normal) > 17.3, "the evidence is broken");
         }
@@ -176,7 +304,7 @@ mod tests {
             let wrist: [f64; 3] = std::array::from_fn(|i| 585.0 * towards[i] + at[i]);
             when(dot(&wrist, &wrist).sqrt() > 600.0)
         });
-        let (radius, ..) = found.unwrap();
+        let (radius, ..) = found.nearest.unwrap();
         assert!((0.0..TOLERANCE).contains(&(radius - 15.0)), "{radius}");
     }
 
@@ -186,18 +314,19 @@ mod tests {
         let found = nearest_break(&SEARCH, &on_circle(16), |[yaw, roll]| {
             when(yaw * cosine + roll * sine < -6.25)
         });
-        let (radius, ..) = found.unwrap();
+        let (radius, ..) = found.nearest.unwrap();
         assert!((0.0..TOLERANCE).contains(&(radius - 6.25)), "{radius}");
     }
 
     #[test]
     fn nothing_breaks_beyond_the_limit_and_what_is_broken_has_no_radius() {
+        let found = nearest_break(&SEARCH, &on_sphere(32), |at| when(at[0] > 51.0));
         assert_eq!(
-            nearest_break(&SEARCH, &on_sphere(32), |at| when(at[0] > 51.0)),
-            None
+            (found.nearest, found.points, found.settled),
+            (None, 2048, true)
         );
         let found = nearest_break(&SEARCH, &on_sphere(32), |_| when(true));
-        assert_eq!(found.unwrap().0, 0.0);
+        assert_eq!(found.nearest.unwrap().0, 0.0);
     }
 
     #[test]
@@ -205,7 +334,51 @@ mod tests {
         let found = nearest_break(&SEARCH, &on_sphere(32), |at| {
             when((11.0..13.5).contains(&at[2]) || at[2] > 30.0)
         });
-        let (radius, ..) = found.unwrap();
+        let (radius, ..) = found.nearest.unwrap();
         assert!((0.0..TOLERANCE).contains(&(radius - 11.0)), "{radius}");
+    }
+
+    #[test]
+    fn a_narrow_cone_between_the_directions_is_found() {
+        // A cone of 4 degrees about a direction of none of those, and a plane far behind it.
+        let axis = [0.53, -0.41, 0.742_293_471_610_2];
+        let found = nearest_break(&SEARCH, &on_sphere(32), |at| {
+            let far = dot(at, at).sqrt();
+            when(at[0] > 45.0 || far > 30.0 && dot(at, &axis) > 0.997_6 * far)
+        });
+        let (radius, ..) = found.nearest.unwrap();
+        assert!((0.0..TOLERANCE).contains(&(radius - 30.0)), "{radius}");
+    }
+
+    #[test]
+    fn a_place_that_does_not_exist_is_no_break_and_does_not_hold() {
+        // A slab that does not exist hides the plane's nearest part; a half of the ball does not exist.
+        let found = nearest_break(&SEARCH, &on_sphere(32), |at| {
+            if (10.0..20.0).contains(&at[2]) || at[1] < 0.0 {
+                Verdict::Impossible
+            } else {
+                when(at[2] > 15.0)
+            }
+        });
+        let (radius, offset, _) = found.nearest.unwrap();
+        assert!((0.0..TOLERANCE).contains(&(radius - 20.0)), "{radius}");
+        assert!(offset[2] >= 20.0 && offset[1] >= 0.0);
+        let share = f64::from(found.impossible) / f64::from(found.points);
+        // Half of the ball, and of the other half the cap above 10 of 20: 5/32.
+        assert!((share - (0.5 + 0.5 * 5.0 / 32.0)).abs() < 0.01, "{share}");
+    }
+
+    #[test]
+    fn points_fill_the_ball_evenly() {
+        let points: Vec<[f64; 3]> = (0..4000).map(|number| in_ball(number, 2.0)).collect();
+        for axis in 0..3 {
+            let count = |wanted: &dyn Fn(&[f64; 3]) -> bool| {
+                points.iter().filter(|point| wanted(point)).count() as f64 / 4000.0
+            };
+            assert!((count(&|point| point[axis] > 0.0) - 0.5).abs() < 0.01);
+            // A cap of half the radius is 5/32 of a ball.
+            assert!((count(&|point| point[axis] > 1.0) - 5.0 / 32.0).abs() < 0.01);
+        }
+        assert!(points.iter().all(|point| dot(point, point) <= 4.0 + 1e-12));
     }
 }

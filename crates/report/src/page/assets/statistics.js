@@ -19,7 +19,7 @@ NB.Statistics = class {
     if (!summary || typeof summary !== 'object') return [];
     const rate = (value) => (value && value.rate !== null && value.rate !== undefined
       ? `${NB.fixed(100 * value.rate, 1)} %${value.interval ? ` (${NB.fixed(100 * value.interval.low, 1)} to ${NB.fixed(100 * value.interval.high, 1)})` : ''}` : '\u2013');
-    const done = new Set(['schema_version', 'confidence', 'overall', 'goals', 'metrics', 'spreads', 'effects', 'regions', 'choices', 'evidence', 'notes', 'methods', 'criteria', 'not_judged', 'verdict']);
+    const done = new Set(['headline', 'of_choice', 'not_ranked', 'over_all_choices', 'replanned', 'mode', 'postures_only', 'schema_version', 'confidence', 'overall', 'goals', 'metrics', 'spreads', 'effects', 'regions', 'choices', 'evidence', 'notes', 'methods', 'criteria', 'not_judged', 'verdict']);
     const sections = [];
     const add = (key, title, open, make) => {
       if (summary[key] === undefined || summary[key] === null) return;
@@ -28,13 +28,18 @@ NB.Statistics = class {
       if (content) sections.push(NB.section(title, open, content));
     };
     add('criteria', 'Criteria', true, (criteria) => NB.table('What was checked', [
-      { title: 'Criterion', cell: (c) => NB.words(c.criterion) }, { title: 'Of', cell: (c) => c.of || '' },
+      { title: 'Criterion', cell: (c) => NB.words(c.criterion) }, { title: 'Of', cell: (c) => c.of || '' }, ...(criteria.some((c) => c.choice) ? [{ title: 'With the best choice', cell: (c) => c.choice || '' }] : []),
       { title: 'Value', numeric: true, cell: (c) => NB.significant(c.value) }, { title: 'Limit', numeric: true, cell: (c) => NB.significant(c.limit) },
       { title: 'Met', cell: (c) => {
         const open = c.value === null || (c.confidence && c.interval === null);
         return NB.el('span', { class: c.pass ? 'good' : 'bad', text: c.pass ? '\u2713 met' : open ? '? not judged' : '\u2717 missed' });
       } },
     ], criteria, { class: 'small' }));
+    add('replanned', 'What postures alone overstate', true, ({ cases, of, gaps }) => NB.table(`${cases} of ${of} static cases with their motions planned too, drawn at random`, [
+      { title: 'Configuration', cell: (g) => g.of }, { title: 'Ok by posture', numeric: true, cell: (g) => g.by_postures }, { title: 'With a motion', numeric: true, cell: (g) => g.planned },
+      { title: 'Gap', unit: 'points', numeric: true, cell: (g) => `${NB.fixed(100 * g.gap, 1)} (${NB.fixed(100 * g.interval.low, 1)} to ${NB.fixed(100 * g.interval.high, 1)})` },
+      { title: 'With a motion only', numeric: true, cell: (g) => g.gained },
+    ], gaps, { class: 'small' }));
     add('notes', 'Notes', true, (notes) => NB.el('ul', { class: 'plain' }, notes.map((note) => NB.el('li', { text: String(note) }))));
     add('choices', 'Which choice is the best', true, ({ choices, axes }) => NB.table(`Choices of ${axes.map((axis) => NB.words(axis.name)).join(' and ')}, the best first`, [
       { title: 'Choice', cell: (c) => c.label }, { title: 'Cases', numeric: true, cell: (c) => c.cases },
@@ -44,13 +49,14 @@ NB.Statistics = class {
       { title: 'Told apart from the first', cell: (c) => (c.against_first ? (c.against_first.distinguishable ? `yes, ${NB.fixed(100 * c.against_first.difference, 1)} %` : 'no') : '') },
       { title: 'Fails in', cell: (c) => this.study.caseButtons((c.failing || []).slice(0, 5)) },
     ], choices.slice(0, 60), { class: 'small' }));
-    add('overall', 'What became of the configurations', true, (overall) => [overall, ...(summary.goals || [])].map((counts) => NB.table(
+    const best = summary.of_choice ? `, with the best choice: ${summary.of_choice.label}` : '';
+    add('overall', `What became of the configurations${best}`, true, (overall) => [overall, ...(summary.goals || [])].map((counts) => NB.table(
       counts.goal ? `Goal ${NB.words(counts.goal)}: ${counts.cases} cases, ${counts.invalid} invalid` : `All goals: ${counts.cases} cases, ${counts.invalid} invalid`, [
         { title: 'Configuration', cell: (c) => c.label }, { title: 'Ok', numeric: true, cell: (c) => c.ok }, { title: 'Failed', numeric: true, cell: (c) => c.failed },
         { title: 'Rejected', numeric: true, cell: (c) => c.rejected }, { title: 'Best', numeric: true, cell: (c) => c.best },
         { title: 'Success', numeric: true, cell: (c) => rate(c.success) }, { title: '', cell: (c) => c.success?.remark || '' },
       ], counts.configurations, { class: 'small' })));
-    add('spreads', 'Quantiles', false, (spreads) => {
+    add('spreads', `Quantiles${best}`, false, (spreads) => {
       const shares = [...new Set(spreads.flatMap((each) => each.quantiles.map((quantile) => quantile.p)))].sort((a, b) => a - b);
       return NB.table('Quantiles with their intervals', [
         { title: 'Metric', cell: (s) => this.metric(s.metric) }, { title: 'Of', cell: (s) => s.of }, { title: 'Values', numeric: true, cell: (s) => s.count },
@@ -61,7 +67,7 @@ NB.Statistics = class {
         } })),
       ], spreads, { class: 'small' });
     });
-    add('effects', 'What the factors do', false, (effects) => effects.responses.map((response) => NB.el('div', null,
+    add('effects', `What the factors do${summary.of_choice ? ', over all choices' : ''}`, false, (effects) => effects.responses.map((response) => NB.el('div', null,
       NB.table(`${NB.words(response.response)}: share of its variance`, [
         { title: 'Factor', cell: (m) => NB.words(effects.axes[m.axis].name) },
         { title: 'Share', unit: '%', numeric: true, cell: (m) => NB.fixed(m.share === null ? NaN : 100 * m.share, 1) },
@@ -73,8 +79,8 @@ NB.Statistics = class {
         { title: 'Share', unit: '%', numeric: true, cell: (m) => NB.fixed(100 * m.share, 1) },
         { title: 'By chance', unit: '%', numeric: true, cell: (m) => NB.fixed(100 * m.noise, 1) },
       ], response.interactions, { class: 'small' }) : null)));
-    add('evidence', 'Cases worth a look', true, (evidence) => this.evidence(evidence));
-    add('regions', 'Best configuration by region', false, (regions) => regions.maps.filter((map) => map.axes.length === 1).map((map) => {
+    add('evidence', `Cases worth a look${best}`, true, (evidence) => this.evidence(evidence));
+    add('regions', `Best configuration by region${summary.of_choice ? ', over all choices' : ''}`, false, (regions) => regions.maps.filter((map) => map.axes.length === 1).map((map) => {
       const axis = regions.axes[map.axes[0]];
       return NB.table(`Over ${NB.words(axis.name)}${axis.unit ? ` (${axis.unit})` : ''}`, [
         { title: 'From', cell: ({ bin }) => bin.label }, { title: 'Layouts', numeric: true, cell: ({ cell }) => cell.layouts },

@@ -15,7 +15,9 @@ NB.StudyPage = class extends NB.StudyPlots {
     const posed = NB.array(page.postures.cases);
     this.posed = new Map([...posed].map((index, at) => [index, at]));
     this.poses = NB.array(page.postures.joints);
-    this.places = page.postures.places ? NB.array(page.postures.places) : null;
+    this.places = page.places ? NB.array(page.places) : null;
+    this.lookOf = page.lookOf ? NB.array(page.lookOf) : null;
+    this.looks = page.looks || [];
     this.derive();
     app.append(this.head());
     if (!this.count) {
@@ -71,7 +73,21 @@ NB.StudyPage = class extends NB.StudyPlots {
       criteria.length || open.length ? NB.verdict(verdict) : null,
       open.length ? NB.el('span', { class: 'error', text: `not judged: ${open.join('; ')}` }) : null,
       NB.el('span', { text: `${group(cases)} cases of 8 configurations` }),
+      this.page.summary?.headline ? NB.el('strong', { class: 'headline', text: this.page.summary.headline.charAt(0).toUpperCase() + this.page.summary.headline.slice(1) }) : null,
+      this.choiceText() ? NB.el('strong', { class: 'headline', text: this.choiceText() }) : null,
       kept < cases ? NB.el('strong', { text: `The plots show ${group(kept)} of them: one of each block of successive cases, drawn by a fixed rule, and those that the statistics name. All tables of statistics are of all cases.` }) : null);
+  }
+
+  /** Of which choice the statistics are, in a sentence; empty where nothing is chosen. */
+  choiceText() {
+    const best = this.page.summary?.of_choice;
+    if (this.page.summary?.not_ranked) return `Not judged: ${this.page.summary.not_ranked}`;
+    if (!best) return '';
+    const rate = this.page.summary.overall?.at_least?.[0];
+    const heldOut = best.held_out === null || best.held_out === undefined ? ''
+      : `; picked on one half of the points, a choice works in ${NB.fixed(100 * best.held_out, 1)} % of the other half`;
+    const share = rate?.rate === null || rate?.rate === undefined ? '' : ` At least one configuration is ok in ${NB.fixed(100 * rate.rate, 1)} %${rate.interval ? ` (${NB.fixed(100 * rate.interval.low, 1)} to ${NB.fixed(100 * rate.interval.high, 1)}, which holds for all choices at once)` : ''} of its valid layouts${heldOut}.`;
+    return `Rates and criteria are of the best of ${best.of} choices, ${best.label}, by ${best.by}.${share}`;
   }
 
   build(app) {
@@ -120,7 +136,7 @@ NB.StudyPage = class extends NB.StudyPlots {
     const metricSelect = NB.select('metric', metricOptions, this.state.metric, redraw((value) => { this.state.metric = value; this.sorted = null; }));
     app.append(
       figure('How often each configuration works', this.page.summary?.overall
-        ? `Share of valid cases in which it is ok, with ${Math.round(100 * (this.page.summary.confidence || 0.95))} % interval; of all cases.`
+        ? `Share of valid cases in which it is ok, with ${Math.round(100 * (this.page.summary.confidence || 0.95))} % interval; ${this.page.summary.of_choice ? `of the best choice, ${this.page.summary.of_choice.label}` : 'of all cases'}.`
         : 'Share of the valid cases on this page in which it is ok.', this.strip.element),
       controls, this.shown,
       NB.el('div', { class: 'grid cases' },
@@ -358,7 +374,9 @@ NB.StudyPage = class extends NB.StudyPlots {
     const { scene } = this.page;
     this.viewNote = NB.el('p', { class: 'soft small', role: 'status' });
     if (!scene) return;
-    this.view = new NB.View(scene, 'Posture of the chosen configuration');
+    // Tools and phantoms of other cases stand in groups of their own: `skin@1`.
+    const others = this.looks.flatMap((look, at) => look.parts.map((part) => ({ ...part, group: `${part.group}@${at + 1}` })));
+    this.view = new NB.View({ ...scene, parts: [...scene.parts, ...others] }, 'Posture of the chosen configuration');
     this.view.element.style.height = '330px';
     this.arm = this.view.arm('arm');
     for (const layer of ['collision', 'corridor']) this.arm.layer(layer, false);
@@ -381,33 +399,48 @@ NB.StudyPage = class extends NB.StudyPlots {
       const numbers = Array.from(this.places.subarray(14 * at, 14 * at + 14));
       known = !Number.isNaN(numbers[0]);
       if (known) chain.base = numbers.slice(0, 7);
-      if (known && this.view.works) this.movePhantom(numbers.slice(7), numbers);
     }
+    // Without places the picture is of the base scenario, which says so below.
+    const look = this.lookOf && at !== undefined ? this.lookOf[at] : this.lookOf ? 255 : 0;
+    const drawn = look <= this.looks.length;
+    this.look(look, known ? Array.from(this.places.subarray(14 * at + 7, 14 * at + 14)) : null);
     this.arm.show(has);
     this.view.empty('needle');
-    if (has && this.view.works) {
-      this.arm.pose(chain, joints);
+    if (has && this.view.works) this.arm.pose(chain, joints);
+    if (has && drawn && this.view.works) {
       const poses = NB.forward(chain, joints);
-      const guide = poses[6].clone().multiply(NB.matrix(this.page.scene.guide[1]));
+      const exit = (look ? this.looks[look - 1] : this.page.scene).guide[1];
+      const guide = poses[6].clone().multiply(NB.matrix(exit));
       const point = (z) => new THREE.Vector3(0, 0, z).applyMatrix4(guide).toArray();
       this.view.rod('needle', point(-0.12), point(0.08), 0.0012, [0, 0.45, 0.32, 1]);
     }
     this.viewNote.textContent = [
       has ? `${this.page.configurations[c]} in case ${this.caseOf(index)}.`
         : at === undefined ? 'The posture of this case is not on the page (it holds some thousand): rerun it by the command.' : 'This configuration has no posture.',
-      known ? 'Robot and phantom stand where they do in this case; sizes and tools are those of the base scenario.'
+      known && drawn ? 'Robot, patient and tool are those of this case, and stand where they do in it; table, gantry and mount are those of the base scenario.'
+        : known ? 'The robot stands where it does in this case; its tool and its patient are not on the page, and are not drawn: rerun it with --run to see them.'
+        : this.lookOf ? 'Tool and patient of this case are not on the page, and are not drawn; table, gantry and mount are those of the base scenario.'
         : 'The surroundings are those of the base scenario: what this case changes of them is not drawn.'].join(' ');
     this.view.draw();
   }
 
-  movePhantom(pose) {
-    if (Number.isNaN(pose[0]) || !this.page.phantom) return;
-    const move = NB.matrix(pose).multiply(NB.matrix(this.page.phantom).invert());
-    for (const name of ['skin', 'bone', 'organ', 'vessel', 'lesion', 'marker']) {
-      const group = this.view.group(name);
-      group.matrixAutoUpdate = false;
-      group.matrix.copy(move);
-      group.matrixWorldNeedsUpdate = true;
+  /** Shows the tool and the patient of a look alone, the patient at a place; of one that is not on the page, none. */
+  look(look, phantom) {
+    if (!this.view.works) return;
+    const name = (group, at) => (at ? `${group}@${at}` : group);
+    for (let at = 0; at <= this.looks.length; at++) {
+      this.arm.layer(name('tool', at), at === look);
+      for (const tissue of ['skin', 'bone', 'organ', 'vessel', 'lesion', 'marker']) {
+        const group = this.view.group(name(tissue, at));
+        group.visible = at === look;
+        if (at !== look || !phantom || Number.isNaN(phantom[0])) continue;
+        const move = NB.matrix(phantom);
+        // The base scenario's lies where it does there, the others in their own frame.
+        if (!at) { if (!this.page.phantom) continue; move.multiply(NB.matrix(this.page.phantom).invert()); }
+        group.matrixAutoUpdate = false;
+        group.matrix.copy(move);
+        group.matrixWorldNeedsUpdate = true;
+      }
     }
   }
 };

@@ -154,7 +154,7 @@ NB.View = class {
 
   mesh(index, color) {
     const mesh = new THREE.Mesh(this.geometries[index], this.material(color));
-    if (color[3] < 1) mesh.renderOrder = this.scene.parts[index].group === 'skin' ? 20 : 10;
+    if (color[3] < 1) mesh.renderOrder = this.scene.parts[index].group.split('@')[0] === 'skin' ? 20 : 10;
     return mesh;
   }
 

@@ -1,11 +1,11 @@
 //! The page of a study: plots from every point of which one gets to the case.
 
 mod columns;
+mod looks;
 #[cfg(test)]
 mod tests;
 
 use needlebench_cell::ResolvedScenario;
-use needlebench_kinematics::Pose;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_study::{FactorKind, Results, ResultsError};
 use serde_json::{Value, json};
@@ -14,6 +14,7 @@ use super::pack::Pack;
 use super::scene::{pose, surroundings};
 use super::viewer::Viewer;
 use columns::{Columns, LABELLED};
+use looks::Looks;
 
 const SCRIPT: &str = concat!(
     include_str!("../assets/statistics.js"),
@@ -37,17 +38,9 @@ pub struct StudyPage<'a> {
     pub manifest: &'a Value,
     /// The base scenario, for the picture.
     pub base: Option<&'a ResolvedScenario>,
-    /// Where things are in a case; without it the picture shows the base scenario, and says so.
-    pub places: Option<&'a dyn Fn(u64) -> Option<CasePlaces>>,
-}
-
-/// Where things are in a case.
-#[derive(Debug, Clone, Copy)]
-pub struct CasePlaces {
-    /// Robot.
-    pub world_from_base_link: Pose,
-    /// Phantom; none where there is none.
-    pub world_from_phantom: Option<Pose>,
+    /// The scenario of a case, none of one that cannot exist; without it the picture shows the base
+    /// scenario, and says so.
+    pub scenarios: Option<&'a dyn Fn(u64) -> Option<ResolvedScenario>>,
 }
 
 impl StudyPage<'_> {
@@ -108,8 +101,9 @@ impl StudyPage<'_> {
         let postures = json!({
             "cases": pack.indices(&columns.posed),
             "joints": pack.coarse_column(&columns.joints_deg, u16::MAX - 1),
-            "places": self.case_places(&columns, &mut pack),
         });
+        let scene = self.base.map(|base| surroundings(base, &mut pack));
+        let [places, codes, looks] = self.case_places(&columns, &mut pack);
         let labels = Configuration::ALL.map(Configuration::label);
         let document = json!({
             "kind": "study",
@@ -124,9 +118,12 @@ impl StudyPage<'_> {
             "outcomes": pack.u8s(&columns.outcomes),
             "outcomeNames": columns.outcome_names,
             "postures": postures,
+            "places": places,
+            "lookOf": codes,
+            "looks": looks,
             "summary": self.summary,
             "manifest": self.manifest,
-            "scene": self.base.map(|base| surroundings(base, &mut pack)),
+            "scene": scene,
             "goals": self.base.map(goals),
             "phantom": self.base.and_then(|base| base.phantom.as_ref()).map(|placed| pose(&placed.world_from_phantom)),
         });
@@ -139,16 +136,21 @@ impl StudyPage<'_> {
         Ok(page.html(pack, &document))
     }
 
-    /// Robot and phantom of the cases that have postures, seven numbers each.
-    fn case_places(&self, columns: &Columns, pack: &mut Pack) -> Value {
-        let Some(places) = self.places else {
-            return Value::Null;
+    /// Robot and phantom of the cases that have postures, seven numbers each; what they look like.
+    fn case_places(&self, columns: &Columns, pack: &mut Pack) -> [Value; 3] {
+        let Some(scenarios) = self.scenarios else {
+            return [Value::Null, Value::Null, Value::Array(Vec::new())];
         };
+        let mut looks = Looks::new(self.base, pack);
         let mut numbers = Vec::with_capacity(14 * columns.posed.len());
         for &index in &columns.posed {
-            let found = places(columns.cases[index as usize]);
-            let robot = found.map(|each| each.world_from_base_link);
-            let phantom = found.and_then(|each| each.world_from_phantom);
+            let found = scenarios(columns.cases[index as usize]);
+            looks.push(found.as_ref(), pack);
+            let robot = found
+                .as_ref()
+                .map(|each| each.cell.robot.world_from_base_link);
+            let placed = found.as_ref().and_then(|each| each.phantom.as_ref());
+            let phantom = placed.map(|placed| placed.world_from_phantom);
             for pose in [robot, phantom] {
                 match pose {
                     Some(pose) => {
@@ -159,7 +161,8 @@ impl StudyPage<'_> {
                 }
             }
         }
-        pack.f32s(numbers)
+        let [codes, looks] = looks.finish(pack);
+        [pack.f32s(numbers), codes, looks]
     }
 }
 

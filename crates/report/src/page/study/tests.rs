@@ -28,6 +28,7 @@ impl Synthetic {
             name: name.to_owned(),
             unit: String::new(),
             role,
+            sampled: false,
             kind: FactorKind::Levels(
                 labels
                     .iter()
@@ -42,6 +43,7 @@ impl Synthetic {
             name: name.to_owned(),
             unit: unit.to_owned(),
             role: Role::Circumstance,
+            sampled: false,
             kind: FactorKind::Continuous { low, high },
         };
         let factors = vec![
@@ -177,7 +179,7 @@ fn page(results: &Synthetic, summary: &Value) -> String {
         summary,
         manifest: &json!({"seed": 1}),
         base: None,
-        places: None,
+        scenarios: None,
     };
     page.html().unwrap()
 }
@@ -320,7 +322,7 @@ fn a_page_of_a_hundred_thousand_cases_for_the_browser() {
         summary: &summary(&results),
         manifest: &json!({"seed": 1}),
         base: Some(&base),
-        places: None,
+        scenarios: None,
     };
     std::fs::write(path, page.html().unwrap()).unwrap();
 }

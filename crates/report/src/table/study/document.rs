@@ -85,10 +85,27 @@ fn case_list(cases: &[u64]) -> String {
 
 fn overview(summary: &Summary) -> Vec<String> {
     let overall = &summary.overall;
-    let mut lines = vec![format!(
+    let mut lines = Vec::new();
+    let of_choice = summary.of_choice.as_ref();
+    if let (Some(best), Some(all)) = (of_choice, &summary.over_all_choices) {
+        lines.push(format!(
+            "{} cases with {} choices; rates, quantiles and criteria are of the best one: {}",
+            all.cases, best.of, best.label
+        ));
+        lines.push(format!(
+            "best by {}; {} others cannot be told apart from it",
+            best.by, best.as_good
+        ));
+    }
+    if let Some(why) = &summary.not_ranked {
+        lines.push(format!(
+            "NOT JUDGED: rates are of all choices together, which answers no question: {why}"
+        ));
+    }
+    lines.push(format!(
         "{} cases: {} valid layouts, {} that cannot exist",
         overall.cases, overall.layouts, overall.invalid
-    )];
+    ));
     for detail in overall.invalid_details.iter().take(MOST_REASONS) {
         lines.push(format!("  {} because of {}", detail.count, detail.detail));
     }
@@ -110,7 +127,23 @@ fn overview(summary: &Summary) -> Vec<String> {
             rate_text(rate)
         ));
     }
-    lines.push("intervals: 95 %".to_owned());
+    match of_choice {
+        Some(best) => {
+            if let Some(share) = best.held_out {
+                lines.push(format!(
+                    "picked on the same layouts, which flatters it: picked on one half of the points, a choice \
+                     works in {} % of the valid layouts of the other half",
+                    in_percent(share)
+                ));
+            }
+            lines.push(format!(
+                "intervals: 95 % for all {} choices at once, {:.5} % each",
+                best.of,
+                100.0 * best.confidence_each
+            ));
+        }
+        None => lines.push("intervals: 95 %".to_owned()),
+    }
     lines
 }
 
@@ -252,9 +285,10 @@ fn effects(summary: &Summary, blocks: &mut Vec<Block>) {
         row.push(range.unwrap_or("-".to_owned()));
         row
     });
-    blocks.push(Block::Heading(
-        "share of the variance that each factor explains (%)".to_owned(),
-    ));
+    blocks.push(Block::Heading(over_all_choices(
+        summary,
+        "share of the variance that each factor explains (%)",
+    )));
     blocks.push(table(
         [
             "factor",
@@ -293,6 +327,14 @@ fn effects(summary: &Summary, blocks: &mut Vec<Block>) {
     }
 }
 
+/// A heading of what is of all choices together, as factors.
+fn over_all_choices(summary: &Summary, heading: &str) -> String {
+    match &summary.of_choice {
+        Some(_) => format!("{heading}, over all choices"),
+        None => heading.to_owned(),
+    }
+}
+
 /// Least and largest mean of bins.
 fn spread_of_bins(bins: &[BinMean]) -> Option<String> {
     let means = || bins.iter().filter_map(|bin| bin.mean);
@@ -318,9 +360,10 @@ fn regions(summary: &Summary, blocks: &mut Vec<Block>) {
     if rows.is_empty() {
         return;
     }
-    blocks.push(Block::Heading(
-        "where another configuration is the best".to_owned(),
-    ));
+    blocks.push(Block::Heading(over_all_choices(
+        summary,
+        "where another configuration is the best",
+    )));
     blocks.push(table(
         [
             "factor",
@@ -418,6 +461,7 @@ fn choices(summary: &Summary, blocks: &mut Vec<Block>) {
         rows: rows.collect(),
     });
     let mut lines = vec![
+        "works: of the valid layouts; its interval is 95 % for this choice alone".to_owned(),
         "against 1.: points fewer layouts; `as good` where they cannot be told apart".to_owned(),
     ];
     if ranking.choices.len() > MOST_CHOICES {

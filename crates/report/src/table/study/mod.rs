@@ -2,6 +2,7 @@
 
 mod case;
 pub(crate) mod document;
+pub(crate) mod postures;
 pub(crate) mod robustness;
 pub(crate) mod text;
 

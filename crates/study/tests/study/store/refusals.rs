@@ -220,6 +220,7 @@ fn factors_that_make_no_table_are_refused() {
         name: name.to_owned(),
         unit: String::new(),
         role: needlebench_study::Role::Choice,
+        sampled: false,
         kind: FactorKind::Levels(levels.to_vec()),
     };
     let one = [level("a", None)];

@@ -20,6 +20,7 @@ impl SyntheticDesign {
             name: name.to_owned(),
             unit: unit.to_owned(),
             role,
+            sampled: false,
             kind,
         };
         let labels = |labels: &[&str]| {

@@ -1,0 +1,131 @@
+//! What a study of postures alone has to say of itself.
+
+use needlebench_bench::study::PreparedStudy;
+use needlebench_cell::study::StudyMode;
+use needlebench_study::statistics::{ANY, Gap};
+
+use super::document::{Block, table};
+use crate::files::Replanned;
+use crate::number::in_percent;
+
+/// Which cases are of postures only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Postures {
+    /// All.
+    All,
+    /// Those of some levels.
+    Some,
+    /// None: all have motions.
+    None,
+}
+
+impl Postures {
+    /// Of a study.
+    pub(crate) fn of(prepared: &PreparedStudy) -> Self {
+        let modes = prepared.modes();
+        match (modes.contains(&StudyMode::Static), modes.len()) {
+            (false, _) => Self::None,
+            (true, 1) => Self::All,
+            (true, _) => Self::Some,
+        }
+    }
+
+    /// Name in `summary.json`.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Some => "some",
+            Self::None => "none",
+        }
+    }
+}
+
+/// The first sentence of a study of postures, wherever it is shown.
+pub(crate) fn postures_headline(postures: Postures, found: Option<&Replanned>) -> Option<String> {
+    let what = match postures {
+        Postures::None => return None,
+        Postures::All => "postures only",
+        Postures::Some => "postures only in the static cases",
+    };
+    let any = found.and_then(|found| Some((found, found.gaps.iter().find(|gap| gap.of == ANY)?)));
+    let Some((found, any)) = any else {
+        return Some(format!(
+            "{what}: whether a motion gets there is not known, and none was planned to see how often"
+        ));
+    };
+    Some(format!(
+        "{what}: whether a motion gets there is not known. Of {} cases, drawn from {} and planned too, {} % work \
+         by their posture and {} % with a motion: {}",
+        found.cases,
+        found.of,
+        share(any.by_postures, any),
+        share(any.planned, any),
+        points(any)
+    ))
+}
+
+fn share(count: u64, gap: &Gap) -> String {
+    in_percent(count as f64 / gap.cases.max(1) as f64)
+}
+
+/// `45 points less (27 to 60)`.
+fn points(gap: &Gap) -> String {
+    let (Some(difference), Some(interval)) = (gap.gap, gap.interval) else {
+        return "-".to_owned();
+    };
+    format!(
+        "{} points less ({} to {}, 95 %)",
+        in_percent(difference),
+        in_percent(interval.low),
+        in_percent(interval.high)
+    )
+}
+
+/// The headline, and the gap of each configuration.
+pub(crate) fn postures_blocks(headline: Option<&str>, found: Option<&Replanned>) -> Vec<Block> {
+    let Some(headline) = headline else {
+        return Vec::new();
+    };
+    let mut text = headline.to_owned();
+    text.replace_range(..8, "POSTURES");
+    let mut blocks = vec![Block::Lines(vec![text])];
+    let Some(found) = found else {
+        return blocks;
+    };
+    let rows = found.gaps.iter().map(|gap| {
+        vec![
+            gap.of.clone(),
+            share(gap.by_postures, gap),
+            share(gap.planned, gap),
+            gap.gap.map_or("-".to_owned(), in_percent),
+            gap.interval.map_or("-".to_owned(), |interval| {
+                format!(
+                    "{} .. {}",
+                    in_percent(interval.low),
+                    in_percent(interval.high)
+                )
+            }),
+            gap.gained.to_string(),
+        ]
+    });
+    blocks.push(Block::Heading(format!(
+        "what postures alone overstate, by {} of {} cases",
+        found.cases, found.of
+    )));
+    blocks.push(table(
+        [
+            "configuration",
+            "ok by\nposture (%)",
+            "with a\nmotion (%)",
+            "gap\n(points)",
+            "95 %",
+            "motion\nonly",
+        ],
+        rows.collect(),
+    ));
+    blocks.push(Block::Lines(vec![
+        "motion only: cases that work with their motion and not by the posture that would be tried first"
+            .to_owned(),
+    ]));
+    blocks
+}
