@@ -116,6 +116,14 @@ pub fn command_line() -> clap::Command {
 
 /// Runs the program.
 pub fn main() -> ExitCode {
+    // What is wrong is on standard error by then; a bug of ours has a status as everything else.
+    std::panic::catch_unwind(run).unwrap_or_else(|_| {
+        complain("error: this is a bug of needlebench, not of your input");
+        ExitStatus::EnvironmentFailed.into()
+    })
+}
+
+fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match cli.command {
         Command::Run(arguments) => command::run(&arguments),

@@ -238,13 +238,11 @@ fn input(path: &Path, case: Option<u64>) -> Result<Input, Refused> {
             file.display().to_string(),
             format!("the report cannot be read: {error}"),
         );
-        finding.hint = Some(match results_below(path) {
-            Some(below) => format!("`{name}` has the results of several scenarios: try {below}"),
-            None => {
-                let hint = error.hint("give a report.json, a results folder, or a scenario");
-                hint.to_owned()
-            }
-        });
+        let hint = error.hint("give a report.json, a results folder, or a scenario");
+        finding.hint = Some(results_below(path).map_or_else(
+            || hint.to_owned(),
+            |below| format!("`{name}` has the results of several scenarios: try {below}"),
+        ));
         Refused::from(finding)
     })?;
     let stored = StoredReport::parse(&file.display().to_string(), &text)?;

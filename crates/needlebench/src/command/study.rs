@@ -213,7 +213,7 @@ fn too_long(
 fn show(progress: &TerminalProgress, event: Event<'_>) {
     match event {
         Event::CutOff { .. } | Event::Damage { .. } | Event::Unsound { .. } => {
-            complain(&event.to_string())
+            complain(&event.to_string());
         }
         Event::Begin { kept, total } => {
             if kept > 0 {

@@ -29,6 +29,7 @@ mod people;
 #[cfg(target_os = "linux")]
 mod process;
 mod referee;
+mod robust_io;
 mod run;
 mod schema;
 mod study;

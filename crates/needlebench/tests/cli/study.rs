@@ -210,6 +210,32 @@ fn shards_on_any_number_of_threads_merge_into_the_same_bytes() {
 }
 
 #[test]
+fn results_do_not_depend_on_how_the_study_was_called() {
+    let bench = bench(STUDY);
+    let absolute = bench.path("study.toml").display().to_string();
+    let all = ["--quiet", "--csv", "--out"];
+    bench
+        .run(&[&["study", "study.toml"][..], &all, &["a"]].concat())
+        .exits_with(0);
+    bench
+        .run(&[&["study", &absolute][..], &all, &["b"]].concat())
+        .exits_with(0);
+    let files = [
+        "report.html",
+        "results.csv",
+        "results.parquet",
+        "study.json",
+        "summary.json",
+        "summary.md",
+    ];
+    assert_eq!(bench.tree("a").len(), files.len());
+    for file in files {
+        let [a, b] = ["a", "b"].map(|folder| bench.read(&format!("{folder}/moved/{file}")));
+        assert!(a == b, "{file} differs");
+    }
+}
+
+#[test]
 fn a_folder_with_results_is_neither_overwritten_nor_mixed() {
     let bench = bench(STUDY);
     run(&bench, &["--no-page"]).exits_with(0);

@@ -180,10 +180,13 @@ pub fn write_study(
             let layout = StudyCase::new(&prepared.study, &prepared.design, case);
             layout.scenario(&prepared.study).ok()
         };
+        // Its name alone: where it lies, and how it was called, is no part of the results.
+        let source = Path::new(&prepared.study.source.file);
+        let source = source.file_name().unwrap_or_default().to_string_lossy();
         let page = StudyPage {
             name: &file.name,
             description: &file.description,
-            file: &prepared.study.source.file,
+            file: &source,
             results,
             summary: &serde_json::to_value(&summary)?,
             manifest: &serde_json::to_value(prepared.manifest(None))?,

@@ -213,13 +213,11 @@ impl Manifest {
             Err(error) if error.is_not_found() => return Ok(None),
             Err(InputError::Io(error)) => return Err(StudyError::io("read", &path)(error)),
             Err(error) => {
-                let message = format!("is no manifest of a study: {error}");
-                return Err(StudyError::file(&path, message));
+                return Err(unreadable(&path, &error));
             }
         };
-        let version: Version = serde_json::from_str(&text).map_err(|error| {
-            StudyError::file(&path, format!("is no manifest of a study: {error}"))
-        })?;
+        let version: Version =
+            serde_json::from_str(&text).map_err(|error| unreadable(&path, &error))?;
         if version.schema_version != SCHEMA_VERSION {
             let message = format!(
                 "has schema version {}; this program reads version {SCHEMA_VERSION}",
@@ -227,9 +225,8 @@ impl Manifest {
             );
             return Err(StudyError::file(&path, message));
         }
-        let manifest: Self = serde_json::from_str(&text).map_err(|error| {
-            StudyError::file(&path, format!("is no manifest of a study: {error}"))
-        })?;
+        let manifest: Self =
+            serde_json::from_str(&text).map_err(|error| unreadable(&path, &error))?;
         if manifest.block_cases == 0 {
             return Err(StudyError::file(&path, "block_cases is 0"));
         }
@@ -289,6 +286,14 @@ impl Manifest {
             && self.columns == other.columns
             && self.provenance == other.provenance
     }
+}
+
+fn unreadable(path: &Path, error: &dyn fmt::Display) -> StudyError {
+    let message = format!(
+        "is no manifest of a study: {error}\n\
+         hint: put back a copy of it, or compute the study in another folder"
+    );
+    StudyError::file(path, message)
 }
 
 fn provenance_differences(

@@ -4,6 +4,7 @@
 //! their place. So no bit of a table can change unnoticed, wherever the file is taken: of the row groups,
 //! of the footer that says how they are read, and of the sum.
 
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
@@ -84,6 +85,12 @@ fn sum(mut file: &File, place: u64) -> io::Result<String> {
         hash.update(&chunk[..read]);
         at += read as u64;
     }
-    let digits = hash.finalize();
-    Ok(digits.iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(hash
+        .finalize()
+        .iter()
+        .fold(String::new(), |mut text, byte| {
+            // Writing to a String cannot fail.
+            let _ = write!(text, "{byte:02x}");
+            text
+        }))
 }

@@ -292,7 +292,12 @@ mod tests {
         for (file, text) in [("tiny/a.py", "a = 1\n"), ("tiny/b.so", "\u{7f}ELF")] {
             fs::write(site.join(file), text).unwrap();
             let digest: [u8; 32] = Sha256::digest(text).into();
-            record += &format!("{file},sha256={},{}\n", base64url(&digest), text.len());
+            let _ = writeln!(
+                record,
+                "{file},sha256={},{}",
+                base64url(&digest),
+                text.len()
+            );
         }
         record += "tiny_one-1.0.dist-info/RECORD,,\n";
         fs::write(info.join("RECORD"), record).unwrap();
