@@ -38,8 +38,6 @@ pub fn wrap_angle(angle_rad: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod calibrated_tests;
-#[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod wraps_tests;

@@ -120,7 +120,7 @@ pub(super) fn free_wrist(
 
 /// Why configurations of a shoulder and wrist do not exist: recomputed when asked for. `None` if
 /// they do, within rounding.
-pub(in super::super) fn unreachable(
+pub(super) fn unreachable(
     geometry: &UrGeometry,
     pose: &Pose,
     shoulder: Shoulder,

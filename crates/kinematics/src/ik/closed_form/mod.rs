@@ -15,7 +15,6 @@ use std::sync::LazyLock;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch};
 
-pub(super) use careful::unreachable;
 pub(super) use clamped::clamped;
 pub use family::FreeWrist;
 

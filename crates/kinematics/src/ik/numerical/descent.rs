@@ -72,14 +72,14 @@ const POLISHING: f64 = 0.1;
 /// Damping that is always there, so that a singular matrix can be factored.
 const LEAST_DAMPING: f64 = 1e-16;
 
-struct Factor {
+pub(super) struct Factor {
     lower: [[f64; 6]; 6],
     inverse: [f64; 6],
 }
 
 /// `J^T J` with lengths weighted.
 #[inline(always)]
-fn normal_matrix(rows: &[Lanes; 6], weight: f64) -> [Lanes; 6] {
+pub(super) fn normal_matrix(rows: &[Lanes; 6], weight: f64) -> [Lanes; 6] {
     let mut matrix = [[0.0; 8]; 6];
     for (i, row) in matrix.iter_mut().enumerate() {
         for (l, entry) in row.iter_mut().enumerate() {
@@ -95,7 +95,7 @@ fn normal_matrix(rows: &[Lanes; 6], weight: f64) -> [Lanes; 6] {
 
 /// `J^T e` with lengths weighted.
 #[inline(always)]
-fn gradient(rows: &[Lanes; 6], e: &[f64; 6], weight: f64) -> Lanes {
+pub(super) fn gradient(rows: &[Lanes; 6], e: &[f64; 6], weight: f64) -> Lanes {
     std::array::from_fn(|l| {
         let linear = rows[0][l] * e[0] + rows[1][l] * e[1] + rows[2][l] * e[2];
         let angular = rows[3][l] * e[3] + rows[4][l] * e[4] + rows[5][l] * e[5];
@@ -106,7 +106,7 @@ fn gradient(rows: &[Lanes; 6], e: &[f64; 6], weight: f64) -> Lanes {
 impl Factor {
     /// `L D L^T` of `matrix + damping I`.
     #[inline(always)]
-    fn new(matrix: &[Lanes; 6], damping: f64) -> Self {
+    pub(super) fn new(matrix: &[Lanes; 6], damping: f64) -> Self {
         let mut rest = *matrix;
         let (mut lower, mut inverse) = ([[0.0; 6]; 6], [0.0; 6]);
         for k in 0..6 {
@@ -124,7 +124,7 @@ impl Factor {
     }
 
     #[inline(always)]
-    fn solve(&self, right: &Lanes) -> Lanes {
+    pub(super) fn solve(&self, right: &Lanes) -> Lanes {
         let mut y = *right;
         for k in 0..6 {
             for i in k + 1..6 {
@@ -145,7 +145,7 @@ impl Factor {
 
 /// Second derivative of the pose along a joint direction: `d (dJ/dq d) d`.
 #[inline(always)]
-fn curvature(rows: &[Lanes; 6], d: &Lanes) -> [f64; 6] {
+pub(super) fn curvature(rows: &[Lanes; 6], d: &Lanes) -> [f64; 6] {
     // Angular velocity of the link before each joint.
     let mut before = [[0.0; 8]; 3];
     for k in 0..3 {
@@ -178,7 +178,7 @@ fn squares(e: &[f64; 6]) -> (f64, f64) {
 }
 
 #[inline(always)]
-fn product(a: &Lanes, b: &Lanes) -> f64 {
+pub(super) fn product(a: &Lanes, b: &Lanes) -> f64 {
     (0..6).map(|i| a[i] * b[i]).sum()
 }
 

@@ -7,12 +7,13 @@
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 
+use fearless_simd::prelude::*;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::{Chain, JOINT_COUNT, Joints, Pose};
 
 /// One value per joint, and two spare ones.
-pub(super) type Lanes = [f64; 8];
+pub(in super::super) type Lanes = [f64; 8];
 pub(super) type V3 = [f64; 3];
 
 pub(super) fn lanes(q: &Joints) -> Lanes {
@@ -30,7 +31,7 @@ pub(super) fn joints(lanes: &Lanes) -> Joints {
 ///
 /// Reduction by Cody and Waite with pi/2 in three parts, and the polynomials of Sun's fdlibm.
 #[inline(always)]
-pub(super) fn sin_cos(angles: &Lanes) -> (Lanes, Lanes) {
+pub(in super::super) fn sin_cos(angles: &Lanes) -> (Lanes, Lanes) {
     const LARGEST_RAD: f64 = 100.0;
     /// Adding it rounds to an integer, found in the low bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
@@ -80,6 +81,26 @@ pub(super) fn sin_cos(angles: &Lanes) -> (Lanes, Lanes) {
     (sines, cosines)
 }
 
+/// A vector turned by a matrix. Without closures, which are not inlined into vector code.
+#[inline(always)]
+fn rotated<S: Simd, V: SimdFloat<S, Element = f64>>(m: &Matrix3<f64>, v: &[V; 3]) -> [V; 3] {
+    [
+        v[0] * m[(0, 0)] + v[1] * m[(0, 1)] + v[2] * m[(0, 2)],
+        v[0] * m[(1, 0)] + v[1] * m[(1, 1)] + v[2] * m[(1, 2)],
+        v[0] * m[(2, 0)] + v[1] * m[(2, 1)] + v[2] * m[(2, 2)],
+    ]
+}
+
+/// A sum of three vectors with their factors.
+#[inline(always)]
+fn mixed<S: Simd, V: SimdFloat<S, Element = f64>>(v: &[[V; 3]; 3], by: [f64; 3]) -> [V; 3] {
+    [
+        v[0][0] * by[0] + v[1][0] * by[1] + v[2][0] * by[2],
+        v[0][1] * by[0] + v[1][1] * by[1] + v[2][1] * by[2],
+        v[0][2] * by[0] + v[1][2] * by[1] + v[2][2] * by[2],
+    ]
+}
+
 #[inline(always)]
 pub(super) fn cross(a: &V3, b: &V3) -> V3 {
     [
@@ -116,6 +137,13 @@ pub(super) struct Kernel {
 pub(in super::super) struct Target {
     columns: [V3; 3],
     position: V3,
+}
+
+/// A frame: the columns of its rotation, and its origin, m.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Placed<V> {
+    pub columns: [[V; 3]; 3],
+    pub position: [V; 3],
 }
 
 /// The chain at some joint positions, seen from the first joint.
@@ -219,45 +247,90 @@ impl Kernel {
         }
     }
 
-    /// Forward kinematics and Jacobian.
+    /// Cosines and sines of the turns about the kernel's own frames, from those of the joints.
     #[inline(always)]
-    pub(super) fn state(&self, q: &Lanes) -> State {
-        let (own_sin, own_cos) = sin_cos(q);
+    fn turns(&self, own_cos: &Lanes, own_sin: &Lanes) -> (Lanes, Lanes) {
         let (mut s, mut c) = ([0.0; 8], [0.0; 8]);
         for i in 0..8 {
             c[i] = own_cos[i] * self.turn_cos[i] - own_sin[i] * self.turn_sin[i];
             s[i] = own_sin[i] * self.turn_cos[i] + own_cos[i] * self.turn_sin[i];
         }
-        // Joint axes and origins by coordinate, and the frame that runs along the chain.
-        let (mut axes, mut origins) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
-        axes[2][0] = 1.0;
-        let mut x = [c[0], s[0], 0.0];
-        let mut y = [-s[0], c[0], 0.0];
-        let mut z = [0.0, 0.0, 1.0];
-        let mut p = [0.0; 3];
+        (c, s)
+    }
+
+    /// Forward kinematics from cosines and sines of the joints, in the chain's base, postures
+    /// across lanes.
+    #[inline(always)]
+    pub(super) fn placed<S: Simd, V: SimdFloat<S, Element = f64>>(
+        &self,
+        simd: S,
+        own_cos: &[V; JOINT_COUNT],
+        own_sin: &[V; JOINT_COUNT],
+    ) -> Placed<V> {
+        let zero = V::splat(simd, 0.0);
+        let one = V::splat(simd, 1.0);
+        let (mut x, mut y, mut z) = ([one, zero, zero], [zero, one, zero], [zero, zero, one]);
+        let mut p = [zero; 3];
         for i in 0..JOINT_COUNT {
-            if i > 0 {
-                for k in 0..3 {
-                    let (xk, yk) = (x[k], y[k]);
-                    x[k] = c[i] * xk + s[i] * yk;
-                    y[k] = c[i] * yk - s[i] * xk;
-                }
-            }
+            let c = own_cos[i] * self.turn_cos[i] - own_sin[i] * self.turn_sin[i];
+            let s = own_sin[i] * self.turn_cos[i] + own_cos[i] * self.turn_sin[i];
             let shift = &self.arm[i];
             for k in 0..3 {
-                p[k] += (shift[0] * x[k] + shift[1] * y[k]) + shift[2] * z[k];
+                let (xk, yk) = (x[k], y[k]);
+                x[k] = c.mul_add(xk, s * yk);
+                y[k] = c.mul_add(yk, -(s * xk));
+                p[k] = p[k] + x[k] * shift[0] + y[k] * shift[1] + z[k] * shift[2];
             }
             if i + 1 < JOINT_COUNT {
                 let (cosine, sine) = self.twist[i];
                 for k in 0..3 {
                     let (yk, zk) = (y[k], z[k]);
-                    y[k] = cosine * yk + sine * zk;
-                    z[k] = cosine * zk - sine * yk;
-                    axes[k][i + 1] = z[k];
-                    origins[k][i + 1] = p[k];
+                    y[k] = yk * cosine + zk * sine;
+                    z[k] = zk * cosine - yk * sine;
                 }
             }
         }
+        let last = [
+            rotated(&self.base_rotation, &x),
+            rotated(&self.base_rotation, &y),
+            rotated(&self.base_rotation, &z),
+        ];
+        let [px, py, pz] = rotated(&self.base_rotation, &p);
+        let tool = &self.tool_rotation;
+        let base = &self.base_position;
+        Placed {
+            columns: [
+                mixed(&last, [tool[(0, 0)], tool[(1, 0)], tool[(2, 0)]]),
+                mixed(&last, [tool[(0, 1)], tool[(1, 1)], tool[(2, 1)]]),
+                mixed(&last, [tool[(0, 2)], tool[(1, 2)], tool[(2, 2)]]),
+            ],
+            position: [px + base[0], py + base[1], pz + base[2]],
+        }
+    }
+
+    /// Forward kinematics and Jacobian.
+    #[inline(always)]
+    pub(super) fn state(&self, q: &Lanes) -> State {
+        let (own_sin, own_cos) = sin_cos(q);
+        let (c, s) = self.turns(&own_cos, &own_sin);
+        // Joint axes and origins by coordinate, and the frame that runs along the chain.
+        let (mut axes, mut origins) = ([[0.0; 8]; 3], [[0.0; 8]; 3]);
+        axes[2][0] = 1.0;
+        let mut frame = Frame::after_first(c[0], s[0]);
+        for i in 0..JOINT_COUNT {
+            if i > 0 {
+                frame.turn(c[i], s[i]);
+            }
+            frame.shift(&self.arm[i]);
+            if i + 1 < JOINT_COUNT {
+                frame.twist(self.twist[i]);
+                for k in 0..3 {
+                    axes[k][i + 1] = frame.z[k];
+                    origins[k][i + 1] = frame.p[k];
+                }
+            }
+        }
+        let Frame { x, y, z, p } = frame;
         let mut rows = [[0.0; 8]; 6];
         for i in 0..8 {
             let lever = [
@@ -274,6 +347,53 @@ impl Kernel {
             rows,
             columns: [x, y, z],
             position: p,
+        }
+    }
+}
+
+/// The frame that runs along the chain.
+struct Frame {
+    x: V3,
+    y: V3,
+    z: V3,
+    p: V3,
+}
+
+impl Frame {
+    #[inline(always)]
+    fn after_first(cosine: f64, sine: f64) -> Self {
+        Self {
+            x: [cosine, sine, 0.0],
+            y: [-sine, cosine, 0.0],
+            z: [0.0, 0.0, 1.0],
+            p: [0.0; 3],
+        }
+    }
+
+    /// By a joint's turn, about z.
+    #[inline(always)]
+    fn turn(&mut self, cosine: f64, sine: f64) {
+        for k in 0..3 {
+            let (xk, yk) = (self.x[k], self.y[k]);
+            self.x[k] = cosine * xk + sine * yk;
+            self.y[k] = cosine * yk - sine * xk;
+        }
+    }
+
+    #[inline(always)]
+    fn shift(&mut self, by: &V3) {
+        for k in 0..3 {
+            self.p[k] += (by[0] * self.x[k] + by[1] * self.y[k]) + by[2] * self.z[k];
+        }
+    }
+
+    /// By a link's twist, about x.
+    #[inline(always)]
+    fn twist(&mut self, (cosine, sine): (f64, f64)) {
+        for k in 0..3 {
+            let (yk, zk) = (self.y[k], self.z[k]);
+            self.y[k] = cosine * yk + sine * zk;
+            self.z[k] = cosine * zk - sine * yk;
         }
     }
 }

@@ -4,6 +4,7 @@
 //! orientation error the log map `vee(log(R_d R^T))`.
 
 mod descent;
+mod fold;
 mod kernel;
 #[cfg(test)]
 mod tests;
@@ -12,15 +13,17 @@ use std::f64::consts::PI;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
+use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Matrix6, Vector6};
 
 use crate::random::SplitMix64;
 use crate::{Chain, JOINT_COUNT, Joints, Pose, rotation_vector};
 use descent::{End, Steering, descend, least_squares};
-use kernel::{Kernel, Lanes, joints, lanes};
+use fold::{flattest_plane, fold};
+use kernel::{Kernel, joints, lanes};
 
-pub(super) use kernel::Target;
+pub(super) use kernel::{Lanes, Placed, Target, sin_cos};
 
 /// Vector instructions of this machine, at most those of four doubles: a chain is no wider.
 static LEVEL: LazyLock<Level> = LazyLock::new(|| {
@@ -293,6 +296,31 @@ impl Numerical {
         })
     }
 
+    /// The flange in the chain's base, from cosines and sines of the joints, postures across lanes.
+    #[inline(always)]
+    pub(super) fn placed<S: Simd, V: SimdFloat<S, Element = f64>>(
+        &self,
+        simd: S,
+        cosines: &[V; JOINT_COUNT],
+        sines: &[V; JOINT_COUNT],
+    ) -> Placed<V> {
+        self.kernel.placed(simd, cosines, sines)
+    }
+
+    /// Starts near the two solutions that meet at a singularity near a posture.
+    pub(super) fn fold(&self, target: &Target, start: &Joints) -> Option<[Joints; 2]> {
+        let (start, rad_per_m) = (lanes(start), self.rad_per_m());
+        let found =
+            dispatch!(*LEVEL, simd => folded(simd, &self.kernel, target, &start, rad_per_m))?;
+        Some(found.map(|q| joints(&q)))
+    }
+
+    /// The two directions of the joints that move the flange least, rad.
+    pub(super) fn flattest_plane(&self, q: &Joints) -> Option<[Joints; 2]> {
+        let found = flattest_plane(&self.kernel, &lanes(q), self.rad_per_m())?;
+        Some(found.map(|direction| joints(&direction)))
+    }
+
     /// Residuals of postures, m and rad.
     pub(super) fn residuals(&self, target: &Target, q: &Joints) -> (f64, f64) {
         let e = self.kernel.state(&lanes(q)).error(target);
@@ -333,6 +361,17 @@ fn result(end: &End, iterations: u32, restarts: u32, stop: Stop) -> NumericalRes
         converged: stop == Stop::Converged,
         stop,
     }
+}
+
+#[inline(always)]
+fn folded<S: Simd>(
+    _simd: S,
+    kernel: &Kernel,
+    target: &Target,
+    start: &Lanes,
+    rad_per_m: f64,
+) -> Option<[Lanes; 2]> {
+    fold(kernel, target, start, rad_per_m)
 }
 
 #[inline(always)]
