@@ -123,6 +123,7 @@ def cases(scenario: dict, report: dict, results: Path) -> list[tuple[str, Case, 
                 times,
                 path,
                 scenario.get("engines", {}).get("timestep_ms", 1.0) * 1e-3,
+                scenario["imperfections"],
             )
             apart = np.abs(planned(case)[1] - target).max()
             assert apart < SAME_POINT_M, (

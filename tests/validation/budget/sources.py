@@ -11,7 +11,9 @@ from model import (
     Arm,
     Array,
     Chain,
+    defaults,
     flange,
+    from_vector,
     gravity_torque,
     mass_matrix,
     moved,
@@ -23,6 +25,9 @@ from model import (
 BALANCE_STEPS = 4
 # Halvings of the way that a joint springs back: a way of a milliradian to rounding.
 HALVINGS = 50
+# Postures that a calibration is made from, and what a radian of the flange counts beside a metre.
+ABSORBING_POSTURES = 200
+LEVER_M = 0.2
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,7 @@ class Case:
     times: Array  # of the planned motion's last phase
     path: Array  # joint positions at these times
     timestep: float
+    blocks: dict  # [imperfections], by name
 
 
 @dataclass
@@ -51,7 +57,7 @@ class Truth:
     chain: Chain
     tool_mass: Array
     tool_com: Array
-    compliance: Array
+    softness: Array  # factor on each gear's twist; no gears if all are 0
     reading: Array  # of the encoders at rest, beyond the motor's angle
     noise: Array | None = None  # standard deviation of a reading
     friction: dict | None = (
@@ -67,6 +73,18 @@ class Truth:
     breath: Array = field(
         default_factory=lambda: np.zeros((2, 1, 3))
     )  # of skin and target
+    deviations: Array = field(
+        default_factory=lambda: np.zeros((1, 6, 6))
+    )  # of joint origins
+    markers: Array | None = None
+    seen_off: Array | float = 0.0  # of each marker, phantom frame
+    base_turn: Array = field(default_factory=lambda: np.eye(3)[None])
+    base_place: Array = field(default_factory=lambda: np.zeros((1, 3)))
+    unseen: Array = field(
+        default_factory=lambda: np.zeros((1, 3))
+    )  # target, phantom frame
+    bent: Array = field(default_factory=lambda: np.zeros((2, 1, 3)))  # needle, axes
+    pushed: Array = field(default_factory=lambda: np.zeros((2, 1)))  # along the needle
 
 
 def as_planned(case: Case, count: int) -> Truth:
@@ -83,11 +101,13 @@ def calibration(
 ) -> None:
     """An arm of the normal distribution with mean and covariance of the real arms."""
     arms = case.real_arms.reshape(len(case.real_arms), -1) * block["scale"]
+    middle = arms.mean(axis=0)
+    if block.get("class", "factory_calibrated") != "nominal_kinematics":
+        # The controller knows its arm, but for a share.
+        arms, middle = arms * block["residual"], 0.0 * middle
     spread = np.cov(arms, rowvar=False)
-    drawn = random.multivariate_normal(
-        arms.mean(axis=0), spread, truth.count, method="eigh"
-    )
-    truth.chain = moved(case.arm.chain, drawn.reshape(-1, 6, 6))
+    drawn = random.multivariate_normal(middle, spread, truth.count, method="eigh")
+    truth.deviations = truth.deviations + drawn.reshape(-1, 6, 6)
 
 
 def encoder(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
@@ -104,12 +124,105 @@ def encoder(case: Case, block: dict, random: np.random.Generator, truth: Truth) 
 def elasticity(
     case: Case, block: dict, random: np.random.Generator, truth: Truth
 ) -> None:
-    """Gears that twist by the torque that they carry."""
-    stiffness = np.array(
-        block.get("stiffness_nm_rad") or case.arm.data["gears"]["stiffness_nm_rad"]
+    """Gears that twist by the torque that they carry, less what a calibration took of it for geometry."""
+    truth.softness = 1.0 + block["spread"] * random.standard_normal((truth.count, 6))
+    calibrated = case.blocks.get("calibration")
+    if calibrated is not None and calibrated.get("measured_under_gravity", True):
+        assert calibrated.get("class") != "calibrated_here", "the tool was on then"
+        taken = absorbed(case)
+        truth.deviations = truth.deviations - np.einsum(
+            "nj,jik->nik", truth.softness, taken
+        )
+
+
+def twist(case: Case, torque: Array) -> Array:
+    """Angle of each gear under a torque: three slopes, stiffer from corner to corner."""
+    gears = case.arm.data["gears"]
+    given = case.blocks["elasticity"].get("stiffness_nm_rad")
+    more = gears.get("stiffening")
+    if given is not None or more is None:
+        return torque / np.array(given or gears["stiffness_nm_rad"])
+    corners = [np.zeros(6), *(np.array(more[k]) for k in ("first_corner_nm", "second_corner_nm")), np.inf]
+    slopes = [gears["stiffness_nm_rad"], more["second_nm_rad"], more["third_nm_rad"]]
+    size = np.abs(torque)
+    parts = [
+        np.clip(size, low, high) - low
+        for low, high in zip(corners[:-1], corners[1:], strict=True)
+    ]
+    return np.sign(torque) * sum(
+        part / np.array(slope) for part, slope in zip(parts, slopes, strict=True)
     )
-    factor = 1.0 + block["spread"] * random.standard_normal((truth.count, 6))
-    truth.compliance = factor / stiffness
+
+
+def softest_loop(case: Case) -> Array:
+    """Least compliance of the gears, which the servo's small motions are reckoned with."""
+    if "elasticity" not in case.blocks:
+        return np.zeros(6)
+    large = np.full(6, 1e6)
+    return (twist(case, 2.0 * large) - twist(case, large)) / large
+
+
+def halton(point: int) -> Array:
+    """Joint positions in (-pi, pi) from Halton's sequence in the first six primes."""
+    found = []
+    for base in (2, 3, 5, 7, 11, 13):
+        digits, left = [], point
+        while left:
+            left, digit = divmod(left, base)
+            digits.append(digit)
+        share = sum(digit / base ** (k + 1) for k, digit in enumerate(digits))
+        found.append((2.0 * share - 1.0) * np.pi)
+    return np.array(found)
+
+
+def absorbed(case: Case) -> Array:
+    """Origin deviations (by sagging joint) that fit best what twists do to the flange of a bare, upright arm.
+
+    Least squares in place and in orientation times 0.2 m over 200 postures with the flange above the base, of
+    Halton's sequence; the smallest that fit. Derivatives are differences of the forward kinematics.
+    """
+    arm = Arm(
+        case.arm.chain, case.arm.bodies, np.eye(3), np.zeros(3), case.arm.tool, case.arm.data
+    )
+    points, chosen = 0, []
+    while len(chosen) < ABSORBING_POSTURES:
+        points += 1
+        q = halton(points)
+        _, place = flange(arm.chain, posture(arm, arm.chain, q[None]))
+        if place[0, 2] >= 0.0:
+            chosen.append(q)
+    q = np.array(chosen)
+    bare = gravity_torque(arm, arm.chain, q, np.zeros(1), np.zeros((1, 3)))
+    angle = twist(case, bare)
+
+    def pose(chain: Chain, q: Array) -> tuple[Array, Array]:
+        turn, place = flange(chain, posture(arm, chain, q))
+        return np.broadcast_to(turn, (len(q), 3, 3)), np.broadcast_to(place, (len(q), 3))
+
+    def change(ahead: tuple[Array, Array], behind: tuple[Array, Array], step: float) -> Array:
+        turn = (ahead[0] @ behind[0].transpose(0, 2, 1)) / (2.0 * step)
+        vector = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=-1)
+        place = (ahead[1] - behind[1]) / (2.0 * step)
+        return np.hstack([place, LEVER_M * vector]).reshape(-1)
+
+    step = 1e-5
+    columns = []
+    for joint in range(6):
+        for k in range(6):
+            off = np.zeros((1, 6, 6))
+            off[0, joint, k] = step
+            sides = [pose(moved(arm.chain, sign * off), q) for sign in (1.0, -1.0)]
+            columns.append(change(*sides, step))
+    matrix = np.array(columns).T
+    found = []
+    for joint in range(6):
+        off = np.zeros(6)
+        off[joint] = step
+        swing = change(pose(arm.chain, q + off), pose(arm.chain, q - off), step)
+        wanted = -swing.reshape(len(q), 6) * angle[:, joint, None]
+        solved, *_ = np.linalg.lstsq(matrix, wanted.reshape(-1), rcond=np.sqrt(1e-9))
+        found.append(solved.reshape(6, 6))
+    return np.array(found)
 
 
 def payload(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
@@ -151,40 +264,118 @@ def guide(case: Case, block: dict, random: np.random.Generator, truth: Truth) ->
 def registration(
     case: Case, block: dict, random: np.random.Generator, truth: Truth
 ) -> None:
-    """Markers seen with an error, and the rigid least-squares fit to them (Kabsch, by SVD).
+    """Markers seen with an error."""
+    truth.markers = np.array(block["markers_mm"]) * 1e-3
+    sigma = block["localisation_error_mm"] * 1e-3 / np.sqrt(3.0)
+    truth.seen_off = truth.seen_off + sigma * random.standard_normal(
+        (truth.count, *truth.markers.shape)
+    )
+
+
+def skin_markers(
+    case: Case, block: dict, random: np.random.Generator, truth: Truth
+) -> None:
+    """Markers that shift on the skin, and rise with it at a phase of their own."""
+    truth.markers = np.array(defaults("RegistrationBlock", case.blocks["registration"])["markers_mm"]) * 1e-3
+    shift = block["shift_mm"] * 1e-3 * random.standard_normal((truth.count, *truth.markers.shape))
+    breath = defaults("BreathingBlock", case.blocks["breathing"])
+    own = breath | {"phase": 0.0, "phase_spread": block["phase_spread"]}
+    share = np.sin(np.pi * phases(own, random, truth.count)) ** 4
+    risen = share[:, None] * np.array(breath["skin_mm"]) * 1e-3
+    truth.seen_off = truth.seen_off + shift + risen[:, None]
+
+
+def fit(case: Case, truth: Truth) -> None:
+    """The rigid least-squares fit (Kabsch, by SVD) to where markers were seen, then the robot's own place.
 
     The phantom is planned where the fit has it. So it really is where the fit's inverse leads from there.
     """
-    markers = np.array(block["markers_mm"]) * 1e-3
-    sigma = block["localisation_error_mm"] * 1e-3 / np.sqrt(3.0)
-    seen = markers + sigma * random.standard_normal((truth.count, *markers.shape))
-    middle, seen_middle = markers.mean(axis=0), seen.mean(axis=1)
-    products = np.einsum("ki,nkj->nij", markers - middle, seen - seen_middle[:, None])
-    left, _, right = np.linalg.svd(products)
-    turn = right.transpose(0, 2, 1) @ left.transpose(0, 2, 1)
-    mirror = np.ones((truth.count, 3))
-    mirror[:, 2] = np.linalg.det(turn)
-    turn = right.transpose(0, 2, 1) @ (mirror[..., None] * left.transpose(0, 2, 1))
-    place = seen_middle - turn @ middle
-    # Back: x_true = turn^T (x_planned - place), in the phantom's frame; then as seen in the world.
-    back = turn.transpose(0, 2, 1)
-    back_place = -(back @ place[..., None])[..., 0]
     own, at = case.phantom_turn, case.phantom_place
-    truth.shift_turn = own @ back @ own.T
-    truth.shift_place = at + back_place @ own.T - truth.shift_turn @ at
+    if truth.markers is not None:
+        markers = truth.markers
+        seen = markers + truth.seen_off
+        middle, seen_middle = markers.mean(axis=0), seen.mean(axis=1)
+        products = np.einsum(
+            "ki,nkj->nij", markers - middle, seen - seen_middle[:, None]
+        )
+        left, _, right = np.linalg.svd(products)
+        turn = right.transpose(0, 2, 1) @ left.transpose(0, 2, 1)
+        mirror = np.ones((len(seen), 3))
+        mirror[:, 2] = np.linalg.det(turn)
+        turn = right.transpose(0, 2, 1) @ (mirror[..., None] * left.transpose(0, 2, 1))
+        place = seen_middle - turn @ middle
+        # Back: x_true = turn^T (x_planned - place), in the phantom's frame; then as seen in the world.
+        back = turn.transpose(0, 2, 1)
+        back_place = -(back @ place[..., None])[..., 0]
+        truth.shift_turn = own @ back @ own.T
+        truth.shift_place = at + back_place @ own.T - truth.shift_turn @ at
+    # About the phantom's origin.
+    base, off = truth.base_turn, truth.base_place
+    truth.shift_place = (
+        at + off + (base @ (truth.shift_place - at)[..., None])[..., 0]
+    )
+    truth.shift_turn = base @ truth.shift_turn
+
+
+def hand_eye(
+    case: Case, block: dict, random: np.random.Generator, truth: Truth
+) -> None:
+    """The robot's base is not where it is believed to be: a turn about the phantom's origin, and a way."""
+    turn = np.radians(block["rotation_deg"]) * random.standard_normal((truth.count, 3))
+    truth.base_turn = from_vector(turn)
+    truth.base_place = block["translation_mm"] * 1e-3 * random.standard_normal((truth.count, 3))
+
+
+def imaging(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
+    """The target is anywhere in its voxel, and its centre is chosen with an error."""
+    voxel = np.array(block["voxel_mm"]) * 1e-3
+    within = voxel * random.uniform(-0.5, 0.5, (truth.count, 3))
+    truth.unseen = within + block["reader_mm"] * 1e-3 * random.standard_normal((truth.count, 3))
+
+
+def needle(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
+    """A force across the tip, in any direction, bends the needle from the guide's exit on."""
+    outer, bore = case.arm.tool.needle, block["bore_mm"] * 1e-3
+    rigidity = block["young_gpa"] * 1e9 * np.pi * (outer**4 - bore**4) / 64.0
+    # Squares of the force are exponential: its parts along two axes are normal.
+    force = block["side_force_n"] * np.sqrt(random.exponential(1.0, truth.count))
+    angle = random.uniform(0.0, 2.0 * np.pi, truth.count)
+    length = case.depths[1]
+    across = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
+    truth.bent = np.array(
+        [
+            across * (force * s**2 * (3.0 * length - s) / (6.0 * rigidity))[:, None]
+            for s in case.depths
+        ]
+    )
+
+
+def indentation(
+    case: Case, block: dict, random: np.random.Generator, truth: Truth
+) -> None:
+    """Skin and target give way along the needle."""
+    truth.pushed = np.array(
+        [
+            (block[f"{what}_mm"] + block[f"{what}_spread_mm"] * random.standard_normal(truth.count)) * 1e-3
+            for what in ("skin", "target")
+        ]
+    )
+
+
+def phases(block: dict, random: np.random.Generator, count: int) -> Array:
+    """Phases of the breath: near the one that is met, or any where the hold fails."""
+    any_phase = random.random(count)
+    if block["free"]:
+        return any_phase
+    met = block["phase"] + block["phase_spread"] * random.standard_normal(count)
+    return np.where(random.random(count) < block["hold_failure"], any_phase, met)
 
 
 def breathing(
     case: Case, block: dict, random: np.random.Generator, truth: Truth
 ) -> None:
     """Skin and target move by `sin^4(pi phase)` of their amplitudes (Lujan 1999)."""
-    if block["free"]:
-        phase = random.random(truth.count)
-    else:
-        phase = block["phase"] + block["phase_spread"] * random.standard_normal(
-            truth.count
-        )
-    share = np.sin(np.pi * phase) ** 4
+    share = np.sin(np.pi * phases(block, random, truth.count)) ** 4
     moves = (np.array(block[key]) * 1e-3 for key in ("skin_mm", "target_mm"))
     truth.breath = np.array(
         [share[:, None] * (case.phantom_turn @ each) for each in moves]
@@ -199,7 +390,12 @@ SOURCES = {
     "payload": ("PayloadBlock", payload),
     "friction": ("FrictionBlock", friction),
     "guide": ("GuideBlock", guide),
+    "hand_eye": ("HandEyeBlock", hand_eye),
     "registration": ("RegistrationBlock", registration),
+    "skin_markers": ("SkinMarkersBlock", skin_markers),
+    "imaging": ("ImagingBlock", imaging),
+    "needle": ("NeedleBlock", needle),
+    "indentation": ("IndentationBlock", indentation),
     "breathing": ("BreathingBlock", breathing),
 }
 # Blocks that leave nothing at an arm that has come to rest.
@@ -296,7 +492,7 @@ def noise_covariance(case: Case, truth: Truth) -> Array:
     """
     servo = case.arm.data["servo"]
     kp, kd = np.array(servo["stiffness_nm_rad"]), np.array(servo["damping_nms_rad"])
-    soft = 1.0 + kp * truth.compliance.mean(axis=0)
+    soft = 1.0 + kp * softest_loop(case) * (truth.softness.any())
     inverse = np.linalg.inv(mass_matrix(case.arm, case.target))
     own = truth.friction
     stiff, damped = kp.copy(), kd.copy()
@@ -337,7 +533,7 @@ def rest(case: Case, truth: Truth, random: np.random.Generator) -> Array:
             - (load - believed) / kp
             - stuck
             - truth.reading
-            - truth.compliance * load
+            - (truth.softness * twist(case, load) if truth.softness.any() else 0.0)
         )
     if truth.noise is not None and truth.noise.any():
         spread = noise_covariance(case, truth)
@@ -359,6 +555,8 @@ def planned(case: Case) -> list[Array]:
 def errors(case: Case, truth: Truth, random: np.random.Generator) -> list[Array]:
     """Needle minus where it should be, at skin and target, in the goal's axes."""
     tool = case.arm.tool
+    fit(case, truth)
+    truth.chain = moved(case.arm.chain, truth.deviations)
     at = posture(case.arm, truth.chain, rest(case, truth, random))
     turn, place = flange(truth.chain, at)
     entry, leave = truth.in_guide[:, 0], truth.in_guide[:, 1]
@@ -367,14 +565,16 @@ def errors(case: Case, truth: Truth, random: np.random.Generator) -> list[Array]
     along /= np.linalg.norm(along, axis=1)[:, None]
     start = np.column_stack([leave, np.zeros(len(leave))])
     found = []
-    for wanted, depth, breath in zip(
-        planned(case), case.depths, truth.breath, strict=True
+    unseen = [np.zeros((1, 3)), truth.unseen @ case.phantom_turn.T]
+    for k, (wanted, depth, breath) in enumerate(
+        zip(planned(case), case.depths, truth.breath, strict=True)
     ):
         in_tool = (start + depth * along) @ tool.exit_turn.T + tool.exit_place
         needle = place + (turn @ in_tool[..., None])[..., 0]
         # Breath moves the patient as he really lies.
-        moved_by = (truth.shift_turn @ breath[..., None])[..., 0]
+        moved_by = (truth.shift_turn @ (breath + unseen[k])[..., None])[..., 0]
         really = truth.shift_turn @ wanted + truth.shift_place + moved_by
-        error = (needle - really) @ case.axes.T
+        error = (needle - really) @ case.axes.T + truth.bent[k]
+        error = error - truth.pushed[k][:, None] * np.array([0.0, 0.0, 1.0])
         found.append(np.broadcast_to(error, (truth.count, 3)))
     return found

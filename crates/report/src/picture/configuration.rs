@@ -8,6 +8,7 @@ use needlebench_cell::{Goal, ResolvedScenario};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
 use needlebench_geometry::Visual;
 use needlebench_kinematics::{Joints, Pose};
+use needlebench_planning::Rule;
 use needlebench_render::{
     Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceInstance, render,
 };
@@ -78,6 +79,10 @@ fn add(surfaces: &mut Vec<SurfaceInstance>, visuals: &[Visual], world_from_paren
     }));
 }
 
+/// The planned needle, and one that goes where it must not.
+const NEEDLE_RGBA: [f32; 4] = [0.0, 0.55, 0.2, 1.0];
+const REFUSED_RGBA: [f32; 4] = [0.85, 0.1, 0.05, 1.0];
+
 /// Draws one configuration in its final posture; `None` if it has none.
 pub fn configuration_picture(
     resolved: &ResolvedScenario,
@@ -89,6 +94,8 @@ pub fn configuration_picture(
     let q = Joints::from_column_slice(&report.joints_rad?);
     let mut scene = posture_scene(resolved, backdrop, &q);
 
+    let mut rejections = report.rejections.iter();
+    let refused = rejections.find(|each| each.rule == Rule::NeedleRoute.name());
     let exit = Point3::from(goal.world_from_guide_exit.translation.vector);
     let behind = exit
         - goal.axis.into_inner()
@@ -96,7 +103,11 @@ pub fn configuration_picture(
     scene.lines.push(Line3 {
         from_m: behind,
         to_m: goal.target_m,
-        color_rgba: [0.0, 0.55, 0.2, 1.0],
+        color_rgba: if refused.is_some() {
+            REFUSED_RGBA
+        } else {
+            NEEDLE_RGBA
+        },
         width_px: 3.0,
     });
     scene.labels.push(Label {
@@ -104,7 +115,7 @@ pub fn configuration_picture(
         anchor: Anchor::TopLeft,
     });
     scene.labels.push(Label {
-        text: "target".to_owned(),
+        text: refused.map_or("target".to_owned(), |rejection| rejection.detail.clone()),
         anchor: Anchor::World(goal.target_m),
     });
     if let Some(found) = report.clearance.least() {

@@ -10,6 +10,7 @@ use needlebench_evaluation::metric::Heading;
 use needlebench_evaluation::report::{
     ConfigurationReport, GoalReport, Report, RouteReport, Status,
 };
+use needlebench_planning::Rule;
 use needlebench_uncertainty::budget::ErrorBudget;
 
 use super::budget::{ALLOWED_M, CLINICAL_LATERAL_M, CLINICAL_M, budget_text, budgets, mm};
@@ -296,6 +297,9 @@ fn goal_table(report: &Report, goal: &GoalReport, columns: &[Column], mostly: Mo
             configuration.label.to_owned()
         };
         let status = match (configuration.status, configuration.rejections.first()) {
+            (Status::Rejected, Some(first)) if first.rule == Rule::NeedleRoute.name() => {
+                Cell::new(first.rule).fg(Color::Red)
+            }
             (Status::Rejected, Some(first)) => Cell::new(first.rule).fg(Color::Yellow),
             _ => match status(report, &goal.name, configuration) {
                 failed @ "failed" => Cell::new(failed).fg(Color::Red),

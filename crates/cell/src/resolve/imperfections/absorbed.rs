@@ -1,7 +1,6 @@
 //! What a calibration that is measured on a sagging arm takes for geometry.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3, Vector6};
-use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints, Pose};
 
 use super::{GearTwist, OriginDeviations};
@@ -21,7 +20,22 @@ const REDUNDANT: f64 = 1e-9;
 /// Standard gravity, m/s^2, on an upright arm.
 const GRAVITY_M_S2: f64 = 9.80665;
 
-/// Origin deviations that fit best, over postures all round an upright arm, what the twist of each joint's
+/// A point of Halton's sequence (bases 2, 3, 5, 7, 11, 13) as joint positions in (-pi, pi).
+fn halton(point: u32) -> Joints {
+    const BASES: [u32; JOINT_COUNT] = [2, 3, 5, 7, 11, 13];
+    Joints::from_fn(|joint, _| {
+        let base = BASES[joint];
+        let (mut left, mut place, mut share) = (point, 1.0, 0.0);
+        while left > 0 {
+            place /= f64::from(base);
+            share += place * f64::from(left % base);
+            left /= base;
+        }
+        (2.0 * share - 1.0) * std::f64::consts::PI
+    })
+}
+
+/// Origin deviations that fit best, over [`POSTURES`] points of Halton's sequence all round an upright arm, what the twist of each joint's
 /// gear does to the flange: one set for each joint that twists.
 ///
 /// A calibration moves joint origins until the arm's model meets the measured poses, whatever moved these.
@@ -46,13 +60,13 @@ pub(crate) fn absorbed_sag(
         armature_kgm2: Joints::zeros(),
         gravity_m_s2: Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
     };
-    let mut random = SplitMix64::new(0x6361_6c69);
     let size = 6 * JOINT_COUNT;
     let mut normal = DMatrix::zeros(size, size);
     let mut sides = DMatrix::zeros(size, JOINT_COUNT);
-    let mut seen = 0;
+    let (mut seen, mut point) = (0, 0);
     while seen < POSTURES {
-        let q = Joints::from_fn(|_, _| random.uniform(-std::f64::consts::PI, std::f64::consts::PI));
+        point += 1;
+        let q = halton(point);
         let links = chain.link_poses(&q);
         let flange = chain.base_link_from_flange(&q).translation.vector;
         // Nobody measures an arm that hangs over the edge of its table.
@@ -109,6 +123,8 @@ pub(crate) fn absorbed_sag(
 
 #[cfg(test)]
 mod tests {
+    use needlebench_kinematics::random::SplitMix64;
+
     use super::super::ArmPopulation;
     use super::*;
 
