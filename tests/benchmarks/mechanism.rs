@@ -42,7 +42,7 @@ pub struct Mechanism {
 
 /// Mass and moment of inertia of the small body in the origin that each inner link is.
 const HUB_KG: f64 = 0.1;
-const HUB_KGM2: f64 = 1e-3;
+pub const HUB_KGM2: f64 = 1e-3;
 
 fn ball(mass_kg: f64, com_m: Vector3<f64>, moment_kgm2: f64) -> Body {
     Body {

@@ -9,7 +9,7 @@
 //!
 //! A [`Truth`] is one arm and one patient: what the engines simulate. The [`budget`] says how far the
 //! needle's tip is off over all arms and patients, by source, analytically and by Monte Carlo; the
-//! two share no formula but the model of each source.
+//! two share no formula but the model of each source. `tests/validation/budget` shares neither.
 
 pub mod budget;
 mod distribution;

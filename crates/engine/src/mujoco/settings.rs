@@ -41,8 +41,9 @@ pub struct MujocoSettings {
     pub contact_damping_per_s: f64,
     /// Impedance of contacts at every depth, in (0, 1) (`solimp`).
     ///
-    /// A contact under the force `F` settles at the depth `F / m * (1 - d) / (d k)`, with the
-    /// effective mass `m`, the impedance `d` and the stiffness `k`.
+    /// A contact under the force `F` settles at the depth `F W (1 - d) / k`, with the impedance `d`, the
+    /// stiffness `k`, and MuJoCo's estimate `W` of the bodies' inverse inertia there: the mean over three
+    /// directions.
     pub contact_impedance: f64,
     /// Coulomb friction between any two solids.
     ///
