@@ -273,6 +273,58 @@ fn an_empty_table_has_a_page() {
     assert_eq!(back.document["kept"], 0);
 }
 
+#[test]
+fn a_case_looks_like_itself() {
+    use needlebench_cell::{Change, KeyPath, Overrides, ScenarioFamily, Setting};
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let scenario = root.join("scenarios/supine_suite.toml");
+    let family = ScenarioFamily::load(&scenario, &Overrides::default()).unwrap();
+    let goal = family.goals().next().unwrap().to_owned();
+    let vary = |key: &str, value: &str| {
+        let change = Change::Set(Setting::from(value));
+        family.vary(&goal, &[(KeyPath::parse(key).unwrap(), change)])
+    };
+    let results = Synthetic::new(6);
+    let scenarios = |case: u64| match case {
+        0 | 1 => family.vary(&goal, &[]).ok(),
+        2 | 3 => vary("tool.urdf", "inline").ok(),
+        4 => vary("phantom.model", "male-p95").ok(),
+        // A layout that cannot exist.
+        _ => None,
+    };
+    let page = StudyPage {
+        name: "looks",
+        description: "",
+        file: "looks.toml",
+        results: &results,
+        summary: &json!({}),
+        manifest: &json!({}),
+        base: Some(family.base()),
+        scenarios: Some(&scenarios),
+    };
+    let back = of_page(&page.html().unwrap());
+    let codes = back.column(&back.document["lookOf"]);
+    assert_eq!(codes, [0.0, 0.0, 1.0, 1.0, 2.0, 255.0]);
+    let looks = back.document["looks"].as_array().unwrap();
+    assert_eq!(looks.len(), 2);
+    let base = &back.document["scene"];
+    // Another guide, the same patient; the same guide, another patient.
+    assert_ne!(looks[0]["guide"], base["guide"]);
+    assert_eq!(looks[1]["guide"], base["guide"]);
+    for look in looks {
+        let groups: Vec<&str> = look["parts"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|part| part["group"].as_str().unwrap())
+            .collect();
+        for group in ["tool", "skin", "bone", "lesion"] {
+            assert!(groups.contains(&group), "{groups:?}");
+        }
+        assert!(!groups.contains(&"robot"));
+    }
+}
+
 /// A summary with the keys that the page draws, from the table itself.
 fn summary(results: &Synthetic) -> Value {
     let mut ok = [0_u64; 8];
