@@ -230,7 +230,7 @@ impl Layout {
         )
     }
 
-    /// Draws that are stratified in every variable and come in mirrored pairs.
+    /// Draws that are stratified in every variable.
     pub fn hypercube(&self, rows: usize, random: &mut SplitMix64) -> Vec<Draw> {
         let rows = hypercube(&self.variables, rows, random);
         rows.into_iter().map(Draw).collect()

@@ -142,7 +142,8 @@ fn reach_route_start_and_target_are_known_without_a_simulation() {
             assert_eq!(each["works"] == false, says_why, "{each}");
         }
         // What its comments say: ribs are 4.7 mm away and more.
-        assert!(goal["route"]["clearance_m"].as_f64().unwrap() > 4e-3);
+        assert!(goal["needle_route"]["distance_m"].as_f64().unwrap() > 4e-3);
+        assert_eq!(goal["needle_route"]["kept"], true);
         assert!(goal["target"]["lesion"].is_string());
     }
     let text = bench.run(&["check", "s.toml"]).exits_with(0).stdout;
