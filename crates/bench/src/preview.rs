@@ -5,6 +5,7 @@
 //! clearances. Motions and engines can only take configurations away, so a goal for which too few are left
 //! here fails in every run.
 
+use needlebench_cell::phantom::PhantomPart;
 use needlebench_cell::{ClearanceClass, Finding, Goal, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_evaluation::report::{ConfigurationReport, RejectionReport};
@@ -259,6 +260,14 @@ fn reach_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
 /// touch, but not pierce.
 fn route_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) -> Option<Finding> {
     let route = goal.route.as_ref()?;
+    // Aimed at a lesion in a bone, the needle has to enter the bone.
+    let placed = resolved.phantom.as_ref()?;
+    let target = placed.world_from_phantom.inverse() * resolved.goals[index].target_m;
+    let holds_target =
+        |part: &PhantomPart| part.solid.name == route.nearest && part.solid.contains(&target);
+    if placed.phantom.parts.iter().any(holds_target) {
+        return None;
+    }
     let limit_mm = resolved.scenario.criteria.min_clearance_mm.needle_route;
     let limit_m = limit_mm.unwrap_or(0.0) * 1e-3;
     if route.clearance_m >= limit_m {
