@@ -1,7 +1,7 @@
 //! What the planned needle passes on its way from the skin to its end.
 
 use nalgebra::Point3;
-use needlebench_cell::phantom::{RouteObstacle, Tissue};
+use needlebench_cell::phantom::{PhantomPart, RouteObstacle, Tissue};
 use needlebench_cell::scenario::NeedleRouteSection;
 use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom, ResolvedScenario};
 use needlebench_clearance::ROUNDING_M;
@@ -21,7 +21,8 @@ pub struct RouteClearance<'a> {
 /// What the planned needle comes nearest to of bones, vessels and organs, from the skin to where it ends;
 /// `None` without a phantom that has any.
 ///
-/// The organ that contains the target is left out: the needle has to enter it.
+/// The organ that contains the target is left out, and the bone whose lesion is aimed at: the needle has to
+/// enter them.
 pub fn needle_route<'a>(
     cell: &Cell,
     placed: &'a PlacedPhantom,
@@ -38,10 +39,11 @@ fn nearest_of<'a>(
 ) -> Option<RouteClearance<'a>> {
     let obstacles = placed.phantom.route_obstacles();
     let entry = goal.entry_m?;
+    let entered = entered(placed, goal);
     let counts = |index: usize| {
         let part = &obstacles.parts[index];
-        let is_entered = goal.target_organ.is_some() && part.organ == goal.target_organ;
-        !is_entered && wanted(part)
+        let organ = part.organ.as_deref().unwrap_or(&part.name);
+        !entered.contains(&organ) && wanted(part)
     };
     let (index, separation) = obstacles.solids.nearest_to_segment(
         &entry,
@@ -54,6 +56,20 @@ fn nearest_of<'a>(
         part: &obstacles.parts[index],
         separation,
     })
+}
+
+/// Structures that the needle has to enter: the organ of the target, and what holds the lesion that it is
+/// aimed at, such as a rib.
+fn entered<'a>(placed: &'a PlacedPhantom, goal: &'a Goal) -> Vec<&'a str> {
+    let mut entered: Vec<&str> = goal.target_organ.as_deref().into_iter().collect();
+    if goal.lesion.is_some() {
+        let target = placed.world_from_phantom.inverse() * goal.target_m;
+        let is_bone = |part: &&PhantomPart| part.tissue == Tissue::Bone;
+        let bones = placed.phantom.parts.iter().filter(is_bone);
+        let holding = bones.filter(|part| part.solid.contains(&target));
+        entered.extend(holding.map(|part| part.organ.as_deref().unwrap_or(&part.name)));
+    }
+    entered
 }
 
 /// Where the needle's tip ends, or the target where that is deeper.

@@ -18,6 +18,9 @@ use crate::{Finding, Robot, Tool};
 
 /// Overlap of rigid things that is rounding of a drawing, m.
 const RIGID_M: f64 = 1e-3;
+/// How far a base's shapes may reach into what it stands on, m: the shipped arms' enclose their foot and
+/// reach 7.2 mm below it.
+const FOOT_M: f64 = 10e-3;
 /// Depth to which a patient may lie in a cushion or a table top, m (assumed).
 const SOFT_M: f64 = 10e-3;
 /// Height of a cushion that is worth a note, and that nobody has, m (assumed).
@@ -152,7 +155,7 @@ impl Standing<'_> {
             let Some(fixture) = self.fixture(kind) else {
                 continue;
             };
-            if let Some(found) = deepest(&base, &fixture.solids, RIGID_M) {
+            if let Some(found) = deepest(&base, &fixture.solids, FOOT_M) {
                 let message = format!(
                     "the robot's base stands {} inside the {name}",
                     found.depth()
@@ -326,9 +329,9 @@ impl Standing<'_> {
 /// Refuses a base, and fixtures, that are under the floor before anything is built on them.
 pub(super) fn check_floor(toml: &TomlText<'_>, robot: &Robot) -> Result<(), Finding> {
     let place = &robot.world_from_base_link;
-    let low_m = placed(&robot.base.solids, place)
-        .map(|solid| solid.bounding_box().0.z)
-        .fold(place.translation.z, f64::min);
+    let solids = placed(&robot.base.solids, place);
+    let of_solids_m = solids.map(|solid| solid.bounding_box().0.z + FOOT_M);
+    let low_m = of_solids_m.fold(place.translation.z, f64::min);
     if low_m >= -RIGID_M {
         return Ok(());
     }

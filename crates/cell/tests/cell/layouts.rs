@@ -102,7 +102,10 @@ fn layouts_that_cannot_exist_are_refused_at_the_key_that_places_them() {
             "over the floor",
         ),
         (
-            vec![(PATIENT, "position_mm = [420, 205, 0]")],
+            vec![(
+                PATIENT,
+                "rest_on_table = false\nposition_mm = [420, 260, 910]",
+            )],
             patient,
             "inside the gantry's housing",
         ),

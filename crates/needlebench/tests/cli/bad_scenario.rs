@@ -45,7 +45,22 @@ fn refused_goal_with(from: &str, to: &str) -> Finding {
 #[test]
 fn goal_by_entry_and_target_is_sound_before_it_is_spoilt() {
     let bench = Bench::with_scenario(&with_edit(SMALL, FLANGE_POSE, ENTRY_AND_TARGET));
-    bench.run(&["check", "s.toml"]).exits_with(0);
+    let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(2);
+    // All that is wrong with it is where it aims from there: it can be read, and a run rejects it.
+    let answer = answer.json();
+    let messages: Vec<&str> = answer["findings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|each| each["message"].as_str().unwrap())
+        .collect();
+    assert!(
+        messages[0].contains("out of reach") && messages[1].contains("deep through sternum"),
+        "{messages:?}"
+    );
+    assert_eq!(messages.len(), 2, "{messages:?}");
+    let run = ["run", "s.toml", "--engine", "rapier"];
+    bench.run(&run).exits_with(1);
 }
 
 #[test]
@@ -184,10 +199,10 @@ fn goal_inside_the_table_is_refused() {
     );
     let text = with_edit(&sunk, FLANGE_POSE, ENTRY_AND_TARGET);
     refused(&text)
-        .at("target_mm")
-        .key("goals[0].target_mm")
-        .says("the target lies inside the table")
-        .hints("phantom's posture and place");
+        .at("position_mm")
+        .key("phantom.position_mm")
+        .says("deep in the table")
+        .hints("rest_on_table");
     // The same by flange pose, where the target is where the needle ends.
     let start = SMALL.find("[phantom]").unwrap();
     let end = SMALL.find("[table]").unwrap();
