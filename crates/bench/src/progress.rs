@@ -4,6 +4,10 @@
 pub trait Progress: Sync {
     /// What is being done now.
     fn message(&self, _text: &str) {}
+    /// Something that is worth saying where nobody watches too: an engine is set up, or mended.
+    fn notice(&self, text: &str) {
+        self.message(text);
+    }
     /// So many steps more are to be done.
     fn expect(&self, _steps: u64) {}
     /// So many steps of all are done.

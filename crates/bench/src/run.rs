@@ -160,7 +160,7 @@ fn plan_while_engines_start(
     std::thread::scope(|scope| {
         for engine in engines {
             scope.spawn(move || {
-                let mut tell = |text: &str| control.progress.message(text);
+                let mut tell = |text: &str| control.progress.notice(text);
                 // Whoever asks the engine for something is told why it could not start.
                 let _ = pool.start(*engine, settings, &mut tell);
             });

@@ -5,6 +5,8 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use needlebench_bench::progress::Progress;
 
+use crate::output::complain;
+
 /// A progress bar on standard error, if that is a terminal.
 #[derive(Debug, Clone)]
 pub(crate) struct TerminalProgress(ProgressBar);
@@ -37,6 +39,10 @@ impl TerminalProgress {
 impl Progress for TerminalProgress {
     fn message(&self, text: &str) {
         self.0.set_message(text.to_owned());
+    }
+
+    fn notice(&self, text: &str) {
+        self.0.suspend(|| complain(text));
     }
 
     fn expect(&self, steps: u64) {

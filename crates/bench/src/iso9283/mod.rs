@@ -132,7 +132,7 @@ fn simulate_engines(
     let cycles = u64::from(protocol.cycles) * sequences;
     control.progress.expect(cycles * engines.len() as u64);
     in_parallel(control.threads, engines, |&engine| {
-        let mut tell = |text: &str| control.progress.message(text);
+        let mut tell = |text: &str| control.progress.notice(text);
         // Why it could not start is told again to whoever asks it for a motion.
         let _ = pool.start(engine, settings, &mut tell);
         let cycles = Cycles::new(setup, protocol, &pool, engine, control);
