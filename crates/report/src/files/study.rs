@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use needlebench_bench::study::{PreparedStudy, RobustnessResult, StudyCase, robustness_of};
+use needlebench_bench::study::{
+    PreparedStudy, Replanned, RobustnessResult, StudyCase, robustness_of,
+};
 use needlebench_study::ParquetResults;
 use needlebench_study::statistics::{
     CriterionResult, Summary, SummaryOptions, judge_study, summarise,
@@ -13,7 +15,7 @@ use serde::Serialize;
 use super::atomic::write_atomically;
 use super::error::FilesError;
 use super::folder::Folder;
-use super::replan::{Replanned, replan};
+use super::replan::replan;
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
 use crate::page::study::StudyPage;
