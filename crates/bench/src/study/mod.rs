@@ -23,7 +23,7 @@ pub use former::FormerResults;
 pub use identity::Identity;
 pub use planned::planned_rows;
 pub use prepare::{PreparedStudy, in_words, time_per_case};
-pub use replan::{ReplanControl, ReplanDraw, replan_draw, replanned};
+pub use replan::{ReplanControl, ReplanDraw, Replanned, replan_draw, replanned};
 pub use robust::{RobustnessResult, robustness_of};
 pub use rows::{CaseRow, StudyColumns, metric_column};
 pub(crate) use static_case::set_clearances;

@@ -5,8 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use needlebench_cell::study::StudyMode;
 use needlebench_kinematics::random::SplitMix64;
-use needlebench_study::statistics::{ChoiceRanking, ReplannedCase};
+use needlebench_study::statistics::{ChoiceRanking, Gap, ReplannedCase, gaps};
 use needlebench_study::{Outcome, Results, ResultsError};
+use serde::Serialize;
 
 use super::case::StudyCase;
 use super::planned::planned_rows;
@@ -24,6 +25,32 @@ pub struct ReplanDraw {
     pub cases: Vec<ReplannedCase>,
     /// Cases that they are drawn from: static ones of layouts that can exist, of the best choice.
     pub of: u64,
+}
+
+/// How much postures alone overstate.
+#[derive(Debug, Clone, Serialize)]
+pub struct Replanned {
+    /// Static cases that were planned too, drawn at random.
+    pub cases: u64,
+    /// Static cases that they were drawn from, of the best choice where something is to be chosen.
+    pub of: u64,
+    /// Gap of at least one configuration, then of each: share that works by postures less share that does
+    /// with its motions.
+    pub gaps: Vec<Gap>,
+    /// The cases: configurations that are ok, as bits, by postures and with motions.
+    pub drawn: Vec<ReplannedCase>,
+}
+
+impl Replanned {
+    /// Of a draw, all of whose cases are planned.
+    pub fn new(draw: &ReplanDraw, drawn: Vec<ReplannedCase>) -> Self {
+        Self {
+            cases: drawn.len() as u64,
+            of: draw.of,
+            gaps: gaps(&drawn),
+            drawn,
+        }
+    }
 }
 
 /// Draws the cases that the study asks for, each as likely as any other, by its seed alone.

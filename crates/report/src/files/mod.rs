@@ -19,7 +19,6 @@ pub use atomic::write_atomically;
 pub use error::FilesError;
 pub use folder::Folder;
 pub use iso9283::{write_measured, write_test};
-pub use replan::Replanned;
 pub use run::{RunFiles, write_run};
 pub use servo::write_servo;
 pub use study::{FinishedStudy, StudyOutput, StudySummary, write_study};

@@ -5,32 +5,17 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
 use needlebench_bench::progress::Progress;
-use needlebench_bench::study::{PreparedStudy, ReplanControl, ReplanDraw, replan_draw, replanned};
+use needlebench_bench::study::{PreparedStudy, ReplanControl, Replanned, replan_draw, replanned};
 use needlebench_cell::sha256_hex;
 use needlebench_cell::study::StudyMode;
 use needlebench_study::ParquetResults;
-use needlebench_study::statistics::{Gap, ReplannedCase, Summary, gaps};
-use serde::Serialize;
+use needlebench_study::statistics::Summary;
 
 use super::error::FilesError;
 use super::folder::Folder;
 
 /// Name of the file in a study's folder.
 const FILE: &str = "replanned.txt";
-
-/// How much postures alone overstate.
-#[derive(Debug, Clone, Serialize)]
-pub struct Replanned {
-    /// Static cases that were planned too, drawn at random.
-    pub cases: u64,
-    /// Static cases that they were drawn from, of the best choice where something is to be chosen.
-    pub of: u64,
-    /// Gap of at least one configuration, then of each: share that works by postures less share that does
-    /// with its motions.
-    pub gaps: Vec<Gap>,
-    /// The cases: configurations that are ok, as bits, by postures and with motions.
-    pub drawn: Vec<ReplannedCase>,
-}
 
 /// Plans the cases that the study asks for; none of a study without static cases, or that asks for none.
 pub(super) fn replan(
@@ -70,16 +55,7 @@ pub(super) fn replan(
     // Of this draw alone: the same bytes whatever was there before.
     let bits: BTreeMap<u64, u8> = drawn.iter().map(|each| (each.case, each.planned)).collect();
     folder.write(FILE, text(id, &bits))?;
-    Ok(Some(of_draw(&draw, drawn)))
-}
-
-fn of_draw(draw: &ReplanDraw, drawn: Vec<ReplannedCase>) -> Replanned {
-    Replanned {
-        cases: drawn.len() as u64,
-        of: draw.of,
-        gaps: gaps(&drawn),
-        drawn,
-    }
+    Ok(Some(Replanned::new(&draw, drawn)))
 }
 
 /// What is kept: a hash of the rest, the study, and a line for each case.

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use needlebench_bench::study::{
-    ENGINE_FAILURE, PreparedStudy, RobustnessResult, StudyCase, robustness_of,
+    ENGINE_FAILURE, PreparedStudy, Replanned, RobustnessResult, StudyCase, robustness_of,
 };
 use needlebench_evaluation::report::Verdict;
 use needlebench_study::ParquetResults;
@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::atomic::write_atomically;
 use super::error::FilesError;
 use super::folder::Folder;
-use super::replan::{Replanned, replan};
+use super::replan::replan;
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
 use crate::page::study::StudyPage;

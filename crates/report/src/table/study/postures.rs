@@ -1,11 +1,10 @@
 //! What a study of postures alone has to say of itself.
 
-use needlebench_bench::study::PreparedStudy;
+use needlebench_bench::study::{PreparedStudy, Replanned};
 use needlebench_cell::study::StudyMode;
 use needlebench_study::statistics::{ANY, Gap};
 
 use super::document::{Block, table};
-use crate::files::Replanned;
 use crate::number::in_percent;
 
 /// Which cases are of postures only.
