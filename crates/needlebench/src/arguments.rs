@@ -63,40 +63,45 @@ fn missing_inertia() -> impl TypedValueParser<Value = MissingInertia> {
     })
 }
 
-/// Six comma-separated finite numbers.
+/// Six comma-separated finite numbers, and half a unit in the last place that each was written to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Six(pub [f64; 6]);
+pub(crate) struct Six(pub [f64; 6], pub [f64; 6]);
 
 impl std::str::FromStr for Six {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let numbers: Vec<f64> = text
+        let numbers: Vec<(f64, f64)> = text
             .split(',')
-            .map(|word| finite(word.trim()))
-            .collect::<Result<_, _>>()?;
+            .map(|word| Ok((finite(word.trim())?, half_unit(word.trim()))))
+            .collect::<Result<_, String>>()?;
         let count = numbers.len();
-        numbers
+        let numbers: [(f64, f64); 6] = numbers
             .try_into()
-            .map(Self)
-            .map_err(|_| format!("needs six numbers separated by commas, got {count}"))
+            .map_err(|_| format!("needs six numbers separated by commas, got {count}"))?;
+        Ok(Self(
+            numbers.map(|(value, _)| value),
+            numbers.map(|(_, half_unit)| half_unit),
+        ))
     }
 }
 
-/// The upper three rows `[R | p]` of a pose's matrix, as they were given.
+/// The upper three rows `[R | p]` of a pose's matrix, as they were given, and half a unit in the last
+/// place that each number was written to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PoseMatrix(pub Matrix3x4<f64>);
+pub(crate) struct PoseMatrix(pub Matrix3x4<f64>, pub Matrix3x4<f64>);
 
 impl std::str::FromStr for PoseMatrix {
     type Err = String;
 
     /// Reads what programs print: numbers between commas, semicolons, brackets and white space.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let numbers: Vec<f64> = text
-            .split(|each: char| each.is_whitespace() || ",;[]()".contains(each))
-            .filter(|word| !word.is_empty())
-            .map(finite)
-            .collect::<Result<_, _>>()?;
+        let words = || {
+            text.split(|each: char| each.is_whitespace() || ",;[]()".contains(each))
+                .filter(|word| !word.is_empty())
+        };
+        let numbers: Vec<f64> = words().map(finite).collect::<Result<_, _>>()?;
+        let half_units: Vec<f64> = words().map(half_unit).collect();
         let count = numbers.len();
         let rows = match count {
             12 => &numbers[..],
@@ -118,8 +123,23 @@ impl std::str::FromStr for PoseMatrix {
                 ));
             }
         };
-        Ok(Self(Matrix3x4::from_row_slice(rows)))
+        Ok(Self(
+            Matrix3x4::from_row_slice(rows),
+            Matrix3x4::from_row_slice(&half_units[..12]),
+        ))
     }
+}
+
+/// Half a unit in the last place that a number was written to: 5e-4 for `0.120` and `12.0e-2`, 0.5 for
+/// `3`.
+fn half_unit(word: &str) -> f64 {
+    let (mantissa, exponent) = word.split_once(['e', 'E']).unwrap_or((word, "0"));
+    let decimals = mantissa
+        .split_once('.')
+        .map_or(0, |(_, decimals)| decimals.len());
+    let decimals = i32::try_from(decimals).unwrap_or(i32::MAX);
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    0.5 * 10.0_f64.powi(exponent.saturating_sub(decimals))
 }
 
 fn finite(word: &str) -> Result<f64, String> {

@@ -281,6 +281,8 @@ fn unreachable_detail(reason: needlebench_kinematics::ik::Unreachable) -> String
             "the nominal arm reaches the pose, the calibrated one does not"
         }
         Unreachable::NotFinite => "the pose is not finite",
+        Unreachable::NotARotation => "the orientation is no rotation",
+        Unreachable::TooFar { .. } => "the pose is farther away than any arm reaches",
     }
     .to_owned()
 }

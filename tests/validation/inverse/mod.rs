@@ -65,7 +65,7 @@ fn is_true(certificate: Certificate, rows: &[Row], postures: usize) -> bool {
         Certificate::MergedBranches => !rows.is_empty() && !any_free,
         Certificate::FreeJoint => any_free,
         Certificate::NearestOnly => rows.is_empty() && postures == 0,
-        Certificate::Refined => false,
+        Certificate::Refined | Certificate::NotAPose => false,
     }
 }
 

@@ -11,15 +11,15 @@ mod solve;
 mod wraps;
 
 pub use closed_form::{
-    Certificate, ClosedForm, ClosedFormSolution, FreeWrist, Preference, Unreachable, closed_form,
-    closed_form_batch, closed_form_into,
+    Certificate, ClosedForm, ClosedFormSolution, FreeWrist, Preference, Tolerance, Unreachable,
+    closed_form, closed_form_batch, closed_form_batch_within, closed_form_into, closed_form_within,
 };
 pub use configuration::{Configuration, Elbow, Shoulder, Wrist};
 pub use numerical::{
     DampedOptions, GaussNewtonOptions, GaussNewtonStep, Numerical, NumericalResult, Stop,
     gauss_newton,
 };
-pub use solve::{Kinematics, Solution, SolutionKind, Solutions};
+pub use solve::{Kinematics, Rows, Solution, SolutionKind, Solutions};
 pub use wraps::{InvalidWeight, Wrap, WrapOrder, WrapSearch, Wraps, nearest_within_limits};
 
 use std::f64::consts::{PI, TAU};

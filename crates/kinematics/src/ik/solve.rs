@@ -1,12 +1,14 @@
 //! All solutions of a flange pose on a real chain.
 
 use super::calibrated::{Calibrated, RAD_PER_M};
-use super::closed_form::clamped;
+use super::closed_form::{clamped, defect};
 use super::numerical::Target;
 use super::{
-    Certificate, ClosedForm, Configuration, Numerical, Preference, Unreachable, closed_form_into,
-    wrap_angle,
+    Certificate, ClosedForm, ClosedFormSolution, Configuration, Elbow, Numerical, Preference,
+    Tolerance, Unreachable, closed_form_batch_within, closed_form_within, wrap_angle,
 };
+use nalgebra::UnitQuaternion;
+
 use crate::geometry::{Mismatch, base_from_base_link};
 use crate::{Chain, JointLimits, Joints, NotUrGeometry, Pose, UrGeometry};
 
@@ -15,6 +17,8 @@ use crate::{Chain, JointLimits, Joints, NotUrGeometry, Pose, UrGeometry};
 pub enum SolutionKind {
     /// Reproduces the pose.
     Exact,
+    /// Misses the pose by no more than the tolerance.
+    Touching,
     /// The nearest posture that the solver found; the residuals say how far off.
     Nearest,
 }
@@ -36,6 +40,9 @@ pub struct Solution {
     pub wrist_3_is_free: bool,
     /// A root was zero: another configuration is the same posture and has no row of its own.
     pub merged: bool,
+    /// The pose as its numbers stand misses this row: it exists within their rounding, or within the
+    /// tolerance, only. The residuals say by how much.
+    pub touching: bool,
 }
 
 /// All solutions of a pose.
@@ -63,6 +70,7 @@ pub struct Kinematics {
     numerical: Numerical,
     mismatch: Mismatch,
     limits: Option<JointLimits>,
+    tolerance: Tolerance,
 }
 
 impl Kinematics {
@@ -78,7 +86,14 @@ impl Kinematics {
             numerical: Numerical::new(&chain),
             mismatch: Mismatch::of(&chain, &geometry),
             limits: None,
+            tolerance: Tolerance::default(),
         })
+    }
+
+    /// The same with another tolerance: a branch that the pose misses by no more has a row, flagged
+    /// as touching. Without, it is [`Tolerance::default`].
+    pub fn touching_within(self, tolerance: Tolerance) -> Self {
+        Self { tolerance, ..self }
     }
 
     /// The same with joint limits, which then decide between the members of a family.
@@ -104,56 +119,159 @@ impl Kinematics {
     /// (`every_solution_reproduces_the_pose`).
     pub fn solve(&self, base_link_from_flange: &Pose, seed: Option<&Joints>) -> Solutions {
         let mut answer = self.branches(base_link_from_flange, seed);
-        if answer.solutions.is_empty() && is_finite(base_link_from_flange) {
+        if answer.certificate == Certificate::NotAPose {
+            return answer;
+        }
+        let pose = normalised(base_link_from_flange);
+        if !self.is_nominal() {
+            self.add_touching(&pose, &mut answer);
+        }
+        if answer.solutions.is_empty() {
             // A nearest posture that solves the pose is a solution that was missed.
             (answer.solutions, answer.nearest) = self
-                .nearest(base_link_from_flange, seed)
+                .nearest(&pose, seed)
                 .into_iter()
-                .partition(|row| row.kind == SolutionKind::Exact);
+                .partition(|row| row.kind != SolutionKind::Nearest);
             if answer.solutions.is_empty() {
                 answer.certificate = Certificate::NearestOnly;
             } else {
                 answer.nearest.clear();
-                let found = &answer.solutions;
-                answer
-                    .unreachable
-                    .retain(|(name, _)| found.iter().all(|row| row.configuration != *name));
                 answer.certificate = Certificate::Refined;
             }
         }
+        let found = &answer.solutions;
+        answer
+            .unreachable
+            .retain(|(name, _)| found.iter().all(|row| row.configuration != *name));
         answer
     }
 
     /// [`Kinematics::solve`] without the search for nearest postures where no configuration reaches
     /// the pose, which takes a thousand times as long as all the rest.
     pub fn branches(&self, base_link_from_flange: &Pose, seed: Option<&Joints>) -> Solutions {
+        if let Some(defect) = defect(base_link_from_flange) {
+            return Solutions {
+                solutions: Vec::new(),
+                nearest: Vec::new(),
+                unreachable: Configuration::ALL.map(|name| (name, defect)).into(),
+                certificate: Certificate::NotAPose,
+            };
+        }
+        let pose = normalised(base_link_from_flange);
+        let mut nominal = ClosedForm::BLANK;
+        let base_from_flange = base_from_base_link() * pose;
+        self.closed_form(&base_from_flange, seed, &mut nominal);
+        if !self.is_nominal() {
+            return self.calibrated(&pose, &nominal);
+        }
+        let target = self.numerical.target(&pose);
+        Solutions {
+            solutions: nominal
+                .solutions()
+                .map(|row| Solution {
+                    wrist_3_is_free: row.wrist_3_is_free,
+                    merged: row.merged,
+                    ..self.refined(&target, row.configuration, &row.joints, row.touching)
+                })
+                .collect(),
+            nearest: Vec::new(),
+            unreachable: nominal
+                .unreachable(&self.geometry, &base_from_flange)
+                .collect(),
+            certificate: nominal.certificate(),
+        }
+    }
+
+    /// All rows of a pose in `base_link`, into a place that exists: [`Kinematics::branches`] without
+    /// residuals and reasons.
+    ///
+    /// On a nominal chain nothing is allocated, and rows are as the closed form gives them: a chain
+    /// whose file prints its angles to ten digits is off by up to 1e-8, which
+    /// [`Kinematics::branches`] takes off.
+    pub fn rows_into(&self, base_link_from_flange: &Pose, seed: Option<&Joints>, out: &mut Rows) {
         let base_from_flange = base_from_base_link() * base_link_from_flange;
-        let preference = Preference {
+        self.closed_form(&base_from_flange, seed, &mut out.closed);
+        self.finish(base_link_from_flange, out);
+    }
+
+    /// [`Kinematics::rows_into`] of many poses, which on a nominal chain takes half as long a pose.
+    ///
+    /// # Panics
+    /// If there are not as many answers as poses.
+    pub fn rows_batch(
+        &self,
+        base_link_from_flange: &[Pose],
+        seed: Option<&Joints>,
+        out: &mut [Rows],
+    ) {
+        const BLOCK: usize = 32;
+        assert_eq!(
+            base_link_from_flange.len(),
+            out.len(),
+            "one answer for each pose"
+        );
+        let turn = base_from_base_link();
+        let mut poses = [Pose::identity(); BLOCK];
+        let mut closed = [ClosedForm::BLANK; BLOCK];
+        for (given, out) in base_link_from_flange
+            .chunks(BLOCK)
+            .zip(out.chunks_mut(BLOCK))
+        {
+            for (pose, given) in poses.iter_mut().zip(given) {
+                *pose = turn * given;
+            }
+            let count = given.len();
+            closed_form_batch_within(
+                &self.geometry,
+                &poses[..count],
+                self.preference(seed),
+                self.tolerance,
+                &mut closed[..count],
+            );
+            for ((given, closed), out) in given.iter().zip(&closed).zip(out) {
+                out.closed = *closed;
+                self.finish(given, out);
+            }
+        }
+    }
+
+    /// Refines the rows of a calibrated chain.
+    #[inline]
+    fn finish(&self, base_link_from_flange: &Pose, out: &mut Rows) {
+        out.is_closed = self.is_nominal() || out.closed.certificate() == Certificate::NotAPose;
+        out.refined.clear();
+        if out.is_closed {
+            return;
+        }
+        let pose = normalised(base_link_from_flange);
+        let branches = self.near_nominal(&pose).branches(&out.closed);
+        out.refined
+            .extend(branches.found.iter().map(|branch| ClosedFormSolution {
+                configuration: branch.configuration,
+                joints: branch.solution.joints,
+                wrist_3_is_free: false,
+                merged: false,
+                touching: false,
+            }));
+    }
+
+    fn preference<'a>(&'a self, seed: Option<&'a Joints>) -> Preference<'a> {
+        Preference {
             seed,
             limits: self.limits.as_ref(),
-        };
-        let mut nominal = ClosedForm::BLANK;
-        closed_form_into(&self.geometry, &base_from_flange, preference, &mut nominal);
-        let target = self.numerical.target(base_link_from_flange);
-        if self.is_nominal() || !is_finite(base_link_from_flange) {
-            Solutions {
-                solutions: nominal
-                    .solutions()
-                    .map(|row| Solution {
-                        wrist_3_is_free: row.wrist_3_is_free,
-                        merged: row.merged,
-                        ..self.refined(&target, row.configuration, &row.joints)
-                    })
-                    .collect(),
-                nearest: Vec::new(),
-                unreachable: nominal
-                    .unreachable(&self.geometry, &base_from_flange)
-                    .collect(),
-                certificate: nominal.certificate(),
-            }
-        } else {
-            self.calibrated(base_link_from_flange, &nominal)
         }
+    }
+
+    #[inline]
+    fn closed_form(&self, base_from_flange: &Pose, seed: Option<&Joints>, out: &mut ClosedForm) {
+        let preference = self.preference(seed);
+        closed_form_within(
+            &self.geometry,
+            base_from_flange,
+            preference,
+            self.tolerance,
+            out,
+        );
     }
 
     /// Pose of the flange in `base_link`.
@@ -164,6 +282,34 @@ impl Kinematics {
     /// Numerical solvers on the same chain.
     pub fn numerical(&self) -> &Numerical {
         &self.numerical
+    }
+
+    /// Rows of a calibrated chain for names that it misses by no more than the tolerance.
+    fn add_touching(&self, pose: &Pose, answer: &mut Solutions) {
+        /// What the nominal arm misses by more than this, m, the calibrated one does too.
+        const FAR_M: f64 = 0.02;
+        let base_from_flange = base_from_base_link() * pose;
+        let target = self.numerical.target(pose);
+        for (name, reason) in &answer.unreachable {
+            if name.elbow == Elbow::Up || reason.missing_m() > FAR_M {
+                continue;
+            }
+            let start = clamped(&self.geometry, &base_from_flange, *name, 0.0);
+            let found = self.numerical.nearest(pose, &start, RAD_PER_M);
+            let row = self.row(&target, *name, found.joints.map(wrap_angle));
+            let known = answer.solutions.iter().any(|other| {
+                (other.joints - row.joints)
+                    .map(|d| wrap_angle(d).abs())
+                    .max()
+                    < SAME_POSTURE_RAD
+            });
+            if row.kind != SolutionKind::Nearest && !known {
+                answer.solutions.push(row);
+            }
+        }
+        answer
+            .solutions
+            .sort_by_key(|row| row.configuration.index());
     }
 
     fn near_nominal<'a>(&'a self, pose: &'a Pose) -> Calibrated<'a> {
@@ -184,7 +330,7 @@ impl Kinematics {
             .map(|branch| {
                 let found = branch.solution;
                 let residuals = (found.residual_m, found.residual_rad);
-                row(branch.configuration, found.joints, residuals)
+                self.judged(branch.configuration, found.joints, residuals)
             })
             .collect();
         let mut unreachable = branches.lost;
@@ -229,17 +375,61 @@ impl Kinematics {
     }
 
     fn row(&self, target: &Target, configuration: Configuration, joints: Joints) -> Solution {
-        row(
+        self.judged(
             configuration,
             joints,
             self.numerical.residuals(target, &joints),
         )
     }
 
+    /// A row that is what its residuals make of it.
+    fn judged(
+        &self,
+        configuration: Configuration,
+        joints: Joints,
+        (residual_m, residual_rad): (f64, f64),
+    ) -> Solution {
+        let kind = if residual_m.max(residual_rad) <= EXACT {
+            SolutionKind::Exact
+        } else if residual_m <= self.tolerance.m && residual_rad <= self.tolerance.rad {
+            SolutionKind::Touching
+        } else {
+            SolutionKind::Nearest
+        };
+        Solution {
+            configuration,
+            joints,
+            residual_m,
+            residual_rad,
+            kind,
+            wrist_3_is_free: false,
+            merged: false,
+            touching: kind == SolutionKind::Touching,
+        }
+    }
+
     /// A row of the closed form, with a step or two of Newton's method where the chain's origins
     /// were printed to a few digits.
-    fn refined(&self, target: &Target, configuration: Configuration, start: &Joints) -> Solution {
+    fn refined(
+        &self,
+        target: &Target,
+        configuration: Configuration,
+        start: &Joints,
+        touching: bool,
+    ) -> Solution {
         let closed = self.row(target, configuration, *start);
+        if touching {
+            // Where shoulder and elbow both touch, each by the tolerance, their sum is a little more.
+            let kind = match closed.kind {
+                SolutionKind::Exact => SolutionKind::Exact,
+                SolutionKind::Touching | SolutionKind::Nearest => SolutionKind::Touching,
+            };
+            return Solution {
+                kind,
+                touching,
+                ..closed
+            };
+        }
         if closed.residual_m.max(closed.residual_rad) <= CLOSED_FORM_SUFFICES {
             return closed;
         }
@@ -247,7 +437,7 @@ impl Kinematics {
             return closed;
         };
         let residuals = (found.residual_m, found.residual_rad);
-        let refined = row(configuration, found.joints.map(wrap_angle), residuals);
+        let refined = self.judged(configuration, found.joints.map(wrap_angle), residuals);
         // A step that jumps to another branch would give the row a wrong name.
         let same_branch = (found.joints - start).amax() < 0.1;
         let better = residuals.0.max(residuals.1) < closed.residual_m.max(closed.residual_rad);
@@ -259,25 +449,63 @@ impl Kinematics {
     }
 }
 
-fn row(
-    configuration: Configuration,
-    joints: Joints,
-    (residual_m, residual_rad): (f64, f64),
-) -> Solution {
-    let exact = residual_m.max(residual_rad) <= EXACT;
-    Solution {
-        configuration,
-        joints,
-        residual_m,
-        residual_rad,
-        kind: if exact {
-            SolutionKind::Exact
-        } else {
-            SolutionKind::Nearest
-        },
-        wrist_3_is_free: false,
-        merged: false,
+/// Rows of a pose, to be filled again and again.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    closed: ClosedForm,
+    /// Rows of a calibrated chain.
+    refined: Vec<ClosedFormSolution>,
+    is_closed: bool,
+}
+
+impl Rows {
+    /// To be written over.
+    pub const fn new() -> Self {
+        Self {
+            closed: ClosedForm::BLANK,
+            refined: Vec::new(),
+            is_closed: true,
+        }
     }
+
+    /// Postures, in the order of [`Configuration::ALL`]; a calibrated arm may have several of a name.
+    pub fn iter(&self) -> impl Iterator<Item = ClosedFormSolution> {
+        let closed = self.is_closed.then(|| self.closed.solutions());
+        let refined = self.refined.iter().copied();
+        closed.into_iter().flatten().chain(refined)
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        if self.is_closed {
+            self.closed.count() as usize
+        } else {
+            self.refined.len()
+        }
+    }
+
+    /// What the answer is worth.
+    pub fn certificate(&self) -> Certificate {
+        if self.is_closed {
+            self.closed.certificate()
+        } else {
+            Certificate::Refined
+        }
+    }
+}
+
+impl Default for Rows {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The pose with a quaternion of norm one.
+fn normalised(pose: &Pose) -> Pose {
+    Pose::from_parts(
+        pose.translation,
+        UnitQuaternion::new_normalize(pose.rotation.into_inner()),
+    )
 }
 
 /// A row is exact below this: m and rad.
@@ -292,9 +520,4 @@ const SAME_POSTURE_RAD: f64 = 1e-4;
 /// What the search for the nearest posture minimises, rad.
 fn cost(row: &Solution) -> f64 {
     (RAD_PER_M * row.residual_m).hypot(row.residual_rad)
-}
-
-fn is_finite(pose: &Pose) -> bool {
-    let mut numbers = pose.translation.vector.iter().chain(&pose.rotation.coords);
-    numbers.all(|value| value.is_finite())
 }

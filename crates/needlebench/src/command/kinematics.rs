@@ -13,13 +13,13 @@ use anyhow::Result;
 use needlebench_cell::Finding;
 use needlebench_kinematics::ik::{
     Certificate, Configuration, DampedOptions, GaussNewtonOptions, Kinematics, Solution,
-    SolutionKind, WrapSearch, wrap_angle,
+    SolutionKind, Tolerance, WrapSearch, wrap_angle,
 };
 use needlebench_kinematics::{Joints, Pose};
 
 use self::answer::{ArmAnswer, FkAnswer, IkAnswer, SolutionAnswer, UnreachableAnswer, kind_name};
 use self::arm::Arm;
-use self::target::target;
+use self::target::{target, tolerance};
 use super::{print_json, print_text};
 
 use crate::exit::ExitStatus;
@@ -81,6 +81,10 @@ pub(crate) struct IkArguments {
     /// machine.
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(1..))]
     pub time_limit_ms: Option<u32>,
+    /// By how much a posture may miss the pose and still be a row, flagged as touching: one number for
+    /// m and rad. Without it, what the digits of the pose leave open, at least 1e-7.
+    #[arg(long, value_name = "M_AND_RAD")]
+    pub tolerance: Option<f64>,
     /// List whole turns within the joint limits too, nearest to the seed (or to zero) first; at most
     /// one turn more or less of a joint without limits.
     #[arg(long)]
@@ -140,12 +144,26 @@ fn solve(arguments: &IkArguments) -> Result<IkAnswer, Vec<Finding>> {
             ]);
         }
     }
+    if arguments.method != IkMethod::ClosedForm && arguments.tolerance.is_some() {
+        return Err(vec![
+            Finding::new("--tolerance", "a numerical method goes on to rounding")
+                .hint("the tolerance is the closed form's: leave --method out"),
+        ]);
+    }
+    let tolerance = tolerance(arguments).map_err(|finding| vec![finding])?;
     let (arm, base_link_from_flange) = target(arguments)?;
     let kinematics = Kinematics::new(arm.chain)
         .map_err(|error| vec![Finding::new(&arm.file, error.to_string())])?
-        .within(arm.limits);
+        .within(arm.limits)
+        .touching_within(tolerance);
     Ok(match arguments.method {
-        IkMethod::ClosedForm => closed_form(arguments, &arm, &kinematics, &base_link_from_flange),
+        IkMethod::ClosedForm => closed_form(
+            arguments,
+            &arm,
+            &kinematics,
+            &base_link_from_flange,
+            tolerance,
+        ),
         IkMethod::GaussNewton | IkMethod::Damped => {
             numerical(arguments, &arm, &kinematics, &base_link_from_flange)
         }
@@ -162,6 +180,7 @@ fn closed_form(
     arm: &Arm,
     kinematics: &Kinematics,
     base_link_from_flange: &Pose,
+    tolerance: Tolerance,
 ) -> IkAnswer {
     let seed = seed(arguments);
     let found = kinematics.solve(base_link_from_flange, seed.as_ref());
@@ -174,13 +193,14 @@ fn closed_form(
         free_joint: solution.wrist_3_is_free.then_some("wrist_3"),
         kind: kind_name(solution.kind),
         merged: solution.merged,
+        touching: solution.touching,
         iterations: None,
     };
     let (exact, nearest): (Vec<Solution>, Vec<Solution>) = found
         .solutions
         .iter()
         .chain(&found.nearest)
-        .partition(|solution| solution.kind == SolutionKind::Exact);
+        .partition(|solution| solution.kind != SolutionKind::Nearest);
     let solutions: Vec<SolutionAnswer> = if arguments.wraps {
         WrapSearch::new(&arm.limits, &seed.unwrap_or_else(Joints::zeros))
             .at_most_turns(1)
@@ -194,6 +214,8 @@ fn closed_form(
         schema_version: 1,
         arm: ArmAnswer::of(arm),
         method: "closed-form",
+        tolerance_m: Some(tolerance.m),
+        tolerance_rad: Some(tolerance.rad),
         count: solutions.len(),
         solutions,
         nearest: nearest.iter().map(|each| row(each, each.joints)).collect(),
@@ -217,6 +239,7 @@ fn certificate_name(certificate: Certificate) -> &'static str {
         Certificate::FreeJoint => "free_joint",
         Certificate::NearestOnly => "nearest_only",
         Certificate::Refined => "refined",
+        Certificate::NotAPose => "not_a_pose",
     }
 }
 
@@ -268,23 +291,26 @@ fn numerical(
         free_joint: None,
         kind: kind_name(kind),
         merged: false,
+        touching: false,
         iterations: Some(found.iterations),
     };
     let (solutions, nearest) = match kind {
-        SolutionKind::Exact => (vec![row], Vec::new()),
+        SolutionKind::Exact | SolutionKind::Touching => (vec![row], Vec::new()),
         SolutionKind::Nearest => (Vec::new(), vec![row]),
     };
     IkAnswer {
         schema_version: 1,
         arm: ArmAnswer::of(arm),
         method,
+        tolerance_m: None,
+        tolerance_rad: None,
         count: solutions.len(),
         solutions,
         nearest,
         unreachable: Vec::new(),
         // A numerical method finds one posture and knows nothing of the others.
         certificate: match kind {
-            SolutionKind::Exact => "one_of_several",
+            SolutionKind::Exact | SolutionKind::Touching => "one_of_several",
             SolutionKind::Nearest => "not_converged",
         },
     }

@@ -12,12 +12,19 @@ use std::f64::consts::PI;
 use super::super::{Configuration, Elbow, Shoulder, Wrist, wrap_angle};
 use super::extended::Extended;
 use super::family::FreeWrist;
-use super::{Certificate, ClosedForm, Preference, Unreachable};
+use super::{Certificate, ClosedForm, Preference, Tolerance, Unreachable};
 use crate::{Pose, UrGeometry};
 
 /// What a pose may be off by from having been computed in doubles: 32 roundings of a metre or of
 /// a radian. Rows that need it solve the pose within it.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
+
+/// A position beyond this has lost the millimetres of an arm, and its square may overflow, m.
+const FARTHEST_M: f64 = 1e6;
+
+/// A squared norm of a quaternion off one by more than this is no rounding, not even of single
+/// precision, twice 1e-6: it is refused rather than scaled.
+const NOT_UNIT: f64 = 2e-6;
 
 /// Two branches nearer to one another than this are one row, rad: the square root of a double's
 /// rounding, by which rounding moves either of them. Their middle solves the pose within 1e-16.
@@ -35,7 +42,9 @@ struct Arm {
     /// Wrist centre ahead of the shoulder axis, m.
     ahead: Extended,
     merged: bool,
-    /// By how much `q1` may turn without moving the flange by more than [`ROUNDING`], rad.
+    /// The wrist centre is nearer to the shoulder axis than it can be.
+    touching: bool,
+    /// By how much `q1` may turn without moving the flange by more than the slack, rad.
     slack_rad: f64,
 }
 
@@ -66,6 +75,10 @@ struct Solver<'a> {
     centre: [Extended; 3],
     out: &'a mut ClosedForm,
     used_extended: bool,
+    /// What the pose may be off by.
+    slack: Tolerance,
+    /// The rows being made exist only within the slack.
+    touching: bool,
 }
 
 /// Solves with all care; about a microsecond.
@@ -74,13 +87,15 @@ pub(super) fn solve(
     geometry: &UrGeometry,
     pose: &Pose,
     preference: Preference<'_>,
+    tolerance: Tolerance,
     out: &mut ClosedForm,
 ) {
     out.exists = 0;
     out.merged = 0;
     out.free = 0;
-    if !is_finite(pose) {
-        out.certificate = Certificate::NearestOnly;
+    out.touching = 0;
+    if defect(pose).is_some() {
+        out.certificate = Certificate::NotAPose;
         return;
     }
     let mut solver = Solver::new(geometry, pose, preference, out);
@@ -88,6 +103,15 @@ pub(super) fn solve(
         solver.wrists(&arm);
     }
     let used_extended = solver.used_extended;
+    if tolerance.m.max(tolerance.rad) > ROUNDING && solver.out.exists != u8::MAX {
+        solver.slack = Tolerance {
+            m: tolerance.m.max(ROUNDING),
+            rad: tolerance.rad.max(ROUNDING),
+        };
+        for arm in solver.shoulders().into_iter().flatten() {
+            solver.wrists(&arm);
+        }
+    }
     out.certificate = if out.exists == 0 {
         Certificate::NearestOnly
     } else if out.free != 0 {
@@ -126,8 +150,8 @@ pub(super) fn unreachable(
     shoulder: Shoulder,
     wrist: Wrist,
 ) -> Option<Unreachable> {
-    if !is_finite(pose) {
-        return Some(Unreachable::NotFinite);
+    if let Some(defect) = defect(pose) {
+        return Some(defect);
     }
     let [n, o, a] = columns(pose).map(|column| column.map(Extended::rounded));
     let p = &pose.translation.vector;
@@ -165,9 +189,20 @@ pub(super) fn unreachable(
     }
 }
 
-fn is_finite(pose: &Pose) -> bool {
-    let mut numbers = pose.translation.vector.iter().chain(&pose.rotation.coords);
-    numbers.all(|value| value.is_finite())
+/// What makes numbers no pose.
+pub(in super::super) fn defect(pose: &Pose) -> Option<Unreachable> {
+    let (p, q) = (&pose.translation.vector, &pose.rotation.coords);
+    if !p.iter().chain(q.iter()).all(|value| value.is_finite()) {
+        return Some(Unreachable::NotFinite);
+    }
+    let norm = q.amax();
+    let is_unit = norm < 2.0 && (q.norm_squared() - 1.0).abs() <= NOT_UNIT;
+    if !is_unit {
+        return Some(Unreachable::NotARotation);
+    }
+    (p.amax() > FARTHEST_M).then(|| Unreachable::TooFar {
+        missing_m: p.amax(),
+    })
 }
 
 /// Columns of the rotation matrix of the normalised quaternion.
@@ -211,6 +246,11 @@ impl<'a> Solver<'a> {
             ],
             out,
             used_extended: false,
+            slack: Tolerance {
+                m: ROUNDING,
+                rad: ROUNDING,
+            },
+            touching: false,
         }
     }
 
@@ -224,14 +264,16 @@ impl<'a> Solver<'a> {
         if root_squared.rounded().abs() <= DOUBLE_DECIDES * (rho_squared.rounded() + d4 * d4) {
             self.used_extended = true;
         }
-        if root_squared.is_negative() && d4.abs() - rho.rounded() > ROUNDING {
+        if root_squared.is_negative() && d4.abs() - rho.rounded() > self.slack.m {
             return [None, None];
         }
         let root = root_squared.sqrt();
         let merged = root.rounded() <= MERGED_RAD * d4.abs();
         // The flange moves by root e + d4 e^2 / 2 when q1 turns by e.
-        let slack_rad = 2.0 * ROUNDING
-            / (root.rounded() + (root.rounded().powi(2) + 2.0 * d4.abs() * ROUNDING).sqrt());
+        let slack_m = self.slack.m;
+        let slack_rad = 2.0 * slack_m
+            / (root.rounded() + (root.rounded().powi(2) + 2.0 * d4.abs() * slack_m).sqrt());
+        let touching = root_squared.is_negative();
         let arm = |shoulder: Shoulder| {
             // Where the roots meet, the wrist centre lies square to the arm's plane.
             let (c1, s1, ahead) = if merged {
@@ -251,6 +293,7 @@ impl<'a> Solver<'a> {
                 s1,
                 ahead,
                 merged,
+                touching,
                 slack_rad,
             })
         };
@@ -261,23 +304,40 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Equations 10 to 22 for one shoulder.
+    /// Equations 10 to 22 for one shoulder, but for wrists that have their rows.
     fn wrists(&mut self, arm: &Arm) {
+        let has_row = |bits: u8, wrist: Wrist| {
+            [Elbow::Down, Elbow::Up].into_iter().any(|elbow| {
+                let configuration = Configuration {
+                    shoulder: arm.shoulder,
+                    elbow,
+                    wrist,
+                };
+                (bits >> configuration.index()) & 1 == 1
+            })
+        };
+        if has_row(self.out.free, Wrist::Fold) {
+            return;
+        }
+        self.touching = arm.touching;
         if let Some(aligned) = self.aligned(arm) {
             self.free_wrist(&aligned);
             return;
         }
         let fold = self.fold(arm);
         for wrist in [Wrist::Fold, Wrist::Unfold] {
-            if self.elbows(arm, wrist, &fold, 0.0) {
+            self.touching = arm.touching;
+            if has_row(self.out.exists, wrist) || self.elbows(arm, wrist, &fold, self.slack.m) {
                 continue;
             }
             // Not reachable as the pose stands. Where the wrist or the shoulder is nearly
             // singular, another q1 or q6 may solve it as well and bring the elbow within reach.
+            self.touching = true;
             if !self.turn_to_reach(arm, wrist) {
                 self.swing_to_reach(arm, wrist, &fold);
             }
         }
+        self.touching = false;
     }
 
     /// The arm with `q1` turned so that `q5` is exactly 0 or pi, if that is within rounding.
@@ -315,7 +375,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Equations 24 to 38 for one shoulder and wrist; whether the elbow closes.
-    fn elbows(&mut self, arm: &Arm, wrist: Wrist, fold: &Fold, extra_m: f64) -> bool {
+    fn elbows(&mut self, arm: &Arm, wrist: Wrist, fold: &Fold, allowed_m: f64) -> bool {
         let (ahead, up) = self.wrist_1(arm, wrist, fold);
         let q234 = fold.s234.rounded().atan2(fold.c234.rounded());
         // An unfolded wrist: q6 and q2 + q3 + q4 half a turn on, q5 mirrored.
@@ -344,9 +404,10 @@ impl<'a> Solver<'a> {
             shortest
         };
         let missing_m = -closing * scale.abs() / (reach_squared.sqrt() + limit);
-        if closing < 0.0 && missing_m > ROUNDING + extra_m {
+        if closing < 0.0 && missing_m > allowed_m {
             return false;
         }
+        self.touching |= closing < 0.0;
         let s3 = (one_minus * one_plus).max(0.0).sqrt();
         let elbows_merge = s3 <= MERGED_RAD;
         let configuration = |elbow| Configuration {
@@ -407,6 +468,7 @@ impl<'a> Solver<'a> {
         self.out.exists |= 1 << index;
         self.out.merged |= u8::from(merged) << index;
         self.out.free |= u8::from(free) << index;
+        self.out.touching |= u8::from(self.touching) << index;
     }
 
     /// Rows of a family: the member nearest to the seed, for each elbow.
@@ -473,19 +535,19 @@ impl<'a> Solver<'a> {
         };
         let turned = arm.turned(&self.centre, turn_rad);
         let fold = self.fold(&turned);
-        self.elbows(&turned, wrist, &fold, ROUNDING)
+        self.elbows(&turned, wrist, &fold, 2.0 * ROUNDING)
     }
 
     /// Tries the least swing of `q2 + q3 + q4` and `q6` together, which next to a free wrist turns
     /// the flange by only `s5` times as much, that lets the elbow close.
     fn swing_to_reach(&mut self, arm: &Arm, wrist: Wrist, fold: &Fold) -> bool {
-        let widest = (ROUNDING / fold.s5).min(PI);
+        let widest = (self.slack.rad / fold.s5).min(PI);
         let closes = |swing_rad: f64| self.closing_of(arm, wrist, &fold.swung(swing_rad, 1.0));
         let Some(swing_rad) = least_closing(closes, widest, widest, 1e3) else {
             return false;
         };
         let turn = self.family(arm).turn;
-        self.elbows(arm, wrist, &fold.swung(swing_rad, turn), ROUNDING)
+        self.elbows(arm, wrist, &fold.swung(swing_rad, turn), 2.0 * ROUNDING)
     }
 
     fn closing_of(&self, arm: &Arm, wrist: Wrist, fold: &Fold) -> f64 {

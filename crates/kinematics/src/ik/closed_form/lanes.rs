@@ -9,8 +9,8 @@ use std::f64::consts::{PI, TAU};
 use fearless_simd::prelude::*;
 use fearless_simd::{f64x2, f64x4};
 
-use super::ClosedForm;
 use super::atan2::{atan2, upper_half};
+use super::{ClosedForm, Tolerance};
 use crate::{Pose, UrGeometry};
 
 /// Lanes of the widest vectors.
@@ -24,12 +24,43 @@ const CERTAIN_ROOT: f64 = 1e-4;
 const CERTAIN_S5: f64 = 1e-4;
 const CERTAIN_C3: f64 = 1e-6;
 
+/// Off by no more than this, a squared norm is scaled to one exactly.
+const CERTAIN_NORM: f64 = 2e-6;
+
+/// A squared distance from the shoulder axis beyond this is that of no pose an arm is asked for, m^2.
+const CERTAIN_RHO_SQUARED: f64 = 1e9;
+
+/// Beyond which the signs are certain, and no branch exists within a tolerance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    /// Of `rho^2 - d4^2`, m^2.
+    root: (f64, f64),
+    /// Of the lesser of `1 - cos q3` and `1 + cos q3`.
+    closing: (f64, f64),
+}
+
+impl Bounds {
+    pub(super) fn new(g: &UrGeometry, tolerance: Tolerance) -> Self {
+        let root = (CERTAIN_ROOT * g.d4).powi(2);
+        // Next to the bounds of s5 and of the root, a tolerance turns q6 and q1 by so much more.
+        let turned_m = tolerance.rad * g.d5.abs() / CERTAIN_S5 + tolerance.m / CERTAIN_ROOT;
+        let longest = (g.a2 + g.a3).abs();
+        let closing = 2.0 * longest * (tolerance.m + turned_m) / (g.a2 * g.a3).abs();
+        Self {
+            root: (-root - 4.0 * g.d4.abs() * tolerance.m, root),
+            closing: (-CERTAIN_C3 - closing, CERTAIN_C3),
+        }
+    }
+}
+
 /// Columns of the rotation, and the wrist centre seen from the shoulder.
 struct Target<V> {
     n: [V; 3],
     o: [V; 3],
     a: [V; 3],
     centre: [V; 3],
+    /// By how much the quaternion's squared norm is off one.
+    off_unit: V,
 }
 
 impl<V: Copy> Target<V> {
@@ -42,9 +73,9 @@ impl<V: Copy> Target<V> {
         let [w, x, y, z] = q;
         let splat = |value| V::splat(simd, value);
         let norm_squared = w.mul_add(w, x.mul_add(x, y.mul_add(y, z * z)));
-        // 2 / norm_squared to first order: exact to rounding for a unit quaternion, which is off
-        // by a few roundings after products.
-        let s = norm_squared.mul_add(splat(-2.0), splat(4.0));
+        // 2 / norm_squared to second order: exact to rounding within `CERTAIN_NORM`.
+        let off_unit = norm_squared - splat(1.0);
+        let s = (off_unit * 2.0).mul_add(off_unit - splat(1.0), splat(2.0));
         let (sx, sy, sz) = (s * x, s * y, s * z);
         let (xx, yy, zz) = (sx * x, sy * y, sz * z);
         let (xy, xz, yz) = (sx * y, sx * z, sy * z);
@@ -60,6 +91,7 @@ impl<V: Copy> Target<V> {
                 a[1].mul_add(splat(-g.d6), p[1]),
                 a[2].mul_add(splat(-g.d6), p[2] - g.d1),
             ],
+            off_unit,
         }
     }
 }
@@ -97,7 +129,9 @@ fn fold<S: Simd, V: SimdFloat<S, Element = f64>>(
     fold_sign: V,
 ) -> Fold<V> {
     let splat = |value| V::splat(simd, value);
-    let Target { n, o, a, centre } = target;
+    let Target {
+        n, o, a, centre, ..
+    } = target;
     let inverse = splat(1.0) / rho_squared.max(splat(f64::MIN_POSITIVE));
     let (fx, fy) = (forward * inverse, splat(g.d4) * inverse);
     let c1 = fx.mul_add(centre[0], -(fy * centre[1]));
@@ -227,6 +261,7 @@ fn half_turn<S: Simd, V: SimdFloat<S, Element = f64>>(simd: S, angle: V) -> V {
 pub(super) fn one_pose<S: Simd>(
     simd: S,
     g: &UrGeometry,
+    bounds: &Bounds,
     pose: &Pose,
     out: &mut ClosedForm,
 ) -> bool {
@@ -305,9 +340,10 @@ pub(super) fn one_pose<S: Simd>(
         values.store_array(row);
     }
     out.exists = both_elbows(closes.to_bitmask());
-    is_certain_root(simd, g, root_squared).all_true()
+    is_certain_root(bounds, root_squared).all_true()
+        && is_certain_pose(&target, rho_squared).all_true()
         && is_certain_s5(simd, fold.s5_squared).all_true()
-        && is_certain_elbow(elbows.closing).all_true()
+        && is_certain_elbow(bounds, elbows.closing).all_true()
 }
 
 /// Bits of shoulders and wrists to bits of configurations.
@@ -338,6 +374,7 @@ fn both_elbows(branches: u64) -> u8 {
 pub(super) fn many_poses<S: Simd>(
     simd: S,
     g: &UrGeometry,
+    bounds: &Bounds,
     poses: &[Pose],
     out: &mut [ClosedForm],
 ) -> u64 {
@@ -379,13 +416,14 @@ pub(super) fn many_poses<S: Simd>(
         fold_elbows(simd, g, &target, &left, g.d5),
         fold_elbows(simd, g, &target, &left, -g.d5),
     ];
-    let mut certain = is_certain_root(simd, g, root_squared)
+    let mut certain = is_certain_root(bounds, root_squared)
+        & is_certain_pose(&target, rho_squared)
         & is_certain_s5(simd, right.s5_squared)
         & is_certain_s5(simd, left.s5_squared);
     let reachable = root_squared.simd_ge(0.0);
     let mut closing = [0; 4];
     for (bits, elbows) in closing.iter_mut().zip(&elbows) {
-        certain &= is_certain_elbow(elbows.closing);
+        certain &= is_certain_elbow(bounds, elbows.closing);
         *bits = (elbows.closing.simd_ge(0.0) & reachable).to_bitmask();
     }
     let (q1_right, q1_left) = (angle(simd, right.cos_sin_1), angle(simd, left.cos_sin_1));
@@ -457,12 +495,21 @@ fn transpose<S: Simd, V: SimdBase<S>>(rows: &mut [V]) {
 
 #[inline(always)]
 fn is_certain_root<S: Simd, V: SimdFloat<S, Element = f64>>(
-    simd: S,
-    g: &UrGeometry,
+    bounds: &Bounds,
     root_squared: V,
 ) -> V::Mask {
-    let least = V::splat(simd, (CERTAIN_ROOT * g.d4).powi(2));
-    root_squared.abs().simd_gt(least)
+    root_squared.simd_lt(bounds.root.0) | root_squared.simd_gt(bounds.root.1)
+}
+
+/// Whether the numbers are a pose that squares do not spoil.
+#[inline(always)]
+fn is_certain_pose<S: Simd, V: SimdFloat<S, Element = f64>>(
+    target: &Target<V>,
+    rho_squared: V,
+) -> V::Mask {
+    let up = target.centre[2];
+    target.off_unit.abs().simd_le(CERTAIN_NORM)
+        & up.mul_add(up, rho_squared).simd_lt(CERTAIN_RHO_SQUARED)
 }
 
 #[inline(always)]
@@ -471,8 +518,11 @@ fn is_certain_s5<S: Simd, V: SimdFloat<S, Element = f64>>(simd: S, s5_squared: V
 }
 
 #[inline(always)]
-fn is_certain_elbow<S: Simd, V: SimdFloat<S, Element = f64>>(closing: V) -> V::Mask {
-    closing.abs().simd_gt(CERTAIN_C3)
+fn is_certain_elbow<S: Simd, V: SimdFloat<S, Element = f64>>(
+    bounds: &Bounds,
+    closing: V,
+) -> V::Mask {
+    closing.simd_lt(bounds.closing.0) | closing.simd_gt(bounds.closing.1)
 }
 
 #[inline(always)]

@@ -15,8 +15,10 @@ use std::sync::LazyLock;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch};
 
+pub(super) use careful::defect;
 pub(super) use clamped::clamped;
 pub use family::FreeWrist;
+use lanes::Bounds;
 
 use super::{Configuration, Shoulder};
 use crate::{JointLimits, Joints, Pose, UrGeometry};
@@ -33,6 +35,30 @@ pub struct ClosedFormSolution {
     pub wrist_3_is_free: bool,
     /// Another configuration is the same posture within rounding and has no row of its own.
     pub merged: bool,
+    /// The pose as its numbers stand misses this row: it exists within their rounding, or within the
+    /// tolerance that was given, only.
+    pub touching: bool,
+}
+
+/// By how much a row may miss the pose and still be one, flagged as touching.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance {
+    /// Of the position, m.
+    pub m: f64,
+    /// Of the orientation, rad.
+    pub rad: f64,
+}
+
+impl Tolerance {
+    /// The rounding of doubles only.
+    pub const ROUNDING: Self = Self { m: 0.0, rad: 0.0 };
+}
+
+/// A tenth of a micrometre and of a microradian: a pose in single precision is off by less.
+impl Default for Tolerance {
+    fn default() -> Self {
+        Self { m: 1e-7, rad: 1e-7 }
+    }
 }
 
 /// Why a configuration does not exist at a pose.
@@ -62,6 +88,13 @@ pub enum Unreachable {
     },
     /// The pose has a number that is not finite.
     NotFinite,
+    /// The quaternion's norm is off one by more than 1e-6, which no rounding explains.
+    NotARotation,
+    /// The position is farther away than 1000 km.
+    TooFar {
+        /// By how much, m.
+        missing_m: f64,
+    },
 }
 
 impl Unreachable {
@@ -71,8 +104,9 @@ impl Unreachable {
             Self::WristTooNear { missing_m }
             | Self::ElbowTooShort { missing_m }
             | Self::ElbowTooLong { missing_m }
-            | Self::NoCounterpart { missing_m, .. } => missing_m,
-            Self::NotFinite => f64::INFINITY,
+            | Self::NoCounterpart { missing_m, .. }
+            | Self::TooFar { missing_m } => missing_m,
+            Self::NotFinite | Self::NotARotation => f64::INFINITY,
         }
     }
 }
@@ -80,11 +114,13 @@ impl Unreachable {
 /// What an answer of the closed form is worth.
 ///
 /// The pose is what its doubles say, exactly. Its branches depend on three signs, of
-/// `rho^2 - d4^2`, `s5^2` and `1 -+ cos q3`, and on nothing else.
+/// `rho^2 - d4^2`, `s5^2` and `1 -+ cos q3`, and on nothing else. A row that these signs deny, and
+/// that exists within rounding or a tolerance only, says so itself
+/// ([`ClosedFormSolution::touching`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Certificate {
-    /// Every sign was beyond the error bound of double precision: no branch is missing and none is
-    /// too many.
+    /// Every sign was beyond the error bound of double precision: no branch is missing, and none but
+    /// touching ones is too many.
     Complete,
     /// As [`Certificate::Complete`], but a sign needed extended precision.
     DecidedInExtendedPrecision,
@@ -98,6 +134,8 @@ pub enum Certificate {
     Refined,
     /// No configuration reaches the pose; there is only a nearest posture.
     NearestOnly,
+    /// The numbers are no pose: see [`ClosedForm::unreachable`].
+    NotAPose,
 }
 
 /// What decides between the members of a family.
@@ -118,6 +156,7 @@ pub struct ClosedForm {
     exists: u8,
     merged: u8,
     free: u8,
+    touching: u8,
     certificate: Certificate,
 }
 
@@ -128,6 +167,7 @@ impl ClosedForm {
         exists: 0,
         merged: 0,
         free: 0,
+        touching: 0,
         certificate: Certificate::NearestOnly,
     };
 
@@ -157,6 +197,7 @@ impl ClosedForm {
             joints: Joints::from_fn(|joint, _| self.joints[joint][index]),
             wrist_3_is_free: bit(self.free),
             merged: bit(self.merged),
+            touching: bit(self.touching),
         })
     }
 
@@ -236,41 +277,69 @@ pub fn closed_form_into(
     preference: Preference<'_>,
     out: &mut ClosedForm,
 ) {
-    solve_at(*LEVEL, geometry, base_from_flange, preference, out);
+    closed_form_within(
+        geometry,
+        base_from_flange,
+        preference,
+        Tolerance::ROUNDING,
+        out,
+    );
+}
+
+/// [`closed_form_into`] with touching rows for branches that the pose misses by no more than a
+/// tolerance: that of a pose in few digits, or in single precision.
+#[inline]
+pub fn closed_form_within(
+    geometry: &UrGeometry,
+    base_from_flange: &Pose,
+    preference: Preference<'_>,
+    tolerance: Tolerance,
+    out: &mut ClosedForm,
+) {
+    let asked = Asked {
+        geometry,
+        preference,
+        tolerance,
+    };
+    solve_at(*LEVEL, &asked, base_from_flange, out);
+}
+
+/// What is asked of every pose.
+struct Asked<'a> {
+    geometry: &'a UrGeometry,
+    preference: Preference<'a>,
+    tolerance: Tolerance,
 }
 
 #[inline]
-fn solve_at(
-    level: Level,
-    geometry: &UrGeometry,
-    pose: &Pose,
-    preference: Preference<'_>,
-    out: &mut ClosedForm,
-) {
-    let certain = dispatch!(level, simd => lanes::one_pose(simd, geometry, pose, out));
-    out.finish(geometry, pose, preference, certain);
+fn solve_at(level: Level, asked: &Asked<'_>, pose: &Pose, out: &mut ClosedForm) {
+    let bounds = Bounds::new(asked.geometry, asked.tolerance);
+    let certain =
+        dispatch!(level, simd => lanes::one_pose(simd, asked.geometry, &bounds, pose, out));
+    out.finish(asked, pose, certain);
 }
 
 impl ClosedForm {
     /// Fills in what the vectors leave, or solves anew with care.
     #[inline(always)]
-    fn finish(
-        &mut self,
-        geometry: &UrGeometry,
-        pose: &Pose,
-        preference: Preference<'_>,
-        certain: bool,
-    ) {
+    fn finish(&mut self, asked: &Asked<'_>, pose: &Pose, certain: bool) {
         if certain {
             self.merged = 0;
             self.free = 0;
+            self.touching = 0;
             self.certificate = if self.exists == 0 {
                 Certificate::NearestOnly
             } else {
                 Certificate::Complete
             };
         } else {
-            careful::solve(geometry, pose, preference, self);
+            careful::solve(
+                asked.geometry,
+                pose,
+                asked.preference,
+                asked.tolerance,
+                self,
+            );
         }
     }
 }
@@ -285,41 +354,56 @@ pub fn closed_form_batch(
     preference: Preference<'_>,
     out: &mut [ClosedForm],
 ) {
-    batch_at(*LEVEL, geometry, base_from_flange, preference, out);
+    closed_form_batch_within(
+        geometry,
+        base_from_flange,
+        preference,
+        Tolerance::ROUNDING,
+        out,
+    );
 }
 
-fn batch_at(
-    level: Level,
+/// [`closed_form_within`] of many poses.
+///
+/// # Panics
+/// If there are not as many answers as poses.
+pub fn closed_form_batch_within(
     geometry: &UrGeometry,
-    poses: &[Pose],
+    base_from_flange: &[Pose],
     preference: Preference<'_>,
+    tolerance: Tolerance,
     out: &mut [ClosedForm],
 ) {
+    let asked = Asked {
+        geometry,
+        preference,
+        tolerance,
+    };
+    batch_at(*LEVEL, &asked, base_from_flange, out);
+}
+
+fn batch_at(level: Level, asked: &Asked<'_>, poses: &[Pose], out: &mut [ClosedForm]) {
     assert_eq!(poses.len(), out.len(), "one answer for each pose");
-    dispatch!(level, simd => batch(simd, geometry, poses, preference, out));
+    dispatch!(level, simd => batch(simd, asked, poses, out));
 }
 
 #[inline(always)]
-fn batch<S: Simd>(
-    simd: S,
-    geometry: &UrGeometry,
-    poses: &[Pose],
-    preference: Preference<'_>,
-    out: &mut [ClosedForm],
-) {
+fn batch<S: Simd>(simd: S, asked: &Asked<'_>, poses: &[Pose], out: &mut [ClosedForm]) {
+    let geometry = asked.geometry;
+    let bounds = Bounds::new(geometry, asked.tolerance);
     let lanes = S::f64s::LEN;
     let mut pose_blocks = poses.chunks_exact(lanes);
     let mut out_blocks = out.chunks_exact_mut(lanes);
     for (poses, out) in (&mut pose_blocks).zip(&mut out_blocks) {
-        let certain = lanes::many_poses(simd, geometry, poses, out);
+        let certain = lanes::many_poses(simd, geometry, &bounds, poses, out);
         for (lane, (pose, out)) in poses.iter().zip(out).enumerate() {
-            out.finish(geometry, pose, preference, (certain >> lane) & 1 == 1);
+            out.finish(asked, pose, (certain >> lane) & 1 == 1);
         }
     }
     let rest = pose_blocks.remainder().iter();
     for (pose, out) in rest.zip(out_blocks.into_remainder()) {
-        let certain = lanes::one_pose(simd, geometry, pose, out);
-        out.finish(geometry, pose, preference, certain);
+        let certain = lanes::one_pose(simd, geometry, &bounds, pose, out);
+        out.finish(asked, pose, certain);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::super::{Elbow, wrap_angle};
 use super::*;
@@ -22,6 +22,21 @@ const LEVELS_AGREE_RAD: f64 = 1e-10;
 
 /// The same away from singularities: sines of elbow and wrist 2 above 0.1, the wrist 50 mm ahead.
 const REGULAR_LEVELS_AGREE_RAD: f64 = 2e-14;
+
+const ASKED: Asked<'_> = Asked {
+    geometry: &UR3,
+    preference: Preference {
+        seed: None,
+        limits: None,
+    },
+    tolerance: Tolerance::ROUNDING,
+};
+
+fn careful(pose: &Pose) -> ClosedForm {
+    let mut out = ClosedForm::BLANK;
+    careful::solve(&UR3, pose, ASKED.preference, ASKED.tolerance, &mut out);
+    out
+}
 
 fn residual(pose: &Pose, q: &Joints) -> f64 {
     let found = UR3.base_from_flange(q);
@@ -54,7 +69,7 @@ fn levels() -> Vec<Level> {
 
 fn solved(level: Level, pose: &Pose) -> ClosedForm {
     let mut out = ClosedForm::BLANK;
-    solve_at(level, &UR3, pose, Preference::default(), &mut out);
+    solve_at(level, &ASKED, pose, &mut out);
     out
 }
 
@@ -99,7 +114,7 @@ fn a_batch_gives_the_rows_of_single_poses() {
         .collect();
     for level in levels() {
         let mut batch = vec![ClosedForm::BLANK; poses.len()];
-        batch_at(level, &UR3, &poses, Preference::default(), &mut batch);
+        batch_at(level, &ASKED, &poses, &mut batch);
         for (pose, found) in poses.iter().zip(&batch) {
             let single = solved(level, pose);
             assert_eq!(found.certificate(), single.certificate());
@@ -162,8 +177,7 @@ fn the_careful_path_confirms_the_fast_one() {
         let q = PoseSet::Generic.sample(&UR3, &mut random, 0.0);
         let pose = UR3.base_from_flange(&q);
         let fast = closed_form(&UR3, &pose, None);
-        let mut careful = ClosedForm::BLANK;
-        careful::solve(&UR3, &pose, Preference::default(), &mut careful);
+        let careful = careful(&pose);
         assert_eq!(fast.certificate(), careful.certificate());
         assert_eq!(fast.exists, careful.exists);
         for (a, b) in fast.solutions().zip(careful.solutions()) {
@@ -180,6 +194,7 @@ fn the_careful_path_confirms_the_fast_one() {
 /// off from extended precision by less than the margin that makes its signs certain.
 #[test]
 fn bounds_of_the_fast_path_hold() {
+    let bounds = Bounds::new(&UR3, Tolerance::ROUNDING);
     let mut random = SplitMix64::new(26);
     let mut edge = 0;
     for _ in 0..20_000 {
@@ -188,12 +203,11 @@ fn bounds_of_the_fast_path_hold() {
         let q = set.sample(&UR3, &mut random, away_rad);
         let pose = UR3.base_from_flange(&q);
         let mut fast = ClosedForm::BLANK;
-        if !dispatch!(*LEVEL, simd => lanes::one_pose(simd, &UR3, &pose, &mut fast)) {
+        if !dispatch!(*LEVEL, simd => lanes::one_pose(simd, &UR3, &bounds, &pose, &mut fast)) {
             continue;
         }
         edge += 1;
-        let mut careful = ClosedForm::BLANK;
-        careful::solve(&UR3, &pose, Preference::default(), &mut careful);
+        let careful = careful(&pose);
         assert_eq!(fast.exists, careful.exists, "{q}");
         // sin q3 is off by the error of its square over twice itself.
         for row in fast.solutions() {
@@ -289,4 +303,126 @@ fn a_free_wrist_keeps_joint_limits_where_it_can() {
         out.solutions()
             .all(|row| residual(&pose, &row.joints) < RESIDUAL)
     );
+}
+
+/// A row of a pose in few digits misses it by no more than was allowed, each of position and
+/// orientation; a shoulder and an elbow that both touch add up.
+const TOUCHING: f64 = 1.5;
+
+#[test]
+fn a_pose_in_single_precision_has_the_posture_that_made_it() {
+    // At a double root a rounding of 1e-7 is its square root in the joints, and where two of them
+    // meet its fourth root.
+    const DOUBLE_ROOT_RAD: f64 = 5e-3;
+    const FOURTH_ROOT_RAD: f64 = 0.1;
+    let tolerance = Tolerance::default();
+    let mut random = SplitMix64::new(28);
+    for set in [PoseSet::Shoulder, PoseSet::Elbow, PoseSet::ElbowShoulder] {
+        let (mut lost, mut touching, count) = (0, 0, 1000);
+        for _ in 0..count {
+            let q = set.sample(&UR3, &mut random, 0.0);
+            let pose = rounded_to_f32(&UR3.base_from_flange(&q));
+            let mut found = ClosedForm::BLANK;
+            closed_form_within(&UR3, &pose, Preference::default(), tolerance, &mut found);
+            for row in found.solutions() {
+                let residual = residual(&pose, &row.joints);
+                let allowed = if row.touching {
+                    TOUCHING * tolerance.m
+                } else {
+                    RESIDUAL
+                };
+                assert!(residual <= allowed, "{set:?}: {residual:e}");
+                touching += usize::from(row.touching);
+            }
+            let within = if set == PoseSet::ElbowShoulder {
+                FOURTH_ROOT_RAD
+            } else {
+                DOUBLE_ROOT_RAD
+            };
+            lost += usize::from(
+                !found
+                    .solutions()
+                    .any(|row| difference(&row.joints, &q) < within),
+            );
+        }
+        assert!(touching > count / 4, "{set:?}: {touching}");
+        assert!(lost <= count / 50, "{set:?}: {lost} of {count}");
+    }
+}
+
+#[test]
+fn rows_that_the_pose_denies_are_touching() {
+    // Stretched, and half a micrometre farther.
+    let q = Joints::from_column_slice(&[0.3, -1.2, 0.0, -0.5, 1.1, 0.8]);
+    let mut pose = UR3.base_from_flange(&q);
+    let beyond = (pose.translation.vector - Vector3::new(0.0, 0.0, UR3.d1)).normalize();
+    pose.translation.vector += beyond * 5e-7;
+    let mut found = ClosedForm::BLANK;
+    let rows_within = |m: f64, found: &mut ClosedForm| {
+        let tolerance = Tolerance { m, rad: 1e-9 };
+        closed_form_within(&UR3, &pose, Preference::default(), tolerance, found);
+        found
+            .solutions()
+            .filter(|row| difference(&row.joints, &q) < 0.01)
+            .map(|row| row.touching)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(rows_within(1e-7, &mut found), []);
+    assert_eq!(rows_within(1e-6, &mut found), [true]);
+    // Away from the edge nothing touches.
+    let mut random = SplitMix64::new(29);
+    for _ in 0..1000 {
+        let pose = UR3.base_from_flange(&PoseSet::Generic.sample(&UR3, &mut random, 0.0));
+        let tolerance = Tolerance::default();
+        closed_form_within(&UR3, &pose, Preference::default(), tolerance, &mut found);
+        let exact = closed_form(&UR3, &pose, None);
+        let untouched = |found: &ClosedForm| found.exists & !found.touching;
+        assert_eq!(untouched(&found), untouched(&exact));
+    }
+}
+
+#[test]
+fn a_position_out_of_this_world_and_no_rotation_are_no_pose() {
+    let good = UR3.base_from_flange(&Joints::repeat(0.4));
+    for far_m in [1e7, 1e160, 1e200, 1e300, f64::MAX] {
+        let mut pose = good;
+        pose.translation = Translation3::new(0.1, -far_m, 0.2);
+        let found = closed_form(&UR3, &pose, None);
+        assert_eq!(
+            (found.count(), found.certificate()),
+            (0, Certificate::NotAPose)
+        );
+        let reasons: Vec<_> = found.unreachable(&UR3, &pose).collect();
+        assert!(reasons.len() == 8);
+        assert!(
+            reasons
+                .iter()
+                .all(|(_, reason)| reason.missing_m() == far_m)
+        );
+    }
+    for norm in [0.0, 1e-200, 0.999, 1.001, 1.00001, 2.0, 1e200] {
+        let mut pose = good;
+        let scaled = good.rotation.into_inner() * norm;
+        pose.rotation = UnitQuaternion::new_unchecked(scaled);
+        let found = closed_form(&UR3, &pose, None);
+        assert_eq!(
+            (found.count(), found.certificate()),
+            (0, Certificate::NotAPose),
+            "{norm}"
+        );
+        let mut reasons = found.unreachable(&UR3, &pose);
+        assert!(reasons.all(|(_, reason)| reason == Unreachable::NotARotation));
+    }
+    // A rounding of single precision is none of the rows' business.
+    for norm in [1.0 - 5e-7, 1.0 + 1e-7, 1.0 + 5e-7] {
+        let mut pose = good;
+        pose.rotation = UnitQuaternion::new_unchecked(good.rotation.into_inner() * norm);
+        let found = closed_form(&UR3, &pose, None);
+        assert_eq!(found.certificate(), Certificate::Complete);
+        assert!(
+            found
+                .solutions()
+                .all(|row| residual(&good, &row.joints) < 10.0 * RESIDUAL)
+        );
+    }
 }

@@ -54,6 +54,11 @@ pub(super) struct IkAnswer {
     #[serde(flatten)]
     pub arm: ArmAnswer,
     pub method: &'static str,
+    /// By how much a touching row may miss the pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance_rad: Option<f64>,
     /// Postures that reproduce the pose.
     pub solutions: Vec<SolutionAnswer>,
     pub count: usize,
@@ -73,6 +78,8 @@ pub(super) struct SolutionAnswer {
     pub free_joint: Option<&'static str>,
     pub kind: &'static str,
     pub merged: bool,
+    /// The pose as it was given misses this row, by no more than the tolerance.
+    pub touching: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<u32>,
 }
@@ -87,6 +94,7 @@ pub(super) struct UnreachableAnswer {
 pub(super) fn kind_name(kind: SolutionKind) -> &'static str {
     match kind {
         SolutionKind::Exact => "exact",
+        SolutionKind::Touching => "touching",
         SolutionKind::Nearest => "nearest",
     }
 }
@@ -94,7 +102,7 @@ pub(super) fn kind_name(kind: SolutionKind) -> &'static str {
 impl SolutionAnswer {
     fn remarks(&self) -> String {
         let mut remarks = Vec::new();
-        if self.kind != kind_name(SolutionKind::Exact) {
+        if self.kind == kind_name(SolutionKind::Nearest) {
             remarks.push("nearest, not a solution".to_owned());
         }
         if !self.within_limits {
@@ -105,6 +113,9 @@ impl SolutionAnswer {
         }
         if self.merged {
             remarks.push("merged".to_owned());
+        }
+        if self.touching {
+            remarks.push("touching".to_owned());
         }
         if let Some(iterations) = self.iterations {
             let plural = if iterations == 1 { "" } else { "s" };
@@ -140,13 +151,33 @@ impl IkAnswer {
             let mut cells = vec![unreachable.label.to_owned()];
             cells.extend((0..8).map(|_| "-".to_owned()));
             cells.push(format!(
-                "unreachable: {:.1} mm missing",
-                unreachable.missing_m * 1e3
+                "unreachable: {} missing",
+                length(unreachable.missing_m)
             ));
             table.add_row(cells);
         }
         let (arm, count, certificate) = (self.arm.text(), self.count, self.certificate);
-        format!("{table}\narm: {arm}\n{count}: {certificate}")
+        let mut text = format!("{table}\narm: {arm}\n{count}: {certificate}");
+        if let (Some(m), Some(rad)) = (self.tolerance_m, self.tolerance_rad)
+            && self.solutions.iter().any(|row| row.touching)
+        {
+            let m = length(m);
+            text += &format!("\ntouching: the pose misses the row by up to {m} and {rad:.1e} rad");
+        }
+        text
+    }
+}
+
+/// A length in the unit that shows its digits.
+fn length(m: f64) -> String {
+    if m >= 1e-4 {
+        format!("{:.1} mm", m * 1e3)
+    } else if m >= 1e-7 {
+        format!("{:.1} um", m * 1e6)
+    } else if m >= 1e-10 {
+        format!("{:.1} nm", m * 1e9)
+    } else {
+        format!("{m:.1e} m")
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 use needlebench_cell::{Finding, Robot, Roll};
 use needlebench_clearance::ClearanceModel;
+use needlebench_kinematics::ik::Tolerance;
 use needlebench_kinematics::{
     NotARotation, Pose, pose_from_matrix, pose_from_rotation_vector, rotation_vector,
 };
@@ -18,6 +19,45 @@ use crate::arguments::{PoseMatrix, Six};
 
 /// A coordinate beyond this is in another unit.
 const FARTHEST_M: f64 = 10.0;
+
+/// What few digits leave open is taken for no more than that of four decimals, m and rad: who writes
+/// 0.3 means it.
+const MOST_DIGITS: f64 = 1e-4;
+
+/// A tolerance beyond this makes neighbouring postures one, m and rad.
+const MOST_GIVEN: f64 = 1e-3;
+
+/// By how much the pose may be missed: as the argument says, or what the digits that were written
+/// leave open, but at least [`Tolerance::default`] and at most [`MOST_DIGITS`].
+pub(super) fn tolerance(arguments: &IkArguments) -> Result<Tolerance, Finding> {
+    if let Some(given) = arguments.tolerance {
+        if (0.0..=MOST_GIVEN).contains(&given) {
+            return Ok(Tolerance {
+                m: given,
+                rad: given,
+            });
+        }
+        let message = format!("it is {given:?}, outside 0 to {MOST_GIVEN:?} m and rad");
+        return Err(Finding::new("--tolerance", message)
+            .hint("it is in metres and radians: 1e-6 is a micrometre and a microradian"));
+    }
+    // The most digits of any number tell how all are meant: 0.3 beside 0.244470 is exact.
+    let finest = |half_units: &[f64]| half_units.iter().copied().fold(f64::INFINITY, f64::min);
+    let (m, rad) = match (&arguments.pose, &arguments.matrix) {
+        (Some(Six(_, half)), _) => (finest(&half[..3]), finest(&half[3..])),
+        (None, Some(PoseMatrix(_, half))) => (
+            finest(half.column(3).as_slice()),
+            finest(half.fixed_columns::<3>(0).into_owned().as_slice()),
+        ),
+        (None, None) => (0.0, 0.0),
+    };
+    let default = Tolerance::default();
+    let three = 3.0_f64.sqrt();
+    Ok(Tolerance {
+        m: (three * m).clamp(default.m, MOST_DIGITS),
+        rad: (three * rad).clamp(default.rad, MOST_DIGITS),
+    })
+}
 
 /// The arm, and the pose of its flange in `base_link`.
 pub(super) fn target(arguments: &IkArguments) -> Result<(Arm, Pose), Vec<Finding>> {
@@ -35,7 +75,7 @@ pub(super) fn target(arguments: &IkArguments) -> Result<(Arm, Pose), Vec<Finding
     Ok((arm, Robot::base_link_from_base() * base_from_flange))
 }
 
-fn of_vector(Six([x, y, z, rx, ry, rz]): &Six) -> Result<Pose, Finding> {
+fn of_vector(Six([x, y, z, rx, ry, rz], _): &Six) -> Result<Pose, Finding> {
     let position_m = Vector3::new(*x, *y, *z);
     check_position("--pose", &position_m)?;
     let rotvec_rad = Vector3::new(*rx, *ry, *rz);
@@ -52,7 +92,7 @@ fn of_vector(Six([x, y, z, rx, ry, rz]): &Six) -> Result<Pose, Finding> {
     Ok(pose_from_rotation_vector(position_m, rotvec_rad))
 }
 
-fn of_matrix(PoseMatrix(matrix): &PoseMatrix, nearest: bool) -> Result<Pose, Finding> {
+fn of_matrix(PoseMatrix(matrix, _): &PoseMatrix, nearest: bool) -> Result<Pose, Finding> {
     let position_m = matrix.column(3).into_owned();
     check_position("--matrix", &position_m)?;
     let error = match pose_from_matrix(&matrix.fixed_columns::<3>(0).into_owned(), position_m) {
