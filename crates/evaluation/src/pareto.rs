@@ -19,13 +19,15 @@ impl Scale {
     /// makes a large difference vanish. So being even is not transitive. NaN is worse than any number,
     /// and even with NaN.
     pub fn compare(&self, a: f64, b: f64) -> Ordering {
-        match (a.is_nan(), b.is_nan()) {
-            (true, true) => Ordering::Equal,
-            (true, false) => Ordering::Less,
-            (false, true) => Ordering::Greater,
-            (false, false) if a == b || (a - b).abs() <= self.resolution => Ordering::Equal,
-            (false, false) if (a > b) == self.more_is_better => Ordering::Greater,
-            (false, false) => Ordering::Less,
+        let is_even = a == b || (a - b).abs() <= self.resolution;
+        if a.is_nan() || b.is_nan() {
+            b.is_nan().cmp(&a.is_nan())
+        } else if is_even {
+            Ordering::Equal
+        } else if (a > b) == self.more_is_better {
+            Ordering::Greater
+        } else {
+            Ordering::Less
         }
     }
 }
@@ -57,11 +59,10 @@ pub fn pareto_set(candidates: &[Vec<f64>], scales: &[Scale]) -> Vec<bool> {
         .map(|a| candidates.iter().map(|b| dominates(a, b, scales)).collect())
         .collect();
     for through in 0..count {
-        for from in 0..count {
-            if beats[from][through] {
-                for to in 0..count {
-                    beats[from][to] |= beats[through][to];
-                }
+        let onwards = beats[through].clone();
+        for from in beats.iter_mut().filter(|from| from[through]) {
+            for (to, beaten) in from.iter_mut().zip(&onwards) {
+                *to |= *beaten;
             }
         }
     }

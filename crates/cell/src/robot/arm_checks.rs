@@ -49,19 +49,18 @@ pub(super) fn joint_limit(urdf: &Urdf, joint: &UrdfJoint) -> Result<JointLimit, 
             "it needs effort (N m), velocity (rad/s) and, if revolute, lower and upper (rad)",
         ));
     };
-    let (lower_rad, upper_rad) = match joint.kind {
-        JointKind::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
-        _ => {
-            for (key, is_given) in ["lower", "upper"].into_iter().zip(limit.has_range) {
-                if !is_given {
-                    return Err(
-                        refuse(format!("the <limit> of joint '{name}' has no `{key}`"))
-                            .hint("a revolute joint needs lower and upper, in radians"),
-                    );
-                }
+    let (lower_rad, upper_rad) = if joint.kind == JointKind::Continuous {
+        (f64::NEG_INFINITY, f64::INFINITY)
+    } else {
+        for (key, is_given) in ["lower", "upper"].into_iter().zip(limit.has_range) {
+            if !is_given {
+                return Err(
+                    refuse(format!("the <limit> of joint '{name}' has no `{key}`"))
+                        .hint("a revolute joint needs lower and upper, in radians"),
+                );
             }
-            (limit.lower, limit.upper)
         }
+        (limit.lower, limit.upper)
     };
     for (key, value, [least, most], unit, hint) in [
         (

@@ -7,6 +7,7 @@ use serde::{Deserializer, Serializer};
 pub(crate) const OFF: &str = "off";
 
 /// A number, or [`OFF`].
+#[expect(clippy::ref_option, reason = "the signature that serde calls")]
 pub(super) fn serialize<S: Serializer>(
     value: &Option<f64>,
     serializer: S,
