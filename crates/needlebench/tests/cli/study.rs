@@ -264,15 +264,15 @@ fn what_a_study_cannot_be_is_refused_at_its_line() {
     for (edit, parts) in [
         (
             ("values = [790, 800, 810]", "values = []"),
-            ["study.toml:16", "factors[1].values", "no values"],
+            ["study.toml:18", "factors[1].values", "no values"],
         ),
         (
             ("range = [-20, 20]", "range = [20, -20]"),
-            ["study.toml:10", "factors[0].range", "empty"],
+            ["study.toml:12", "factors[0].range", "empty"],
         ),
         (
             ("position_mm[0]", "positon_mm[0]"),
-            ["study.toml:10", "positon_mm", "position_mm"],
+            ["study.toml:12", "positon_mm", "position_mm"],
         ),
         (
             ("s.toml", "missing.toml"),
@@ -280,10 +280,10 @@ fn what_a_study_cannot_be_is_refused_at_its_line() {
         ),
         (
             ("seed = 1", "seeds = 1"),
-            ["study.toml:4", "seeds", "did you mean `seed`"],
+            ["study.toml:6", "seeds", "did you mean `seed`"],
         ),
         (
-            ("seed = 1", "mode = \"dynamik\""),
+            ("mode = \"static\"", "mode = \"dynamik\""),
             ["study.toml:4", "dynamik", "dynamic"],
         ),
     ] {
@@ -322,8 +322,8 @@ fn a_case_is_run_with_everything_that_a_run_leaves() {
     let bench = bench(STUDY);
     run(&bench, &["--case", "7", "--run", "--engine-free"]).exits_with(2);
     let study = STUDY.replace(
-        "[sampling]",
-        "mode = \"dynamic\"\nengines = [\"rapier\"]\n[sampling]",
+        "mode = \"static\"",
+        "mode = \"dynamic\"\nengines = [\"rapier\"]",
     );
     bench.write("study.toml", study);
     let answer = run(&bench, &["--case", "7", "--run"]);
