@@ -51,7 +51,7 @@ def from_vector(vector: Array) -> Array:
     cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(
         *x.shape, 3, 3
     )
-    safe = np.maximum(angle, 1e-300)
+    safe = np.maximum(angle, 1e-150)
     return (
         np.eye(3)
         + np.sinc(angle / np.pi) * cross

@@ -103,7 +103,7 @@ fn placed(path: &Path, finding: Finding) -> Finding {
     if finding.line.is_some() || finding.file != path.display().to_string() {
         return finding;
     }
-    match std::fs::read_to_string(path) {
+    match needlebench_cell::read_text(path) {
         Ok(text) => finding.placed_in(&text),
         Err(_) => finding,
     }

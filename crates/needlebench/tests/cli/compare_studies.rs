@@ -18,7 +18,7 @@ samples = 64
 [[factors]]
 name = "up"
 key = "phantom.position_mm[2]"
-range = [-60, 20]
+range = [-8, 16]
 relative = true
 "#;
 
@@ -26,9 +26,11 @@ relative = true
 fn tables() -> &'static [Vec<u8>; 3] {
     static TABLES: OnceLock<[Vec<u8>; 3]> = OnceLock::new();
     TABLES.get_or_init(|| {
-        let lower = with_edit(SMALL, "-597.5, 0]", "-597.5, -8]");
+        // A patient who moves under a needle that does not brings ribs into its way: not what is compared here.
+        let small = format!("{SMALL}[planning.needle_route]\noff = [\"bone\"]\n");
+        let lower = with_edit(&small, "-597.5, 0]", "-597.5, -8]");
         let other_seed = STUDY.replace("seed = 1", "seed = 2");
-        [(SMALL, STUDY), (&lower, STUDY), (SMALL, &other_seed)].map(|(scenario, study)| {
+        [(&small, STUDY), (&lower, STUDY), (&small, &other_seed)].map(|(scenario, study)| {
             let bench = Bench::with_scenario(scenario);
             bench.write(
                 "study.toml",

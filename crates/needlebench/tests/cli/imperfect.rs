@@ -72,7 +72,7 @@ fn engines_and_balance_of_torques_agree_on_where_an_imperfect_arm_ends() {
             total["analytic"]["rms_m"].as_f64().unwrap() > 0.5e-3,
             "{total}"
         );
-        assert_eq!(each["budget"]["sources"].as_array().unwrap().len(), 8);
+        assert_eq!(each["budget"]["sources"].as_array().unwrap().len(), 13);
     }
     assert!(simulated > 0);
 

@@ -207,6 +207,8 @@ fn results_folder_holds_what_the_report_lists() {
         "report.html",
         "junit.xml",
         "summary.md",
+        "pose.budget.png",
+        "pose.budget.svg",
         "pose.png",
         "pose.ranking.png",
         "pose.ranking.svg",
@@ -222,7 +224,7 @@ fn results_folder_holds_what_the_report_lists() {
         }
     }
     // Eight pictures of the posture and of the room each, six recordings.
-    assert_eq!(expected.len(), 8 + 16 + 6);
+    assert_eq!(expected.len(), 10 + 16 + 6);
     let found: BTreeSet<String> = bench
         .tree("results/small")
         .iter()

@@ -221,6 +221,7 @@ fn results_do_not_depend_on_how_the_study_was_called() {
         .run(&[&["study", &absolute][..], &all, &["b"]].concat())
         .exits_with(0);
     let files = [
+        "replanned.txt",
         "report.html",
         "results.csv",
         "results.parquet",
