@@ -26,7 +26,7 @@ use super::{Interrupted, Watch};
 pub enum Source {
     Paper,
     ThisRun,
-    /// Measured on one other machine, one core; see the remark.
+    /// Recorded once, on another machine: a constant, not of this run.
     Peer,
 }
 
@@ -85,14 +85,14 @@ const fn peer(name: &'static str, numerical: bool, time_s: f64, up_to_s: Option<
 /// Other solvers: 100 000 random UR3 poses, every solution, native loops, one core of one machine;
 /// numerical ones from random starts to 1e-6.
 const PEERS: [TimeRow; 8] = [
-    peer("ur_kinematics (C++)", false, 1186e-9, None),
-    peer("ik-geo 0.1.2 (Rust)", false, 1647e-9, None),
-    peer("ur-analytic-ik (C++)", false, 2839e-9, None),
-    peer("EAIK (C++)", false, 3009e-9, None),
-    peer("Robotics Toolbox LM (C++)", true, 60e-6, None),
-    peer("optik (Rust)", true, 92e-6, None),
-    peer("KDL LMA (C++)", true, 140e-6, None),
-    peer("TRAC-IK (C++)", true, 226e-6, None),
+    peer("ur_kinematics (C++), recorded", false, 1186e-9, None),
+    peer("ik-geo 0.1.2 (Rust), recorded", false, 1647e-9, None),
+    peer("ur-analytic-ik (C++), recorded", false, 2839e-9, None),
+    peer("EAIK (C++), recorded", false, 3009e-9, None),
+    peer("Robotics Toolbox LM (C++), recorded", true, 60e-6, None),
+    peer("optik (Rust), recorded", true, 92e-6, None),
+    peer("KDL LMA (C++), recorded", true, 140e-6, None),
+    peer("TRAC-IK (C++), recorded", true, 226e-6, None),
 ];
 
 const POSES: usize = 200;

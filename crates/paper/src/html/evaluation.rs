@@ -144,7 +144,7 @@ pub(super) fn time(out: &mut String, report: &PaperReport) -> std::fmt::Result {
         let legend = [
             (Paint::Series(1), Marker::Diamond, "paper"),
             (Paint::Series(0), Marker::Disc, "this run"),
-            (Paint::Series(4), Marker::Square, "published"),
+            (Paint::Series(4), Marker::Square, "recorded elsewhere"),
         ];
         writeln!(
             out,

@@ -55,7 +55,7 @@ fn head(out: &mut String, report: &PaperReport) -> std::fmt::Result {
     writeln!(
         out,
         "<header><h1>{}: reproduced</h1><p class=\"soft\">{}. Recomputed by needlebench {}; every \
-         number below comes from this run.</p><p><span class=\"verdict {class}\">{word}</span></p>",
+         number below comes from this run, but for the paper's own and the times of other solvers, which were recorded on another machine.</p><p><span class=\"verdict {class}\">{word}</span></p>",
         report.paper.title, report.paper.authors, report.provenance.version
     )?;
     out.write_str("<ul class=\"checks\">")?;
