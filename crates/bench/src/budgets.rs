@@ -3,7 +3,7 @@
 use needlebench_cell::imperfections::Expected;
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
 use needlebench_uncertainty::budget::{
-    BudgetCase, ErrorBudget, Moments, PointBudget, Samples, SourceBudget, analytic_total, budget,
+    BudgetCase, ErrorBudget, Moments, PointBudget, Samples, SourceBudget, budget, total_budget,
 };
 
 use crate::parallel::in_parallel;
@@ -28,11 +28,16 @@ pub(crate) fn budgets(setup: &Setup<'_>, plans: &[GoalPlan], threads: usize) -> 
     })
 }
 
-/// The same with nothing but the analytic totals: no sources of their own, no draws.
-pub(crate) fn analytic_budgets(setup: &Setup<'_>, plans: &[GoalPlan]) -> Budgets {
+/// The same of all sources together alone; drawn where engines have run, as a run's are.
+pub(crate) fn total_budgets(setup: &Setup<'_>, plans: &[GoalPlan], is_drawn: bool) -> Budgets {
+    let seed = setup.resolved.scenario.seed;
     of_each(setup, plans, 1, |case| {
-        let moments = analytic_total(case).map_err(|error| error.to_string())?;
-        Ok(analytic_budget(moments))
+        let samples = if is_drawn {
+            case.imperfections.budget_samples
+        } else {
+            0
+        };
+        total_budget(case, samples, seed).map_err(|error| error.to_string())
     })
 }
 

@@ -202,43 +202,10 @@ pub fn budget(
     samples: Samples,
     seed: u64,
 ) -> Result<ErrorBudget, BudgetError> {
-    let of = |source: Option<Source>| -> Result<SourceBudget, BudgetError> {
-        let imperfections = source.map_or_else(
-            || case.imperfections.clone(),
-            |source| only(case.imperfections, |each| each == source),
-        );
-        let analytic = analytic::moments(case, &imperfections)?;
-        let samples = source.map_or(samples.total, |_| samples.each_source);
-        let sampled = if samples > 1 {
-            Some(monte_carlo::moments(case, &imperfections, samples, seed)?)
-        } else {
-            None
-        };
-        let point = |index: usize| {
-            let analytic = analytic[index];
-            let sampled = sampled.map(|both| both[index]);
-            let size = analytic.covariance().norm();
-            PointBudget {
-                analytic,
-                monte_carlo: sampled.map(|(moments, _)| moments),
-                radius_95_m: sampled.map(|(_, radius_m)| radius_m),
-                covariance_difference: sampled.filter(|_| size > LEAST_VARIANCE_M2).map(
-                    |(moments, _)| (moments.covariance() - analytic.covariance()).norm() / size,
-                ),
-                bias_difference_m: sampled
-                    .map(|(moments, _)| (moments.bias() - analytic.bias()).norm()),
-            }
-        };
-        Ok(SourceBudget {
-            source,
-            at_skin: point(0),
-            at_target: point(1),
-        })
-    };
     let sources = Source::ALL
         .into_iter()
         .filter(|source| source.is_in(case.imperfections))
-        .map(|source| of(Some(source)))
+        .map(|source| source_budget(case, Some(source), samples.each_source, seed))
         .collect::<Result<Vec<_>, _>>()?;
     let dominant = sources
         .iter()
@@ -247,15 +214,31 @@ pub fn budget(
             rms(a).total_cmp(&rms(b))
         })
         .and_then(|each| each.source);
+    Ok(ErrorBudget {
+        sources,
+        dominant,
+        ..total_budget(case, samples.total, seed)?
+    })
+}
+
+/// The same of all sources together alone.
+///
+/// # Errors
+/// [`BudgetError`].
+pub fn total_budget(
+    case: &BudgetCase<'_>,
+    samples: usize,
+    seed: u64,
+) -> Result<ErrorBudget, BudgetError> {
     let at_target = |imperfections: &Imperfections| -> Result<Moments, BudgetError> {
         let [_, at_target] = analytic::moments(case, imperfections)?;
         Ok(at_target)
     };
     Ok(ErrorBudget {
-        samples: samples.total,
-        sources,
-        total: of(None)?,
-        dominant,
+        samples,
+        sources: Vec::new(),
+        total: source_budget(case, None, samples, seed)?,
+        dominant: None,
         before_insertion: Some(at_target(&only(
             case.imperfections,
             Source::is_before_insertion,
@@ -263,6 +246,45 @@ pub fn budget(
         breathing_freely: breathing_freely(case.imperfections)
             .map(|free| at_target(&free))
             .transpose()?,
+    })
+}
+
+/// The budget of a source, or of all.
+fn source_budget(
+    case: &BudgetCase<'_>,
+    source: Option<Source>,
+    samples: usize,
+    seed: u64,
+) -> Result<SourceBudget, BudgetError> {
+    let imperfections = source.map_or_else(
+        || case.imperfections.clone(),
+        |source| only(case.imperfections, |each| each == source),
+    );
+    let analytic = analytic::moments(case, &imperfections)?;
+    let sampled = if samples > 1 {
+        Some(monte_carlo::moments(case, &imperfections, samples, seed)?)
+    } else {
+        None
+    };
+    let point = |index: usize| {
+        let analytic = analytic[index];
+        let sampled = sampled.map(|both| both[index]);
+        let size = analytic.covariance().norm();
+        PointBudget {
+            analytic,
+            monte_carlo: sampled.map(|(moments, _)| moments),
+            radius_95_m: sampled.map(|(_, radius_m)| radius_m),
+            covariance_difference: sampled
+                .filter(|_| size > LEAST_VARIANCE_M2)
+                .map(|(moments, _)| (moments.covariance() - analytic.covariance()).norm() / size),
+            bias_difference_m: sampled
+                .map(|(moments, _)| (moments.bias() - analytic.bias()).norm()),
+        }
+    };
+    Ok(SourceBudget {
+        source,
+        at_skin: point(0),
+        at_target: point(1),
     })
 }
 

@@ -14,7 +14,7 @@ use needlebench_study::Outcome;
 
 use crate::adjudication::Adjudicated;
 use crate::assemble::{Context, goal_report};
-use crate::budgets::analytic_budgets;
+use crate::budgets::total_budgets;
 use crate::events::EventRun;
 use crate::setup::Setup;
 use crate::simulate::EngineRun;
@@ -51,7 +51,7 @@ pub(super) fn case_report(
         || criteria.min_hand_cone_deg.is_some();
     let context = Context {
         setup,
-        budgets: &analytic_budgets(setup, std::slice::from_ref(plan)),
+        budgets: &total_budgets(setup, std::slice::from_ref(plan), !engines.is_empty()),
         room: room_counts.then(|| RoomModel::new(setup.resolved)),
         events,
         engines,

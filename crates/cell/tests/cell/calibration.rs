@@ -344,7 +344,7 @@ fn files_that_cannot_be_read_are_refused() {
     let path = folder.path().join("c.yaml");
     std::fs::write(&path, [0xff, 0xfe, 0x00]).unwrap();
     let finding = load_robot(&calibrated(path)).unwrap_err();
-    assert!(finding.message.contains("not UTF-8"), "{finding}");
+    assert!(finding.message.contains("no UTF-8"), "{finding}");
 }
 
 #[test]

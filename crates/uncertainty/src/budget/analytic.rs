@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, SymmetricEigen, Vector3};
 use needlebench_cell::imperfections::{ArmPopulation, Breathing, Imperfections};
 use needlebench_kinematics::registration::{transform_covariance, tre_covariance};
-use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
+use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints, Pose};
 
 use super::{BudgetCase, BudgetError, Moments};
 use crate::jitter::Jitter;
@@ -40,14 +40,7 @@ pub(super) fn moments(
             bias += 0.5 * (ahead + behind) - displaced(&joints.bias);
         }
         let mut covariance = jacobian * joints.rigid_covariance * jacobian.transpose();
-        covariance += elasticity(
-            case,
-            imperfections,
-            &joints.sag_spread,
-            &jacobian,
-            &target,
-            point,
-        );
+        covariance += elasticity(case, imperfections, &joints, &jacobian, &target, point);
         if let Some(arms) = &imperfections.calibration {
             let (curved, spread) = calibration(case, arms, &target, point);
             bias += curved;
@@ -156,6 +149,24 @@ struct JointErrors {
     rigid_covariance: Matrix6<f64>,
     /// Standard deviation of each joint's twist, rad.
     sag_spread: Joints,
+    /// What becomes of errors of the joints when the weight has followed them: a joint that yields moves the
+    /// load of all, `(I + D dg/dq)^-1` with what servo and gear yield by, `D`, rad/(N m).
+    followed: Matrix6<f64>,
+}
+
+/// Step of the derivative of gravity's torque, rad.
+const GRADIENT_STEP_RAD: f64 = 1e-4;
+
+/// How the torque that holds the arm changes with its posture, N m/rad.
+fn gravity_gradient(real: &Dynamics, q: &Joints) -> Matrix6<f64> {
+    let mut gradient = Matrix6::zeros();
+    for joint in 0..JOINT_COUNT {
+        let mut step = Joints::zeros();
+        step[joint] = GRADIENT_STEP_RAD;
+        let change = real.gravity_torque(&(q + step)) - real.gravity_torque(&(q - step));
+        gradient.set_column(joint, &(change / (2.0 * GRADIENT_STEP_RAD)));
+    }
+    gradient
 }
 
 impl JointErrors {
@@ -181,6 +192,10 @@ impl JointErrors {
         bias -= unknown.component_div(&kp) + sag;
         let elasticity = imperfections.elasticity.as_ref();
         let sag_spread = sag * elasticity.map_or(0.0, |each| each.spread);
+        let gradient = gravity_gradient(&real, target);
+        let stiff = Matrix6::identity() + Matrix6::from_diagonal(&yields) * gradient;
+        // A servo that cannot hold its weight is refused elsewhere.
+        let followed = stiff.try_inverse().unwrap_or_else(Matrix6::identity);
         if let Some(payload) = imperfections.payload {
             let mut column = |body: needlebench_kinematics::Body| {
                 let other = Truth {
@@ -217,6 +232,7 @@ impl JointErrors {
             let spread = 0.5 * (error(1.0 + block.spread) - error(1.0 - block.spread));
             covariance += Matrix6::from_diagonal(&spread.component_mul(&spread));
         }
+        covariance = followed * covariance * followed.transpose();
         if let Some(encoder) = imperfections.encoder {
             let squared = |values: &Joints| values.component_mul(values);
             let still = squared(&encoder.zero_spread_rad) + squared(&encoder.resolution_rad) / 12.0;
@@ -230,6 +246,7 @@ impl JointErrors {
             covariance: covariance + Matrix6::from_diagonal(&sag_spread.component_mul(&sag_spread)),
             rigid_covariance: covariance,
             sag_spread,
+            followed,
         }
     }
 
@@ -259,7 +276,7 @@ fn world_from_origins(case: &BudgetCase<'_>, q: &Joints) -> [Pose; JOINT_COUNT] 
 fn elasticity(
     case: &BudgetCase<'_>,
     imperfections: &Imperfections,
-    sag_spread: &Joints,
+    joints: &JointErrors,
     jacobian: &Matrix3x6<f64>,
     q: &Joints,
     point: &Point3<f64>,
@@ -269,7 +286,7 @@ fn elasticity(
     };
     let origins = world_from_origins(case, q);
     let columns = (0..JOINT_COUNT).map(|joint| {
-        let sags: Vector3<f64> = jacobian.column(joint) * sag_spread[joint];
+        let sags = jacobian * (joints.followed.column(joint) * joints.sag_spread[joint]);
         let taken = elasticity
             .absorbed
             .as_ref()

@@ -138,7 +138,8 @@ mod tests {
         std::array::from_fn(|joint| parts.iter().map(|part| part[joint]).sum())
     }
 
-    /// Root mean square distance of the flange from where the controller has it, over other postures than
+    /// Root mean square distance of the flange from where the controller has it, and of its orientation by the
+    /// same lever, over other postures than
     /// those of the fit: the whole non-linear arm, with its twist, under a chain that the controller
     /// believes in.
     fn rms_m(robot: &Robot, believed: &OriginDeviations) -> f64 {

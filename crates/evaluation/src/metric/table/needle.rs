@@ -211,6 +211,7 @@ pub(super) const BUDGET: &[Metric] = &[
         Length,
         Configuration(|each| each.budget.as_ref()?.total.at_target.radius_95_m),
     )
+    .only_in(&[Dynamic])
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
