@@ -11,7 +11,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use needlebench_kinematics::ik::{
-    ClosedForm, GaussNewtonOptions, Kinematics, Preference, closed_form, closed_form_batch,
+    ClosedForm, GaussNewtonOptions, Kinematics, Preference, Rows, closed_form, closed_form_batch,
     closed_form_into, gauss_newton,
 };
 use needlebench_kinematics::pose_sets::PoseSet;
@@ -45,6 +45,13 @@ fn inverse(c: &mut Criterion) {
     });
     group.bench_function("closed form, checked by forward kinematics", |b| {
         b.iter(|| kinematics.solve(black_box(&base_link_from_flange), None));
+    });
+    group.bench_function("rows, into a place", |b| {
+        let mut rows = Rows::new();
+        b.iter(|| {
+            kinematics.rows_into(black_box(&base_link_from_flange), None, &mut rows);
+            black_box(rows.count())
+        });
     });
     group.finish();
     // Per pose, over 1024 different ones: generic, then singular, where more care is taken.
@@ -82,6 +89,20 @@ fn inverse(c: &mut Criterion) {
             });
         });
     }
+    let poses: Vec<Pose> = {
+        let mut random = SplitMix64::new(1);
+        (0..1024)
+            .map(|_| PoseSet::Generic.sample(&geometry, &mut random, 0.0))
+            .map(|q| kinematics.base_link_from_flange(&q))
+            .collect()
+    };
+    let mut rows = vec![Rows::new(); poses.len()];
+    group.bench_function("rows, batch, generic", |b| {
+        b.iter(|| {
+            kinematics.rows_batch(black_box(&poses), None, &mut rows);
+            black_box(&rows);
+        });
+    });
     group.finish();
     c.bench_function("Gauss-Newton from 0.05 rad", |b| {
         b.iter(|| {
