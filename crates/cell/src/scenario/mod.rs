@@ -63,7 +63,6 @@ pub use planning::{NeedleRouteSection, PlanningSection, RollAim};
 pub use ranking::RankingSection;
 pub use recording::RecordingSection;
 pub use robot::RobotSection;
-pub(crate) use switch::OFF;
 pub(crate) use tool::NEEDLE_OUTER_DIAMETER_MM;
 pub use tool::ToolSection;
 

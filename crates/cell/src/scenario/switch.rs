@@ -3,10 +3,9 @@
 use serde::de::{Error, Visitor};
 use serde::{Deserializer, Serializer};
 
-/// Switches a value off.
-pub(crate) const OFF: &str = "off";
+use crate::schema::SWITCHED_OFF;
 
-/// A number, or [`OFF`].
+/// A number, or [`SWITCHED_OFF`].
 #[expect(clippy::ref_option, reason = "the signature that serde calls")]
 pub(super) fn serialize<S: Serializer>(
     value: &Option<f64>,
@@ -14,7 +13,7 @@ pub(super) fn serialize<S: Serializer>(
 ) -> Result<S::Ok, S::Error> {
     match value {
         Some(number) => serializer.serialize_f64(*number),
-        None => serializer.serialize_str(OFF),
+        None => serializer.serialize_str(SWITCHED_OFF),
     }
 }
 
@@ -27,7 +26,7 @@ pub(super) fn deserialize<'de, D: Deserializer<'de>>(
         type Value = Option<f64>;
 
         fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-            write!(formatter, "a number or \"{OFF}\"")
+            write!(formatter, "a number or \"{SWITCHED_OFF}\"")
         }
         fn visit_f64<E: Error>(self, number: f64) -> Result<Self::Value, E> {
             Ok(Some(number))
@@ -40,7 +39,7 @@ pub(super) fn deserialize<'de, D: Deserializer<'de>>(
         }
         fn visit_str<E: Error>(self, word: &str) -> Result<Self::Value, E> {
             match word {
-                OFF => Ok(None),
+                SWITCHED_OFF => Ok(None),
                 _ => Err(E::invalid_value(serde::de::Unexpected::Str(word), &self)),
             }
         }

@@ -4,10 +4,10 @@ use std::fmt;
 
 use toml::Value;
 
+use super::SWITCHED_OFF;
 use super::node::{Limits, List, Node, Table, Text};
 use super::unit::{in_words, quantity, unit_of};
 use crate::nearest_name;
-use crate::scenario::OFF;
 
 /// One thing that does not fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +76,8 @@ impl Node {
     pub fn check(&self, at: Path<'_>, value: &Value, found: &mut Vec<Misfit>) {
         match (self, value) {
             (Self::Anything, _) | (Self::Truth, Value::Boolean(_)) => {}
-            (Self::Number(limits), Value::String(word)) if limits.or_off && word == OFF => {}
+            (Self::Number(limits), Value::String(word))
+                if limits.or_off && word == SWITCHED_OFF => {}
             (Self::Number(limits), Value::Float(number)) => limits.check(at, *number, found),
             (Self::Number(limits), Value::Integer(number)) => {
                 limits.check(at, *number as f64, found);
@@ -101,9 +102,9 @@ impl Node {
             Self::Table(_) => "a table",
         };
         let hint = match self {
-            Self::Number(limits) if limits.or_off => {
-                Some(format!("a word is \"{OFF}\", which switches it off"))
-            }
+            Self::Number(limits) if limits.or_off => Some(format!(
+                "a word is \"{SWITCHED_OFF}\", which switches it off"
+            )),
             Self::Number(_) => Some(match in_words(unit_of(at.name())) {
                 "" => "give a plain number, in the unit in its name".to_owned(),
                 unit => format!("give a plain number, in {unit}"),
@@ -229,7 +230,7 @@ impl<N: Limited> Limits<N> {
                 "" => "it is a plain number".to_owned(),
                 unit => format!("the value is in {unit}"),
             };
-            return format!("{unit}; \"{OFF}\" in its place switches it off");
+            return format!("{unit}; \"{SWITCHED_OFF}\" in its place switches it off");
         }
         let meant = |factor: i32| self.unit == "mm" && self.holds(number.times(factor));
         match self.unit.as_str() {

@@ -30,6 +30,8 @@ pub(crate) const HINT: &str = "x-hint";
 
 /// Whether a number may be switched off by the word "off".
 pub(crate) const OFF: &str = "x-off";
+/// Word in place of a number that switches the value off.
+pub(crate) const SWITCHED_OFF: &str = "off";
 
 /// Longest name: file systems take 255 bytes, some 143, and a name gets endings such as
 /// `.ranking.svg` and the name of a configuration beside it.

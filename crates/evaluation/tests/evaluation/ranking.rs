@@ -42,17 +42,18 @@ fn needle(tip_error_m: f64) -> NeedleMeasurement {
     }
 }
 
-/// A budget of nothing but the analytic totals.
+/// A budget of what is known of all sources together.
 fn budget(rms_m: f64) -> ErrorBudget {
+    let moments = Moments {
+        bias_m: [rms_m, 0.0, 0.0],
+        covariance_m2: [[0.0; 3]; 3],
+        rms_m,
+        lateral_rms_m: rms_m,
+    };
     let point = || PointBudget {
-        analytic: Moments {
-            bias_m: [rms_m, 0.0, 0.0],
-            covariance_m2: [[0.0; 3]; 3],
-            rms_m,
-            lateral_rms_m: rms_m,
-        },
+        analytic: moments,
         monte_carlo: None,
-        radius_95_m: None,
+        radius_95_m: Some(2.0 * rms_m),
         covariance_difference: None,
         bias_difference_m: None,
     };
@@ -65,8 +66,8 @@ fn budget(rms_m: f64) -> ErrorBudget {
             at_target: point(),
         },
         dominant: None,
-        before_insertion: None,
-        breathing_freely: None,
+        before_insertion: Some(moments),
+        breathing_freely: Some(moments),
     }
 }
 

@@ -50,7 +50,7 @@ fn further_engine_has_its_columns_files_and_motions() {
         heading.contains("rapier") && heading.contains("Replay"),
         "{heading}"
     );
-    assert!(markdown(&finished.report, &MORE).contains("| Tip error Replay |"));
+    assert!(markdown(&finished.report, &MORE).contains("| Residual Replay |"));
     // Those who do not know it show it by its name.
     assert!(markdown(&finished.report, ENGINES).contains("| Tip error replay |"));
     // Where it did not run, nothing is left of it.

@@ -12,7 +12,10 @@ const SAMPLES: usize = 10_000;
 /// Largest relative difference of the covariances.
 const COVARIANCE: f64 = 0.05;
 
-/// Largest difference of the biases, m.
+/// Standard errors of a mean over the draws that a bias may be off by.
+const STANDARD_ERRORS: f64 = 3.0;
+
+/// Largest difference of the biases besides, m: what a budget of first order leaves out.
 const BIAS_M: f64 = 2e-6;
 
 fn budgets(blocks: &str, samples: usize) -> Vec<ErrorBudget> {
@@ -56,7 +59,12 @@ fn jacobians_and_ten_thousand_draws_agree_for_every_source_and_for_all() {
                     covariance <= COVARIANCE,
                     "{what}: covariance off by {covariance:.4}"
                 );
-                assert!(bias_m <= BIAS_M, "{what}: bias off by {bias_m:.3e} m");
+                let spread_m = point.analytic.covariance().trace().sqrt();
+                let drawn_m = STANDARD_ERRORS * spread_m / (SAMPLES as f64).sqrt();
+                assert!(
+                    bias_m <= BIAS_M + drawn_m,
+                    "{what}: bias off by {bias_m:.3e} m"
+                );
             }
         }
     }
@@ -157,7 +165,7 @@ fn needle_bends_as_a_cantilever_does() {
         at_target.rms_m
     );
     assert!(
-        at_target.lateral_rms_m == at_target.rms_m,
+        (at_target.lateral_rms_m - at_target.rms_m).abs() < 1e-15,
         "across the needle alone"
     );
 }

@@ -277,7 +277,7 @@ fn an_empty_table_has_a_page() {
 fn a_case_looks_like_itself() {
     use needlebench_cell::{Change, KeyPath, Overrides, ScenarioFamily, Setting};
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let scenario = root.join("scenarios/supine_suite.toml");
+    let scenario = root.join("scenarios/studies/chest.toml");
     let family = ScenarioFamily::load(&scenario, &Overrides::default()).unwrap();
     let goal = family.goals().next().unwrap().to_owned();
     let vary = |key: &str, value: &str| {

@@ -30,6 +30,7 @@ diametral_clearance_mm = 0.15
 [imperfections.needle]
 [imperfections.indentation]
 [imperfections.breathing]
+hold_failure = 0
 ";
 
 /// Ends of motions: one with a bent wrist, one stretched out.
