@@ -77,12 +77,11 @@ impl<'a> Prediction<'a> {
         } else {
             Some(JointTrajectory::starting_at(candidate.joints))
         };
-        let needle = match &self.real {
-            Some(real) => motion.as_ref().and_then(|motion| self.needle(real, motion)),
-            None => {
-                let exit = self.resolved.cell.world_from_guide_exit(&candidate.joints);
-                Some(measure_guide(None, goal, &exit))
-            }
+        let needle = if let Some(real) = &self.real {
+            motion.as_ref().and_then(|motion| self.needle(real, motion))
+        } else {
+            let exit = self.resolved.cell.world_from_guide_exit(&candidate.joints);
+            Some(measure_guide(None, goal, &exit))
         };
         Predicted {
             needle,

@@ -130,13 +130,12 @@ pub fn replanned(
         if cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed)) {
             return Ok(None);
         }
-        let planned = match known.get(&each.case) {
-            Some(bits) => *bits,
-            None => {
-                let bits = planned_bits(prepared, each.case)?;
-                done(each.case, bits);
-                bits
-            }
+        let planned = if let Some(bits) = known.get(&each.case) {
+            *bits
+        } else {
+            let bits = planned_bits(prepared, each.case)?;
+            done(each.case, bits);
+            bits
         };
         progress.step();
         Ok(Some(ReplannedCase { planned, ..*each }))

@@ -40,6 +40,7 @@ const IMPERFECT: &str = "
 [imperfections]
 budget_samples = 2
 [imperfections.calibration]
+class = \"nominal_kinematics\"
 [imperfections.encoder]
 [imperfections.payload]
 [imperfections.friction]

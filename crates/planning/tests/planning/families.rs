@@ -172,7 +172,7 @@ fn out_of_reach_is_unreachable_at_every_roll() {
     let resolved = changed(
         "supine_suite.toml",
         "base_position_mm = [-280, 350, 1050]",
-        "base_position_mm = [-280, 1750, 1050]",
+        "base_position_mm = [-280, 1550, 1050]",
     );
     let model = ClearanceModel::new(&resolved.cell);
     let planner = Planner::new(&resolved, &model).unwrap();

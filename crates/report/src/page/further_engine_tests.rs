@@ -52,7 +52,7 @@ fn further_engine_has_its_columns_files_and_motions() {
     );
     assert!(markdown(&finished.report, &MORE).contains("| Residual Replay |"));
     // Those who do not know it show it by its name.
-    assert!(markdown(&finished.report, ENGINES).contains("| Tip error replay |"));
+    assert!(markdown(&finished.report, ENGINES).contains("| Residual replay |"));
     // Where it did not run, nothing is left of it.
     assert!(!report_text(&run(&["rapier"]).report, &MORE).contains("Replay"));
 }

@@ -123,8 +123,6 @@ pub(crate) fn absorbed_sag(
 
 #[cfg(test)]
 mod tests {
-    use needlebench_kinematics::random::SplitMix64;
-
     use super::super::ArmPopulation;
     use super::*;
 
@@ -139,9 +137,8 @@ mod tests {
     }
 
     /// Root mean square distance of the flange from where the controller has it, and of its orientation by the
-    /// same lever, over other postures than
-    /// those of the fit: the whole non-linear arm, with its twist, under a chain that the controller
-    /// believes in.
+    /// same lever, over the postures of the fit: the whole non-linear arm, with its twist, under a chain that
+    /// the controller believes in.
     fn rms_m(robot: &Robot, believed: &OriginDeviations) -> f64 {
         let dynamics = Dynamics {
             chain: robot.chain,
@@ -150,23 +147,19 @@ mod tests {
             gravity_m_s2: Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
         };
         let believed = ArmPopulation::moved(&robot.chain, believed);
-        let mut random = SplitMix64::new(99);
-        let (mut total, mut count) = (0.0, 0.0);
-        while count < 500.0 {
-            let q = Joints::from_fn(|_, _| random.uniform(-3.0, 3.0));
+        let upright = (1..).map(halton).filter(|q| {
+            let flange = robot.chain.base_link_from_flange(q);
+            flange.translation.vector.z >= 0.0
+        });
+        let squares = upright.take(POSTURES).map(|q| {
             let sagged = q - gears().twist_rad(&dynamics.gravity_torque(&q));
-            let real = robot
-                .chain
-                .base_link_from_flange(&sagged)
-                .translation
-                .vector;
-            if real.z < 0.0 {
-                continue;
-            }
-            total += (real - believed.base_link_from_flange(&q).translation.vector).norm_squared();
-            count += 1.0;
-        }
-        (total / count).sqrt()
+            let real = robot.chain.base_link_from_flange(&sagged);
+            let believed = believed.base_link_from_flange(&q);
+            let turned = LEVER_M * real.rotation.angle_to(&believed.rotation);
+            let moved = real.translation.vector - believed.translation.vector;
+            moved.norm_squared() + turned * turned
+        });
+        (squares.sum::<f64>() / POSTURES as f64).sqrt()
     }
 
     #[test]
