@@ -3,8 +3,8 @@
 //! A factory calibration moves every joint axis by fractions of a millimetre and a few milliradian.
 //! The closed form does not hold any more, but its solutions are near the true ones, and Newton's
 //! method takes each of them there. Next to a singularity that is not enough, since there a small
-//! change of the arm moves branches far, merges or unmakes them, or makes four of two: up to
-//! fourteen were seen. There every solution of the shoulder is looked for ([`sweep`]).
+//! change of the arm moves branches far, merges or unmakes them, or makes four of two: ten of
+//! a pose were seen. There every solution of the shoulder is looked for ([`sweep`]).
 
 use std::f64::consts::TAU;
 

@@ -529,7 +529,12 @@ impl<'a> Solver<'a> {
             self.closing_of(&turned, wrist, &self.fold(&turned))
         };
         // Wrist 1 moves with the turn by less than the arm's length over s5.
-        let per_rad = 1e3 * (1.0 + 1.0 / s5.max(arm.slack_rad));
+        let per_rad = if s5 > 4.0 * arm.slack_rad {
+            let [x, y, _] = self.centre.map(Extended::rounded);
+            self.closing_per_m() * (x.hypot(y) + 2.0 * self.geometry.d5.abs() / s5)
+        } else {
+            1e3 * (1.0 + 1.0 / s5.max(arm.slack_rad))
+        };
         let Some(turn_rad) = least_closing(closes, arm.slack_rad, 4.0 * s5, per_rad) else {
             return false;
         };
@@ -543,11 +548,19 @@ impl<'a> Solver<'a> {
     fn swing_to_reach(&mut self, arm: &Arm, wrist: Wrist, fold: &Fold) -> bool {
         let widest = (self.slack.rad / fold.s5).min(PI);
         let closes = |swing_rad: f64| self.closing_of(arm, wrist, &fold.swung(swing_rad, 1.0));
-        let Some(swing_rad) = least_closing(closes, widest, widest, 1e3) else {
+        let per_rad = self.closing_per_m() * self.geometry.d5.abs();
+        let Some(swing_rad) = least_closing(closes, widest, widest, per_rad) else {
             return false;
         };
         let turn = self.family(arm).turn;
         self.elbows(arm, wrist, &fold.swung(swing_rad, turn), 2.0 * ROUNDING)
+    }
+
+    /// By how much `1 -+ cos q3` changes as wrist 1 moves, at most, 1/m; doubled, for what a finite
+    /// way adds.
+    fn closing_per_m(&self) -> f64 {
+        let (a2, a3) = (self.geometry.a2, self.geometry.a3);
+        2.0 * (a2 + a3).abs() / (a2 * a3).abs()
     }
 
     fn closing_of(&self, arm: &Arm, wrist: Wrist, fold: &Fold) -> f64 {

@@ -24,6 +24,10 @@ const CERTAIN_ROOT: f64 = 1e-4;
 const CERTAIN_S5: f64 = 1e-4;
 const CERTAIN_C3: f64 = 1e-6;
 
+/// Within a tolerance, which turns `q1` the farther the smaller the root is, fewer poses take the
+/// careful path in all if roots count as certain only beyond this.
+const CERTAIN_ROOT_WITHIN: f64 = 1e-2;
+
 /// Off by no more than this, a squared norm is scaled to one exactly.
 const CERTAIN_NORM: f64 = 2e-6;
 
@@ -41,9 +45,14 @@ pub(super) struct Bounds {
 
 impl Bounds {
     pub(super) fn new(g: &UrGeometry, tolerance: Tolerance) -> Self {
-        let root = (CERTAIN_ROOT * g.d4).powi(2);
+        let certain_root = if tolerance.m > 0.0 {
+            CERTAIN_ROOT_WITHIN
+        } else {
+            CERTAIN_ROOT
+        };
+        let root = (certain_root * g.d4).powi(2);
         // Next to the bounds of s5 and of the root, a tolerance turns q6 and q1 by so much more.
-        let turned_m = tolerance.rad * g.d5.abs() / CERTAIN_S5 + tolerance.m / CERTAIN_ROOT;
+        let turned_m = tolerance.rad * g.d5.abs() / CERTAIN_S5 + tolerance.m / certain_root;
         let longest = (g.a2 + g.a3).abs();
         let closing = 2.0 * longest * (tolerance.m + turned_m) / (g.a2 * g.a3).abs();
         Self {

@@ -157,14 +157,14 @@ impl IkAnswer {
             table.add_row(cells);
         }
         let (arm, count, certificate) = (self.arm.text(), self.count, self.certificate);
-        let mut text = format!("{table}\narm: {arm}\n{count}: {certificate}");
-        if let (Some(m), Some(rad)) = (self.tolerance_m, self.tolerance_rad)
-            && self.solutions.iter().any(|row| row.touching)
-        {
-            let m = length(m);
-            text += &format!("\ntouching: the pose misses the row by up to {m} and {rad:.1e} rad");
-        }
-        text
+        let touching = match (self.tolerance_m, self.tolerance_rad) {
+            (Some(m), Some(rad)) if self.solutions.iter().any(|row| row.touching) => {
+                let m = length(m);
+                format!("\ntouching: the pose misses the row by up to {m} and {rad:.1e} rad")
+            }
+            _ => String::new(),
+        };
+        format!("{table}\narm: {arm}\n{count}: {certificate}{touching}")
     }
 }
 
