@@ -639,7 +639,7 @@ proptest! {
         prop_assert!(members.iter().any(|member| *member));
         // From the words of the definition, metric by metric.
         let beats = |a: &[f64], b: &[f64]| {
-            let lead = |metric: usize| if metric % 2 == 0 { a[metric] - b[metric] } else { b[metric] - a[metric] };
+            let lead = |metric: usize| if metric.is_multiple_of(2) { a[metric] - b[metric] } else { b[metric] - a[metric] };
             (0..4).all(|metric| lead(metric) >= -RESOLUTION) && (0..4).any(|metric| lead(metric) > RESOLUTION)
         };
         for (at, each) in values.iter().enumerate() {

@@ -98,7 +98,7 @@ fn a_study_of_postures_says_so_everywhere_and_what_they_overstate() {
     // A case that was drawn has the postures of its rows, and the motions of the case planned by itself.
     let case = &drawn[0];
     let bits = |mode: &str| {
-        bench.write("alone.toml", &STUDY.replace("mode = \"static\"", mode));
+        bench.write("alone.toml", STUDY.replace("mode = \"static\"", mode));
         let number = case["case"].to_string();
         let arguments = ["study", "alone.toml", "--case", &number, "--json"];
         let alone = bench.run(&arguments).exits_with(0).json();
@@ -125,7 +125,7 @@ fn what_was_planned_for_the_gap_is_not_planned_again() {
     // Damage is seen, and made good.
     bench.write(
         "out/moved/replanned.txt",
-        &kept.replacen("\nstudy", "\nStudy", 1),
+        kept.replacen("\nstudy", "\nStudy", 1),
     );
     run(&bench, &["--no-page", "--resume"]).exits_with(0);
     assert_eq!(bench.read("out/moved/summary.json"), whole);
