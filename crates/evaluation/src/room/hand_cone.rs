@@ -102,7 +102,7 @@ impl Cell {
 /// it is never too large but for the distances' own error (below 1e-8 m). The smallest angle at
 /// which a point was found inside a solid bounds it from the other side, as proven; the search ends
 /// when both are within [`CONE_TOLERANCE_RAD`], or when what is left is nearer than 0.5 mm to
-/// touching. Then a point of what is so near is the bound ([`touched_rad`]): being near is not being
+/// touching. Then a point of what is so near is the bound (`touched_rad`): being near is not being
 /// inside, and 0.25 mm beside the guide's entry are more than a degree.
 pub fn hand_cone(
     obstacles: &PlacedObstacles<'_>,
