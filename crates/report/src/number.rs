@@ -1,5 +1,6 @@
 //! Numbers as people read them, in tables, pages and charts alike.
 
+use needlebench_cell::digits_apart;
 use needlebench_evaluation::metric::Show;
 
 /// A unit of length.
@@ -73,7 +74,8 @@ pub fn millimetres(metres: f64) -> String {
     format!("{:.1}", metres * 1e3)
 }
 
-/// A value and its limit, both in the same unit that people use.
+/// A value and its limit, both in the same unit that people use; the value with as many digits as show on
+/// which side of its limit it is.
 pub fn value_and_limit(value: f64, limit: f64, unit: &str) -> (String, String) {
     let text = |value: f64| match unit {
         // Limits of accuracy are far below those of clearance.
@@ -84,7 +86,20 @@ pub fn value_and_limit(value: f64, limit: f64, unit: &str) -> (String, String) {
         "1" => format!("{value:.4}"),
         unit => format!("{value:.3} {unit}"),
     };
-    (text(value), text(limit))
+    let (shown, bound) = (text(value), text(limit));
+    // A limit that reads the same would hide that it is missed.
+    if shown == bound && value.partial_cmp(&limit) != Some(std::cmp::Ordering::Equal) {
+        let (factor, unit) = match unit {
+            "m" => (1e3, " mm".to_owned()),
+            "rad" => (1.0_f64.to_degrees(), " deg".to_owned()),
+            "1" => (1.0, String::new()),
+            unit => (1.0, format!(" {unit}")),
+        };
+        let digits = digits_apart(value * factor, limit * factor);
+        let bound = digits_apart(limit * factor, value * factor);
+        return (format!("{digits}{unit}"), format!("{bound}{unit}"));
+    }
+    (shown, bound)
 }
 
 /// At most so many decimals, without trailing zeros and without a minus before zero.
@@ -215,6 +230,23 @@ pub fn shown(show: Show, value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_value_beyond_its_limit_does_not_read_like_it() {
+        let apart = |value: f64, limit: f64, unit: &str| value_and_limit(value, limit, unit);
+        assert_eq!(
+            apart(2.704_3e-3, 2.7e-3, "m"),
+            ("2.704 mm".to_owned(), "2.7 mm".to_owned())
+        );
+        assert_eq!(
+            apart(3e-3, 2.7e-3, "m"),
+            ("3.00 mm".to_owned(), "2.70 mm".to_owned())
+        );
+        assert_eq!(
+            apart(2.7e-3, 2.7e-3, "m"),
+            ("2.70 mm".to_owned(), "2.70 mm".to_owned())
+        );
+    }
 
     #[test]
     fn lengths_are_in_the_unit_that_shows_them() {
