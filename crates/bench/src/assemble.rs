@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Point3;
-use needlebench_cell::imperfections::{ArmClass, BreathState, Expected};
-use needlebench_cell::{ArmInUse, ClearanceClass, Goal, ResolvedScenario, enclosures};
+use needlebench_cell::imperfections::{ArmClass, BreathState};
+use needlebench_cell::{ArmInUse, ClearanceClass, Expected, Goal, ResolvedScenario, enclosures};
 use needlebench_engine::{EngineIdentity, Recording};
 use needlebench_evaluation::metric::measured;
 use needlebench_evaluation::ranking::rank_goal;

@@ -1,6 +1,6 @@
 //! The fifth stage: error budgets.
 
-use needlebench_cell::imperfections::Expected;
+use needlebench_cell::Expected;
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
 use needlebench_uncertainty::budget::{
     BudgetCase, ErrorBudget, Moments, PointBudget, Samples, SourceBudget, budget, total_budget,

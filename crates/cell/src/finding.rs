@@ -5,8 +5,6 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use crate::toml_text::TomlText;
-
 /// One thing wrong with an input: where, what, and how to mend it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, thiserror::Error)]
 pub struct Finding {
@@ -50,23 +48,6 @@ impl Finding {
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());
         self
-    }
-
-    /// With the place of its key in the file's text, where it has none yet and the key stands there.
-    #[must_use]
-    pub fn placed_in(self, text: &str) -> Self {
-        let (None, Some(key)) = (&self.span, &self.key) else {
-            return self;
-        };
-        let Ok(toml) = TomlText::parse(&self.file, text) else {
-            return self;
-        };
-        let placed = toml.finding(key, "");
-        Self {
-            line: placed.line,
-            span: placed.span,
-            ..self
-        }
     }
 
     /// With its place in the file's text.

@@ -51,7 +51,7 @@ pub use model::{
 };
 pub use printable::{printable, printable_json, printable_line};
 pub use resolve::{
-    Expectation, Goal, Overrides, PlacedPhantom, ResolvedScenario, Roll, ServoSettings,
+    Expectation, Expected, Goal, Overrides, PlacedPhantom, ResolvedScenario, Roll, ServoSettings,
     imperfections, iso9283, load_robot, load_scenario, people, resolve_scenario,
 };
 pub use robot::{

@@ -203,3 +203,22 @@ fn value(at: Path<'_>, spanned: &Spanned<DeValue<'_>>) -> Result<Value, Beyond> 
         DeValue::Table(inner) => Value::Table(table(at, inner)?),
     })
 }
+
+impl Finding {
+    /// With the place of its key in the file's text, where it has none yet and the key stands there.
+    #[must_use]
+    pub fn placed_in(self, text: &str) -> Self {
+        let (None, Some(key)) = (&self.span, &self.key) else {
+            return self;
+        };
+        let Ok(toml) = TomlText::parse(&self.file, text) else {
+            return self;
+        };
+        let placed = toml.finding(key, "");
+        Self {
+            line: placed.line,
+            span: placed.span,
+            ..self
+        }
+    }
+}

@@ -2,7 +2,7 @@
 
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
-use super::imperfections::GearTwist;
+use super::gears::GearTwist;
 use crate::arm::data::ArmData;
 use crate::scenario::{ControlBlock, ElasticityBlock, FrictionBlock, Iso9283Section, Scenario};
 use crate::toml_text::TomlText;

@@ -2,7 +2,9 @@
 
 mod arm_values;
 mod cache;
+mod expected;
 mod fixtures;
+mod gears;
 mod goals;
 pub mod imperfections;
 pub mod iso9283;
@@ -35,9 +37,11 @@ use crate::scenario::{self, Scenario};
 use crate::toml_text::TomlText;
 use crate::{Finding, Robot};
 use arm_values::check_brakes;
+pub use expected::Expected;
+use expected::RealThings;
 pub use goals::{Expectation, Goal, Roll};
 use goals::{Surroundings, resolve_goal};
-use imperfections::{Expected, Imperfections, RealThings};
+use imperfections::Imperfections;
 use iso9283::{Iso9283Protocol, resolve_iso9283};
 use layout::Layout;
 pub(crate) use library::ModelLibrary;

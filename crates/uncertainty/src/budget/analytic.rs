@@ -85,14 +85,17 @@ pub(super) fn moments(
         }
         let along = exit.rotation * Vector3::z();
         let across = Matrix3::identity() - along * along.transpose();
+        // As the goal has the needle, which is where the posture has it.
+        let inwards = case.goal.axis.into_inner();
+        let beside = Matrix3::identity() - inwards * inwards.transpose();
         if let Some(needle) = &imperfections.needle {
             let [depth_m, length_m] = [case.depths_m()[index], case.depths_m()[1]];
             let bent_m = needle.side_force_n * needle.compliance_m_per_n(depth_m, length_m);
-            covariance += across * (0.5 * bent_m * bent_m);
+            covariance += beside * (0.5 * bent_m * bent_m);
         }
         if let Some(indentation) = &imperfections.indentation {
-            bias -= along * indentation.mean_m[index];
-            covariance += along * along.transpose() * indentation.spread_m[index].powi(2);
+            bias -= inwards * indentation.mean_m[index];
+            covariance += inwards * inwards.transpose() * indentation.spread_m[index].powi(2);
         }
         if let Some(breathing) = &imperfections.breathing {
             let amplitude = [breathing.skin_m, breathing.target_m][index];

@@ -2,21 +2,16 @@
 
 mod absorbed;
 mod arms;
-mod gears;
-mod real;
 
 use nalgebra::{Point3, Vector3};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
+pub use super::gears::GearTwist;
 pub(crate) use absorbed::absorbed_sag;
 pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
-pub use gears::GearTwist;
-pub use real::Expected;
-pub(crate) use real::RealThings;
 
 pub use super::arm_values::JointFriction;
-pub(crate) use super::arm_values::gear_twist;
 use super::arm_values::{joint_friction, set_point_period_ms};
 use crate::files::ModelSource;
 pub use crate::scenario::{ArmClass, BreathState, CalibrationBlock};

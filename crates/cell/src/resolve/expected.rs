@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use super::{Elasticity, Imperfections, gear_twist, resolve_imperfections};
-use crate::resolve::library::ModelLibrary;
+use super::arm_values::gear_twist;
+use super::imperfections::{Elasticity, Imperfections, resolve_imperfections};
+use super::library::ModelLibrary;
 use crate::scenario::{ArmClass, BreathState, ImperfectionsSection, Scenario};
 use crate::toml_text::TomlText;
 use crate::{Finding, Robot, Tool};
