@@ -15,7 +15,7 @@ use needlebench_cell::ranking::{Aim, RankingSection};
 use crate::metric::{Better, Bound, Metric, metrics};
 use crate::pareto::{Scale, dominates, pareto_set};
 pub use crate::ranking_report::{
-    Dominance, GoalRanking, RankedMetric, RankingReport, Term, WeightChange,
+    Dominance, GoalRanking, RankedMetric, RankingReport, SAME_SCORE, Term, WeightChange,
 };
 use crate::reason::reason;
 use crate::report::{ConfigurationReport, GoalReport, Recommendation, Status};
@@ -28,10 +28,6 @@ struct Column {
     /// As measured.
     values: Vec<f64>,
 }
-
-/// Scores nearer than this are even: far above the rounding of values, and far below what one
-/// resolution of any metric changes.
-pub const SAME_SCORE: f64 = 1e-9;
 
 /// Marks the Pareto set of a goal, ranks its configurations and recommends the first.
 ///

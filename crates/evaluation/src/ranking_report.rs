@@ -2,6 +2,10 @@
 
 use serde::Serialize;
 
+/// Scores nearer than this are even: far above the rounding of values, and far below what one
+/// resolution of any metric changes.
+pub const SAME_SCORE: f64 = 1e-9;
+
 /// Score of a configuration that works.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RankingReport {

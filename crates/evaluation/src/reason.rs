@@ -1,8 +1,7 @@
 //! Why a configuration is recommended, in words.
 
 use crate::metric::Metric;
-use crate::ranking::SAME_SCORE;
-use crate::ranking_report::{GoalRanking, RankingReport, Term};
+use crate::ranking_report::{GoalRanking, RankingReport, SAME_SCORE, Term};
 use crate::report::ConfigurationReport;
 
 /// Terms that are named for the first choice and, of the runner-up's leads, against it.
