@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::dh::Arm;
 use super::equations::{SEED, angle_error, well_conditioned};
-use super::newton::{Ended, gauss_newton, levenberg_marquardt, trace};
+use super::newton::{EARLY_STEPS, Ended, gauss_newton, levenberg_marquardt, trace};
 use super::solver::same_joints;
 use super::{Interrupted, Watch};
 
@@ -111,6 +111,8 @@ pub struct Point {
     pub distance_rad: f64,
     /// Share of guesses from which it converges, 0 to 1.
     pub converged: f64,
+    /// Share of guesses from which it converges in no more than [`EARLY_STEPS`] steps, 0 to 1.
+    pub converged_in_50_steps: f64,
     /// Share of guesses from which it ends in the branch that the guess was near to, 0 to 1.
     pub same_branch: f64,
     /// Mean number of steps of those that converge; null if none does.
@@ -240,13 +242,15 @@ fn curve(
     for distance_rad in DISTANCES_RAD {
         // The same guesses for every method.
         let mut random = SplitMix64::new(SEED + 5);
-        let (mut converged, mut same, mut iterations) = (0_usize, 0_usize, 0_u32);
+        let (mut converged, mut early, mut same, mut iterations) =
+            (0_usize, 0_usize, 0_usize, 0_u32);
         for wanted in postures {
             watch.check()?;
             let guess = guess_near(wanted, distance_rad, &mut random);
             let ended = method.run(bench, wanted, &guess);
             if ended.converged {
                 converged += 1;
+                early += usize::from(ended.iterations <= EARLY_STEPS);
                 iterations += ended.iterations;
                 same += usize::from(same_joints(&ended.joints, wanted));
             }
@@ -255,6 +259,7 @@ fn curve(
         points.push(Point {
             distance_rad,
             converged: share(converged),
+            converged_in_50_steps: share(early),
             same_branch: share(same),
             mean_iterations: f64::from(iterations) / converged as f64,
         });
