@@ -11,6 +11,9 @@ use crate::report::{
     Verdict,
 };
 
+/// Name of the criterion that a configuration comes out as the scenario expects.
+pub const EXPECTED: &str = "expected";
+
 /// Criterion of the margins that the planned needle keeps, and the rule that rejects where it does not.
 const NEEDLE_ROUTE: &str = "needle_route";
 
@@ -163,7 +166,7 @@ fn check_expectation(
         goal: goal.to_owned(),
         label: Some(configuration.label.to_owned()),
         engine: None,
-        criterion: "expected".to_owned(),
+        criterion: EXPECTED.to_owned(),
         value: None,
         limit: None,
         unit: "1",

@@ -35,7 +35,7 @@ pub use clearance::{
 pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balance};
 pub use criteria::{check_configuration, first_missed_by_posture};
 pub use engine_pairs::{largest_over_pairs, pairs};
-pub use judge::{judge, route_is_expected};
+pub use judge::{EXPECTED, judge, route_is_expected};
 pub use motion::{
     ContactMeasurement, EngineDifference, MotionMeasurement, SaturatedJoint, engine_difference,
     measure_motion,

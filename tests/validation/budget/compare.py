@@ -108,10 +108,11 @@ def cases(scenario: dict, report: dict, results: Path) -> list[tuple[str, Case, 
         towards_head /= np.linalg.norm(towards_head)
         axes = np.array([towards_head, np.cross(along, towards_head), along])
         for each in goal["configurations"]:
-            if not each.get("budget") or not each["files"]:
+            recordings = [file for file in each["files"] if file.endswith(".csv")]
+            if not each.get("budget") or not recordings:
                 continue
             moving = [phase for phase in each["motion"] if phase["phase"] != "hold"]
-            times, path = last_phase(results / each["files"][0], moving[-1])
+            times, path = last_phase(results / recordings[0], moving[-1])
             case = Case(
                 arm,
                 np.array(each["joints_rad"]),

@@ -19,7 +19,7 @@ use super::events::events_text;
 use super::plain_table;
 use super::ranking::comparison_text;
 use super::shown::{Shown, shown_metrics};
-use super::verdict::{capitals, counts, status};
+use super::verdict::{capitals, counts, missed_as_expected, status};
 use crate::number::value_and_limit;
 
 /// The whole report as text; `engines` are those that there are, with their titles.
@@ -456,7 +456,12 @@ fn write_missed(out: &mut String, report: &Report, goal: &str) -> std::fmt::Resu
             .flatten()
             .filter(|p| !p.is_empty())
             .collect();
-        writeln!(out, "FAILED {}", parts.join(" "))?;
+        let word = if missed_as_expected(report, result) {
+            "missed as expected:"
+        } else {
+            "FAILED"
+        };
+        writeln!(out, "{word} {}", parts.join(" "))?;
     }
     Ok(())
 }
