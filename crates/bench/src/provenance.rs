@@ -44,6 +44,8 @@ pub fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentity>) -> 
     );
     let parts = &resolved.phantom_parts;
     inputs.extend(parts.iter().map(|source| input("phantom part", source)));
+    let obstacles = &resolved.obstacle_files;
+    inputs.extend(obstacles.iter().map(|source| input("obstacle", source)));
     let arms = resolved.imperfections.iter().flat_map(|each| &each.sources);
     inputs.extend(arms.map(|source| input("real arm", source)));
     Provenance {

@@ -1,6 +1,9 @@
-//! What stands around the robot and the phantom: CT table, CT gantry and the robot's mount.
+//! What stands around the robot and the phantom: CT table, CT gantry, the robot's mount, and obstacles.
 //!
-//! Each is built in the world frame (z up, floor at z = 0) from convex solids.
+//! Each is in the world frame (z up, floor at z = 0). Table, gantry and mount are built from convex
+//! solids.
+
+mod mount;
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -10,7 +13,8 @@ use needlebench_geometry::{ConvexMesh, Shape, Solid, TriangleMesh};
 use needlebench_kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::{GantrySection, MountSection, TableSection};
+use crate::scenario::{GantrySection, TableSection};
+pub(crate) use mount::mount;
 
 /// Which fixture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -22,6 +26,8 @@ pub enum FixtureKind {
     Gantry,
     /// What the robot's base is bolted to.
     Mount,
+    /// One of the scenario's obstacles.
+    Obstacle,
 }
 
 /// One rigid thing that does not move.
@@ -29,10 +35,25 @@ pub enum FixtureKind {
 pub struct Fixture {
     /// Which one.
     pub kind: FixtureKind,
-    /// Convex solids, world frame.
+    /// Its solids, world frame.
     pub solids: Vec<Solid>,
-    /// Red, green, blue, opacity, each 0 to 1 (sRGB).
+    /// Red, green, blue, opacity, each 0 to 1 (sRGB). Opaque, so that inner faces of a gantry made of
+    /// convex pieces stay hidden.
     pub color_rgba: [f32; 4],
+}
+
+impl Fixture {
+    /// Its solids, by the colour that they are drawn in: walls and ceilings are seen through.
+    pub fn by_color(&self) -> Vec<([f32; 4], Vec<&Solid>)> {
+        /// Opacity of what would hide the cell.
+        const FAINT: f32 = 0.12;
+        let (faint, plain): (Vec<&Solid>, Vec<&Solid>) =
+            self.solids.iter().partition(|solid| mount::is_slab(solid));
+        let [red, green, blue, _] = self.color_rgba;
+        let groups = [(self.color_rgba, plain), ([red, green, blue, FAINT], faint)];
+        let there = groups.into_iter().filter(|(_, solids)| !solids.is_empty());
+        there.collect()
+    }
 }
 
 /// Why a fixture cannot be built.
@@ -53,26 +74,49 @@ pub enum FixtureError {
         /// Smallest thickness of the housing beside the bore, mm.
         least_mm: f64,
     },
-    /// A mount stands on the floor and needs a robot that stands upright.
+    /// The base looks where this kind of mount cannot carry it.
     #[error(
-        "the robot's base is tilted by {tilt_deg:.3} deg: a mount carries an upright base only \
-         (leave the mount out for a robot on a wall or a ceiling)"
+        "the robot's base is tilted by {tilt_deg:.3} deg from upright, and a mount of the kind \
+         `{kind}` carries {carries}"
     )]
     BaseTilted {
+        /// As in a scenario.
+        kind: &'static str,
         /// Angle between the base's z axis and the vertical, deg.
         tilt_deg: f64,
+        /// What it could carry.
+        carries: &'static str,
     },
-    /// The base is on or below the floor.
+    /// There is not enough space between the base and what the mount stands on or hangs from.
     #[error(
-        "the robot's base is {height_mm:.1} mm above the floor, less than the mount's plate of \
-         {plate_mm} mm (leave the mount out for a base on the floor)"
+        "the robot's base is {height_mm:.1} mm {from}, less than the {needs_mm:.1} mm of the mount's {parts}"
     )]
-    BaseTooLow {
-        /// Height of `base_link` above world z = 0, mm.
+    BaseTooNear {
+        /// Distance of `base_link` from the floor or the ceiling, mm.
         height_mm: f64,
-        /// Thickness of the base plate, mm.
-        plate_mm: f64,
+        /// "above the floor" or "below the ceiling".
+        from: &'static str,
+        /// What the mount needs, mm.
+        needs_mm: f64,
+        /// What it needs that for.
+        parts: &'static str,
     },
+    /// The plate's edge would reach past the end of the wedge.
+    #[error(
+        "`wedge_height_mm` is {height_mm} mm, and the plate's edge reaches {edge_mm:.1} mm behind its \
+         middle"
+    )]
+    WedgeTooLow {
+        /// Height of the wedge, mm.
+        height_mm: f64,
+        /// How far the plate reaches along the column behind the middle of its back, mm.
+        edge_mm: f64,
+    },
+    /// A mount on the table's rail, without a table.
+    #[error(
+        "a mount of the kind `table_rail` is clamped to a table's rail, and there is no [table]"
+    )]
+    NoTable,
 }
 
 impl FixtureError {
@@ -80,19 +124,43 @@ impl FixtureError {
     pub(crate) fn key(&self) -> Option<&'static str> {
         match self {
             Self::HousingTooSmall { key, .. } => Some(key),
-            Self::BaseTilted { .. } | Self::BaseTooLow { .. } => None,
+            Self::WedgeTooLow { .. } => Some("wedge_height_mm"),
+            Self::NoTable => Some("kind"),
+            Self::BaseTilted { .. } | Self::BaseTooNear { .. } => None,
+        }
+    }
+
+    /// How to mend it.
+    pub(crate) fn hint(&self) -> &'static str {
+        match self {
+            Self::HousingTooSmall { .. } => "lengths are in millimetres",
+            Self::WedgeTooLow { .. } => "make the wedge higher, or the plate narrower",
+            Self::NoTable => "add a [table], or choose another kind",
+            Self::BaseTilted { .. } => {
+                "`base_rpy_deg` under [robot] turns the base; kinds are column (upright), wedge \
+                 (tilted), wall, ceiling (hanging) and table_rail"
+            }
+            Self::BaseTooNear { .. } => {
+                "see `base_position_mm` under [robot]; leave [mount] out for a base bolted to the \
+                 floor or the ceiling"
+            }
         }
     }
 }
 
 const MILLI: f64 = 1e-3;
+
+/// The table's frame: x along it, y across, z up; in the middle of its upper face.
+pub(crate) fn world_from_table(parameters: &TableSection) -> Pose {
+    let [x_mm, y_mm] = parameters.center_mm;
+    Pose::from_parts(
+        Translation3::new(x_mm * MILLI, y_mm * MILLI, parameters.top_height_mm * MILLI),
+        turn_about_z(parameters.yaw_deg),
+    )
+}
+
 /// Builds the table.
 pub(crate) fn table(parameters: &TableSection) -> Fixture {
-    let center_mm = Vector3::new(
-        parameters.center_mm[0],
-        parameters.center_mm[1],
-        parameters.top_height_mm - 0.5 * parameters.thickness_mm,
-    );
     let size_mm = Vector3::new(
         parameters.length_mm,
         parameters.width_mm,
@@ -105,10 +173,8 @@ pub(crate) fn table(parameters: &TableSection) -> Fixture {
             shape: Shape::Cuboid {
                 half_extents_m: 0.5 * MILLI * size_mm,
             },
-            parent_from_shape: Pose::from_parts(
-                Translation3::from(MILLI * center_mm),
-                turn_about_z(parameters.yaw_deg),
-            ),
+            parent_from_shape: world_from_table(parameters)
+                * Translation3::new(0.0, 0.0, -0.5 * MILLI * parameters.thickness_mm),
         }],
         color_rgba: [0.75, 0.78, 0.82, 1.0],
     }
@@ -120,6 +186,16 @@ pub(crate) fn table(parameters: &TableSection) -> Fixture {
 /// bore by the sagitta `R (1 - cos(pi / n))`: at most 0.75 mm for the standard bore. A clearance
 /// against it is never optimistic.
 const PIECES_PER_TURN: f64 = 48.0;
+
+/// The gantry's frame: x along the bore, y across, z up while it is not tilted; in its isocentre.
+pub(crate) fn world_from_gantry(parameters: &GantrySection) -> Pose {
+    let tilt =
+        UnitQuaternion::from_axis_angle(&Vector3::y_axis(), parameters.tilt_deg.to_radians());
+    Pose::from_parts(
+        Translation3::from(MILLI * Vector3::from(parameters.isocentre_mm)),
+        turn_about_z(parameters.axis_yaw_deg) * tilt,
+    )
+}
 
 /// Builds the gantry: convex wedges around the bore, each with its outer face on the housing.
 pub(crate) fn gantry(parameters: &GantrySection) -> Result<Fixture, FixtureError> {
@@ -142,12 +218,7 @@ pub(crate) fn gantry(parameters: &GantrySection) -> Result<Fixture, FixtureError
     }
 
     // Gantry frame: x along the bore, z up when not tilted. Cross-section in (y, z).
-    let tilt =
-        UnitQuaternion::from_axis_angle(&Vector3::y_axis(), parameters.tilt_deg.to_radians());
-    let world_from_gantry = Pose::from_parts(
-        Translation3::from(MILLI * Vector3::from(parameters.isocentre_mm)),
-        turn_about_z(parameters.axis_yaw_deg) * tilt,
-    );
+    let world_from_gantry = world_from_gantry(parameters);
     let radius_m = 0.5 * MILLI * bore_mm;
     let half_depth_m = 0.5 * MILLI * parameters.depth_mm;
     let half_m =
@@ -237,61 +308,6 @@ fn prism(quadrilateral: &[Point2<f64>; 4], half_length_m: f64) -> (ConvexMesh, P
         triangles,
     });
     (mesh, center)
-}
-
-/// Builds the mount under a robot whose base is at `world_from_base_link`.
-pub(crate) fn mount(
-    parameters: &MountSection,
-    world_from_base_link: &Pose,
-) -> Result<Fixture, FixtureError> {
-    /// Tilt of a base that counts as upright: rounding of a pose given in degrees.
-    const UPRIGHT_RAD: f64 = 1e-6;
-    /// A column shorter than this is left out.
-    const SHORTEST_COLUMN_M: f64 = 1e-3;
-
-    let up = world_from_base_link.rotation * Vector3::z();
-    let tilt_rad = up.x.hypot(up.y).atan2(up.z);
-    if tilt_rad > UPRIGHT_RAD {
-        return Err(FixtureError::BaseTilted {
-            tilt_deg: tilt_rad.to_degrees(),
-        });
-    }
-    let height_m = world_from_base_link.translation.z;
-    let plate_m = MILLI * parameters.plate_thickness_mm;
-    if height_m < plate_m {
-        return Err(FixtureError::BaseTooLow {
-            height_mm: height_m / MILLI,
-            plate_mm: parameters.plate_thickness_mm,
-        });
-    }
-
-    // A box whose upper face is at a depth below the base.
-    let slab = |name: &str, size_x_m: f64, size_y_m: f64, top_m: f64, thickness_m: f64| Solid {
-        name: name.to_owned(),
-        shape: Shape::Cuboid {
-            half_extents_m: 0.5 * Vector3::new(size_x_m, size_y_m, thickness_m),
-        },
-        parent_from_shape: world_from_base_link
-            * Translation3::new(0.0, 0.0, -top_m - 0.5 * thickness_m),
-    };
-    let plate_width_m = MILLI * parameters.plate_width_mm;
-    let mut solids = vec![slab(
-        "mount.plate",
-        plate_width_m,
-        plate_width_m,
-        0.0,
-        plate_m,
-    )];
-    let column_m = height_m - plate_m;
-    if column_m >= SHORTEST_COLUMN_M {
-        let (width_m, depth_m) = (MILLI * parameters.width_mm, MILLI * parameters.depth_mm);
-        solids.push(slab("mount.column", width_m, depth_m, plate_m, column_m));
-    }
-    Ok(Fixture {
-        kind: FixtureKind::Mount,
-        solids,
-        color_rgba: [0.35, 0.37, 0.40, 1.0],
-    })
 }
 
 fn turn_about_z(angle_deg: f64) -> UnitQuaternion<f64> {

@@ -9,21 +9,8 @@ use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 use crate::body::{LinkPlacements, PlacedBody, placed_body};
 use crate::posture::Posture;
 
-/// Number of classes; `NeedleRoute` is the last.
-pub(crate) const CLASS_COUNT: usize = ClearanceClass::NeedleRoute as usize + 1;
-
-/// All classes, each at the index that it is cast to.
-const CLASSES: [ClearanceClass; CLASS_COUNT] = [
-    ClearanceClass::RobotPhantom,
-    ClearanceClass::RobotTable,
-    ClearanceClass::RobotGantry,
-    ClearanceClass::RobotMount,
-    ClearanceClass::SelfCollision,
-    ClearanceClass::ToolPhantom,
-    ClearanceClass::GuideStandoff,
-    ClearanceClass::NeedleCorridor,
-    ClearanceClass::NeedleRoute,
-];
+/// Number of classes.
+pub(crate) const CLASS_COUNT: usize = ClearanceClass::ALL.len();
 
 /// Clearance of one pair of bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -244,7 +231,7 @@ impl ClearanceModel {
     ) -> Option<PairClearance> {
         let links = world_from_links.each_ref().map(Placement::new);
         let posture = Posture::new(&self.bodies, &links);
-        let limits_m = CLASSES.map(|class| {
+        let limits_m = ClearanceClass::ALL.map(|class| {
             if class.is_physical() {
                 limit_m(class)
             } else {

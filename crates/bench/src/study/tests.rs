@@ -37,11 +37,12 @@ fn add(path: &str, by: f64) -> (KeyPath, Change) {
 }
 
 /// Names of the classes' clearances in a static case.
-const CLASSES: [(ClearanceClass, &str); 8] = [
+const CLASSES: [(ClearanceClass, &str); 9] = [
     (ClearanceClass::RobotPhantom, "arm_to_skin_static"),
     (ClearanceClass::RobotTable, "to_table_static"),
     (ClearanceClass::RobotGantry, "to_gantry_static"),
     (ClearanceClass::RobotMount, "to_mount_static"),
+    (ClearanceClass::RobotObstacle, "to_obstacles_static"),
     (ClearanceClass::SelfCollision, "self_clearance_static"),
     (ClearanceClass::ToolPhantom, "tool_to_skin_static"),
     (ClearanceClass::GuideStandoff, "guide_to_skin_static"),

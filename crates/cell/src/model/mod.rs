@@ -188,6 +188,8 @@ pub enum BodyKind {
     Gantry,
     /// The robot's mount.
     Mount,
+    /// One of the scenario's obstacles.
+    Obstacle,
 }
 
 /// What a collision body moves with.
@@ -224,6 +226,8 @@ pub enum ClearanceClass {
     RobotGantry,
     /// Links and tool against the mount.
     RobotMount,
+    /// Links and tool against the scenario's obstacles.
+    RobotObstacle,
     /// The arm and its tool against themselves.
     #[serde(rename = "self")]
     SelfCollision,
@@ -238,12 +242,13 @@ pub enum ClearanceClass {
 }
 
 impl ClearanceClass {
-    /// All of them, in the order of reports.
-    pub const ALL: [Self; 9] = [
+    /// All of them, in the order of reports; each at the index that it is cast to.
+    pub const ALL: [Self; 10] = [
         Self::RobotPhantom,
         Self::RobotTable,
         Self::RobotGantry,
         Self::RobotMount,
+        Self::RobotObstacle,
         Self::SelfCollision,
         Self::ToolPhantom,
         Self::GuideStandoff,
@@ -263,6 +268,7 @@ impl ClearanceClass {
             Self::RobotTable => "robot_table",
             Self::RobotGantry => "robot_gantry",
             Self::RobotMount => "robot_mount",
+            Self::RobotObstacle => "robot_obstacle",
             Self::SelfCollision => "self",
             Self::ToolPhantom => "tool_phantom",
             Self::GuideStandoff => "guide_standoff",
@@ -496,6 +502,14 @@ fn placed(solids: &[Solid], new_from_old: &Pose) -> Vec<Solid> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_class_is_at_its_index_and_goes_by_its_name() {
+        for (index, class) in ClearanceClass::ALL.into_iter().enumerate() {
+            assert_eq!(class as usize, index);
+            assert_eq!(ClearanceClass::named(class.name()), Some(class));
+        }
+    }
 
     #[test]
     fn the_hand_cone_is_closed_convex_and_contains_the_cone() {

@@ -27,7 +27,9 @@ pub enum PairRule {
 /// measured too: the needle corridor against wrist 3, since a tool that is bolted on so that the
 /// wrist stands behind its guide shows that as a constant.
 pub fn pair_rule(a: &CollisionBody, b: &CollisionBody) -> PairRule {
-    use BodyKind::{Base, Gantry, GuideTube, Link, Mount, NeedleCorridor, Phantom, Table, Tool};
+    use BodyKind::{
+        Base, Gantry, GuideTube, Link, Mount, NeedleCorridor, Obstacle, Phantom, Table, Tool,
+    };
     let (first, second) = if a.kind <= b.kind { (a, b) } else { (b, a) };
     let wrist_behind_guide = second.kind == NeedleCorridor && first.kind == Link;
     if a.frame == b.frame && !wrist_behind_guide {
@@ -41,7 +43,7 @@ pub fn pair_rule(a: &CollisionBody, b: &CollisionBody) -> PairRule {
             ClearanceClass::SelfCollision
         }
         (Base | Link, Tool | GuideTube) => ClearanceClass::SelfCollision,
-        (_, NeedleCorridor) | (NeedleCorridor, Phantom | Table | Gantry | Mount) => {
+        (_, NeedleCorridor) | (NeedleCorridor, Phantom | Table | Gantry | Mount | Obstacle) => {
             ClearanceClass::NeedleCorridor
         }
         (Link, Phantom) => ClearanceClass::RobotPhantom,
@@ -50,6 +52,7 @@ pub fn pair_rule(a: &CollisionBody, b: &CollisionBody) -> PairRule {
         (Link | Tool | GuideTube, Table) => ClearanceClass::RobotTable,
         (Link | Tool | GuideTube, Gantry) => ClearanceClass::RobotGantry,
         (Link | Tool | GuideTube, Mount) => ClearanceClass::RobotMount,
+        (Link | Tool | GuideTube, Obstacle) => ClearanceClass::RobotObstacle,
         // Two parts of the tool, or two that stand still: they share a frame.
         _ => return PairRule::LeftOut(LeftOut::Fixed),
     })

@@ -11,6 +11,7 @@ use super::fixtures::fixture_finding;
 use super::imperfections::{
     GearTwist, OriginDeviations, RealArms, absorbed_sag, resolve_calibration,
 };
+use super::obstacles::{UnplacedShape, unplaced_shape};
 use super::overrides::Overrides;
 use super::phantom::{UnplacedPhantom, scenario_phantom};
 use super::robot::scenario_robot;
@@ -20,8 +21,8 @@ use crate::fixtures::{self, Fixture, FixtureError};
 use crate::robot::MissingInertia;
 use crate::robot::ToolOverrides;
 use crate::scenario::{
-    CalibrationBlock, GantrySection, MountSection, PartSection, PhantomSection, RobotSection,
-    Scenario, TableSection,
+    CalibrationBlock, GantrySection, MountKind, MountSection, ObstacleSection, ObstacleShape,
+    PartSection, PhantomSection, RobotSection, Scenario, TableSection,
 };
 use crate::toml_text::TomlText;
 use crate::{Finding, Robot, Tool};
@@ -54,7 +55,8 @@ pub(crate) struct ModelLibrary {
     phantoms: Cache<PhantomKey, UnplacedPhantom>,
     tables: Cache<TableSection, Fixture>,
     gantries: Cache<GantrySection, Fixture>,
-    mounts: Cache<(MountSection, Pose), Fixture>,
+    mounts: Cache<(MountSection, Pose, Option<TableSection>), Fixture>,
+    obstacles: Cache<ObstacleShape, UnplacedShape>,
     real_arms: Cache<(CalibrationBlock, Option<ModelSource>), RealArms>,
     absorbed: Cache<AbsorbedKey, [OriginDeviations; JOINT_COUNT]>,
 }
@@ -166,6 +168,11 @@ impl ModelLibrary {
             .map_err(|error| finding(&error))
         }
         let finding = |section| move |error: &FixtureError| fixture_finding(toml, section, error);
+        // Only one on the table's rail goes where the table goes.
+        let table_of = |mount: &MountSection| {
+            let on_rail = mount.kind == MountKind::TableRail;
+            scenario.table.clone().filter(|_| on_rail)
+        };
         let mount = scenario.mount.clone();
         Ok([
             made(
@@ -182,11 +189,31 @@ impl ModelLibrary {
             )?,
             made(
                 &self.mounts,
-                mount.map(|mount| (mount, *world_from_base_link)),
-                |(mount, base)| fixtures::mount(mount, base),
+                mount.map(|mount| {
+                    let table = table_of(&mount);
+                    (mount, *world_from_base_link, table)
+                }),
+                |(mount, base, table)| fixtures::mount(mount, base, table.as_ref()),
                 finding("mount"),
             )?,
         ])
+    }
+
+    /// The shape of an obstacle, not placed. `index` is its section's, for findings.
+    pub fn obstacle(
+        &self,
+        toml: &TomlText<'_>,
+        index: usize,
+        section: &ObstacleSection,
+        base: &Path,
+    ) -> Result<Arc<UnplacedShape>, Finding> {
+        self.obstacles.get(
+            |known| *known == section.shape,
+            || {
+                let shape = unplaced_shape(toml, index, section, base)?;
+                Ok((section.shape.clone(), shape))
+            },
+        )
     }
 
     /// The real arms of a calibration block, for a robot.

@@ -12,12 +12,14 @@ mod layout;
 mod library;
 mod names;
 mod needle_route;
+mod obstacles;
 mod overrides;
 pub mod people;
 mod phantom;
 mod robot;
 mod servo;
 mod standing;
+mod stl_file;
 mod tool;
 
 use std::path::Path;
@@ -46,6 +48,7 @@ use iso9283::{Iso9283Protocol, resolve_iso9283};
 use layout::Layout;
 pub(crate) use library::ModelLibrary;
 use needle_route::check_needle_route;
+use obstacles::{check_obstacle_names, place_obstacles};
 pub use overrides::Overrides;
 use people::{People, Room, resolve_people};
 pub use phantom::PlacedPhantom;
@@ -71,7 +74,7 @@ pub struct ResolvedScenario {
     pub cell: Cell,
     /// The phantom, if there is one.
     pub phantom: Option<PlacedPhantom>,
-    /// Table, gantry and mount, for pictures.
+    /// Table, gantry, mount and obstacles, for pictures.
     pub fixtures: Vec<Fixture>,
     /// Where needles are to go.
     pub goals: Vec<Goal>,
@@ -87,6 +90,8 @@ pub struct ResolvedScenario {
     pub phantom_source: Option<ModelSource>,
     /// Files of the parts that the user gave the phantom.
     pub phantom_parts: Vec<ModelSource>,
+    /// Files of the obstacles' shapes.
+    pub obstacle_files: Vec<ModelSource>,
     /// What was assumed or adjusted; belongs in every report.
     pub notes: Vec<String>,
     /// The people in the room, by goal.
@@ -189,6 +194,14 @@ pub(crate) fn resolve(
     let [table, gantry, mount] = library
         .fixtures(toml, &scenario, &world_from_base_link)
         .map_err(one)?;
+    let obstacles = place_obstacles(
+        toml,
+        &scenario,
+        &world_from_base_link,
+        base,
+        library,
+        &mut notes,
+    )?;
     let (mut phantom, mut phantom_source, mut phantom_parts) = (None, None, Vec::new());
     let mut lying = None;
     if let Some(section) = &scenario.phantom {
@@ -225,14 +238,26 @@ pub(crate) fn resolve(
         }
     }
 
+    let arm = robot.links.iter().chain([&robot.base]);
+    let arm = arm.flat_map(|link| {
+        let solids = link.solids.iter().chain(&tool.solids);
+        let solids = solids.chain(&tool.guide_solids);
+        solids.map(|solid| &*solid.name).chain([&*link.name])
+    });
+    let parts = phantom.iter().flat_map(|placed| &placed.phantom.parts);
+    let taken = arm.chain(parts.map(|part| &*part.name));
+    check_obstacle_names(toml, &scenario.obstacles, taken).map_err(one)?;
     let standing = Standing {
         toml,
+        obstacles: &obstacles.placed,
         scenario: &scenario,
         robot: &robot,
         fixtures: &fixtures,
         phantom: phantom.as_ref().zip(lying.as_deref()),
     };
     standing.check(&mut notes).map_err(one)?;
+    surroundings.extend(obstacles.bodies(&scenario.obstacles));
+    fixtures.extend(obstacles.fixtures());
     note_idle_criteria(&scenario, &mut notes);
     let goals = {
         let context = Surroundings {
@@ -344,6 +369,7 @@ pub(crate) fn resolve(
         motion,
         phantom_source,
         phantom_parts,
+        obstacle_files: obstacles.sources,
         notes,
         people,
         imperfections,

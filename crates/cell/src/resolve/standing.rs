@@ -3,18 +3,21 @@
 //!
 //! What cannot be is refused; what is odd but possible is noted.
 
+mod obstacles;
+
 use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Point3, Vector3};
 use needlebench_geometry::{PreparedShape, Solid, separation};
 use needlebench_kinematics::{Joints, Pose};
 
+use super::obstacles::PlacedObstacle;
 use super::phantom::UnplacedPhantom;
 use super::{Goal, PlacedPhantom};
 use crate::fixtures::{Fixture, FixtureKind};
-use crate::scenario::{Scenario, TableSection};
+use crate::scenario::{MountKind, Scenario, TableSection};
 use crate::toml_text::TomlText;
-use crate::{Finding, Robot, Tool};
+use crate::{ClearanceClass, Finding, Robot, Tool};
 
 /// Overlap of rigid things that is rounding of a drawing, m.
 const RIGID_M: f64 = 1e-3;
@@ -40,6 +43,7 @@ pub(super) struct Standing<'a> {
     /// Table, gantry and mount, as far as there are any.
     pub fixtures: &'a [Fixture],
     pub phantom: Option<(&'a PlacedPhantom, &'a UnplacedPhantom)>,
+    pub obstacles: &'a [PlacedObstacle],
 }
 
 impl Standing<'_> {
@@ -49,7 +53,8 @@ impl Standing<'_> {
         self.check_gantry(notes)?;
         self.check_fixtures()?;
         self.check_base(notes)?;
-        self.check_phantom(notes)
+        self.check_phantom(notes)?;
+        self.check_obstacles(notes)
     }
 
     fn fixture(&self, kind: FixtureKind) -> Option<&Fixture> {
@@ -131,15 +136,34 @@ impl Standing<'_> {
                         "robot.base_position_mm",
                         format!("{} goes {} into the {name}", found.a, found.depth()),
                     )
-                    .hint(if name == "table" {
-                        "the mount is a column from the floor to the robot's base: move the base \
-                         beside the table, or leave [mount] out for a robot on the table"
-                    } else {
-                        "the mount is a column from the floor to the robot's base: move one of them"
-                    }));
+                    .hint(self.way_for_mount(name)));
             }
         }
         Ok(())
+    }
+
+    /// What to do about a mount in something.
+    fn way_for_mount(&self, name: &str) -> &'static str {
+        let kind = self.scenario.mount.as_ref().map(|mount| mount.kind);
+        match (kind.unwrap_or_default(), name) {
+            (MountKind::Column | MountKind::Wedge, "table") => {
+                "the mount is a column from the floor to under the robot's base: move the base beside \
+                 the table, put the column there with `column_offset_mm` under [mount], or leave \
+                 [mount] out for a robot on the table"
+            }
+            (MountKind::Column | MountKind::Wedge, _) => {
+                "the mount is a column from the floor to under the robot's base: move one of them, or \
+                 the column with `column_offset_mm` under [mount]"
+            }
+            (MountKind::TableRail, _) => {
+                "the mount is a post beside the table with a level arm to under the robot's base: \
+                 raise the base, or move it along the table"
+            }
+            (MountKind::Wall | MountKind::Ceiling, _) => {
+                "a wall or a ceiling is a square of `surface_mm` about the robot: move the base, or \
+                 make the square smaller"
+            }
+        }
     }
 
     /// A base in or under something, and one that stands on nothing.
@@ -427,39 +451,12 @@ pub(super) fn check_distance(
 
 /// Criteria on things that the scenario does not have: nobody would judge them.
 pub(super) fn note_idle_criteria(scenario: &Scenario, notes: &mut Vec<String>) {
-    let least = &scenario.criteria.min_clearance_mm;
-    let of_patient = [
-        ("robot_phantom", least.robot_phantom),
-        ("tool_phantom", least.tool_phantom),
-        ("guide_standoff", least.guide_standoff),
-        ("needle_route", least.needle_route),
-    ];
-    let of_fixtures = [
-        (
-            "robot_table",
-            least.robot_table,
-            "table",
-            scenario.table.is_some(),
-        ),
-        (
-            "robot_gantry",
-            least.robot_gantry,
-            "gantry",
-            scenario.gantry.is_some(),
-        ),
-        (
-            "robot_mount",
-            least.robot_mount,
-            "mount",
-            scenario.mount.is_some(),
-        ),
-    ];
-    let has_phantom = scenario.phantom.is_some();
-    let of_patient = of_patient.map(|(key, limit)| (key, limit, "phantom", has_phantom));
-    for (key, limit, section, is_there) in of_patient.into_iter().chain(of_fixtures) {
-        if limit.is_some() && !is_there {
+    for class in ClearanceClass::ALL {
+        let is_judged = scenario.criteria.min_clearance_mm.of(class).is_some();
+        if let (true, Some((section, false))) = (is_judged, scenario.section_of(class)) {
             notes.push(format!(
-                "`criteria.min_clearance_mm.{key}` judges nothing: there is no [{section}]"
+                "`criteria.min_clearance_mm.{}` judges nothing: there is no {section}",
+                class.name()
             ));
         }
     }

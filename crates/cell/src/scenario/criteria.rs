@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::switch;
+use crate::ClearanceClass;
 
 /// Least clearances, mm; a class that is left out or `"off"` is not judged.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -29,6 +30,10 @@ pub struct ClearanceCriteria {
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 500.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub robot_mount: Option<f64>,
+    /// Arm and tool against the obstacles of `[[obstacles]]`.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 0.0, max = 1000.0), extend("x-off" = true, "x-unit" = "mm"))]
+    pub robot_obstacle: Option<f64>,
     /// Arm and tool against themselves.
     #[serde(rename = "self", with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 100.0), extend("x-off" = true, "x-unit" = "mm"))]
@@ -49,6 +54,24 @@ pub struct ClearanceCriteria {
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 100.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub needle_route: Option<f64>,
+}
+
+impl ClearanceCriteria {
+    /// The least clearance of a class, mm; none if it is not judged.
+    pub fn of(&self, class: ClearanceClass) -> Option<f64> {
+        match class {
+            ClearanceClass::RobotPhantom => self.robot_phantom,
+            ClearanceClass::RobotTable => self.robot_table,
+            ClearanceClass::RobotGantry => self.robot_gantry,
+            ClearanceClass::RobotMount => self.robot_mount,
+            ClearanceClass::RobotObstacle => self.robot_obstacle,
+            ClearanceClass::SelfCollision => self.self_collision,
+            ClearanceClass::ToolPhantom => self.tool_phantom,
+            ClearanceClass::GuideStandoff => self.guide_standoff,
+            ClearanceClass::NeedleCorridor => self.needle_corridor,
+            ClearanceClass::NeedleRoute => self.needle_route,
+        }
+    }
 }
 
 /// What every working configuration has to reach, in each engine; what is `"off"` is not judged.

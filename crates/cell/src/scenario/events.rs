@@ -39,6 +39,8 @@ pub enum PressClass {
     RobotGantry,
     /// Arm or tool against the mount.
     RobotMount,
+    /// Arm or tool against an obstacle.
+    RobotObstacle,
 }
 
 impl PressClass {
@@ -51,18 +53,7 @@ impl PressClass {
             Self::RobotTable => ClearanceClass::RobotTable,
             Self::RobotGantry => ClearanceClass::RobotGantry,
             Self::RobotMount => ClearanceClass::RobotMount,
-        }
-    }
-
-    /// Section of the scenario that has to be there.
-    fn needs(self, scenario: &Scenario) -> (&'static str, bool) {
-        match self {
-            Self::GuideStandoff | Self::ToolPhantom | Self::RobotPhantom => {
-                ("phantom", scenario.phantom.is_some())
-            }
-            Self::RobotTable => ("table", scenario.table.is_some()),
-            Self::RobotGantry => ("gantry", scenario.gantry.is_some()),
-            Self::RobotMount => ("mount", scenario.mount.is_some()),
+            Self::RobotObstacle => ClearanceClass::RobotObstacle,
         }
     }
 }
@@ -198,11 +189,11 @@ pub(super) fn check(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
         }
     }
     for (i, press) in events.press.iter().enumerate() {
-        let (section, is_there) = press.class.needs(scenario);
-        if !is_there {
-            let name = press.class.class().name();
-            let text = format!("`{name}` has nothing to press against: there is no `[{section}]`");
-            let hint = format!("add a section `[{section}]`, or press against something else");
+        let class = press.class.class();
+        if let Some((section, false)) = scenario.section_of(class) {
+            let name = class.name();
+            let text = format!("`{name}` has nothing to press against: there is no `{section}`");
+            let hint = format!("add a section `{section}`, or press against something else");
             let key = format!("events.press[{i}].class");
             findings.push(toml.finding(&key, text).hint(hint));
         }

@@ -83,16 +83,37 @@ impl Default for GantrySection {
     }
 }
 
-/// The robot's mount: a column on the floor with a base plate, aligned with `base_link`.
+/// How the robot is carried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MountKind {
+    /// A column on the floor, under an upright base.
+    #[default]
+    Column,
+    /// A column on the floor with a wedge on it, under a base that is tilted by up to 90 deg.
+    Wedge,
+    /// A post that is clamped to the rail along the table's side; needs a `[table]`.
+    TableRail,
+    /// A bracket on a wall, behind a base whose z axis points away from it.
+    Wall,
+    /// A column from the ceiling, above a base that hangs.
+    Ceiling,
+}
+
+/// What carries the robot: a plate under its foot, and what that stands or hangs on.
 ///
-/// The plate's upper face is the plane z = 0 of `base_link`, so robot and mount touch.
+/// The plate's face is the plane z = 0 of `base_link`, so robot and mount touch. Where the base is not at
+/// a right angle to what carries it, a wedge is between. Lengths across the column are along `base_link`'s
+/// x and y as they are seen along the column.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MountSection {
-    /// Size of the column along `base_link` x, mm. Default 120 (assumed).
+    /// How the robot is carried. Default a column.
+    pub kind: MountKind,
+    /// Size of the column, post or bracket along `base_link` x, mm. Default 120 (assumed).
     #[schemars(range(min = 20.0, max = 3000.0))]
     pub width_mm: f64,
-    /// Size of the column along `base_link` y, mm. Default 120 (assumed).
+    /// Size of the column, post or bracket along `base_link` y, mm. Default 120 (assumed).
     #[schemars(range(min = 20.0, max = 3000.0))]
     pub depth_mm: f64,
     /// Edge of the square base plate, mm. Default 160 (assumed; the base's foot is 128 wide).
@@ -101,15 +122,47 @@ pub struct MountSection {
     /// Thickness of the base plate, mm. Default 15 (assumed).
     #[schemars(range(min = 1.0, max = 200.0))]
     pub plate_thickness_mm: f64,
+    /// Where the column is beside the base, along `base_link` x and y, mm: a level arm leads from it
+    /// under the base. Default [0, 0]: right under, or over, it. Not for `table_rail` and `wall`.
+    #[schemars(inner(range(min = -3000.0, max = 3000.0)))]
+    pub column_offset_mm: [f64; 2],
+    /// Thickness of that arm, and of the one from a rail's post, mm. Default 60 (assumed).
+    #[schemars(range(min = 5.0, max = 500.0))]
+    pub arm_thickness_mm: f64,
+    /// From the middle of the plate's back to the end of the wedge, where there is one, mm. Default 150
+    /// (assumed).
+    #[schemars(range(min = 5.0, max = 2000.0))]
+    pub wedge_height_mm: f64,
+    /// Length of the bracket between a wall and the plate, or the wedge, mm. Default 0: bolted to the wall.
+    #[schemars(range(min = 0.0, max = 3000.0))]
+    pub bracket_mm: f64,
+    /// Height of the ceiling over the floor, mm. Default 2800 (assumed).
+    #[schemars(range(min = 1000.0, max = 10_000.0))]
+    pub ceiling_height_mm: f64,
+    /// Edge of the square of wall or ceiling about the robot that is in the cell, mm. Default 3000: what
+    /// the longest of the shipped arms can reach with a tool.
+    #[schemars(range(min = 100.0, max = 10_000.0))]
+    pub surface_mm: f64,
+    /// Length of the table's rail, about the post, mm. Default 500 (assumed).
+    #[schemars(range(min = 50.0, max = 5000.0))]
+    pub rail_length_mm: f64,
 }
 
 impl Default for MountSection {
     fn default() -> Self {
         Self {
+            kind: MountKind::Column,
             width_mm: 120.0,
             depth_mm: 120.0,
             plate_width_mm: 160.0,
             plate_thickness_mm: 15.0,
+            column_offset_mm: [0.0; 2],
+            arm_thickness_mm: 60.0,
+            wedge_height_mm: 150.0,
+            bracket_mm: 0.0,
+            ceiling_height_mm: 2800.0,
+            surface_mm: 3000.0,
+            rail_length_mm: 500.0,
         }
     }
 }

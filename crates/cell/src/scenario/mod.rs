@@ -16,6 +16,7 @@ mod imperfections;
 mod iso9283;
 mod models;
 mod motion;
+mod obstacles;
 mod people;
 mod phantom;
 mod planning;
@@ -30,17 +31,17 @@ use std::sync::LazyLock;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Finding;
 pub use crate::engine_name::EngineName;
 use crate::schema::{FileSchema, LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
+use crate::{ClearanceClass, Finding};
 
 pub use controller::ControllerSection;
 pub use criteria::{ClearanceCriteria, CriteriaSection};
 pub use engines::{EnginesSection, MujocoSection, RapierSection};
 pub use envelope::EnvelopeSection;
 pub use events::{EventsSection, PressClass, PressSection, StopSection};
-pub use fixtures::{GantrySection, MountSection, TableSection};
+pub use fixtures::{GantrySection, MountKind, MountSection, TableSection};
 pub(crate) use goals::EVERY_CONFIGURATION;
 pub use goals::{FlangePose, GoalSection, REJECTION_RULES};
 pub(crate) use imperfections::POPULATION;
@@ -54,6 +55,10 @@ pub use iso9283::{
     Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES, STANDARD_EDGES_MM,
 };
 pub use motion::{MotionSection, StartSection};
+pub use obstacles::{
+    AttachedTo, BoxShape, ObstacleClass, ObstacleSection, ObstacleShape, RoundShape, SphereShape,
+    StlShape,
+};
 pub use people::{
     ElbowPreference, Handedness, PeopleSection, PersonSection, Role, Side, StaturePercentile,
 };
@@ -85,7 +90,7 @@ pub struct Scenario {
     /// The arm and where it stands.
     #[serde(default)]
     pub robot: RobotSection,
-    /// Column under the robot; none if left out.
+    /// What carries the robot; none if left out.
     #[serde(default)]
     pub mount: Option<MountSection>,
     /// The needle guide.
@@ -100,6 +105,9 @@ pub struct Scenario {
     /// CT gantry; none if left out.
     #[serde(default)]
     pub gantry: Option<GantrySection>,
+    /// What else the arm may hit: equipment in the room, on the table, the gantry or the robot.
+    #[serde(default)]
+    pub obstacles: Vec<ObstacleSection>,
     /// Where needles are to go. Needed unless there is an `[iso9283]`.
     #[serde(default)]
     pub goals: Vec<GoalSection>,
@@ -145,6 +153,26 @@ pub struct Scenario {
     pub events: Option<EventsSection>,
 }
 
+impl Scenario {
+    /// The section that what a class is measured against comes from, and whether the scenario has it, or
+    /// an obstacle that counts as it; none for a class of the arm and its tool alone.
+    pub(crate) fn section_of(&self, class: ClearanceClass) -> Option<(&'static str, bool)> {
+        let (section, is_there) = match class {
+            ClearanceClass::RobotPhantom
+            | ClearanceClass::ToolPhantom
+            | ClearanceClass::GuideStandoff
+            | ClearanceClass::NeedleRoute => ("[phantom]", self.phantom.is_some()),
+            ClearanceClass::RobotTable => ("[table]", self.table.is_some()),
+            ClearanceClass::RobotGantry => ("[gantry]", self.gantry.is_some()),
+            ClearanceClass::RobotMount => ("[mount]", self.mount.is_some()),
+            ClearanceClass::RobotObstacle => ("[[obstacles]]", false),
+            ClearanceClass::SelfCollision | ClearanceClass::NeedleCorridor => return None,
+        };
+        let counts = |each: &ObstacleSection| each.present && each.class.class() == class;
+        Some((section, is_there || self.obstacles.iter().any(counts)))
+    }
+}
+
 /// The JSON schema (draft-07) of scenario files, for editors.
 pub fn scenario_schema() -> serde_json::Value {
     FILE.published()
@@ -164,6 +192,7 @@ pub fn parse_scenario(file: &str, text: &str) -> Result<Scenario, Vec<Finding>> 
 pub(crate) fn check_together(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
     let engines = &scenario.engines;
     let mut findings = recording::check(toml, &scenario.recording, engines);
+    findings.extend(obstacles::check(toml, &scenario.obstacles));
     findings.extend(people::check(toml, &scenario.people));
     findings.extend(goals::check(
         toml,

@@ -104,6 +104,28 @@ pub enum LengthUnit {
     In,
 }
 
+impl LengthUnit {
+    /// Metres per unit.
+    pub(crate) fn metres(self) -> f64 {
+        match self {
+            Self::Mm => 1e-3,
+            Self::Cm => 1e-2,
+            Self::M => 1.0,
+            Self::In => 25.4e-3,
+        }
+    }
+
+    /// As in a scenario.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Self::Mm => "mm",
+            Self::Cm => "cm",
+            Self::M => "m",
+            Self::In => "in",
+        }
+    }
+}
+
 /// What a part from a file is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]

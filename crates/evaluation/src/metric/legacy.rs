@@ -16,6 +16,7 @@ fn stem(class: ClearanceClass) -> &'static str {
         ClearanceClass::RobotTable => "to_table",
         ClearanceClass::RobotGantry => "to_gantry",
         ClearanceClass::RobotMount => "to_mount",
+        ClearanceClass::RobotObstacle => "to_obstacles",
         ClearanceClass::SelfCollision => "self_clearance",
         ClearanceClass::ToolPhantom => "tool_to_skin",
         ClearanceClass::GuideStandoff => "guide_to_skin",

@@ -40,7 +40,7 @@ pub const VOXEL_M: f64 = 0.02;
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct RoomReport {
     /// Share of the half ball of 0.35 m on the outer side of the skin at the entry point that is
-    /// farther than 0.05 m from arm and tool; what phantom, table, gantry and mount fill does not
+    /// farther than 0.05 m from arm and tool; what phantom, table, gantry, mount and obstacles fill does not
     /// count. By cubes of 20 mm.
     pub free_fraction: f64,
     /// The same by region, which share out the half ball: `above` and the patient's level sides.
@@ -87,7 +87,7 @@ pub struct SightReport {
     /// Mean of the two below.
     pub fraction: f64,
     /// What arm and tool leave of the lines to the skin within 30 mm of the entry point that phantom,
-    /// table, gantry and mount leave free: 1 if the robot takes nothing. 0 where nothing can be seen
+    /// table, gantry, mount and obstacles leave free: 1 if the robot takes nothing. 0 where nothing can be seen
     /// without the robot either.
     pub entry_fraction: f64,
     /// The same of the lines to the needle between guide and hub.

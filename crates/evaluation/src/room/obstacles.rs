@@ -73,7 +73,7 @@ impl<'c> Obstacles<'c> {
         self.placed(q, |solid| solid.is_robot)
     }
 
-    /// What does not move: phantom, table, gantry and mount.
+    /// What does not move: phantom, table, gantry, mount and obstacles.
     pub fn surroundings(&self) -> PlacedObstacles<'_> {
         self.placed(&Joints::zeros(), |solid| !solid.is_robot)
     }

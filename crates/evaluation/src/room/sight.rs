@@ -33,7 +33,7 @@ pub struct SightTargets {
 /// Which part of the sight the robot leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sight {
-    /// Of the segments to the skin about the entry point that phantom, table, gantry and mount leave
+    /// Of the segments to the skin about the entry point that phantom, table, gantry, mount and obstacles leave
     /// free, the share that arm and tool leave free too; 0 where nothing is to be seen at all.
     pub entry_fraction: f64,
     /// The same of the segments to the needle behind the guide.

@@ -103,6 +103,7 @@ fn configuration(index: usize) -> ConfigurationReport {
         "robot_table",
         "robot_gantry",
         "robot_mount",
+        "robot_obstacle",
         "self",
         "tool_phantom",
         "guide_standoff",
@@ -424,7 +425,13 @@ fn ample_clearance_is_ample() {
     // The table is at 50 mm from both, so take it away.
     let mut made = goal.configurations;
     for each in &mut made {
-        for class in ["robot_table", "robot_gantry", "robot_mount", "tool_phantom"] {
+        for class in [
+            "robot_table",
+            "robot_gantry",
+            "robot_mount",
+            "robot_obstacle",
+            "tool_phantom",
+        ] {
             each.clearance.classes.remove(class);
         }
     }

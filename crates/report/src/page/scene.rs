@@ -193,21 +193,21 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
             FixtureKind::Table => "table",
             FixtureKind::Gantry => "gantry",
             FixtureKind::Mount => "mount",
+            FixtureKind::Obstacle => "obstacle",
         };
-        let mut color_rgba = fixture.color_rgba;
-        color_rgba[3] = 1.0;
-        let solids: Vec<TriangleMesh> = fixture
-            .solids
-            .iter()
-            .map(|solid| {
-                let mut placed = solid.shape.surface(CHORD_ERROR_M);
-                for vertex in &mut placed.vertices_m {
-                    *vertex = solid.parent_from_shape * *vertex;
-                }
-                placed
-            })
-            .collect();
-        surfaces.add(group, WORLD, color_rgba, &joined(&solids), &here);
+        for (color_rgba, solids) in fixture.by_color() {
+            let solids: Vec<TriangleMesh> = solids
+                .iter()
+                .map(|solid| {
+                    let mut placed = solid.shape.surface(CHORD_ERROR_M);
+                    for vertex in &mut placed.vertices_m {
+                        *vertex = solid.parent_from_shape * *vertex;
+                    }
+                    placed
+                })
+                .collect();
+            surfaces.add(group, WORLD, color_rgba, &joined(&solids), &here);
+        }
     }
     if let Some(placed) = &resolved.phantom {
         surfaces.add_phantom(&placed.phantom, &placed.world_from_phantom);

@@ -17,7 +17,7 @@ use crate::number::{millimetres, small_length};
 
 /// Size of one picture, pixels.
 const SIZE_PX: [u32; 2] = [1000, 750];
-/// Height of the arm's reach over its base, for framing, m.
+/// Reach of the arm out of its base, which may hang or be tilted, for framing, m.
 const REACH_M: f64 = 0.55;
 /// Share of a needle's direction that leads away from the robot, beyond which pictures look the
 /// same way.
@@ -41,15 +41,12 @@ impl Backdrop {
             &robot.world_from_base_link,
         );
         for fixture in &resolved.fixtures {
-            for solid in &fixture.solids {
-                // Opaque: inner faces of a gantry made of convex pieces stay hidden.
-                let mut color_rgba = fixture.color_rgba;
-                color_rgba[3] = 1.0;
-                surfaces.push(SurfaceInstance {
+            for (color_rgba, solids) in fixture.by_color() {
+                surfaces.extend(solids.into_iter().map(|solid| SurfaceInstance {
                     mesh: Arc::new(solid.shape.surface(CHORD_ERROR_M)),
                     world_from_surface: solid.parent_from_shape,
                     color_rgba,
-                });
+                }));
             }
         }
         if let Some(placed) = &resolved.phantom {
@@ -173,11 +170,11 @@ pub fn goal_camera(resolved: &ResolvedScenario, goal: &Goal) -> Camera {
 
 /// Points that every picture of a goal shows.
 fn framed(resolved: &ResolvedScenario, goal: &Goal) -> Vec<Point3<f64>> {
-    let base = Point3::from(resolved.cell.robot.world_from_base_link.translation.vector);
+    let world_from_base = &resolved.cell.robot.world_from_base_link;
     let mut points = vec![goal.target_m];
     for corner in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
         for height_m in [-0.1, REACH_M] {
-            points.push(base + Vector3::new(0.2 * corner[0], 0.2 * corner[1], height_m));
+            points.push(world_from_base * Point3::new(0.2 * corner[0], 0.2 * corner[1], height_m));
         }
     }
     if let Some(placed) = &resolved.phantom {

@@ -180,8 +180,8 @@ pub(super) const CLEARANCE: &[Metric] = {
     clearance!(
         "clearance",
         "clearance",
-        "least of the clearances of arm and tool from phantom, table, gantry and mount, without the \
-         guide's stand-off and the arm's own",
+        "least of the clearances of arm and tool from phantom, table, gantry, mount and obstacles, \
+         without the guide's stand-off and the arm's own",
         surroundings(),
         with
     )
@@ -262,6 +262,21 @@ pub(super) const TO_MOUNT: &[Metric] = {
         "clearance of arm and tool from the mount",
         "min_clearance_mm.robot_mount",
         robot_mount,
+        with
+    )
+};
+
+pub(super) const TO_OBSTACLES: &[Metric] = {
+    const fn with(metric: Metric) -> Metric {
+        headed(metric, None, (6, "To obstacles"))
+    }
+    clearance_of_class!(
+        RobotObstacle,
+        "to_obstacles",
+        "arm and tool to obstacles",
+        "clearance of arm and tool from the obstacles",
+        "min_clearance_mm.robot_obstacle",
+        robot_obstacle,
         with
     )
 };

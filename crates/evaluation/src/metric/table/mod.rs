@@ -44,6 +44,7 @@ pub fn groups() -> &'static [&'static [Metric]] {
         clearance::TO_TABLE,
         clearance::TO_GANTRY,
         clearance::TO_MOUNT,
+        clearance::TO_OBSTACLES,
         clearance::SELF_CLEARANCE,
         clearance::TOOL_TO_SKIN,
         clearance::GUIDE_TO_SKIN,

@@ -13,7 +13,7 @@ NB.ruleStyle = function (name) {
 NB.AtlasPage = class {
   constructor(page, app) {
     this.page = page;
-    this.layers = { robot: true, tool: true, table: true, gantry: true, mount: true, skin: true, bone: true, organ: true, vessel: true, lesion: true, marker: true, corridor: false, collision: false, needle: true };
+    this.layers = { robot: true, tool: true, table: true, gantry: true, mount: true, obstacle: true, skin: true, bone: true, organ: true, vessel: true, lesion: true, marker: true, corridor: false, collision: false, needle: true };
     this.view = new NB.View(page.scene, `Cell of ${page.scenario}`);
     this.arm = this.view.arm('arm');
     this.curves = new NB.Curves({
@@ -46,7 +46,7 @@ NB.AtlasPage = class {
     this.side = NB.el('div', { class: 'panel' });
     this.table = NB.el('div');
     const present = new Set(page.scene.parts.map((part) => part.group));
-    const names = { robot: 'robot', tool: 'tool', collision: 'collision shapes', table: 'table', gantry: 'gantry', mount: 'mount', skin: 'skin', bone: 'bones', organ: 'organs', vessel: 'vessels', lesion: 'lesions', marker: 'markers', corridor: 'needle corridor', needle: 'needle line' };
+    const names = { robot: 'robot', tool: 'tool', collision: 'collision shapes', table: 'table', gantry: 'gantry', mount: 'mount', obstacle: 'obstacles', skin: 'skin', bone: 'bones', organ: 'organs', vessel: 'vessels', lesion: 'lesions', marker: 'markers', corridor: 'needle corridor', needle: 'needle line' };
     app.append(
       NB.el('div', { class: 'bar' }, NB.el('strong', { text: 'Goal' }), NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons)),
       NB.el('div', { class: 'grid' },

@@ -119,6 +119,7 @@ NB.classStyle = {
   robot_table: { color: NB.palette.blue, dash: [] },
   robot_gantry: { color: NB.palette.sky, dash: [] },
   robot_mount: { color: NB.palette.green, dash: [] },
+  robot_obstacle: { color: NB.palette.green, dash: [3, 3] },
   self: { color: NB.palette.purple, dash: [] },
   needle_corridor: { color: NB.palette.grey, dash: [6, 3] },
   needle_route: { color: NB.palette.black, dash: [2, 4] },

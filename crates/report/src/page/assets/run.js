@@ -7,7 +7,7 @@ NB.RunPage = class {
     this.report = page.report;
     this.ghosts = new Set();
     this.layers = {
-      robot: true, tool: true, collision: false, table: true, gantry: true, mount: true, skin: true, bone: true,
+      robot: true, tool: true, collision: false, table: true, gantry: true, mount: true, obstacle: true, skin: true, bone: true,
       organ: true, vessel: true, lesion: true, marker: true, corridor: false, needle: true, witness: true,
       people: false, space: false, cone: false, ellipsoids: true,
     };
@@ -119,7 +119,7 @@ NB.RunPage = class {
   layerPanel() {
     const box = (name, text) => NB.checkbox(text, this.layers[name], (on) => { this.layers[name] = on; this.applyLayers(); });
     const present = new Set(this.page.scene.parts.map((part) => part.group));
-    const parts = [['robot', 'robot'], ['tool', 'tool'], ['collision', 'collision shapes'], ['table', 'table'], ['gantry', 'gantry'], ['mount', 'mount'],
+    const parts = [['robot', 'robot'], ['tool', 'tool'], ['collision', 'collision shapes'], ['table', 'table'], ['gantry', 'gantry'], ['mount', 'mount'], ['obstacle', 'obstacles'],
       ['skin', 'skin'], ['bone', 'bones'], ['organ', 'organs'], ['vessel', 'vessels'], ['lesion', 'lesions'], ['marker', 'markers'],
       ['corridor', 'needle corridor']].filter(([name]) => present.has(name));
     const hasBudget = this.report.goals.some((goal) => goal.configurations.some((each) => each.budget));

@@ -417,9 +417,9 @@ NB.StudyPage = class extends NB.StudyPlots {
     this.viewNote.textContent = [
       has ? `${this.page.configurations[c]} in case ${this.caseOf(index)}.`
         : at === undefined ? 'The posture of this case is not on the page (it holds some thousand): rerun it by the command.' : 'This configuration has no posture.',
-      known && drawn ? 'Robot, patient and tool are those of this case, and stand where they do in it; table, gantry and mount are those of the base scenario.'
+      known && drawn ? 'Robot, patient and tool are those of this case, and stand where they do in it; table, gantry, mount and obstacles are those of the base scenario.'
         : known ? 'The robot stands where it does in this case; its tool and its patient are not on the page, and are not drawn: rerun it with --run to see them.'
-        : this.lookOf ? 'Tool and patient of this case are not on the page, and are not drawn; table, gantry and mount are those of the base scenario.'
+        : this.lookOf ? 'Tool and patient of this case are not on the page, and are not drawn; table, gantry, mount and obstacles are those of the base scenario.'
         : 'The surroundings are those of the base scenario: what this case changes of them is not drawn.'].join(' ');
     this.view.draw();
   }

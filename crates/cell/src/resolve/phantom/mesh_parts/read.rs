@@ -4,14 +4,13 @@ use std::path::Path;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use needlebench_geometry::TriangleMesh;
-use needlebench_geometry::mesh::{MeshDefect, check_closed, read_stl, size_m};
+use needlebench_geometry::mesh::size_m;
 use needlebench_kinematics::Pose;
 
 use super::unit::wrong_unit;
 use crate::Finding;
 use crate::files::ModelSource;
-use crate::files::source_of;
-use crate::input::read_data;
+use crate::resolve::stl_file::{FileFault, StlFile};
 use crate::scenario::{PartSection, PartTissue};
 use crate::toml_text::TomlText;
 
@@ -34,9 +33,9 @@ pub(super) fn read_part(
     notes: &mut Vec<String>,
 ) -> Result<(PartMesh, ModelSource), Finding> {
     let key = |name: &str| format!("phantom.parts[{index}].{name}");
-    let path = base.join(&section.file);
-    let file = path.display().to_string();
+    let file = base.join(&section.file).display().to_string();
     let refused = |what: String| toml.finding(&key("file"), format!("{file}: {what}"));
+    let faulty = |fault: FileFault| toml.finding(&key("file"), fault.message).hint(fault.hint);
     if let Some((at, value)) = (0..)
         .zip(section.position_mm)
         .find(|(_, value)| value.abs() > FARTHEST_MM)
@@ -48,13 +47,9 @@ pub(super) fn read_part(
             )
             .hint("the position is in millimetres, whatever the file's unit"));
     }
-    let bytes = read_data(&path).map_err(|error| {
-        let hint = error.hint("the path is relative to the scenario's folder");
-        refused(error.to_string()).hint(hint)
-    })?;
-    let in_file = read_stl(&bytes, [1.0; 3])
-        .map_err(|why| refused(why.to_string()).hint("parts are STL files, binary or text"))?;
-    if let Some((message, hint)) = wrong_unit(section.tissue, section.unit, &size_m(&in_file)) {
+    let read = StlFile::read(&section.file, base).map_err(faulty)?;
+    if let Some((message, hint)) = wrong_unit(section.tissue, section.unit, &size_m(&read.in_file))
+    {
         let mut finding = refused(message).hint(hint);
         if toml.span_of(&key("unit")).is_some() {
             finding = Finding {
@@ -70,31 +65,11 @@ pub(super) fn read_part(
         Translation3::from(Vector3::from(section.position_mm) * 1e-3),
         UnitQuaternion::from_euler_angles(roll, pitch, yaw),
     );
-    let metres = section.unit.metres();
-    let mut surface = TriangleMesh {
-        vertices_m: in_file
-            .vertices_m
-            .iter()
-            .map(|vertex| vertex * metres)
-            .collect(),
-        triangles: in_file.triangles,
-    };
-    if section.flip {
-        for triangle in &mut surface.triangles {
-            triangle.swap(1, 2);
-        }
-    }
-    // In the file's own frame, where its author looks for the place.
-    let facts = check_closed(&surface).map_err(|defect| {
-        let hint = match &defect {
-            MeshDefect::Inverted { .. } if section.flip => {
-                "it was flipped: leave `flip` out".to_owned()
-            }
-            MeshDefect::Inverted { .. } => format!("{}, or set `flip = true`", defect.hint()),
-            _ => defect.hint().to_owned(),
-        };
-        refused(format!("part `{}`: {defect}", section.name)).hint(hint)
-    })?;
+    let mut surface = read.surface(section.unit, section.flip);
+    let what = format!("part `{}`", section.name);
+    let facts = read
+        .check_closed(&surface, section.flip, &what)
+        .map_err(faulty)?;
     if facts.shared_edges > 0 {
         notes.push(format!(
             "part `{}` touches itself along {} edges",
@@ -111,6 +86,6 @@ pub(super) fn read_part(
     for vertex in &mut surface.vertices_m {
         *vertex = phantom_from_file * *vertex;
     }
-    let source = source_of(file.clone(), &bytes);
+    let StlFile { file, source, .. } = read;
     Ok((PartMesh { file, surface }, source))
 }

@@ -7,26 +7,6 @@ use crate::scenario::{LengthUnit, PartTissue};
 impl LengthUnit {
     const ALL: [Self; 4] = [Self::Mm, Self::Cm, Self::M, Self::In];
 
-    /// Metres per unit.
-    pub(super) fn metres(self) -> f64 {
-        match self {
-            Self::Mm => 1e-3,
-            Self::Cm => 1e-2,
-            Self::M => 1.0,
-            Self::In => 25.4e-3,
-        }
-    }
-
-    /// As in a scenario.
-    fn key(self) -> &'static str {
-        match self {
-            Self::Mm => "mm",
-            Self::Cm => "cm",
-            Self::M => "m",
-            Self::In => "in",
-        }
-    }
-
     fn words(self) -> &'static str {
         match self {
             Self::Mm => "millimetres",

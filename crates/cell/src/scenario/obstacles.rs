@@ -1,0 +1,224 @@
+//! What else stands, lies or hangs in the room: `[[obstacles]]`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::LengthUnit;
+use crate::schema::{LONGEST_NAME, NAME};
+use crate::toml_text::TomlText;
+use crate::{BodyKind, ClearanceClass, Finding};
+
+/// What an obstacle's clearance counts for: a class of clearance, by the name that it has in
+/// `[criteria.min_clearance_mm]` and in reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ObstacleClass {
+    /// A class of its own: equipment that belongs to nothing else.
+    #[default]
+    RobotObstacle,
+    /// The table's: an arm board, a side rail, a cushion.
+    RobotTable,
+    /// The gantry's: a monitor or a laser on the housing.
+    RobotGantry,
+    /// The mount's: feet, braces and cables of what carries the robot.
+    RobotMount,
+}
+
+impl ObstacleClass {
+    /// The class of clearance.
+    pub fn class(self) -> ClearanceClass {
+        match self {
+            Self::RobotObstacle => ClearanceClass::RobotObstacle,
+            Self::RobotTable => ClearanceClass::RobotTable,
+            Self::RobotGantry => ClearanceClass::RobotGantry,
+            Self::RobotMount => ClearanceClass::RobotMount,
+        }
+    }
+
+    /// The kind of body whose pairs are of this class.
+    pub(crate) fn kind(self) -> BodyKind {
+        match self {
+            Self::RobotObstacle => BodyKind::Obstacle,
+            Self::RobotTable => BodyKind::Table,
+            Self::RobotGantry => BodyKind::Gantry,
+            Self::RobotMount => BodyKind::Mount,
+        }
+    }
+}
+
+/// What an obstacle is fixed to: its position and rotation are in that frame, and it goes where that
+/// goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AttachedTo {
+    /// The room: the world's frame, z up, the floor at 0.
+    #[default]
+    World,
+    /// The table: x along it, y across, z up; the origin in the middle of its upper face.
+    Table,
+    /// The gantry: x along the bore, y across, z up while it is not tilted; the origin in the isocentre.
+    Gantry,
+    /// The robot's base: the frame of ROS's `base_link`, z out of the foot; hanging and tilted with it.
+    RobotBase,
+}
+
+impl AttachedTo {
+    /// As in a scenario.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Self::World => "world",
+            Self::Table => "table",
+            Self::Gantry => "gantry",
+            Self::RobotBase => "robot_base",
+        }
+    }
+}
+
+/// One rigid thing that the arm may hit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ObstacleSection {
+    /// Name in reports: letters, digits, `-` and `_`; unlike that of any other body.
+    #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME))]
+    pub name: String,
+    /// Class that its clearance counts for, with the criterion of that name.
+    #[serde(default)]
+    pub class: ObstacleClass,
+    /// What it is fixed to; `position_mm` and `rpy_deg` are in that frame.
+    #[serde(default)]
+    pub attached_to: AttachedTo,
+    /// Where the origin of its shape is in the frame of `attached_to`, mm. That is the middle of a box,
+    /// a cylinder, a capsule or a sphere, and the origin of an STL file.
+    #[schemars(inner(range(min = -20_000.0, max = 20_000.0)))]
+    pub position_mm: [f64; 3],
+    /// Roll, pitch and yaw of its shape in the frame of `attached_to`, deg.
+    #[serde(default)]
+    #[schemars(inner(range(min = -720.0, max = 720.0)))]
+    pub rpy_deg: [f64; 3],
+    /// Its shape: one of `box`, `cylinder`, `capsule`, `sphere`, `convex` and `mesh`.
+    pub shape: ObstacleShape,
+    /// Whether it is there: what is `false` is as if left out, so that a study can vary it.
+    #[serde(default = "yes")]
+    pub present: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// A shape: one of these keys.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ObstacleShape {
+    /// A box along the axes.
+    #[serde(rename = "box")]
+    pub cuboid: Option<BoxShape>,
+    /// A cylinder about z.
+    pub cylinder: Option<RoundShape>,
+    /// A cylinder about z with a half ball at each end.
+    pub capsule: Option<RoundShape>,
+    /// A ball.
+    pub sphere: Option<SphereShape>,
+    /// The convex hull of an STL file's points.
+    pub convex: Option<StlShape>,
+    /// The solid inside an STL file's surface, which is closed and need not be convex. Engines collide
+    /// with convex pieces that cover it.
+    pub mesh: Option<StlShape>,
+}
+
+/// A box.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoxShape {
+    /// Edges along x, y and z, mm.
+    #[schemars(inner(range(min = 0.1, max = 20_000.0)))]
+    pub size_mm: [f64; 3],
+}
+
+/// A cylinder or a capsule.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RoundShape {
+    /// Radius, mm.
+    #[schemars(range(min = 0.1, max = 5000.0))]
+    pub radius_mm: f64,
+    /// Length along z, mm: of a capsule its straight part, so that the capsule is 2 `radius_mm` longer.
+    #[schemars(range(min = 0.1, max = 20_000.0))]
+    pub length_mm: f64,
+}
+
+/// A ball.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SphereShape {
+    /// Radius, mm.
+    #[schemars(range(min = 0.1, max = 5000.0))]
+    pub radius_mm: f64,
+}
+
+/// A shape from an STL file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StlShape {
+    /// STL file, relative to this file: triangles counter-clockwise seen from outside.
+    pub file: String,
+    /// Unit of the file's coordinates: `mm`, `cm`, `m` or `in`. Default mm.
+    #[serde(default)]
+    pub unit: LengthUnit,
+    /// Turns a surface that is inside out round.
+    #[serde(default)]
+    pub flip: bool,
+}
+
+impl ObstacleShape {
+    /// The keys that are given.
+    fn given(&self) -> Vec<&'static str> {
+        [
+            ("box", self.cuboid.is_some()),
+            ("cylinder", self.cylinder.is_some()),
+            ("capsule", self.capsule.is_some()),
+            ("sphere", self.sphere.is_some()),
+            ("convex", self.convex.is_some()),
+            ("mesh", self.mesh.is_some()),
+        ]
+        .into_iter()
+        .filter_map(|(key, is_given)| is_given.then_some(key))
+        .collect()
+    }
+}
+
+/// Obstacles without a shape or with several, and two of one name.
+pub(super) fn check(toml: &TomlText<'_>, sections: &[ObstacleSection]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (index, section) in sections.iter().enumerate() {
+        let given = section.shape.given();
+        if given.len() != 1 {
+            let message = if given.is_empty() {
+                format!("obstacle `{}` has no shape", section.name)
+            } else {
+                let given = given.join(" and ");
+                format!(
+                    "obstacle `{}` has the shapes {given}, and can have one",
+                    section.name
+                )
+            };
+            findings.push(
+                toml.finding(&format!("obstacles[{index}].shape"), message)
+                    .hint("one of box, cylinder, capsule, sphere, convex and mesh; a body of several is several obstacles"),
+            );
+        }
+        if sections[..index]
+            .iter()
+            .any(|other| other.name == section.name)
+        {
+            findings.push(
+                toml.finding(
+                    &format!("obstacles[{index}].name"),
+                    format!("two obstacles are called `{}`", section.name),
+                )
+                .hint("reports tell bodies by their names"),
+            );
+        }
+    }
+    findings
+}
