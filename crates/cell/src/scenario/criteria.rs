@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::switch;
+use crate::ClearanceClass;
 
 /// Least clearances, mm; a class that is left out or `"off"` is not judged.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -49,6 +50,23 @@ pub struct ClearanceCriteria {
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 0.0, max = 100.0), extend("x-off" = true, "x-unit" = "mm"))]
     pub needle_route: Option<f64>,
+}
+
+impl ClearanceCriteria {
+    /// Least clearance of a class, mm; `None` if it is not judged.
+    pub fn least_mm(&self, class: ClearanceClass) -> Option<f64> {
+        match class {
+            ClearanceClass::RobotPhantom => self.robot_phantom,
+            ClearanceClass::RobotTable => self.robot_table,
+            ClearanceClass::RobotGantry => self.robot_gantry,
+            ClearanceClass::RobotMount => self.robot_mount,
+            ClearanceClass::SelfCollision => self.self_collision,
+            ClearanceClass::ToolPhantom => self.tool_phantom,
+            ClearanceClass::GuideStandoff => self.guide_standoff,
+            ClearanceClass::NeedleCorridor => self.needle_corridor,
+            ClearanceClass::NeedleRoute => self.needle_route,
+        }
+    }
 }
 
 /// What every working configuration has to reach, in each engine; what is `"off"` is not judged.
