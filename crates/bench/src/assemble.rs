@@ -9,18 +9,19 @@ use needlebench_engine::{EngineIdentity, Recording};
 use needlebench_evaluation::metric::measured;
 use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
-    ClassClearance, ClearanceReport, ConfigurationReport, EngineFailure, EngineReport,
-    ExpectedReport, GoalReport, MarginsReport, PhaseReport, RejectionReport, Report, RouteReport,
-    SCHEMA_VERSION, ScenarioSummary, SearchReport, Status,
+    ClassClearance, ClassMarginReport, ClearanceReport, ConfigurationReport, EngineFailure,
+    EngineReport, ExpectedReport, GoalReport, MarginReport, MarginsReport, PhaseReport,
+    RejectionReport, Report, RouteReport, SCHEMA_VERSION, ScenarioSummary, SearchReport, Status,
+    StraightReport,
 };
 use needlebench_evaluation::room::RoomModel;
 use needlebench_evaluation::{
-    add_approach_speeds, engine_difference, judge, measure_motion, measure_needle,
-    planned_clearance, posture_clearance, route_clearance, tip_of, tip_sensitivity,
+    add_approach_speeds, certified_clearance, engine_difference, judge, measure_motion,
+    measure_needle, planned_clearance, posture_clearance, route_clearance, tip_of, tip_sensitivity,
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{
-    ConfigurationPlan, GoalPlan, Planner, PostureMargins, Rejection, Rule, judge_route,
+    ConfigurationPlan, GoalPlan, Margin, Planner, PostureMargins, Rejection, Rule, judge_route,
     needle_route,
 };
 
@@ -260,6 +261,8 @@ fn configuration_report(
         margins: candidate.map(|each| margins_report(&each.margins)),
         motion: phases(plan.trajectory.as_ref()),
         retreat: phases(plan.retreat.as_ref()),
+        retreat_clearance: retreat_clearance(setup, plan),
+        margin: plan.margin.as_ref().map(margin_report),
         search: plan.search.map(|effort| SearchReport {
             waypoints: effort.waypoints,
             postures_checked: effort.checks,
@@ -367,15 +370,11 @@ fn overall_clearance(
     plan: &ConfigurationPlan,
     engines: &BTreeMap<String, EngineReport>,
 ) -> ClearanceReport {
-    let Setup {
-        resolved, model, ..
-    } = setup;
-    let cell = &resolved.cell;
+    let cell = &setup.resolved.cell;
     let mut classes: BTreeMap<&'static str, ClassClearance> = BTreeMap::new();
     if engines.is_empty() {
-        let tolerance_m = resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
-        let minima = match (&plan.trajectory, &plan.candidate) {
-            (Some(trajectory), _) => planned_clearance(cell, model, trajectory, tolerance_m),
+        let minima = match (&plan.certificate, &plan.candidate) {
+            (Some(certificate), _) => certified_clearance(cell, certificate),
             (None, Some(candidate)) => posture_clearance(cell, &candidate.clearance),
             (None, None) => BTreeMap::new(),
         };
@@ -403,6 +402,54 @@ fn overall_clearance(
         }
     }
     ClearanceReport::new(classes)
+}
+
+/// Proven clearances of the way back.
+fn retreat_clearance(setup: &Setup<'_>, plan: &ConfigurationPlan) -> ClearanceReport {
+    let Setup {
+        resolved, model, ..
+    } = setup;
+    let tolerance_m = resolved.scenario.planning.certificate_tolerance_mm * 1e-3;
+    plan.retreat
+        .as_ref()
+        .map_or_else(ClearanceReport::default, |retreat| {
+            ClearanceReport::of(&planned_clearance(
+                &resolved.cell,
+                model,
+                retreat,
+                tolerance_m,
+            ))
+        })
+}
+
+/// What a motion keeps, as a value of the report.
+fn margin_report(margin: &Margin) -> MarginReport {
+    let least = margin.least();
+    MarginReport {
+        attainable_m: margin.attainable_m(),
+        achieved_m: margin.achieved_m(),
+        class: least.map(|each| each.class.name()),
+        limited_by: least.map(|each| each.limited_by.name()),
+        search: margin.end.name(),
+        straight: margin.straight.map(|straight| StraightReport {
+            clearance_m: straight.clearance_m,
+            instead_m: straight.instead_m,
+            duration_s: straight.duration_s,
+        }),
+        classes: margin
+            .classes
+            .iter()
+            .map(|each| {
+                let report = ClassMarginReport {
+                    limit_m: each.limit_m,
+                    attainable_m: each.attainable_m,
+                    achieved_m: each.achieved_m,
+                    limited_by: each.limited_by.name(),
+                };
+                (each.class.name(), report)
+            })
+            .collect(),
+    }
 }
 
 /// A broken rule, as a value of the report.

@@ -43,7 +43,8 @@ mod posture;
 
 pub use certificate::{
     CertificateOptions, ClassCertificate, Effort, LEAST_INTERVAL_S, MOST_INTERVALS, Motion,
-    MotionBound, MotionCertificate, ROUNDING_M, RecordedMotion, Span, certify, certify_sampled,
+    MotionBound, MotionCertificate, ROUNDING_M, RecordedMotion, Span, certify, certify_enough,
+    certify_sampled,
 };
 pub use model::{ClassMinima, ClearanceModel, PairClearance};
 pub use pairs::{

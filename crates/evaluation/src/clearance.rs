@@ -125,6 +125,16 @@ pub fn recorded_clearance(
     minima
 }
 
+/// Least clearances of a motion that has its certificate already.
+pub fn certified_clearance(
+    cell: &Cell,
+    certificate: &MotionCertificate,
+) -> BTreeMap<ClearanceClass, ClassClearance> {
+    let mut minima = BTreeMap::new();
+    take_minima(&mut minima, cell, certificate, None);
+    minima
+}
+
 /// Least clearances of a planned motion with their proven lower bounds.
 pub fn planned_clearance(
     cell: &Cell,

@@ -254,6 +254,54 @@ pub struct SearchReport {
     pub seed: u64,
 }
 
+/// What a planned motion keeps of the clearance that its configuration allows. Clearances are proven lower
+/// bounds; margins are what they are beyond what is judged: the scenario's `[criteria]`, else the floors
+/// of `[planning]`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MarginReport {
+    /// Least margin from the surroundings that any motion to this posture could keep: that of the start, the
+    /// approach and the place where it ends.
+    pub attainable_m: Option<f64>,
+    /// The one that this motion keeps.
+    pub achieved_m: Option<f64>,
+    /// Class of that one.
+    pub class: Option<&'static str>,
+    /// What comes nearest in it: `start`, `approach` (with the place where it ends) or `transfer`.
+    pub limited_by: Option<&'static str>,
+    /// How the search for a transfer ended: `bound`, it keeps what the other postures keep, or what is
+    /// ample, so that there is none that keeps more that counts; `proof`, a posture that every motion
+    /// must take is nearer than allowed; `budget`, there may be a better one.
+    pub search: &'static str,
+    /// What the straight transfer would have kept and taken; none where the transfer is straight.
+    pub straight: Option<StraightReport>,
+    /// The classes, by name.
+    pub classes: BTreeMap<&'static str, ClassMarginReport>,
+}
+
+/// The straight transfer that a way around replaces.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StraightReport {
+    /// Least clearance from the surroundings, negative where it is blocked.
+    pub clearance_m: f64,
+    /// The same of the way around.
+    pub instead_m: f64,
+    /// How long the motion would take.
+    pub duration_s: f64,
+}
+
+/// What a motion keeps in one class.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ClassMarginReport {
+    /// What is judged.
+    pub limit_m: f64,
+    /// Clearance of the start, the approach and the place where it ends.
+    pub attainable_m: f64,
+    /// Clearance of the whole motion.
+    pub achieved_m: f64,
+    /// What comes nearest: `start`, `approach` or `transfer`.
+    pub limited_by: &'static str,
+}
+
 /// One configuration of a goal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConfigurationReport {
@@ -282,10 +330,15 @@ pub struct ConfigurationReport {
     /// Planned motion.
     pub motion: Vec<PhaseReport>,
     /// The way back out: straight back along the needle axis, then to the start posture. Empty
-    /// unless the configuration works. Planned and free, not simulated.
+    /// unless the configuration works. Planned and certified, not simulated.
     pub retreat: Vec<PhaseReport>,
-    /// Search for a way around what blocks the straight transfer; none where it was not needed.
+    /// Proven clearances of the way back, by itself, planned; empty where there is none.
+    pub retreat_clearance: ClearanceReport,
+    /// Search for a way around, where the straight transfer is blocked or comes nearer than the postures
+    /// that it joins; none where it was not needed.
     pub search: Option<SearchReport>,
+    /// What the planned motion keeps of the clearance that its posture allows; none without a motion.
+    pub margin: Option<MarginReport>,
     /// Needle metrics of the commanded posture, by our forward kinematics.
     pub commanded: Option<NeedleMeasurement>,
     /// Measurements per engine: `rapier`, `mujoco`.
@@ -350,7 +403,9 @@ impl ConfigurationReport {
             margins: None,
             motion: Vec::new(),
             retreat: Vec::new(),
+            retreat_clearance: ClearanceReport::default(),
             search: None,
+            margin: None,
             commanded: None,
             engines: BTreeMap::new(),
             engine_difference: None,

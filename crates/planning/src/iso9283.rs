@@ -10,6 +10,7 @@ use needlebench_kinematics::trajectory::{
 };
 use needlebench_kinematics::{JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
+use crate::limits::ClassLimits;
 use crate::motion::MotionChecker;
 
 /// The order of the standard: from P1 to P5, P4, P3, P2 and back to P1; indices from 0.
@@ -132,9 +133,8 @@ pub fn plan_protocol(
     let checker = MotionChecker::new(
         &resolved.cell,
         model,
-        planning.min_clearance_mm * 1e-3,
-        planning.min_self_clearance_mm * 1e-3,
-        planning.sample_spacing_mm * 1e-3,
+        ClassLimits::of(&resolved.scenario),
+        planning,
     );
     for cycle in [Some(&plan.cycle), plan.directional.as_ref()]
         .into_iter()

@@ -5,6 +5,8 @@
 
 mod family;
 pub mod iso9283;
+mod limits;
+mod margin;
 mod motion;
 mod motion_plan;
 mod plan;
@@ -14,7 +16,9 @@ mod rejection;
 mod route;
 mod transfer;
 
-pub use family::{Aim, Best, EDGE_RAD, Edge, Family, Member, RollRange};
+pub use family::{Aim, Best, EDGE_RAD, Edge, Family, Member, Merit, RollRange};
+pub use limits::{ByClass, ClassLimit, ClassLimits, Shortfall};
+pub use margin::{ClassMargin, LimitedBy, Margin, SearchEnd, Straight};
 pub use motion::MotionChecker;
 pub use motion_plan::{ConfigurationPlan, SearchEffort};
 pub use plan::GoalPlan;

@@ -2,25 +2,28 @@
 
 use std::sync::OnceLock;
 
+use needlebench_cell::scenario::PlanningSection;
 use needlebench_cell::{BodyKind, Cell, ClearanceClass, Frame};
 use needlebench_clearance::{ClassMinima, ClearanceModel, PairClearance};
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
+use crate::limits::{ByClass, ClassLimits};
+
 /// Checks motions of one cell.
 #[derive(Debug)]
 pub struct MotionChecker<'a> {
-    model: &'a ClearanceModel,
+    pub(crate) model: &'a ClearanceModel,
     cell: &'a Cell,
     /// Radius about each joint's axis within which everything beyond the joint stays, m; found when a
     /// motion is checked.
     sweep_radius_m: OnceLock<Joints>,
-    /// Clearance from the surroundings below which bodies collide, m.
-    min_clearance_m: f64,
-    /// Clearance of the arm from itself below which bodies collide, m.
-    min_self_clearance_m: f64,
+    /// What clearances may be and ought to be.
+    pub(crate) limits: ClassLimits,
     /// Motion of any point that may go unchecked, m.
     spacing_m: f64,
+    /// Width of certificates that is aimed at, m.
+    pub(crate) tolerance_m: f64,
 }
 
 /// A pair that comes too near during a motion.
@@ -40,29 +43,22 @@ impl<'a> MotionChecker<'a> {
     pub fn new(
         cell: &'a Cell,
         model: &'a ClearanceModel,
-        min_clearance_m: f64,
-        min_self_clearance_m: f64,
-        spacing_m: f64,
+        limits: ClassLimits,
+        planning: &PlanningSection,
     ) -> Self {
         Self {
             model,
             cell,
             sweep_radius_m: OnceLock::new(),
-            min_clearance_m,
-            min_self_clearance_m,
-            spacing_m,
+            limits,
+            spacing_m: planning.sample_spacing_mm * 1e-3,
+            tolerance_m: planning.certificate_tolerance_mm * 1e-3,
         }
     }
 
     /// Least clearance that a class may have, m.
-    ///
-    /// The guide tube is meant to stand near the skin, so there only touching counts.
     pub(crate) fn limit_m(&self, class: ClearanceClass) -> f64 {
-        match class {
-            ClearanceClass::GuideStandoff => self.min_clearance_m.min(0.0),
-            ClearanceClass::SelfCollision => self.min_self_clearance_m,
-            _ => self.min_clearance_m,
-        }
+        self.limits.get(class).floor_m
     }
 
     /// Least clearances of a posture, and the pair that is deepest in collision, if any collides.
@@ -123,10 +119,15 @@ impl<'a> MotionChecker<'a> {
         None
     }
 
-    /// Whether the straight joint motion between two postures is free of collisions, its first end
+    /// Whether the straight joint motion between two postures keeps some clearances, its first end
     /// not looked at; and the number of postures that it took. No point of the arm moves by more
     /// than the spacing from one of them to the next.
-    pub(crate) fn is_straight_free(&self, from: &Joints, to: &Joints) -> (bool, u64) {
+    pub(crate) fn keeps_straight(
+        &self,
+        from: &Joints,
+        to: &Joints,
+        least_m: &ByClass,
+    ) -> (bool, u64) {
         let way_m = self.largest_displacement_m(from, to);
         #[expect(
             clippy::cast_possible_truncation,
@@ -146,7 +147,7 @@ impl<'a> MotionChecker<'a> {
             checks += 1;
             if self
                 .model
-                .first_below(&q, |class| self.limit_m(class))
+                .first_below(&q, |class| least_m.get(class))
                 .is_some()
             {
                 return (false, checks);

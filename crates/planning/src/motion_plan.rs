@@ -4,11 +4,13 @@ use std::f64::consts::TAU;
 
 use nalgebra::UnitVector3;
 use needlebench_cell::Goal;
+use needlebench_clearance::{ClassCertificate, MotionCertificate};
 use needlebench_kinematics::ik::{Configuration, WrapOrder, WrapSearch};
 use needlebench_kinematics::trajectory::{JointPath, JointTrajectory, LineError, Phase};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
-use crate::motion::Violation;
+use crate::limits::ByClass;
+use crate::margin::{Margin, Parts, SAME_M, SearchEnd, Straight};
 use crate::planner::{Candidate, Planner};
 use crate::transfer::{Budget, TransferSearch};
 use crate::{Rejection, Rule};
@@ -29,6 +31,26 @@ pub struct ConfigurationPlan {
     pub retreat: Option<JointTrajectory>,
     /// What the search for a way around cost; `None` where the straight motion was tried alone.
     pub search: Option<SearchEffort>,
+    /// What the motion keeps of the clearance that the posture allows; `None` without a motion.
+    pub margin: Option<Margin>,
+    /// Proven clearances of the whole motion, to the scenario's tolerance.
+    pub certificate: Option<MotionCertificate>,
+}
+
+impl ConfigurationPlan {
+    /// Of a configuration without a posture.
+    pub(crate) fn nothing(configuration: Configuration) -> Self {
+        Self {
+            configuration,
+            candidate: None,
+            rejections: Vec::new(),
+            trajectory: None,
+            retreat: None,
+            search: None,
+            margin: None,
+            certificate: None,
+        }
+    }
 }
 
 /// A search for a motion.
@@ -50,6 +72,15 @@ const WRAP_TRIES: usize = 8;
 /// How much corners of a way around are rounded, in the order in which it is tried.
 const ROUNDINGS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 
+/// Part of the postures that may be looked at that the search for all the clearance that there is may use,
+/// and that each further one may: one of so many.
+const FIRST_SHARE: u64 = 6;
+const SHARE: u64 = 8;
+/// Steps by which a free way is improved at most: each halves what is missing, or what is asked for.
+const STEPS: u32 = 5;
+/// What a way around has to gain for a longer motion to be worth it, m.
+const LEAST_GAIN_M: f64 = 5e-4;
+
 /// A way from the start posture to where the approach begins.
 #[derive(Debug, Clone)]
 enum Transfer {
@@ -58,119 +89,392 @@ enum Transfer {
     Around(Vec<JointPath>),
 }
 
-/// A way around, with the whole turns of its goal.
-struct Around {
+/// A transfer with its motion.
+#[derive(Debug, Clone)]
+pub(crate) struct Way {
     turns: [i32; JOINT_COUNT],
-    paths: Vec<JointPath>,
+    transfer: Transfer,
     trajectory: JointTrajectory,
+    /// Of the transfer alone.
+    certificate: MotionCertificate,
+    /// Proven clearances of the transfer.
+    keeps: ByClass,
+    corners: usize,
+}
+
+/// What every motion to a posture has in common.
+#[derive(Debug, Clone)]
+pub(crate) struct Required {
+    pub candidate: Candidate,
+    /// Rules that the posture breaks.
+    pub rejections: Vec<Rejection>,
+    line: JointPath,
+    approach: MotionCertificate,
+    start: ByClass,
+    /// Clearances that count of start and approach.
+    target: ByClass,
+    wraps: Vec<[i32; JOINT_COUNT]>,
+}
+
+impl Required {
+    /// Clearances of the postures that every motion takes.
+    pub fn attainable(&self) -> ByClass {
+        self.start.least(&ByClass::proven(&self.approach))
+    }
+
+    fn parts(&self, way: &Way) -> Parts {
+        Parts {
+            start: self.start,
+            approach: ByClass::proven(&self.approach),
+            transfer: way.keeps,
+        }
+    }
+
+    /// Clearances of the whole motion.
+    pub fn achieved(&self, way: &Way) -> ByClass {
+        self.parts(way).achieved()
+    }
+
+    /// The transfer keeps what start and approach do.
+    pub fn is_reached_by(&self, way: &Way) -> bool {
+        way.keeps.most_below(&self.target) <= SAME_M
+    }
 }
 
 impl Planner<'_> {
-    /// Adds the motion: transfer, straight approach, hold.
+    /// The part of a motion that a posture decides: its approach, certified, and the whole turns with
+    /// which it can be reached.
     ///
-    /// The transfer is straight in the joints where that is free. Where it is not, and with
-    /// `checks_left`, a way around is searched, and what it takes is subtracted there.
-    pub(crate) fn plan_motion(
+    /// # Errors
+    /// The plan of a posture to which there is no motion at all.
+    pub(crate) fn required(
         &self,
         goal: &Goal,
         configuration: Configuration,
-        mut candidate: Candidate,
+        candidate: Candidate,
         mut rejections: Vec<Rejection>,
-        checks_left: Option<&mut u64>,
-    ) -> ConfigurationPlan {
-        let limits = &self.cell().robot.limits;
-        let mut plan = ConfigurationPlan {
-            configuration,
-            candidate: None,
-            rejections: Vec::new(),
-            trajectory: None,
-            retreat: None,
-            search: None,
+    ) -> Result<Required, Box<ConfigurationPlan>> {
+        let line = self.approach_line(goal, &candidate);
+        let reason = match &line {
+            Err(error) => Some(blocked_approach(error, goal.approach_m)),
+            Ok(line) => self.wraps(line).is_empty().then(|| Rejection {
+                rule: Rule::JointLimit,
+                value: self.cell().robot.limits.margin(&line.start()),
+                limit: 0.0,
+                unit: "1",
+                detail: "the approach leaves the joint ranges, whatever the whole turns".to_owned(),
+                class: None,
+            }),
         };
-        let line = match self.approach_line(goal, &candidate) {
-            Ok(line) => line,
-            Err(error) => {
-                rejections.push(blocked_approach(&error, goal.approach_m));
-                plan.candidate = Some(candidate);
-                plan.rejections = rejections;
-                return plan;
+        let (Ok(line), None) = (line, &reason) else {
+            rejections.extend(reason);
+            return Err(Box::new(ConfigurationPlan {
+                candidate: Some(candidate),
+                rejections,
+                ..ConfigurationPlan::nothing(configuration)
+            }));
+        };
+        let approach = JointTrajectory::starting_at(line.start())
+            .then_along(Phase::Approach, line.clone(), &self.resolved.motion)
+            .then_hold(Phase::Hold, self.resolved.scenario.motion.hold_s);
+        let approach = self.checker.certificate(&approach);
+        let start = *self.start_clearance();
+        let attainable = start.least(&ByClass::proven(&approach)).of_bodies();
+        let limits = self.limits();
+        Ok(Required {
+            wraps: self.wraps(&line),
+            target: attainable.least(&limits.ample()),
+            candidate,
+            rejections,
+            line,
+            approach,
+            start,
+        })
+    }
+
+    /// The straight transfer that keeps most, those with fewer turns first: the first that keeps what
+    /// start and approach do, else the first that is free, else the first.
+    pub(crate) fn straight(&self, required: &Required) -> Way {
+        let first = self.straight_with(required, required.wraps[0]);
+        if required.is_reached_by(&first) || !self.is_worth_a_search(required) {
+            return first;
+        }
+        let asked = required.target.with(&required.target, |m, _| m - SAME_M);
+        for least in [&asked, &self.limits().wanted().least(&asked)] {
+            if first.keeps.most_below(least) <= 0.0 {
+                return first;
             }
-        };
-        let approach = JointTrajectory::starting_at(line.start()).then_along(
-            Phase::Approach,
-            line.clone(),
-            &self.resolved.motion,
+            for &turns in &required.wraps[1..] {
+                let to = required.line.start() + shift(&turns);
+                if !self.checker.keeps_straight(self.start(), &to, least).0 {
+                    continue;
+                }
+                let way = self.straight_with(required, turns);
+                if way.keeps.most_below(least) <= SAME_M {
+                    return way;
+                }
+            }
+        }
+        first
+    }
+
+    fn straight_with(&self, required: &Required, turns: [i32; JOINT_COUNT]) -> Way {
+        let line = required.line.shifted(&shift(&turns));
+        self.certified(required, turns, Transfer::Straight, &line, 2)
+    }
+
+    fn certified(
+        &self,
+        required: &Required,
+        turns: [i32; JOINT_COUNT],
+        transfer: Transfer,
+        line: &JointPath,
+        corners: usize,
+    ) -> Way {
+        let trajectory = self.motion(&transfer, line);
+        // What is farther than the approach does not change the motion's clearance.
+        let certificate = self.checker.of_transfer(
+            &trajectory,
+            &ByClass::attained(&required.approach).of_bodies(),
         );
-        // Whole turns, or a way around, change the transfer, but neither the approach nor the
-        // posture.
-        let approach_is_free = rejections
-            .iter()
-            .all(|rejection| rejection.rule != Rule::Collision)
-            && self.checker.first_collision(&approach).is_none();
-        let wraps = self.wraps(&line);
-        let mut first_failure = None;
-        let mut chosen: Option<([i32; JOINT_COUNT], Transfer, JointTrajectory)> = None;
-        for &turns in &wraps {
-            let trajectory = self.motion(&Transfer::Straight, &line.shifted(&shift(&turns)));
-            let collision = self.checker.first_collision(&trajectory);
-            let works = collision.is_none();
-            if works || chosen.is_none() {
-                chosen = Some((turns, Transfer::Straight, trajectory));
-                first_failure = collision;
+        Way {
+            turns,
+            transfer,
+            trajectory,
+            keeps: ByClass::proven(&certificate).of_bodies(),
+            certificate,
+            corners,
+        }
+    }
+
+    /// Whether another transfer can help: no posture that every motion takes is below its floor.
+    fn is_worth_a_search(&self, required: &Required) -> bool {
+        required.rejections.is_empty()
+            && required.attainable().most_below(&self.limits().floors()) <= 0.0
+    }
+
+    /// The transfer that keeps most of those found: as much as start and approach, or as much as the
+    /// postures that may be looked at allow. What it looks at is subtracted from `checks_left`.
+    pub(crate) fn improved(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        required: &Required,
+        straight: Way,
+        checks_left: &mut u64,
+    ) -> (Way, Option<SearchEffort>) {
+        if required.is_reached_by(&straight)
+            || *checks_left == 0
+            || !self.is_worth_a_search(required)
+        {
+            return (straight, None);
+        }
+        let mut effort = SearchEffort {
+            waypoints: 0,
+            checks: 0,
+            samples: 0,
+            seed: seed_of(self.resolved.scenario.seed, &goal.name, configuration),
+        };
+        let whole = *checks_left;
+        let target = required.target;
+        let floors = self.limits().floors().of_bodies();
+        let is_free = |way: &Way| way.keeps.most_below(&floors) <= 0.0;
+        let mut best = straight;
+        let mut look = |least: &ByClass, share: u64, effort: &mut SearchEffort| {
+            let checks = (whole / share).min(*checks_left);
+            let (found, took) = self.way_around(required, least, effort, checks);
+            *checks_left = checks_left.saturating_sub(took);
+            found
+        };
+        // All of it; what is wanted of it; any way at all.
+        let wanted = self.limits().wanted().least(&target);
+        for (least, share) in [
+            (target, FIRST_SHARE),
+            (wanted, SHARE),
+            (floors.least(&target), 1),
+        ] {
+            if best.keeps.most_below(&least) <= SAME_M {
+                break;
             }
-            if works || !approach_is_free {
+            if let Some(found) = look(&least, share, &mut effort)
+                && (!is_free(&best) || gains(&best, &found, &target))
+            {
+                best = found;
                 break;
             }
         }
-        if let (Some(_), true, Some(checks_left)) = (&first_failure, approach_is_free, checks_left)
-        {
-            let (found, effort) = self.way_around(goal, configuration, &line, &wraps, *checks_left);
-            *checks_left = checks_left.saturating_sub(effort.checks);
-            plan.search = Some(effort);
-            if let Some(around) = found {
-                first_failure = None;
-                chosen = Some((
-                    around.turns,
-                    Transfer::Around(around.paths),
-                    around.trajectory,
-                ));
+        // Half of what is missing, each class by as much as it can; less where that was not found.
+        let mut share = 0.5;
+        for _ in 0..STEPS {
+            let missing_m = best.keeps.most_below(&target);
+            if !is_free(&best) || missing_m <= SAME_M || missing_m * share < SAME_M {
+                break;
+            }
+            let kept = best.keeps.least(&target);
+            let least = kept.with(&target, |kept_m, target_m| {
+                kept_m + share * (target_m - kept_m)
+            });
+            match look(&least, SHARE, &mut effort).filter(|found| gains(&best, found, &target)) {
+                Some(found) => best = found,
+                None => share *= 0.5,
             }
         }
-        let Some((turns, transfer, trajectory)) = chosen else {
-            rejections.push(Rejection {
-                rule: Rule::JointLimit,
-                value: limits.margin(&line.start()),
-                limit: 0.0,
-                unit: "1",
-                detail: "the approach leaves the joint ranges".to_owned(),
-                class: None,
-            });
-            plan.candidate = Some(candidate);
-            plan.rejections = rejections;
-            return plan;
-        };
-        candidate.wrap = turns;
-        candidate.joints = trajectory.end();
+        effort.waypoints = if is_free(&best) { best.corners } else { 0 };
+        (best, Some(effort))
+    }
+
+    /// The plan of a posture with its motion.
+    pub(crate) fn planned(
+        &self,
+        configuration: Configuration,
+        required: Required,
+        way: Way,
+        straight: &Way,
+        search: Option<SearchEffort>,
+    ) -> ConfigurationPlan {
+        let limits = self.limits();
+        let mut candidate = required.candidate.clone();
+        candidate.wrap = way.turns;
+        candidate.joints = way.trajectory.end();
         // Whole turns change the margin to the joint limits.
         candidate.margins = self.margins(&candidate.joints);
-        // A posture that collides says so already; the motion into it adds nothing.
-        let known = rejections
+        let parts = required.parts(&way);
+        let end = if !self.is_worth_a_search(&required) {
+            SearchEnd::Proof
+        } else if required.is_reached_by(&way) {
+            SearchEnd::Bound
+        } else {
+            SearchEnd::Budget
+        };
+        let begins_s = way
+            .trajectory
+            .phases()
             .iter()
-            .any(|rejection| rejection.rule == Rule::Collision);
-        match first_failure {
-            Some(violation) if !known => {
-                rejections.push(self.blocked(&violation, plan.search.as_ref()));
-            }
-            Some(_) => {}
-            None => {
-                plan.retreat = Some(self.retreat(&transfer, &line.shifted(&shift(&turns))));
-            }
+            .find(|phase| phase.0 == Phase::Approach)
+            .map_or(0.0, |phase| phase.1);
+        let approach = required.approach.clone().later_by(begins_s);
+        let is_around = matches!(way.transfer, Transfer::Around(_)) || way.turns != straight.turns;
+        let straight = is_around.then(|| Straight {
+            clearance_m: required.achieved(straight).of_surroundings_m(),
+            instead_m: required.achieved(&way).of_surroundings_m(),
+            duration_s: straight.trajectory.duration_s(),
+        });
+        let mut rejections = required.rejections.clone();
+        // A posture that breaks a rule says so already; the motion into it adds nothing.
+        if rejections.is_empty() {
+            rejections.extend(self.too_near(&required, &way, &approach, search.as_ref()));
         }
-        rejections.sort_by_key(|rejection| rejection.rule);
-        plan.candidate = Some(candidate);
-        plan.rejections = rejections;
-        plan.trajectory = Some(trajectory);
-        plan
+        let retreat = rejections.is_empty().then(|| {
+            let line = required.line.shifted(&shift(&way.turns));
+            self.retreat(&way.transfer, &line)
+        });
+        ConfigurationPlan {
+            configuration,
+            candidate: Some(candidate),
+            rejections,
+            retreat,
+            search,
+            margin: Some(parts.margin(limits, end, straight)),
+            certificate: Some(way.certificate.and(&approach)),
+            trajectory: Some(way.trajectory),
+        }
+    }
+
+    /// Why a motion is rejected: first what every motion to this posture does, then what the transfer
+    /// does, each at its deepest.
+    fn too_near(
+        &self,
+        required: &Required,
+        way: &Way,
+        approach: &MotionCertificate,
+        search: Option<&SearchEffort>,
+    ) -> Option<Rejection> {
+        if let Some(pair) = self.checker.posture(self.start()).1 {
+            let (a, b) = pair.solid_names(self.cell());
+            return Some(Rejection {
+                rule: Rule::Collision,
+                value: pair.separation.distance_m,
+                limit: self.limits().get(pair.class).floor_m,
+                unit: "m",
+                detail: format!(
+                    "{a} and {b} in the start posture: every motion begins there; another start would \
+                     free it"
+                ),
+                class: Some(pair.class),
+            });
+        }
+        if let Some(found) = self.deepest(approach) {
+            let (a, b) = found.attained.solid_names(self.cell());
+            let class = found.attained.class;
+            return Some(Rejection {
+                rule: Rule::Collision,
+                value: found
+                    .lower_bound_m
+                    .min(found.attained.separation.distance_m),
+                limit: self.limits().get(class).floor_m,
+                unit: "m",
+                detail: format!(
+                    "{a} and {b} in the {} at {:.2} s, at their nearest: the way along the needle, which no \
+                     transfer changes; another roll, a shorter `approach_mm` or another base may free it",
+                    found.phase.name(),
+                    found.time_s
+                ),
+                class: Some(class),
+            });
+        }
+        let found = self.deepest(&way.certificate)?;
+        let (a, b) = found.attained.solid_names(self.cell());
+        let class = found.attained.class;
+        let place = format!(
+            "{a} and {b} in the {} at {:.2} s, at their nearest",
+            found.phase.name(),
+            found.time_s
+        );
+        let kept_mm = required.attainable().get(class) * 1e3;
+        let (rule, detail) = match search {
+            Some(effort) => (
+                Rule::NoMotion,
+                format!(
+                    "no way around was found among {} random postures ({} looked at); the straight \
+                     motion is blocked by {place}; start and approach keep {kept_mm:.1} mm there: more \
+                     `motion_checks`, another start or another base may free it",
+                    effort.samples, effort.checks
+                ),
+            ),
+            None => (
+                Rule::Collision,
+                format!(
+                    "{place}; start and approach keep {kept_mm:.1} mm: a way around (`motion_checks`) may \
+                     free it"
+                ),
+            ),
+        };
+        Some(Rejection {
+            rule,
+            value: found
+                .lower_bound_m
+                .min(found.attained.separation.distance_m),
+            limit: self.limits().get(class).floor_m,
+            unit: "m",
+            detail,
+            class: Some(class),
+        })
+    }
+
+    /// The class that is farthest below its floor along a motion, if any is.
+    fn deepest<'c>(&self, certificate: &'c MotionCertificate) -> Option<&'c ClassCertificate> {
+        certificate
+            .iter()
+            .filter(|(class, _)| class.is_physical())
+            .map(|(class, found)| {
+                (
+                    found,
+                    found.lower_bound_m - self.limits().get(class).floor_m,
+                )
+            })
+            .filter(|(_, excess_m)| *excess_m < 0.0)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(found, _)| found)
     }
 
     /// The last, straight part of a posture's motion alone: along the needle to its place, without
@@ -225,62 +529,73 @@ impl Planner<'_> {
         }
     }
 
-    /// Searches a way around to the beginning of the approach in any of its whole-turn images.
+    /// Searches a way around that keeps some clearances, to the beginning of the approach in any of its
+    /// whole-turn images; and the number of postures that it took.
     fn way_around(
         &self,
-        goal: &Goal,
-        configuration: Configuration,
-        line: &JointPath,
-        wraps: &[[i32; JOINT_COUNT]],
+        required: &Required,
+        least: &ByClass,
+        effort: &mut SearchEffort,
         checks: u64,
-    ) -> (Option<Around>, SearchEffort) {
-        let seed = seed_of(self.resolved.scenario.seed, &goal.name, configuration);
+    ) -> (Option<Way>, u64) {
+        // Certificates are no wider than this, and what is between two postures is little nearer; but
+        // what is as near as allowed could not be proven free.
+        let floors = self.limits().floors();
+        let sampled = least
+            .with(&floors, |least_m, floor_m| {
+                (least_m - 0.5 * SAME_M).max(floor_m + SAME_M)
+            })
+            .least(
+                &required
+                    .target
+                    .with(&floors, |target_m, _| target_m - 0.5 * SAME_M),
+            );
         let mut search = TransferSearch::new(
             &self.checker,
             &self.cell().robot.limits,
             self.resolved.motion.velocity,
-            seed,
+            effort.seed,
+            sampled,
             Budget { checks },
         );
+        let wraps = &required.wraps;
         let goals: Vec<Joints> = wraps
             .iter()
-            .map(|turns| line.start() + shift(turns))
+            .map(|turns| required.line.start() + shift(turns))
             .collect();
-        let found = search
-            .search(&self.resolved.start, &goals)
-            .and_then(|found| {
-                let waypoints = search.shortened(found.waypoints);
-                let turns = wraps[found.goal];
-                let (paths, trajectory) =
-                    self.rounded(&waypoints, &line.shifted(&shift(&turns)))?;
-                let around = Around {
-                    turns,
-                    paths,
-                    trajectory,
-                };
-                Some((around, waypoints.len()))
-            });
-        let effort = SearchEffort {
-            waypoints: found.as_ref().map_or(0, |(_, waypoints)| *waypoints),
-            checks: search.checks,
-            samples: search.samples,
-            seed,
-        };
-        (found.map(|(around, _)| around), effort)
+        let found = search.search(self.start(), &goals).and_then(|found| {
+            let waypoints = search.shortened(found.waypoints);
+            self.rounded(required, &waypoints, wraps[found.goal], least)
+        });
+        effort.checks += search.checks;
+        effort.samples += search.samples;
+        (found, search.checks)
     }
 
-    /// The way through the waypoints with its corners rounded as much as stays free.
+    /// The way through the waypoints with its corners rounded as much as leaves the clearances; where none
+    /// does, the one that keeps most.
     fn rounded(
         &self,
+        required: &Required,
         waypoints: &[Joints],
-        line: &JointPath,
-    ) -> Option<(Vec<JointPath>, JointTrajectory)> {
-        ROUNDINGS.into_iter().find_map(|rounding| {
+        turns: [i32; JOINT_COUNT],
+        least: &ByClass,
+    ) -> Option<Way> {
+        let line = required.line.shifted(&shift(&turns));
+        let mut best: Option<(f64, Way)> = None;
+        for rounding in ROUNDINGS {
             let paths = self.fastest(waypoints, rounding)?;
-            let trajectory = self.motion(&Transfer::Around(paths.clone()), line);
-            let free = self.checker.first_collision(&trajectory).is_none();
-            free.then_some((paths, trajectory))
-        })
+            let transfer = Transfer::Around(paths);
+            let way = self.certified(required, turns, transfer, &line, waypoints.len());
+            let lack_m = way.keeps.most_below(least);
+            if lack_m <= SAME_M && way.keeps.most_below(&self.limits().floors()) <= 0.0 {
+                return Some(way);
+            }
+            if best.as_ref().is_none_or(|(known_m, _)| lack_m < *known_m) {
+                best = Some((lack_m, way));
+            }
+        }
+        best.map(|(_, way)| way)
     }
 
     /// Paths through the waypoints, with stops at those corners where stopping takes less time than
@@ -328,37 +643,6 @@ impl Planner<'_> {
         }
     }
 
-    fn blocked(&self, violation: &Violation, search: Option<&SearchEffort>) -> Rejection {
-        let (a, b) = violation.pair.solid_names(self.cell());
-        let place = format!(
-            "{a} and {b} in the {} at {:.2} s",
-            violation.phase.name(),
-            violation.time_s
-        );
-        match search {
-            Some(effort) => Rejection {
-                rule: Rule::NoMotion,
-                value: violation.pair.separation.distance_m,
-                limit: violation.limit_m,
-                unit: "m",
-                detail: format!(
-                    "no way around was found among {} random postures ({} looked at); the straight \
-                     motion is blocked by {place}",
-                    effort.samples, effort.checks
-                ),
-                class: Some(violation.pair.class),
-            },
-            None => Rejection {
-                rule: Rule::Collision,
-                value: violation.pair.separation.distance_m,
-                limit: violation.limit_m,
-                unit: "m",
-                detail: place,
-                class: Some(violation.pair.class),
-            },
-        }
-    }
-
     /// Whole turns that keep the approach inside the joint ranges, shortest transfer first; at most
     /// one either way.
     fn wraps(&self, line: &JointPath) -> Vec<[i32; JOINT_COUNT]> {
@@ -377,6 +661,13 @@ impl Planner<'_> {
             .map(|wrap| wrap.turns)
             .collect()
     }
+}
+
+/// Whether a way comes nearer to what is wanted than a known one by more than what a longer motion is worth,
+/// or keeps as much in less time.
+fn gains(known: &Way, found: &Way, target: &ByClass) -> bool {
+    let missing_m = |way: &Way| way.keeps.most_below(target).max(0.0);
+    missing_m(found) < missing_m(known) - LEAST_GAIN_M
 }
 
 fn shift(turns: &[i32; JOINT_COUNT]) -> Joints {

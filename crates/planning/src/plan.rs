@@ -1,12 +1,17 @@
 //! The plan of a goal: for each configuration the best posture to which there is a motion.
 
+use std::cmp::Ordering;
+
 use needlebench_cell::{Goal, Roll};
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 
-use crate::family::Member;
-use crate::motion_plan::ConfigurationPlan;
+use crate::family::{Member, Merit};
+use crate::limits::{ByClass, Shortfall};
+use crate::margin::SAME_M;
+use crate::motion_plan::{ConfigurationPlan, Required, Way};
 use crate::planner::{Candidate, Planner};
-use crate::{Rejection, Rule, route_rejection};
+use crate::{Rejection, route_rejection};
+
 /// All eight configurations of one goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GoalPlan {
@@ -109,16 +114,17 @@ impl Planner<'_> {
         members.extend(of_grid.cloned());
         // Equal ones stay in the order of roll.
         if some_work {
-            members.sort_by(|a, b| {
-                let value = |member: &Member| {
-                    let candidate = member.candidate.as_ref();
-                    candidate.map_or(f64::NEG_INFINITY, |each| self.value(goal, aim, each))
-                };
-                value(b).total_cmp(&value(a))
-            });
-        } else {
-            members.sort_by(|a, b| b.surplus.total_cmp(&a.surplus));
+            let mut rated: Vec<(Merit, Member)> = members
+                .into_iter()
+                .filter_map(|member| {
+                    let merit = self.merit(goal, aim, member.candidate.as_ref()?);
+                    Some((merit, member))
+                })
+                .collect();
+            rated.sort_by(|(a, _), (b, _)| a.better_first(b));
+            return rated.into_iter().map(|(_, member)| member).collect();
         }
+        members.sort_by(|a, b| b.surplus.total_cmp(&a.surplus));
         members
     }
 
@@ -134,62 +140,79 @@ impl Planner<'_> {
             .filter_map(|member| Some((member.candidate?, member.rejections)))
             .collect();
         if candidates.is_empty() {
-            let rejections = nearest(grid).rejections;
             return ConfigurationPlan {
-                configuration,
-                candidate: None,
-                rejections,
-                trajectory: None,
-                retreat: None,
-                search: None,
+                rejections: nearest(grid).rejections,
+                ..ConfigurationPlan::nothing(configuration)
             };
         }
-        let mut best: Option<ConfigurationPlan> = None;
-        let mut blocked = Vec::new();
+        let limits = self.limits();
+        let mut checks_left = u64::from(self.planning().motion_checks);
+        let mut tried: Vec<(Required, Way)> = Vec::new();
+        let mut without_line = None;
         for (candidate, rejections) in spread_over_rolls(candidates).into_iter().take(MOTION_TRIES)
         {
             // The best posture breaks a rule, so all do: one motion shows what would happen.
             let hopeless = !rejections.is_empty();
-            let plan = self.plan_motion(goal, configuration, candidate.clone(), rejections, None);
-            if plan.rejections.is_empty() {
-                return plan;
-            }
+            let posture = ByClass::of_posture(&candidate.clearance);
+            let required = match self.required(goal, configuration, candidate, rejections) {
+                Ok(required) => required,
+                Err(plan) => {
+                    if hopeless {
+                        return *plan;
+                    }
+                    without_line.get_or_insert(plan);
+                    continue;
+                }
+            };
+            let straight = self.straight(&required);
             if hopeless {
-                return best.unwrap_or(plan);
+                return self.planned(configuration, required, straight.clone(), &straight, None);
             }
-            blocked.push(candidate);
-            let better = best
-                .as_ref()
-                .is_none_or(|known| plan.trajectory.is_some() && known.trajectory.is_none());
-            if better {
-                best = Some(plan);
+            // What this posture could keep at best, and what comes of it.
+            let possible = limits.shortfall(&posture.least(self.start_clearance()));
+            let comes = limits.shortfall(&required.achieved(&straight));
+            if self.is_free(&required.achieved(&straight)) && comes.reaches(&possible, SAME_M) {
+                let known = straight.clone();
+                let (way, search) =
+                    self.improved(goal, configuration, &required, straight, &mut checks_left);
+                return self.planned(configuration, required, way, &known, search);
             }
+            tried.push((required, straight));
         }
-        // No straight motion to any of them: a way around is searched for the best ones.
-        let mut checks_left = u64::from(self.planning().motion_checks);
-        for candidate in blocked.into_iter().take(SEARCH_TRIES) {
-            if checks_left == 0 {
-                break;
-            }
-            let plan = self.plan_motion(
-                goal,
-                configuration,
-                candidate,
-                Vec::new(),
-                Some(&mut checks_left),
-            );
-            if plan.rejections.is_empty() {
+        // No straight way keeps what its posture does: ways around are searched for those that may keep
+        // most.
+        tried.sort_by(|(a, _), (b, _)| {
+            let possible = |required: &Required| limits.shortfall(&required.attainable());
+            let (a, b) = (possible(a), possible(b));
+            b.partial_cmp(&a).unwrap_or(Ordering::Equal)
+        });
+        let mut best: Option<(bool, Shortfall, ConfigurationPlan)> = None;
+        for (required, straight) in tried.into_iter().take(SEARCH_TRIES) {
+            let possible = limits.shortfall(&required.attainable());
+            let known = straight.clone();
+            let (way, search) =
+                self.improved(goal, configuration, &required, straight, &mut checks_left);
+            let achieved = required.achieved(&way);
+            let (is_free, comes) = (self.is_free(&achieved), limits.shortfall(&achieved));
+            let plan = self.planned(configuration, required, way, &known, search);
+            if is_free && comes.reaches(&possible, SAME_M) {
                 return plan;
             }
-            let searched = plan.rejections[0].rule == Rule::NoMotion;
-            let better = best
+            let is_better = best
                 .as_ref()
-                .is_none_or(|known| searched && known.rejections[0].rule != Rule::NoMotion);
-            if better {
-                best = Some(plan);
+                .is_none_or(|(free, known, _)| (is_free, comes) > (*free, *known));
+            if is_better {
+                best = Some((is_free, comes, plan));
             }
         }
-        best.expect("there is at least one candidate")
+        best.map(|(_, _, plan)| plan)
+            .or(without_line.map(|plan| *plan))
+            .expect("there is at least one candidate")
+    }
+
+    /// Nothing is below its floor.
+    fn is_free(&self, clearance: &ByClass) -> bool {
+        clearance.most_below(&self.limits().floors()) <= 0.0
     }
 }
 

@@ -1,6 +1,7 @@
 //! What plans are made with: the solver, the checker, and one posture with what can be said of it.
 
 use std::f64::consts::TAU;
+use std::sync::OnceLock;
 
 use needlebench_cell::scenario::PlanningSection;
 use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, Roll};
@@ -8,6 +9,7 @@ use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
+use crate::limits::{ByClass, ClassLimits};
 use crate::motion::MotionChecker;
 use crate::{Rejection, Rule};
 /// Where a final posture stands between its limits and singularities.
@@ -54,6 +56,8 @@ pub struct Planner<'a> {
     pub(crate) checker: MotionChecker<'a>,
     /// Keys of the scenario's `[ranking]` with weights and utilities.
     ranking_aims: Vec<(&'static str, needlebench_cell::ranking::Aim)>,
+    /// Least clearances of the start posture, of bodies alone; found when a motion is planned.
+    start_clearance: OnceLock<ByClass>,
 }
 
 impl<'a> Planner<'a> {
@@ -73,11 +77,11 @@ impl<'a> Planner<'a> {
             checker: MotionChecker::new(
                 &resolved.cell,
                 clearance,
-                planning.min_clearance_mm * 1e-3,
-                planning.min_self_clearance_mm * 1e-3,
-                planning.sample_spacing_mm * 1e-3,
+                ClassLimits::of(&resolved.scenario),
+                planning,
             ),
             ranking_aims: resolved.scenario.ranking.aims().to_vec(),
+            start_clearance: OnceLock::new(),
         })
     }
 
@@ -89,6 +93,14 @@ impl<'a> Planner<'a> {
         &self.resolved.start
     }
 
+    /// Least clearances of the start posture.
+    pub(crate) fn start_clearance(&self) -> &ByClass {
+        self.start_clearance.get_or_init(|| {
+            let minima = self.checker.model.minimum_per_class(self.start());
+            ByClass::of_posture(&minima).of_bodies()
+        })
+    }
+
     pub(crate) fn planning(&self) -> &PlanningSection {
         &self.resolved.scenario.planning
     }
@@ -97,9 +109,9 @@ impl<'a> Planner<'a> {
         &self.ranking_aims
     }
 
-    /// Least clearance that a class of physical bodies may have, m.
-    pub(crate) fn limit_m(&self, class: ClearanceClass) -> f64 {
-        self.checker.limit_m(class)
+    /// What clearances may be and ought to be.
+    pub fn limits(&self) -> &ClassLimits {
+        &self.checker.limits
     }
 
     /// The solver, for callers that need poses of their own.

@@ -9,6 +9,7 @@
 use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{JOINT_COUNT, JointLimits, Joints};
 
+use crate::limits::ByClass;
 use crate::motion::MotionChecker;
 
 /// What a search may cost.
@@ -36,6 +37,8 @@ pub(crate) struct TransferSearch<'s> {
     speed: Joints,
     random: SplitMix64,
     budget: Budget,
+    /// Clearances that every posture has to keep.
+    least_m: ByClass,
     /// Postures looked at so far.
     pub checks: u64,
     /// Random postures drawn so far.
@@ -46,6 +49,8 @@ pub(crate) struct TransferSearch<'s> {
 const MOST_NODES: usize = 20_000;
 /// Motion of any point by which a tree grows at most in one step, m.
 const STEP_M: f64 = 0.5;
+/// Part of a step that is tried where all of it is blocked.
+const SHORT: f64 = 0.2;
 /// Margin around the box of start and goals from which postures are drawn at first, rad, and how
 /// much it grows with each posture drawn.
 const FIRST_MARGIN_RAD: f64 = 0.6;
@@ -72,6 +77,7 @@ impl<'s> TransferSearch<'s> {
         limits: &'s JointLimits,
         speed: Joints,
         seed: u64,
+        least_m: ByClass,
         budget: Budget,
     ) -> Self {
         Self {
@@ -80,6 +86,7 @@ impl<'s> TransferSearch<'s> {
             speed,
             random: SplitMix64::new(seed),
             budget,
+            least_m,
             checks: 0,
             samples: 0,
         }
@@ -193,14 +200,19 @@ impl<'s> TransferSearch<'s> {
         if way_m <= 0.0 {
             return Growth::Reached(nearest);
         }
-        let reaches = way_m <= STEP_M;
-        let to = if reaches {
+        let mut reaches = way_m <= STEP_M;
+        let mut to = if reaches {
             *towards
         } else {
             from + (towards - from) * (STEP_M / way_m)
         };
         if !self.is_free(&from, &to) {
-            return Growth::Blocked;
+            // In narrow places a short step may do; a blocked long one shows early and costs little.
+            reaches = false;
+            to = from + (to - from) * SHORT;
+            if !self.is_free(&from, &to) {
+                return Growth::Blocked;
+            }
         }
         tree.push(Node {
             position: to,
@@ -236,7 +248,7 @@ impl<'s> TransferSearch<'s> {
 
     /// Whether the straight way between two postures is free, its first end excepted.
     fn is_free(&mut self, from: &Joints, to: &Joints) -> bool {
-        let (free, checks) = self.checker.is_straight_free(from, to);
+        let (free, checks) = self.checker.keeps_straight(from, to, &self.least_m);
         self.checks += checks;
         free
     }

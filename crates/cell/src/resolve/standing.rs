@@ -452,7 +452,7 @@ pub(super) fn check_distance(
 /// Criteria on things that the scenario does not have: nobody would judge them.
 pub(super) fn note_idle_criteria(scenario: &Scenario, notes: &mut Vec<String>) {
     for class in ClearanceClass::ALL {
-        let is_judged = scenario.criteria.min_clearance_mm.of(class).is_some();
+        let is_judged = scenario.criteria.min_clearance_mm.least_mm(class).is_some();
         if let (true, Some((section, false))) = (is_judged, scenario.section_of(class)) {
             notes.push(format!(
                 "`criteria.min_clearance_mm.{}` judges nothing: there is no {section}",

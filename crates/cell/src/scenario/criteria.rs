@@ -57,8 +57,8 @@ pub struct ClearanceCriteria {
 }
 
 impl ClearanceCriteria {
-    /// The least clearance of a class, mm; none if it is not judged.
-    pub fn of(&self, class: ClearanceClass) -> Option<f64> {
+    /// Least clearance of a class, mm; `None` if it is not judged.
+    pub fn least_mm(&self, class: ClearanceClass) -> Option<f64> {
         match class {
             ClearanceClass::RobotPhantom => self.robot_phantom,
             ClearanceClass::RobotTable => self.robot_table,

@@ -97,13 +97,20 @@ impl Default for NeedleRouteSection {
 #[serde(deny_unknown_fields, default)]
 pub struct PlanningSection {
     /// Clearance of arm and tool from their surroundings below which a posture or motion is
-    /// rejected, mm.
+    /// rejected, mm: the floor of all classes. What `[criteria]` wants of a class beyond it is planned
+    /// for, and missing that fails a configuration but does not reject it.
     #[schemars(range(min = 0.0, max = 200.0))]
     pub min_clearance_mm: f64,
     /// Clearance of arm and tool from themselves below which a posture or motion is rejected, mm.
     /// Forearm and wrist 2 are about 10 mm apart in most postures.
     #[schemars(range(min = 0.0, max = 200.0))]
     pub min_self_clearance_mm: f64,
+    /// What postures and motions are planned to keep beyond what `[criteria]` or the floors want of
+    /// each class, where they can, mm: criteria are judged by proven bounds of simulated motions, which
+    /// are off the planned ones by the certificate's tolerance (0.1) and by the servo's tracking (assumed
+    /// below 0.9).
+    #[schemars(range(min = 0.0, max = 50.0))]
+    pub clearance_reserve_mm: f64,
     /// `|sin q5|` and `|sin q3|` below which the final posture is rejected as singular.
     #[schemars(range(min = 0.0, max = 0.9))]
     pub min_singularity_sine: f64,
@@ -129,8 +136,9 @@ pub struct PlanningSection {
     #[schemars(range(min = 0.1, max = 100.0))]
     pub sample_spacing_mm: f64,
     /// Postures that the search for a motion may look at per configuration, where the straight joint
-    /// motion is blocked; 0 for straight motions only. A count, not a time: results are the same on
-    /// every machine. A posture takes about 10 us.
+    /// motion is blocked or comes nearer to anything than the postures that it joins; 0 for straight
+    /// motions only. A count, not a time: results are the same on every machine. A posture takes about
+    /// 10 us.
     pub motion_checks: u32,
     /// Distance between the least clearance found along a motion and its proven lower bound that
     /// is aimed at, mm.
@@ -143,6 +151,7 @@ impl Default for PlanningSection {
         Self {
             min_clearance_mm: 0.0,
             min_self_clearance_mm: 0.0,
+            clearance_reserve_mm: 1.0,
             min_singularity_sine: 0.01,
             min_shoulder_distance_mm: 5.0,
             require_needle_corridor: true,

@@ -189,6 +189,41 @@ impl MotionCertificate {
         self.classes[class as usize].as_ref()
     }
 
+    /// The same of a motion that begins later.
+    #[must_use]
+    pub fn later_by(mut self, delay_s: f64) -> Self {
+        for class in self.classes.iter_mut().flatten() {
+            class.time_s += delay_s;
+        }
+        self
+    }
+
+    /// Of two motions together: the nearer of what is attained, the lesser bound.
+    #[must_use]
+    pub fn and(mut self, other: &Self) -> Self {
+        for (mine, other) in self.classes.iter_mut().zip(&other.classes) {
+            let (Some(one), Some(two)) = (*mine, other) else {
+                *mine = mine.or(*other);
+                continue;
+            };
+            let nearer = if two.attained.separation.distance_m < one.attained.separation.distance_m
+            {
+                *two
+            } else {
+                one
+            };
+            *mine = Some(ClassCertificate {
+                lower_bound_m: one.lower_bound_m.min(two.lower_bound_m),
+                ..nearer
+            });
+        }
+        self.effort.postures += other.effort.postures;
+        self.effort.intervals += other.effort.intervals;
+        self.effort.distances += other.effort.distances;
+        self.effort.planes += other.effort.planes;
+        self
+    }
+
     /// All classes, in the order of [`ClearanceClass`].
     pub fn iter(&self) -> impl Iterator<Item = (ClearanceClass, &ClassCertificate)> {
         let found = self.classes.iter().flatten();
@@ -206,7 +241,27 @@ pub fn certify(
     motion: &impl Motion,
     options: &CertificateOptions,
 ) -> MotionCertificate {
-    search::certify(model, motion, options, &[], 1.0)
+    search::certify(
+        model,
+        motion,
+        options,
+        &[],
+        [f64::INFINITY; CLASS_COUNT],
+        1.0,
+    )
+}
+
+/// [`certify`] as far as it matters: a class is known to the tolerance where it comes nearer than
+/// `enough_m` of it, and else its lower bound is at least that less the tolerance. Much of the work is
+/// left out where little is enough; nothing is asked of a class with negative infinity.
+pub fn certify_enough(
+    model: &ClearanceModel,
+    motion: &impl Motion,
+    options: &CertificateOptions,
+    enough_m: impl Fn(ClearanceClass) -> f64,
+) -> MotionCertificate {
+    let enough_m = ClearanceClass::ALL.map(enough_m);
+    search::certify(model, motion, options, &[], enough_m, 1.0)
 }
 
 /// [`certify`], whose attained clearances are at most those at any of the given times (s, in
@@ -220,5 +275,12 @@ pub fn certify_sampled(
     options: &CertificateOptions,
     samples_s: &[f64],
 ) -> MotionCertificate {
-    search::certify(model, motion, options, samples_s, 1.0)
+    search::certify(
+        model,
+        motion,
+        options,
+        samples_s,
+        [f64::INFINITY; CLASS_COUNT],
+        1.0,
+    )
 }

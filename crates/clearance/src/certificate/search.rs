@@ -174,6 +174,8 @@ struct Search<'m, M> {
     couples: Vec<Couple<'m>>,
     postures: Vec<Posture>,
     classes: [Option<ClassCertificate>; CLASS_COUNT],
+    /// Clearances beyond which nobody asks for more, m.
+    enough_m: [f64; CLASS_COUNT],
     will_sample: bool,
     closed: Vec<Closed>,
     effort: Effort,
@@ -185,6 +187,7 @@ pub(super) fn certify<M: Motion>(
     motion: &M,
     options: &CertificateOptions,
     samples_s: &[f64],
+    enough_m: [f64; CLASS_COUNT],
     length_scale: f64,
 ) -> MotionCertificate {
     let mut search = Search {
@@ -196,6 +199,7 @@ pub(super) fn certify<M: Motion>(
         couples: couples(model),
         postures: Vec::new(),
         classes: [None; CLASS_COUNT],
+        enough_m,
         will_sample: !samples_s.is_empty(),
         closed: Vec::new(),
         effort: Effort::default(),
@@ -295,10 +299,14 @@ impl<M: Motion> Search<'_, M> {
         }
     }
 
+    /// What matters of a class is less than this: what has been attained, or what is enough.
     fn attained_m(&self, class: ClearanceClass) -> f64 {
+        let enough_m = self.enough_m[class as usize];
         self.classes[class as usize]
             .as_ref()
-            .map_or(f64::INFINITY, |known| known.attained.separation.distance_m)
+            .map_or(enough_m, |known| {
+                known.attained.separation.distance_m.min(enough_m)
+            })
     }
 
     /// Counts a bound that holds over an interval.

@@ -8,7 +8,7 @@ use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use super::motion::{Motion, RecordedMotion, Span};
 use super::search;
 use super::{CertificateOptions, ClassCertificate, MotionBound, MotionCertificate, certify};
-use crate::model::ClearanceModel;
+use crate::model::{CLASS_COUNT, ClearanceModel};
 
 #[path = "../../tests/clearance/common/motions.rs"]
 mod motions;
@@ -213,11 +213,13 @@ fn lengths_that_are_too_short_are_refuted() {
         ..CertificateOptions::default()
     };
     let swings = swings(&resolved, 40);
+    let unlimited = [f64::INFINITY; CLASS_COUNT];
     let worst_m = |length_scale: f64| {
         swings
             .iter()
             .map(|motion| {
-                let certificate = search::certify(&model, motion, &options, &[], length_scale);
+                let certificate =
+                    search::certify(&model, motion, &options, &[], unlimited, length_scale);
                 refutation_m(&sampled(&model, motion, &certificate, 60, 4))
             })
             .fold(f64::NEG_INFINITY, f64::max)

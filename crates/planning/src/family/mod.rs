@@ -17,13 +17,14 @@
 mod aim;
 mod ranges;
 
-use needlebench_cell::{ClearanceClass, Goal};
+use needlebench_cell::Goal;
 use needlebench_kinematics::ik::{Configuration, Solutions};
 
 pub use aim::Aim;
 pub use ranges::{Best, EDGE_RAD, Edge, Family, RollRange};
 
-use crate::planner::{Candidate, Planner, absent};
+use crate::limits::{ByClass, Shortfall};
+use crate::planner::{Candidate, Planner, PostureMargins, absent};
 use crate::{Rejection, Rule};
 
 /// One configuration at one angle of the guide about the needle.
@@ -38,6 +39,46 @@ pub struct Member {
     /// Distance from breaking a rule, or how far the worst broken one is broken (negative): metres
     /// for clearances and reach, a tenth of a metre per unit for sines and radians.
     pub surplus: f64,
+}
+
+/// How good a posture is among those that break no rule; the order is that of preference.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub struct Merit {
+    /// Of clearances, and of distances from singularities in its reserve.
+    pub shortfall: Shortfall,
+    /// Value for the aim.
+    pub value: f64,
+}
+
+impl Merit {
+    /// Less than any other.
+    const NONE: Self = Self {
+        shortfall: Shortfall {
+            judged_m: f64::NEG_INFINITY,
+            reserve_m: f64::NEG_INFINITY,
+        },
+        value: f64::NEG_INFINITY,
+    };
+
+    /// Everything that will be judged, and can be judged by clearances, is met with its reserve.
+    fn meets_all(&self) -> bool {
+        self.shortfall == Shortfall::NONE
+    }
+
+    /// The better one first.
+    pub(crate) fn better_first(&self, other: &Self) -> std::cmp::Ordering {
+        other
+            .shortfall
+            .judged_m
+            .total_cmp(&self.shortfall.judged_m)
+            .then(
+                other
+                    .shortfall
+                    .reserve_m
+                    .total_cmp(&self.shortfall.reserve_m),
+            )
+            .then(other.value.total_cmp(&self.value))
+    }
 }
 
 /// Metres that a unit of a sine or a radian counts in a [`Member::surplus`]: about the lever of the
@@ -110,28 +151,46 @@ impl Planner<'_> {
         }
     }
 
+    /// Distances from the rules about singularities, m.
+    fn singular_surplus_m(&self, margins: &PostureMargins) -> [f64; 3] {
+        let planning = self.planning();
+        let sine = |sine: f64| METRES_PER_UNIT * (sine - planning.min_singularity_sine);
+        [
+            sine(margins.wrist_sine),
+            sine(margins.elbow_sine),
+            margins.shoulder_m - planning.min_shoulder_distance_mm * 1e-3,
+        ]
+    }
+
+    /// How good a posture is: first how little it falls short of the clearances that will be judged, then
+    /// of the reserve, from singularities too, and then by the aim. The order is that of preference.
+    pub fn merit(&self, goal: &Goal, aim: Aim, candidate: &Candidate) -> Merit {
+        let mut shortfall = self
+            .limits()
+            .shortfall(&ByClass::of_posture(&candidate.clearance));
+        let reserve_m = self.planning().clearance_reserve_mm * 1e-3;
+        shortfall.reserve_m += self
+            .singular_surplus_m(&candidate.margins)
+            .iter()
+            .map(|surplus_m| (surplus_m - reserve_m).min(0.0))
+            .sum::<f64>();
+        Merit {
+            shortfall,
+            value: self.value(goal, aim, candidate),
+        }
+    }
+
     /// Least distance of a posture from breaking a rule.
     ///
     /// Of `rejections` those for its joint limits and for what it misses count: the others say what
     /// the candidate's own numbers say.
     pub fn surplus(&self, candidate: &Candidate, rejections: &[Rejection]) -> f64 {
-        let planning = self.planning();
         let margins = &candidate.margins;
-        let clearances = candidate.clearance.iter().map(|pair| {
-            let limit_m = if pair.class.is_physical() {
-                self.limit_m(pair.class)
-            } else if pair.class == ClearanceClass::NeedleCorridor
-                && planning.require_needle_corridor
-            {
-                0.0
-            } else {
-                f64::NEG_INFINITY
-            };
-            pair.separation.distance_m - limit_m
-        });
-        let sines = [margins.wrist_sine, margins.elbow_sine]
-            .map(|sine| METRES_PER_UNIT * (sine - planning.min_singularity_sine));
-        let shoulder = margins.shoulder_m - planning.min_shoulder_distance_mm * 1e-3;
+        let clearances = candidate
+            .clearance
+            .iter()
+            .map(|pair| pair.separation.distance_m - self.limits().get(pair.class).floor_m);
+        let singular = self.singular_surplus_m(margins);
         let others = rejections
             .iter()
             .filter_map(|rejection| match rejection.rule {
@@ -142,8 +201,7 @@ impl Planner<'_> {
                 _ => None,
             });
         clearances
-            .chain(sines)
-            .chain([shoulder])
+            .chain(singular)
             .chain(others)
             .fold(f64::INFINITY, f64::min)
     }

@@ -6,7 +6,7 @@ use needlebench_cell::Goal;
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
-use super::{Aim, Member};
+use super::{Aim, Member, Merit};
 use crate::Rejection;
 use crate::planner::Planner;
 
@@ -225,7 +225,8 @@ impl Planner<'_> {
         }
     }
 
-    /// The best knot, refined between its neighbours.
+    /// The best knot, refined between its neighbours; where even that falls short of what will be judged,
+    /// the best of all knots that are better than their neighbours, each refined.
     fn best(
         &self,
         goal: &Goal,
@@ -234,39 +235,50 @@ impl Planner<'_> {
         whole: bool,
         aim: Aim,
     ) -> Best {
-        let value = |member: &Member| match &member.candidate {
-            Some(candidate) if member.works() => self.value(goal, aim, candidate),
-            _ => f64::NEG_INFINITY,
+        let merit = |member: &Member| match &member.candidate {
+            Some(candidate) if member.works() => self.merit(goal, aim, candidate),
+            _ => Merit::NONE,
         };
-        let (mut index, mut most) = (0, f64::NEG_INFINITY);
-        for (k, knot) in knots.iter().enumerate() {
-            let here = value(&knot.member);
-            if here > most {
-                (index, most) = (k, here);
-            }
-        }
-        let mut best = Best {
-            aim,
-            value: most,
-            member: knots[index].member.clone(),
-        };
+        let merits: Vec<Merit> = knots.iter().map(|knot| merit(&knot.member)).collect();
         let last = knots.len() - 1;
         let roll = |k: usize| knots[k].roll_rad;
-        let (low, high) = match (index, whole) {
-            (0, true) => (roll(last) - TAU, roll(1)),
-            (k, true) if k == last => (roll(last - 1), roll(0) + TAU),
-            (k, _) => (roll(k.saturating_sub(1)), roll((k + 1).min(last))),
-        };
-        golden(low, high, |roll_rad| {
-            let member = self.member_at(goal, configuration, roll_rad.rem_euclid(TAU));
-            let here = value(&member);
-            if here > best.value {
-                best.value = here;
-                best.member = member;
+        let mut peaks: Vec<usize> = (0..knots.len())
+            .filter(|&k| {
+                let (before, after) = match (k, whole) {
+                    (0, true) => (last, 1.min(last)),
+                    (k, true) if k == last => (last - 1, 0),
+                    (k, _) => (k.saturating_sub(1), (k + 1).min(last)),
+                };
+                merits[k] >= merits[before] && merits[k] >= merits[after]
+            })
+            .collect();
+        // Equal ones stay in the order of roll.
+        peaks.sort_by(|&a, &b| merits[a].better_first(&merits[b]));
+        let first = peaks.first().copied().unwrap_or(0);
+        let (mut most, mut member) = (merits[first], knots[first].member.clone());
+        for index in peaks {
+            let (low, high) = match (index, whole) {
+                (0, true) => (roll(last) - TAU, roll(1)),
+                (k, true) if k == last => (roll(last - 1), roll(0) + TAU),
+                (k, _) => (roll(k.saturating_sub(1)), roll((k + 1).min(last))),
+            };
+            golden(low, high, |roll_rad| {
+                let found = self.member_at(goal, configuration, roll_rad.rem_euclid(TAU));
+                let here = merit(&found);
+                if here > most {
+                    (most, member) = (here, found);
+                }
+                here
+            });
+            if most.meets_all() {
+                break;
             }
-            here
-        });
-        best
+        }
+        Best {
+            aim,
+            value: most.value,
+            member,
+        }
     }
 }
 
@@ -315,7 +327,7 @@ fn closer_look(grid: &[Member], at: &dyn Fn(f64) -> Member) -> Vec<Knot> {
 }
 
 /// Looks for the largest value between two rolls; `value` keeps what it finds.
-fn golden(mut low: f64, mut high: f64, mut value: impl FnMut(f64) -> f64) {
+fn golden<V: PartialOrd>(mut low: f64, mut high: f64, mut value: impl FnMut(f64) -> V) {
     const SECTION: f64 = 0.618_033_988_749_895;
     if high <= low {
         return;

@@ -2,5 +2,6 @@
 
 mod around;
 mod families;
+mod margins;
 mod plans;
 mod routes;

@@ -482,6 +482,42 @@ pub fn route_in_words(route: &RouteReport) -> String {
     )
 }
 
+/// What a planned motion does about clearance, where there is something to say: that it goes around, what
+/// that gains and takes, and where it keeps less than its posture allows.
+pub(crate) fn margin_in_words(configuration: &ConfigurationReport) -> Option<String> {
+    if !configuration.rejections.is_empty() {
+        return None;
+    }
+    let margin = configuration.margin.as_ref()?;
+    let mut words = Vec::new();
+    if let Some(straight) = &margin.straight {
+        let end_s = configuration.motion.last().map_or(0.0, |phase| phase.end_s);
+        words.push(format!(
+            "goes around: {:.1} mm instead of {:.1} mm, in {:.1} s instead of {:.1} s",
+            1e3 * straight.instead_m,
+            1e3 * straight.clearance_m,
+            end_s,
+            straight.duration_s
+        ));
+    }
+    if margin.search == "budget" {
+        let short = margin
+            .classes
+            .iter()
+            .filter(|(_, each)| each.limited_by == "transfer")
+            .min_by(|(_, a), (_, b)| a.achieved_m.total_cmp(&b.achieved_m));
+        if let Some((class, each)) = short {
+            words.push(format!(
+                "its transfer keeps {:.1} mm of the {:.1} mm attainable ({class}): the search ended by \
+                 `motion_checks`, a better way may exist",
+                1e3 * each.achieved_m,
+                1e3 * each.attainable_m
+            ));
+        }
+    }
+    (!words.is_empty()).then(|| words.join("; "))
+}
+
 fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::fmt::Result {
     if let Some(route) = &goal.needle_route {
         writeln!(out, "{}", route_in_words(route))?;
@@ -494,6 +530,11 @@ fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::f
                 "{}: {}: {value} (limit {limit}): {}",
                 configuration.label, rejection.rule, rejection.detail
             )?;
+        }
+    }
+    for configuration in &goal.configurations {
+        if let Some(words) = margin_in_words(configuration) {
+            writeln!(out, "{}: {words}", configuration.label)?;
         }
     }
     write_missed(out, report, &goal.name)?;

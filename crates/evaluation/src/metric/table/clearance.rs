@@ -357,6 +357,43 @@ pub(super) const NEEDLE_CORRIDOR: &[Metric] = {
     )
 };
 
+/// What the planned motion keeps of the clearance that its posture allows, and the way back.
+pub(super) const MARGIN: &[Metric] = &[
+    Metric::new(
+        "margin_attainable",
+        "margin, attainable",
+        "least clearance beyond what is judged, from phantom, table, gantry and mount, of the postures that \
+         every motion takes: the start, the approach and its end",
+        Length,
+        Configuration(|each| each.margin.as_ref()?.attainable_m),
+    )
+    .known(Certified, Nominal, PlannedMotion)
+    .better(More, CLEARANCE_RESOLUTION_M),
+    Metric::new(
+        "margin_planned",
+        "margin of the plan",
+        "least clearance beyond what is judged, from phantom, table, gantry and mount",
+        Length,
+        Configuration(|each| each.margin.as_ref()?.achieved_m),
+    )
+    .known(Certified, Nominal, PlannedMotion)
+    .better(More, CLEARANCE_RESOLUTION_M),
+    Metric::new(
+        "clearance_retreat",
+        "clearance, way back",
+        "least of the clearances of arm and tool from phantom, table, gantry and mount on the way back",
+        Length,
+        Configuration(|each| {
+            let classes = &each.retreat_clearance.classes;
+            surroundings()
+                .filter_map(|class| classes.get(class.name())?.certified_lower_bound_m)
+                .reduce(f64::min)
+        }),
+    )
+    .known(Certified, Nominal, PlannedMotion)
+    .better(More, CLEARANCE_RESOLUTION_M),
+];
+
 /// The same for all configurations, whatever the motion.
 pub(super) const NEEDLE_ROUTE: &[Metric] = &[Metric::new(
     "needle_route",

@@ -50,5 +50,6 @@ pub fn groups() -> &'static [&'static [Metric]] {
         clearance::GUIDE_TO_SKIN,
         clearance::NEEDLE_CORRIDOR,
         clearance::NEEDLE_ROUTE,
+        clearance::MARGIN,
     ]
 }
