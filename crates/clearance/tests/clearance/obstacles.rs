@@ -33,7 +33,9 @@ fn shape(variety: &mut Variety, kind: usize) -> Shape {
         },
         4 => {
             let half_m = Vector3::from_fn(|_, _| size(0.05, 0.3));
-            Shape::Convex(Arc::new(ConvexMesh(sample_solids::ellipsoid(9, 12, half_m))))
+            Shape::Convex(Arc::new(ConvexMesh(sample_solids::ellipsoid(
+                9, 12, half_m,
+            ))))
         }
         _ => {
             let mut surface = sample_solids::torus(20, 10);
@@ -81,7 +83,11 @@ fn exhaustive_m(cell: &Cell, q: &Joints) -> Vec<Option<f64>> {
     let prepared: Vec<Vec<PreparedShape>> = cell
         .bodies
         .iter()
-        .map(|body| body.solids.iter().map(|solid| PreparedShape::new(&solid.shape)))
+        .map(|body| {
+            body.solids
+                .iter()
+                .map(|solid| PreparedShape::new(&solid.shape))
+        })
         .map(Iterator::collect)
         .collect();
     let mut least_m = vec![None::<f64>; ClearanceClass::ALL.len()];
@@ -124,7 +130,10 @@ fn minima_among_obstacles_are_those_of_all_solids() {
                 let (Some(found), Some(expected)) = (found, expected) else {
                     continue;
                 };
-                assert!((found - expected).abs() <= REPRODUCED_M, "{class:?} {found} {expected}");
+                assert!(
+                    (found - expected).abs() <= REPRODUCED_M,
+                    "{class:?} {found} {expected}"
+                );
                 if class == ClearanceClass::RobotObstacle {
                     touching += usize::from(found < 0.0);
                     apart += usize::from(found > 0.0);
@@ -136,9 +145,15 @@ fn minima_among_obstacles_are_those_of_all_solids() {
             };
             let nearest_m = exhaustive_m[ClearanceClass::RobotObstacle as usize];
             let below = model.first_below(&q, limit_m);
-            assert_eq!(below.is_some(), nearest_m.is_some_and(|least_m| least_m < 0.02));
+            assert_eq!(
+                below.is_some(),
+                nearest_m.is_some_and(|least_m| least_m < 0.02)
+            );
             free_of_obstacles += usize::from(below.is_none());
         }
     }
-    assert!(touching > 8 && apart > 8 && free_of_obstacles > 8, "{touching} {apart}");
+    assert!(
+        touching > 8 && apart > 8 && free_of_obstacles > 8,
+        "{touching} {apart}"
+    );
 }
