@@ -1,8 +1,9 @@
 """The cell of a scenario, built from its files by Pinocchio and Coal.
 
-Place of the robot, joints, geometry of arm and tool come from the scenario's TOML and the URDF
-files, read by Python and Pinocchio. Phantom, table, gantry and mount, which needlebench makes from
-parameters, come from its export, and so does the size of the needle's corridor.
+Place of the robot, joints, geometry of arm and tool, and obstacles come from the scenario's TOML,
+the URDF and the STL files, read by Python and Pinocchio. Phantom, table, gantry and mount, which
+needlebench makes from parameters, come from its export, and so does the size of the needle's
+corridor.
 """
 
 import json
@@ -15,6 +16,7 @@ from pathlib import Path
 import coal
 import numpy as np
 import pinocchio as pin
+from obstacles import obstacle
 
 ROOT = Path(__file__).resolve().parents[3]
 JOINTS = [
@@ -178,10 +180,29 @@ def shape_difference_m(theirs: coal.CollisionGeometry, ours: dict) -> float:
         case "cylinder" if isinstance(theirs, coal.Cylinder):
             half = abs(theirs.halfLength - ours["half_length_m"])
             return max(abs(theirs.radius - ours["radius_m"]), half)
+        case "capsule" if isinstance(theirs, coal.Capsule):
+            half = abs(theirs.halfLength - ours["half_length_m"])
+            return max(abs(theirs.radius - ours["radius_m"]), half)
         case "cuboid" if isinstance(theirs, coal.Box):
             return float(np.abs(theirs.halfSide - np.array(ours["half_extents_m"])).max())
         case _:
             return math.inf
+
+
+def points_difference_m(corners: Array, ours: dict) -> float:
+    """How far points from a file are from the vertices of a shape that is made of them: of a mesh
+    every one is a vertex, of a hull the outermost in every direction."""
+    vertices = np.array(ours["vertices_m"])
+    if ours["kind"] == "mesh":
+        theirs = np.unique(corners, axis=0)
+        if len(theirs) != len(vertices) or len(corners) != 3 * len(ours["triangles"]):
+            return math.inf
+        order = [np.lexsort(np.round(each, 9).T) for each in (theirs, vertices)]
+        return float(np.abs(theirs[order[0]] - vertices[order[1]]).max())
+    directions = np.random.default_rng(1).normal(size=(2000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    reach = [(directions @ each.T).max(axis=1) for each in (corners, vertices)]
+    return float(np.abs(reach[0] - reach[1]).max())
 
 
 def numbers(values: list[float]) -> str:
@@ -235,7 +256,10 @@ def assembled_urdf(scenario: Path) -> tuple[str, set[str]]:
 def build_cell(header_file: Path) -> Cell:
     """Build the cell whose export is given."""
     header = json.loads(header_file.read_text())
-    xml, tool_links = assembled_urdf(ROOT / header["scenario"])
+    scenario = ROOT / header["scenario"]
+    settings = tomllib.loads(scenario.read_text())
+    sections = {each["name"]: each for each in settings.get("obstacles", [])}
+    xml, tool_links = assembled_urdf(scenario)
     model = pin.buildModelFromXML(xml)
     if list(model.names)[1:] != JOINTS or model.nq != len(JOINTS):
         raise ValueError(f"{header['name']}: joints {list(model.names)} with {model.nq} numbers")
@@ -258,6 +282,7 @@ def build_cell(header_file: Path) -> Cell:
     for index, body in enumerate(header["bodies"]):
         link = 0 if body["link"] is None else body["link"] + 1
         first_solid.append(len(solids))
+        section = sections.pop(body["name"], None) if link == 0 else None
         theirs = read.pop((body["kind"], link), None)
         if theirs is not None and len(theirs) != len(body["solids"]):
             raise ValueError(f"{body['name']}: {len(theirs)} solids in the URDF")
@@ -266,6 +291,14 @@ def build_cell(header_file: Path) -> Cell:
             if theirs is not None:
                 placement, shape = theirs[k].placement, theirs[k].geometry
                 worst_m = max(worst_m, shape_difference_m(shape, solid["shape"]))
+            elif section is not None:
+                placement, shape, corners = obstacle(section, settings, scenario.parent)
+                worst_m = max(
+                    worst_m,
+                    shape_difference_m(shape, solid["shape"])
+                    if corners is None
+                    else points_difference_m(corners, solid["shape"]),
+                )
             elif body["kind"] == "needle_corridor":
                 shape = coal_shape(solid["shape"])
                 # The cylinder of the corridor ends at the guide's entry, the hand cone's apex is there.
@@ -287,6 +320,8 @@ def build_cell(header_file: Path) -> Cell:
                     position=placement.translation.copy(),
                 )
             )
+    if missing := [name for name, each in sections.items() if each.get("present", True)]:
+        raise ValueError(f"needlebench has no obstacles {missing}")
     if read:
         raise ValueError(f"needlebench has no geometry for {sorted(read)}")
     pair_of = []

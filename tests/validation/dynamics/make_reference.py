@@ -63,6 +63,21 @@ CASES = [
         base_position_mm=(310.0, -240.0, 820.0),
         base_rpy_deg=(25.0, -40.0, 110.0),
     ),
+    Case(
+        name="hanging_arm_with_turned_tool",
+        robot=ROBOT,
+        tool=TOOL,
+        mount_rotation_deg=90.0,
+        base_position_mm=(-60.0, 330.0, 1560.0),
+        base_rpy_deg=(180.0, 0.0, 90.0),
+    ),
+    Case(
+        name="arm_with_tool_on_a_wall",
+        robot=ROBOT,
+        tool=TOOL,
+        base_position_mm=(-60.0, 330.0, 1560.0),
+        base_rpy_deg=(-90.0, 0.0, 20.0),
+    ),
     Case(name="other_frames", robot=OTHER_FRAMES),
 ]
 

@@ -1,5 +1,5 @@
-//! Both engines with the shipped models, robot, tool and surroundings as `scenarios/table3.toml`
-//! has them: against our kinematics and dynamics, and against each other.
+//! Both engines with the shipped models, robot, tool and surroundings as `scenarios/table3.toml` and
+//! `scenarios/hanging.toml` have them: against our kinematics and dynamics, and against each other.
 
 use std::f64::consts::PI;
 use std::path::Path;
@@ -35,11 +35,16 @@ const SETTLED_TIP_M: f64 = 1e-14;
 /// States for each comparison.
 const STATES: usize = 100;
 
-fn scenario() -> ResolvedScenario {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/table3.toml");
+/// A robot that stands, and one that hangs.
+const SCENARIOS: [&str; 2] = ["table3.toml", "hanging.toml"];
+
+fn scenario(name: &str) -> ResolvedScenario {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../scenarios")
+        .join(name);
     let text = std::fs::read_to_string(&file).unwrap();
     let base = file.parent().unwrap();
-    resolve_scenario("table3.toml", &text, base, &Overrides::default()).unwrap()
+    resolve_scenario(name, &text, base, &Overrides::default()).unwrap()
 }
 
 fn harness() -> HarnessProcess {
@@ -101,28 +106,35 @@ fn worst_pose(cell: &Cell, plant: &mut dyn Plant) -> f64 {
 
 #[test]
 fn engine_bodies_are_where_forward_kinematics_puts_them() {
-    let scenario = scenario();
     let mut harness = harness();
-    let (mut rapier, mut mujoco) = (rapier(&scenario), mujoco(&scenario, &mut harness));
-    let plants: [&mut dyn Plant; 2] = [&mut rapier, &mut mujoco];
-    for plant in plants {
-        let worst = worst_pose(&scenario.cell, plant);
-        println!("{}: {worst:e} m or rad", plant.identity().name);
-        assert!(worst < LINK_POSE, "{}: {worst:e}", plant.identity().name);
+    for name in SCENARIOS {
+        let scenario = scenario(name);
+        let (mut rapier, mut mujoco) = (rapier(&scenario), mujoco(&scenario, &mut harness));
+        let plants: [&mut dyn Plant; 2] = [&mut rapier, &mut mujoco];
+        for plant in plants {
+            let worst = worst_pose(&scenario.cell, plant);
+            println!("{name} {}: {worst:e} m or rad", plant.identity().name);
+            assert!(worst < LINK_POSE, "{}: {worst:e}", plant.identity().name);
+        }
     }
 }
 
 #[test]
 fn engines_have_the_dynamics_of_arm_and_tool() {
-    let scenario = scenario();
+    let mut harness = harness();
+    for name in SCENARIOS {
+        check_dynamics(&scenario(name), &mut harness);
+    }
+}
+
+fn check_dynamics(scenario: &ResolvedScenario, harness: &mut HarnessProcess) {
     let dynamics = scenario.cell.dynamics();
     let tool_kg = scenario.cell.tool.body.mass_kg;
     let wrist_3_kg = scenario.cell.robot.bodies[5].mass_kg;
     assert!(tool_kg > 0.1);
     assert!((dynamics.bodies[5].mass_kg - wrist_3_kg - tool_kg).abs() < 1e-15);
 
-    let mut harness = harness();
-    let (mut rapier, mut mujoco) = (rapier(&scenario), mujoco(&scenario, &mut harness));
+    let (mut rapier, mut mujoco) = (rapier(scenario), mujoco(scenario, harness));
     let mut random = Random(2);
     let mut worst = [0.0_f64; 4];
     for _ in 0..STATES {
@@ -172,14 +184,16 @@ fn worst_holding_torque(cell: &Cell, plant: &mut dyn Plant) -> f64 {
 
 #[test]
 fn gravity_torque_holds_arm_and_tool_still() {
-    let scenario = scenario();
     let mut harness = harness();
-    let (mut rapier, mut mujoco) = (rapier(&scenario), mujoco(&scenario, &mut harness));
-    let plants: [&mut dyn Plant; 2] = [&mut rapier, &mut mujoco];
-    for plant in plants {
-        let worst = worst_holding_torque(&scenario.cell, plant);
-        println!("{}: {worst:e} N m", plant.identity().name);
-        assert!(worst < HOLDING_TORQUE_NM, "{worst:e}");
+    for name in SCENARIOS {
+        let scenario = scenario(name);
+        let (mut rapier, mut mujoco) = (rapier(&scenario), mujoco(&scenario, &mut harness));
+        let plants: [&mut dyn Plant; 2] = [&mut rapier, &mut mujoco];
+        for plant in plants {
+            let worst = worst_holding_torque(&scenario.cell, plant);
+            println!("{name} {}: {worst:e} N m", plant.identity().name);
+            assert!(worst < HOLDING_TORQUE_NM, "{worst:e}");
+        }
     }
 }
 
@@ -203,7 +217,7 @@ fn tip(cell: &Cell, goal: &Goal, state: &PlantState) -> Vector3<f64> {
 
 #[test]
 fn engines_agree_along_every_planned_motion() {
-    let scenario = scenario();
+    let scenario = scenario("table3.toml");
     let clearance = ClearanceModel::new(&scenario.cell);
     let planner = Planner::new(&scenario, &clearance).unwrap();
     let goal = &scenario.goals[0];

@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use nalgebra::Vector3;
+
+use super::GRAVITY_M_S2;
 use super::arm_values::gear_twist;
 use super::imperfections::{Elasticity, Imperfections, resolve_imperfections};
 use super::library::ModelLibrary;
@@ -50,7 +53,16 @@ impl RealThings<'_> {
                 absorbed: measured.map(|block| {
                     let carried = block.class() == ArmClass::CalibratedHere;
                     let tool = carried.then_some(self.tool);
-                    self.library.absorbed_sag(self.robot, tool, &gears)
+                    // Makers measure their arms upright; one that is measured here stands or hangs as it
+                    // does here.
+                    let down = Vector3::new(0.0, 0.0, -GRAVITY_M_S2);
+                    let gravity_m_s2 = if carried {
+                        self.robot.world_from_base_link.rotation.inverse() * down
+                    } else {
+                        down
+                    };
+                    self.library
+                        .absorbed_sag(self.robot, tool, &gears, gravity_m_s2)
                 }),
                 gears,
                 spread: elastic.spread,

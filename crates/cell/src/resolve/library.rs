@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use nalgebra::Vector3;
 use needlebench_kinematics::{Body, Chain, JOINT_COUNT, Pose};
 
 use super::cache::Cache;
@@ -68,6 +69,7 @@ struct AbsorbedKey {
     bodies: [Body; JOINT_COUNT],
     carried: Option<(Body, Pose)>,
     gears: GearTwist,
+    gravity_m_s2: Vector3<f64>,
 }
 
 /// What decides a robot but its place.
@@ -236,28 +238,31 @@ impl ModelLibrary {
     }
 
     /// What a calibration that was measured on the sagging arm takes of its sag; with the tool on, or
-    /// without.
+    /// without, and with gravity in the frame of `base_link` as it was then.
     pub fn absorbed_sag(
         &self,
         robot: &Robot,
         tool: Option<&Tool>,
         gears: &GearTwist,
+        gravity_m_s2: Vector3<f64>,
     ) -> Arc<[OriginDeviations; JOINT_COUNT]> {
         let key = AbsorbedKey {
             chain: robot.chain,
             bodies: robot.bodies,
             carried: tool.map(|tool| (tool.body, tool.flange_from_guide_exit)),
             gears: *gears,
+            gravity_m_s2,
         };
         let made = self.absorbed.get(
             |known| *known == key,
             || {
-                let absorbed = absorbed_sag(robot, tool, gears);
+                let absorbed = absorbed_sag(robot, tool, gears, gravity_m_s2);
                 let AbsorbedKey {
                     chain,
                     bodies,
                     carried,
                     gears,
+                    gravity_m_s2,
                 } = key;
                 Ok::<_, std::convert::Infallible>((
                     AbsorbedKey {
@@ -265,6 +270,7 @@ impl ModelLibrary {
                         bodies,
                         carried,
                         gears,
+                        gravity_m_s2,
                     },
                     absorbed,
                 ))

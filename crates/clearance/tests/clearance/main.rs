@@ -2,5 +2,6 @@
 
 mod cell;
 mod common;
+mod obstacles;
 mod pairs;
 mod shipped_arms;

@@ -17,9 +17,6 @@ const LEVER_M: f64 = 0.2;
 /// parallel axes can slide along them.
 const REDUNDANT: f64 = 1e-9;
 
-/// Standard gravity, m/s^2, on an upright arm.
-const GRAVITY_M_S2: f64 = 9.80665;
-
 /// A point of Halton's sequence (bases 2, 3, 5, 7, 11, 13) as joint positions in (-pi, pi).
 fn halton(point: u32) -> Joints {
     const BASES: [u32; JOINT_COUNT] = [2, 3, 5, 7, 11, 13];
@@ -35,18 +32,19 @@ fn halton(point: u32) -> Joints {
     })
 }
 
-/// Origin deviations that fit best, over [`POSTURES`] points of Halton's sequence all round an upright arm, what the twist of each joint's
-/// gear does to the flange: one set for each joint that twists.
+/// Origin deviations that fit best, over [`POSTURES`] points of Halton's sequence in front of the base's plane, what the twist of
+/// each joint's gear does to the flange: one set for each joint that twists.
 ///
 /// A calibration moves joint origins until the arm's model meets the measured poses, whatever moved these.
 /// What constant deviations can imitate of a sag that changes with the posture is in the calibration
 /// already; the rest is left to the sag. The fit is of least squares in place and orientation
 /// ([`LEVER_M`]), to first order, and the smallest of those that fit equally. `tool` is what the arm
-/// carried, if it did.
+/// carried, if it did, and `gravity_m_s2` is in the frame of `base_link`, as it stood or hung then.
 pub(crate) fn absorbed_sag(
     robot: &Robot,
     tool: Option<&Tool>,
     gears: &GearTwist,
+    gravity_m_s2: Vector3<f64>,
 ) -> [OriginDeviations; JOINT_COUNT] {
     let chain = &robot.chain;
     let mut bodies = robot.bodies;
@@ -58,7 +56,7 @@ pub(crate) fn absorbed_sag(
         chain: *chain,
         bodies,
         armature_kgm2: Joints::zeros(),
-        gravity_m_s2: Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
+        gravity_m_s2,
     };
     let size = 6 * JOINT_COUNT;
     let mut normal = DMatrix::zeros(size, size);
@@ -69,7 +67,7 @@ pub(crate) fn absorbed_sag(
         let q = halton(point);
         let links = chain.link_poses(&q);
         let flange = chain.base_link_from_flange(&q).translation.vector;
-        // Nobody measures an arm that hangs over the edge of its table.
+        // Nobody measures an arm that reaches behind what its base is bolted to.
         if flange.z < 0.0 {
             continue;
         }
@@ -139,12 +137,12 @@ mod tests {
     /// Root mean square distance of the flange from where the controller has it, and of its orientation by the
     /// same lever, over the postures of the fit: the whole non-linear arm, with its twist, under a chain that
     /// the controller believes in.
-    fn rms_m(robot: &Robot, believed: &OriginDeviations) -> f64 {
+    fn rms_m(robot: &Robot, believed: &OriginDeviations, gravity_m_s2: Vector3<f64>) -> f64 {
         let dynamics = Dynamics {
             chain: robot.chain,
             bodies: robot.bodies,
             armature_kgm2: Joints::zeros(),
-            gravity_m_s2: Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
+            gravity_m_s2,
         };
         let believed = ArmPopulation::moved(&robot.chain, believed);
         let upright = (1..).map(halton).filter(|q| {
@@ -164,16 +162,22 @@ mod tests {
 
     #[test]
     fn calibration_under_gravity_takes_a_part_of_the_sag_and_not_all() {
+        const GRAVITY_M_S2: f64 = 9.80665;
         let robot = crate::load_robot(&crate::Overrides::default()).unwrap();
         let none = [Vector6::zeros(); JOINT_COUNT];
-        let absorbed = sum(&absorbed_sag(&robot, None, &gears()));
-        let (before, after) = (rms_m(&robot, &none), rms_m(&robot, &absorbed));
-        assert!(after < 0.8 * before, "{before} {after}");
-        assert!(after > 0.0);
-        // It is a minimum: neither less nor more of it fits better.
-        for share in [0.8, 1.2] {
-            let other = absorbed.map(|each| each * share);
-            assert!(rms_m(&robot, &other) > after, "{share}");
+        // Upright, hanging, and on a wall.
+        for down in [-Vector3::z(), Vector3::z(), Vector3::x()] {
+            let gravity_m_s2 = down * GRAVITY_M_S2;
+            let rms_m = |believed: &OriginDeviations| rms_m(&robot, believed, gravity_m_s2);
+            let absorbed = sum(&absorbed_sag(&robot, None, &gears(), gravity_m_s2));
+            let (before, after) = (rms_m(&none), rms_m(&absorbed));
+            assert!(after < 0.8 * before, "{before} {after}");
+            assert!(after > 0.0);
+            // It is a minimum: neither less nor more of it fits better.
+            for share in [0.8, 1.2] {
+                let other = absorbed.map(|each| each * share);
+                assert!(rms_m(&other) > after, "{share}");
+            }
         }
     }
 }

@@ -248,7 +248,7 @@ fn tool() -> Tool {
     }
 }
 
-fn fixed(name: &str, kind: BodyKind, solids: Vec<Solid>) -> CollisionBody {
+pub fn fixed(name: &str, kind: BodyKind, solids: Vec<Solid>) -> CollisionBody {
     CollisionBody {
         name: name.into(),
         kind,
@@ -260,6 +260,11 @@ fn fixed(name: &str, kind: BodyKind, solids: Vec<Solid>) -> CollisionBody {
 /// An arm of 24 solids beside a patient on a table in a gantry: 46 fixed pieces, of which the
 /// skin has 402 vertices.
 pub fn cell() -> Cell {
+    cell_among(Vec::new())
+}
+
+/// The same among obstacles.
+pub fn cell_among(obstacles: Vec<CollisionBody>) -> Cell {
     let skin = ellipsoid(21, 20, Vector3::new(0.17, 0.11, 0.28));
     let skin = Shape::Convex(Arc::new(ConvexMesh(skin)));
     let along_y = UnitQuaternion::new(Vector3::x() * FRAC_PI_2);
@@ -299,12 +304,16 @@ pub fn cell() -> Cell {
             length_m: 0.2,
             hand_cone_half_angle_rad: 0.0,
         },
-        vec![
-            fixed("phantom", BodyKind::Phantom, phantom),
-            fixed("table", BodyKind::Table, table),
-            fixed("gantry", BodyKind::Gantry, gantry),
-            fixed("mount", BodyKind::Mount, mount),
-        ],
+        [
+            vec![
+                fixed("phantom", BodyKind::Phantom, phantom),
+                fixed("table", BodyKind::Table, table),
+                fixed("gantry", BodyKind::Gantry, gantry),
+                fixed("mount", BodyKind::Mount, mount),
+            ],
+            obstacles,
+        ]
+        .concat(),
         Joints::repeat(0.1),
         Vector3::new(0.0, 0.0, -9.80665),
     )
