@@ -198,8 +198,7 @@ pub(crate) fn resolve(
         toml,
         &scenario,
         &world_from_base_link,
-        base,
-        library,
+        |index, section| library.obstacle(toml, index, section, base),
         &mut notes,
     )?;
     let (mut phantom, mut phantom_source, mut phantom_parts) = (None, None, Vec::new());

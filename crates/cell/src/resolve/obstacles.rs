@@ -8,7 +8,6 @@ use needlebench_geometry::mesh::{Use, convex_hull, extent_m, shape_of_surface, s
 use needlebench_geometry::{PreparedShape, Shape, Solid, TriangleMesh};
 use needlebench_kinematics::Pose;
 
-use super::library::ModelLibrary;
 use super::stl_file::{FileFault, StlFile};
 use super::{pose_of, static_body};
 use crate::Finding;
@@ -87,13 +86,12 @@ impl PlacedObstacles {
 }
 
 /// Places the obstacles that are there. What is not is looked at too, for a study that puts it there, but
-/// for its file.
+/// for its file. `shape_of` makes the shape of a section, or has it.
 pub(super) fn place_obstacles(
     toml: &TomlText<'_>,
     scenario: &Scenario,
     world_from_base_link: &Pose,
-    base: &Path,
-    library: &ModelLibrary,
+    shape_of: impl Fn(usize, &ObstacleSection) -> Result<Arc<UnplacedShape>, Finding>,
     notes: &mut Vec<String>,
 ) -> Result<PlacedObstacles, Vec<Finding>> {
     let (mut made, mut findings) = (PlacedObstacles::default(), Vec::new());
@@ -118,7 +116,7 @@ pub(super) fn place_obstacles(
         if !section.present {
             continue;
         }
-        let shape = match library.obstacle(toml, index, section, base) {
+        let shape = match shape_of(index, section) {
             Ok(shape) => shape,
             Err(finding) => {
                 findings.push(finding);

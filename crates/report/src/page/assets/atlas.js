@@ -100,8 +100,7 @@ NB.AtlasPage = class {
     view.ball('needle', goal.target, 0.004, [0.84, 0.37, 0, 1]);
     view.label('needle', 'target', goal.target);
     if (goal.entry) { view.ball('needle', goal.entry, 0.0035, [0, 0.45, 0.7, 1]); view.label('needle', 'entry', goal.entry); }
-    const [bx, by, bz] = this.page.scene.chain.base;
-    view.frame([[bx - 0.2, by - 0.2, bz - 0.1], [bx + 0.2, by + 0.2, bz + 0.55], goal.target.map((v) => v - 0.25), goal.target.map((v) => v + 0.25)], NB.direction(this.page.scene.chain.base, goal.target, goal.axis));
+    view.frame([...NB.aboutBase(this.page.scene.chain.base, 0.55), goal.target.map((v) => v - 0.25), goal.target.map((v) => v + 0.25)], NB.direction(this.page.scene.chain.base, goal.target, goal.axis));
     this.slider.step = String(360 / goal.rolls);
     this.slider.max = String(360 - 360 / goal.rolls);
     this.sideTable();

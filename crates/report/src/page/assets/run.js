@@ -91,8 +91,7 @@ NB.RunPage = class {
 
   /** Base and shoulders of the arm, and points of the goal. */
   framed(points) {
-    const [x, y, z] = this.page.scene.chain.base;
-    return [[x - 0.2, y - 0.2, z - 0.1], [x + 0.2, y + 0.2, z + 0.55], ...points];
+    return [...NB.aboutBase(this.page.scene.chain.base, 0.55), ...points];
   }
 
   direction(target, axis) { return NB.direction(this.page.scene.chain.base, target, axis); }

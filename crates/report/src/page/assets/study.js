@@ -381,10 +381,9 @@ NB.StudyPage = class extends NB.StudyPlots {
     this.arm = this.view.arm('arm');
     for (const layer of ['collision', 'corridor']) this.arm.layer(layer, false);
     this.view.show('gantry', false);
-    const [x, y, z] = scene.chain.base;
     const goals = Object.values(this.page.goals || {});
     const targets = goals.map((goal) => goal.target);
-    this.view.frame([[x - 0.2, y - 0.2, z - 0.1], [x + 0.2, y + 0.2, z + 0.5], ...targets.flatMap((t) => [t.map((v) => v - 0.25), t.map((v) => v + 0.25)])], goals.length ? NB.direction(scene.chain.base, goals[0].target, goals[0].axis) : [-0.75, 0.45, -0.55]);
+    this.view.frame([...NB.aboutBase(scene.chain.base, 0.5), ...targets.flatMap((t) => [t.map((v) => v - 0.25), t.map((v) => v + 0.25)])], goals.length ? NB.direction(scene.chain.base, goals[0].target, goals[0].axis) : [-0.75, 0.45, -0.55]);
   }
 
   /** The posture of a row, where it is on the page; places of robot and phantom as far as they are known. */

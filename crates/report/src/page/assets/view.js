@@ -9,6 +9,12 @@ NB.matrix = function ([x, y, z, qx, qy, qz, qw]) {
     new THREE.Vector3(x, y, z), new THREE.Quaternion(qx, qy, qz, qw), new THREE.Vector3(1, 1, 1));
 };
 
+/** Corners of a box about a base and `reach` m out of it, which may hang or be tilted. */
+NB.aboutBase = function (base, reach) {
+  const place = NB.matrix(base);
+  return [-0.2, 0.2].flatMap((x) => [-0.2, 0.2].flatMap((y) => [-0.1, reach].map((z) => new THREE.Vector3(x, y, z).applyMatrix4(place).toArray())));
+};
+
 /** Poses of the six links and the flange: `base * product of joint * turn(axis, q)`. */
 NB.forward = function (chain, joints) {
   const poses = [];
