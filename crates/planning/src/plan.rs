@@ -172,7 +172,8 @@ impl Planner<'_> {
             let kept = kept.map(|each| self.limits().shortfall(&ByClass::proven(each)));
             (works, kept)
         };
-        if rank(&other) > rank(&plan) {
+        // What does not work either says no more than the first, for which most was looked at.
+        if other.rejections.is_empty() && rank(&other) > rank(&plan) {
             other
         } else {
             plan
