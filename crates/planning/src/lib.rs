@@ -3,6 +3,7 @@
 //! For each goal all eight configurations get a [`ConfigurationPlan`], never fewer: one that
 //! cannot work carries the rules that reject it, the first failing one first.
 
+mod blocked;
 mod family;
 pub mod iso9283;
 mod limits;

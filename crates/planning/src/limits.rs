@@ -96,7 +96,11 @@ impl ClassLimits {
                 _ => criteria.least_mm(class).map(|mm| mm * MM),
             };
             let judged_m = criterion_m.map_or(floor_m, |least_m| least_m.max(floor_m));
-            let wanted_m = judged_m + reserve_m;
+            let wanted_m = match class {
+                // How far the tube stands off is the goal's, not the posture's, to choose.
+                ClearanceClass::GuideStandoff => judged_m,
+                _ => judged_m + reserve_m,
+            };
             let ample_m = match class {
                 ClearanceClass::SelfCollision => AMPLE_SELF_SHARE * best_self_m,
                 _ if class.is_surroundings() => best_clearance_m,

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::UnitVector3;
 use needlebench_cell::Goal;
-use needlebench_clearance::{ClassCertificate, MotionCertificate};
+use needlebench_clearance::MotionCertificate;
 use needlebench_kinematics::ik::{Configuration, WrapOrder, WrapSearch};
 use needlebench_kinematics::trajectory::{JointPath, JointTrajectory, LineError, Phase};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
@@ -96,7 +96,7 @@ pub(crate) struct Way {
     transfer: Transfer,
     trajectory: JointTrajectory,
     /// Of the transfer alone.
-    certificate: MotionCertificate,
+    pub certificate: MotionCertificate,
     /// Proven clearances of the transfer.
     keeps: ByClass,
     corners: usize,
@@ -156,7 +156,7 @@ impl Planner<'_> {
     ) -> Result<Required, Box<ConfigurationPlan>> {
         let line = self.approach_line(goal, &candidate);
         let reason = match &line {
-            Err(error) => Some(blocked_approach(error, goal.approach_m)),
+            Err(error) => Some(Self::blocked_approach(error, goal.approach_m)),
             Ok(line) => self.wraps(line).is_empty().then(|| Rejection {
                 rule: Rule::JointLimit,
                 value: self.cell().robot.limits.margin(&line.start()),
@@ -380,103 +380,6 @@ impl Planner<'_> {
         }
     }
 
-    /// Why a motion is rejected: first what every motion to this posture does, then what the transfer
-    /// does, each at its deepest.
-    fn too_near(
-        &self,
-        required: &Required,
-        way: &Way,
-        approach: &MotionCertificate,
-        search: Option<&SearchEffort>,
-    ) -> Option<Rejection> {
-        if let Some(pair) = self.checker.posture(self.start()).1 {
-            let (a, b) = pair.solid_names(self.cell());
-            return Some(Rejection {
-                rule: Rule::Collision,
-                value: pair.separation.distance_m,
-                limit: self.limits().get(pair.class).floor_m,
-                unit: "m",
-                detail: format!(
-                    "{a} and {b} in the start posture: every motion begins there; another start would \
-                     free it"
-                ),
-                class: Some(pair.class),
-            });
-        }
-        if let Some(found) = self.deepest(approach) {
-            let (a, b) = found.attained.solid_names(self.cell());
-            let class = found.attained.class;
-            return Some(Rejection {
-                rule: Rule::Collision,
-                value: found
-                    .lower_bound_m
-                    .min(found.attained.separation.distance_m),
-                limit: self.limits().get(class).floor_m,
-                unit: "m",
-                detail: format!(
-                    "{a} and {b} in the {} at {:.2} s, at their nearest: the way along the needle, which no \
-                     transfer changes; another roll, a shorter `approach_mm` or another base may free it",
-                    found.phase.name(),
-                    found.time_s
-                ),
-                class: Some(class),
-            });
-        }
-        let found = self.deepest(&way.certificate)?;
-        let (a, b) = found.attained.solid_names(self.cell());
-        let class = found.attained.class;
-        let place = format!(
-            "{a} and {b} in the {} at {:.2} s, at their nearest",
-            found.phase.name(),
-            found.time_s
-        );
-        let kept_mm = required.attainable().get(class) * 1e3;
-        let (rule, detail) = match search {
-            Some(effort) => (
-                Rule::NoMotion,
-                format!(
-                    "no way around was found among {} random postures ({} looked at); the straight \
-                     motion is blocked by {place}; start and approach keep {kept_mm:.1} mm there: more \
-                     `motion_checks`, another start or another base may free it",
-                    effort.samples, effort.checks
-                ),
-            ),
-            None => (
-                Rule::Collision,
-                format!(
-                    "{place}; start and approach keep {kept_mm:.1} mm: a way around (`motion_checks`) may \
-                     free it"
-                ),
-            ),
-        };
-        Some(Rejection {
-            rule,
-            value: found
-                .lower_bound_m
-                .min(found.attained.separation.distance_m),
-            limit: self.limits().get(class).floor_m,
-            unit: "m",
-            detail,
-            class: Some(class),
-        })
-    }
-
-    /// The class that is farthest below its floor along a motion, if any is.
-    fn deepest<'c>(&self, certificate: &'c MotionCertificate) -> Option<&'c ClassCertificate> {
-        certificate
-            .iter()
-            .filter(|(class, _)| class.is_physical())
-            .map(|(class, found)| {
-                (
-                    found,
-                    found.lower_bound_m - self.limits().get(class).floor_m,
-                )
-            })
-            .filter(|(_, excess_m)| *excess_m < 0.0)
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(found, _)| found)
-    }
-
     /// The last, straight part of a posture's motion alone: along the needle to its place, without
     /// the way there. `None` where the line meets a singularity or leaves the workspace. Nothing is
     /// checked for collisions.
@@ -512,8 +415,8 @@ impl Planner<'_> {
             .then_hold(Phase::Hold, self.resolved.scenario.motion.hold_s)
     }
 
-    /// The same way backwards: out along the needle axis, then to the start. It is as free as the
-    /// way in, whose every posture it passes.
+    /// The same way backwards: out along the needle axis, then to the start. It passes
+    /// every posture of the way in; its clearance is certified by itself in reports.
     fn retreat(&self, transfer: &Transfer, line: &JointPath) -> JointTrajectory {
         let motion = &self.resolved.motion;
         let out = JointTrajectory::starting_at(line.end()).then_along(
@@ -680,20 +583,4 @@ fn seed_of(scenario: u64, goal: &str, configuration: Configuration) -> u64 {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     });
     scenario ^ name ^ ((configuration.index() as u64) << 56)
-}
-
-fn blocked_approach(error: &LineError, approach_m: f64) -> Rejection {
-    let free_m = match error {
-        LineError::Singular { travelled_m, .. } | LineError::OutOfReach { travelled_m } => {
-            *travelled_m
-        }
-    };
-    Rejection {
-        rule: Rule::Approach,
-        value: free_m,
-        limit: approach_m,
-        unit: "m",
-        detail: error.to_string(),
-        class: None,
-    }
 }

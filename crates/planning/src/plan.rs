@@ -1,6 +1,7 @@
 //! The plan of a goal: for each configuration the best posture to which there is a motion.
 
 use std::cmp::Ordering;
+use std::f64::consts::TAU;
 
 use needlebench_cell::{Goal, Roll};
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
@@ -10,7 +11,7 @@ use crate::limits::{ByClass, Shortfall};
 use crate::margin::SAME_M;
 use crate::motion_plan::{ConfigurationPlan, Required, Way};
 use crate::planner::{Candidate, Planner};
-use crate::{Rejection, route_rejection};
+use crate::{Rejection, Rule, route_rejection};
 
 /// All eight configurations of one goal.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +22,8 @@ pub struct GoalPlan {
 
 /// Postures of one configuration for which a motion is tried, best first.
 const MOTION_TRIES: usize = 12;
+/// Rolls of each range that are tried where none of the first ones has a motion that keeps what is judged.
+const RANGE_TRIES: u32 = 9;
 /// Postures of one configuration for which a way around is searched where the straight motion is
 /// blocked.
 const SEARCH_TRIES: usize = 3;
@@ -81,7 +84,9 @@ impl Planner<'_> {
 
     fn first(&self, goal: &Goal, configuration: Configuration, grid: Vec<Member>) -> Member {
         let ranked = self.ranked(goal, configuration, &grid);
-        ranked.into_iter().next().unwrap_or_else(|| nearest(grid))
+        let mut member = ranked.into_iter().next().unwrap_or_else(|| nearest(grid));
+        say_what_frees(goal, &mut member.rejections);
+        member
     }
 
     /// All members at the rolls that are looked at, by configuration.
@@ -140,25 +145,97 @@ impl Planner<'_> {
             .filter_map(|member| Some((member.candidate?, member.rejections)))
             .collect();
         if candidates.is_empty() {
+            let mut rejections = nearest(grid).rejections;
+            say_what_frees(goal, &mut rejections);
             return ConfigurationPlan {
-                rejections: nearest(grid).rejections,
+                rejections,
                 ..ConfigurationPlan::nothing(configuration)
             };
         }
-        let limits = self.limits();
+        let some_work = candidates[0].1.is_empty();
+        let first = spread_over_rolls(candidates).into_iter().take(MOTION_TRIES);
         let mut checks_left = u64::from(self.planning().motion_checks);
+        let (plan, is_settled) =
+            self.best_motion(goal, configuration, first.collect(), &mut checks_left);
+        if is_settled || !some_work || matches!(goal.roll, Roll::Fixed(_)) {
+            return plan;
+        }
+        // None of the first rolls has a motion that keeps what is judged: more of each range.
+        let more = self.within_ranges(goal, configuration, &grid);
+        if more.is_empty() {
+            return plan;
+        }
+        let (other, _) = self.best_motion(goal, configuration, more, &mut checks_left);
+        let rank = |plan: &ConfigurationPlan| {
+            let works = plan.rejections.is_empty();
+            let kept = plan.certificate.as_ref();
+            let kept = kept.map(|each| self.limits().shortfall(&ByClass::proven(each)));
+            (works, kept)
+        };
+        // What does not work either says no more than the first, for which most was looked at.
+        if other.rejections.is_empty() && rank(&other) > rank(&plan) {
+            other
+        } else {
+            plan
+        }
+    }
+
+    /// Members at even rolls within each range of a configuration, those first that keep what is judged and
+    /// are best for the aim.
+    fn within_ranges(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        grid: &[Member],
+    ) -> Vec<(Candidate, Vec<Rejection>)> {
+        let aim = self.planning().roll_aim;
+        let mut rated: Vec<(Merit, Candidate)> = self
+            .family_for(goal, configuration, grid, &[aim])
+            .ranges
+            .iter()
+            .flat_map(|range| {
+                let steps = f64::from(RANGE_TRIES);
+                (0..RANGE_TRIES)
+                    .map(move |k| range.from_rad + range.width_rad() * (f64::from(k) + 0.5) / steps)
+            })
+            .filter_map(|roll_rad| {
+                let member = self.member_at(goal, configuration, roll_rad.rem_euclid(TAU));
+                let works = member.works();
+                let candidate = member.candidate.filter(|_| works)?;
+                Some((self.merit(goal, aim, &candidate), candidate))
+            })
+            .collect();
+        // The reserve is not fought for here: it led to where there is no motion.
+        rated.sort_by(|(a, _), (b, _)| {
+            let judged = b.shortfall.judged_m.total_cmp(&a.shortfall.judged_m);
+            judged.then(b.value.total_cmp(&a.value))
+        });
+        let all = rated.into_iter();
+        all.map(|(_, candidate)| (candidate, Vec::new())).collect()
+    }
+
+    /// The best motion to one of some postures, tried in their order, and whether it keeps all that will be
+    /// judged: if not, other postures may.
+    fn best_motion(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        candidates: Vec<(Candidate, Vec<Rejection>)>,
+        checks_left: &mut u64,
+    ) -> (ConfigurationPlan, bool) {
+        let limits = self.limits();
         let mut tried: Vec<(Required, Way)> = Vec::new();
         let mut without_line = None;
-        for (candidate, rejections) in spread_over_rolls(candidates).into_iter().take(MOTION_TRIES)
-        {
+        for (candidate, mut rejections) in candidates {
             // The best posture breaks a rule, so all do: one motion shows what would happen.
             let hopeless = !rejections.is_empty();
+            say_what_frees(goal, &mut rejections);
             let posture = ByClass::of_posture(&candidate.clearance);
             let required = match self.required(goal, configuration, candidate, rejections) {
                 Ok(required) => required,
                 Err(plan) => {
                     if hopeless {
-                        return *plan;
+                        return (*plan, false);
                     }
                     without_line.get_or_insert(plan);
                     continue;
@@ -166,7 +243,8 @@ impl Planner<'_> {
             };
             let straight = self.straight(&required);
             if hopeless {
-                return self.planned(configuration, required, straight.clone(), &straight, None);
+                let plan = self.planned(configuration, required, straight.clone(), &straight, None);
+                return (plan, false);
             }
             // What this posture could keep at best, and what comes of it.
             let possible = limits.shortfall(&posture.least(self.start_clearance()));
@@ -174,8 +252,9 @@ impl Planner<'_> {
             if self.is_free(&required.achieved(&straight)) && comes.reaches(&possible, SAME_M) {
                 let known = straight.clone();
                 let (way, search) =
-                    self.improved(goal, configuration, &required, straight, &mut checks_left);
-                return self.planned(configuration, required, way, &known, search);
+                    self.improved(goal, configuration, &required, straight, checks_left);
+                let plan = self.planned(configuration, required, way, &known, search);
+                return (plan, comes.judged_m >= -SAME_M);
             }
             tried.push((required, straight));
         }
@@ -191,12 +270,12 @@ impl Planner<'_> {
             let possible = limits.shortfall(&required.attainable());
             let known = straight.clone();
             let (way, search) =
-                self.improved(goal, configuration, &required, straight, &mut checks_left);
+                self.improved(goal, configuration, &required, straight, checks_left);
             let achieved = required.achieved(&way);
             let (is_free, comes) = (self.is_free(&achieved), limits.shortfall(&achieved));
             let plan = self.planned(configuration, required, way, &known, search);
             if is_free && comes.reaches(&possible, SAME_M) {
-                return plan;
+                return (plan, comes.judged_m >= -SAME_M);
             }
             let is_better = best
                 .as_ref()
@@ -205,8 +284,8 @@ impl Planner<'_> {
                 best = Some((is_free, comes, plan));
             }
         }
-        best.map(|(_, _, plan)| plan)
-            .or(without_line.map(|plan| *plan))
+        best.map(|(is_free, comes, plan)| (plan, is_free && comes.judged_m >= -SAME_M))
+            .or(without_line.map(|plan| (*plan, false)))
             .expect("there is at least one candidate")
     }
 
@@ -214,6 +293,30 @@ impl Planner<'_> {
     fn is_free(&self, clearance: &ByClass) -> bool {
         clearance.most_below(&self.limits().floors()) <= 0.0
     }
+}
+
+/// Adds to the first rule that a posture breaks, the decisive one, whether other rolls break it too and
+/// what else may free the configuration.
+fn say_what_frees(goal: &Goal, rejections: &mut [Rejection]) {
+    let Some(first) = rejections.first_mut() else {
+        return;
+    };
+    let rolls = match goal.roll {
+        Roll::Fixed(_) => "the goal fixes its roll: a free one",
+        Roll::Free => "some rule is broken at every roll, least here:",
+    };
+    let others = match first.rule {
+        Rule::Unreachable => "another place of the base may reach it",
+        Rule::Collision => "another base, tool or limit may free it",
+        Rule::NeedleCorridor => "another base or tool may free it",
+        Rule::Singular | Rule::JointLimit | Rule::Approach => "another base may free it",
+        Rule::NeedleRoute | Rule::Merged | Rule::NearestOnly | Rule::NoMotion => return,
+    };
+    let or = match goal.roll {
+        Roll::Fixed(_) => " or ",
+        Roll::Free => " ",
+    };
+    first.detail = format!("{}; {rolls}{or}{others}", first.detail);
 }
 
 /// Of members without a posture the one that comes nearest, which says most, with the rule that it

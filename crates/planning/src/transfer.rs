@@ -1,7 +1,9 @@
-//! Motions from the start posture to the pre-entry posture where the straight one is blocked.
+//! Motions from the start posture to the pre-entry posture where the straight one is blocked, or comes
+//! nearer to anything than it must.
 //!
 //! A bidirectional rapidly-exploring random tree (RRT-Connect: Kuffner and `LaValle`, 2000) in joint
-//! space finds a polygon of free straight pieces; shortcuts then shorten it. One tree grows from the
+//! space finds a polygon of straight pieces that keep some clearances, class by class, at all postures looked
+//! at; shortcuts then shorten it. Who asks for it certifies the motion and chooses the clearances. One tree grows from the
 //! start, the other from all whole-turn images of the goal at once. Everything random comes from a
 //! seed, and effort is counted in postures looked at, not in seconds: the same input gives the same
 //! motion on any machine.

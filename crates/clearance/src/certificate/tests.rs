@@ -7,7 +7,9 @@ use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 
 use super::motion::{Motion, RecordedMotion, Span};
 use super::search;
-use super::{CertificateOptions, ClassCertificate, MotionBound, MotionCertificate, certify};
+use super::{
+    CertificateOptions, ClassCertificate, MotionBound, MotionCertificate, certify, certify_enough,
+};
 use crate::model::{CLASS_COUNT, ClearanceModel};
 
 #[path = "../../tests/clearance/common/motions.rs"]
@@ -272,5 +274,59 @@ fn positions_that_are_no_numbers_get_no_bound() {
     assert!(certificate.iter().count() > 3);
     for (class, found) in certificate.iter() {
         assert_eq!(found.lower_bound_m, f64::NEG_INFINITY, "{class:?}");
+    }
+}
+
+#[test]
+fn what_is_enough_is_proven_and_what_is_nearer_is_known() {
+    let resolved = shipped("table3.toml");
+    let model = ClearanceModel::new(&resolved.cell);
+    let options = CertificateOptions::default();
+    let (mut nearer, mut farther) = (0, 0);
+    for motion in &swings(&resolved, 12) {
+        let whole = certify(&model, motion, &options);
+        for enough_m in [0.0, 0.02, 0.1] {
+            let part = certify_enough(&model, motion, &options, |_| enough_m);
+            for (class, known) in whole.iter() {
+                let found = part.get(class).unwrap();
+                let least_m = known.attained.separation.distance_m;
+                // Two proofs of the same motion: no bound is above what the other has seen.
+                assert!(found.lower_bound_m <= least_m);
+                assert!(found.lower_bound_m >= least_m.min(enough_m) - 2.0 * options.tolerance_m);
+                if least_m < enough_m - options.tolerance_m {
+                    nearer += 1;
+                    let attained_m = found.attained.separation.distance_m;
+                    assert!((attained_m - least_m).abs() <= options.tolerance_m);
+                } else {
+                    farther += 1;
+                }
+            }
+            assert!(part.effort.distances <= whole.effort.distances);
+        }
+    }
+    assert!(nearer > 5 && farther > 5, "{nearer} {farther}");
+}
+
+#[test]
+fn certificates_of_two_motions_together_say_what_the_nearer_one_does() {
+    let resolved = shipped("table3.toml");
+    let model = ClearanceModel::new(&resolved.cell);
+    let options = CertificateOptions::default();
+    let swings = swings(&resolved, 2);
+    let [one, two] = [0, 1].map(|k| certify(&model, &swings[k], &options));
+    let later = two.clone().later_by(3.0);
+    let both = one.clone().and(&later);
+    for (class, found) in both.iter() {
+        let (a, b) = (one.get(class).unwrap(), later.get(class).unwrap());
+        let nearer = if b.attained.separation.distance_m < a.attained.separation.distance_m {
+            b
+        } else {
+            a
+        };
+        assert_eq!(found.attained, nearer.attained);
+        assert_eq!(found.time_s.to_bits(), nearer.time_s.to_bits());
+        let least_m = a.lower_bound_m.min(b.lower_bound_m);
+        assert_eq!(found.lower_bound_m.to_bits(), least_m.to_bits());
+        assert!((two.get(class).unwrap().time_s + 3.0 - b.time_s).abs() < 1e-12);
     }
 }

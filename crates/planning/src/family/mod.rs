@@ -60,9 +60,9 @@ impl Merit {
         value: f64::NEG_INFINITY,
     };
 
-    /// Everything that will be judged, and can be judged by clearances, is met with its reserve.
-    fn meets_all(&self) -> bool {
-        self.shortfall == Shortfall::NONE
+    /// Everything that will be judged by clearances is met.
+    fn meets_what_is_judged(&self) -> bool {
+        self.shortfall.judged_m >= 0.0
     }
 
     /// The better one first.

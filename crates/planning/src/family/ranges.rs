@@ -270,7 +270,7 @@ impl Planner<'_> {
                 }
                 here
             });
-            if most.meets_all() {
+            if most.meets_what_is_judged() {
                 break;
             }
         }

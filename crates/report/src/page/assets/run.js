@@ -470,7 +470,23 @@ NB.RunPage = class {
     if (rows[0]) rows[0].tabIndex = 0;
     NB.clear(this.details, NB.el('h3', { text: c.label }),
       NB.el('p', { class: 'small' }, c.joints_rad ? `joints ${c.joints_rad.map((q) => NB.deg(q)).join(', ')}\u00b0 \u00b7 roll ${NB.deg(c.roll_rad)}\u00b0` : 'no posture'),
-      reasons.length || failed.length ? NB.el('ul', { class: 'plain small' }, reasons, failed) : null, table);
+      reasons.length || failed.length ? NB.el('ul', { class: 'plain small' }, reasons, failed) : null, table, this.marginDetails(c));
+  }
+
+  /** What the planned motion keeps of the clearance that its postures allow, and the way back. */
+  marginDetails(c) {
+    if (!c.margin) return null;
+    const retreat = (name) => c.retreat_clearance[name]?.certified_lower_bound_m ?? null;
+    const columns = [
+      { title: 'Planned motion, proven', cell: ([name]) => NB.words(name) },
+      { title: 'judged', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.limit_m) },
+      { title: 'attainable', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.attainable_m), help: 'least of the start, the approach and its end, which every motion takes' },
+      { title: 'kept', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.achieved_m) },
+      { title: 'limited by', cell: ([, each]) => each.limited_by },
+      { title: 'way back', unit: 'mm', numeric: true, cell: ([name]) => (retreat(name) === null ? '\u2013' : NB.mm(retreat(name))) },
+    ];
+    const ends = { bound: 'no transfer keeps more that counts', proof: 'no transfer helps: a posture that every motion takes is too near', budget: 'a better transfer may exist' };
+    return NB.table(`Search ended by ${c.margin.search}: ${ends[c.margin.search]}`, columns, Object.entries(c.margin.classes), { class: 'small full' });
   }
 
   configurationTable() {
