@@ -40,6 +40,7 @@ mod certificate;
 mod model;
 mod pairs;
 mod posture;
+mod search;
 
 pub use certificate::{
     CertificateOptions, ClassCertificate, Effort, LEAST_INTERVAL_S, MOST_INTERVALS, Motion,
@@ -50,3 +51,4 @@ pub use pairs::{
     PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
     check_srdf, examine_pairs,
 };
+pub use search::{Nearby, Share};
