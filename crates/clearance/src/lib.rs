@@ -30,8 +30,9 @@
 //!
 //! Of a posture: that of the distances; enclosing volumes only leave out pairs of which they prove
 //! that they are not the nearest, so that the result is bit for bit the least of all pairs
-//! (`tests/clearance/cell.rs`). Of a motion: [`certify`] proves a lower bound at all times, which is
-//! within [`CertificateOptions::tolerance_m`] of a clearance that is attained, less
+//! (`tests/clearance/cell.rs`). Of postures that follow each other, bounds of the one before and what
+//! has moved since leave out pairs in the same way ([`Nearby`]). Of a motion: [`certify`] proves a
+//! lower bound at all times, which is within [`CertificateOptions::tolerance_m`] of a clearance that is attained, less
 //! [`ROUNDING_M`] for rounding. Of all joint positions: [`examine_pairs`] likewise, in
 //! [`RangeBound`].
 

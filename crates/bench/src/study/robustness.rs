@@ -15,9 +15,9 @@
 //! of the distance within which something breaks, and no proof that nothing does.
 //!
 //! Along each of a fixed set of directions the first break is looked for in steps of a stated length, and
-//! bisected. Around the directions of the nearest ones a pattern search looks whether it breaks at a lesser
-//! distance too, and if so, where it first does. Then evenly spread points of the ball within the nearest
-//! break are looked at; if one breaks, the search goes on about it, until a sweep of as many points finds none. How many directions and points there were, and how many of
+//! bisected. Around the directions of the nearest ones a pattern search looks for nearer ones. Then evenly
+//! spread points of the ball within the nearest break are looked at; if one breaks, the search goes on about
+//! it, until a sweep of as many points finds none. How many directions and points there were, and how many of
 //! the last sweep's layouts cannot exist, is part of the result.
 //!
 //! A layout that cannot exist, such as a patient within the table, is neither a break nor a place where

@@ -141,11 +141,6 @@ fn refine<const N: usize>(
             found = false;
             for turned in turned(&direction, angle_rad) {
                 let limit = radius - search.resolution;
-                // Where it holds at the end, what may break on the way there is left to the sweeps.
-                let end = turned.map(|share| share * limit);
-                if limit <= 0.0 || matches!(look(&end), Verdict::Holds | Verdict::Impossible) {
-                    continue;
-                }
                 if let Some((nearer, what)) = first_break(search, &turned, limit, look) {
                     (radius, direction, detail) = (nearer, turned, what);
                     found = true;
