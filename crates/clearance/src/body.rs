@@ -150,6 +150,8 @@ pub(crate) struct PlacedBody {
     pub solids: Vec<PlacedShape>,
     /// Ball around all solids, in the body's frame.
     pub bound: BoundingCapsule,
+    /// Capsule around all solids, in the body's frame.
+    pub whole: BoundingCapsule,
     /// In the body's frame.
     pub tree: Option<SolidTree>,
     /// Solids of the moving bodies before this one.
@@ -193,10 +195,21 @@ pub(crate) fn placed_body(
     Arc::new(PlacedBody {
         frame: body.frame,
         bound: BoundingCapsule::around_balls(solids.iter().map(|solid| &solid.bound)),
+        whole: around_boxes(&solids),
         tree: SolidTree::new(&solids.iter().map(|s| &s.seen.block).collect::<Vec<_>>()),
         first_moving,
         solids,
     })
+}
+
+/// A capsule around the boxes of solids.
+fn around_boxes(solids: &[PlacedShape]) -> BoundingCapsule {
+    let boxes = solids.iter().map(|solid| &solid.seen.block);
+    let corners: Vec<Vector3<f64>> = boxes.flat_map(OrientedBox::corners).collect();
+    if corners.is_empty() {
+        return BoundingCapsule::on_z(0.0, 0.0);
+    }
+    BoundingCapsule::around_points(corners.iter())
 }
 
 impl PlacedBody {

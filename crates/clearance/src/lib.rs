@@ -30,8 +30,9 @@
 //!
 //! Of a posture: that of the distances; enclosing volumes only leave out pairs of which they prove
 //! that they are not the nearest, so that the result is bit for bit the least of all pairs
-//! (`tests/clearance/cell.rs`). Of a motion: [`certify`] proves a lower bound at all times, which is
-//! within [`CertificateOptions::tolerance_m`] of a clearance that is attained, less
+//! (`tests/clearance/cell.rs`). Of postures that follow each other, bounds of the one before and what
+//! has moved since leave out pairs in the same way ([`Nearby`]). Of a motion: [`certify`] proves a
+//! lower bound at all times, which is within [`CertificateOptions::tolerance_m`] of a clearance that is attained, less
 //! [`ROUNDING_M`] for rounding. Of all joint positions: [`examine_pairs`] likewise, in
 //! [`RangeBound`].
 
@@ -40,6 +41,7 @@ mod certificate;
 mod model;
 mod pairs;
 mod posture;
+mod search;
 
 pub use certificate::{
     CertificateOptions, ClassCertificate, Effort, LEAST_INTERVAL_S, MOST_INTERVALS, Motion,
@@ -51,3 +53,4 @@ pub use pairs::{
     PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
     check_srdf, examine_pairs,
 };
+pub use search::{Nearby, Share};

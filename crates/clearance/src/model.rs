@@ -8,6 +8,7 @@ use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 
 use crate::body::{LinkPlacements, PlacedBody, placed_body};
 use crate::posture::Posture;
+use crate::search::{Below, Least, Look, Nearby, Share};
 
 /// Number of classes.
 pub(crate) const CLASS_COUNT: usize = ClearanceClass::ALL.len();
@@ -40,7 +41,7 @@ impl PairClearance {
 
 /// The least clearance of each class.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClassMinima([Option<PairClearance>; CLASS_COUNT]);
+pub struct ClassMinima(pub(crate) [Option<PairClearance>; CLASS_COUNT]);
 
 impl ClassMinima {
     /// Least clearance of a class, or `None` if the cell has no pair of that class.
@@ -59,6 +60,8 @@ pub(crate) struct PlacedPair {
     pub a: usize,
     pub b: usize,
     pub class: ClearanceClass,
+    /// No solid of the two bodies is a mesh.
+    pub is_convex: bool,
 }
 
 /// Two solids of a pair; indices into their bodies' solids.
@@ -122,19 +125,26 @@ impl ClearanceModel {
             }
             placed
         });
+        let bodies: Vec<Arc<PlacedBody>> = bodies.collect();
+        let is_convex = |body: usize| {
+            let mut solids = bodies[body].solids.iter();
+            solids.all(|solid| solid.shape.is_convex())
+        };
+        let pairs = cell
+            .pairs
+            .iter()
+            .map(|pair| PlacedPair {
+                a: pair.a,
+                b: pair.b,
+                class: pair.class,
+                is_convex: is_convex(pair.a) && is_convex(pair.b),
+            })
+            .collect();
         Self {
             chain: cell.robot.chain,
             world_from_base_link: cell.robot.world_from_base_link,
-            bodies: bodies.collect(),
-            pairs: cell
-                .pairs
-                .iter()
-                .map(|pair| PlacedPair {
-                    a: pair.a,
-                    b: pair.b,
-                    class: pair.class,
-                })
-                .collect(),
+            bodies,
+            pairs,
         }
     }
 
@@ -169,46 +179,66 @@ impl ClearanceModel {
     /// [`ClearanceModel::minimum_per_class`] with the poses of the moving links given.
     pub fn minimum_per_class_at(&self, world_from_links: &[Pose; JOINT_COUNT]) -> ClassMinima {
         let links = world_from_links.each_ref().map(Placement::new);
-        let posture = Posture::new(&self.bodies, &links);
-        // The most promising solids of each class first: their distance prunes most of the rest.
-        let mut promising: [Option<Promising>; CLASS_COUNT] = [None; CLASS_COUNT];
-        let mut pairs: Vec<Promising> = Vec::with_capacity(self.pairs.len());
-        // Backwards: what moves most, the tool, tends to be closest and comes late in the list.
-        for (pair, placed) in self.pairs.iter().enumerate().rev() {
-            let slot = &mut promising[placed.class as usize];
-            let least_m = slot.map_or(f64::INFINITY, |promising| promising.bound_m);
-            let query = self.query(pair, &links, &posture);
-            let found = query.most_promising(least_m);
-            let here = Promising {
-                bound_m: found.map_or(least_m, |(bound_m, _)| bound_m),
-                pair,
-                solids: found.map(|(_, solids)| solids),
-            };
-            if found.is_some() {
-                *slot = Some(here);
-            }
-            pairs.push(here);
-        }
-        let mut best = [None; CLASS_COUNT];
-        for (slot, promising) in best.iter_mut().zip(promising) {
-            if let Some(Promising {
-                pair,
-                solids: Some(solids),
-                ..
-            }) = promising
-            {
-                self.query(pair, &links, &posture).try_solids(solids, slot);
-            }
-        }
-        for here in pairs.into_iter().rev() {
-            let class = self.pairs[here.pair].class as usize;
-            if here.bound_m < beyond_m(best[class].as_ref()) || here.bound_m.is_nan() {
-                let is_done = promising[class].is_some_and(|one| one.pair == here.pair);
-                let query = self.query(here.pair, &links, &posture);
-                query.improve_from(&mut best[class], here.solids, is_done);
-            }
-        }
-        ClassMinima(best)
+        let look = Look {
+            model: self,
+            links: &links,
+        };
+        let mut least = Least::of_each_class();
+        look.search(&mut Nearby::default(), &mut least);
+        least.minima(&look)
+    }
+
+    /// [`ClearanceModel::minimum_per_class`] of postures that follow each other: what is known from the
+    /// one before says of most solids that they are not the nearest.
+    pub fn minimum_per_class_near(&self, q: &Joints, nearby: &mut Nearby) -> ClassMinima {
+        self.least_near(q, nearby, Least::of_each_class())
+    }
+
+    /// Of each group of classes the one with the least clearance over its offset; all others are `None`,
+    /// and what cannot be the least of its group costs nothing. `share` says how a class counts, `None`
+    /// that it does not.
+    pub fn minimum_per_group_near(
+        &self,
+        q: &Joints,
+        nearby: &mut Nearby,
+        share: impl Fn(ClearanceClass) -> Option<Share>,
+    ) -> ClassMinima {
+        self.least_near(q, nearby, Least::of(ClearanceClass::ALL.map(share)))
+    }
+
+    fn least_near(&self, q: &Joints, nearby: &mut Nearby, mut least: Least) -> ClassMinima {
+        let links = self.world_from_links(q).each_ref().map(Placement::new);
+        let look = Look {
+            model: self,
+            links: &links,
+        };
+        look.search(nearby, &mut least);
+        least.minima(&look)
+    }
+
+    /// A pair that is closer than the limit of its class, m, if there is any; of postures that follow
+    /// each other, as [`ClearanceModel::minimum_per_class_near`].
+    ///
+    /// Classes that do not matter have the limit negative infinity.
+    pub fn below_near(
+        &self,
+        q: &Joints,
+        nearby: &mut Nearby,
+        limit_m: impl Fn(ClearanceClass) -> f64,
+    ) -> Option<PairClearance> {
+        let links = self.world_from_links(q).each_ref().map(Placement::new);
+        let look = Look {
+            model: self,
+            links: &links,
+        };
+        let limits_m = ClearanceClass::ALL.map(limit_m);
+        let mut below = Below {
+            limits_m: &limits_m,
+            found: None,
+        };
+        look.search(nearby, &mut below);
+        let (couple, separation) = below.found?;
+        Some(look.clearance(couple, &separation))
     }
 
     /// The first pair of physical bodies, in the order of [`Cell::pairs`], that is closer than
@@ -259,7 +289,7 @@ impl ClearanceModel {
         links: &'m LinkPlacements,
         posture: &'m Posture,
     ) -> PairQuery<'m> {
-        let PlacedPair { a, b, class } = self.pairs[pair];
+        let PlacedPair { a, b, class, .. } = self.pairs[pair];
         PairQuery {
             pair,
             class,
@@ -269,15 +299,6 @@ impl ClearanceModel {
             posture,
         }
     }
-}
-
-/// Solids of a pair with a lower bound of the distance of the pair's bodies.
-#[derive(Debug, Clone, Copy)]
-struct Promising {
-    bound_m: f64,
-    pair: usize,
-    /// Those with that bound, unless others of the class have a lower one.
-    solids: Option<SolidPair>,
 }
 
 /// What a lower bound has to reach for a pair to be left out.
@@ -317,20 +338,9 @@ impl PairQuery<'_> {
     /// Replaces `best` by the closest solids of this pair if they are closer.
     fn improve(&self, best: &mut Option<PairClearance>) {
         let first = self.most_promising(beyond_m(best.as_ref()));
-        self.improve_from(best, first.map(|(_, solids)| solids), false);
-    }
-
-    /// [`PairQuery::improve`] with the most promising solids given, which may have been tried.
-    fn improve_from(
-        &self,
-        best: &mut Option<PairClearance>,
-        first: Option<SolidPair>,
-        is_done: bool,
-    ) {
+        let first = first.map(|(_, solids)| solids);
         // A good start halves the number of full distances.
-        if let Some(first) = first
-            && !is_done
-        {
+        if let Some(first) = first {
             self.try_solids(first, best);
         }
         self.for_each_near(beyond_m(best.as_ref()), |solids, _| {
@@ -370,7 +380,7 @@ impl PairQuery<'_> {
     /// Calls `visit` with all solids whose lower bound, which is passed on, is below a limit.
     /// `visit` returns the limit from there on, or `None` to end.
     fn for_each_near(&self, limit_m: f64, mut visit: impl FnMut(SolidPair, f64) -> Option<f64>) {
-        let visit = |a, b, gap_m| visit(SolidPair { a, b }, gap_m);
+        let visit = |a, b, bound_m| visit(SolidPair { a, b }, bound_m);
         self.posture.for_each_near(self.a, self.b, limit_m, visit);
     }
 

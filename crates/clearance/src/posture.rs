@@ -18,22 +18,33 @@ pub(crate) struct Posture {
     moving: Vec<Seen>,
     /// Balls around the bodies.
     balls: Vec<BoundingCapsule>,
+    /// Capsules around the bodies.
+    wholes: Vec<BoundingCapsule>,
 }
 
 impl Posture {
     pub fn new(bodies: &[Arc<PlacedBody>], links: &LinkPlacements) -> Self {
         let mut moving = Vec::with_capacity(32);
         let mut balls = Vec::with_capacity(bodies.len());
+        let mut wholes = Vec::with_capacity(bodies.len());
         for body in bodies {
             match body.frame {
-                Frame::World => balls.push(body.bound),
+                Frame::World => {
+                    balls.push(body.bound);
+                    wholes.push(body.whole);
+                }
                 Frame::Link(i) => {
                     balls.push(body.bound.placed(&links[i]));
+                    wholes.push(body.whole.placed(&links[i]));
                     moving.extend(body.solids.iter().map(|solid| solid.seen.placed(&links[i])));
                 }
             }
         }
-        Self { moving, balls }
+        Self {
+            moving,
+            balls,
+            wholes,
+        }
     }
 
     #[inline]
@@ -47,6 +58,19 @@ impl Posture {
     /// Where a solid is in the world.
     pub fn place<'s>(&'s self, body: &'s PlacedBody, solid: usize) -> &'s Placement {
         &self.seen(body, solid).placement
+    }
+
+    /// Lower bound of the distance of two bodies by what encloses them whole, m; the balls alone where
+    /// these suffice for the limit.
+    pub fn whole_gap_m(&self, a: usize, b: usize, limit_m: f64) -> f64 {
+        let (ball_a, ball_b) = (&self.balls[a], &self.balls[b]);
+        let ball_m =
+            (ball_a.centre - ball_b.centre).norm() - ball_a.ball_radius_m - ball_b.ball_radius_m;
+        if ball_m >= limit_m || ball_m.is_nan() {
+            return ball_m;
+        }
+        let (one, other) = (&self.wholes[a], &self.wholes[b]);
+        ball_m.max(one.gap_m(other))
     }
 
     /// Calls `visit` with all solids of A and B whose lower bound, which is passed on, is below a

@@ -1,6 +1,6 @@
 //! Why a motion is rejected, in words: the decisive reason, with its deepest value and what would free it.
 
-use needlebench_clearance::{ClassCertificate, MotionCertificate};
+use needlebench_clearance::{ClassCertificate, MotionCertificate, Nearby};
 use needlebench_kinematics::trajectory::LineError;
 
 use crate::motion_plan::{Required, SearchEffort, Way};
@@ -17,7 +17,7 @@ impl Planner<'_> {
         approach: &MotionCertificate,
         search: Option<&SearchEffort>,
     ) -> Option<Rejection> {
-        if let Some(pair) = self.checker.posture(self.start()).1 {
+        if let Some(pair) = self.checker.posture(self.start(), &mut Nearby::default()).1 {
             let (a, b) = pair.solid_names(self.cell());
             return Some(Rejection {
                 rule: Rule::Collision,

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use needlebench_cell::scenario::PlanningSection;
 use needlebench_cell::{BodyKind, Cell, ClearanceClass, Frame};
-use needlebench_clearance::{ClassMinima, ClearanceModel, PairClearance};
+use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby, PairClearance, Share};
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
@@ -62,10 +62,43 @@ impl<'a> MotionChecker<'a> {
     }
 
     /// Least clearances of a posture, and the pair that is deepest in collision, if any collides.
-    pub(crate) fn posture(&self, q: &Joints) -> (ClassMinima, Option<PairClearance>) {
-        let minima = self.model.minimum_per_class(q);
+    pub(crate) fn posture(
+        &self,
+        q: &Joints,
+        nearby: &mut Nearby,
+    ) -> (ClassMinima, Option<PairClearance>) {
+        let minima = self.model.minimum_per_class_near(q, nearby);
         let collision = self.worst(&minima);
         (minima, collision)
+    }
+
+    /// The least clearances of groups of classes.
+    pub(crate) fn minima(
+        &self,
+        q: &Joints,
+        nearby: &mut Nearby,
+        share: impl Fn(ClearanceClass) -> Option<Share>,
+    ) -> ClassMinima {
+        self.model.minimum_per_group_near(q, nearby, share)
+    }
+
+    /// Whether no pair is closer than the limit of its class.
+    pub(crate) fn is_free(
+        &self,
+        q: &Joints,
+        nearby: &mut Nearby,
+        limit_m: impl Fn(ClearanceClass) -> f64,
+    ) -> bool {
+        self.model.below_near(q, nearby, limit_m).is_none()
+    }
+
+    /// Limits of a motion, m: of what is no body nothing is asked.
+    fn motion_limit_m(&self, class: ClearanceClass) -> f64 {
+        if class.is_physical() {
+            self.limit_m(class)
+        } else {
+            f64::NEG_INFINITY
+        }
     }
 
     /// The pair that is farthest below its limit, if any is.
@@ -91,6 +124,7 @@ impl<'a> MotionChecker<'a> {
             reason = "small, positive"
         )]
         let steps = (duration_s / GRID_S).ceil() as u32;
+        let mut nearby = Nearby::default();
         let mut checked: Option<Joints> = None;
         let mut next = trajectory.sample(0.0).position;
         for k in 0..=steps {
@@ -103,7 +137,10 @@ impl<'a> MotionChecker<'a> {
             if near && k < steps {
                 continue;
             }
-            if let Some(found) = self.model.first_below(&q, |class| self.limit_m(class)) {
+            let below = self
+                .model
+                .below_near(&q, &mut nearby, |class| self.motion_limit_m(class));
+            if let Some(found) = below {
                 let pair = self
                     .worst(&self.model.minimum_per_class(&q))
                     .unwrap_or(found);
@@ -136,6 +173,7 @@ impl<'a> MotionChecker<'a> {
         )]
         let steps = ((way_m / self.spacing_m).ceil() as u64).max(1);
         let mut checks = 0;
+        let mut nearby = Nearby::default();
         // The end, the middle, the quarters ...: a blocked way shows early.
         let bits = u64::BITS - steps.leading_zeros();
         for k in 0..1_u64 << bits {
@@ -145,11 +183,14 @@ impl<'a> MotionChecker<'a> {
             }
             let q = from + (to - from) * (step as f64 / steps as f64);
             checks += 1;
-            if self
-                .model
-                .first_below(&q, |class| least_m.get(class))
-                .is_some()
-            {
+            let least = |class: ClearanceClass| {
+                if class.is_physical() {
+                    least_m.get(class)
+                } else {
+                    f64::NEG_INFINITY
+                }
+            };
+            if !self.is_free(&q, &mut nearby, least) {
                 return (false, checks);
             }
         }

@@ -73,10 +73,7 @@ impl Planner<'_> {
             self.member_at(goal, configuration, roll_rad)
         } else {
             let rolls = self.rolls(goal, self.planning().roll_samples);
-            let grid = rolls
-                .into_iter()
-                .map(|roll_rad| self.member_at(goal, configuration, roll_rad))
-                .collect();
+            let grid = self.members_along(goal, configuration, &rolls);
             self.first(goal, configuration, grid)
         };
         member.on_route(route_rejection(self.resolved, goal).as_ref())
@@ -93,8 +90,10 @@ impl Planner<'_> {
     fn grids(&self, goal: &Goal) -> [Vec<Member>; 8] {
         let rolls = self.rolls(goal, self.planning().roll_samples);
         let mut grids: [Vec<Member>; 8] = std::array::from_fn(|_| Vec::with_capacity(rolls.len()));
+        let mut nearby = Default::default();
         for &roll_rad in &rolls {
-            for (grid, member) in grids.iter_mut().zip(self.members_at(goal, roll_rad)) {
+            let members = self.members_near(goal, roll_rad, &mut nearby);
+            for (grid, member) in grids.iter_mut().zip(members) {
                 grid.push(member);
             }
         }

@@ -5,10 +5,11 @@ use std::sync::OnceLock;
 
 use needlebench_cell::scenario::PlanningSection;
 use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, Roll};
-use needlebench_clearance::{ClassMinima, ClearanceModel};
+use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby, Share};
 use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
+use crate::family::{Aim, share_in};
 use crate::limits::{ByClass, ClassLimits};
 use crate::motion::MotionChecker;
 use crate::{Rejection, Rule};
@@ -25,6 +26,13 @@ pub struct PostureMargins {
     pub shoulder_m: f64,
     /// `sqrt(det J J^T)` of the flange.
     pub manipulability: f64,
+}
+
+/// Distances of a posture from the three singularities, as in [`PostureMargins`].
+struct Singularity {
+    wrist_sine: f64,
+    elbow_sine: f64,
+    shoulder_m: f64,
 }
 
 /// A posture that brings the guide to its place.
@@ -69,11 +77,35 @@ impl<'a> Planner<'a> {
         resolved: &'a ResolvedScenario,
         clearance: &'a ClearanceModel,
     ) -> Result<Self, NotUrGeometry> {
+        let kinematics = Kinematics::new(resolved.cell.robot.chain)?;
+        Ok(Self::with_solver(resolved, clearance, kinematics))
+    }
+
+    /// [`Planner::new`] with the solver of another planner, if that is of the same chain.
+    ///
+    /// # Errors
+    /// As [`Planner::new`].
+    pub fn like(
+        resolved: &'a ResolvedScenario,
+        clearance: &'a ClearanceModel,
+        known: &Kinematics,
+    ) -> Result<Self, NotUrGeometry> {
+        if known.chain == resolved.cell.robot.chain {
+            Ok(Self::with_solver(resolved, clearance, *known))
+        } else {
+            Self::new(resolved, clearance)
+        }
+    }
+
+    fn with_solver(
+        resolved: &'a ResolvedScenario,
+        clearance: &'a ClearanceModel,
+        kinematics: Kinematics,
+    ) -> Self {
         let planning = &resolved.scenario.planning;
-        Ok(Self {
+        Self {
             resolved,
-            kinematics: Kinematics::new(resolved.cell.robot.chain)?
-                .within(resolved.cell.robot.limits),
+            kinematics: kinematics.within(resolved.cell.robot.limits),
             checker: MotionChecker::new(
                 &resolved.cell,
                 clearance,
@@ -82,7 +114,7 @@ impl<'a> Planner<'a> {
             ),
             ranking_aims: resolved.scenario.ranking.aims().to_vec(),
             start_clearance: OnceLock::new(),
-        })
+        }
     }
 
     pub(crate) fn cell(&self) -> &Cell {
@@ -136,12 +168,87 @@ impl<'a> Planner<'a> {
                 .collect(),
         }
     }
-    /// Margins, clearances and broken rules of one posture.
+    /// Margins, clearances and broken rules of one posture. `nearby` is of the posture before.
     pub(crate) fn candidate(
         &self,
         roll_rad: f64,
         solution: &Solution,
+        nearby: &mut Nearby,
     ) -> (Candidate, Vec<Rejection>) {
+        let mut rejections = self.joint_rules(solution);
+        let (clearance, broken) = self.clearance_rules_near(&solution.joints, nearby);
+        rejections.extend(broken);
+        (
+            self.with_clearance(roll_rad, solution, clearance),
+            rejections,
+        )
+    }
+
+    fn with_clearance(
+        &self,
+        roll_rad: f64,
+        solution: &Solution,
+        clearance: ClassMinima,
+    ) -> Candidate {
+        Candidate {
+            joints: solution.joints,
+            roll_rad,
+            wrap: [0; JOINT_COUNT],
+            residual_m: solution.residual_m,
+            residual_rad: solution.residual_rad,
+            wrist_3_is_free: solution.wrist_3_is_free,
+            margins: self.margins(&solution.joints),
+            clearance,
+        }
+    }
+
+    /// [`Planner::candidate`] with those clearances alone that count in its value at an aim.
+    pub(crate) fn candidate_for(
+        &self,
+        aim: Aim,
+        roll_rad: f64,
+        solution: &Solution,
+        nearby: &mut Nearby,
+    ) -> Candidate {
+        let clearance = self
+            .checker
+            .minima(&solution.joints, nearby, |class| share_in(aim, class));
+        self.with_clearance(roll_rad, solution, clearance)
+    }
+
+    /// [`Planner::candidate`] with that clearance alone which is least above its limit, and the rules
+    /// that the joints alone break: what its surplus needs.
+    pub(crate) fn candidate_of_surplus(
+        &self,
+        roll_rad: f64,
+        solution: &Solution,
+        nearby: &mut Nearby,
+    ) -> (Candidate, Vec<Rejection>) {
+        let clearance = self.checker.minima(&solution.joints, nearby, |class| {
+            let offset_m = self.limits().get(class).floor_m;
+            offset_m.is_finite().then_some(Share { group: 0, offset_m })
+        });
+        let candidate = self.with_clearance(roll_rad, solution, clearance);
+        (candidate, self.joint_rules(solution))
+    }
+
+    /// Whether a posture breaks no rule: what [`Planner::candidate`] says, without numbers.
+    pub(crate) fn works(&self, solution: &Solution, nearby: &mut Nearby) -> bool {
+        self.joint_rules(solution).is_empty()
+            && self.checker.is_free(&solution.joints, nearby, |class| {
+                self.limits().get(class).floor_m
+            })
+    }
+
+    /// Whether a posture keeps every clearance that is wanted.
+    pub(crate) fn keeps_wanted(&self, solution: &Solution, nearby: &mut Nearby) -> bool {
+        let limits = self.limits();
+        self.checker
+            .is_free(&solution.joints, nearby, |class| limits.get(class).wanted_m)
+    }
+
+    /// The rules that the joint positions alone break.
+    fn joint_rules(&self, solution: &Solution) -> Vec<Rejection> {
         let planning = &self.resolved.scenario.planning;
         let limits = &self.resolved.cell.robot.limits;
         let mut rejections = Vec::new();
@@ -172,22 +279,26 @@ impl<'a> Planner<'a> {
                 });
             }
         }
-        let margins = self.margins(&solution.joints);
+        let Singularity {
+            wrist_sine,
+            elbow_sine,
+            shoulder_m,
+        } = self.singularity(&solution.joints);
         for (value, limit, unit, detail) in [
             (
-                margins.wrist_sine,
+                wrist_sine,
                 planning.min_singularity_sine,
                 "1",
                 "wrist: |sin q5|",
             ),
             (
-                margins.elbow_sine,
+                elbow_sine,
                 planning.min_singularity_sine,
                 "1",
                 "elbow: |sin q3|",
             ),
             (
-                margins.shoulder_m,
+                shoulder_m,
                 planning.min_shoulder_distance_mm * 1e-3,
                 "m",
                 "shoulder: sqrt(rho^2 - d4^2)",
@@ -204,25 +315,21 @@ impl<'a> Planner<'a> {
                 });
             }
         }
-        let (clearance, broken) = self.clearance_rules(&solution.joints);
-        rejections.extend(broken);
-        let candidate = Candidate {
-            joints: solution.joints,
-            roll_rad,
-            wrap: [0; JOINT_COUNT],
-            residual_m: solution.residual_m,
-            residual_rad: solution.residual_rad,
-            wrist_3_is_free: solution.wrist_3_is_free,
-            margins,
-            clearance,
-        };
-        (candidate, rejections)
+        rejections
     }
 
     /// Least clearances of a posture, and the rules about them that it breaks.
     pub fn clearance_rules(&self, q: &Joints) -> (ClassMinima, Vec<Rejection>) {
+        self.clearance_rules_near(q, &mut Nearby::default())
+    }
+
+    fn clearance_rules_near(
+        &self,
+        q: &Joints,
+        nearby: &mut Nearby,
+    ) -> (ClassMinima, Vec<Rejection>) {
         let mut rejections = Vec::new();
-        let (clearance, collision) = self.checker.posture(q);
+        let (clearance, collision) = self.checker.posture(q, nearby);
         if let Some(pair) = collision {
             rejections.push(Rejection {
                 rule: Rule::Collision,
@@ -257,13 +364,26 @@ impl<'a> Planner<'a> {
         (clearance, rejections)
     }
 
-    pub(crate) fn margins(&self, q: &Joints) -> PostureMargins {
-        let jacobian = self.kinematics.chain.jacobian(q);
-        PostureMargins {
-            joint_limit: self.resolved.cell.robot.limits.margin(q),
+    fn singularity(&self, q: &Joints) -> Singularity {
+        Singularity {
             wrist_sine: q[4].sin().abs(),
             elbow_sine: q[2].sin().abs(),
             shoulder_m: self.kinematics.geometry.wrist_forward_m(q).abs(),
+        }
+    }
+
+    pub(crate) fn margins(&self, q: &Joints) -> PostureMargins {
+        let jacobian = self.kinematics.chain.jacobian(q);
+        let Singularity {
+            wrist_sine,
+            elbow_sine,
+            shoulder_m,
+        } = self.singularity(q);
+        PostureMargins {
+            joint_limit: self.resolved.cell.robot.limits.margin(q),
+            wrist_sine,
+            elbow_sine,
+            shoulder_m,
             manipulability: jacobian.determinant().abs(),
         }
     }

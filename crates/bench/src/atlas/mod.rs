@@ -50,18 +50,9 @@ pub fn goal_atlas(
     let rolls_rad: Vec<f64> = (0..rolls)
         .map(|k| TAU * f64::from(k) / f64::from(rolls))
         .collect();
-    let by_roll = in_parallel(threads, &rolls_rad, |&roll_rad| {
-        planner.members_at(goal, roll_rad)
+    let mut members = in_parallel(threads, &Configuration::ALL, |&configuration| {
+        planner.members_along(goal, configuration, &rolls_rad)
     });
-    let mut members: Vec<Vec<Member>> = Configuration::ALL
-        .iter()
-        .map(|_| Vec::with_capacity(rolls_rad.len()))
-        .collect();
-    for row in by_roll {
-        for (column, member) in members.iter_mut().zip(row) {
-            column.push(member);
-        }
-    }
     let mut families = in_parallel(threads, &Configuration::ALL, |&configuration| {
         planner.family(goal, configuration, &members[configuration.index()])
     });

@@ -1,5 +1,7 @@
 //! How far the base layout of a study may move.
 
+use std::sync::atomic::AtomicBool;
+
 use needlebench_cell::Finding;
 use needlebench_cell::study::{ResolvedStudy, RobustnessSection};
 use needlebench_kinematics::ik::Configuration;
@@ -21,7 +23,7 @@ pub struct RobustnessResult {
     pub found: Robustness,
 }
 
-/// Radii of all goals and configurations of the base scenario.
+/// Radii of all goals and configurations of the base scenario; `None` if it was cancelled.
 ///
 /// # Errors
 /// What is wrong with the base scenario for one goal alone.
@@ -29,8 +31,9 @@ pub fn robustness_of(
     study: &ResolvedStudy,
     section: &RobustnessSection,
     threads: usize,
+    cancel: Option<&AtomicBool>,
     progress: &dyn Progress,
-) -> Result<Vec<RobustnessResult>, Vec<Finding>> {
+) -> Result<Option<Vec<RobustnessResult>>, Vec<Finding>> {
     let settings = RobustnessSettings {
         max_shift_mm: section.max_shift_mm,
         max_tilt_deg: section.max_tilt_deg,
@@ -44,13 +47,13 @@ pub fn robustness_of(
     progress.message("robustness");
     progress.at(0, jobs.len() as u64);
     in_parallel(threads, &jobs, |(goal, configuration)| {
-        let found = robustness(&study.family, goal, &[], *configuration, &settings);
+        let found = robustness(&study.family, goal, &[], *configuration, &settings, cancel);
         progress.step();
-        Ok(RobustnessResult {
+        Ok(found?.map(|found| RobustnessResult {
             goal: (*goal).clone(),
             configuration: configuration.label(),
-            found: found?,
-        })
+            found,
+        }))
     })
     .into_iter()
     .collect()

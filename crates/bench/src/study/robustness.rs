@@ -4,8 +4,8 @@
 //! anyone. Two questions are asked:
 //!
 //! - *aware*: the plan knows of the move. Goals by entry and target go with the phantom, the posture is
-//!   solved anew, and the configuration breaks where its static case is no longer ok. A goal by a flange
-//!   pose stays where it is.
+//!   solved anew, and the configuration breaks where its static case is no longer ok, and no posture is at
+//!   a roll that was ok elsewhere. A goal by a flange pose stays where it is.
 //! - *unaware*: the arm stands where it was when the patient moved; it breaks where a clearance is less
 //!   than the rules or the criteria want.
 //!
@@ -26,8 +26,9 @@
 mod search;
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use needlebench_cell::{Change, Finding, KeyPath, ResolvedScenario, ScenarioFamily};
+use needlebench_cell::{Change, Finding, KeyPath, ResolvedScenario, Roll, ScenarioFamily};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_study::Outcome;
@@ -51,8 +52,9 @@ pub struct RobustnessSettings {
     pub shift_directions: u32,
     /// Directions of turns.
     pub tilt_directions: u32,
-    /// Points of the ball within the nearest break, none of which may break.
-    pub points: u32,
+    /// Points along an axis of the ball within the nearest break, none of which may break: of a shift there
+    /// are as many to the third power, of a turn, which has two angles, to the second.
+    pub points_per_axis: u32,
 }
 
 impl Default for RobustnessSettings {
@@ -64,7 +66,7 @@ impl Default for RobustnessSettings {
             step_deg: 1.0,
             shift_directions: 64,
             tilt_directions: 16,
-            points: 4096,
+            points_per_axis: 16,
         }
     }
 }
@@ -127,6 +129,9 @@ pub struct Unaware {
     pub tilt: SmallestFound,
 }
 
+/// Rolls that are tried before a configuration is swept over all of them.
+const MOST_ROLLS: usize = 6;
+
 /// Keys of a shift and of a turn.
 const SHIFT_KEYS: [&str; 3] = [
     "phantom.position_mm[0]",
@@ -139,7 +144,7 @@ const TILT_KEYS: [&str; 2] = ["phantom.head_yaw_deg", "phantom.body_roll_deg"];
 /// it stands, the radius is 0. Deterministic.
 ///
 /// With `rest_on_table` a turned phantom rests on the table again, and a vertical shift is a change of
-/// its cushion's height.
+/// its cushion's height. `None` if it was cancelled.
 ///
 /// # Errors
 /// What is wrong with the layout itself.
@@ -149,7 +154,8 @@ pub fn robustness(
     changes: &[(KeyPath, Change)],
     configuration: Configuration,
     settings: &RobustnessSettings,
-) -> Result<Robustness, Vec<Finding>> {
+    cancel: Option<&AtomicBool>,
+) -> Result<Option<Robustness>, Vec<Finding>> {
     let here = family.vary(goal, changes)?;
     if here.phantom.is_none() {
         let finding = Finding::new(&here.source.file, "there is no phantom to move");
@@ -159,17 +165,42 @@ pub fn robustness(
     let row = worker.row(&here, configuration);
     let joints_rad = row.measured.joints_rad;
     let mut mover = Mover {
+        cancel,
         family,
         goal,
         changes,
         settings,
         evaluations: 0,
     };
+    // Rolls that were ok in some layout, the one that was last is the last. Where the goal fixes the roll,
+    // there is no other.
+    let is_free = here
+        .goals
+        .first()
+        .is_some_and(|goal| goal.roll == Roll::Free);
+    let mut rolls_rad: Vec<f64> = Vec::new();
     let mut aware = |resolved: Result<ResolvedScenario, Vec<Finding>>| match resolved {
         Ok(resolved) => {
+            // Mostly the posture at the roll of the layout before is ok too, and needs no sweep.
+            let known = rolls_rad.iter().rposition(|&roll_rad| {
+                let row = worker.row_at(&resolved, configuration, roll_rad);
+                row.outcome == Outcome::Ok
+            });
+            if let Some(known) = known {
+                rolls_rad[known..].rotate_left(1);
+                return Verdict::Holds;
+            }
             let row = worker.row(&resolved, configuration);
             match row.outcome {
-                Outcome::Ok => Verdict::Holds,
+                Outcome::Ok => {
+                    if let Some(roll_rad) = row.measured.roll_rad.filter(|_| is_free) {
+                        if rolls_rad.len() == MOST_ROLLS {
+                            rolls_rad.remove(0);
+                        }
+                        rolls_rad.push(roll_rad);
+                    }
+                    Verdict::Holds
+                }
                 Outcome::Failed | Outcome::Rejected => Verdict::Breaks(row.detail.into_owned()),
                 Outcome::Invalid => Verdict::Impossible,
             }
@@ -193,12 +224,13 @@ pub fn robustness(
             tilt: mover.tilt(&mut stays),
         }
     });
-    Ok(Robustness {
+    let found = Robustness {
         shift,
         tilt,
         unaware,
         evaluations: mover.evaluations,
-    })
+    };
+    Ok(Some(found).filter(|_| !mover.is_cancelled()))
 }
 
 /// The goal's key at fault, where the move leaves the goal without a needle. A place that the phantom
@@ -210,6 +242,7 @@ fn goal_at_fault(findings: &[Finding]) -> Option<String> {
 
 /// Moves the phantom of a layout.
 struct Mover<'a> {
+    cancel: Option<&'a AtomicBool>,
     family: &'a ScenarioFamily,
     goal: &'a str,
     changes: &'a [(KeyPath, Change)],
@@ -226,7 +259,7 @@ impl Mover<'_> {
             limit: self.settings.max_shift_mm,
             step: self.settings.step_mm,
             resolution: RESOLUTION,
-            points: self.settings.points,
+            points: self.settings.points_per_axis.pow(3),
         };
         let directions = search::on_sphere(self.settings.shift_directions);
         self.nearest(&search, &directions, &SHIFT_KEYS, judge)
@@ -237,7 +270,7 @@ impl Mover<'_> {
             limit: self.settings.max_tilt_deg,
             step: self.settings.step_deg,
             resolution: RESOLUTION,
-            points: self.settings.points,
+            points: self.settings.points_per_axis.pow(2),
         };
         let directions = search::on_circle(self.settings.tilt_directions);
         self.nearest(&search, &directions, &TILT_KEYS, judge)
@@ -254,6 +287,10 @@ impl Mover<'_> {
         let mut evaluations = 0;
         let found = nearest_break(search, directions, |offset| {
             evaluations += 1;
+            // What is found then is thrown away.
+            if self.is_cancelled() {
+                return Verdict::Impossible;
+            }
             judge(self.moved(&paths, offset))
         });
         self.evaluations += evaluations;
@@ -274,6 +311,11 @@ impl Mover<'_> {
             impossible: found.impossible,
             settled: found.settled,
         }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancel
+            .is_some_and(|cancel| cancel.load(Ordering::Relaxed))
     }
 
     fn moved<const N: usize>(

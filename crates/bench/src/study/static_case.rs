@@ -8,8 +8,8 @@ use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_evaluation::first_missed_by_posture;
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_kinematics::Joints;
-use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{Member, Planner, needle_route};
+use needlebench_kinematics::ik::{Configuration, Kinematics};
+use needlebench_planning::{Member, Planner, needle_route, route_rejection};
 use needlebench_study::Outcome;
 
 use super::prediction::Prediction;
@@ -38,6 +38,8 @@ const KEPT: usize = 8;
 pub struct StaticWorker {
     /// The one used last is the last.
     models: Vec<ClearanceModel>,
+    /// Of the arm used last.
+    kinematics: Option<Kinematics>,
 }
 
 /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
@@ -86,6 +88,23 @@ impl StaticWorker {
         .unwrap_or_else(|key| CaseRow::new(configuration, StudyMode::Static, Outcome::Invalid, key))
     }
 
+    /// One of [`StaticWorker::rows`] if the guide stood at a roll that others than the planner chose.
+    pub fn row_at(
+        &mut self,
+        resolved: &ResolvedScenario,
+        configuration: Configuration,
+        roll_rad: f64,
+    ) -> CaseRow {
+        self.evaluate(resolved, |planner, prediction, route_m| {
+            let goal = &resolved.goals[0];
+            let route = route_rejection(resolved, goal);
+            let member = planner.member_at(goal, configuration, roll_rad);
+            let member = member.on_route(route.as_ref());
+            row(planner, prediction, configuration, &member, route_m)
+        })
+        .unwrap_or_else(|key| CaseRow::new(configuration, StudyMode::Static, Outcome::Invalid, key))
+    }
+
     /// The first rule or criterion about clearances that a posture breaks in a layout; the key at fault of a
     /// layout that cannot be.
     pub(super) fn clearance_broken(
@@ -114,9 +133,17 @@ impl StaticWorker {
         }
         let route_m = route_m(resolved);
         let prediction = Prediction::new(resolved)?;
+        let known = self.kinematics.take();
         let model = self.model(resolved);
-        let planner = Planner::new(resolved, model).map_err(|_| "robot.urdf")?;
-        Ok(with(&planner, &prediction, route_m))
+        let planner = match known {
+            Some(known) => Planner::like(resolved, model, &known),
+            None => Planner::new(resolved, model),
+        };
+        let planner = planner.map_err(|_| "robot.urdf")?;
+        let kinematics = *planner.kinematics();
+        let found = with(&planner, &prediction, route_m);
+        self.kinematics = Some(kinematics);
+        Ok(found)
     }
 
     /// The layout's clearances, prepared from the kept ones.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::common::{Variety, cell};
 use nalgebra::{Point3, Vector3};
 use needlebench_cell::{Cell, ClearanceClass};
-use needlebench_clearance::{ClearanceModel, PairClearance};
+use needlebench_clearance::{ClearanceModel, Nearby, PairClearance, Share};
 use needlebench_geometry::{PreparedShape, PreparedSolids, Shape, SolidMesh, separation};
 use needlebench_kinematics::{Joints, Pose};
 
@@ -112,6 +112,125 @@ fn pruned_minima_are_exactly_the_minima_of_all_pairs() {
         // All but the needle's route, which is no pair of bodies.
         assert_eq!(classes, 8);
         assert_eq!(minima.get(ClearanceClass::NeedleRoute), None);
+    }
+}
+
+/// Steps of a way through postures, rad: from those of a bisection's end to jumps.
+const STEPS_RAD: [f64; 5] = [1e-4, 1e-3, 0.01, 0.1, 1.0];
+
+/// Postures that follow each other by such steps, with jumps in between.
+fn walk(variety: &mut Variety, count: usize) -> Vec<Joints> {
+    let mut q = Joints::new(0.3, -1.2, 1.5, -1.5, -1.5, 0.2);
+    (0..count)
+        .map(|k| {
+            let step_rad = STEPS_RAD[k / 3 % STEPS_RAD.len()];
+            q += Joints::from_fn(|_, _| variety.between(-step_rad, step_rad));
+            q
+        })
+        .collect()
+}
+
+/// The same cell with a dented skin, which is a surface.
+fn with_dented_skin(mut cell: Cell) -> Cell {
+    let mut bodies = cell.bodies.iter_mut();
+    let phantom = bodies.find(|body| body.name == "phantom").expect("it has");
+    let Shape::Convex(skin) = &phantom.solids[0].shape else {
+        panic!("the skin is convex")
+    };
+    let mut surface = skin.0.clone();
+    for dent in &mut surface.vertices_m[50..70] {
+        *dent = Point3::from(dent.coords * 0.8);
+    }
+    phantom.solids[0].shape = Shape::Mesh(Arc::new(SolidMesh {
+        surface,
+        pieces: Vec::new(),
+    }));
+    cell
+}
+
+#[test]
+fn what_is_known_from_the_posture_before_changes_no_answer() {
+    let limit_m = |class: ClearanceClass| match class {
+        ClearanceClass::GuideStandoff => f64::NEG_INFINITY,
+        ClearanceClass::SelfCollision => 0.002,
+        _ => 0.02,
+    };
+    // Two groups, one of them with offsets; the rest does not count.
+    let share = |class: ClearanceClass| match class {
+        ClearanceClass::SelfCollision | ClearanceClass::NeedleCorridor => Some(Share {
+            group: 3,
+            offset_m: 0.0,
+        }),
+        ClearanceClass::GuideStandoff => None,
+        _ => Some(Share {
+            group: 1,
+            offset_m: limit_m(class) + 0.01 * (class as usize) as f64,
+        }),
+    };
+    for (cell, count) in [(cell(), 900), (with_dented_skin(cell()), 60)] {
+        let model = ClearanceModel::new(&cell);
+        let mut variety = Variety::new(8);
+        let [mut all, mut grouped, mut below, mut mixed] = [(); 4].map(|()| Nearby::default());
+        let mut hits = 0;
+        for (k, q) in walk(&mut variety, count).into_iter().enumerate() {
+            let pairs = model.all_pairs(&q);
+            let least_m = |class: ClearanceClass| {
+                let found = least(&pairs, class).expect("the class has pairs");
+                found.separation.distance_m
+            };
+            let check = |found: &PairClearance| {
+                assert_eq!(found.separation.distance_m, least_m(found.class), "{k}");
+                // The witness is that of the pair itself.
+                assert_eq!(pairs[found.pair].separation, found.separation, "{k}");
+            };
+            let minima = model.minimum_per_class_near(&q, &mut all);
+            assert_eq!(minima.iter().count(), 8);
+            minima.iter().for_each(check);
+            // Of a group the least excess over the offsets.
+            let excess_m = |class: ClearanceClass| Some(least_m(class) - share(class)?.offset_m);
+            let asked = |nearby: &mut Nearby| model.minimum_per_group_near(&q, nearby, share);
+            let found = asked(&mut grouped);
+            found.iter().for_each(check);
+            for group in [1, 3] {
+                let of_group =
+                    |class: &ClearanceClass| share(*class).map(|s| s.group) == Some(group);
+                let classes = minima.iter().map(|each| each.class);
+                let wanted_m = classes.filter(of_group).filter_map(excess_m);
+                let classes: Vec<_> = found.iter().map(|each| each.class).collect();
+                let [only] = classes
+                    .iter()
+                    .filter(|class| of_group(class))
+                    .collect::<Vec<_>>()[..]
+                else {
+                    panic!("one of each group");
+                };
+                assert_eq!(excess_m(*only), wanted_m.min_by(f64::total_cmp));
+            }
+            let is_below = |pair: &PairClearance| {
+                pair.class.is_physical() && pair.separation.distance_m < limit_m(pair.class)
+            };
+            let limit_m = |class: ClearanceClass| {
+                if class.is_physical() {
+                    limit_m(class)
+                } else {
+                    f64::NEG_INFINITY
+                }
+            };
+            let near = model.below_near(&q, &mut below, limit_m);
+            assert_eq!(near.is_some(), pairs.iter().any(is_below), "{k}");
+            assert!(near.is_none_or(|pair| is_below(&pair)));
+            hits += usize::from(near.is_some());
+            // One after the other, whatever was asked before.
+            match k % 3 {
+                0 => assert_eq!(model.minimum_per_class_near(&q, &mut mixed), minima),
+                1 => assert_eq!(asked(&mut mixed), found),
+                _ => {
+                    let again = model.below_near(&q, &mut mixed, limit_m);
+                    assert_eq!(again.is_some(), near.is_some());
+                }
+            }
+        }
+        assert!(hits > count / 20 && hits < count, "{hits}");
     }
 }
 
@@ -222,23 +341,7 @@ fn the_nearest_solid_of_a_segment_is_the_least_of_all() {
 
 #[test]
 fn pruned_minima_of_a_cell_with_a_mesh_are_exactly_the_minima_of_all_pairs() {
-    let mut cell = cell();
-    let phantom = cell
-        .bodies
-        .iter_mut()
-        .find(|body| body.name == "phantom")
-        .expect("the cell has a phantom");
-    let Shape::Convex(skin) = &phantom.solids[0].shape else {
-        panic!("the skin is convex")
-    };
-    let mut surface = skin.0.clone();
-    for dent in &mut surface.vertices_m[50..70] {
-        *dent = Point3::from(dent.coords * 0.8);
-    }
-    phantom.solids[0].shape = Shape::Mesh(Arc::new(SolidMesh {
-        surface,
-        pieces: Vec::new(),
-    }));
+    let cell = with_dented_skin(cell());
     let model = ClearanceModel::new(&cell);
     let mut variety = Variety::new(37);
     let mut inside = 0;

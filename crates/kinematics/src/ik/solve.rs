@@ -168,17 +168,45 @@ impl Kinematics {
         Solutions {
             solutions: nominal
                 .solutions()
-                .map(|row| Solution {
-                    wrist_3_is_free: row.wrist_3_is_free,
-                    merged: row.merged,
-                    ..self.refined(&target, row.configuration, &row.joints, row.touching)
-                })
+                .map(|row| self.refined_row(&target, &row))
                 .collect(),
             nearest: Vec::new(),
             unreachable: nominal
                 .unreachable(&self.geometry, &base_from_flange)
                 .collect(),
             certificate: nominal.certificate(),
+        }
+    }
+
+    /// One configuration of [`Kinematics::branches`], with the same bits; none if it has no row there. On
+    /// a nominal chain the others are not refined.
+    pub fn branch(
+        &self,
+        base_link_from_flange: &Pose,
+        seed: Option<&Joints>,
+        configuration: Configuration,
+    ) -> Option<Solution> {
+        if !self.is_nominal() {
+            let found = self.branches(base_link_from_flange, seed).solutions;
+            let mut rows = found.into_iter();
+            return rows.find(|row| row.configuration == configuration);
+        }
+        if defect(base_link_from_flange).is_some() {
+            return None;
+        }
+        let pose = normalised(base_link_from_flange);
+        let mut nominal = ClosedForm::BLANK;
+        self.closed_form(&(base_from_base_link() * pose), seed, &mut nominal);
+        let row = nominal.solution(configuration)?;
+        let target = self.numerical.target(&pose);
+        Some(self.refined_row(&target, &row))
+    }
+
+    fn refined_row(&self, target: &Target, row: &ClosedFormSolution) -> Solution {
+        Solution {
+            wrist_3_is_free: row.wrist_3_is_free,
+            merged: row.merged,
+            ..self.refined(target, row.configuration, &row.joints, row.touching)
         }
     }
 

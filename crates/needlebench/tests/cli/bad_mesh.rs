@@ -279,7 +279,7 @@ fn file_that_is_missing_or_no_stl_is_refused() {
     Finding::only(&check(&bench).exits_with(2), &text)
         .key("phantom.parts[1].file")
         .at("file = \"bone.stl\"")
-        .hints("STL files");
+        .hints("an STL file");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 use needlebench_cell::scenario::RollAim;
 use needlebench_cell::{ClearanceClass, Goal};
+use needlebench_clearance::Share;
 
 use super::Member;
 use crate::planner::{Candidate, Planner};
@@ -12,6 +13,26 @@ pub type Aim = RollAim;
 
 /// Length over which clearances count less and less for [`Aim::Clearance`], m.
 const CLEARANCE_SCALE_M: f64 = 0.02;
+
+/// How the clearance of a class counts in [`Planner::value`], which reads no more of it than the least of
+/// each group (`a_sweep_sees_what_each_member_is_alone`).
+pub(crate) fn share_in(aim: Aim, class: ClearanceClass) -> Option<Share> {
+    let group = match aim {
+        Aim::Clearance => match class {
+            ClearanceClass::GuideStandoff | ClearanceClass::NeedleRoute => return None,
+            _ => class as usize,
+        },
+        Aim::Balanced => match class {
+            ClearanceClass::SelfCollision => 1,
+            ClearanceClass::NeedleCorridor => 2,
+            _ if class.is_surroundings() => 0,
+            _ => return None,
+        },
+        Aim::JointMargin | Aim::Singularity | Aim::TipAccuracy => return None,
+    };
+    let offset_m = 0.0;
+    Some(Share { group, offset_m })
+}
 
 impl Planner<'_> {
     /// How good a posture is at an aim; more is better. Of postures that work or do not work alike:

@@ -18,9 +18,11 @@ mod aim;
 mod ranges;
 
 use needlebench_cell::Goal;
-use needlebench_kinematics::ik::{Configuration, Solutions};
+use needlebench_clearance::Nearby;
+use needlebench_kinematics::ik::{Configuration, Solution, Solutions};
 
 pub use aim::Aim;
+pub(crate) use aim::share_in;
 pub use ranges::{Best, EDGE_RAD, Edge, Family, RollRange};
 
 use crate::limits::{ByClass, Shortfall};
@@ -105,49 +107,155 @@ impl Member {
     }
 }
 
+/// One configuration looked at at one roll after the other: each look is quicker by what the one before
+/// has shown, and the answers do not depend on it.
+pub(crate) struct Sweep<'p> {
+    planner: &'p Planner<'p>,
+    goal: &'p Goal,
+    configuration: Configuration,
+    nearby: Nearby,
+}
+
+impl<'p> Sweep<'p> {
+    pub fn new(planner: &'p Planner<'p>, goal: &'p Goal, configuration: Configuration) -> Self {
+        Self {
+            planner,
+            goal,
+            configuration,
+            nearby: Nearby::default(),
+        }
+    }
+
+    /// The member at a roll.
+    pub fn member(&mut self, roll_rad: f64) -> Member {
+        let pose = self.planner.base_link_from_flange(self.goal, roll_rad);
+        let (kinematics, start) = (self.planner.kinematics(), self.planner.start());
+        let found = kinematics.branch(&pose, Some(start), self.configuration);
+        match found {
+            Some(solution) => self.planner.present(roll_rad, &solution, &mut self.nearby),
+            // Why it is not there.
+            None => {
+                let all = kinematics.branches(&pose, Some(start));
+                missing(roll_rad, self.configuration, &all)
+            }
+        }
+    }
+
+    /// Merit of the member at a roll; that of none if it does not work.
+    pub fn merit(&mut self, aim: Aim, roll_rad: f64) -> Merit {
+        let found = self.solution(roll_rad);
+        let Some(solution) = found.filter(|found| self.planner.works(found, &mut self.nearby))
+        else {
+            return Merit::NONE;
+        };
+        let nearby = &mut self.nearby;
+        // What keeps all that is wanted falls short of nothing: its value is all that tells it apart.
+        let candidate = if self.planner.keeps_wanted(&solution, nearby) {
+            self.planner.candidate_for(aim, roll_rad, &solution, nearby)
+        } else {
+            self.planner.candidate(roll_rad, &solution, nearby).0
+        };
+        self.planner.merit(self.goal, aim, &candidate)
+    }
+
+    /// Surplus of the member at a roll, and whether it works.
+    pub fn surplus(&mut self, roll_rad: f64) -> (f64, bool) {
+        let Some(solution) = self.solution(roll_rad) else {
+            return (self.member(roll_rad).surplus, false);
+        };
+        let nearby = &mut self.nearby;
+        let (candidate, broken) = self
+            .planner
+            .candidate_of_surplus(roll_rad, &solution, nearby);
+        let surplus = self.planner.surplus(&candidate, &broken);
+        let limits = candidate.clearance.iter();
+        let collides = limits
+            .map(|pair| pair.separation.distance_m - self.planner.limits().get(pair.class).floor_m)
+            .any(|excess_m| excess_m < 0.0);
+        (surplus, broken.is_empty() && !collides)
+    }
+
+    fn solution(&self, roll_rad: f64) -> Option<Solution> {
+        let pose = self.planner.base_link_from_flange(self.goal, roll_rad);
+        let start = Some(self.planner.start());
+        let kinematics = self.planner.kinematics();
+        kinematics.branch(&pose, start, self.configuration)
+    }
+
+    /// Whether the member at a roll works.
+    pub fn works(&mut self, roll_rad: f64) -> bool {
+        let found = self.solution(roll_rad);
+        found.is_some_and(|solution| self.planner.works(&solution, &mut self.nearby))
+    }
+}
+
+/// What becomes of a configuration that does not reach its pose.
+fn missing(roll_rad: f64, configuration: Configuration, found: &Solutions) -> Member {
+    let rejection = absent(configuration, found);
+    Member {
+        roll_rad,
+        candidate: None,
+        surplus: if rejection.rule == Rule::Unreachable {
+            -rejection.value.max(f64::MIN_POSITIVE)
+        } else {
+            MERGED_SURPLUS
+        },
+        rejections: vec![rejection],
+    }
+}
+
 impl Planner<'_> {
     /// All eight configurations at one roll, in the order of [`Configuration::ALL`]: postures only,
     /// no motions.
     pub fn members_at(&self, goal: &Goal, roll_rad: f64) -> [Member; 8] {
-        let found = self.solutions_at(goal, roll_rad);
-        Configuration::ALL.map(|configuration| self.member_of(roll_rad, configuration, &found))
+        self.members_near(goal, roll_rad, &mut Default::default())
+    }
+
+    /// [`Planner::members_at`] of one roll after the other.
+    pub(crate) fn members_near(
+        &self,
+        goal: &Goal,
+        roll_rad: f64,
+        nearby: &mut [Nearby; 8],
+    ) -> [Member; 8] {
+        let pose = self.base_link_from_flange(goal, roll_rad);
+        let found = self.kinematics().branches(&pose, Some(self.start()));
+        Configuration::ALL.map(|configuration| {
+            let mut rows = found.solutions.iter();
+            match rows.find(|each| each.configuration == configuration) {
+                Some(solution) => {
+                    self.present(roll_rad, solution, &mut nearby[configuration.index()])
+                }
+                None => missing(roll_rad, configuration, &found),
+            }
+        })
     }
 
     /// One configuration at one roll.
     pub fn member_at(&self, goal: &Goal, configuration: Configuration, roll_rad: f64) -> Member {
-        let found = self.solutions_at(goal, roll_rad);
-        self.member_of(roll_rad, configuration, &found)
+        Sweep::new(self, goal, configuration).member(roll_rad)
     }
 
-    fn solutions_at(&self, goal: &Goal, roll_rad: f64) -> Solutions {
-        let pose = self.base_link_from_flange(goal, roll_rad);
-        self.kinematics().branches(&pose, Some(self.start()))
+    /// One configuration at one roll after the other.
+    pub fn members_along(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        rolls_rad: &[f64],
+    ) -> Vec<Member> {
+        let mut sweep = Sweep::new(self, goal, configuration);
+        let rolls = rolls_rad.iter();
+        rolls.map(|&roll_rad| sweep.member(roll_rad)).collect()
     }
 
-    fn member_of(&self, roll_rad: f64, configuration: Configuration, found: &Solutions) -> Member {
-        let solution = found
-            .solutions
-            .iter()
-            .find(|each| each.configuration == configuration);
-        if let Some(solution) = solution {
-            let (candidate, rejections) = self.candidate(roll_rad, solution);
-            return Member {
-                roll_rad,
-                surplus: self.surplus(&candidate, &rejections),
-                candidate: Some(candidate),
-                rejections,
-            };
-        }
-        let rejection = absent(configuration, found);
+    /// A member that has a posture.
+    fn present(&self, roll_rad: f64, solution: &Solution, nearby: &mut Nearby) -> Member {
+        let (candidate, rejections) = self.candidate(roll_rad, solution, nearby);
         Member {
             roll_rad,
-            candidate: None,
-            surplus: if rejection.rule == Rule::Unreachable {
-                -rejection.value.max(f64::MIN_POSITIVE)
-            } else {
-                MERGED_SURPLUS
-            },
-            rejections: vec![rejection],
+            surplus: self.surplus(&candidate, &rejections),
+            candidate: Some(candidate),
+            rejections,
         }
     }
 
@@ -204,5 +312,55 @@ impl Planner<'_> {
             .chain(singular)
             .chain(others)
             .fold(f64::INFINITY, f64::min)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+    use std::path::Path;
+
+    use needlebench_cell::{Overrides, load_scenario};
+    use needlebench_clearance::ClearanceModel;
+    use needlebench_kinematics::random::SplitMix64;
+
+    use super::*;
+
+    #[test]
+    fn a_sweep_sees_what_each_member_is_alone() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+        let (mut working, mut seen) = (0, 0);
+        for name in ["supine_suite.toml", "studies/chest.toml"] {
+            let resolved = load_scenario(&folder.join(name), &Overrides::default()).unwrap();
+            let model = ClearanceModel::new(&resolved.cell);
+            let planner = Planner::new(&resolved, &model).unwrap();
+            let mut random = SplitMix64::new(4);
+            for goal in &resolved.goals {
+                for configuration in Configuration::ALL {
+                    let mut sweep = Sweep::new(&planner, goal, configuration);
+                    let mut roll_rad: f64 = 1.0;
+                    for step_rad in [1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 1.0, 1e-3, 0.02] {
+                        roll_rad = (roll_rad + random.uniform(-step_rad, step_rad)).rem_euclid(TAU);
+                        let alone = planner.member_at(goal, configuration, roll_rad);
+                        assert_eq!(sweep.works(roll_rad), alone.works());
+                        assert_eq!(sweep.surplus(roll_rad), (alone.surplus, alone.works()));
+                        // Values need the least of each group alone.
+                        for aim in Aim::ALL {
+                            let merit = match &alone.candidate {
+                                Some(candidate) if alone.works() => {
+                                    planner.merit(goal, aim, candidate)
+                                }
+                                _ => Merit::NONE,
+                            };
+                            assert_eq!(sweep.merit(aim, roll_rad), merit, "{aim:?}");
+                        }
+                        assert_eq!(sweep.member(roll_rad), alone);
+                        working += usize::from(alone.works());
+                        seen += 1;
+                    }
+                }
+            }
+        }
+        assert!(working > seen / 20 && working < seen, "{working} of {seen}");
     }
 }

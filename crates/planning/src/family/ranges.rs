@@ -6,7 +6,7 @@ use needlebench_cell::Goal;
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
-use super::{Aim, Member, Merit};
+use super::{Aim, Member, Merit, Sweep};
 use crate::Rejection;
 use crate::planner::Planner;
 
@@ -110,7 +110,7 @@ impl Planner<'_> {
         grid: &[Member],
         aims: &[Aim],
     ) -> Family {
-        let at = |roll_rad: f64| self.member_at(goal, configuration, roll_rad);
+        let mut sweep = Sweep::new(self, goal, configuration);
         let empty = Family {
             configuration,
             ranges: Vec::new(),
@@ -121,15 +121,15 @@ impl Planner<'_> {
                 member: only.clone(),
             }];
             let ranges = if only.works() {
-                vec![self.range(goal, configuration, &knots, None, None, aims)]
+                vec![self.range(goal, &mut sweep, &knots, None, None, aims)]
             } else {
                 Vec::new()
             };
             return Family { ranges, ..empty };
         }
-        let knots = closer_look(grid, &at);
+        let knots = closer_look(grid, &mut sweep);
         if knots.iter().all(|knot| knot.member.works()) {
-            let mut range = self.range(goal, configuration, &knots, None, None, aims);
+            let mut range = self.range(goal, &mut sweep, &knots, None, None, aims);
             range.is_whole_circle = true;
             range.to_rad = range.from_rad + TAU;
             return Family {
@@ -159,8 +159,8 @@ impl Planner<'_> {
                 (false, true) => begin = Some(k),
                 (true, false) => {
                     let from = begin.take().unwrap_or(1);
-                    let (low, before) = bisect(&turned[from], &turned[from - 1], &at);
-                    let (high, after) = bisect(&turned[k - 1], &turned[k], &at);
+                    let (low, before) = bisect(&turned[from], &turned[from - 1], &mut sweep);
+                    let (high, after) = bisect(&turned[k - 1], &turned[k], &mut sweep);
                     let mut inside = Vec::with_capacity(k - from + 2);
                     inside.extend(low);
                     inside.extend(turned[from..k].iter().map(|knot| Knot {
@@ -170,7 +170,7 @@ impl Planner<'_> {
                     inside.extend(high);
                     ranges.push(self.range(
                         goal,
-                        configuration,
+                        &mut sweep,
                         &inside,
                         Some(before),
                         Some(after),
@@ -193,7 +193,7 @@ impl Planner<'_> {
     fn range(
         &self,
         goal: &Goal,
-        configuration: Configuration,
+        sweep: &mut Sweep<'_>,
         knots: &[Knot],
         before: Option<Edge>,
         after: Option<Edge>,
@@ -203,7 +203,7 @@ impl Planner<'_> {
         let (from_rad, to_rad) = (knots[0].roll_rad, knots[knots.len() - 1].roll_rad);
         let best = aims
             .iter()
-            .map(|aim| self.best(goal, configuration, knots, whole, *aim))
+            .map(|aim| self.best(goal, sweep, knots, whole, *aim))
             .collect();
         let (low, high) = joint_extent(knots);
         let limits = &self.cell().robot.limits;
@@ -230,7 +230,7 @@ impl Planner<'_> {
     fn best(
         &self,
         goal: &Goal,
-        configuration: Configuration,
+        sweep: &mut Sweep<'_>,
         knots: &[Knot],
         whole: bool,
         aim: Aim,
@@ -255,7 +255,7 @@ impl Planner<'_> {
         // Equal ones stay in the order of roll.
         peaks.sort_by(|&a, &b| merits[a].better_first(&merits[b]));
         let first = peaks.first().copied().unwrap_or(0);
-        let (mut most, mut member) = (merits[first], knots[first].member.clone());
+        let (mut most, mut better_rad) = (merits[first], None);
         for index in peaks {
             let (low, high) = match (index, whole) {
                 (0, true) => (roll(last) - TAU, roll(1)),
@@ -263,10 +263,10 @@ impl Planner<'_> {
                 (k, _) => (roll(k.saturating_sub(1)), roll((k + 1).min(last))),
             };
             golden(low, high, |roll_rad| {
-                let found = self.member_at(goal, configuration, roll_rad.rem_euclid(TAU));
-                let here = merit(&found);
+                let roll_rad = roll_rad.rem_euclid(TAU);
+                let here = sweep.merit(aim, roll_rad);
                 if here > most {
-                    (most, member) = (here, found);
+                    (most, better_rad) = (here, Some(roll_rad));
                 }
                 here
             });
@@ -277,13 +277,16 @@ impl Planner<'_> {
         Best {
             aim,
             value: most.value,
-            member,
+            member: match better_rad {
+                Some(roll_rad) => sweep.member(roll_rad),
+                None => knots[first].member.clone(),
+            },
         }
     }
 }
 
 /// The grid, with members between its rolls where the surplus may change its sign twice.
-fn closer_look(grid: &[Member], at: &dyn Fn(f64) -> Member) -> Vec<Knot> {
+fn closer_look(grid: &[Member], sweep: &mut Sweep<'_>) -> Vec<Knot> {
     let count = grid.len();
     let step_rad = TAU / count as f64;
     let mut knots: Vec<Knot> = Vec::with_capacity(count);
@@ -303,21 +306,21 @@ fn closer_look(grid: &[Member], at: &dyn Fn(f64) -> Member) -> Vec<Knot> {
         if !(alike && peak && here.surplus.abs() < CLOSER_LOOK * steep) {
             continue;
         }
-        let mut found: Option<Member> = None;
+        let mut found_rad: Option<f64> = None;
         golden(
             here.roll_rad - step_rad,
             here.roll_rad + step_rad,
             |roll_rad| {
-                let member = at(roll_rad.rem_euclid(TAU));
-                let value = sign * member.surplus;
-                if member.works() != here.works() && found.is_none() {
-                    found = Some(member);
+                let roll_rad = roll_rad.rem_euclid(TAU);
+                let (surplus, works) = sweep.surplus(roll_rad);
+                if works != here.works() && found_rad.is_none() {
+                    found_rad = Some(roll_rad);
                 }
-                value
+                sign * surplus
             },
         );
-        if let Some(member) = found {
-            let roll_rad = member.roll_rad;
+        if let Some(roll_rad) = found_rad {
+            let member = sweep.member(roll_rad);
             knots.push(Knot { roll_rad, member });
         }
     }
@@ -351,21 +354,23 @@ fn golden<V: PartialOrd>(mut low: f64, mut high: f64, mut value: impl FnMut(f64)
 }
 
 /// Last member that works before an edge, if it is not `inside` itself, and the edge.
-fn bisect(inside: &Knot, outside: &Knot, at: &dyn Fn(f64) -> Member) -> (Option<Knot>, Edge) {
+fn bisect(inside: &Knot, outside: &Knot, sweep: &mut Sweep<'_>) -> (Option<Knot>, Edge) {
     let (mut good_rad, mut bad_rad) = (inside.roll_rad, outside.roll_rad);
-    let (mut good, mut bad) = (None, None);
     while (good_rad - bad_rad).abs() > EDGE_RAD {
         let middle_rad = f64::midpoint(good_rad, bad_rad);
-        let member = at(middle_rad.rem_euclid(TAU));
-        if member.works() {
+        if sweep.works(middle_rad.rem_euclid(TAU)) {
             good_rad = middle_rad;
-            good = Some(member);
         } else {
             bad_rad = middle_rad;
-            bad = Some(member);
         }
     }
-    let rejections = bad.map_or_else(|| outside.member.rejections.clone(), |bad| bad.rejections);
+    let mut at = |roll_rad: f64, known: &Knot| {
+        (roll_rad != known.roll_rad).then(|| sweep.member(roll_rad.rem_euclid(TAU)))
+    };
+    let rejections = match at(bad_rad, outside) {
+        Some(bad) => bad.rejections,
+        None => outside.member.rejections.clone(),
+    };
     let edge = Edge {
         roll_rad: bad_rad,
         rejection: rejections
@@ -373,7 +378,7 @@ fn bisect(inside: &Knot, outside: &Knot, at: &dyn Fn(f64) -> Member) -> (Option<
             .next()
             .expect("what does not work breaks a rule"),
     };
-    let knot = good.map(|member| Knot {
+    let knot = at(good_rad, inside).map(|member| Knot {
         roll_rad: good_rad,
         member,
     });

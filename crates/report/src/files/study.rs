@@ -121,12 +121,16 @@ pub fn write_study(
     let robustness = file
         .robustness
         .as_ref()
-        .map(|section| robustness_of(&prepared.study, section, output.threads, progress))
-        .transpose()
-        .map_err(|findings| {
-            let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
-            FilesError::Robustness(texts.join("; "))
-        })?;
+        .map(|section| {
+            let (threads, cancel) = (output.threads, output.cancel);
+            let found = robustness_of(&prepared.study, section, threads, cancel, progress);
+            let found = found.map_err(|findings| {
+                let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
+                FilesError::Robustness(texts.join("; "))
+            })?;
+            found.ok_or(FilesError::Interrupted)
+        })
+        .transpose()?;
     let of_radii = robustness.as_deref().and_then(robustness_method);
     statistics.methods.extend(of_radii);
     let not_judged = not_judged(&statistics, &criteria);
