@@ -247,10 +247,13 @@ impl Planner<'_> {
         }
     }
 
-    /// Whether another transfer can help: no posture that every motion takes is below its floor.
+    /// Whether another transfer can help: no posture that every motion takes is below its floor. What
+    /// another rule rejects needs a motion only to be simulated.
     fn is_worth_a_search(&self, required: &Required) -> bool {
-        required.rejections.is_empty()
-            && required.attainable().most_below(&self.limits().floors()) <= 0.0
+        let mut rejections = required.rejections.iter();
+        let is_wanted = rejections
+            .all(|each| self.planning().simulate_rejected && each.rule != Rule::Collision);
+        is_wanted && required.attainable().most_below(&self.limits().floors()) <= 0.0
     }
 
     /// The transfer that keeps most of those found: as much as start and approach, or as much as the

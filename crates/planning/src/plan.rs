@@ -242,7 +242,10 @@ impl Planner<'_> {
             };
             let straight = self.straight(&required);
             if hopeless {
-                let plan = self.planned(configuration, required, straight.clone(), &straight, None);
+                let known = straight.clone();
+                let (way, search) =
+                    self.improved(goal, configuration, &required, straight, checks_left);
+                let plan = self.planned(configuration, required, way, &known, search);
                 return (plan, false);
             }
             // What this posture could keep at best, and what comes of it.
