@@ -8,7 +8,6 @@ use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 
 use crate::body::{LinkPlacements, PlacedBody, placed_body};
 use crate::posture::Posture;
-use crate::search::{Below, Least, Look, Nearby, Share};
 
 /// Number of classes.
 pub(crate) const CLASS_COUNT: usize = ClearanceClass::ALL.len();
@@ -174,71 +173,6 @@ impl ClearanceModel {
     /// bounding volumes or a separating plane show to be farther apart are left out.
     pub fn minimum_per_class(&self, q: &Joints) -> ClassMinima {
         self.minimum_per_class_at(&self.world_from_links(q))
-    }
-
-    /// [`ClearanceModel::minimum_per_class`] with the poses of the moving links given.
-    pub fn minimum_per_class_at(&self, world_from_links: &[Pose; JOINT_COUNT]) -> ClassMinima {
-        let links = world_from_links.each_ref().map(Placement::new);
-        let look = Look {
-            model: self,
-            links: &links,
-        };
-        let mut least = Least::of_each_class();
-        look.search(&mut Nearby::default(), &mut least);
-        least.minima(&look)
-    }
-
-    /// [`ClearanceModel::minimum_per_class`] of postures that follow each other: what is known from the
-    /// one before says of most solids that they are not the nearest.
-    pub fn minimum_per_class_near(&self, q: &Joints, nearby: &mut Nearby) -> ClassMinima {
-        self.least_near(q, nearby, Least::of_each_class())
-    }
-
-    /// Of each group of classes the one with the least clearance over its offset; all others are `None`,
-    /// and what cannot be the least of its group costs nothing. `share` says how a class counts, `None`
-    /// that it does not.
-    pub fn minimum_per_group_near(
-        &self,
-        q: &Joints,
-        nearby: &mut Nearby,
-        share: impl Fn(ClearanceClass) -> Option<Share>,
-    ) -> ClassMinima {
-        self.least_near(q, nearby, Least::of(ClearanceClass::ALL.map(share)))
-    }
-
-    fn least_near(&self, q: &Joints, nearby: &mut Nearby, mut least: Least) -> ClassMinima {
-        let links = self.world_from_links(q).each_ref().map(Placement::new);
-        let look = Look {
-            model: self,
-            links: &links,
-        };
-        look.search(nearby, &mut least);
-        least.minima(&look)
-    }
-
-    /// A pair that is closer than the limit of its class, m, if there is any; of postures that follow
-    /// each other, as [`ClearanceModel::minimum_per_class_near`].
-    ///
-    /// Classes that do not matter have the limit negative infinity.
-    pub fn below_near(
-        &self,
-        q: &Joints,
-        nearby: &mut Nearby,
-        limit_m: impl Fn(ClearanceClass) -> f64,
-    ) -> Option<PairClearance> {
-        let links = self.world_from_links(q).each_ref().map(Placement::new);
-        let look = Look {
-            model: self,
-            links: &links,
-        };
-        let limits_m = ClearanceClass::ALL.map(limit_m);
-        let mut below = Below {
-            limits_m: &limits_m,
-            found: None,
-        };
-        look.search(nearby, &mut below);
-        let (couple, separation) = below.found?;
-        Some(look.clearance(couple, &separation))
     }
 
     /// The first pair of physical bodies, in the order of [`Cell::pairs`], that is closer than

@@ -330,7 +330,7 @@ impl Planner<'_> {
     pub(crate) fn planned(
         &self,
         configuration: Configuration,
-        required: Required,
+        required: &Required,
         way: Way,
         straight: &Way,
         search: Option<SearchEffort>,
@@ -342,7 +342,7 @@ impl Planner<'_> {
         // Whole turns change the margin to the joint limits.
         candidate.margins = self.margins(&candidate.joints);
         let parts = required.parts(&way);
-        let end = if !self.is_worth_a_search(&required) {
+        let end = if !self.is_worth_a_search(required) {
             SearchEnd::Proof
         } else if required.is_reached_by(&way) {
             SearchEnd::Bound
@@ -365,7 +365,7 @@ impl Planner<'_> {
         let mut rejections = required.rejections.clone();
         // A posture that breaks a rule says so already; the motion into it adds nothing.
         if rejections.is_empty() {
-            rejections.extend(self.too_near(&required, &way, &approach, search.as_ref()));
+            rejections.extend(self.too_near(required, &way, &approach, search.as_ref()));
         }
         let retreat = rejections.is_empty().then(|| {
             let line = required.line.shifted(&shift(&way.turns));

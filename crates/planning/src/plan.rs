@@ -245,7 +245,7 @@ impl Planner<'_> {
                 let known = straight.clone();
                 let (way, search) =
                     self.improved(goal, configuration, &required, straight, checks_left);
-                let plan = self.planned(configuration, required, way, &known, search);
+                let plan = self.planned(configuration, &required, way, &known, search);
                 return (plan, false);
             }
             // What this posture could keep at best, and what comes of it.
@@ -255,7 +255,7 @@ impl Planner<'_> {
                 let known = straight.clone();
                 let (way, search) =
                     self.improved(goal, configuration, &required, straight, checks_left);
-                let plan = self.planned(configuration, required, way, &known, search);
+                let plan = self.planned(configuration, &required, way, &known, search);
                 return (plan, comes.judged_m >= -SAME_M);
             }
             tried.push((required, straight));
@@ -275,7 +275,7 @@ impl Planner<'_> {
                 self.improved(goal, configuration, &required, straight, checks_left);
             let achieved = required.achieved(&way);
             let (is_free, comes) = (self.is_free(&achieved), limits.shortfall(&achieved));
-            let plan = self.planned(configuration, required, way, &known, search);
+            let plan = self.planned(configuration, &required, way, &known, search);
             if is_free && comes.reaches(&possible, SAME_M) {
                 return (plan, comes.judged_m >= -SAME_M);
             }

@@ -9,7 +9,6 @@ use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby, Share};
 use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
-use crate::family::{Aim, share_in};
 use crate::limits::{ByClass, ClassLimits};
 use crate::motion::MotionChecker;
 use crate::{Rejection, Rule};
@@ -78,7 +77,7 @@ impl<'a> Planner<'a> {
         clearance: &'a ClearanceModel,
     ) -> Result<Self, NotUrGeometry> {
         let kinematics = Kinematics::new(resolved.cell.robot.chain)?;
-        Ok(Self::with_solver(resolved, clearance, kinematics))
+        Ok(Self::with_solver(resolved, clearance, &kinematics))
     }
 
     /// [`Planner::new`] with the solver of another planner, if that is of the same chain.
@@ -91,7 +90,7 @@ impl<'a> Planner<'a> {
         known: &Kinematics,
     ) -> Result<Self, NotUrGeometry> {
         if known.chain == resolved.cell.robot.chain {
-            Ok(Self::with_solver(resolved, clearance, *known))
+            Ok(Self::with_solver(resolved, clearance, known))
         } else {
             Self::new(resolved, clearance)
         }
@@ -100,7 +99,7 @@ impl<'a> Planner<'a> {
     fn with_solver(
         resolved: &'a ResolvedScenario,
         clearance: &'a ClearanceModel,
-        kinematics: Kinematics,
+        kinematics: &Kinematics,
     ) -> Self {
         let planning = &resolved.scenario.planning;
         Self {
@@ -179,16 +178,16 @@ impl<'a> Planner<'a> {
         let (clearance, broken) = self.clearance_rules_near(&solution.joints, nearby);
         rejections.extend(broken);
         (
-            self.with_clearance(roll_rad, solution, clearance),
+            self.with_clearance(roll_rad, solution, &clearance),
             rejections,
         )
     }
 
-    fn with_clearance(
+    pub(crate) fn with_clearance(
         &self,
         roll_rad: f64,
         solution: &Solution,
-        clearance: ClassMinima,
+        clearance: &ClassMinima,
     ) -> Candidate {
         Candidate {
             joints: solution.joints,
@@ -198,22 +197,8 @@ impl<'a> Planner<'a> {
             residual_rad: solution.residual_rad,
             wrist_3_is_free: solution.wrist_3_is_free,
             margins: self.margins(&solution.joints),
-            clearance,
+            clearance: *clearance,
         }
-    }
-
-    /// [`Planner::candidate`] with those clearances alone that count in its value at an aim.
-    pub(crate) fn candidate_for(
-        &self,
-        aim: Aim,
-        roll_rad: f64,
-        solution: &Solution,
-        nearby: &mut Nearby,
-    ) -> Candidate {
-        let clearance = self
-            .checker
-            .minima(&solution.joints, nearby, |class| share_in(aim, class));
-        self.with_clearance(roll_rad, solution, clearance)
     }
 
     /// [`Planner::candidate`] with that clearance alone which is least above its limit, and the rules
@@ -228,7 +213,7 @@ impl<'a> Planner<'a> {
             let offset_m = self.limits().get(class).floor_m;
             offset_m.is_finite().then_some(Share { group: 0, offset_m })
         });
-        let candidate = self.with_clearance(roll_rad, solution, clearance);
+        let candidate = self.with_clearance(roll_rad, solution, &clearance);
         (candidate, self.joint_rules(solution))
     }
 

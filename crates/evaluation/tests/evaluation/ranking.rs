@@ -8,8 +8,8 @@ use needlebench_evaluation::pareto::{Scale, dominates, pareto_set};
 use needlebench_evaluation::ranking::SAME_SCORE;
 use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
-    ClassClearance, ClearanceReport, ConfigurationReport, EngineReport, GoalReport, MarginsReport,
-    PhaseReport, Status,
+    ClassClearance, ClearanceReport, ConfigurationReport, EngineReport, GoalReport, MarginReport,
+    MarginsReport, PhaseReport, Status,
 };
 use needlebench_evaluation::room::RoomReport;
 use needlebench_evaluation::{EngineDifference, MotionMeasurement, NeedleMeasurement};
@@ -211,7 +211,19 @@ fn every_metric_is_read_from_a_report_that_has_everything() {
         budget: Some(budget(3e-4)),
         ..configuration(0)
     };
-    let planned = planned(simulated.clone());
+    let planned = ConfigurationReport {
+        margin: Some(MarginReport {
+            attainable_m: Some(0.02),
+            achieved_m: Some(0.01),
+            class: Some("robot_table"),
+            limited_by: Some("transfer"),
+            search: "budget",
+            straight: None,
+            classes: BTreeMap::new(),
+        }),
+        retreat_clearance: simulated.clearance.clone(),
+        ..planned(simulated.clone())
+    };
     for metric in metrics() {
         let values = [&simulated, &planned].map(|made| metric.read(made));
         assert!(values.iter().any(Option::is_some), "{}", metric.key);

@@ -362,7 +362,7 @@ pub(super) const MARGIN: &[Metric] = &[
     Metric::new(
         "margin_attainable",
         "margin, attainable",
-        "least clearance beyond what is judged, from phantom, table, gantry and mount, of the postures that \
+        "least clearance beyond what is judged, from phantom, table, gantry, mount and obstacles, of the postures that \
          every motion takes: the start, the approach and its end",
         Length,
         Configuration(|each| each.margin.as_ref()?.attainable_m),
@@ -372,7 +372,7 @@ pub(super) const MARGIN: &[Metric] = &[
     Metric::new(
         "margin_planned",
         "margin of the plan",
-        "least clearance beyond what is judged, from phantom, table, gantry and mount",
+        "least clearance beyond what is judged, from phantom, table, gantry, mount and obstacles",
         Length,
         Configuration(|each| each.margin.as_ref()?.achieved_m),
     )
@@ -381,7 +381,7 @@ pub(super) const MARGIN: &[Metric] = &[
     Metric::new(
         "clearance_retreat",
         "clearance, way back",
-        "least of the clearances of arm and tool from phantom, table, gantry and mount on the way back",
+        "least of the clearances of arm and tool from phantom, table, gantry, mount and obstacles on the way back",
         Length,
         Configuration(|each| {
             let classes = &each.retreat_clearance.classes;
