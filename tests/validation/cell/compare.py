@@ -42,7 +42,7 @@ ITERATIONS = 1000
 TIMING_PASSES = 3
 # Cells that are made for this comparison, with what shipped scenarios lack, and their share of postures.
 CELLS = Path(__file__).resolve().parent / "cells"
-OF_CELLS = 5
+OF_CELLS = 20
 # Coal gives up with answers far beyond this, m.
 BEYOND_M = 1e6
 
