@@ -53,4 +53,4 @@ pub use pairs::{
     PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
     check_srdf, examine_pairs,
 };
-pub use search::{Nearby, Share};
+pub use search::{AIMS, Counted, Counts, Nearby};

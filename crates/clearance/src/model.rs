@@ -79,6 +79,8 @@ pub struct ClearanceModel {
     world_from_base_link: Pose,
     pub(crate) bodies: Vec<Arc<PlacedBody>>,
     pub(crate) pairs: Vec<PlacedPair>,
+    /// By class: whether there is a pair of it.
+    has_class: [bool; CLASS_COUNT],
 }
 
 impl ClearanceModel {
@@ -129,6 +131,10 @@ impl ClearanceModel {
             let mut solids = bodies[body].solids.iter();
             solids.all(|solid| solid.shape.is_convex())
         };
+        let mut has_class = [false; CLASS_COUNT];
+        for pair in &cell.pairs {
+            has_class[pair.class as usize] = true;
+        }
         let pairs = cell
             .pairs
             .iter()
@@ -144,7 +150,13 @@ impl ClearanceModel {
             world_from_base_link: cell.robot.world_from_base_link,
             bodies,
             pairs,
+            has_class,
         }
+    }
+
+    /// Whether there is a pair of a class.
+    pub fn has(&self, class: ClearanceClass) -> bool {
+        self.has_class[class as usize]
     }
 
     /// Clearance of every pair of [`Cell::pairs`], in that order, at joint positions `q`.
@@ -221,7 +233,7 @@ impl ClearanceModel {
         &'m self,
         pair: usize,
         links: &'m LinkPlacements,
-        posture: &'m Posture,
+        posture: &'m Posture<'m>,
     ) -> PairQuery<'m> {
         let PlacedPair { a, b, class, .. } = self.pairs[pair];
         PairQuery {
@@ -254,7 +266,7 @@ struct PairQuery<'m> {
     a: (usize, &'m PlacedBody),
     b: (usize, &'m PlacedBody),
     links: &'m LinkPlacements,
-    posture: &'m Posture,
+    posture: &'m Posture<'m>,
 }
 
 impl PairQuery<'_> {

@@ -5,6 +5,7 @@
 //! axis to the other's turned box, which for a box of a table or a wedge of a ring is mostly the
 //! distance itself.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use needlebench_cell::Frame;
@@ -12,46 +13,46 @@ use needlebench_geometry::{BoundingCapsule, Placement};
 
 use crate::body::{LinkPlacements, Part, PlacedBody, Seen, SolidTree};
 
-/// All solids at one posture, in the world.
-pub(crate) struct Posture {
+/// All solids at one posture, in the world; each is placed when it is first asked for.
+pub(crate) struct Posture<'l> {
+    links: &'l LinkPlacements,
     /// Of the bodies that move, one body after the other.
-    moving: Vec<Seen>,
+    moving: Vec<OnceCell<Seen>>,
     /// Balls around the bodies.
     balls: Vec<BoundingCapsule>,
     /// Capsules around the bodies.
     wholes: Vec<BoundingCapsule>,
 }
 
-impl Posture {
-    pub fn new(bodies: &[Arc<PlacedBody>], links: &LinkPlacements) -> Self {
-        let mut moving = Vec::with_capacity(32);
-        let mut balls = Vec::with_capacity(bodies.len());
-        let mut wholes = Vec::with_capacity(bodies.len());
-        for body in bodies {
-            match body.frame {
-                Frame::World => {
-                    balls.push(body.bound);
-                    wholes.push(body.whole);
-                }
-                Frame::Link(i) => {
-                    balls.push(body.bound.placed(&links[i]));
-                    wholes.push(body.whole.placed(&links[i]));
-                    moving.extend(body.solids.iter().map(|solid| solid.seen.placed(&links[i])));
-                }
-            }
-        }
+impl<'l> Posture<'l> {
+    pub fn new(bodies: &[Arc<PlacedBody>], links: &'l LinkPlacements) -> Self {
+        let placed = |bound: &BoundingCapsule, frame: Frame| match frame {
+            Frame::World => *bound,
+            Frame::Link(link) => bound.placed(&links[link]),
+        };
+        let moving = bodies.iter().filter(|body| body.frame != Frame::World);
+        let count = moving.map(|body| body.solids.len()).sum();
+        let all = bodies.iter();
         Self {
-            moving,
-            balls,
-            wholes,
+            links,
+            moving: vec![OnceCell::new(); count],
+            balls: all
+                .clone()
+                .map(|body| placed(&body.bound, body.frame))
+                .collect(),
+            wholes: all.map(|body| placed(&body.whole, body.frame)).collect(),
         }
     }
 
     #[inline]
     fn seen<'s>(&'s self, body: &'s PlacedBody, solid: usize) -> &'s Seen {
+        let seen = &body.solids[solid].seen;
         match body.frame {
-            Frame::World => &body.solids[solid].seen,
-            Frame::Link(_) => &self.moving[body.first_moving + solid],
+            Frame::World => seen,
+            Frame::Link(link) => {
+                let place = &self.moving[body.first_moving + solid];
+                place.get_or_init(|| seen.placed(&self.links[link]))
+            }
         }
     }
 

@@ -14,13 +14,15 @@
 //! two bodies' travel together, in penetration too: it is the largest gap along any direction. So does
 //! that of a mesh while the bound stays above zero; below, it is given up.
 
+use std::cmp::Ordering;
+
 use needlebench_cell::{ClearanceClass, Frame};
 use needlebench_geometry::{PRUNING_MARGIN_M, Placement, Separation, separation_within};
 
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
 
 use crate::body::{LinkPlacements, PlacedBody, Seen};
-use crate::model::{CLASS_COUNT, ClassMinima, ClearanceModel, PairClearance};
+use crate::model::{CLASS_COUNT, ClassMinima, ClearanceModel, PairClearance, PlacedPair};
 use crate::posture::Posture;
 
 impl ClearanceModel {
@@ -31,7 +33,7 @@ impl ClearanceModel {
             model: self,
             links: &links,
         };
-        let mut least = Least::of_each_class();
+        let mut least = Least::default();
         look.search(&mut Nearby::default(), &mut least);
         least.minima(&look)
     }
@@ -39,29 +41,47 @@ impl ClearanceModel {
     /// [`ClearanceModel::minimum_per_class`] of postures that follow each other: what is known from the
     /// one before says of most solids that they are not the nearest.
     pub fn minimum_per_class_near(&self, q: &Joints, nearby: &mut Nearby) -> ClassMinima {
-        self.least_near(q, nearby, Least::of_each_class())
-    }
-
-    /// Of each group of classes the one with the least clearance over its offset; all others are `None`,
-    /// and what cannot be the least of its group costs nothing. `share` says how a class counts, `None`
-    /// that it does not.
-    pub fn minimum_per_group_near(
-        &self,
-        q: &Joints,
-        nearby: &mut Nearby,
-        share: impl Fn(ClearanceClass) -> Option<Share>,
-    ) -> ClassMinima {
-        self.least_near(q, nearby, Least::of(ClearanceClass::ALL.map(share)))
-    }
-
-    fn least_near(&self, q: &Joints, nearby: &mut Nearby, mut least: Least) -> ClassMinima {
         let links = self.world_from_links(q).each_ref().map(Placement::new);
         let look = Look {
             model: self,
             links: &links,
         };
+        let mut least = Least::default();
         look.search(nearby, &mut least);
         least.minima(&look)
+    }
+
+    /// Least clearances as far as they count, and no farther; of postures that follow each other, as
+    /// [`ClearanceModel::minimum_per_class_near`].
+    pub fn what_counts_near(&self, q: &Joints, nearby: &mut Nearby, counts: &Counts) -> Counted {
+        let links = self.world_from_links(q).each_ref().map(Placement::new);
+        let look = Look {
+            model: self,
+            links: &links,
+        };
+        let mut counting = Counting {
+            counts,
+            found: Counted {
+                by_class_m: [f64::INFINITY; CLASS_COUNT],
+                aim_m: counts.aim_cap_m,
+                excess_m: counts.excess_cap_m,
+                excess_of: None,
+            },
+        };
+        look.search(nearby, &mut counting);
+        counting.found
+    }
+
+    /// Most that the clearance of a pair differs between two postures, m: what its two bodies have
+    /// travelled from one to the other.
+    pub fn travel_m(&self, pair: usize, from: &Joints, to: &Joints) -> f64 {
+        let [from, to] =
+            [from, to].map(|q| self.world_from_links(q).each_ref().map(Placement::new));
+        let PlacedPair { a, b, .. } = self.pairs[pair];
+        [a, b]
+            .map(|body| travel_m(&self.bodies[body], &from, &to))
+            .iter()
+            .sum()
     }
 
     /// A pair that is closer than the limit of its class, m, if there is any; of postures that follow
@@ -129,15 +149,17 @@ struct Near {
     couple: Couple,
 }
 
+impl Near {
+    fn least_first(&self, other: &Self) -> Ordering {
+        let by_bound = self.bound_m.total_cmp(&other.bound_m);
+        by_bound.then(self.couple.cmp(&other.couple))
+    }
+}
+
 /// What is asked of a posture.
 pub(crate) trait Wanted {
     /// What lies beyond does not matter, m; negative infinity for a class that is not asked for.
     fn cutoff_m(&self, class: ClearanceClass) -> f64;
-
-    /// How a class counts, if the least of some classes is asked for.
-    fn share(&self, _class: ClearanceClass) -> Option<Share> {
-        None
-    }
 
     /// A couple within the cutoff; false ends the search.
     fn take(&mut self, class: ClearanceClass, couple: Couple, found: &Separation) -> bool;
@@ -188,17 +210,22 @@ impl Look<'_> {
     /// Hands all couples to `wanted` that are within its cutoffs.
     pub fn search(&self, nearby: &mut Nearby, wanted: &mut impl Wanted) {
         let last = nearby.last.replace(*self.links);
-        let ahead_m = last.and_then(|last| self.ahead_m(&last));
-        if ahead_m.is_none() {
+        let Some(ahead_m) = last.and_then(|last| self.ahead_m(&last)) else {
+            nearby.reference = None;
             nearby.nearest = [None; CLASS_COUNT];
-        }
+            return self.search_afresh(nearby, wanted);
+        };
         let bodies = &self.model.bodies;
-        let mut posture = None;
-        let tried = self.promising(&mut posture, nearby, wanted);
+        let tried = nearby.nearest;
         for couple in tried.into_iter().flatten() {
             if !self.try_couple(couple, nearby, wanted) {
                 return;
             }
+        }
+        let mut classes = ClearanceClass::ALL.into_iter();
+        if classes.any(|class| self.model.has(class) && wanted.cutoff_m(class) == f64::INFINITY) {
+            // Of that class nothing is known.
+            return self.search_afresh(nearby, wanted);
         }
         let known = nearby.reference.take();
         let known = known.filter(|reference| {
@@ -212,8 +239,7 @@ impl Look<'_> {
         let reference = known.unwrap_or_else(|| {
             nearby.travel_m.clear();
             nearby.travel_m.resize(bodies.len(), 0.0);
-            let posture = posture.get_or_insert_with(|| Posture::new(bodies, self.links));
-            self.reference(posture, wanted, ahead_m.unwrap_or(0.0))
+            self.reference(&Posture::new(bodies, self.links), wanted, ahead_m)
         });
         for near in &reference.near {
             let (pair, couple) = (&self.model.pairs[near.couple.pair], near.couple);
@@ -242,48 +268,50 @@ impl Look<'_> {
         Some(STEPS_AHEAD * step_m).filter(|ahead_m| *ahead_m <= MOST_AHEAD_M)
     }
 
-    /// What was nearest of each class in the posture before, and of groups of which nothing was the couple
-    /// with the least bound: their distances leave out most of the rest.
-    fn promising(
-        &self,
-        posture: &mut Option<Posture>,
-        nearby: &Nearby,
-        wanted: &impl Wanted,
-    ) -> [Option<Couple>; CLASS_COUNT] {
+    /// The same of a posture of which nothing is known: the pairs whose bounds are least are looked at
+    /// first, and leave out most of the rest.
+    fn search_afresh(&self, nearby: &mut Nearby, wanted: &mut impl Wanted) {
         let (bodies, pairs) = (&self.model.bodies, &self.model.pairs);
-        let mut tried = nearby.nearest;
-        let mut best: [(f64, Option<(ClearanceClass, Couple)>); CLASS_COUNT] =
-            [(f64::INFINITY, None); CLASS_COUNT];
-        for couple in tried.iter().flatten() {
-            if let Some(share) = wanted.share(pairs[couple.pair].class) {
-                best[share.group].0 = f64::NEG_INFINITY;
+        let posture = Posture::new(bodies, self.links);
+        let mut order: Vec<(f64, usize)> = Vec::with_capacity(pairs.len());
+        for (index, pair) in pairs.iter().enumerate() {
+            let cutoff_m = wanted.cutoff_m(pair.class);
+            if cutoff_m == f64::NEG_INFINITY {
+                continue;
+            }
+            let whole_m = posture.whole_gap_m(pair.a, pair.b, cutoff_m);
+            if !(whole_m >= cutoff_m) {
+                order.push((whole_m, index));
             }
         }
-        // Backwards: what moves most, the tool, tends to be closest and comes late in the list.
-        for (index, pair) in pairs.iter().enumerate().rev() {
-            let Some(share) = wanted.share(pair.class) else {
-                continue;
-            };
-            let (least_m, found) = &mut best[share.group];
-            if *least_m == f64::NEG_INFINITY {
-                continue;
-            }
-            let posture = posture.get_or_insert_with(|| Posture::new(bodies, self.links));
-            let limit_m = *least_m + share.offset_m;
-            if posture.whole_gap_m(pair.a, pair.b, limit_m) >= limit_m {
+        // Of equal ones what moves most, the tool, tends to be closest and comes late in the list.
+        order.sort_unstable_by(|one, other| one.0.total_cmp(&other.0).then(other.1.cmp(&one.1)));
+        let mut near: Vec<Near> = Vec::with_capacity(16);
+        for (whole_m, index) in order {
+            let pair = &pairs[index];
+            let cutoff_m = wanted.cutoff_m(pair.class);
+            if whole_m >= cutoff_m {
                 continue;
             }
+            near.clear();
             let (a, b) = ((pair.a, &*bodies[pair.a]), (pair.b, &*bodies[pair.b]));
-            posture.for_each_near(a, b, limit_m, |a, b, bound_m| {
-                *least_m = bound_m - share.offset_m;
-                *found = Some((pair.class, Couple { pair: index, a, b }));
-                Some(bound_m)
+            posture.for_each_near(a, b, cutoff_m, |a, b, bound_m| {
+                near.push(Near {
+                    bound_m,
+                    couple: Couple { pair: index, a, b },
+                });
+                Some(cutoff_m)
             });
+            near.sort_unstable_by(Near::least_first);
+            for near in &near {
+                if near.bound_m >= wanted.cutoff_m(pair.class) {
+                    continue;
+                }
+                if !self.try_couple(near.couple, nearby, wanted) {
+                    return;
+                }
+            }
         }
-        for (class, couple) in best.iter().filter_map(|(_, found)| *found) {
-            tried[class as usize] = Some(couple);
-        }
-        tried
     }
 
     /// Whether no couple outside the list can be within the cutoffs.
@@ -330,10 +358,7 @@ impl Look<'_> {
         for (rest_m, pair) in rest_m.iter_mut().zip(pairs) {
             *rest_m = rest_m.max(limits_m[pair.class as usize]);
         }
-        near.sort_unstable_by(|one, other| {
-            let by_bound = one.bound_m.total_cmp(&other.bound_m);
-            by_bound.then(one.couple.cmp(&other.couple))
-        });
+        near.sort_unstable_by(Near::least_first);
         Reference {
             links: *self.links,
             rest_m,
@@ -396,91 +421,132 @@ impl Look<'_> {
     }
 }
 
-/// How a class counts where the least of several is asked for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Share {
-    /// Classes with the same number are asked for together: the least of them all.
-    pub group: usize,
-    /// Taken off the clearances of the class before they are compared, m.
-    pub offset_m: f64,
-}
-
-/// The nearest couple of each group of classes; classes without a share are not asked for.
-pub(crate) struct Least {
-    shares: [Option<Share>; CLASS_COUNT],
-    /// By group.
-    best: [Option<(ClearanceClass, Couple, Separation)>; CLASS_COUNT],
-}
+/// The nearest couple of each class.
+#[derive(Default)]
+pub(crate) struct Least([Option<(Couple, Separation)>; CLASS_COUNT]);
 
 impl Least {
-    /// Each class alone.
-    pub fn of_each_class() -> Self {
-        Self::of(std::array::from_fn(|group| {
-            Some(Share {
-                group,
-                offset_m: 0.0,
-            })
-        }))
-    }
-
-    /// Numbers of groups are below that of classes.
-    pub fn of(shares: [Option<Share>; CLASS_COUNT]) -> Self {
-        Self {
-            shares,
-            best: [None; CLASS_COUNT],
-        }
-    }
-
-    /// What a couple counts.
-    fn counted_m(&self, class: ClearanceClass, separation: &Separation) -> f64 {
-        let offset_m = self.shares[class as usize].map_or(0.0, |share| share.offset_m);
-        separation.distance_m - offset_m
-    }
-
     /// What was found, as it is reported.
     pub fn minima(&self, look: &Look<'_>) -> ClassMinima {
-        let mut minima = [None; CLASS_COUNT];
-        for (class, couple, separation) in self.best.iter().flatten() {
-            minima[*class as usize] = Some(look.clearance(*couple, separation));
-        }
-        ClassMinima(minima)
+        let found = self.0.each_ref();
+        ClassMinima(found.map(|best| {
+            let (couple, separation) = best.as_ref()?;
+            Some(look.clearance(*couple, separation))
+        }))
     }
 }
 
 impl Wanted for Least {
-    fn share(&self, class: ClearanceClass) -> Option<Share> {
-        self.shares[class as usize]
-    }
-
     #[inline]
     fn cutoff_m(&self, class: ClearanceClass) -> f64 {
-        let Some(share) = &self.shares[class as usize] else {
-            return f64::NEG_INFINITY;
-        };
-        match &self.best[share.group] {
+        match &self.0[class as usize] {
             None => f64::INFINITY,
-            Some((other, _, best)) => {
-                self.counted_m(*other, best) + share.offset_m + PRUNING_MARGIN_M
-            }
+            Some((_, best)) => best.distance_m + PRUNING_MARGIN_M,
         }
     }
 
     fn take(&mut self, class: ClearanceClass, couple: Couple, found: &Separation) -> bool {
-        let Some(share) = self.shares[class as usize] else {
-            return true;
-        };
-        let here_m = self.counted_m(class, found);
-        let is_better = self.best[share.group]
-            .as_ref()
-            .is_none_or(|(class, known, best)| {
-                let best_m = self.counted_m(*class, best);
-                here_m < best_m
+        let best = &mut self.0[class as usize];
+        let here_m = found.distance_m;
+        let is_better = best.as_ref().is_none_or(|(known, best)| {
+            here_m < best.distance_m
                 // Joint positions that are not finite must not pass for free.
-                || here_m.is_nan() && !best_m.is_nan()
-                || here_m == best_m && couple < *known
-            });
+                || here_m.is_nan() && !best.distance_m.is_nan()
+                || here_m == best.distance_m && couple < *known
+        });
         if is_better {
-            self.best[share.group] = Some((class, couple, *found));
+            *best = Some((couple, *found));
+        }
+        true
+    }
+}
+
+/// Groups of classes of which the least clearance counts as one.
+pub const AIMS: usize = 3;
+
+/// Up to where clearances count.
+///
+/// A class counts for itself up to a limit, and beside others for the least of one of some groups and for
+/// the least *excess* over floors, each up to a cap. What counts for nothing any more costs nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Counts {
+    /// By class: up to where its own clearance counts, m.
+    pub class_cap_m: [f64; CLASS_COUNT],
+    /// By class: the group that it counts in, if any.
+    pub aim_of: [Option<usize>; CLASS_COUNT],
+    /// By group: up to where its least clearance counts, m.
+    pub aim_cap_m: [f64; AIMS],
+    /// By class: what its clearance has to keep, m; negative infinity where nothing.
+    pub floor_m: [f64; CLASS_COUNT],
+    /// Up to where the least excess over the floors counts, m. Where it is negative nothing else does.
+    pub excess_cap_m: f64,
+}
+
+/// Clearances as far as they count.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Counted {
+    /// By class: the least clearance where it is below the class's cap, else something not below it, m.
+    pub by_class_m: [f64; CLASS_COUNT],
+    /// By group: the least clearance, or the cap where that is less, m.
+    pub aim_m: [f64; AIMS],
+    /// The least excess over a floor, or the cap where that is less, m. Where it is negative it alone is right.
+    pub excess_m: f64,
+    /// The pair whose excess it is, an index into [`Cell::pairs`](needlebench_cell::Cell::pairs), unless it is
+    /// the cap.
+    pub excess_of: Option<usize>,
+}
+
+impl Counts {
+    /// Up to where the clearance of a class counts for itself or for its group, m.
+    pub fn farthest_m(&self, class: ClearanceClass) -> f64 {
+        let own_m = self.class_cap_m[class as usize];
+        let aim = self.aim_of[class as usize];
+        aim.map_or(own_m, |aim| own_m.max(self.aim_cap_m[aim]))
+    }
+}
+
+struct Counting<'c> {
+    counts: &'c Counts,
+    found: Counted,
+}
+
+impl Wanted for Counting<'_> {
+    #[inline]
+    fn cutoff_m(&self, class: ClearanceClass) -> f64 {
+        let (counts, found, class) = (self.counts, &self.found, class as usize);
+        let mut cutoff_m = match counts.floor_m[class] {
+            f64::NEG_INFINITY => f64::NEG_INFINITY,
+            floor_m => floor_m + found.excess_m,
+        };
+        if found.excess_m >= 0.0 {
+            let own_m = counts.class_cap_m[class].min(found.by_class_m[class]);
+            cutoff_m = cutoff_m.max(own_m);
+            if let Some(aim) = counts.aim_of[class] {
+                cutoff_m = cutoff_m.max(found.aim_m[aim]);
+            }
+            // No farther than what is known of the class already.
+            cutoff_m = cutoff_m.min(found.by_class_m[class]);
+        }
+        cutoff_m + PRUNING_MARGIN_M
+    }
+
+    fn take(&mut self, class: ClearanceClass, couple: Couple, found: &Separation) -> bool {
+        let (counts, class) = (self.counts, class as usize);
+        // Joint positions that are not finite must not pass for free.
+        let distance_m = if found.distance_m.is_nan() {
+            f64::NEG_INFINITY
+        } else {
+            found.distance_m
+        };
+        let least = |known_m: &mut f64, here_m: f64| *known_m = known_m.min(here_m);
+        least(&mut self.found.by_class_m[class], distance_m);
+        if let Some(aim) = counts.aim_of[class] {
+            least(&mut self.found.aim_m[aim], distance_m);
+        }
+        let excess_m = distance_m - counts.floor_m[class];
+        if counts.floor_m[class] > f64::NEG_INFINITY && excess_m < self.found.excess_m {
+            self.found.excess_m = excess_m;
+            self.found.excess_of = Some(couple.pair);
         }
         true
     }

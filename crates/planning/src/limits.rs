@@ -17,7 +17,7 @@ use needlebench_cell::scenario::Scenario;
 use needlebench_clearance::{ClassMinima, MotionCertificate};
 
 /// Number of classes.
-const CLASS_COUNT: usize = ClearanceClass::ALL.len();
+pub(crate) const CLASS_COUNT: usize = ClearanceClass::ALL.len();
 
 /// Clearance from itself that is ample, as a share of the one at which the ranking's utility is full. By
 /// its build the arm keeps about that one whatever it does, and no way around changes it.
@@ -158,6 +158,11 @@ impl ByClass {
             all[pair.class as usize] = pair.separation.distance_m;
         }
         Self(all)
+    }
+
+    /// Clearances by class, m.
+    pub(crate) fn of(clearance_m: impl Fn(ClearanceClass) -> f64) -> Self {
+        Self(ClearanceClass::ALL.map(clearance_m))
     }
 
     /// The proven lower bounds of a motion.

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use needlebench_cell::scenario::PlanningSection;
 use needlebench_cell::{BodyKind, Cell, ClearanceClass, Frame};
-use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby, PairClearance, Share};
+use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby, PairClearance};
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
@@ -70,16 +70,6 @@ impl<'a> MotionChecker<'a> {
         let minima = self.model.minimum_per_class_near(q, nearby);
         let collision = self.worst(&minima);
         (minima, collision)
-    }
-
-    /// The least clearances of groups of classes.
-    pub(crate) fn minima(
-        &self,
-        q: &Joints,
-        nearby: &mut Nearby,
-        share: impl Fn(ClearanceClass) -> Option<Share>,
-    ) -> ClassMinima {
-        self.model.minimum_per_group_near(q, nearby, share)
     }
 
     /// Whether no pair is closer than the limit of its class.

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use needlebench_cell::{Goal, Roll};
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 
-use crate::family::{Member, Merit};
+use crate::family::{Member, Merit, nearest_missing};
 use crate::limits::{ByClass, Shortfall};
 use crate::margin::SAME_M;
 use crate::motion_plan::{ConfigurationPlan, Required, Way};
@@ -59,10 +59,9 @@ impl Planner<'_> {
             let members = self.members_at(goal, roll_rad);
             return members.map(|member| member.on_route(route.as_ref()));
         }
-        let mut grids = self.grids(goal).into_iter();
+        let rolls = self.rolls(goal, self.planning().roll_samples);
         Configuration::ALL.map(|configuration| {
-            let grid = grids.next().expect("there are eight");
-            let first = self.first(goal, configuration, grid);
+            let first = self.first(goal, configuration, &rolls);
             first.on_route(route.as_ref())
         })
     }
@@ -73,15 +72,14 @@ impl Planner<'_> {
             self.member_at(goal, configuration, roll_rad)
         } else {
             let rolls = self.rolls(goal, self.planning().roll_samples);
-            let grid = self.members_along(goal, configuration, &rolls);
-            self.first(goal, configuration, grid)
+            self.first(goal, configuration, &rolls)
         };
         member.on_route(route_rejection(self.resolved, goal).as_ref())
     }
 
-    fn first(&self, goal: &Goal, configuration: Configuration, grid: Vec<Member>) -> Member {
-        let ranked = self.ranked(goal, configuration, &grid);
-        let mut member = ranked.into_iter().next().unwrap_or_else(|| nearest(grid));
+    fn first(&self, goal: &Goal, configuration: Configuration, rolls_rad: &[f64]) -> Member {
+        let aim = self.planning().roll_aim;
+        let mut member = self.best_member(goal, configuration, rolls_rad, aim);
         say_what_frees(goal, &mut member.rejections);
         member
     }
@@ -144,7 +142,7 @@ impl Planner<'_> {
             .filter_map(|member| Some((member.candidate?, member.rejections)))
             .collect();
         if candidates.is_empty() {
-            let mut rejections = nearest(grid).rejections;
+            let mut rejections = nearest_missing(grid).rejections;
             say_what_frees(goal, &mut rejections);
             return ConfigurationPlan {
                 rejections,
@@ -319,18 +317,6 @@ fn say_what_frees(goal: &Goal, rejections: &mut [Rejection]) {
         Roll::Free => " ",
     };
     first.detail = format!("{}; {rolls}{or}{others}", first.detail);
-}
-
-/// Of members without a posture the one that comes nearest, which says most, with the rule that it
-/// breaks.
-fn nearest(grid: Vec<Member>) -> Member {
-    let missing = |member: &Member| {
-        let values = member.rejections.iter().map(|rejection| rejection.value);
-        values.fold(f64::INFINITY, f64::min)
-    };
-    grid.into_iter()
-        .min_by(|a, b| missing(a).total_cmp(&missing(b)))
-        .expect("at least one roll is looked at")
 }
 
 /// Angle between two rolls that count as different for a motion, rad.

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use needlebench_cell::scenario::PlanningSection;
 use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, Roll};
-use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby, Share};
+use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby};
 use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
 
@@ -201,22 +201,6 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// [`Planner::candidate`] with that clearance alone which is least above its limit, and the rules
-    /// that the joints alone break: what its surplus needs.
-    pub(crate) fn candidate_of_surplus(
-        &self,
-        roll_rad: f64,
-        solution: &Solution,
-        nearby: &mut Nearby,
-    ) -> (Candidate, Vec<Rejection>) {
-        let clearance = self.checker.minima(&solution.joints, nearby, |class| {
-            let offset_m = self.limits().get(class).floor_m;
-            offset_m.is_finite().then_some(Share { group: 0, offset_m })
-        });
-        let candidate = self.with_clearance(roll_rad, solution, &clearance);
-        (candidate, self.joint_rules(solution))
-    }
-
     /// Whether a posture breaks no rule: what [`Planner::candidate`] says, without numbers.
     pub(crate) fn works(&self, solution: &Solution, nearby: &mut Nearby) -> bool {
         self.joint_rules(solution).is_empty()
@@ -225,15 +209,8 @@ impl<'a> Planner<'a> {
             })
     }
 
-    /// Whether a posture keeps every clearance that is wanted.
-    pub(crate) fn keeps_wanted(&self, solution: &Solution, nearby: &mut Nearby) -> bool {
-        let limits = self.limits();
-        self.checker
-            .is_free(&solution.joints, nearby, |class| limits.get(class).wanted_m)
-    }
-
     /// The rules that the joint positions alone break.
-    fn joint_rules(&self, solution: &Solution) -> Vec<Rejection> {
+    pub(crate) fn joint_rules(&self, solution: &Solution) -> Vec<Rejection> {
         let planning = &self.resolved.scenario.planning;
         let limits = &self.resolved.cell.robot.limits;
         let mut rejections = Vec::new();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::common::{Variety, cell};
 use nalgebra::{Point3, Vector3};
 use needlebench_cell::{Cell, ClearanceClass};
-use needlebench_clearance::{ClearanceModel, Nearby, PairClearance, Share};
+use needlebench_clearance::{AIMS, ClearanceModel, Counts, Nearby, PairClearance};
 use needlebench_geometry::{PreparedShape, PreparedSolids, Shape, SolidMesh, separation};
 use needlebench_kinematics::{Joints, Pose};
 
@@ -155,23 +155,26 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
         ClearanceClass::SelfCollision => 0.002,
         _ => 0.02,
     };
-    // Two groups, one of them with offsets; the rest does not count.
-    let share = |class: ClearanceClass| match class {
-        ClearanceClass::SelfCollision | ClearanceClass::NeedleCorridor => Some(Share {
-            group: 3,
-            offset_m: 0.0,
+    // Two groups and each class for itself, all up to somewhere; one class counts for nothing.
+    let all = ClearanceClass::ALL;
+    // Deep, so that some of the postures are free.
+    let floor_m = |class: ClearanceClass| limit_m(class) - 0.1;
+    let counts = Counts {
+        class_cap_m: all.map(|class| limit_m(class) + 0.001 * (class as usize) as f64),
+        aim_of: all.map(|class| match class {
+            ClearanceClass::SelfCollision | ClearanceClass::NeedleCorridor => Some(2),
+            ClearanceClass::GuideStandoff => None,
+            _ => Some(0),
         }),
-        ClearanceClass::GuideStandoff => None,
-        _ => Some(Share {
-            group: 1,
-            offset_m: limit_m(class) + 0.01 * (class as usize) as f64,
-        }),
+        aim_cap_m: [0.1, f64::NEG_INFINITY, f64::INFINITY],
+        floor_m: all.map(floor_m),
+        excess_cap_m: 0.03,
     };
     for (cell, count) in [(cell(), 900), (with_dented_skin(cell()), 60)] {
         let model = ClearanceModel::new(&cell);
         let mut variety = Variety::new(8);
-        let [mut all, mut grouped, mut below, mut mixed] = [(); 4].map(|()| Nearby::default());
-        let mut hits = 0;
+        let [mut all, mut counted, mut below, mut mixed] = [(); 4].map(|()| Nearby::default());
+        let (mut hits, mut free) = (0, 0);
         for (k, q) in walk(&mut variety, count).into_iter().enumerate() {
             let pairs = model.all_pairs(&q);
             let least_m = |class: ClearanceClass| {
@@ -186,25 +189,39 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
             let minima = model.minimum_per_class_near(&q, &mut all);
             assert_eq!(minima.iter().count(), 8);
             minima.iter().for_each(check);
-            // Of a group the least excess over the offsets.
-            let excess_m = |class: ClearanceClass| Some(least_m(class) - share(class)?.offset_m);
-            let asked = |nearby: &mut Nearby| model.minimum_per_group_near(&q, nearby, share);
-            let found = asked(&mut grouped);
-            found.iter().for_each(check);
-            for group in [1, 3] {
-                let of_group =
-                    |class: &ClearanceClass| share(*class).map(|s| s.group) == Some(group);
+            // As far as it counts.
+            let asked = |nearby: &mut Nearby| model.what_counts_near(&q, nearby, &counts);
+            let found = asked(&mut counted);
+            let least = |wanted: &dyn Fn(ClearanceClass) -> bool| {
                 let classes = minima.iter().map(|each| each.class);
-                let wanted_m = classes.filter(of_group).filter_map(excess_m);
-                let classes: Vec<_> = found.iter().map(|each| each.class).collect();
-                let [only] = classes
-                    .iter()
-                    .filter(|class| of_group(class))
-                    .collect::<Vec<_>>()[..]
-                else {
-                    panic!("one of each group");
-                };
-                assert_eq!(excess_m(*only), wanted_m.min_by(f64::total_cmp));
+                let wanted_m = classes.filter(|class| wanted(*class)).map(least_m);
+                wanted_m.fold(f64::INFINITY, f64::min)
+            };
+            let excess_m = minima
+                .iter()
+                .map(|each| each.separation.distance_m - floor_m(each.class))
+                .fold(counts.excess_cap_m, f64::min);
+            assert_eq!(found.excess_m, excess_m, "{k}");
+            let of_pair = found.excess_of.map(|pair| {
+                let pair = &pairs[pair];
+                pair.separation.distance_m - floor_m(pair.class)
+            });
+            assert_eq!(of_pair.unwrap_or(counts.excess_cap_m), excess_m, "{k}");
+            if excess_m >= 0.0 {
+                for aim in 0..AIMS {
+                    let least_m = least(&|class| counts.aim_of[class as usize] == Some(aim));
+                    assert_eq!(found.aim_m[aim], least_m.min(counts.aim_cap_m[aim]), "{k}");
+                }
+                for each in minima.iter() {
+                    let (class, least_m) = (each.class as usize, each.separation.distance_m);
+                    let cap_m = counts.class_cap_m[class];
+                    assert_eq!(
+                        found.by_class_m[class].min(cap_m),
+                        least_m.min(cap_m),
+                        "{k}"
+                    );
+                }
+                free += 1;
             }
             let is_below = |pair: &PairClearance| {
                 pair.class.is_physical() && pair.separation.distance_m < limit_m(pair.class)
@@ -223,7 +240,11 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
             // One after the other, whatever was asked before.
             match k % 3 {
                 0 => assert_eq!(model.minimum_per_class_near(&q, &mut mixed), minima),
-                1 => assert_eq!(asked(&mut mixed), found),
+                1 => {
+                    let again = asked(&mut mixed);
+                    assert_eq!(again.excess_m, found.excess_m);
+                    assert!(excess_m < 0.0 || again.aim_m == found.aim_m);
+                }
                 _ => {
                     let again = model.below_near(&q, &mut mixed, limit_m);
                     assert_eq!(again.is_some(), near.is_some());
@@ -231,6 +252,7 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
             }
         }
         assert!(hits > count / 20 && hits < count, "{hits}");
+        assert!(free > count / 20, "{free}");
     }
 }
 

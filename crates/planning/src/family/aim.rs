@@ -3,10 +3,12 @@
 use nalgebra::Point3;
 use needlebench_cell::scenario::RollAim;
 use needlebench_cell::{ClearanceClass, Goal};
-use needlebench_clearance::Share;
+use needlebench_clearance::AIMS;
+use needlebench_kinematics::Joints;
 
 use super::Member;
-use crate::planner::{Candidate, Planner};
+use crate::limits::ByClass;
+use crate::planner::{Candidate, Planner, PostureMargins};
 
 /// What a roll is chosen for.
 pub type Aim = RollAim;
@@ -14,37 +16,57 @@ pub type Aim = RollAim;
 /// Length over which clearances count less and less for [`Aim::Clearance`], m.
 const CLEARANCE_SCALE_M: f64 = 0.02;
 
-/// How the clearance of a class counts in [`Planner::value`], which reads no more of it than the least of
-/// each group (`a_sweep_sees_what_each_member_is_alone`).
-pub(crate) fn share_in(aim: Aim, class: ClearanceClass) -> Option<Share> {
-    let group = match aim {
-        Aim::Clearance => match class {
-            ClearanceClass::GuideStandoff | ClearanceClass::NeedleRoute => return None,
-            _ => class as usize,
-        },
-        Aim::Balanced => match class {
-            ClearanceClass::SelfCollision => 1,
-            ClearanceClass::NeedleCorridor => 2,
-            _ if class.is_surroundings() => 0,
-            _ => return None,
-        },
-        Aim::JointMargin | Aim::Singularity | Aim::TipAccuracy => return None,
-    };
-    let offset_m = 0.0;
-    Some(Share { group, offset_m })
+/// Group of classes of which the least clearance counts for [`Aim::Balanced`], with its key in `[ranking]`.
+pub(super) const BALANCED: [&str; AIMS] =
+    ["clearance_mm", "self_clearance_mm", "needle_corridor_mm"];
+
+/// Index in [`BALANCED`] of the group of a class.
+pub(super) fn balanced_group(class: ClearanceClass) -> Option<usize> {
+    match class {
+        ClearanceClass::SelfCollision => Some(1),
+        ClearanceClass::NeedleCorridor => Some(2),
+        _ if class.is_surroundings() => Some(0),
+        _ => None,
+    }
+}
+
+/// Whether a roll can change the clearance of a class.
+fn changes_with_roll(class: ClearanceClass) -> bool {
+    !matches!(
+        class,
+        ClearanceClass::GuideStandoff | ClearanceClass::NeedleRoute
+    )
+}
+
+/// What a posture's value depends on.
+pub(super) struct Valued<'v> {
+    pub joints: &'v Joints,
+    pub margins: &'v PostureMargins,
+    pub clearance: &'v ByClass,
 }
 
 impl Planner<'_> {
     /// How good a posture is at an aim; more is better. Of postures that work or do not work alike:
     /// it does not look at rules.
     pub fn value(&self, goal: &Goal, aim: Aim, candidate: &Candidate) -> f64 {
-        let margins = &candidate.margins;
+        self.value_of(
+            goal,
+            aim,
+            &Valued {
+                joints: &candidate.joints,
+                margins: &candidate.margins,
+                clearance: &ByClass::of_posture(&candidate.clearance),
+            },
+        )
+    }
+
+    pub(super) fn value_of(&self, goal: &Goal, aim: Aim, posture: &Valued<'_>) -> f64 {
         match aim {
-            Aim::Clearance => soft_least_m(candidate),
-            Aim::JointMargin => margins.joint_limit,
-            Aim::Singularity => singularity_margin(candidate),
-            Aim::TipAccuracy => -self.tip_sensitivity(goal, candidate),
-            Aim::Balanced => self.balanced(goal, candidate),
+            Aim::Clearance => soft_least_m(posture.clearance),
+            Aim::JointMargin => posture.margins.joint_limit,
+            Aim::Singularity => singularity_margin(posture.margins),
+            Aim::TipAccuracy => -self.tip_sensitivity_at(goal, posture.joints),
+            Aim::Balanced => self.balanced(goal, posture),
         }
     }
 
@@ -53,36 +75,40 @@ impl Planner<'_> {
     /// With independent errors of standard deviation `s` in every joint the tip's root-mean-square
     /// displacement is `s` times this, to first order.
     pub fn tip_sensitivity(&self, goal: &Goal, candidate: &Candidate) -> f64 {
+        self.tip_sensitivity_at(goal, &candidate.joints)
+    }
+
+    fn tip_sensitivity_at(&self, goal: &Goal, q: &Joints) -> f64 {
         let tool = &self.cell().tool;
         let tip_in_flange =
             tool.flange_from_guide_exit * Point3::new(0.0, 0.0, goal.insertion_length_m);
         self.kinematics()
             .chain
-            .jacobian_at(&candidate.joints, &tip_in_flange.coords)
+            .jacobian_at(q, &tip_in_flange.coords)
             .fixed_rows::<3>(0)
             .norm()
     }
 
     /// Weighted mean of the scenario's utilities of what a posture alone decides.
-    fn balanced(&self, goal: &Goal, candidate: &Candidate) -> f64 {
+    fn balanced(&self, goal: &Goal, posture: &Valued<'_>) -> f64 {
         const MM: f64 = 1e3;
-        let margins = &candidate.margins;
-        let least = |wanted: fn(ClearanceClass) -> bool| {
-            candidate
-                .clearance
-                .iter()
-                .filter(|pair| wanted(pair.class))
-                .map(|pair| pair.separation.distance_m)
+        let margins = posture.margins;
+        let least = |group: usize| {
+            let classes = ClearanceClass::ALL.into_iter();
+            classes
+                .filter(|class| balanced_group(*class) == Some(group))
+                .map(|class| posture.clearance.get(class))
                 .fold(f64::INFINITY, f64::min)
         };
         let (mut sum, mut weights) = (0.0, 0.0);
         for (key, aim) in self.ranking_aims() {
             let value = match *key {
-                "clearance_mm" => MM * least(ClearanceClass::is_surroundings),
-                "self_clearance_mm" => MM * least(|class| class == ClearanceClass::SelfCollision),
-                "needle_corridor_mm" => MM * least(|class| class == ClearanceClass::NeedleCorridor),
+                _ if BALANCED.contains(key) => {
+                    let group = BALANCED.iter().position(|known| known == key);
+                    group.map_or(f64::INFINITY, |group| MM * least(group))
+                }
                 // The same number in m/rad and in mm/mrad.
-                "tip_sensitivity_mm_mrad" => self.tip_sensitivity(goal, candidate),
+                "tip_sensitivity_mm_mrad" => self.tip_sensitivity_at(goal, posture.joints),
                 "joint_margin" => margins.joint_limit,
                 "singularity_margin" => margins.wrist_sine.min(margins.elbow_sine),
                 "shoulder_margin_mm" => MM * margins.shoulder_m,
@@ -98,9 +124,8 @@ impl Planner<'_> {
 }
 
 /// Smallest of `|sin q5|`, `|sin q3|` and the distance from the shoulder's singularity over 0.1 m.
-fn singularity_margin(candidate: &Candidate) -> f64 {
+fn singularity_margin(margins: &PostureMargins) -> f64 {
     const SHOULDER_SCALE_M: f64 = 0.1;
-    let margins = &candidate.margins;
     margins
         .wrist_sine
         .min(margins.elbow_sine)
@@ -111,17 +136,11 @@ fn singularity_margin(candidate: &Candidate) -> f64 {
 ///
 /// The arm keeps about 10 mm from itself in most postures, by its build. A plain least would stop
 /// there and leave the rest to chance; this one still grows with every other clearance.
-fn soft_least_m(candidate: &Candidate) -> f64 {
-    let terms: f64 = candidate
-        .clearance
-        .iter()
-        .filter(|pair| {
-            !matches!(
-                pair.class,
-                ClearanceClass::GuideStandoff | ClearanceClass::NeedleRoute
-            )
-        })
-        .map(|pair| (-pair.separation.distance_m / CLEARANCE_SCALE_M).exp())
+fn soft_least_m(clearance: &ByClass) -> f64 {
+    let terms: f64 = ClearanceClass::ALL
+        .into_iter()
+        .filter(|class| changes_with_roll(*class))
+        .map(|class| (-clearance.get(class) / CLEARANCE_SCALE_M).exp())
         .sum();
     if terms > 0.0 {
         -CLEARANCE_SCALE_M * terms.ln()
@@ -138,12 +157,7 @@ impl Member {
             .as_ref()?
             .clearance
             .iter()
-            .filter(|pair| {
-                !matches!(
-                    pair.class,
-                    ClearanceClass::GuideStandoff | ClearanceClass::NeedleRoute
-                )
-            })
+            .filter(|pair| changes_with_roll(pair.class))
             .min_by(|a, b| a.separation.distance_m.total_cmp(&b.separation.distance_m))
     }
 }

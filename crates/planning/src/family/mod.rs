@@ -17,15 +17,17 @@
 mod aim;
 mod ranges;
 
-use needlebench_cell::Goal;
-use needlebench_clearance::Nearby;
-use needlebench_kinematics::ik::{Configuration, Solution, Solutions};
+use std::f64::consts::TAU;
+
+use needlebench_cell::{ClearanceClass, Goal};
+use needlebench_clearance::{AIMS, Counts, Nearby};
+use needlebench_kinematics::ik::{Configuration, Solution, Solutions, wrap_angle};
 
 pub use aim::Aim;
-use aim::share_in;
+use aim::{BALANCED, Valued, balanced_group};
 pub use ranges::{Best, EDGE_RAD, Edge, Family, RollRange};
 
-use crate::limits::{ByClass, Shortfall};
+use crate::limits::{ByClass, CLASS_COUNT, Shortfall};
 use crate::planner::{Candidate, Planner, PostureMargins, absent};
 use crate::{Rejection, Rule};
 
@@ -61,11 +63,6 @@ impl Merit {
         },
         value: f64::NEG_INFINITY,
     };
-
-    /// Everything that will be judged by clearances is met.
-    fn meets_what_is_judged(&self) -> bool {
-        self.shortfall.judged_m >= 0.0
-    }
 
     /// The better one first.
     pub(crate) fn better_first(&self, other: &Self) -> std::cmp::Ordering {
@@ -107,6 +104,21 @@ impl Member {
     }
 }
 
+/// What the choice of a roll needs to know of a member.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Glance {
+    /// The configuration reaches the pose.
+    pub exists: bool,
+    /// It breaks no rule.
+    pub works: bool,
+    /// [`Member::surplus`], of one that exists; else negative infinity.
+    pub surplus: f64,
+    /// The pair whose clearance it is, unless the joints decide it.
+    pub decided_by: Option<usize>,
+    /// That of none if it does not work.
+    pub merit: Merit,
+}
+
 /// One configuration looked at at one roll after the other: each look is quicker by what the one before
 /// has shown, and the answers do not depend on it.
 pub(crate) struct Sweep<'p> {
@@ -114,6 +126,8 @@ pub(crate) struct Sweep<'p> {
     goal: &'p Goal,
     configuration: Configuration,
     nearby: Nearby,
+    /// What counts for an aim, or for the surplus alone.
+    counts: Option<(Option<Aim>, Counts)>,
 }
 
 impl<'p> Sweep<'p> {
@@ -123,6 +137,7 @@ impl<'p> Sweep<'p> {
             goal,
             configuration,
             nearby: Nearby::default(),
+            counts: None,
         }
     }
 
@@ -139,38 +154,103 @@ impl<'p> Sweep<'p> {
         self.planner.present(roll_rad, &solution, &mut self.nearby)
     }
 
-    /// Merit of the member at a roll; that of none if it does not work.
-    pub fn merit(&mut self, aim: Aim, roll_rad: f64) -> Merit {
-        let found = self.solution(roll_rad);
-        let Some(solution) = found.filter(|found| self.planner.works(found, &mut self.nearby))
-        else {
-            return Merit::NONE;
-        };
-        let nearby = &mut self.nearby;
-        // What keeps all that is wanted falls short of nothing: its value is all that tells it apart.
-        let candidate = if self.planner.keeps_wanted(&solution, nearby) {
-            self.planner.candidate_for(aim, roll_rad, &solution, nearby)
-        } else {
-            self.planner.candidate(roll_rad, &solution, nearby).0
-        };
-        self.planner.merit(self.goal, aim, &candidate)
+    /// What an aim's choice needs to know of the member at a roll.
+    pub fn glance(&mut self, aim: Aim, roll_rad: f64) -> Glance {
+        self.look(Some(aim), roll_rad)
+    }
+
+    /// Whether what keeps a roll from working keeps all from working between it and another: it is broken by
+    /// more than the arm moves on the way, of the flange where there is no posture.
+    pub fn excludes(&mut self, roll_rad: f64, glance: &Glance, to_rad: f64) -> bool {
+        let rolls = [roll_rad, to_rad].map(|roll_rad| roll_rad.rem_euclid(TAU));
+        match rolls.map(|roll_rad| self.solution(roll_rad)) {
+            [Some(from), Some(to)] => {
+                let change_m = match glance.decided_by {
+                    Some(pair) => {
+                        let model = self.planner.checker.model;
+                        model.travel_m(pair, &from.joints, &to.joints)
+                    }
+                    None => METRES_PER_UNIT * (from.joints - to.joints).map(wrap_angle).amax(),
+                };
+                change_m < -glance.surplus
+            }
+            [None, None] => {
+                let [from, to] =
+                    rolls.map(|roll_rad| self.planner.base_link_from_flange(self.goal, roll_rad));
+                // Of the wrist before the flange, and the joint before that.
+                let geometry = &self.planner.kinematics().geometry;
+                let reach_m = geometry.d6.abs() + geometry.d5.abs();
+                let turn_rad = from.rotation.angle_to(&to.rotation);
+                let moved_m = (from.translation.vector - to.translation.vector).norm();
+                moved_m + turn_rad * reach_m < -self.surplus(rolls[0]).0
+            }
+            _ => false,
+        }
     }
 
     /// Surplus of the member at a roll, and whether it works.
     pub fn surplus(&mut self, roll_rad: f64) -> (f64, bool) {
+        let seen = self.look(None, roll_rad);
+        if seen.exists {
+            (seen.surplus, seen.works)
+        } else {
+            (self.member(roll_rad).surplus, false)
+        }
+    }
+
+    fn look(&mut self, aim: Option<Aim>, roll_rad: f64) -> Glance {
+        let planner = self.planner;
         let Some(solution) = self.solution(roll_rad) else {
-            return (self.member(roll_rad).surplus, false);
+            return Glance {
+                exists: false,
+                works: false,
+                surplus: f64::NEG_INFINITY,
+                decided_by: None,
+                merit: Merit::NONE,
+            };
         };
-        let nearby = &mut self.nearby;
-        let (candidate, broken) = self
-            .planner
-            .candidate_of_surplus(roll_rad, &solution, nearby);
-        let surplus = self.planner.surplus(&candidate, &broken);
-        let limits = candidate.clearance.iter();
-        let collides = limits
-            .map(|pair| pair.separation.distance_m - self.planner.limits().get(pair.class).floor_m)
-            .any(|excess_m| excess_m < 0.0);
-        (surplus, broken.is_empty() && !collides)
+        let q = &solution.joints;
+        let margins = planner.margins(q);
+        let broken = planner.joint_rules(&solution);
+        let mut counts = match &self.counts {
+            Some((known, counts)) if *known == aim => *counts,
+            _ => {
+                let counts = planner.counts(aim);
+                self.counts = Some((aim, counts));
+                counts
+            }
+        };
+        counts.excess_cap_m = planner.surplus_of_joints(&margins, &broken);
+        let model = planner.checker.model;
+        let found = model.what_counts_near(q, &mut self.nearby, &counts);
+        let works = broken.is_empty() && found.excess_m >= 0.0;
+        let merit = match aim.filter(|_| works) {
+            None => Merit::NONE,
+            Some(aim) => planner.merit_of(
+                self.goal,
+                aim,
+                &Valued {
+                    joints: q,
+                    margins: &margins,
+                    clearance: &ByClass::of(|class| {
+                        let found_m = found.by_class_m[class as usize];
+                        match counts.farthest_m(class) {
+                            far_m if model.has(class) && far_m > f64::NEG_INFINITY => {
+                                found_m.min(far_m)
+                            }
+                            _ => found_m,
+                        }
+                    }),
+                },
+            ),
+        };
+        Glance {
+            exists: true,
+            works,
+            surplus: found.excess_m,
+            decided_by: found.excess_of,
+            merit,
+        }
     }
 
     fn solution(&self, roll_rad: f64) -> Option<Solution> {
@@ -202,19 +282,53 @@ fn missing(roll_rad: f64, configuration: Configuration, found: &Solutions) -> Me
     }
 }
 
+/// Of members without a posture the one that comes nearest, which says most, with the rule that it
+/// breaks.
+pub(crate) fn nearest_missing(grid: Vec<Member>) -> Member {
+    let missing = |member: &Member| {
+        let values = member.rejections.iter().map(|rejection| rejection.value);
+        values.fold(f64::INFINITY, f64::min)
+    };
+    grid.into_iter()
+        .min_by(|a, b| missing(a).total_cmp(&missing(b)))
+        .expect("at least one roll is looked at")
+}
+
 impl Planner<'_> {
-    /// [`Planner::candidate`] with those clearances alone that count in its value at an aim.
-    fn candidate_for(
-        &self,
-        aim: Aim,
-        roll_rad: f64,
-        solution: &Solution,
-        nearby: &mut Nearby,
-    ) -> Candidate {
-        let clearance = self
-            .checker
-            .minima(&solution.joints, nearby, |class| share_in(aim, class));
-        self.with_clearance(roll_rad, solution, &clearance)
+    /// Up to where clearances count for an aim, and for what is judged; without an aim for the surplus alone.
+    /// What lies beyond changes nothing: a utility is full there.
+    fn counts(&self, aim: Option<Aim>) -> Counts {
+        const MM: f64 = 1e-3;
+        let all = ClearanceClass::ALL;
+        let limits = self.limits();
+        let counts = Counts {
+            class_cap_m: [f64::NEG_INFINITY; CLASS_COUNT],
+            aim_of: [None; CLASS_COUNT],
+            aim_cap_m: [f64::NEG_INFINITY; AIMS],
+            floor_m: all.map(|class| limits.get(class).floor_m),
+            excess_cap_m: f64::INFINITY,
+        };
+        let Some(aim) = aim else { return counts };
+        let counts = Counts {
+            class_cap_m: all.map(|class| limits.get(class).wanted_m),
+            ..counts
+        };
+        match aim {
+            Aim::JointMargin | Aim::Singularity | Aim::TipAccuracy => counts,
+            Aim::Clearance => Counts {
+                class_cap_m: [f64::INFINITY; CLASS_COUNT],
+                ..counts
+            },
+            Aim::Balanced => Counts {
+                aim_of: all.map(balanced_group),
+                aim_cap_m: BALANCED.map(|key| {
+                    let mut aims = self.ranking_aims().iter();
+                    let aim = aims.find(|(known, aim)| *known == key && aim.weight > 0.0);
+                    aim.map_or(f64::NEG_INFINITY, |(_, aim)| aim.best.max(aim.worst) * MM)
+                }),
+                ..counts
+            },
+        }
     }
 
     /// All eight configurations at one roll, in the order of [`Configuration::ALL`]: postures only,
@@ -285,18 +399,25 @@ impl Planner<'_> {
     /// How good a posture is: first how little it falls short of the clearances that will be judged, then
     /// of the reserve, from singularities too, and then by the aim. The order is that of preference.
     pub fn merit(&self, goal: &Goal, aim: Aim, candidate: &Candidate) -> Merit {
-        let mut shortfall = self
-            .limits()
-            .shortfall(&ByClass::of_posture(&candidate.clearance));
+        let posture = Valued {
+            joints: &candidate.joints,
+            margins: &candidate.margins,
+            clearance: &ByClass::of_posture(&candidate.clearance),
+        };
+        self.merit_of(goal, aim, &posture)
+    }
+
+    fn merit_of(&self, goal: &Goal, aim: Aim, posture: &Valued<'_>) -> Merit {
+        let mut shortfall = self.limits().shortfall(posture.clearance);
         let reserve_m = self.planning().clearance_reserve_mm * 1e-3;
         shortfall.reserve_m += self
-            .singular_surplus_m(&candidate.margins)
+            .singular_surplus_m(posture.margins)
             .iter()
             .map(|surplus_m| (surplus_m - reserve_m).min(0.0))
             .sum::<f64>();
         Merit {
             shortfall,
-            value: self.value(goal, aim, candidate),
+            value: self.value_of(goal, aim, posture),
         }
     }
 
@@ -305,12 +426,18 @@ impl Planner<'_> {
     /// Of `rejections` those for its joint limits and for what it misses count: the others say what
     /// the candidate's own numbers say.
     pub fn surplus(&self, candidate: &Candidate, rejections: &[Rejection]) -> f64 {
-        let margins = &candidate.margins;
         let clearances = candidate
             .clearance
             .iter()
             .map(|pair| pair.separation.distance_m - self.limits().get(pair.class).floor_m);
-        let singular = self.singular_surplus_m(margins);
+        clearances.fold(
+            self.surplus_of_joints(&candidate.margins, rejections),
+            f64::min,
+        )
+    }
+
+    /// The same without clearances.
+    fn surplus_of_joints(&self, margins: &PostureMargins, rejections: &[Rejection]) -> f64 {
         let others = rejections
             .iter()
             .filter_map(|rejection| match rejection.rule {
@@ -320,16 +447,13 @@ impl Planner<'_> {
                 Rule::NearestOnly => Some(rejection.limit - rejection.value),
                 _ => None,
             });
-        clearances
-            .chain(singular)
-            .chain(others)
-            .fold(f64::INFINITY, f64::min)
+        let singular = self.singular_surplus_m(margins).into_iter();
+        singular.chain(others).fold(f64::INFINITY, f64::min)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
     use std::path::Path;
 
     use needlebench_cell::{Overrides, load_scenario};
@@ -364,7 +488,13 @@ mod tests {
                                 }
                                 _ => Merit::NONE,
                             };
-                            assert_eq!(sweep.merit(aim, roll_rad), merit, "{aim:?}");
+                            let glance = sweep.glance(aim, roll_rad);
+                            assert_eq!(glance.merit, merit, "{aim:?}");
+                            assert_eq!(glance.works, alone.works());
+                            assert_eq!(glance.exists, alone.candidate.is_some());
+                            if glance.exists {
+                                assert_eq!(glance.surplus, alone.surplus);
+                            }
                         }
                         assert_eq!(sweep.member(roll_rad), alone);
                         working += usize::from(alone.works());

@@ -6,8 +6,9 @@ use needlebench_cell::Goal;
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
-use super::{Aim, Member, Merit, Sweep};
+use super::{Aim, Glance, Member, Merit, Sweep, nearest_missing};
 use crate::Rejection;
+use crate::limits::Shortfall;
 use crate::planner::Planner;
 
 /// Where a range ends.
@@ -83,17 +84,34 @@ pub struct Family {
 
 /// Width within which an edge is located, rad: 0.01 degrees.
 pub const EDGE_RAD: f64 = 1.745e-4;
-/// Steps of a golden-section search: each leaves 0.618 of the interval.
-const SEARCH_STEPS: u32 = 9;
+/// Part of the way between a knot's neighbours to which the best roll is found.
+const REFINED: f64 = 1.0 / 64.0;
+/// Half the width of the widest range that may be missed where nothing on the grid works, rad.
+const SCAN_RAD: f64 = 0.01;
 /// A local extreme of the surplus is searched where it is nearer to zero than this many times the
 /// rise to its neighbours.
 const CLOSER_LOOK: f64 = 2.0;
 
-/// A member of the sweep with its place on the unrolled circle.
+/// A roll that was looked at.
+#[derive(Debug, Clone, Copy)]
 struct Knot {
     roll_rad: f64,
-    member: Member,
+    works: bool,
+    surplus: f64,
 }
+
+impl Knot {
+    fn of(member: &Member) -> Self {
+        Self {
+            roll_rad: member.roll_rad,
+            works: member.works(),
+            surplus: member.surplus,
+        }
+    }
+}
+
+/// Rolls in a row that work: the number of the first one, and how many there are.
+type Stretch = (usize, usize);
 
 impl Planner<'_> {
     /// Ranges of one configuration from its members on an even grid of rolls, in ascending order
@@ -116,20 +134,22 @@ impl Planner<'_> {
             ranges: Vec::new(),
         };
         if let [only] = grid {
-            let knots = [Knot {
-                roll_rad: only.roll_rad,
-                member: only.clone(),
-            }];
             let ranges = if only.works() {
-                vec![self.range(goal, &mut sweep, &knots, None, None, aims)]
+                vec![self.range(goal, &mut sweep, std::slice::from_ref(only), None, aims)]
             } else {
                 Vec::new()
             };
             return Family { ranges, ..empty };
         }
-        let knots = closer_look(grid, &mut sweep);
-        if knots.iter().all(|knot| knot.member.works()) {
-            let mut range = self.range(goal, &mut sweep, &knots, None, None, aims);
+        let knots: Vec<Knot> = grid.iter().map(Knot::of).collect();
+        let mut members = grid.to_vec();
+        let between = closer_look(&knots, &mut sweep).into_iter();
+        members.extend(between.map(|roll_rad| sweep.member(roll_rad)));
+        members.sort_by(|a, b| a.roll_rad.total_cmp(&b.roll_rad));
+        members.dedup_by(|a, b| a.roll_rad == b.roll_rad);
+        let works: Vec<bool> = members.iter().map(Member::works).collect();
+        if works.iter().all(|works| *works) {
+            let mut range = self.range(goal, &mut sweep, &members, None, aims);
             range.is_whole_circle = true;
             range.to_rad = range.from_rad + TAU;
             return Family {
@@ -137,48 +157,21 @@ impl Planner<'_> {
                 ..empty
             };
         }
-        // Begin behind a knot that does not work, so that no range is cut at roll zero.
-        let Some(first) = knots.iter().position(|knot| !knot.member.works()) else {
-            return empty;
-        };
-        let count = knots.len();
-        let turned: Vec<Knot> = (0..=count)
-            .map(|k| {
-                let knot = &knots[(first + k) % count];
-                let turns = f64::from(u8::from(first + k >= count));
-                Knot {
-                    roll_rad: knot.roll_rad + turns * TAU,
-                    member: knot.member.clone(),
-                }
-            })
-            .collect();
-        let mut ranges = Vec::new();
-        let mut begin = None;
-        for k in 1..turned.len() {
-            match (turned[k - 1].member.works(), turned[k].member.works()) {
-                (false, true) => begin = Some(k),
-                (true, false) => {
-                    let from = begin.take().unwrap_or(1);
-                    let (low, before) = bisect(&turned[from], &turned[from - 1], &mut sweep);
-                    let (high, after) = bisect(&turned[k - 1], &turned[k], &mut sweep);
-                    let mut inside = Vec::with_capacity(k - from + 2);
-                    inside.extend(low);
-                    inside.extend(turned[from..k].iter().map(|knot| Knot {
-                        roll_rad: knot.roll_rad,
-                        member: knot.member.clone(),
-                    }));
-                    inside.extend(high);
-                    ranges.push(self.range(
-                        goal,
-                        &mut sweep,
-                        &inside,
-                        Some(before),
-                        Some(after),
-                        aims,
-                    ));
-                }
-                _ => {}
-            }
+        let count = members.len();
+        let mut ranges: Vec<RollRange> = Vec::new();
+        for (from, length) in stretches(&works) {
+            let at = |k: usize| Member {
+                roll_rad: unrolled(k, count, |k| members[k].roll_rad),
+                ..members[k % count].clone()
+            };
+            let mut inside: Vec<Member> = (from..from + length).map(at).collect();
+            // What precedes a stretch does not work: it is not the first of all.
+            let [before, after] = [at(from - 1), at(from + length)];
+            let (low, before) = edge(&inside[0], &before, &mut sweep);
+            let (high, after) = edge(&inside[length - 1], &after, &mut sweep);
+            inside.splice(0..0, low);
+            inside.extend(high);
+            ranges.push(self.range(goal, &mut sweep, &inside, Some((before, after)), aims));
         }
         for range in &mut ranges {
             let turns = (range.from_rad / TAU).floor() * TAU;
@@ -194,18 +187,37 @@ impl Planner<'_> {
         &self,
         goal: &Goal,
         sweep: &mut Sweep<'_>,
-        knots: &[Knot],
-        before: Option<Edge>,
-        after: Option<Edge>,
+        members: &[Member],
+        edges: Option<(Edge, Edge)>,
         aims: &[Aim],
     ) -> RollRange {
-        let whole = before.is_none() && knots.len() > 1;
-        let (from_rad, to_rad) = (knots[0].roll_rad, knots[knots.len() - 1].roll_rad);
-        let best = aims
-            .iter()
-            .map(|aim| self.best(goal, sweep, knots, whole, *aim))
-            .collect();
-        let (low, high) = joint_extent(knots);
+        let rolls: Vec<f64> = members.iter().map(|member| member.roll_rad).collect();
+        // Of a whole circle the last one precedes the first.
+        let beyond_rad = if edges.is_none() && members.len() > 1 {
+            [rolls[rolls.len() - 1] - TAU, rolls[0] + TAU]
+        } else {
+            [rolls[0], rolls[rolls.len() - 1]]
+        };
+        let best = aims.iter().map(|&aim| {
+            let merits: Vec<Merit> = members
+                .iter()
+                .map(|member| match &member.candidate {
+                    Some(candidate) if member.works() => self.merit(goal, aim, candidate),
+                    _ => Merit::NONE,
+                })
+                .collect();
+            let peak = highest(sweep, aim, &rolls, &merits, beyond_rad);
+            Best {
+                aim,
+                value: peak.merit.value,
+                member: match peak.knot {
+                    Some(knot) => members[knot].clone(),
+                    None => sweep.member(peak.roll_rad.rem_euclid(TAU)),
+                },
+            }
+        });
+        let best = best.collect();
+        let (low, high) = joint_extent(members);
         let limits = &self.cell().robot.limits;
         let fits_joint_limits = (0..JOINT_COUNT).all(|joint| {
             let limit = limits.0[joint];
@@ -213,9 +225,10 @@ impl Planner<'_> {
                 turns.any(|k| high[joint] + TAU * f64::from(k) <= limit.upper_rad)
             })
         });
+        let (before, after) = edges.unzip();
         RollRange {
-            from_rad,
-            to_rad,
+            from_rad: rolls[0],
+            to_rad: rolls[rolls.len() - 1],
             is_whole_circle: false,
             before,
             after,
@@ -225,137 +238,294 @@ impl Planner<'_> {
         }
     }
 
-    /// The best knot, refined between its neighbours; where even that falls short of what will be judged,
-    /// the best of all knots that are better than their neighbours, each refined.
-    fn best(
+    /// The member of a configuration that is best for an aim among those that work, else the one on the grid
+    /// of rolls that comes nearest to working.
+    ///
+    /// Where nothing on the grid keeps what is wanted, what lies between its rolls is looked at too
+    /// ([`scan`]): a configuration fails, or lacks the reserve, where all rolls do.
+    pub(crate) fn best_member(
         &self,
         goal: &Goal,
-        sweep: &mut Sweep<'_>,
-        knots: &[Knot],
-        whole: bool,
+        configuration: Configuration,
+        rolls_rad: &[f64],
         aim: Aim,
-    ) -> Best {
-        let merit = |member: &Member| match &member.candidate {
-            Some(candidate) if member.works() => self.merit(goal, aim, candidate),
-            _ => Merit::NONE,
-        };
-        let merits: Vec<Merit> = knots.iter().map(|knot| merit(&knot.member)).collect();
-        let last = knots.len() - 1;
-        let roll = |k: usize| knots[k].roll_rad;
-        let mut peaks: Vec<usize> = (0..knots.len())
-            .filter(|&k| {
-                let (before, after) = match (k, whole) {
-                    (0, true) => (last, 1.min(last)),
-                    (k, true) if k == last => (last - 1, 0),
-                    (k, _) => (k.saturating_sub(1), (k + 1).min(last)),
-                };
-                merits[k] >= merits[before] && merits[k] >= merits[after]
-            })
+    ) -> Member {
+        let mut sweep = Sweep::new(self, goal, configuration);
+        let grid: Vec<Seen> = rolls_rad
+            .iter()
+            .map(|&roll_rad| Seen::at(&mut sweep, aim, roll_rad))
             .collect();
-        // Equal ones stay in the order of roll.
-        peaks.sort_by(|&a, &b| merits[a].better_first(&merits[b]));
-        let first = peaks.first().copied().unwrap_or(0);
-        let (mut most, mut better_rad) = (merits[first], None);
-        for index in peaks {
-            let (low, high) = match (index, whole) {
-                (0, true) => (roll(last) - TAU, roll(1)),
-                (k, true) if k == last => (roll(last - 1), roll(0) + TAU),
-                (k, _) => (roll(k.saturating_sub(1)), roll((k + 1).min(last))),
-            };
-            golden(low, high, |roll_rad| {
-                let roll_rad = roll_rad.rem_euclid(TAU);
-                let here = sweep.merit(aim, roll_rad);
-                if here > most {
-                    (most, better_rad) = (here, Some(roll_rad));
-                }
-                here
-            });
-            if most.meets_what_is_judged() {
-                break;
+        let mut best = highest_of_circle(&mut sweep, aim, &grid);
+        let is_enough = |best: &Option<Peak>| {
+            let best = best.as_ref();
+            best.is_some_and(|best| best.merit.shortfall == Shortfall::NONE)
+        };
+        if !is_enough(&best) {
+            let mut all = grid.clone();
+            for (k, here) in grid.iter().enumerate() {
+                let next = unrolled(k + 1, grid.len(), |k| grid[k].roll_rad);
+                let next = Seen {
+                    roll_rad: next,
+                    ..grid[(k + 1) % grid.len()]
+                };
+                scan(&mut sweep, aim, here, &next, &mut all);
+            }
+            if all.len() > grid.len() {
+                all.sort_by(|a, b| a.roll_rad.total_cmp(&b.roll_rad));
+                best = highest_of_circle(&mut sweep, aim, &all);
             }
         }
-        Best {
-            aim,
-            value: most.value,
-            member: match better_rad {
-                Some(roll_rad) => sweep.member(roll_rad),
-                None => knots[first].member.clone(),
-            },
+        if let Some(best) = best {
+            return sweep.member(best.roll_rad.rem_euclid(TAU));
+        }
+        let nearest = grid.iter().filter(|seen| seen.glance.exists);
+        let nearest = nearest.reduce(|best, each| {
+            let is_nearer = each.glance.surplus > best.glance.surplus;
+            if is_nearer { each } else { best }
+        });
+        if let Some(seen) = nearest {
+            return sweep.member(seen.roll_rad);
+        }
+        let grid = rolls_rad.iter().map(|&roll_rad| sweep.member(roll_rad));
+        nearest_missing(grid.collect())
+    }
+}
+
+/// A roll with what a choice needs to know of its member.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    roll_rad: f64,
+    glance: Glance,
+}
+
+impl Seen {
+    fn at(sweep: &mut Sweep<'_>, aim: Aim, roll_rad: f64) -> Self {
+        Self {
+            roll_rad,
+            glance: sweep.glance(aim, roll_rad.rem_euclid(TAU)),
         }
     }
 }
 
-/// The grid, with members between its rolls where the surplus may change its sign twice.
-fn closer_look(grid: &[Member], sweep: &mut Sweep<'_>) -> Vec<Knot> {
+/// The best of all stretches that work on a circle of rolls in ascending order; of equal ones the first.
+fn highest_of_circle(sweep: &mut Sweep<'_>, aim: Aim, all: &[Seen]) -> Option<Peak> {
+    let count = all.len();
+    let works: Vec<bool> = all.iter().map(|seen| seen.glance.works).collect();
+    let mut found = stretches(&works);
+    // In the order of the rolls at which they begin.
+    found.sort_by_key(|(from, _)| *from % count);
+    let peaks = found.into_iter().map(|(from, length)| {
+        let roll = |k: usize| unrolled(k, count, |k| all[k].roll_rad);
+        let rolls: Vec<f64> = (from..from + length).map(roll).collect();
+        let merit = |k: usize| all[k % count].glance.merit;
+        let merits: Vec<Merit> = (from..from + length).map(merit).collect();
+        // What lies beyond does not work, or is the other end of the circle.
+        let beyond_rad = [roll(from + count - 1) - TAU, roll(from + length)];
+        highest(sweep, aim, &rolls, &merits, beyond_rad)
+    });
+    peaks.reduce(|best, peak| {
+        if peak.merit.better_first(&best.merit).is_lt() {
+            peak
+        } else {
+            best
+        }
+    })
+}
+
+/// Looks for rolls that work between two that do not, and adds what it finds.
+///
+/// A half of the way is left out where what breaks its rule at the end is deeper than the arm moves from there
+/// to the middle: nothing in it works, as far as the arm goes there by the shortest way. What remains is looked at
+/// down to [`SCAN_RAD`].
+fn scan(sweep: &mut Sweep<'_>, aim: Aim, low: &Seen, high: &Seen, found: &mut Vec<Seen>) {
+    if low.glance.works || high.glance.works || high.roll_rad - low.roll_rad < 2.0 * SCAN_RAD {
+        return;
+    }
+    let middle_rad = f64::midpoint(low.roll_rad, high.roll_rad);
+    let mut is_excluded = |end: &Seen| sweep.excludes(end.roll_rad, &end.glance, middle_rad);
+    if is_excluded(low) && is_excluded(high) {
+        return;
+    }
+    let middle = Seen::at(sweep, aim, middle_rad);
+    if middle.glance.works {
+        found.push(Seen {
+            roll_rad: middle_rad.rem_euclid(TAU),
+            ..middle
+        });
+    }
+    scan(sweep, aim, low, &middle, found);
+    scan(sweep, aim, &middle, high, found);
+}
+
+/// The roll of a knot, counted on beyond the last one.
+fn unrolled(k: usize, count: usize, roll_rad: impl Fn(usize) -> f64) -> f64 {
+    roll_rad(k % count) + TAU * (k / count) as f64
+}
+
+/// The stretches of what works on a circle, the first one beginning behind the first that does not; all of
+/// them if all work.
+fn stretches(works: &[bool]) -> Vec<Stretch> {
+    let count = works.len();
+    let Some(first) = works.iter().position(|works| !works) else {
+        return vec![(0, count)];
+    };
+    let mut found: Vec<Stretch> = Vec::new();
+    let mut goes_on = false;
+    for k in first..first + count {
+        let here = works[k % count];
+        match found.last_mut() {
+            Some((_, length)) if here && goes_on => *length += 1,
+            _ if here => found.push((k, 1)),
+            _ => {}
+        }
+        goes_on = here;
+    }
+    found
+}
+
+/// The best of a range.
+struct Peak {
+    roll_rad: f64,
+    merit: Merit,
+    /// The knot, if it is one.
+    knot: Option<usize>,
+}
+
+/// The best knot, refined between its neighbours; where even that falls short of what is wanted,
+/// the best of all knots that are better than their neighbours, each refined. What lies next to the first and
+/// the last knot, if they have no neighbour, is `beyond_rad`.
+fn highest(
+    sweep: &mut Sweep<'_>,
+    aim: Aim,
+    rolls_rad: &[f64],
+    merits: &[Merit],
+    beyond_rad: [f64; 2],
+) -> Peak {
+    let last = merits.len() - 1;
+    let mut peaks: Vec<usize> = (0..=last)
+        .filter(|&k| {
+            let (before, after) = (k.saturating_sub(1), (k + 1).min(last));
+            merits[k] >= merits[before] && merits[k] >= merits[after]
+        })
+        .collect();
+    // Equal ones stay in the order of roll.
+    peaks.sort_by(|&a, &b| merits[a].better_first(&merits[b]));
+    let first = peaks.first().copied().unwrap_or(0);
+    let mut most = Peak {
+        roll_rad: rolls_rad[first],
+        merit: merits[first],
+        knot: Some(first),
+    };
+    for index in peaks {
+        let before = index.checked_sub(1).map(|k| rolls_rad[k]);
+        let mut bracket = Bracket {
+            low_rad: before.unwrap_or(beyond_rad[0]),
+            middle_rad: rolls_rad[index],
+            high_rad: rolls_rad.get(index + 1).copied().unwrap_or(beyond_rad[1]),
+            best: merits[index],
+        };
+        let end_rad = REFINED * bracket.width_rad();
+        while bracket.width_rad() > end_rad {
+            bracket.narrow(|roll_rad| sweep.glance(aim, roll_rad.rem_euclid(TAU)).merit);
+        }
+        if bracket.best > most.merit {
+            most = Peak {
+                roll_rad: bracket.middle_rad,
+                merit: bracket.best,
+                knot: None,
+            };
+        }
+        if most.merit.shortfall == Shortfall::NONE {
+            break;
+        }
+    }
+    most
+}
+
+/// Rolls between those of the grid where the surplus changes its sign twice.
+fn closer_look(grid: &[Knot], sweep: &mut Sweep<'_>) -> Vec<f64> {
     let count = grid.len();
     let step_rad = TAU / count as f64;
-    let mut knots: Vec<Knot> = Vec::with_capacity(count);
+    let mut between = Vec::new();
     for k in 0..count {
         let here = &grid[k];
         let (last, next) = (&grid[(k + count - 1) % count], &grid[(k + 1) % count]);
-        let alike = last.works() == here.works() && next.works() == here.works();
+        let alike = last.works == here.works && next.works == here.works;
         // Rises towards what the others lack.
-        let sign = if here.works() { -1.0 } else { 1.0 };
-        let rise = |other: &Member| sign * (here.surplus - other.surplus);
+        let sign = if here.works { -1.0 } else { 1.0 };
+        let rise = |other: &Knot| sign * (here.surplus - other.surplus);
         let peak = rise(last).min(rise(next)) >= 0.0;
         let steep = rise(last).max(rise(next));
-        knots.push(Knot {
-            roll_rad: here.roll_rad,
-            member: here.clone(),
-        });
         if !(alike && peak && here.surplus.abs() < CLOSER_LOOK * steep) {
             continue;
         }
-        let mut found_rad: Option<f64> = None;
-        golden(
-            here.roll_rad - step_rad,
-            here.roll_rad + step_rad,
-            |roll_rad| {
-                let roll_rad = roll_rad.rem_euclid(TAU);
-                let (surplus, works) = sweep.surplus(roll_rad);
-                if works != here.works() && found_rad.is_none() {
-                    found_rad = Some(roll_rad);
+        let mut bracket = Bracket {
+            low_rad: here.roll_rad - step_rad,
+            middle_rad: here.roll_rad,
+            high_rad: here.roll_rad + step_rad,
+            best: sign * here.surplus,
+        };
+        let mut found = false;
+        while !found && bracket.width_rad() > REFINED * 2.0 * step_rad {
+            bracket.narrow(|roll_rad| {
+                let (surplus, works) = sweep.surplus(roll_rad.rem_euclid(TAU));
+                if works != here.works {
+                    between.push(roll_rad.rem_euclid(TAU));
+                    found = true;
                 }
                 sign * surplus
-            },
+            });
+        }
+    }
+    between
+}
+
+/// A roll between two others with what was found there; none of the other two is better.
+#[derive(Debug, Clone, Copy)]
+struct Bracket<V> {
+    low_rad: f64,
+    middle_rad: f64,
+    high_rad: f64,
+    /// What was found in the middle.
+    best: V,
+}
+
+impl<V: PartialOrd> Bracket<V> {
+    fn width_rad(&self) -> f64 {
+        self.high_rad - self.low_rad
+    }
+
+    /// Looks at a roll of the wider part by the golden section; whichever of the two is better is the new middle.
+    fn narrow(&mut self, value: impl FnOnce(f64) -> V) {
+        const SECTION: f64 = 0.381_966_011_250_105;
+        let (below_rad, above_rad) = (
+            self.middle_rad - self.low_rad,
+            self.high_rad - self.middle_rad,
         );
-        if let Some(roll_rad) = found_rad {
-            let member = sweep.member(roll_rad);
-            knots.push(Knot { roll_rad, member });
-        }
-    }
-    knots.sort_by(|a, b| a.roll_rad.total_cmp(&b.roll_rad));
-    knots.dedup_by(|a, b| a.roll_rad == b.roll_rad);
-    knots
-}
-
-/// Looks for the largest value between two rolls; `value` keeps what it finds.
-fn golden<V: PartialOrd>(mut low: f64, mut high: f64, mut value: impl FnMut(f64) -> V) {
-    const SECTION: f64 = 0.618_033_988_749_895;
-    if high <= low {
-        return;
-    }
-    let mut left = high - SECTION * (high - low);
-    let mut right = low + SECTION * (high - low);
-    let (mut at_left, mut at_right) = (value(left), value(right));
-    for _ in 0..SEARCH_STEPS {
-        if at_left >= at_right {
-            high = right;
-            (right, at_right) = (left, at_left);
-            left = high - SECTION * (high - low);
-            at_left = value(left);
+        let is_above = above_rad > below_rad;
+        let roll_rad = if is_above {
+            self.middle_rad + SECTION * above_rad
         } else {
-            low = left;
-            (left, at_left) = (right, at_right);
-            right = low + SECTION * (high - low);
-            at_right = value(right);
+            self.middle_rad - SECTION * below_rad
+        };
+        let here = value(roll_rad);
+        let (bound, other) = if is_above {
+            (&mut self.high_rad, &mut self.low_rad)
+        } else {
+            (&mut self.low_rad, &mut self.high_rad)
+        };
+        if here > self.best {
+            *other = self.middle_rad;
+            (self.middle_rad, self.best) = (roll_rad, here);
+        } else {
+            *bound = roll_rad;
         }
     }
 }
 
-/// Last member that works before an edge, if it is not `inside` itself, and the edge.
-fn bisect(inside: &Knot, outside: &Knot, sweep: &mut Sweep<'_>) -> (Option<Knot>, Edge) {
-    let (mut good_rad, mut bad_rad) = (inside.roll_rad, outside.roll_rad);
+/// The last roll that was found to work before one that does not, and the first one beyond.
+fn bisect(inside_rad: f64, outside_rad: f64, sweep: &mut Sweep<'_>) -> (f64, f64) {
+    let (mut good_rad, mut bad_rad) = (inside_rad, outside_rad);
     while (good_rad - bad_rad).abs() > EDGE_RAD {
         let middle_rad = f64::midpoint(good_rad, bad_rad);
         if sweep.works(middle_rad.rem_euclid(TAU)) {
@@ -364,12 +534,18 @@ fn bisect(inside: &Knot, outside: &Knot, sweep: &mut Sweep<'_>) -> (Option<Knot>
             bad_rad = middle_rad;
         }
     }
-    let mut at = |roll_rad: f64, known: &Knot| {
+    (good_rad, bad_rad)
+}
+
+/// Last member that works before an edge, if it is not `inside` itself, and the edge.
+fn edge(inside: &Member, outside: &Member, sweep: &mut Sweep<'_>) -> (Option<Member>, Edge) {
+    let (good_rad, bad_rad) = bisect(inside.roll_rad, outside.roll_rad, sweep);
+    let mut at = |roll_rad: f64, known: &Member| {
         (roll_rad != known.roll_rad).then(|| sweep.member(roll_rad.rem_euclid(TAU)))
     };
     let rejections = match at(bad_rad, outside) {
         Some(bad) => bad.rejections,
-        None => outside.member.rejections.clone(),
+        None => outside.rejections.clone(),
     };
     let edge = Edge {
         roll_rad: bad_rad,
@@ -378,18 +554,18 @@ fn bisect(inside: &Knot, outside: &Knot, sweep: &mut Sweep<'_>) -> (Option<Knot>
             .next()
             .expect("what does not work breaks a rule"),
     };
-    let knot = at(good_rad, inside).map(|member| Knot {
+    let last = at(good_rad, inside).map(|member| Member {
         roll_rad: good_rad,
-        member,
+        ..member
     });
-    (knot, edge)
+    (last, edge)
 }
 
-/// Smallest and largest position of each joint along the knots, without jumps by whole turns, rad.
-fn joint_extent(knots: &[Knot]) -> (Joints, Joints) {
-    let mut joints = knots
+/// Smallest and largest position of each joint along some members, without jumps by whole turns, rad.
+fn joint_extent(members: &[Member]) -> (Joints, Joints) {
+    let mut joints = members
         .iter()
-        .filter_map(|knot| knot.member.candidate.as_ref())
+        .filter_map(|member| member.candidate.as_ref())
         .map(|candidate| candidate.joints);
     let Some(first) = joints.next() else {
         return (Joints::zeros(), Joints::zeros());

@@ -364,7 +364,11 @@ fn a_configuration_misses_clearances_only_if_every_roll_does() {
                 goal.name
             );
             // The middle of a range, not its edge.
-            assert!(of_chosen == Shortfall::NONE || best.reserve_m < 0.0);
+            assert!(
+                of_chosen == Shortfall::NONE || best.reserve_m < 0.0,
+                "{} {index}: {of_chosen:?}, but {best:?} at another roll",
+                goal.name
+            );
         }
     }
     assert!(checked > 16 && kept > 8, "{checked} {kept}");
