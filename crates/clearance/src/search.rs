@@ -280,7 +280,7 @@ impl Look<'_> {
                 continue;
             }
             let whole_m = posture.whole_gap_m(pair.a, pair.b, cutoff_m);
-            if !(whole_m >= cutoff_m) {
+            if whole_m < cutoff_m || whole_m.is_nan() {
                 order.push((whole_m, index));
             }
         }
