@@ -22,6 +22,8 @@ pub struct GoalPlan {
 
 /// Postures of one configuration for which a motion is tried, best first.
 const MOTION_TRIES: usize = 12;
+/// Rolls that are looked at to say which ones would be free.
+const ROLLS_SAID: u32 = 72;
 /// Rolls of each range that are tried where none of the first ones has a motion that keeps what is judged.
 const RANGE_TRIES: u32 = 9;
 /// Postures of one configuration for which a way around is searched where the straight motion is
@@ -80,7 +82,7 @@ impl Planner<'_> {
     fn first(&self, goal: &Goal, configuration: Configuration, rolls_rad: &[f64]) -> Member {
         let aim = self.planning().roll_aim;
         let mut member = self.best_member(goal, configuration, rolls_rad, aim);
-        say_what_frees(goal, &mut member.rejections);
+        self.say_what_frees(goal, configuration, &mut member.rejections);
         member
     }
 
@@ -143,7 +145,7 @@ impl Planner<'_> {
             .collect();
         if candidates.is_empty() {
             let mut rejections = nearest_missing(grid).rejections;
-            say_what_frees(goal, &mut rejections);
+            self.say_what_frees(goal, configuration, &mut rejections);
             return ConfigurationPlan {
                 rejections,
                 ..ConfigurationPlan::nothing(configuration)
@@ -226,7 +228,7 @@ impl Planner<'_> {
         for (candidate, mut rejections) in candidates {
             // The best posture breaks a rule, so all do: one motion shows what would happen.
             let hopeless = !rejections.is_empty();
-            say_what_frees(goal, &mut rejections);
+            self.say_what_frees(goal, configuration, &mut rejections);
             let posture = ByClass::of_posture(&candidate.clearance);
             let required = match self.required(goal, configuration, candidate, rejections) {
                 Ok(required) => required,
@@ -289,34 +291,72 @@ impl Planner<'_> {
             .expect("there is at least one candidate")
     }
 
+    /// Adds to the first rule that a posture breaks, the decisive one, whether other rolls break rules too and
+    /// what else may free the configuration.
+    fn say_what_frees(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        rejections: &mut [Rejection],
+    ) {
+        let Some(first) = rejections.first_mut() else {
+            return;
+        };
+        let others = match first.rule {
+            Rule::Unreachable => "another place of the base may reach it",
+            Rule::Collision => "another base, tool or limit may free it",
+            Rule::NeedleCorridor => "another base or tool may free it",
+            Rule::Singular | Rule::JointLimit | Rule::Approach => "another base may free it",
+            Rule::NeedleRoute | Rule::Merged | Rule::NearestOnly | Rule::NoMotion => return,
+        };
+        first.detail = match goal.roll {
+            Roll::Free => {
+                let detail = &first.detail;
+                format!("{detail}; some rule is broken at every roll, least here: {others}")
+            }
+            Roll::Fixed(roll_rad) => {
+                let fixed = format!("the goal fixes its roll at {}", degrees(roll_rad));
+                let free = self.free_rolls(goal, configuration);
+                if free.is_empty() {
+                    format!(
+                        "{}; {fixed}, and no other is free either: {others}",
+                        first.detail
+                    )
+                } else {
+                    format!("{}; {fixed}, postures are free {free}", first.detail)
+                }
+            }
+        };
+    }
+
+    /// Ranges of roll in which a configuration's postures break no rule, in words; empty if there are none.
+    fn free_rolls(&self, goal: &Goal, configuration: Configuration) -> String {
+        let rolls: Vec<f64> = (0..ROLLS_SAID)
+            .map(|k| TAU * f64::from(k) / f64::from(ROLLS_SAID))
+            .collect();
+        let grid = self.members_along(goal, configuration, &rolls);
+        let family = self.family_for(goal, configuration, &grid, &[]);
+        let ranges = family.ranges.iter().map(|range| {
+            if range.is_whole_circle {
+                "at any other".to_owned()
+            } else {
+                let [from, to] = [range.from_rad, range.to_rad].map(degrees);
+                format!("from {from} to {to}")
+            }
+        });
+        ranges.collect::<Vec<_>>().join(" and ")
+    }
+
     /// Nothing is below its floor.
     fn is_free(&self, clearance: &ByClass) -> bool {
         clearance.most_below(&self.limits().floors()) <= 0.0
     }
 }
 
-/// Adds to the first rule that a posture breaks, the decisive one, whether other rolls break it too and
-/// what else may free the configuration.
-fn say_what_frees(goal: &Goal, rejections: &mut [Rejection]) {
-    let Some(first) = rejections.first_mut() else {
-        return;
-    };
-    let rolls = match goal.roll {
-        Roll::Fixed(_) => "the goal fixes its roll: a free one",
-        Roll::Free => "some rule is broken at every roll, least here:",
-    };
-    let others = match first.rule {
-        Rule::Unreachable => "another place of the base may reach it",
-        Rule::Collision => "another base, tool or limit may free it",
-        Rule::NeedleCorridor => "another base or tool may free it",
-        Rule::Singular | Rule::JointLimit | Rule::Approach => "another base may free it",
-        Rule::NeedleRoute | Rule::Merged | Rule::NearestOnly | Rule::NoMotion => return,
-    };
-    let or = match goal.roll {
-        Roll::Fixed(_) => " or ",
-        Roll::Free => " ",
-    };
-    first.detail = format!("{}; {rolls}{or}{others}", first.detail);
+/// An angle in whole degrees, for people.
+fn degrees(angle_rad: f64) -> String {
+    // Not "-0".
+    format!("{:.0} deg", angle_rad.to_degrees().round() + 0.0)
 }
 
 /// Angle between two rolls that count as different for a motion, rad.
