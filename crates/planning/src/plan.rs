@@ -1,12 +1,13 @@
 //! The plan of a goal: for each configuration the best posture to which there is a motion.
 
+use std::cell::OnceCell;
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
 use needlebench_cell::{Goal, Roll};
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 
-use crate::family::{Member, Merit, nearest_missing};
+use crate::family::{Member, Merit};
 use crate::limits::{ByClass, Shortfall};
 use crate::margin::SAME_M;
 use crate::motion_plan::{ConfigurationPlan, Required, Way};
@@ -39,9 +40,8 @@ impl Planner<'_> {
         let route = route_rejection(self.resolved, goal);
         let configurations = Configuration::ALL
             .into_iter()
-            .zip(self.grids(goal))
-            .map(|(configuration, grid)| {
-                let mut plan = self.plan_configuration(goal, configuration, grid);
+            .map(|configuration| {
+                let mut plan = self.plan_configuration(goal, configuration);
                 plan.rejections.splice(0..0, route.clone());
                 if route.is_some() {
                     plan.retreat = None;
@@ -86,85 +86,74 @@ impl Planner<'_> {
         member
     }
 
-    /// All members at the rolls that are looked at, by configuration.
-    fn grids(&self, goal: &Goal) -> [Vec<Member>; 8] {
-        let rolls = self.rolls(goal, self.planning().roll_samples);
-        let mut grids: [Vec<Member>; 8] = std::array::from_fn(|_| Vec::with_capacity(rolls.len()));
-        let mut nearby = Default::default();
-        for &roll_rad in &rolls {
-            let members = self.members_near(goal, roll_rad, &mut nearby);
-            for (grid, member) in grids.iter_mut().zip(members) {
-                grid.push(member);
-            }
-        }
-        grids
-    }
-
-    /// Members with a posture: those that work, best first, or if none does all, nearest to working
-    /// first.
+    /// Members that work, the best first.
     fn ranked(&self, goal: &Goal, configuration: Configuration, grid: &[Member]) -> Vec<Member> {
         let aim = self.planning().roll_aim;
         // The best of each range that works, then the rest of what works.
-        let mut members: Vec<Member> = self
-            .family_for(goal, configuration, grid, &[aim])
-            .ranges
-            .into_iter()
-            .map(|range| range.best_for(aim).member.clone())
-            .collect();
-        let some_work = !members.is_empty();
-        let of_grid = grid
-            .iter()
-            .filter(|member| member.candidate.is_some() && (member.works() || !some_work));
-        members.extend(of_grid.cloned());
+        let family = self.family_for(goal, configuration, grid, &[aim]);
+        let best = family.ranges.into_iter();
+        let best = best.map(|range| range.best_for(aim).member.clone());
+        let of_grid = grid.iter().filter(|member| member.works()).cloned();
         // Equal ones stay in the order of roll.
-        if some_work {
-            let mut rated: Vec<(Merit, Member)> = members
-                .into_iter()
-                .filter_map(|member| {
-                    let merit = self.merit(goal, aim, member.candidate.as_ref()?);
-                    Some((merit, member))
-                })
-                .collect();
-            rated.sort_by(|(a, _), (b, _)| a.better_first(b));
-            return rated.into_iter().map(|(_, member)| member).collect();
-        }
-        members.sort_by(|a, b| b.surplus.total_cmp(&a.surplus));
-        members
+        let rated = best.chain(of_grid).filter_map(|member| {
+            let merit = self.merit(goal, aim, member.candidate.as_ref()?);
+            Some((merit, member))
+        });
+        let mut rated: Vec<(Merit, Member)> = rated.collect();
+        rated.sort_by(|(a, _), (b, _)| a.better_first(b));
+        rated.into_iter().map(|(_, member)| member).collect()
     }
 
-    fn plan_configuration(
-        &self,
-        goal: &Goal,
-        configuration: Configuration,
-        grid: Vec<Member>,
-    ) -> ConfigurationPlan {
-        let members = self.ranked(goal, configuration, &grid);
-        let candidates: Vec<(Candidate, Vec<Rejection>)> = members
-            .into_iter()
-            .filter_map(|member| Some((member.candidate?, member.rejections)))
-            .collect();
-        if candidates.is_empty() {
-            let mut rejections = nearest_missing(grid).rejections;
+    fn plan_configuration(&self, goal: &Goal, configuration: Configuration) -> ConfigurationPlan {
+        let rolls = self.rolls(goal, self.planning().roll_samples);
+        let first = if let Roll::Fixed(roll_rad) = goal.roll {
+            self.member_at(goal, configuration, roll_rad)
+        } else {
+            self.best_member(goal, configuration, &rolls, self.planning().roll_aim)
+        };
+        let some_work = first.works();
+        let Some(candidate) = first.candidate else {
+            let mut rejections = first.rejections;
             self.say_what_frees(goal, configuration, &mut rejections);
             return ConfigurationPlan {
                 rejections,
                 ..ConfigurationPlan::nothing(configuration)
             };
-        }
-        let some_work = candidates[0].1.is_empty();
-        let first = spread_over_rolls(candidates).into_iter().take(MOTION_TRIES);
+        };
+        // Mostly the first one has a motion that keeps all, and no other is asked for.
+        let grid = OnceCell::new();
+        let grid = || grid.get_or_init(|| self.members_along(goal, configuration, &rolls));
+        let best = (candidate, first.rejections);
+        let candidates = std::iter::once(best.clone()).chain(
+            std::iter::once_with(|| {
+                let ranked = match goal.roll {
+                    Roll::Fixed(_) => Vec::new(),
+                    Roll::Free => self.ranked(goal, configuration, grid()),
+                };
+                let ranked = ranked
+                    .into_iter()
+                    .filter_map(|member| Some((member.candidate?, member.rejections)));
+                let all = std::iter::once(best.clone()).chain(ranked).collect();
+                spread_over_rolls(all).into_iter().skip(1)
+            })
+            .flatten(),
+        );
         let mut checks_left = u64::from(self.planning().motion_checks);
-        let (plan, is_settled) =
-            self.best_motion(goal, configuration, first.collect(), &mut checks_left);
+        let (plan, is_settled) = self.best_motion(
+            goal,
+            configuration,
+            candidates.take(MOTION_TRIES),
+            &mut checks_left,
+        );
         if is_settled || !some_work || matches!(goal.roll, Roll::Fixed(_)) {
             return plan;
         }
         // None of the first rolls has a motion that keeps what is judged: more of each range.
-        let more = self.within_ranges(goal, configuration, &grid);
+        let more = self.within_ranges(goal, configuration, grid());
         if more.is_empty() {
             return plan;
         }
-        let (other, _) = self.best_motion(goal, configuration, more, &mut checks_left);
+        let (other, _) = self.best_motion(goal, configuration, more.into_iter(), &mut checks_left);
         let rank = |plan: &ConfigurationPlan| {
             let works = plan.rejections.is_empty();
             let kept = plan.certificate.as_ref();
@@ -219,7 +208,7 @@ impl Planner<'_> {
         &self,
         goal: &Goal,
         configuration: Configuration,
-        candidates: Vec<(Candidate, Vec<Rejection>)>,
+        candidates: impl Iterator<Item = (Candidate, Vec<Rejection>)>,
         checks_left: &mut u64,
     ) -> (ConfigurationPlan, bool) {
         let limits = self.limits();
