@@ -286,6 +286,31 @@ impl Look<'_> {
         }
         // Of equal ones what moves most, the tool, tends to be closest and comes late in the list.
         order.sort_unstable_by(|one, other| one.0.total_cmp(&other.0).then(other.1.cmp(&one.1)));
+        // Of each class without a cutoff the couple with the least bound: its distance leaves out most of the
+        // others.
+        let mut first = [None; CLASS_COUNT];
+        let mut least_m = ClearanceClass::ALL.map(|class| match wanted.cutoff_m(class) {
+            f64::INFINITY => f64::INFINITY,
+            _ => f64::NEG_INFINITY,
+        });
+        for &(whole_m, index) in &order {
+            let pair = &pairs[index];
+            let class = pair.class as usize;
+            if whole_m >= least_m[class] {
+                continue;
+            }
+            let (a, b) = ((pair.a, &*bodies[pair.a]), (pair.b, &*bodies[pair.b]));
+            posture.for_each_near(a, b, least_m[class], |a, b, bound_m| {
+                least_m[class] = bound_m;
+                first[class] = Some(Couple { pair: index, a, b });
+                Some(bound_m)
+            });
+        }
+        for couple in first.into_iter().flatten() {
+            if !self.try_couple(couple, nearby, wanted) {
+                return;
+            }
+        }
         let mut near: Vec<Near> = Vec::with_capacity(16);
         for (whole_m, index) in order {
             let pair = &pairs[index];
@@ -296,10 +321,10 @@ impl Look<'_> {
             near.clear();
             let (a, b) = ((pair.a, &*bodies[pair.a]), (pair.b, &*bodies[pair.b]));
             posture.for_each_near(a, b, cutoff_m, |a, b, bound_m| {
-                near.push(Near {
-                    bound_m,
-                    couple: Couple { pair: index, a, b },
-                });
+                let couple = Couple { pair: index, a, b };
+                if first[pair.class as usize] != Some(couple) {
+                    near.push(Near { bound_m, couple });
+                }
                 Some(cutoff_m)
             });
             near.sort_unstable_by(Near::least_first);

@@ -14,6 +14,15 @@ pub(crate) struct Simplex {
     pub closest: Vector3<f64>,
 }
 
+/// The part of some vertices, by their numbers, that carries their point closest to the origin.
+#[derive(Clone, Copy)]
+struct Part {
+    numbers: [usize; 3],
+    weights: [f64; 3],
+    len: usize,
+    closest: Vector3<f64>,
+}
+
 impl Simplex {
     pub fn corner(a: &Vertex) -> Self {
         Self {
@@ -25,14 +34,26 @@ impl Simplex {
     }
 
     /// The part of a triangle that carries its point closest to the origin.
-    pub fn triangle([a, b, c]: &[Vertex; 3]) -> Self {
-        let inside_or_at_a = Self::on_triangle(a, b, c, &face_normal(a, b, c));
-        let opposite = Self::on_edge(b, c);
-        if opposite.is_closer_than(&inside_or_at_a) {
+    pub fn triangle(vertices: &[Vertex; 3]) -> Self {
+        let [a, b, c] = vertices;
+        let all = [&a.x, &b.x, &c.x];
+        let inside_or_at_a = Part::on_triangle(&all, [0, 1, 2], &face_normal(&a.x, &b.x, &c.x));
+        let opposite = Part::on_edge(&all, 1, 2);
+        let part = if opposite.is_closer_than(&inside_or_at_a) {
             opposite
         } else {
             inside_or_at_a
+        };
+        Self {
+            vertices: part.numbers.map(|number| vertices[number]),
+            weights: part.weights,
+            len: part.len,
+            closest: part.closest,
         }
+    }
+
+    pub fn is_closer_than(&self, other: &Self) -> bool {
+        self.closest.norm_squared() < other.closest.norm_squared()
     }
 
     pub fn contains(&self, vertex: &Vertex) -> bool {
@@ -50,72 +71,98 @@ impl Simplex {
     /// if the origin is inside the tetrahedron that they form.
     ///
     /// `new` is a support point towards the origin, hence always part of the result.
+    #[inline]
     pub fn with(&self, new: &Vertex) -> Option<Self> {
         let [a, b, c] = &self.vertices;
-        match self.len {
-            1 => Some(Self::on_edge(new, a)),
-            2 => Some(Self::on_triangle(new, a, b, &face_normal(new, a, b))),
+        let all = [&new.x, &a.x, &b.x, &c.x];
+        let part = match self.len {
+            1 => Part::on_edge(&all, 0, 1),
+            2 => Part::on_triangle(&all, [0, 1, 2], &face_normal(all[0], all[1], all[2])),
             _ => {
-                let mut best: Option<Self> = None;
-                for (second, third, opposite) in [(a, b, c), (b, c, a), (c, a, b)] {
-                    let normal = face_normal(new, second, third);
-                    let inside = normal.dot(&(opposite.x - new.x));
-                    let origin = -normal.dot(&new.x);
+                let mut best: Option<Part> = None;
+                for (second, third, opposite) in [(1, 2, 3), (2, 3, 1), (3, 1, 2)] {
+                    let normal = face_normal(all[0], all[second], all[third]);
+                    let inside = normal.dot(&(all[opposite] - all[0]));
+                    let origin = -normal.dot(all[0]);
                     // The origin is behind the face; a flat tetrahedron has no behind.
                     if origin * inside > 0.0 {
                         continue;
                     }
-                    let face = Self::on_triangle(new, second, third, &normal);
+                    let face = Part::on_triangle(&all, [0, second, third], &normal);
                     if best.is_none_or(|best| face.is_closer_than(&best)) {
                         best = Some(face);
                     }
                 }
-                best
+                best?
             }
-        }
+        };
+        Some(Self {
+            vertices: part.numbers.map(|number| match number {
+                0 => *new,
+                known => self.vertices[known - 1],
+            }),
+            weights: part.weights,
+            len: part.len,
+            closest: part.closest,
+        })
     }
+}
 
-    pub fn is_closer_than(&self, other: &Self) -> bool {
+impl Part {
+    fn is_closer_than(&self, other: &Self) -> bool {
         self.closest.norm_squared() < other.closest.norm_squared()
     }
 
-    fn on_edge(a: &Vertex, b: &Vertex) -> Self {
-        let edge = b.x - a.x;
-        let along = -edge.dot(&a.x);
+    #[inline]
+    fn corner(all: &[&Vector3<f64>], a: usize) -> Self {
+        Self {
+            numbers: [a; 3],
+            weights: [1.0, 0.0, 0.0],
+            len: 1,
+            closest: *all[a],
+        }
+    }
+
+    #[inline]
+    fn on_edge(all: &[&Vector3<f64>], a: usize, b: usize) -> Self {
+        let edge = all[b] - all[a];
+        let along = -edge.dot(all[a]);
         let length_squared = edge.norm_squared();
         if along <= 0.0 {
-            Self::corner(a)
+            Self::corner(all, a)
         } else if along >= length_squared {
-            Self::corner(b)
+            Self::corner(all, b)
         } else {
             let t = along / length_squared;
             Self {
-                vertices: [*a, *b, *b],
+                numbers: [a, b, b],
                 weights: [1.0 - t, t, 0.0],
                 len: 2,
-                closest: a.x + edge * t,
+                closest: all[a] + edge * t,
             }
         }
     }
 
-    /// Without the edge opposite to `a`.
-    fn on_triangle(a: &Vertex, b: &Vertex, c: &Vertex, normal: &Vector3<f64>) -> Self {
+    /// Without the edge opposite to the first vertex.
+    #[inline]
+    fn on_triangle(all: &[&Vector3<f64>], numbers: [usize; 3], normal: &Vector3<f64>) -> Self {
+        let [a, b, c] = numbers.map(|number| all[number]);
         // Areas of the origin's projection with each edge.
-        let wa = b.x.cross(&(c.x - b.x)).dot(normal);
-        let wb = c.x.cross(&(a.x - c.x)).dot(normal);
-        let wc = a.x.cross(&(b.x - a.x)).dot(normal);
+        let wa = b.cross(&(c - b)).dot(normal);
+        let wb = c.cross(&(a - c)).dot(normal);
+        let wc = a.cross(&(b - a)).dot(normal);
         if wa > 0.0 && wb > 0.0 && wc > 0.0 {
             let sum = wa + wb + wc;
             let weights = [wa / sum, wb / sum, wc / sum];
             return Self {
-                vertices: [*a, *b, *c],
+                numbers,
                 weights,
                 len: 3,
-                closest: a.x * weights[0] + b.x * weights[1] + c.x * weights[2],
+                closest: a * weights[0] + b * weights[1] + c * weights[2],
             };
         }
-        let one = Self::on_edge(a, b);
-        let other = Self::on_edge(a, c);
+        let one = Self::on_edge(all, numbers[0], numbers[1]);
+        let other = Self::on_edge(all, numbers[0], numbers[2]);
         if other.is_closer_than(&one) {
             other
         } else {
@@ -124,6 +171,6 @@ impl Simplex {
     }
 }
 
-fn face_normal(a: &Vertex, b: &Vertex, c: &Vertex) -> Vector3<f64> {
-    (b.x - a.x).cross(&(c.x - a.x))
+fn face_normal(a: &Vector3<f64>, b: &Vector3<f64>, c: &Vector3<f64>) -> Vector3<f64> {
+    (b - a).cross(&(c - a))
 }
