@@ -2,7 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::shape::{Shape, TriangleMesh};
+use crate::shape::Shape;
+use crate::triangle_mesh::TriangleMesh;
 
 /// Parameter, 0 at `from` and 1 at `to`, at which the segment first is inside the shape; `None` if
 /// it passes. Ends are in the shape's frame, m.
@@ -40,7 +41,7 @@ pub fn first_hit(shape: &Shape, from: &Point3<f64>, to: &Point3<f64>) -> Option<
             .fold(Interval::ALL, Interval::and)
             .hit(),
         Shape::Convex(mesh) => in_hull(&mesh.0, from, &along).hit(),
-        Shape::Mesh(mesh) => mesh.surface.first_hit(from, &along),
+        Shape::Mesh(mesh) => mesh.surface().first_hit(from, &along),
     }
 }
 
@@ -150,7 +151,8 @@ mod tests {
     use needlebench_kinematics::random::SplitMix64;
 
     use super::*;
-    use crate::shape::{ConvexMesh, SolidMesh};
+    use crate::mesh::SolidMesh;
+    use crate::triangle_mesh::ConvexMesh;
 
     /// Rounding of a few operations on metres.
     const ROUNDING: f64 = 1e-12;
@@ -173,10 +175,7 @@ mod tests {
             },
             cuboid,
             Shape::Convex(Arc::new(ConvexMesh(surface.clone()))),
-            Shape::Mesh(Arc::new(SolidMesh {
-                surface,
-                pieces: Vec::new(),
-            })),
+            Shape::Mesh(Arc::new(SolidMesh::new(surface))),
         ]
     }
 
