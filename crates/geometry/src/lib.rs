@@ -122,7 +122,7 @@ pub use distance::{PRUNING_MARGIN_M, separation, separation_within};
 pub use mesh::SolidMesh;
 pub use placement::Placement;
 pub use prepared::PreparedShape;
-pub use ray::first_hit;
+pub use ray::{SightTarget, first_hit};
 pub use segment::{PreparedSolids, segment_clearance};
 pub use separation::Separation;
 pub use shape::{Shape, Solid, Visual};
