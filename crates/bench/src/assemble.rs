@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Point3;
 use needlebench_cell::imperfections::{ArmClass, BreathState};
 use needlebench_cell::{ArmInUse, ClearanceClass, Expected, Goal, ResolvedScenario, enclosures};
-use needlebench_engine::{EngineIdentity, Recording};
+use needlebench_engine::{EngineIdentity, Recording, pieces_in_words};
 use needlebench_evaluation::metric::measured;
 use needlebench_evaluation::ranking::rank_goal;
 use needlebench_evaluation::report::{
@@ -103,12 +103,21 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         engine_failures: results.failures,
         arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
         enclosure: enclosures(&resolved.cell.robot),
-        notes: resolved.notes.clone(),
+        notes: notes(resolved, results.engines),
         expected: resolved.expected.as_ref().map(expected_report),
         truth: setup.real.report(),
         provenance: provenance(resolved, results.identities),
         timings: results.timings,
     }
+}
+
+/// The notes of a scenario, and where engines ran of what they collide with.
+pub(crate) fn notes(resolved: &ResolvedScenario, engines: &[&str]) -> Vec<String> {
+    let mut notes = resolved.notes.clone();
+    if !engines.is_empty() {
+        notes.extend(pieces_in_words(&resolved.cell));
+    }
+    notes
 }
 
 /// What arm and patient the expected tip errors are of.

@@ -8,7 +8,7 @@ use rapier3d_f64::math::{self, Rotation, Vector};
 use rapier3d_f64::parry::mass_properties::MassProperties;
 
 use crate::EngineError;
-use crate::error::convex_pieces;
+use crate::pieces::convex_pieces;
 
 /// rapier's world is in units of `1/1024` m: nearly a millimetre, and scaling is free of rounding.
 ///

@@ -1,7 +1,6 @@
 //! What can go wrong in a simulation.
 
 use needlebench_cell::Cell;
-use needlebench_geometry::{ConvexMesh, Solid, SolidMesh};
 use needlebench_kinematics::JOINT_LABELS;
 
 use crate::{Recording, UnstableServo};
@@ -122,20 +121,6 @@ impl EngineError {
     pub fn is_fatal(&self) -> bool {
         matches!(self, Self::NotStarted { .. } | Self::Lost { .. })
     }
-}
-
-/// The convex pieces of a mesh, which an engine needs.
-pub(crate) fn convex_pieces<'a>(
-    solid: &Solid,
-    mesh: &'a SolidMesh,
-) -> Result<&'a [ConvexMesh], EngineError> {
-    if mesh.pieces.is_empty() {
-        return Err(EngineError::BadSolid {
-            solid: solid.name.clone(),
-            reason: "its mesh has no convex pieces to collide with",
-        });
-    }
-    Ok(&mesh.pieces)
 }
 
 /// Moments of inertia may exceed the triangle inequality by this fraction: rounding of a thin disc.

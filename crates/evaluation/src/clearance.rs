@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use needlebench_cell::{Cell, ClearanceClass};
 use needlebench_clearance::{
-    CertificateOptions, ClassMinima, ClearanceModel, Motion, MotionCertificate, ROUNDING_M,
+    CertificateOptions, ClassMinima, ClearanceModel, Motion, MotionCertificate, Nearby, ROUNDING_M,
     RecordedMotion, certify, certify_sampled,
 };
 use needlebench_engine::Recording;
@@ -39,9 +39,10 @@ pub fn measure_clearance(
         time_s: Vec::new(),
         distance_m: BTreeMap::new(),
     };
+    let mut nearby = Nearby::default();
     for index in sample_indices(recording, period_s) {
         let time_s = recording.time_s[index];
-        let minima = model.minimum_per_class(&recording.state[index].position);
+        let minima = model.minimum_per_class_near(&recording.state[index].position, &mut nearby);
         let phase = trajectory.phase_at(time_s);
         series.time_s.push(time_s);
         for pair in minima.iter() {

@@ -72,12 +72,7 @@ impl Mix {
 }
 fn main() {
     let mut r = Mix(9);
-    let mesh = |surface| {
-        Shape::Mesh(Arc::new(SolidMesh {
-            surface,
-            pieces: Vec::new(),
-        }))
-    };
+    let mesh = |surface| Shape::Mesh(Arc::new(SolidMesh::new(surface)));
     let mut groups: Vec<(&str, Vec<Shape>)> = vec![("convex", Vec::new()), ("mesh", Vec::new())];
     for _ in 0..12 {
         let mut s = || r.u(0.01, 0.15);

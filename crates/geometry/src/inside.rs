@@ -29,7 +29,7 @@ impl Solid {
                 let [a, b, c] = triangle.map(|i| mesh.0.vertices_m[i as usize]);
                 (b - a).cross(&(c - a)).dot(&(local - a)) <= 0.0
             }),
-            Shape::Mesh(mesh) => mesh.surface.winding_number(&local) != 0,
+            Shape::Mesh(mesh) => mesh.surface().winding_number(&local) != 0,
         }
     }
 }

@@ -99,6 +99,7 @@
 mod bounds;
 mod convex;
 mod distance;
+mod encoding;
 mod inside;
 mod measure;
 pub mod mesh;
@@ -114,13 +115,17 @@ mod surface;
 mod tessellate;
 mod topology;
 mod tree;
+mod triangle_mesh;
 
 pub use bounds::{BoundingCapsule, OrientedBox};
 pub use distance::{PRUNING_MARGIN_M, separation, separation_within};
+pub use mesh::SolidMesh;
 pub use placement::Placement;
 pub use prepared::PreparedShape;
-pub use ray::first_hit;
+pub use ray::{SightTarget, first_hit};
 pub use segment::{PreparedSolids, segment_clearance};
 pub use separation::Separation;
-pub use shape::{ConvexMesh, Shape, Solid, SolidMesh, TriangleMesh, Visual};
+pub use shape::{Shape, Solid, Visual};
+pub use surface::{EndGaps, MovingSolids};
 pub use tree::TriangleTree;
+pub use triangle_mesh::{ConvexMesh, TriangleMesh};

@@ -5,7 +5,7 @@ use parry3d_f64::mass_properties::details::trimesh_signed_volume_and_center_of_m
 use parry3d_f64::math::Vector;
 
 use crate::parry;
-use crate::shape::TriangleMesh;
+use crate::triangle_mesh::TriangleMesh;
 
 /// Corners of a triangle.
 pub fn corners(mesh: &TriangleMesh, triangle: [u32; 3]) -> [Point3<f64>; 3] {

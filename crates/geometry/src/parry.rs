@@ -2,7 +2,7 @@
 
 use parry3d_f64::math::Vector;
 
-use crate::shape::TriangleMesh;
+use crate::triangle_mesh::TriangleMesh;
 
 /// Vertices in metres: what is asked of parry here has no tolerance of its own.
 pub(crate) fn vertices(mesh: &TriangleMesh) -> Vec<Vector> {

@@ -66,11 +66,11 @@ impl PreparedShape {
                 }
             }
             Shape::Mesh(mesh) => {
-                let tree = TriangleTree::new(&mesh.surface);
+                let tree = Arc::clone(mesh.tree());
                 let bound = BoundingCapsule::around_points(tree.vertices_m());
                 Self {
                     block: tree.root().clone(),
-                    core: ConvexCore::SurfaceHull(Arc::new(tree)),
+                    core: ConvexCore::SurfaceHull(tree),
                     radius_m: 0.0,
                     bound,
                 }

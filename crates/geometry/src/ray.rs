@@ -1,8 +1,77 @@
 //! Where a line of sight meets a solid, in closed form.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 
-use crate::shape::{Shape, TriangleMesh};
+use crate::shape::Shape;
+use crate::tree::TriangleTree;
+use crate::triangle_mesh::TriangleMesh;
+
+/// A shape made ready for many lines of sight: what [`first_hit`] finds anew is found once.
+#[derive(Debug, Clone)]
+pub struct SightTarget(Target);
+
+#[derive(Debug, Clone)]
+enum Target {
+    /// In closed form.
+    Primitive(Shape),
+    Hull(Vec<Face>),
+    Surface(Arc<TriangleTree>),
+}
+
+/// A face of a convex polyhedron.
+#[derive(Debug, Clone, Copy)]
+struct Face {
+    /// Of no particular length.
+    outwards: Vector3<f64>,
+    corner: Point3<f64>,
+}
+
+impl SightTarget {
+    /// Of a shape.
+    pub fn new(shape: &Shape) -> Self {
+        Self(match shape {
+            Shape::Convex(mesh) => Target::Hull(faces(&mesh.0).collect()),
+            Shape::Mesh(mesh) => Target::Surface(Arc::clone(mesh.tree())),
+            primitive => Target::Primitive(primitive.clone()),
+        })
+    }
+
+    /// [`first_hit`], bit for bit. `likely` is the face that let the line before this one pass; it only saves
+    /// time.
+    pub fn first_hit(
+        &self,
+        from: &Point3<f64>,
+        to: &Point3<f64>,
+        likely: &mut usize,
+    ) -> Option<f64> {
+        let along = to - from;
+        match &self.0 {
+            Target::Primitive(shape) => first_hit(shape, from, to),
+            Target::Surface(tree) => tree.first_hit(from, &along),
+            Target::Hull(faces) => {
+                // Lines that pass a solid mostly pass it before the same face.
+                let passes = faces.get(*likely).map(|face| face.behind(from, &along));
+                if passes.is_some_and(|inside| inside.hit().is_none()) {
+                    return None;
+                }
+                let mut inside = Interval::ALL;
+                for (index, face) in faces.iter().enumerate() {
+                    let behind = face.behind(from, &along);
+                    inside = inside.and(behind);
+                    if behind.hit().is_none() {
+                        *likely = index;
+                    }
+                    if inside.low >= inside.high {
+                        break;
+                    }
+                }
+                inside.hit()
+            }
+        }
+    }
+}
 
 /// Parameter, 0 at `from` and 1 at `to`, at which the segment first is inside the shape; `None` if
 /// it passes. Ends are in the shape's frame, m.
@@ -40,7 +109,7 @@ pub fn first_hit(shape: &Shape, from: &Point3<f64>, to: &Point3<f64>) -> Option<
             .fold(Interval::ALL, Interval::and)
             .hit(),
         Shape::Convex(mesh) => in_hull(&mesh.0, from, &along).hit(),
-        Shape::Mesh(mesh) => mesh.surface.first_hit(from, &along),
+        Shape::Mesh(mesh) => mesh.surface().first_hit(from, &along),
     }
 }
 
@@ -132,10 +201,8 @@ fn half_line(slope: f64, limit: f64) -> Interval {
 
 fn in_hull(mesh: &TriangleMesh, from: &Point3<f64>, along: &Vector3<f64>) -> Interval {
     let mut inside = Interval::ALL;
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|i| mesh.vertices_m[i as usize]);
-        let outwards = (b - a).cross(&(c - a));
-        inside = inside.and(half_line(outwards.dot(along), outwards.dot(&(a - from))));
+    for face in faces(mesh) {
+        inside = inside.and(face.behind(from, along));
         if inside.low >= inside.high {
             break;
         }
@@ -143,14 +210,32 @@ fn in_hull(mesh: &TriangleMesh, from: &Point3<f64>, along: &Vector3<f64>) -> Int
     inside
 }
 
+fn faces(mesh: &TriangleMesh) -> impl Iterator<Item = Face> + '_ {
+    mesh.triangles.iter().map(|triangle| {
+        let [a, b, c] = triangle.map(|i| mesh.vertices_m[i as usize]);
+        Face {
+            outwards: (b - a).cross(&(c - a)),
+            corner: a,
+        }
+    })
+}
+
+impl Face {
+    /// The part of a segment that is behind it.
+    #[inline]
+    fn behind(&self, from: &Point3<f64>, along: &Vector3<f64>) -> Interval {
+        let outwards = &self.outwards;
+        half_line(outwards.dot(along), outwards.dot(&(self.corner - from)))
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use needlebench_kinematics::random::SplitMix64;
 
     use super::*;
-    use crate::shape::{ConvexMesh, SolidMesh};
+    use crate::mesh::SolidMesh;
+    use crate::triangle_mesh::ConvexMesh;
 
     /// Rounding of a few operations on metres.
     const ROUNDING: f64 = 1e-12;
@@ -173,10 +258,7 @@ mod tests {
             },
             cuboid,
             Shape::Convex(Arc::new(ConvexMesh(surface.clone()))),
-            Shape::Mesh(Arc::new(SolidMesh {
-                surface,
-                pieces: Vec::new(),
-            })),
+            Shape::Mesh(Arc::new(SolidMesh::new(surface))),
         ]
     }
 
@@ -206,6 +288,7 @@ mod tests {
         let mut coordinate = || random.uniform(-0.6, 0.6);
         let (mut hits, mut passes) = (0, 0);
         for shape in shapes() {
+            let (target, mut likely) = (SightTarget::new(&shape), usize::MAX);
             for _ in 0..100 {
                 let from = Point3::new(coordinate(), coordinate(), coordinate());
                 let to = Point3::new(coordinate(), coordinate(), coordinate());
@@ -217,6 +300,7 @@ mod tests {
                     .map(|k| f64::from(k) / f64::from(STEPS))
                     .find(|t| inside(&shape, &at(*t)));
                 let found = first_hit(&shape, &from, &to);
+                assert_eq!(target.first_hit(&from, &to, &mut likely), found);
                 match (walked, found) {
                     (Some(walked), Some(found)) => {
                         hits += 1;

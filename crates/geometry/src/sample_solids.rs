@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Point3, Vector3};
 
 use crate::measure::{extent_m, size_m};
-use crate::shape::{Shape, TriangleMesh};
+use crate::shape::Shape;
+use crate::triangle_mesh::TriangleMesh;
 
 /// A box about the origin.
 pub fn cuboid(half_m: [f64; 3]) -> TriangleMesh {

@@ -5,6 +5,12 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use needlebench_kinematics::Pose;
 
+use crate::mesh::{SolidMesh, as_convex};
+use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
+
+/// Vertices of the largest convex mesh that stays one.
+const MOST_CONVEX_VERTICES: usize = 2000;
+
 /// A solid in its own frame; primitives are centred on it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
@@ -39,6 +45,16 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// The solid within a sound, closed surface: the exact hull of a convex one, and all others as they
+    /// are.
+    pub fn of_surface(surface: TriangleMesh) -> Self {
+        let small = surface.vertices_m.len() <= MOST_CONVEX_VERTICES;
+        if small && let Some(hull) = as_convex(&surface) {
+            return Self::Convex(Arc::new(hull));
+        }
+        Self::Mesh(Arc::new(SolidMesh::new(surface)))
+    }
+
     /// Radius of a ball about the shape's origin that holds it, m.
     pub fn bounding_radius_m(&self) -> f64 {
         match self {
@@ -53,43 +69,10 @@ impl Shape {
             } => radius_m + half_length_m,
             Self::Cuboid { half_extents_m } => half_extents_m.norm(),
             Self::Convex(mesh) => mesh.0.bounding_radius_m(),
-            Self::Mesh(mesh) => mesh.surface.bounding_radius_m(),
+            Self::Mesh(mesh) => mesh.surface().bounding_radius_m(),
         }
     }
 }
-
-/// A closed triangle mesh.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TriangleMesh {
-    /// Vertices, m.
-    pub vertices_m: Vec<Point3<f64>>,
-    /// Vertex indices, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-}
-
-impl TriangleMesh {
-    /// Radius of a ball about the origin that holds all vertices, m.
-    pub fn bounding_radius_m(&self) -> f64 {
-        self.vertices_m
-            .iter()
-            .map(|vertex| vertex.coords.norm())
-            .fold(0.0, f64::max)
-    }
-}
-
-/// A solid that need not be convex: its exact surface, and convex pieces for the engines, which
-/// collide with nothing else.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SolidMesh {
-    /// Closed surface, the true one: clearances are measured to it.
-    pub surface: TriangleMesh,
-    /// Convex pieces that together stand for the solid in the engines.
-    pub pieces: Vec<ConvexMesh>,
-}
-
-/// A convex polyhedron: a closed triangle mesh of which every vertex is an extreme point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ConvexMesh(pub TriangleMesh);
 
 /// A shape at a place of its parent frame (a link, the tool, the phantom or the world).
 #[derive(Debug, Clone, PartialEq)]
@@ -138,7 +121,7 @@ impl Solid {
                 about_centre(rotation.matrix().abs() * half_extents_m)
             }
             Shape::Convex(mesh) => of_vertices(&mesh.0),
-            Shape::Mesh(mesh) => of_vertices(&mesh.surface),
+            Shape::Mesh(mesh) => of_vertices(mesh.surface()),
         };
         (
             (centre + low.add_scalar(-ROUNDING_M)).into(),

@@ -4,7 +4,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use nalgebra::Point3;
 
-use crate::shape::{Shape, TriangleMesh};
+use crate::shape::Shape;
+use crate::triangle_mesh::TriangleMesh;
 
 /// Fewest segments around a full circle: below this a cylinder no longer reads as round.
 const MIN_SEGMENTS: u32 = 8;
@@ -53,7 +54,7 @@ impl Shape {
                 cuboid(half_extents_m.x, half_extents_m.y, half_extents_m.z)
             }
             Self::Convex(mesh) => mesh.0.clone(),
-            Self::Mesh(mesh) => mesh.surface.clone(),
+            Self::Mesh(mesh) => mesh.surface().clone(),
         }
     }
 }
@@ -189,7 +190,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::shape::{ConvexMesh, SolidMesh};
+    use crate::mesh::SolidMesh;
+    use crate::triangle_mesh::ConvexMesh;
 
     const RADIUS_M: f64 = 0.06;
     const HALF_LENGTH_M: f64 = 0.2;
@@ -208,10 +210,7 @@ mod tests {
             half_extents_m: half_extents_m(),
         };
         let convex = Shape::Convex(Arc::new(ConvexMesh(cuboid.surface(CHORD_ERROR_M))));
-        let mesh = Shape::Mesh(Arc::new(SolidMesh {
-            surface: cuboid.surface(CHORD_ERROR_M),
-            pieces: vec![ConvexMesh(cuboid.surface(CHORD_ERROR_M))],
-        }));
+        let mesh = Shape::Mesh(Arc::new(SolidMesh::new(cuboid.surface(CHORD_ERROR_M))));
         [
             Shape::Sphere { radius_m },
             Shape::Cylinder {

@@ -2,22 +2,41 @@
 
 use std::collections::HashMap;
 
-use parry3d_f64::shape::{TriMesh, TriMeshFlags};
+use foldhash::fast::FixedState;
 
-use crate::parry;
-use crate::shape::TriangleMesh;
+use crate::triangle_mesh::TriangleMesh;
+
+/// A map of which nobody asks for the order.
+pub(crate) type Map<K, V> = HashMap<K, V, FixedState>;
+
+/// An empty one.
+pub(crate) fn map_for<K, V>(count: usize) -> Map<K, V> {
+    Map::with_capacity_and_hasher(count, FixedState::default())
+}
 
 /// Makes one vertex of those with the same coordinates, in the order of the first of each; vertices
 /// that no triangle uses are left out.
 pub fn weld(mesh: &mut TriangleMesh) {
-    let mut known: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.vertices_m.len());
-    let mut kept = Vec::new();
+    // Adding 0 turns -0 into 0.
+    for vertex in &mut mesh.vertices_m {
+        *vertex = vertex.map(|coordinate| coordinate + 0.0);
+    }
+    let mut known: Map<[u64; 3], usize> = map_for(mesh.vertices_m.len());
+    let first_at_place: Vec<usize> = mesh
+        .vertices_m
+        .iter()
+        .enumerate()
+        .map(|(index, vertex)| {
+            let key = [vertex.x, vertex.y, vertex.z].map(f64::to_bits);
+            *known.entry(key).or_insert(index)
+        })
+        .collect();
+    let mut numbers: Vec<Option<u32>> = vec![None; mesh.vertices_m.len()];
+    let mut kept = Vec::with_capacity(known.len());
     for corner in mesh.triangles.iter_mut().flatten() {
-        // Adding 0 turns -0 into 0.
-        let vertex = mesh.vertices_m[*corner as usize].map(|coordinate| coordinate + 0.0);
-        let key = [vertex.x, vertex.y, vertex.z].map(f64::to_bits);
-        *corner = *known.entry(key).or_insert_with(|| {
-            kept.push(vertex);
+        let first = first_at_place[*corner as usize];
+        *corner = *numbers[first].get_or_insert_with(|| {
+            kept.push(mesh.vertices_m[first]);
             u32::try_from(kept.len() - 1).expect("no more than there were before")
         });
     }
@@ -27,23 +46,36 @@ pub fn weld(mesh: &mut TriangleMesh) {
 /// The triangles of each part that shares no vertex with another; parts by their first triangle,
 /// triangles in their order. All triangles must name vertices that are there.
 pub(crate) fn connected_parts(mesh: &TriangleMesh) -> Vec<Vec<usize>> {
-    let flags = TriMeshFlags::CONNECTED_COMPONENTS;
-    // Without triangles there are no parts.
-    let Ok(parry) = TriMesh::with_flags(parry::vertices(mesh), mesh.triangles.clone(), flags)
-    else {
-        return Vec::new();
-    };
-    let components = parry.connected_components().expect("they were asked for");
-    let mut parts: Vec<Vec<usize>> = components
-        .ranges
-        .windows(2)
-        .map(|range| {
-            let triangles = &components.grouped_faces[range[0]..range[1]];
-            let mut part: Vec<usize> = triangles.iter().map(|&i| i as usize).collect();
-            part.sort_unstable();
-            part
-        })
-        .collect();
-    parts.sort_unstable();
+    // A forest of vertices: each tree is a part, and its root stands for it.
+    let mut above: Vec<u32> = (0..).take(mesh.vertices_m.len()).collect();
+    for &[a, b, c] in &mesh.triangles {
+        let root = root_of(&mut above, a);
+        for other in [b, c] {
+            let other = root_of(&mut above, other);
+            above[other as usize] = root;
+        }
+    }
+    let mut part_of_root: Vec<Option<usize>> = vec![None; above.len()];
+    let mut parts: Vec<Vec<usize>> = Vec::new();
+    for (index, triangle) in mesh.triangles.iter().enumerate() {
+        let root = root_of(&mut above, triangle[0]);
+        let part = *part_of_root[root as usize].get_or_insert_with(|| {
+            parts.push(Vec::new());
+            parts.len() - 1
+        });
+        parts[part].push(index);
+    }
     parts
+}
+
+/// The root of a vertex's tree, whose ways are made shorter.
+fn root_of(above: &mut [u32], mut vertex: u32) -> u32 {
+    loop {
+        let next = above[vertex as usize];
+        if next == vertex {
+            return vertex;
+        }
+        above[vertex as usize] = above[next as usize];
+        vertex = next;
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use nalgebra::Point3;
 use needlebench_cell::scenario::PlanningSection;
 use needlebench_cell::{BodyKind, Cell, ClearanceClass, Frame};
 use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby, PairClearance};
@@ -187,11 +188,43 @@ impl<'a> MotionChecker<'a> {
         (true, checks)
     }
 
+    /// By how much a posture is below some clearances at most, m, not above 0 where it keeps all of them, and
+    /// how much less that gets with each joint, m/rad. `None` where nothing is asked for.
+    pub(crate) fn lack(&self, q: &Joints, least_m: &ByClass) -> Option<(f64, Joints)> {
+        let minima = self
+            .model
+            .minimum_per_group_near(q, &mut Nearby::default(), |class| {
+                let offset_m = least_m.get(class);
+                (class.is_physical() && offset_m.is_finite())
+                    .then_some(Share { group: 0, offset_m })
+            });
+        let nearest = minima.iter().next()?;
+        let separation = &nearest.separation;
+        let robot = &self.cell.robot;
+        let base_link_from_world = robot.world_from_base_link.inverse();
+        // B gets away from A along the normal as its own joints move it, less as A's do.
+        let normal = base_link_from_world.rotation * separation.normal.into_inner();
+        let pair = &self.cell.pairs[nearest.pair];
+        let response = |body: usize, point: &Point3<f64>| match self.cell.bodies[body].frame {
+            Frame::World => Joints::zeros(),
+            Frame::Link(link) => {
+                let point = (base_link_from_world * point).coords;
+                robot.chain.point_response(q, link, &point, &normal)
+            }
+        };
+        let rate =
+            response(pair.b, &separation.point_on_b) - response(pair.a, &separation.point_on_a);
+        Some((least_m.get(nearest.class) - separation.distance_m, rate))
+    }
+
+    /// For each joint, a radius about its axis within which everything beyond the joint stays, m.
+    pub(crate) fn sweep_radii_m(&self) -> &Joints {
+        self.sweep_radius_m.get_or_init(|| sweep_radii(self.cell))
+    }
+
     /// Bound on the way of any point of arm and tool between two postures, m.
     pub(crate) fn largest_displacement_m(&self, from: &Joints, to: &Joints) -> f64 {
-        self.sweep_radius_m
-            .get_or_init(|| sweep_radii(self.cell))
-            .dot(&(to - from).abs())
+        self.sweep_radii_m().dot(&(to - from).abs())
     }
 }
 

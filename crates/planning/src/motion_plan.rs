@@ -73,13 +73,31 @@ const WRAP_TRIES: usize = 8;
 const ROUNDINGS: [f64; 5] = [1.0, 0.5, 0.25, 0.1, 0.03];
 
 /// Part of the postures that may be looked at that the search for all the clearance that there is may use,
-/// and that each further one may: one of so many.
+/// that each further one may, but for the first for any way, and that pulling a way may: one of so many.
 const FIRST_SHARE: u64 = 6;
 const SHARE: u64 = 8;
-/// Steps by which a free way is improved at most: each halves what is missing, or what is asked for.
-const STEPS: u32 = 5;
+const PULL_SHARE: u64 = 40;
+/// How often one way is pulled at most.
+const PULLS: u32 = 6;
 /// What a way around has to gain for a longer motion to be worth it, m.
 const LEAST_GAIN_M: f64 = 5e-4;
+
+/// What searches may look at, and what they have looked at.
+struct Looks<'l> {
+    effort: &'l mut SearchEffort,
+    /// Postures that all of them may look at; one of them, a share of these.
+    whole: u64,
+    /// Postures that all of them may still look at.
+    left: &'l mut u64,
+}
+
+/// Where a way around comes from.
+enum Source<'w> {
+    /// From random postures, others in each round.
+    Random(u64),
+    /// From one that is known and is pulled to where it keeps more.
+    Known(&'w Way),
+}
 
 /// A way from the start posture to where the approach begins.
 #[derive(Debug, Clone)]
@@ -99,7 +117,8 @@ pub(crate) struct Way {
     pub certificate: MotionCertificate,
     /// Proven clearances of the transfer.
     keeps: ByClass,
-    corners: usize,
+    /// Corners of the polygon that it follows, ends included.
+    waypoints: Vec<Joints>,
 }
 
 /// What every motion to a posture has in common.
@@ -220,7 +239,8 @@ impl Planner<'_> {
 
     fn straight_with(&self, required: &Required, turns: [i32; JOINT_COUNT]) -> Way {
         let line = required.line.shifted(&shift(&turns));
-        self.certified(required, turns, Transfer::Straight, &line, 2)
+        let waypoints = vec![*self.start(), line.start()];
+        self.certified(required, turns, Transfer::Straight, &line, waypoints)
     }
 
     fn certified(
@@ -229,7 +249,7 @@ impl Planner<'_> {
         turns: [i32; JOINT_COUNT],
         transfer: Transfer,
         line: &JointPath,
-        corners: usize,
+        waypoints: Vec<Joints>,
     ) -> Way {
         let trajectory = self.motion(&transfer, line);
         // What is farther than the approach does not change the motion's clearance.
@@ -243,7 +263,7 @@ impl Planner<'_> {
             trajectory,
             keeps: ByClass::proven(&certificate).of_bodies(),
             certificate,
-            corners,
+            waypoints,
         }
     }
 
@@ -278,52 +298,71 @@ impl Planner<'_> {
             samples: 0,
             seed: seed_of(self.resolved.scenario.seed, &goal.name, configuration),
         };
-        let whole = *checks_left;
         let target = required.target;
         let floors = self.limits().floors().of_bodies();
         let is_free = |way: &Way| way.keeps.most_below(&floors) <= 0.0;
-        let mut best = straight;
-        let mut look = |least: &ByClass, share: u64, effort: &mut SearchEffort| {
-            let checks = (whole / share).min(*checks_left);
-            let (found, took) = self.way_around(required, least, effort, checks);
-            *checks_left = checks_left.saturating_sub(took);
-            found
+        let mut looks = Looks {
+            effort: &mut effort,
+            whole: *checks_left,
+            left: checks_left,
         };
-        // All of it; what is wanted of it; any way at all.
         let wanted = self.limits().wanted().least(&target);
-        for (least, share) in [
-            (target, FIRST_SHARE),
-            (wanted, SHARE),
-            (floors.least(&target), 1),
-        ] {
-            if best.keeps.most_below(&least) <= SAME_M {
+        let any = floors.least(&target);
+        let mut best = straight;
+        // All of it; what is wanted of it; any way at all. What is found is pulled to where it keeps more; others
+        // are looked for as long as that is not all.
+        let asked = [&target, &wanted, &any, &target, &any, &target, &any];
+        for (round, least) in (0..).zip(asked) {
+            if best.keeps.most_below(&target) <= SAME_M {
                 break;
             }
-            if let Some(found) = look(&least, share, &mut effort)
-                && (!is_free(&best) || gains(&best, &found, &target))
-            {
+            let source = Source::Random(round / 3);
+            let share = match round {
+                0 => FIRST_SHARE,
+                2 => 1,
+                _ => SHARE,
+            };
+            let found = self.way_around(required, &source, least, share, &mut looks);
+            let Some(found) = found.map(|found| self.pulled(required, found, &mut looks)) else {
+                continue;
+            };
+            if !is_free(&best) && is_free(&found) || gains(&best, &found, &target) {
                 best = found;
-                break;
             }
         }
-        // Half of what is missing, each class by as much as it can; less where that was not found.
-        let mut share = 0.5;
-        for _ in 0..STEPS {
-            let missing_m = best.keeps.most_below(&target);
-            if !is_free(&best) || missing_m <= SAME_M || missing_m * share < SAME_M {
-                break;
-            }
-            let kept = best.keeps.least(&target);
-            let least = kept.with(&target, |kept_m, target_m| {
-                kept_m + share * (target_m - kept_m)
-            });
-            match look(&least, SHARE, &mut effort).filter(|found| gains(&best, found, &target)) {
-                Some(found) => best = found,
-                None => share *= 0.5,
-            }
-        }
-        effort.waypoints = if is_free(&best) { best.corners } else { 0 };
+        let found = is_free(&best).then_some(best.waypoints.len());
+        effort.waypoints = found.unwrap_or(0);
         (best, Some(effort))
+    }
+
+    /// A way pulled to where it keeps all that start and approach do, or as much of what is missing as it can.
+    fn pulled(&self, required: &Required, mut way: Way, looks: &mut Looks<'_>) -> Way {
+        let target = &required.target;
+        let mut share = 1.0;
+        for _ in 0..PULLS {
+            let missing_m = way.keeps.most_below(target).max(0.0);
+            if missing_m * share <= SAME_M {
+                break;
+            }
+            let kept = way.keeps.least(target);
+            let least = kept.with(target, |kept_m, target_m| {
+                // What is not asked for has no limit, and lacks nothing.
+                let more_m = share * (target_m - kept_m);
+                if more_m > 0.0 {
+                    kept_m + more_m
+                } else {
+                    kept_m
+                }
+            });
+            let found = self.way_around(required, &Source::Known(&way), &least, PULL_SHARE, looks);
+            match found {
+                Some(found) if found.keeps.most_below(target) < missing_m - 0.5 * SAME_M => {
+                    way = found;
+                }
+                _ => share *= 0.5,
+            }
+        }
+        way
     }
 
     /// The plan of a posture with its motion.
@@ -436,14 +475,16 @@ impl Planner<'_> {
     }
 
     /// Searches a way around that keeps some clearances, to the beginning of the approach in any of its
-    /// whole-turn images; and the number of postures that it took.
+    /// whole-turn images.
     fn way_around(
         &self,
         required: &Required,
+        source: &Source<'_>,
         least: &ByClass,
-        effort: &mut SearchEffort,
-        checks: u64,
-    ) -> (Option<Way>, u64) {
+        share: u64,
+        looks: &mut Looks<'_>,
+    ) -> Option<Way> {
+        let checks = (looks.whole / share).min(*looks.left);
         // Certificates are no wider than this, and what is between two postures is little nearer; but
         // what is as near as allowed could not be proven free.
         let floors = self.limits().floors();
@@ -460,22 +501,33 @@ impl Planner<'_> {
             &self.checker,
             &self.cell().robot.limits,
             self.resolved.motion.velocity,
-            effort.seed,
+            match source {
+                Source::Random(round) => looks.effort.seed.wrapping_add(*round),
+                Source::Known(_) => looks.effort.seed,
+            },
             sampled,
             Budget { checks },
         );
-        let wraps = &required.wraps;
-        let goals: Vec<Joints> = wraps
-            .iter()
-            .map(|turns| required.line.start() + shift(turns))
-            .collect();
-        let found = search.search(self.start(), &goals).and_then(|found| {
-            let waypoints = search.shortened(found.waypoints);
-            self.rounded(required, &waypoints, wraps[found.goal], least)
-        });
-        effort.checks += search.checks;
-        effort.samples += search.samples;
-        (found, search.checks)
+        let found = match source {
+            Source::Random(_) => {
+                let wraps = &required.wraps;
+                let goals: Vec<Joints> = wraps
+                    .iter()
+                    .map(|turns| required.line.start() + shift(turns))
+                    .collect();
+                let found = search.search(self.start(), &goals);
+                found.map(|found| (search.shortened(found.waypoints), wraps[found.goal]))
+            }
+            Source::Known(way) => {
+                let lifted = search.lifted(&way.waypoints);
+                lifted.map(|lifted| (search.straightened(lifted), way.turns))
+            }
+        };
+        looks.effort.checks += search.checks;
+        looks.effort.samples += search.samples;
+        *looks.left = looks.left.saturating_sub(search.checks);
+        let (waypoints, turns) = found?;
+        self.rounded(required, &waypoints, turns, least)
     }
 
     /// The way through the waypoints with its corners rounded as much as leaves the clearances; where none
@@ -492,7 +544,7 @@ impl Planner<'_> {
         for rounding in ROUNDINGS {
             let paths = self.fastest(waypoints, rounding)?;
             let transfer = Transfer::Around(paths);
-            let way = self.certified(required, turns, transfer, &line, waypoints.len());
+            let way = self.certified(required, turns, transfer, &line, waypoints.to_vec());
             let lack_m = way.keeps.most_below(least);
             if lack_m <= SAME_M && way.keeps.most_below(&self.limits().floors()) <= 0.0 {
                 return Some(way);

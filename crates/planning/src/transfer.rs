@@ -8,6 +8,8 @@
 //! seed, and effort is counted in postures looked at, not in seconds: the same input gives the same
 //! motion on any machine.
 
+mod lift;
+
 use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{JOINT_COUNT, JointLimits, Joints};
 
@@ -159,6 +161,12 @@ impl<'s> TransferSearch<'s> {
             }
             waypoints.splice(low + 1..=high, [from, to]);
         }
+        self.leave_out(&mut waypoints);
+        waypoints
+    }
+
+    /// The polygon without the waypoints that can be passed by.
+    pub fn straightened(&mut self, mut waypoints: Vec<Joints>) -> Vec<Joints> {
         self.leave_out(&mut waypoints);
         waypoints
     }

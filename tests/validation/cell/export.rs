@@ -155,10 +155,8 @@ fn skin_as_surface(cell: &mut Cell) {
         .filter(|body| body.kind == BodyKind::Phantom);
     for solid in phantoms.flat_map(|body| &mut body.solids) {
         if let Shape::Convex(mesh) = &solid.shape {
-            solid.shape = Shape::Mesh(Arc::new(SolidMesh {
-                surface: mesh.0.clone(),
-                pieces: vec![ConvexMesh::clone(mesh)],
-            }));
+            let pieces = vec![ConvexMesh::clone(mesh)];
+            solid.shape = Shape::Mesh(Arc::new(SolidMesh::with_pieces(mesh.0.clone(), pieces)));
         }
     }
 }
@@ -258,7 +256,7 @@ fn shape(shape: &Shape) -> Value {
             json!({"kind": "cuboid", "half_extents_m": <[f64; 3]>::from(*half_extents_m)})
         }
         Shape::Convex(mesh) => triangles("convex", &mesh.0),
-        Shape::Mesh(mesh) => triangles("mesh", &mesh.surface),
+        Shape::Mesh(mesh) => triangles("mesh", mesh.surface()),
     }
 }
 

@@ -35,11 +35,7 @@ pub(crate) fn export(seed: u64) -> Value {
         vertices_m: mesh.vertices_m.clone(),
         triangles: mesh.triangles.clone(),
     };
-    let solid = Shape::Mesh(Arc::new(SolidMesh {
-        // Stands in the engines only, which are not asked here.
-        pieces: convex_hull(&mesh.vertices_m).into_iter().collect(),
-        surface: mesh,
-    }));
+    let solid = Shape::Mesh(Arc::new(SolidMesh::new(mesh)));
     let points: Vec<Point3<f64>> = (0..HULL_VERTICES)
         .map(|_| Point3::from(direction(&mut random) * 0.05))
         .collect();

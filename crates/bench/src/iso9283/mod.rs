@@ -19,6 +19,7 @@ use needlebench_evaluation::report::{
 use needlebench_evaluation::{EngineDifference, pairs};
 use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan};
 
+use crate::assemble::notes;
 use crate::control::Control;
 use crate::parallel::in_parallel;
 use crate::provenance::provenance;
@@ -101,6 +102,7 @@ pub(crate) fn run(
             criteria: judged.results,
             not_judged: judged.not_judged,
             truth: setup.real.report(),
+            notes: notes(resolved, &chosen),
             iso9283: Some(report),
             engine_failures: failures,
             ..empty_report(resolved, identities, timings)

@@ -129,7 +129,7 @@ fn reach_m(solid: &Solid, direction: &UnitVector3<f64>) -> f64 {
             .map(|vertex| local.dot(&vertex.coords))
             .fold(f64::NEG_INFINITY, f64::max),
         Shape::Mesh(mesh) => mesh
-            .surface
+            .surface()
             .vertices_m
             .iter()
             .map(|vertex| local.dot(&vertex.coords))

@@ -194,13 +194,9 @@ pub(crate) fn resolve(
     let [table, gantry, mount] = library
         .fixtures(toml, &scenario, &world_from_base_link)
         .map_err(one)?;
-    let obstacles = place_obstacles(
-        toml,
-        &scenario,
-        &world_from_base_link,
-        |index, section| library.obstacle(toml, index, section, base),
-        &mut notes,
-    )?;
+    let obstacles = place_obstacles(toml, &scenario, &world_from_base_link, |index, section| {
+        library.obstacle(toml, index, section, base)
+    })?;
     let (mut phantom, mut phantom_source, mut phantom_parts) = (None, None, Vec::new());
     let mut lying = None;
     if let Some(section) = &scenario.phantom {

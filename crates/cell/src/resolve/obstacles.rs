@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Translation3, Vector3};
-use needlebench_geometry::mesh::{Use, convex_hull, extent_m, shape_of_surface, size_m};
+use needlebench_geometry::mesh::{check_thickness, convex_hull, extent_m, size_m};
 use needlebench_geometry::{PreparedShape, Shape, Solid, TriangleMesh};
 use needlebench_kinematics::Pose;
 
@@ -30,8 +30,6 @@ pub(crate) struct UnplacedShape {
     middle_m: Vector3<f64>,
     /// The file that it is from.
     source: Option<ModelSource>,
-    /// What engines make of it.
-    note: Option<String>,
     prepared: OnceLock<PreparedShape>,
 }
 
@@ -92,7 +90,6 @@ pub(super) fn place_obstacles(
     scenario: &Scenario,
     world_from_base_link: &Pose,
     shape_of: impl Fn(usize, &ObstacleSection) -> Result<Arc<UnplacedShape>, Finding>,
-    notes: &mut Vec<String>,
 ) -> Result<PlacedObstacles, Vec<Finding>> {
     let (mut made, mut findings) = (PlacedObstacles::default(), Vec::new());
     for (index, section) in scenario.obstacles.iter().enumerate() {
@@ -123,7 +120,6 @@ pub(super) fn place_obstacles(
                 continue;
             }
         };
-        notes.extend(shape.note.clone());
         if let Some(source) = &shape.source
             && !made.sources.contains(source)
         {
@@ -226,7 +222,6 @@ pub(super) fn unplaced_shape(
         shape,
         middle_m: Vector3::zeros(),
         source: None,
-        note: None,
         prepared: OnceLock::new(),
     })
 }
@@ -259,17 +254,17 @@ fn shape_of_file(
     for vertex in &mut surface.vertices_m {
         *vertex -= middle;
     }
-    let (shape, fidelity) = if hulled {
+    let shape = if hulled {
         let hull = convex_hull(&surface.vertices_m).map_err(|why| refused(why.to_string()))?;
-        (Shape::Convex(Arc::new(hull)), None)
+        Shape::Convex(Arc::new(hull))
     } else {
-        shape_of_surface(surface, Use::Collision).map_err(|why| refused(why.to_string()))?
+        check_thickness(&surface.vertices_m).map_err(|why| refused(why.to_string()))?;
+        Shape::of_surface(surface)
     };
     Ok(UnplacedShape {
         shape,
         middle_m: middle,
         source: Some(read.source),
-        note: fidelity.map(|fidelity| format!("{what}: {}", fidelity.in_words())),
         prepared: OnceLock::new(),
     })
 }

@@ -208,10 +208,7 @@ mod tests {
     fn can_around_a_bowl_costs_the_depth_of_the_bowl() {
         let bowl = Solid {
             name: String::new(),
-            shape: Shape::Mesh(Arc::new(SolidMesh {
-                surface: bowl(),
-                pieces: Vec::new(),
-            })),
+            shape: Shape::Mesh(Arc::new(SolidMesh::new(bowl()))),
             parent_from_shape: Pose::identity(),
         };
         let can = |radius_m| {

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use needlebench_geometry::mesh::{
-    HullError, Use, convex_hull, inverted_part, mend, open_edges, shape_of_surface, size_m,
-    volume_m3,
+    HullError, check_thickness, convex_hull, inverted_part, mend, open_edges, size_m, volume_m3,
 };
 use needlebench_geometry::{Shape, TriangleMesh};
 
@@ -75,7 +74,8 @@ pub(crate) fn shape_of_link(
         return hull_of(mesh, ": its surface encloses no volume".to_owned());
     }
     let triangles = mended.mesh.triangles.len();
-    let (shape, fidelity) = shape_of_surface(mended.mesh, Use::Collision)?;
+    check_thickness(&mended.mesh.vertices_m)?;
+    let shape = Shape::of_surface(mended.mesh);
     let mut notes = Vec::new();
     if mended.loops > 0 {
         notes.push(format!(
@@ -85,18 +85,12 @@ pub(crate) fn shape_of_link(
             mended.filled_share * 1e2
         ));
     }
-    notes.push(match fidelity {
-        None => format!(
+    notes.push(match &shape {
+        Shape::Convex(hull) => format!(
             "collision mesh of '{link}' is convex: it is used as its convex hull ({} vertices)",
-            match &shape {
-                Shape::Convex(hull) => hull.0.vertices_m.len(),
-                _ => 0,
-            }
+            hull.0.vertices_m.len()
         ),
-        Some(found) => format!(
-            "collision mesh of '{link}' ({triangles} triangles): {}",
-            found.in_words()
-        ),
+        _ => format!("collision mesh of '{link}' is used as it is ({triangles} triangles)"),
     });
     Ok((shape, notes))
 }
@@ -124,9 +118,9 @@ mod tests {
         let Shape::Mesh(mesh) = shape else {
             panic!("{shape:?}")
         };
-        assert_eq!(mesh.surface, ell());
-        assert_eq!(mesh.pieces.len(), 2);
-        assert!(notes[0].contains("2 convex pieces"), "{notes:?}");
+        assert_eq!(*mesh.surface(), ell());
+        assert_eq!(mesh.pieces().hulls.len(), 2);
+        assert!(notes[0].contains("as it is (20 triangles)"), "{notes:?}");
     }
 
     #[test]
@@ -137,7 +131,7 @@ mod tests {
         let Shape::Mesh(solid) = shape else {
             panic!("{shape:?}")
         };
-        assert_eq!(solid.surface.triangles.len(), mesh.triangles.len() + 1);
+        assert_eq!(solid.surface().triangles.len(), mesh.triangles.len() + 1);
         assert!(
             notes[0].contains("1 seams (3 open edges) were closed"),
             "{notes:?}"

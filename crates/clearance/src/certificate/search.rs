@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use needlebench_cell::{ClearanceClass, Frame};
-use needlebench_geometry::{Placement, Separation, separation_within};
+use needlebench_geometry::{MovingSolids, Placement, Separation, separation_within};
 use needlebench_kinematics::trajectory::Phase;
 
 use super::motion::{Motion, Span};
@@ -55,18 +55,18 @@ impl Couple<'_> {
         outer.gap_m(&self.inner.bound)
     }
 
-    /// Signed distance in the frame of the inner body, the normal from the outer solid.
-    fn separation(&self, inner_from_outer: &Placement) -> Separation {
+    fn inner_solid_from_outer_solid(&self, inner_from_outer: &Placement) -> Placement {
         let outer = inner_from_outer.after(&self.outer.body_from_shape);
-        let inner_solid_from_outer_solid = self.inner.body_from_shape.inverse_after(&outer);
-        separation_within(
-            &self.outer.shape,
-            &self.inner.shape,
-            &inner_solid_from_outer_solid,
-            f64::INFINITY,
-        )
-        .expect("no distance is beyond an infinite cutoff")
-        .placed(&self.inner.body_from_shape)
+        self.inner.body_from_shape.inverse_after(&outer)
+    }
+
+    /// Signed distance in the frame of the inner body, the normal from the outer solid; `None` if it is
+    /// certainly larger than the cutoff.
+    fn separation_within(&self, inner_from_outer: &Placement, cutoff_m: f64) -> Option<Separation> {
+        let inner_solid_from_outer_solid = self.inner_solid_from_outer_solid(inner_from_outer);
+        let (outer, inner) = (&self.outer.shape, &self.inner.shape);
+        separation_within(outer, inner, &inner_solid_from_outer_solid, cutoff_m)
+            .map(|separation| separation.placed(&self.inner.body_from_shape))
     }
 
     /// That separation as the model reports it.
@@ -249,10 +249,12 @@ impl<M: Motion> Search<'_, M> {
             let placement = couple.inner_from_outer(&self.postures[posture]);
             let capsules_m = couple.capsules_m(&placement);
             // A bound that is beyond what is attained will do however short the interval.
-            if capsules_m >= self.attained_m(couple.class) {
+            let attained_m = self.attained_m(couple.class);
+            if capsules_m >= attained_m {
                 capsules_m
             } else {
-                couple.separation(&placement).distance_m
+                let found = couple.separation_within(&placement, self.cutoff_m(attained_m));
+                found.map_or(attained_m, |separation| separation.distance_m)
             }
         });
         Known::Ends(Gaps { left_m, right_m })
@@ -260,6 +262,14 @@ impl<M: Motion> Search<'_, M> {
 
     fn uses_planes(&self, couple: &Couple<'_>) -> bool {
         self.options.bound == MotionBound::Planes && couple.are_convex()
+    }
+
+    /// Beyond what a distance from a surface need not be known: bounds of first order live by it.
+    fn cutoff_m(&self, attained_m: f64) -> f64 {
+        match self.options.bound {
+            MotionBound::Planes => attained_m,
+            MotionBound::Lipschitz => f64::INFINITY,
+        }
     }
 
     fn posture(&mut self, time_s: f64) -> usize {
@@ -351,7 +361,7 @@ impl<M: Motion> Search<'_, M> {
                     &self.chain,
                     self.length_scale,
                 );
-                self.bound(&sweep, interval, each)
+                self.bound(&sweep, interval, each, enough_m)
             };
             let is_closed = bound_m >= enough_m
                 // Two surfaces that cross: their depth need not follow the motion smoothly.
@@ -402,15 +412,29 @@ impl<M: Motion> Search<'_, M> {
                 postures[sample] = Some(posture);
                 let couple = &self.couples[closed.couple];
                 let placement = couple.inner_from_outer(&self.postures[posture]);
-                if couple.capsules_m(&placement) < self.attained_m(class) {
-                    self.distance(closed.couple, posture, &placement, closed.phase);
+                let attained_m = self.attained_m(class);
+                if couple.capsules_m(&placement) < attained_m {
+                    self.distance_within(
+                        closed.couple,
+                        posture,
+                        &placement,
+                        closed.phase,
+                        attained_m,
+                    );
                 }
             }
         }
     }
 
-    /// Lower bound of a couple's clearance over an interval, and its way in it, m.
-    fn bound(&self, sweep: &Sweep<'_>, interval: &Interval, open: &Open) -> (f64, f64) {
+    /// Lower bound of a couple's clearance over an interval, and its way in it, m. The bound need not be the
+    /// best where it is enough.
+    fn bound(
+        &self,
+        sweep: &Sweep<'_>,
+        interval: &Interval,
+        open: &Open,
+        enough_m: f64,
+    ) -> (f64, f64) {
         let couple = &self.couples[open.couple];
         let first = couple.first_joint();
         let points = sweep.point_bounds(&couple.moving, couple.outer, first);
@@ -426,14 +450,50 @@ impl<M: Motion> Search<'_, M> {
             ),
             Known::Ends(ends) => {
                 let way_m = sweep.way_m(&couple.moving, couple.outer, first, &points);
-                let bound_m = 0.5 * (ends.left_m + ends.right_m - way_m) - lost_m;
-                if bound_m > 0.0 || couple.are_convex() {
+                let mut bound_m = 0.5 * (ends.left_m + ends.right_m - way_m) - lost_m;
+                if couple.are_convex() || bound_m > 0.0 && bound_m >= enough_m {
                     return (bound_m, way_m);
                 }
                 let around_m = self.by_capsules_m(couple, interval, &points) - lost_m;
-                (around_m, way_m + points.deviation_m)
+                if bound_m <= 0.0 || around_m >= enough_m {
+                    bound_m = around_m;
+                }
+                // One that is inside the other is not told by its surface.
+                let is_apart = ends.left_m > 0.0 || ends.right_m > 0.0;
+                if bound_m < enough_m && is_apart && self.options.bound == MotionBound::Planes {
+                    let least_m = enough_m.max(0.0) + lost_m;
+                    let attained_m = self.attained_m(couple.class).max(0.0) + lost_m;
+                    let aim_m = attained_m.max(least_m);
+                    let found = self.by_surfaces_m(couple, interval, &points, aim_m, least_m);
+                    bound_m = found.map_or(bound_m, |found_m| bound_m.max(found_m - lost_m));
+                }
+                (bound_m, way_m + points.deviation_m)
             }
         }
+    }
+
+    /// The same part by part of their surfaces, as far as it is at least `least_m`; parts that keep `aim_m`
+    /// are not looked into.
+    fn by_surfaces_m(
+        &self,
+        couple: &Couple<'_>,
+        interval: &Interval,
+        points: &PointBounds,
+        aim_m: f64,
+        least_m: f64,
+    ) -> Option<f64> {
+        let solids = MovingSolids {
+            a: &couple.outer.shape,
+            b: &couple.inner.shape,
+            b_from_a: [interval.left, interval.right].map(|posture| {
+                let placement = couple.inner_from_outer(&self.postures[posture]);
+                couple.inner_solid_from_outer_solid(&placement)
+            }),
+        };
+        solids.least_gap_m(aim_m, least_m, |one, two| {
+            let [one, two] = [one, two].map(|[left_m, right_m]| Gaps { left_m, right_m });
+            one.least_of_larger_m(&two, points.curvature_m)
+        })
     }
 
     /// The same by the capsules around both solids, in the directions in which they see each
@@ -539,10 +599,19 @@ impl<M: Motion> Search<'_, M> {
             }
             Known::Ends(ends) => {
                 let mut middle_m = couple.capsules_m(&placement);
-                let reach_m = ends.left_m.max(ends.right_m) - middle_m;
-                if middle_m < attained_m + reach_m.max(0.0) || middle_m < 2.0 * attained_m {
-                    let separation = self.distance(open.couple, middle, &placement, interval.phase);
-                    middle_m = separation.distance_m;
+                let may_do = match self.options.bound {
+                    MotionBound::Planes => middle_m >= attained_m,
+                    MotionBound::Lipschitz => {
+                        let reach_m = ends.left_m.max(ends.right_m) - middle_m;
+                        middle_m >= attained_m + reach_m.max(0.0) && middle_m >= 2.0 * attained_m
+                    }
+                };
+                if !may_do {
+                    let cutoff_m = self.cutoff_m(attained_m);
+                    let phase = interval.phase;
+                    let found =
+                        self.distance_within(open.couple, middle, &placement, phase, cutoff_m);
+                    middle_m = found.map_or(attained_m, |separation| separation.distance_m);
                 }
                 [
                     Known::Ends(ends.left_half(middle_m)),
@@ -559,16 +628,30 @@ impl<M: Motion> Search<'_, M> {
         inner_from_outer: &Placement,
         phase: Phase,
     ) -> Separation {
+        self.distance_within(couple, posture, inner_from_outer, phase, f64::INFINITY)
+            .expect("no distance is beyond an infinite cutoff")
+    }
+
+    /// The distance in a posture, which is attained if it is the nearest of its class; `None` if it is
+    /// certainly larger than the cutoff.
+    fn distance_within(
+        &mut self,
+        couple: usize,
+        posture: usize,
+        inner_from_outer: &Placement,
+        phase: Phase,
+        cutoff_m: f64,
+    ) -> Option<Separation> {
         self.effort.distances += 1;
         let couple = &self.couples[couple];
-        let separation = couple.separation(inner_from_outer);
+        let separation = couple.separation_within(inner_from_outer, cutoff_m)?;
         let posture = &self.postures[posture];
         let time_s = posture.time_s;
         if separation.distance_m < self.attained_m(couple.class) {
             let found = couple.clearance(&separation, posture);
             self.attain(&found, time_s, phase);
         }
-        separation
+        Some(separation)
     }
 
     /// The plane of a separation with its gaps in the middle and at both ends; none if the

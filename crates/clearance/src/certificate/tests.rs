@@ -1,6 +1,9 @@
 //! Attempts to refute certificates by sampling, and the proof that the attempts can succeed.
 
-use needlebench_cell::ClearanceClass;
+use std::sync::Arc;
+
+use needlebench_cell::{Cell, ClearanceClass};
+use needlebench_geometry::{Shape, SolidMesh};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
@@ -234,6 +237,61 @@ fn lengths_that_are_too_short_are_refuted() {
     };
     assert!(worst_m(1.0) < 0.0);
     let refuted_m = worst_m(0.8);
+    assert!(refuted_m > 1e-6, "{refuted_m:e}");
+}
+
+/// Fineness of round solids as surfaces, m.
+const CHORD_ERROR_M: f64 = 1e-3;
+
+/// The same cell with every second solid drawn as a surface, whose box shows no plane by itself.
+fn of_surfaces(mut cell: Cell) -> Cell {
+    let solids = cell.bodies.iter_mut().flat_map(|body| &mut body.solids);
+    for solid in solids.step_by(2) {
+        let surface = solid.shape.surface(CHORD_ERROR_M);
+        solid.shape = Shape::Mesh(Arc::new(SolidMesh::new(surface)));
+    }
+    cell
+}
+
+#[test]
+fn no_sample_is_below_a_certificate_of_surfaces() {
+    let options = CertificateOptions::default();
+    let mut penetrating = 0;
+    for name in ["table3.toml", "supine_suite.toml"] {
+        let resolved = shipped(name);
+        let model = ClearanceModel::new(&of_surfaces(resolved.cell.clone()));
+        let all = motions(&resolved, &[0.4]);
+        for motion in all.iter().step_by(all.len().div_ceil(5)) {
+            let certificate = certify(&model, motion, &options);
+            check(&model, motion, &certificate, options.tolerance_m, 3);
+            let mut classes = certificate.iter();
+            let is_penetrating =
+                classes.any(|(_, class)| class.attained.separation.distance_m < 0.0);
+            penetrating += usize::from(is_penetrating);
+        }
+    }
+    assert!(penetrating > 0);
+}
+
+#[test]
+fn lengths_that_are_too_short_are_refuted_between_surfaces() {
+    let resolved = shipped("table3.toml");
+    let model = ClearanceModel::new(&of_surfaces(resolved.cell.clone()));
+    let options = CertificateOptions {
+        tolerance_m: 0.02,
+        ..CertificateOptions::default()
+    };
+    let swings = swings(&resolved, 20);
+    let unlimited = [f64::INFINITY; CLASS_COUNT];
+    let worst_m = |length_scale: f64| {
+        let refuted = swings.iter().map(|motion| {
+            let found = search::certify(&model, motion, &options, &[], unlimited, length_scale);
+            refutation_m(&sampled(&model, motion, &found, 60, 4))
+        });
+        refuted.fold(f64::NEG_INFINITY, f64::max)
+    };
+    assert!(worst_m(1.0) < 0.0);
+    let refuted_m = worst_m(0.7);
     assert!(refuted_m > 1e-6, "{refuted_m:e}");
 }
 

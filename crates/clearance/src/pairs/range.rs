@@ -265,7 +265,7 @@ fn balls(solid: &Solid) -> Vec<Ball> {
             .map(|corner| place(corner, 0.0))
             .into(),
         Shape::Convex(mesh) => box_of(&mesh.0).map(|corner| place(corner, 0.0)).into(),
-        Shape::Mesh(mesh) => box_of(&mesh.surface)
+        Shape::Mesh(mesh) => box_of(mesh.surface())
             .map(|corner| place(corner, 0.0))
             .into(),
     }

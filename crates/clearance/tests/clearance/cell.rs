@@ -141,10 +141,7 @@ fn with_dented_skin(mut cell: Cell) -> Cell {
     for dent in &mut surface.vertices_m[50..70] {
         *dent = Point3::from(dent.coords * 0.8);
     }
-    phantom.solids[0].shape = Shape::Mesh(Arc::new(SolidMesh {
-        surface,
-        pieces: Vec::new(),
-    }));
+    phantom.solids[0].shape = Shape::Mesh(Arc::new(SolidMesh::new(surface)));
     cell
 }
 

@@ -43,9 +43,7 @@ fn shape(variety: &mut Variety, kind: usize) -> Shape {
             for vertex in &mut surface.vertices_m {
                 *vertex *= scale;
             }
-            // Distances are to the surface; engines alone have a use for pieces.
-            let pieces = Vec::new();
-            Shape::Mesh(Arc::new(SolidMesh { surface, pieces }))
+            Shape::Mesh(Arc::new(SolidMesh::new(surface)))
         }
     }
 }

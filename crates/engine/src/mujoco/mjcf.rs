@@ -11,7 +11,8 @@ use quick_xml::escape::escape;
 use super::settings::MujocoSettings;
 use crate::EngineError;
 use crate::contact_groups::{ContactBits, contact_bits};
-use crate::error::{check_bodies, convex_pieces};
+use crate::error::check_bodies;
+use crate::pieces::convex_pieces;
 
 /// Name of the site at the flange.
 pub(super) const FLANGE_SITE: &str = "flange";

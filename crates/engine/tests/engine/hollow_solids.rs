@@ -55,7 +55,7 @@ fn bowl(pieces: Vec<ConvexMesh>) -> Solid {
     }
     Solid {
         name: "bowl".into(),
-        shape: Shape::Mesh(Arc::new(SolidMesh { surface, pieces })),
+        shape: Shape::Mesh(Arc::new(SolidMesh::with_pieces(surface, pieces))),
         parent_from_shape: Pose::identity(),
     }
 }
@@ -127,7 +127,7 @@ fn hull_of_the_bowl_would_touch() {
     let Shape::Mesh(mesh) = &bowl.shape else {
         panic!()
     };
-    bowl.shape = Shape::Convex(Arc::new(convex_hull(&mesh.surface.vertices_m).unwrap()));
+    bowl.shape = Shape::Convex(Arc::new(convex_hull(&mesh.surface().vertices_m).unwrap()));
     for contact in contacts(&cell) {
         assert!(contact.count > 0, "{contact:?}");
     }
@@ -152,9 +152,8 @@ fn mesh_without_pieces_is_refused_by_name() {
     let Shape::Mesh(mesh) = &solid.shape else {
         panic!()
     };
-    let surface = mesh.surface.clone();
-    let pieces = Vec::new();
-    solid.shape = Shape::Mesh(Arc::new(SolidMesh { surface, pieces }));
+    let without = SolidMesh::with_pieces(mesh.surface().clone(), Vec::new());
+    solid.shape = Shape::Mesh(Arc::new(without));
     solid.parent_from_shape = Pose::translation(0.0, 0.0, 3.0);
     let cell = crate::common::ur3(vec![CollisionBody {
         name: "bowl".into(),

@@ -21,7 +21,7 @@ use serde::Serialize;
 
 pub use grid::VoxelGrid;
 pub use hand_cone::{CONE_START_M, CONE_TOLERANCE_RAD, HandCone, hand_cone};
-pub use obstacles::{Obstacles, PlacedObstacles};
+pub use obstacles::{Obstacles, PlacedObstacles, SightLines};
 pub use sector::Sector;
 pub use sight::{
     ENTRY_DISC_HEIGHT_M, ENTRY_DISC_RADIUS_M, SIGHT_SEGMENTS, SIGHT_SERIES, Sight, SightTargets,

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use needlebench_cell::{BodyKind, Cell, Frame};
-use needlebench_geometry::{PreparedShape, Shape, first_hit, separation};
+use needlebench_geometry::{PreparedShape, Shape, SightTarget, separation};
 use needlebench_kinematics::{Joints, Pose};
 
 use super::grid::VoxelGrid;
@@ -20,7 +20,7 @@ struct Obstacle<'c> {
     name: &'c str,
     body: usize,
     is_robot: bool,
-    shape: &'c Shape,
+    target: SightTarget,
     prepared: PreparedShape,
     body_from_shape: Pose,
     /// Ball around the shape, in its frame.
@@ -53,7 +53,7 @@ impl<'c> Obstacles<'c> {
                     name: &solid.name,
                     body: index,
                     is_robot,
-                    shape: &solid.shape,
+                    target: SightTarget::new(&solid.shape),
                     prepared,
                     body_from_shape: solid.parent_from_shape,
                     ball_center_m,
@@ -105,7 +105,7 @@ impl<'c> Obstacles<'c> {
 
 impl Placed<'_> {
     /// Parameter, 0 at `from` and 1 at `to`, of the first point of a segment in the solid.
-    fn hit(&self, from: &Point3<f64>, to: &Point3<f64>) -> Option<f64> {
+    fn hit(&self, from: &Point3<f64>, to: &Point3<f64>, likely: &mut usize) -> Option<f64> {
         let along = to - from;
         let length_squared = along.norm_squared().max(f64::MIN_POSITIVE);
         let to_center = self.ball_center_m - from;
@@ -116,10 +116,7 @@ impl Placed<'_> {
         }
         let from = self.shape_from_world * from;
         let to = self.shape_from_world * to;
-        match self.solid.prepared.surface() {
-            Some(surface) => surface.first_hit(&from, &(to - from)),
-            None => first_hit(self.solid.shape, &from, &to),
-        }
+        self.solid.target.first_hit(&from, &to, likely)
     }
 }
 
@@ -128,6 +125,42 @@ impl Placed<'_> {
 pub struct PlacedObstacles<'o> {
     point: &'o PreparedShape,
     solids: Vec<Placed<'o>>,
+}
+
+/// Lines of sight past solids; one line is quicker for those before it, and finds the same.
+#[derive(Debug)]
+pub struct SightLines<'p> {
+    obstacles: &'p PlacedObstacles<'p>,
+    /// By solid: what let the last line pass.
+    likely: Vec<usize>,
+}
+
+impl SightLines<'_> {
+    /// First solid on the way from one point to another: parameter of the place, 0 at `from` and 1
+    /// at `to`, and the solid's index.
+    pub fn first_on_the_way(
+        &mut self,
+        from: &Point3<f64>,
+        to: &Point3<f64>,
+    ) -> Option<(f64, usize)> {
+        let mut first: Option<(f64, usize)> = None;
+        let solids = self.obstacles.solids.iter().zip(&mut self.likely);
+        for (index, (placed, likely)) in solids.enumerate() {
+            let hit = placed.hit(from, to, likely);
+            if let Some(t) = hit
+                && first.is_none_or(|(known, _)| t < known)
+            {
+                first = Some((t, index));
+            }
+        }
+        first
+    }
+
+    /// Whether anything is between two points.
+    pub fn is_in_the_way(&mut self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
+        let mut solids = self.obstacles.solids.iter().zip(&mut self.likely);
+        solids.any(|(placed, likely)| placed.hit(from, to, likely).is_some())
+    }
 }
 
 /// Indices of solids that may matter for a piece of space.
@@ -196,26 +229,12 @@ impl PlacedObstacles<'_> {
         (nearest, kept)
     }
 
-    /// First solid on the way from one point to another: parameter of the place, 0 at `from` and 1
-    /// at `to`, and the solid's index.
-    pub fn first_on_the_way(&self, from: &Point3<f64>, to: &Point3<f64>) -> Option<(f64, usize)> {
-        let mut first: Option<(f64, usize)> = None;
-        for (index, placed) in self.solids.iter().enumerate() {
-            let hit = placed.hit(from, to);
-            if let Some(t) = hit
-                && first.is_none_or(|(known, _)| t < known)
-            {
-                first = Some((t, index));
-            }
+    /// Lines of sight past the solids.
+    pub fn lines(&self) -> SightLines<'_> {
+        SightLines {
+            obstacles: self,
+            likely: vec![usize::MAX; self.solids.len()],
         }
-        first
-    }
-
-    /// Whether anything is between two points.
-    pub fn is_in_the_way(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
-        self.solids
-            .iter()
-            .any(|placed| placed.hit(from, to).is_some())
     }
 
     /// Voxels whose centre is nearer to a solid than the margin, in the grid's order.

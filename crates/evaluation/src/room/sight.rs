@@ -137,16 +137,17 @@ pub fn measure_sight(
     let mut blocked: Vec<(usize, u32)> = Vec::new();
     let mut all: Counts = [[0; 2]; 2];
     let mut means = Vec::new();
+    let (mut past_robot, mut past_surroundings) = (robot.lines(), surroundings.lines());
     for start in starts() {
         let mut counts: Counts = [[0; 2]; 2];
         let segments = series(eyes_m, head_movement_m, targets, SIGHT_SEGMENTS, start);
         for (index, [eye, target]) in segments.enumerate() {
-            if surroundings.is_in_the_way(&eye, &target) {
+            if past_surroundings.is_in_the_way(&eye, &target) {
                 continue;
             }
             let [open, free] = &mut counts[index % 2];
             *open += 1;
-            match robot.first_on_the_way(&eye, &target) {
+            match past_robot.first_on_the_way(&eye, &target) {
                 None => *free += 1,
                 Some((_, solid)) => match blocked.iter_mut().find(|(known, _)| *known == solid) {
                     Some((_, count)) => *count += 1,

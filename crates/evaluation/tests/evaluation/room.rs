@@ -424,10 +424,14 @@ fn shares_of_sight_are_as_near_to_the_true_ones_as_they_say() {
                         targets.needle_m[0]
                             + (targets.needle_m[1] - targets.needle_m[0]) * uniform()
                     };
-                    if surroundings.first_on_the_way(&eye, &target).is_none() {
+                    if surroundings
+                        .lines()
+                        .first_on_the_way(&eye, &target)
+                        .is_none()
+                    {
                         let [open, free] = &mut counts[(ray % 2) as usize];
                         *open += 1;
-                        *free += u32::from(robot.first_on_the_way(&eye, &target).is_none());
+                        *free += u32::from(robot.lines().first_on_the_way(&eye, &target).is_none());
                     }
                 }
                 let share = |[open, free]: [u32; 2]| f64::from(free) / f64::from(open.max(1));

@@ -121,10 +121,7 @@ pub fn chest(cuts: u32) -> TriangleMesh {
 }
 
 pub fn solid(surface: TriangleMesh) -> Shape {
-    Shape::Mesh(Arc::new(SolidMesh {
-        surface,
-        pieces: Vec::new(),
-    }))
+    Shape::Mesh(Arc::new(SolidMesh::new(surface)))
 }
 
 /// A convex piece of about 100 vertices, 10 cm long.

@@ -1,48 +1,110 @@
-//! Convex pieces kept in the user's cache folder, as making them takes a while.
+//! What takes a while to make of a mesh, kept in the user's cache folder: convex pieces and trees.
+//!
+//! A file is named by a hash of all that it is made from, version included, and holds the hash of its
+//! contents; it is written whole or not at all. What cannot be read or written, or is damaged, only costs
+//! time. Folders are bounded: the oldest files make room.
 
 use std::env;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
-use nalgebra::Point3;
 use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
 
 use super::decompose::decompose;
 use super::fidelity::Fidelity;
+use super::solid::ConvexPieces;
 use super::surface_index::SurfaceIndex;
-use crate::shape::{ConvexMesh, TriangleMesh};
+use crate::encoding::{Encode, Reader};
+use crate::tree::TriangleTree;
+use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 
-/// First bytes of a file, and of what its name is the hash of: changes whenever the pieces do.
-const VERSION: &[u8] = b"needlebench pieces 2\n";
+/// What is kept of meshes.
+struct Kind<T> {
+    /// Folder of its files.
+    folder: &'static str,
+    /// First bytes of a file, and of what its name is the hash of: changes whenever what is made does.
+    version: &'static [u8],
+    /// Meshes with fewer triangles are not worth a file.
+    worth_keeping: usize,
+    encode: fn(&T, &TriangleMesh) -> Vec<u8>,
+    decode: fn(&mut Reader<'_>, &TriangleMesh) -> Option<T>,
+}
 
-/// Meshes with fewer triangles are not worth a file.
-const WORTH_KEEPING: usize = 500;
+/// Convex pieces.
+const PIECES: Kind<ConvexPieces> = Kind {
+    folder: "pieces",
+    version: b"needlebench pieces 3\n",
+    worth_keeping: 500,
+    encode: |pieces, _| encoded_pieces(pieces),
+    decode: |reader, _| decoded_pieces(reader),
+};
 
-/// Pieces of a solid and how well they stand for it: from the cache if they are there, with the
-/// same bits. A cache that cannot be read or written, or that is damaged, only costs time.
-pub(super) fn pieces_of(solid: &SurfaceIndex) -> (Vec<ConvexMesh>, Fidelity) {
-    let make = || {
-        let pieces = decompose(solid);
-        let fidelity = Fidelity::measure(solid, &pieces);
-        (pieces, fidelity)
-    };
-    if solid.mesh().triangles.len() < WORTH_KEEPING {
+/// Trees of triangles.
+const TREES: Kind<TriangleTree> = Kind {
+    folder: "trees",
+    version: b"needlebench tree 1\n",
+    worth_keeping: 10_000,
+    encode: |tree, _| tree.encoded(),
+    decode: TriangleTree::decoded,
+};
+
+/// Most bytes of a folder.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// Pieces of a solid and how well they stand for it.
+pub(super) fn pieces_of(solid: &SurfaceIndex) -> ConvexPieces {
+    kept(&PIECES, solid.mesh(), || {
+        let hulls = decompose(solid);
+        let fidelity = Fidelity::measure(solid, &hulls);
+        ConvexPieces { hulls, fidelity }
+    })
+}
+
+/// The tree of a mesh.
+pub(super) fn tree_of(mesh: &TriangleMesh) -> TriangleTree {
+    kept(&TREES, mesh, || TriangleTree::new(mesh))
+}
+
+/// From the cache if it is there, with the same bits.
+fn kept<T>(kind: &Kind<T>, mesh: &TriangleMesh, make: impl FnOnce() -> T) -> T {
+    let cache = folder().filter(|_| mesh.triangles.len() >= kind.worth_keeping);
+    let Some(cache) = cache else {
         return make();
-    }
-    let Some(folder) = folder() else {
-        return make();
     };
-    let path = folder.join(name_of(solid.mesh()));
-    if let Some(known) = fs::read(&path).ok().and_then(|bytes| decoded(&bytes)) {
+    kept_in(&cache.join(kind.folder), kind, mesh, make)
+}
+
+fn kept_in<T>(folder: &Path, kind: &Kind<T>, mesh: &TriangleMesh, make: impl FnOnce() -> T) -> T {
+    let path = folder.join(name_of(kind.version, mesh));
+    let known = fs::read(&path).ok();
+    if let Some(known) = known.and_then(|bytes| opened(kind, mesh, &bytes)) {
         return known;
     }
-    let (pieces, fidelity) = make();
+    let made = make();
     // Nothing is lost but the time that it would have saved.
-    let _ = keep(&folder, &path, &encoded(&pieces, &fidelity));
-    (pieces, fidelity)
+    let _ = keep(folder, &path, &sealed(kind, mesh, &made));
+    made
+}
+
+/// Version, hash of the rest, the rest.
+fn sealed<T>(kind: &Kind<T>, mesh: &TriangleMesh, thing: &T) -> Vec<u8> {
+    let rest = (kind.encode)(thing, mesh);
+    [kind.version, &Sha256::digest(&rest), &rest].concat()
+}
+
+fn opened<T>(kind: &Kind<T>, mesh: &TriangleMesh, bytes: &[u8]) -> Option<T> {
+    let hashed = bytes.strip_prefix(kind.version)?;
+    let (hash, rest) = hashed.split_at_checked(32)?;
+    if Sha256::digest(rest).as_slice() != hash {
+        return None;
+    }
+    let mut reader = Reader(rest);
+    let thing = (kind.decode)(&mut reader, mesh)?;
+    reader.0.is_empty().then_some(thing)
 }
 
 /// Writes a file that others may look for at the same time: whole or not at all.
@@ -51,23 +113,44 @@ fn keep(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = NamedTempFile::new_in(folder)?;
     file.write_all(bytes)?;
     file.persist(path)?;
+    make_room(folder, MOST_BYTES)
+}
+
+/// Removes the files that were written first, as long as there is more than `most_bytes`.
+fn make_room(folder: &Path, most_bytes: u64) -> io::Result<()> {
+    let mut files: Vec<(SystemTime, u64, PathBuf)> = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let about = entry.metadata()?;
+        files.push((about.modified()?, about.len(), entry.path()));
+    }
+    files.sort();
+    let mut bytes: u64 = files.iter().map(|file| file.1).sum();
+    for (_, size, path) in files {
+        if bytes <= most_bytes {
+            break;
+        }
+        fs::remove_file(path)?;
+        bytes -= size;
+    }
     Ok(())
 }
 
-/// Name of the file with the pieces of a mesh: a hash of what they are made of.
-fn name_of(mesh: &TriangleMesh) -> String {
-    let digest = Sha256::digest(mesh_bytes(VERSION, mesh));
+/// Name of the file of a mesh: a hash of what it is made of.
+fn name_of(version: &[u8], mesh: &TriangleMesh) -> String {
+    let mut bytes = version.to_vec();
+    mesh.encode(&mut bytes);
     let mut name = String::with_capacity(64);
-    for byte in digest {
+    for byte in Sha256::digest(bytes) {
         write!(name, "{byte:02x}").expect("a string takes all");
     }
     name
 }
 
-/// `pieces` in `NEEDLEBENCH_CACHE_DIR`, or else in `needlebench` in the user's cache folder.
+/// `NEEDLEBENCH_CACHE_DIR`, or else `needlebench` in the user's cache folder.
 fn folder() -> Option<PathBuf> {
     let variable = |name: &str| env::var_os(name).filter(|value| !value.is_empty());
-    let cache = variable("NEEDLEBENCH_CACHE_DIR")
+    variable("NEEDLEBENCH_CACHE_DIR")
         .map(PathBuf::from)
         .or_else(|| {
             let user = if cfg!(windows) {
@@ -85,48 +168,30 @@ fn folder() -> Option<PathBuf> {
                     .or(home.map(|home| home.join(below)))
             };
             user.map(|user| user.join("needlebench"))
-        });
-    cache.map(|cache| cache.join("pieces"))
+        })
 }
 
-fn mesh_bytes(start: &[u8], mesh: &TriangleMesh) -> Vec<u8> {
-    let mut bytes = start.to_vec();
-    for count in [mesh.vertices_m.len(), mesh.triangles.len()] {
-        bytes.extend((count as u64).to_le_bytes());
+/// Fidelity, number of pieces, pieces.
+fn encoded_pieces(pieces: &ConvexPieces) -> Vec<u8> {
+    let Fidelity {
+        pieces: _,
+        overhang_m,
+        mean_overhang_m,
+        uncovered_m,
+        spacing_m,
+    } = pieces.fidelity;
+    let mut bytes = Vec::new();
+    for number in [overhang_m, mean_overhang_m, uncovered_m, spacing_m] {
+        number.encode(&mut bytes);
     }
-    let numbers = mesh
-        .vertices_m
-        .iter()
-        .flat_map(|vertex| [vertex.x, vertex.y, vertex.z]);
-    bytes.extend(numbers.flat_map(f64::to_le_bytes));
-    let indices = mesh.triangles.iter().flatten();
-    bytes.extend(indices.flat_map(|index| index.to_le_bytes()));
+    pieces.hulls.len().encode(&mut bytes);
+    for hull in &pieces.hulls {
+        hull.0.encode(&mut bytes);
+    }
     bytes
 }
 
-/// Version, hash of the rest, fidelity, number of pieces, pieces.
-fn encoded(pieces: &[ConvexMesh], fidelity: &Fidelity) -> Vec<u8> {
-    let numbers = [
-        fidelity.overhang_m,
-        fidelity.mean_overhang_m,
-        fidelity.uncovered_m,
-        fidelity.spacing_m,
-    ];
-    let mut rest: Vec<u8> = numbers.into_iter().flat_map(f64::to_le_bytes).collect();
-    rest.extend((pieces.len() as u64).to_le_bytes());
-    for piece in pieces {
-        rest = mesh_bytes(&rest, &piece.0);
-    }
-    [VERSION, &Sha256::digest(&rest), &rest].concat()
-}
-
-fn decoded(bytes: &[u8]) -> Option<(Vec<ConvexMesh>, Fidelity)> {
-    let hashed = bytes.strip_prefix(VERSION)?;
-    let (hash, rest) = hashed.split_at_checked(32)?;
-    if Sha256::digest(rest).as_slice() != hash {
-        return None;
-    }
-    let mut reader = Reader(rest);
+fn decoded_pieces(reader: &mut Reader<'_>) -> Option<ConvexPieces> {
     let [overhang_m, mean_overhang_m, uncovered_m, spacing_m] = [
         reader.number()?,
         reader.number()?,
@@ -134,75 +199,129 @@ fn decoded(bytes: &[u8]) -> Option<(Vec<ConvexMesh>, Fidelity)> {
         reader.number()?,
     ];
     let count = reader.count()?;
-    let pieces: Vec<ConvexMesh> = (0..count)
-        .map(|_| {
-            let (vertices, triangles) = (reader.count()?, reader.count()?);
-            let vertices_m = (0..vertices)
-                .map(|_| {
-                    Some(Point3::new(
-                        reader.number()?,
-                        reader.number()?,
-                        reader.number()?,
-                    ))
-                })
-                .collect::<Option<_>>()?;
-            let triangles = (0..triangles)
-                .map(|_| Some([reader.index()?, reader.index()?, reader.index()?]))
-                .collect::<Option<_>>()?;
-            Some(ConvexMesh(TriangleMesh {
-                vertices_m,
-                triangles,
-            }))
-        })
-        .collect::<Option<_>>()?;
+    let hulls = reader.list(count, 16, |reader| reader.mesh().map(ConvexMesh))?;
     let fidelity = Fidelity {
-        pieces: pieces.len(),
+        pieces: hulls.len(),
         overhang_m,
         mean_overhang_m,
         uncovered_m,
         spacing_m,
     };
-    reader.0.is_empty().then_some((pieces, fidelity))
-}
-
-struct Reader<'a>(&'a [u8]);
-
-impl Reader<'_> {
-    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (taken, rest) = self.0.split_first_chunk()?;
-        self.0 = rest;
-        Some(*taken)
-    }
-
-    fn number(&mut self) -> Option<f64> {
-        self.take().map(f64::from_le_bytes)
-    }
-
-    fn index(&mut self) -> Option<u32> {
-        self.take().map(u32::from_le_bytes)
-    }
-
-    fn count(&mut self) -> Option<usize> {
-        self.take()
-            .and_then(|bytes| usize::try_from(u64::from_le_bytes(bytes)).ok())
-    }
+    Some(ConvexPieces { hulls, fidelity })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sample_solids::ell;
+    use crate::sample_solids::{bowl, ell, torus};
+
+    /// A folder with the file of one mesh, asked for once.
+    fn filled<T: PartialEq + std::fmt::Debug>(
+        kind: &Kind<T>,
+        mesh: &TriangleMesh,
+        make: impl Fn() -> T,
+    ) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(kept_in(folder.path(), kind, mesh, &make), make());
+        let path = folder.path().join(name_of(kind.version, mesh));
+        (folder, path)
+    }
+
+    /// What is kept has the same bits as what is made, is not made again, and is made anew wherever its file
+    /// was damaged.
+    fn is_kept<T: PartialEq + std::fmt::Debug>(
+        kind: &Kind<T>,
+        mesh: &TriangleMesh,
+        make: impl Fn() -> T,
+    ) {
+        let (folder, path) = filled(kind, mesh, &make);
+        let again = || kept_in(folder.path(), kind, mesh, || panic!("it is there"));
+        assert_eq!(again(), make());
+        let sound = fs::read(&path).unwrap();
+        let cut = sound[..sound.len() - 1].to_vec();
+        let longer = [&sound[..], &[0]].concat();
+        let mut turned = Vec::new();
+        for at in [0, kind.version.len(), sound.len() / 2, sound.len() - 1] {
+            let mut bytes = sound.clone();
+            bytes[at] ^= 1;
+            turned.push(bytes);
+        }
+        for broken in turned.into_iter().chain([cut, longer, Vec::new()]) {
+            fs::write(&path, broken).unwrap();
+            let mut made = false;
+            let found = kept_in(folder.path(), kind, mesh, || {
+                made = true;
+                make()
+            });
+            assert!(made);
+            assert_eq!(found, make());
+            assert_eq!(fs::read(&path).unwrap(), sound, "the file is mended");
+        }
+    }
 
     #[test]
     fn pieces_come_back_with_the_same_bits_and_damage_is_seen() {
         let solid = SurfaceIndex::new(ell());
-        let pieces = decompose(&solid);
-        let fidelity = Fidelity::measure(&solid, &pieces);
-        let mut bytes = encoded(&pieces, &fidelity);
-        assert_eq!(decoded(&bytes), Some((pieces, fidelity)));
-        assert_eq!(decoded(&bytes[..bytes.len() - 1]), None);
-        let middle = bytes.len() / 2;
-        bytes[middle] ^= 1;
-        assert_eq!(decoded(&bytes), None);
+        is_kept(&PIECES, solid.mesh(), || {
+            let hulls = decompose(&solid);
+            let fidelity = Fidelity::measure(&solid, &hulls);
+            ConvexPieces { hulls, fidelity }
+        });
+    }
+
+    #[test]
+    fn trees_come_back_with_the_same_bits_and_damage_is_seen() {
+        for mesh in [ell(), bowl(), torus(24, 12)] {
+            is_kept(&TREES, &mesh, || TriangleTree::new(&mesh));
+        }
+    }
+
+    #[test]
+    fn another_mesh_has_another_file() {
+        let (one, mut other) = (ell(), ell());
+        other.vertices_m[3].x += 1e-15;
+        assert_ne!(one, other);
+        assert_ne!(name_of(b"1", &one), name_of(b"1", &other));
+        assert_ne!(name_of(b"1", &one), name_of(b"2", &one));
+    }
+
+    /// A file that no longer says what is made now would be a wrong answer: who changes trees or pieces
+    /// changes their version, and these hashes of what an L of 12 corners comes to.
+    #[test]
+    fn versions_change_with_what_is_made() {
+        let solid = SurfaceIndex::new(ell());
+        let short = |bytes: &[u8]| -> String {
+            let hash = Sha256::digest(bytes);
+            hash[..8].iter().map(|byte| format!("{byte:02x}")).collect()
+        };
+        let pieces = pieces_of(&solid);
+        assert_eq!(
+            short(&sealed(&PIECES, solid.mesh(), &pieces)),
+            "55828a7291e64a72"
+        );
+        let tree = TriangleTree::new(solid.mesh());
+        assert_eq!(
+            short(&sealed(&TREES, solid.mesh(), &tree)),
+            "cc62928852c1b945"
+        );
+    }
+
+    #[test]
+    fn the_oldest_files_make_room() {
+        let folder = tempfile::tempdir().unwrap();
+        for (age, name) in ["c", "a", "d", "b"].into_iter().enumerate() {
+            let path = folder.path().join(name);
+            fs::write(&path, [0; 100]).unwrap();
+            let written = SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(age as u64);
+            let file = fs::File::options().write(true).open(path).unwrap();
+            file.set_modified(written).unwrap();
+        }
+        make_room(folder.path(), 250).unwrap();
+        let mut left: Vec<_> = fs::read_dir(folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name())
+            .collect();
+        left.sort();
+        assert_eq!(left, ["b", "d"]);
     }
 }

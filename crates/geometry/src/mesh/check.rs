@@ -1,14 +1,13 @@
 //! What makes a triangle mesh the surface of a solid.
 
-use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use nalgebra::Point3;
 
 use crate::measure::{area_vector, corners, size_m, volume_m3};
-use crate::shape::TriangleMesh;
-use crate::topology::connected_parts;
+use crate::topology::{Map, connected_parts, map_for};
 use crate::tree::TriangleTree;
+use crate::triangle_mesh::TriangleMesh;
 
 /// How far beside a surface its sides are looked at, relative to the mesh's size.
 const BESIDE: f64 = 1e-7;
@@ -221,7 +220,7 @@ fn without_area(mesh: &TriangleMesh) -> Option<MeshDefect> {
 }
 
 fn twice(mesh: &TriangleMesh) -> Option<MeshDefect> {
-    let mut seen = HashMap::with_capacity(mesh.triangles.len());
+    let mut seen = map_for(mesh.triangles.len());
     let mut found = None;
     let mut count = 0;
     for (second, triangle) in mesh.triangles.iter().enumerate() {
@@ -247,12 +246,11 @@ fn twice(mesh: &TriangleMesh) -> Option<MeshDefect> {
 }
 
 /// How many triangles run along each edge, in either direction.
-pub(super) struct EdgeCounts(HashMap<(u32, u32), [i32; 2]>);
+pub(super) struct EdgeCounts(Map<(u32, u32), [i32; 2]>);
 
 impl EdgeCounts {
     pub(super) fn of(mesh: &TriangleMesh) -> Self {
-        let mut counts: HashMap<(u32, u32), [i32; 2]> =
-            HashMap::with_capacity(mesh.triangles.len() * 3 / 2);
+        let mut counts: Map<(u32, u32), [i32; 2]> = map_for(mesh.triangles.len() * 3 / 2);
         for [a, b, c] in &mesh.triangles {
             for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
                 let way = usize::from(from > to);

@@ -8,7 +8,7 @@ use super::fidelity::points_on;
 use super::hull::{convex_hull, simplified_hull};
 use super::surface_index::SurfaceIndex;
 use crate::measure::{area_m2, corners, size_m, volume_m3};
-use crate::shape::{ConvexMesh, TriangleMesh};
+use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 
 /// Most pieces of a solid.
 const MOST_PIECES: usize = 16;

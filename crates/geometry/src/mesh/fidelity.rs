@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::surface_index::SurfaceIndex;
 use crate::measure::{area_m2, area_vector, corners};
-use crate::shape::{ConvexMesh, TriangleMesh};
+use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 
 /// Samples over all pieces, and over the surface, about.
 const SAMPLES: f64 = 20_000.0;

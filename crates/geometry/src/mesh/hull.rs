@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use nalgebra::Point3;
 use robust::{Coord3D, orient3d};
 
-use crate::shape::{ConvexMesh, TriangleMesh};
+use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 
 /// Distance by which a point may lie outside the hull that is made of it, relative to its size.
 const HULL_TOLERANCE: f64 = 1e-9;
@@ -31,9 +31,14 @@ pub enum HullError {
     /// Coordinates so small or so large that products of three of them are not numbers.
     #[error("rounding broke its convex hull")]
     Broken,
-    /// Neither the solid nor a part of it has a hull.
-    #[error("it has no convex hull with a volume")]
-    NoPieces,
+}
+
+/// Whether points have a convex hull, without making it.
+///
+/// # Errors
+/// As [`convex_hull`].
+pub fn check_thickness(points: &[Point3<f64>]) -> Result<(), HullError> {
+    Hull::around(points, 0.0).map(|_| ())
 }
 
 /// Convex hull of points, which contains every one of them within 1e-9 of its size.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 
 use super::check::{EdgeCounts, has_no_area};
 use crate::measure::{area_m2, area_vector, corners};
-use crate::shape::TriangleMesh;
+use crate::triangle_mesh::TriangleMesh;
 
 /// A surface with its seams closed, and what that took.
 #[derive(Debug, Clone, PartialEq)]

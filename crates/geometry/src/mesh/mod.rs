@@ -11,11 +11,12 @@ mod stl;
 mod surface_index;
 
 pub use check::{MeshDefect, MeshFacts, check_closed, inverted_part, open_edges};
+pub(crate) use decompose::as_convex;
 pub use decompose::decompose;
 pub use fidelity::{Fidelity, points_on};
-pub use hull::{HullError, convex_hull, simplified_hull};
+pub use hull::{HullError, check_thickness, convex_hull, simplified_hull};
 pub use mend::{Mended, mend};
-pub use solid::{Use, shape_of_surface};
+pub use solid::{ConvexPieces, SolidMesh};
 pub use stl::{StlError, read_stl};
 pub use surface_index::SurfaceIndex;
 

@@ -1,114 +1,91 @@
-//! From a triangle mesh to the shape of a solid.
+//! A solid that need not be convex.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::cache::pieces_of;
-use super::decompose::as_convex;
 use super::fidelity::Fidelity;
-use super::hull::HullError;
 use super::surface_index::SurfaceIndex;
-use crate::shape::{Shape, SolidMesh, TriangleMesh};
+use crate::tree::TriangleTree;
+use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 
-/// Vertices of the largest convex mesh that stays one.
-const MOST_CONVEX_VERTICES: usize = 2000;
-
-/// Whether engines will collide with a shape.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Use {
-    /// They will: it needs convex pieces.
-    Collision,
-    /// Only distances to its surface are wanted.
-    Distance,
+/// A solid that need not be convex: its exact surface, and convex pieces for the engines, which
+/// collide with nothing else.
+///
+/// What takes a while, the tree that finds distances and the pieces, is made when it is first asked for.
+#[derive(Debug, Clone)]
+pub struct SolidMesh {
+    index: SurfaceIndex,
+    pieces: OnceLock<ConvexPieces>,
 }
 
-/// The shape of a sound, closed surface, and what to say about it.
-///
-/// A convex one is the exact hull; all others are their own surface and have convex pieces for the
-/// engines.
-///
-/// # Errors
-/// [`HullError::NoPieces`] if engines cannot collide with it.
-pub fn shape_of_surface(
-    surface: TriangleMesh,
-    purpose: Use,
-) -> Result<(Shape, Option<Fidelity>), HullError> {
-    let small = surface.vertices_m.len() <= MOST_CONVEX_VERTICES;
-    if small && let Some(hull) = as_convex(&surface) {
-        return Ok((Shape::Convex(Arc::new(hull)), None));
+/// Convex pieces that together stand for a solid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConvexPieces {
+    /// The pieces; none if neither the solid nor a part of it has a hull with a volume.
+    pub hulls: Vec<ConvexMesh>,
+    /// How well they stand for it.
+    pub fidelity: Fidelity,
+}
+
+impl PartialEq for SolidMesh {
+    /// Solids with the same surface are the same unless they were given different pieces.
+    fn eq(&self, other: &Self) -> bool {
+        let same_pieces = match (self.pieces.get(), other.pieces.get()) {
+            (Some(mine), Some(theirs)) => mine == theirs,
+            _ => true,
+        };
+        self.surface() == other.surface() && same_pieces
     }
-    if purpose == Use::Distance {
-        let pieces = Vec::new();
-        return Ok((Shape::Mesh(Arc::new(SolidMesh { surface, pieces })), None));
+}
+
+impl SolidMesh {
+    /// The solid within a closed surface of at least one triangle.
+    pub fn new(surface: TriangleMesh) -> Self {
+        Self {
+            index: SurfaceIndex::new(surface),
+            pieces: OnceLock::new(),
+        }
     }
-    let index = SurfaceIndex::new(surface);
-    let (pieces, fidelity) = pieces_of(&index);
-    if pieces.is_empty() {
-        return Err(HullError::NoPieces);
+
+    /// The same with convex pieces from elsewhere.
+    pub fn with_pieces(surface: TriangleMesh, hulls: Vec<ConvexMesh>) -> Self {
+        let index = SurfaceIndex::new(surface);
+        let fidelity = Fidelity::measure(&index, &hulls);
+        Self {
+            index,
+            pieces: OnceLock::from(ConvexPieces { hulls, fidelity }),
+        }
     }
-    let surface = index.into_mesh();
-    let shape = Shape::Mesh(Arc::new(SolidMesh { surface, pieces }));
-    Ok((shape, Some(fidelity)))
+
+    /// Closed surface, the true one: clearances are measured to it.
+    pub fn surface(&self) -> &TriangleMesh {
+        self.index.mesh()
+    }
+
+    /// Its triangles in nested boxes.
+    pub(crate) fn tree(&self) -> &Arc<TriangleTree> {
+        self.index.tree()
+    }
+
+    /// Convex pieces that together stand for the solid in the engines. Seconds for a finely drawn surface,
+    /// unless the user's cache folder has them.
+    pub fn pieces(&self) -> &ConvexPieces {
+        self.pieces.get_or_init(|| pieces_of(&self.index))
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::{PI, TAU};
-
-    use nalgebra::Point3;
-
     use super::*;
     use crate::sample_solids::ell;
 
-    /// Rings of points in planes, in single precision as an STL has them: where incremental hulls
-    /// make faces without an area.
     #[test]
-    fn rings_of_a_long_ellipsoid_are_a_convex_solid() {
-        let (rings, spokes) = (12_u32, 24_u32);
-        #[expect(clippy::cast_possible_truncation, reason = "what is tested")]
-        let single = |value: f64| f64::from(value as f32) * 1e-3;
-        let mut vertices_m = vec![Point3::new(0.0, 0.06, single(-150.0))];
-        for ring in 1..rings {
-            let (sine, cosine) = (PI * f64::from(ring) / f64::from(rings)).sin_cos();
-            for spoke in 0..spokes {
-                let (y, x) = (TAU * f64::from(spoke) / f64::from(spokes)).sin_cos();
-                vertices_m.push(Point3::new(
-                    single(20.0 * sine * x),
-                    single(60.0 + 20.0 * sine * y),
-                    single(-150.0 * cosine),
-                ));
-            }
-        }
-        vertices_m.push(Point3::new(0.0, 0.06, single(150.0)));
-        let last = u32::try_from(vertices_m.len()).unwrap() - 1;
-        let at = |ring: u32, spoke: u32| 1 + (ring - 1) * spokes + spoke % spokes;
-        let mut triangles = Vec::new();
-        for spoke in 0..spokes {
-            triangles.push([0, at(1, spoke + 1), at(1, spoke)]);
-            triangles.push([last, at(rings - 1, spoke), at(rings - 1, spoke + 1)]);
-            for ring in 1..rings - 1 {
-                let [a, b] = [at(ring, spoke), at(ring, spoke + 1)];
-                let [c, d] = [at(ring + 1, spoke), at(ring + 1, spoke + 1)];
-                triangles.extend([[a, b, d], [a, d, c]]);
-            }
-        }
-        let surface = TriangleMesh {
-            vertices_m,
-            triangles,
-        };
-        let (shape, _) = shape_of_surface(surface.clone(), Use::Collision).unwrap();
-        match shape {
-            Shape::Convex(hull) => assert!(hull.0.vertices_m.len() <= surface.vertices_m.len()),
-            Shape::Mesh(mesh) => assert_eq!(mesh.surface, surface),
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn surface_for_distances_alone_has_no_pieces() {
-        let (shape, fidelity) = shape_of_surface(ell(), Use::Distance).unwrap();
-        let Shape::Mesh(mesh) = shape else {
-            panic!("{shape:?}")
-        };
-        assert!(mesh.pieces.is_empty() && fidelity.is_none());
+    fn pieces_are_made_when_they_are_asked_for() {
+        let solid = SolidMesh::new(ell());
+        assert!(solid.pieces.get().is_none());
+        assert_eq!(solid.pieces().hulls.len(), 2);
+        assert_eq!(solid.pieces().fidelity.pieces, 2);
+        assert_eq!(solid, SolidMesh::new(ell()));
+        assert_ne!(solid, SolidMesh::with_pieces(ell(), Vec::new()));
     }
 }

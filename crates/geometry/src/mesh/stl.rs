@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use nalgebra::Point3;
 
-use crate::shape::TriangleMesh;
-use crate::topology::weld;
+use crate::topology::{Map, map_for, weld};
+use crate::triangle_mesh::TriangleMesh;
 
 /// Why a file is not a mesh.
 #[derive(Debug, thiserror::Error)]
@@ -37,51 +37,48 @@ pub enum StlError {
 /// See [`StlError`].
 pub fn read_stl(bytes: &[u8], scale: [f64; 3]) -> Result<TriangleMesh, StlError> {
     let bytes = with_plain_header(bytes);
-    let mesh = stl_io::read_stl(&mut std::io::Cursor::new(bytes)).map_err(|error| {
+    let refused = |error: std::io::Error| {
         if error.kind() == std::io::ErrorKind::UnexpectedEof {
             StlError::CutOff
         } else {
             StlError::Malformed(error)
         }
-    })?;
-    let vertices_m: Vec<Point3<f64>> = mesh
-        .vertices
-        .iter()
-        .map(|v| {
-            Point3::new(
-                f64::from(v[0]) * scale[0],
-                f64::from(v[1]) * scale[1],
-                f64::from(v[2]) * scale[2],
-            )
-        })
-        .collect();
+    };
+    let mut file = std::io::Cursor::new(&bytes);
+    let triangles_of_file = stl_io::create_stl_reader(&mut file).map_err(refused)?;
+    // Corners with the same bits are one vertex, as the file has no others; nothing is reserved by what a
+    // broken file says of itself.
+    let mut known: Map<[u32; 3], u32> = map_for(0);
+    let mut vertices_m: Vec<Point3<f64>> = Vec::new();
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    for triangle in triangles_of_file {
+        let corners = triangle.map_err(refused)?.vertices;
+        let mut numbers = [0; 3];
+        for (number, corner) in numbers.iter_mut().zip(corners) {
+            let next = u32::try_from(vertices_m.len()).map_err(|_| StlError::TooManyVertices)?;
+            *number = *known.entry(corner.0.map(f32::to_bits)).or_insert(next);
+            if *number == next {
+                let at = |axis: usize| f64::from(corner[axis]) * scale[axis];
+                vertices_m.push(Point3::new(at(0), at(1), at(2)));
+            }
+        }
+        triangles.push(numbers);
+    }
     if let Some(bad) = vertices_m
         .iter()
         .position(|v| !v.coords.iter().all(|c| c.is_finite()))
     {
         return Err(StlError::NotFinite { vertex: bad });
     }
-    if mesh.faces.is_empty() {
+    if triangles.is_empty() {
         return Err(StlError::NoTriangles);
     }
-    let index = |i: usize| u32::try_from(i).map_err(|_| StlError::TooManyVertices);
     // A mirrored surface would be inside out.
-    let order = if scale.iter().product::<f64>() < 0.0 {
-        [0, 2, 1]
-    } else {
-        [0, 1, 2]
-    };
-    let triangles = mesh
-        .faces
-        .iter()
-        .map(|face| {
-            Ok([
-                index(face.vertices[order[0]])?,
-                index(face.vertices[order[1]])?,
-                index(face.vertices[order[2]])?,
-            ])
-        })
-        .collect::<Result<_, StlError>>()?;
+    if scale.iter().product::<f64>() < 0.0 {
+        for triangle in &mut triangles {
+            triangle.swap(1, 2);
+        }
+    }
     let mut mesh = TriangleMesh {
         vertices_m,
         triangles,

@@ -1,23 +1,33 @@
 //! Distance of points from a surface, and on which side of it they are.
 
+use std::sync::{Arc, OnceLock};
+
 use nalgebra::{Point3, UnitVector3};
 
-use crate::shape::TriangleMesh;
+use super::cache::tree_of;
 use crate::tree::TriangleTree;
+use crate::triangle_mesh::TriangleMesh;
 
-/// A closed surface with what finds its nearest point, its inside and its crossings with lines.
-#[derive(Debug, Clone, PartialEq)]
+/// A closed surface with what finds its nearest point, its inside and its crossings with lines, which is
+/// made when it is first needed.
+#[derive(Debug, Clone)]
 pub struct SurfaceIndex {
     mesh: TriangleMesh,
-    tree: TriangleTree,
+    tree: OnceLock<Arc<TriangleTree>>,
+}
+
+impl PartialEq for SurfaceIndex {
+    fn eq(&self, other: &Self) -> bool {
+        self.mesh == other.mesh
+    }
 }
 
 impl SurfaceIndex {
     /// Of a mesh with at least one triangle.
     pub fn new(mesh: TriangleMesh) -> Self {
         Self {
-            tree: TriangleTree::new(&mesh),
             mesh,
+            tree: OnceLock::new(),
         }
     }
 
@@ -26,14 +36,14 @@ impl SurfaceIndex {
         &self.mesh
     }
 
-    /// The surface, given back.
-    pub fn into_mesh(self) -> TriangleMesh {
-        self.mesh
+    /// Its triangles in nested boxes.
+    pub(crate) fn tree(&self) -> &Arc<TriangleTree> {
+        self.tree.get_or_init(|| Arc::new(tree_of(&self.mesh)))
     }
 
     /// Whether a point is inside.
     pub fn contains(&self, point: &Point3<f64>) -> bool {
-        self.tree.contains(point)
+        self.tree().contains(point)
     }
 
     /// Distance from the surface, m; positive outside.
@@ -53,12 +63,12 @@ impl SurfaceIndex {
 
     /// The point of the surface that is nearest to a point.
     pub fn nearest(&self, point: &Point3<f64>) -> Point3<f64> {
-        self.tree.nearest(point)
+        self.tree().nearest(point)
     }
 
     /// Where a line runs inside: the distances `s` in m of `origin + s * direction`, in order.
     pub fn clip_line(&self, origin: &Point3<f64>, direction: &UnitVector3<f64>) -> Vec<(f64, f64)> {
-        self.tree.clip_line(origin, direction)
+        self.tree().clip_line(origin, direction)
     }
 }
 

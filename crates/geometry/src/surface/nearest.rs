@@ -10,7 +10,7 @@ use std::collections::BinaryHeap;
 
 use nalgebra::Vector3;
 
-use super::sides::{Boxes, Hint, ROOTS, Sides, Step};
+use super::sides::{Boxes, Hint, Mover, ROOTS, Sides, Step};
 use crate::convex::gjk::{self, Gap};
 use crate::convex::{ConvexCore, CoreSeparation};
 
@@ -65,6 +65,7 @@ pub(crate) fn nearest(sides: &Sides<'_>, cutoff_m: f64) -> Nearest {
         sides,
         best: None,
         best_m: f64::INFINITY,
+        best_high_m: None,
         hint: Hint(usize::MAX),
     };
     let mut heap = BinaryHeap::with_capacity(64);
@@ -74,6 +75,8 @@ pub(crate) fn nearest(sides: &Sides<'_>, cutoff_m: f64) -> Nearest {
         direction: Vector3::zeros(),
     };
     heap.push(search.bounded(ROOTS, &start));
+    // Something is farther than the cutoff, and was left out.
+    let mut is_beyond = false;
     while let Some(entry) = heap.pop() {
         if entry.lower_m > cutoff_m && search.best_m > cutoff_m {
             return Nearest::BeyondCutoff;
@@ -85,7 +88,9 @@ pub(crate) fn nearest(sides: &Sides<'_>, cutoff_m: f64) -> Nearest {
             Step::Boxes(parts) => {
                 for boxes in parts {
                     let part = search.bounded(boxes, &entry);
-                    if part.lower_m < search.best_m {
+                    if part.lower_m > cutoff_m {
+                        is_beyond = true;
+                    } else if part.lower_m < search.best_m {
                         heap.push(part);
                     }
                 }
@@ -99,9 +104,10 @@ pub(crate) fn nearest(sides: &Sides<'_>, cutoff_m: f64) -> Nearest {
         }
     }
     match search.best {
-        Some(best) => Nearest::Apart(best),
+        Some(best) if best.distance_m <= cutoff_m || !is_beyond => Nearest::Apart(best),
+        _ if is_beyond => Nearest::BeyondCutoff,
         // Only numbers that are not finite compare with nothing.
-        None => Nearest::Crossing,
+        _ => Nearest::Crossing,
     }
 }
 
@@ -109,6 +115,8 @@ struct Search<'s> {
     sides: &'s Sides<'s>,
     best: Option<CoreSeparation>,
     best_m: f64,
+    /// Largest coordinate along the best normal of a convex A, the same for all boxes of B.
+    best_high_m: Option<f64>,
     hint: Hint,
 }
 
@@ -116,27 +124,40 @@ impl Search<'_> {
     /// Lower bound of the boxes' distance, never below their parents'.
     fn bounded(&mut self, boxes: Boxes, parent: &Entry) -> Entry {
         let mut entry = Entry { boxes, ..*parent };
-        let improve = |entry: &mut Entry, direction: &Vector3<f64>, hint: &mut Hint| {
-            let gap_m = self.sides.gap_m(boxes, direction, hint);
+        let improve = |entry: &mut Entry, direction: &Vector3<f64>, gap_m: f64| {
             if gap_m > entry.lower_m {
                 entry.lower_m = gap_m;
                 entry.direction = *direction;
             }
         };
-        if let Some(best) = &self.best {
-            improve(&mut entry, &best.normal, &mut self.hint);
+        if let Some(CoreSeparation { normal, .. }) = self.best {
+            let gap_m = match self.best_high_m {
+                Some(high_m) => self.sides.b.block(boxes.b).low(&normal) - high_m,
+                None => self.sides.gap_m(boxes, &normal, &mut self.hint),
+            };
+            improve(&mut entry, &normal, gap_m);
             if entry.lower_m >= self.best_m {
                 return entry;
             }
         }
         if let Some(direction) = self.sides.direction(boxes) {
-            improve(&mut entry, &direction, &mut self.hint);
+            let gap_m = self.sides.gap_m(boxes, &direction, &mut self.hint);
+            improve(&mut entry, &direction, gap_m);
         }
         entry
     }
 
     /// Whether the pair is apart.
     fn try_pair(&mut self, a: &ConvexCore, b: &ConvexCore, entry: &Entry) -> bool {
+        // Most triangles are beyond the plane of the best one.
+        if let (Some(best), Some(high_m), ConvexCore::Triangle(corners)) =
+            (&self.best, self.best_high_m, b)
+        {
+            let low_m = corners.map(|corner| best.normal.dot(&corner));
+            if low_m.into_iter().all(|low_m| low_m - high_m >= self.best_m) {
+                return true;
+            }
+        }
         let mut difference = self.sides.difference(a, b, self.hint);
         let towards = match &self.best {
             Some(best) => best.normal,
@@ -147,6 +168,9 @@ impl Search<'_> {
                 if found.distance_m < self.best_m {
                     self.best_m = found.distance_m;
                     self.best = Some(found);
+                    let is_convex = matches!(self.sides.a, Mover::Convex { .. });
+                    self.best_high_m = is_convex
+                        .then(|| self.sides.high_a(ROOTS.a, &found.normal, &mut self.hint));
                 }
             }
             Gap::BeyondCutoff => {}

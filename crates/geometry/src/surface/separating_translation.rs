@@ -79,7 +79,7 @@ pub(crate) fn separating_translation(
     let mut length_m = 0.0;
     let mut last: Option<Exit> = None;
     for _ in 0..ROUNDS {
-        while let Some(exit) = latest_exit(sides, radius_m, direction, length_m) {
+        while let Some(exit) = latest_exit(sides, radius_m, direction, length_m, limit_m) {
             length_m = exit.length_m;
             last = Some(exit);
             if length_m >= limit_m {
@@ -125,7 +125,8 @@ pub(crate) fn is_within(sides: &Sides<'_>) -> bool {
     }
 }
 
-/// The latest exit, beyond `length_m`, of the triangles that A touches on its way of that length.
+/// The latest exit, beyond `length_m`, of the triangles that A touches on its way of that length; one that is
+/// no earlier than `limit_m` where there is such a one.
 ///
 /// Boxes are opened from the latest that they could be left.
 fn latest_exit(
@@ -133,6 +134,7 @@ fn latest_exit(
     radius_m: f64,
     direction: &Vector3<f64>,
     length_m: f64,
+    limit_m: f64,
 ) -> Option<Exit> {
     let way = sides.swept(&(direction * length_m));
     let mut hint = Hint(usize::MAX);
@@ -165,13 +167,23 @@ fn latest_exit(
             }
             Step::Leaves(ones, others) => {
                 sides.each_pair(ones, others, |a, b| {
-                    let found = exit(sides, &way, (a, b), radius_m, direction, beyond_m);
+                    let found = exit(
+                        sides,
+                        &way,
+                        (a, b),
+                        radius_m,
+                        direction,
+                        [beyond_m, limit_m],
+                    );
                     if let Some(found) = found {
                         beyond_m = found.length_m;
                         latest = Some(found);
                     }
-                    true
+                    beyond_m < limit_m
                 });
+                if beyond_m >= limit_m {
+                    break;
+                }
             }
         }
     }
@@ -200,14 +212,15 @@ pub(crate) fn touches(
     }
 }
 
-/// When A leaves a triangle, if it touches it on its way and leaves it after `beyond_m`.
+/// When A leaves a triangle, if it touches it on its way and leaves it after `beyond_m`; the limit itself where
+/// that is later.
 fn exit(
     sides: &Sides<'_>,
     way: &Sides<'_>,
     (a, b): (&ConvexCore, &ConvexCore),
     radius_m: f64,
     direction: &Vector3<f64>,
-    beyond_m: f64,
+    [beyond_m, limit_m]: [f64; 2],
 ) -> Option<Exit> {
     let farthest = sides
         .difference(a, b, Hint(usize::MAX))
@@ -218,6 +231,11 @@ fn exit(
         return None;
     }
     let mut on_a = farthest.a;
+    // Still touched there: when exactly it is left does not matter.
+    if length_m > limit_m && touches(&sides.moved(&(direction * limit_m)), (a, b), radius_m) {
+        let length_m = limit_m;
+        return Some(Exit { length_m, on_a });
+    }
     for _ in 0..EXIT_STEPS {
         let there = sides.moved(&(direction * length_m));
         let mut difference = there.difference(a, b, Hint(usize::MAX));

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::line::{Crossing, Line};
 use super::point_triangle::nearest_on_triangle;
 use super::triangle_tree::{Parts, TriangleTree};
-use crate::shape::TriangleMesh;
+use crate::triangle_mesh::TriangleMesh;
 
 /// Distance from the box around everything that is no rounding, relative to its size.
 const BOX_SLACK: f64 = 1e-9;

@@ -9,8 +9,9 @@ use std::cmp::Ordering;
 use nalgebra::Vector3;
 
 use crate::bounds::OrientedBox;
-use crate::shape::TriangleMesh;
+use crate::encoding::{Encode, Reader};
 use crate::topology::{connected_parts, weld};
+use crate::triangle_mesh::TriangleMesh;
 
 /// Triangles in a leaf: their own plane tests cost about as much as a further box.
 const LEAF_TRIANGLES: usize = 4;
@@ -40,6 +41,8 @@ pub struct TriangleTree {
     nodes: Vec<Node>,
     /// In the order of the leaves.
     triangles: Vec<[Vector3<f64>; 3]>,
+    /// Their numbers in the mesh.
+    numbers: Vec<u32>,
     /// One vertex of each connected part of the surface.
     pub(crate) anchors: Vec<Vector3<f64>>,
 }
@@ -48,25 +51,72 @@ impl TriangleTree {
     /// Triangles that name a vertex which is not there are left out: an error of the loader's.
     /// Without any triangle the surface is the origin, which keeps every query defined.
     pub fn new(mesh: &TriangleMesh) -> Self {
-        let corner = |&i: &u32| mesh.vertices_m.get(i as usize).map(|vertex| vertex.coords);
-        let mut triangles: Vec<[Vector3<f64>; 3]> = mesh
-            .triangles
-            .iter()
-            .filter_map(|[a, b, c]| Some([corner(a)?, corner(b)?, corner(c)?]))
+        let mut items: Vec<Item> = (0..)
+            .zip(&mesh.triangles)
+            .filter_map(|(number, triangle)| {
+                let corners = corners_of(mesh, triangle)?;
+                Some(Item { corners, number })
+            })
             .collect();
-        let anchors = if triangles.is_empty() {
-            triangles.push([Vector3::zeros(); 3]);
+        let anchors = if items.is_empty() {
+            items.push(NOTHING);
             vec![Vector3::zeros()]
         } else {
-            anchors(&triangles)
+            let corners: Vec<_> = items.iter().map(|item| item.corners).collect();
+            anchors(&corners)
         };
-        let mut nodes = Vec::with_capacity(triangles.len());
-        split(&mut nodes, &mut triangles, 0);
+        let mut nodes = Vec::with_capacity(items.len());
+        split(&mut nodes, &mut items, 0);
         Self {
             nodes,
-            triangles,
+            triangles: items.iter().map(|item| item.corners).collect(),
+            numbers: items.iter().map(|item| item.number).collect(),
             anchors,
         }
+    }
+
+    /// Its bytes: with those of the mesh all of it.
+    pub(crate) fn encoded(&self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(104 * self.nodes.len() + 4 * self.numbers.len() + 64);
+        for count in [self.nodes.len(), self.numbers.len(), self.anchors.len()] {
+            count.encode(&mut bytes);
+        }
+        for node in &self.nodes {
+            node.block.encode(&mut bytes);
+            node.next.encode(&mut bytes);
+            node.count.encode(&mut bytes);
+        }
+        for number in &self.numbers {
+            number.encode(&mut bytes);
+        }
+        for anchor in &self.anchors {
+            anchor.encode(&mut bytes);
+        }
+        bytes
+    }
+
+    /// The tree of a mesh from what [`TriangleTree::encoded`] made of it.
+    pub(crate) fn decoded(reader: &mut Reader<'_>, mesh: &TriangleMesh) -> Option<Self> {
+        let [nodes, triangles, anchors] = [reader.count()?, reader.count()?, reader.count()?];
+        let nodes = reader.list(nodes, 104, |reader| {
+            Some(Node {
+                block: OrientedBox::decoded(reader)?,
+                next: reader.index()?,
+                count: reader.index()?,
+            })
+        })?;
+        let numbers = reader.list(triangles, 4, Reader::index)?;
+        let anchors = reader.list(anchors, 24, Reader::vector)?;
+        let corners = numbers.iter().map(|&number| match number {
+            number if number == NOTHING.number => Some(NOTHING.corners),
+            number => corners_of(mesh, mesh.triangles.get(number as usize)?),
+        });
+        Some(Self {
+            nodes,
+            triangles: corners.collect::<Option<_>>()?,
+            numbers,
+            anchors,
+        })
     }
 
     pub(crate) fn root(&self) -> &OrientedBox {
@@ -132,12 +182,31 @@ impl TriangleTree {
     }
 }
 
+/// A triangle and its number in the mesh.
+struct Item {
+    corners: [Vector3<f64>; 3],
+    number: u32,
+}
+
+/// What stands for a mesh without triangles.
+const NOTHING: Item = Item {
+    corners: [Vector3::new(0.0, 0.0, 0.0); 3],
+    number: u32::MAX,
+};
+
+/// None if a vertex is not there.
+fn corners_of(mesh: &TriangleMesh, triangle: &[u32; 3]) -> Option<[Vector3<f64>; 3]> {
+    let [a, b, c] = triangle.map(|i| mesh.vertices_m.get(i as usize).map(|vertex| vertex.coords));
+    Some([a?, b?, c?])
+}
+
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a mesh numbers its vertices in u32, so its triangles and boxes fit too"
 )]
-fn split(nodes: &mut Vec<Node>, triangles: &mut [[Vector3<f64>; 3]], first: usize) {
-    let (block, axis) = OrientedBox::around(&triangles.iter().flatten());
+fn split(nodes: &mut Vec<Node>, triangles: &mut [Item], first: usize) {
+    let corners = triangles.iter().flat_map(|item| &item.corners);
+    let (block, axis) = OrientedBox::around(&corners);
     if triangles.len() <= LEAF_TRIANGLES {
         nodes.push(Node {
             block,
@@ -146,7 +215,10 @@ fn split(nodes: &mut Vec<Node>, triangles: &mut [[Vector3<f64>; 3]], first: usiz
         });
         return;
     }
-    let key = |triangle: &[Vector3<f64>; 3]| axis.dot(&(triangle[0] + triangle[1] + triangle[2]));
+    let key = |item: &Item| {
+        let [a, b, c] = &item.corners;
+        axis.dot(&(a + b + c))
+    };
     let middle = triangles.len() / 2;
     triangles.select_nth_unstable_by(middle, |one, other| key(one).total_cmp(&key(other)));
     let index = nodes.len();

@@ -24,10 +24,7 @@ const UNDERESTIMATE_M: f64 = 1e-9;
 const LEFT_M: f64 = 1e-9;
 
 fn solid_mesh(surface: TriangleMesh) -> Shape {
-    Shape::Mesh(Arc::new(SolidMesh {
-        surface,
-        pieces: Vec::new(),
-    }))
+    Shape::Mesh(Arc::new(SolidMesh::new(surface)))
 }
 
 fn convex(surface: TriangleMesh) -> Shape {
@@ -131,7 +128,7 @@ fn faceted(shape: &Shape) -> (TriangleMesh, f64) {
     match shape {
         Shape::Cuboid { half_extents_m: h } => (box_mesh([-h.x, -h.y, -h.z], [h.x, h.y, h.z]), 0.0),
         Shape::Convex(mesh) => (mesh.0.clone(), 0.0),
-        Shape::Mesh(mesh) => (mesh.surface.clone(), 0.0),
+        Shape::Mesh(mesh) => (mesh.surface().clone(), 0.0),
         Shape::Sphere { radius_m } => (needle(1e-13), *radius_m),
         Shape::Capsule {
             radius_m,

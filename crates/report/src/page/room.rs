@@ -63,6 +63,7 @@ pub(super) fn configuration(
     let q = Joints::from_column_slice(&report.joints_rad?);
     report.room.as_ref()?;
     let obstacles = room.obstacles().all(&q);
+    let mut sight = obstacles.lines();
     let targets = room.targets(goal, &q);
     // Eye, end, and 1 where the line is blocked there.
     let mut lines: Vec<f64> = Vec::new();
@@ -72,7 +73,7 @@ pub(super) fn configuration(
             let segments =
                 sight_segments(&eyes_m, person.head_movement_m, &targets, LINES_DRAWN / 2);
             for [eye, target] in segments {
-                let blocked = obstacles.first_on_the_way(&eye, &target);
+                let blocked = sight.first_on_the_way(&eye, &target);
                 let end = blocked
                     .as_ref()
                     .map_or(target, |(t, _)| eye + (target - eye) * *t);

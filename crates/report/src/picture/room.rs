@@ -128,6 +128,7 @@ impl<'a> RoomPictures<'a> {
     /// People with their lines of sight; one label for each stature.
     fn add_sight(&self, scene: &mut Scene, q: &Joints, room: &RoomReport) {
         let all = self.room.obstacles().all(q);
+        let mut sight = all.lines();
         let targets = self.room.targets(self.goal, q);
         for person in self.people() {
             for &stature_m in &person.statures_m {
@@ -135,7 +136,7 @@ impl<'a> RoomPictures<'a> {
                 let segments =
                     sight_segments(&eyes_m, person.head_movement_m, &targets, LINES_DRAWN / 2);
                 for [eye, target] in segments {
-                    let (to_m, color_rgba) = match all.first_on_the_way(&eye, &target) {
+                    let (to_m, color_rgba) = match sight.first_on_the_way(&eye, &target) {
                         None => (target, SEEN),
                         Some((t, _)) => (eye + (target - eye) * t, HIDDEN),
                     };

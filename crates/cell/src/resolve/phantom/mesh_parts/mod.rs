@@ -6,7 +6,7 @@ mod unit;
 
 use std::path::Path;
 
-use needlebench_geometry::mesh::{SurfaceIndex, Use, centroid_m, shape_of_surface, volume_m3};
+use needlebench_geometry::mesh::{SurfaceIndex, centroid_m, check_thickness, volume_m3};
 use needlebench_geometry::{Shape, Solid, TriangleMesh};
 use needlebench_kinematics::Pose;
 
@@ -245,20 +245,18 @@ fn part_of(
             .collect(),
         triangles: mesh.surface.triangles.clone(),
     };
-    let purpose = if section.tissue == PartTissue::Skin {
-        Use::Collision
-    } else {
-        Use::Distance
-    };
-    let (shape, fidelity) = shape_of_surface(about_middle, purpose).map_err(|why| {
-        toml.finding(
-            &format!("phantom.parts[{index}].file"),
-            format!("{}: {why}", mesh.file),
-        )
-    })?;
-    if let Some(fidelity) = fidelity {
-        notes.push(format!("part `{}`: {}", section.name, fidelity.in_words()));
-    } else if purpose == Use::Collision && matches!(shape, Shape::Convex(_)) {
+    let is_skin = section.tissue == PartTissue::Skin;
+    if is_skin {
+        // What engines collide with.
+        check_thickness(&about_middle.vertices_m).map_err(|why| {
+            toml.finding(
+                &format!("phantom.parts[{index}].file"),
+                format!("{}: {why}", mesh.file),
+            )
+        })?;
+    }
+    let shape = Shape::of_surface(about_middle);
+    if is_skin && matches!(shape, Shape::Convex(_)) {
         notes.push(format!("part `{}` is convex", section.name));
     }
     Ok(PhantomPart {
