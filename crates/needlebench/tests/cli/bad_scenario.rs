@@ -343,7 +343,8 @@ fn unknown_phantom_is_refused_with_the_shipped_ones() {
         .says("male-p51")
         .hints("did you mean `male-p5");
     refused_with("[phantom]", "[phantom]\nmodel = \"x\"")
-        .hints("female-p5, female-p50, female-p95, male-p5, male-p50, male-p95");
+        .hints("female-p5, female-p5-supine, female-p50, female-p50-supine, female-p95,")
+        .hints("male-p50-supine, male-p95, male-p95-supine");
 }
 
 #[test]
