@@ -31,6 +31,8 @@ const SOFT_M: f64 = 10e-3;
 const CUSHION_M: [f64; 2] = [0.05, 0.3];
 /// Higher than any table or bed, m: the range of `table.top_height_mm` ends here.
 const HIGHEST_TABLE_M: f64 = 2.0;
+/// The key that places the patient.
+const PATIENTS_PLACE: &str = "phantom.position_mm";
 /// Length of a patient beyond the table that is worth a note, m.
 const OVERHANG_M: f64 = 0.05;
 /// A goal this many times farther than the arm could ever be long is a slip, and no question of reach.
@@ -59,6 +61,7 @@ impl Standing<'_> {
         self.check_fixtures()?;
         self.check_base(patient, notes)?;
         self.check_phantom(patient, notes)?;
+        self.check_bore(patient)?;
         self.check_obstacles(patient, notes)
     }
 
@@ -255,17 +258,35 @@ impl Standing<'_> {
         ));
     }
 
+    /// A patient in the gantry's housing.
+    fn check_bore(&self, patient: Option<&Patient<'_>>) -> Result<(), Finding> {
+        let (Some(patient), Some(gantry)) = (patient, self.fixture(FixtureKind::Gantry)) else {
+            return Ok(());
+        };
+        let depth_m = patient.depth_of_any_m(&gantry.solids);
+        if depth_m <= SOFT_M {
+            return Ok(());
+        }
+        let message = format!(
+            "the patient lies {:.0} mm inside the gantry's housing",
+            depth_m * 1e3
+        );
+        let finding = self.toml.finding(PATIENTS_PLACE, message);
+        Err(finding.hint("move the patient into the bore or out of it"))
+    }
+
     /// A patient in, under or far above something, or beyond the table.
     fn check_phantom(
         &self,
         patient: Option<&Patient<'_>>,
         notes: &mut Vec<String>,
     ) -> Result<(), Finding> {
-        const KEY: &str = "phantom.position_mm";
         let (Some(body), Some((placed, unplaced))) = (patient, self.phantom) else {
             return Ok(());
         };
-        let refuse = |message: String, hint: &str| Err(self.toml.finding(KEY, message).hint(hint));
+        let refuse = |message: String, hint: &str| {
+            Err(self.toml.finding(PATIENTS_PLACE, message).hint(hint))
+        };
         let height = "the third number is the height over the floor, with `rest_on_table` that of a \
                       cushion over the table, in millimetres";
         // Along and across the table, so that its box is the table; z is the world's.
@@ -277,16 +298,6 @@ impl Standing<'_> {
         if low < -SOFT_M {
             let message = format!("the patient lies {:.0} mm under the floor", -low * 1e3);
             return refuse(message, height);
-        }
-        if let Some(gantry) = self.fixture(FixtureKind::Gantry) {
-            let depth_m = body.depth_of_any_m(&gantry.solids);
-            if depth_m > SOFT_M {
-                let message = format!(
-                    "the patient lies {:.0} mm inside the gantry's housing",
-                    depth_m * 1e3
-                );
-                return refuse(message, "move the patient into the bore or out of it");
-            }
         }
         let on_nothing = |notes: &mut Vec<String>| {
             if low > HIGHEST_TABLE_M {

@@ -13,8 +13,7 @@ const TABLE_M: f64 = 0.78;
 fn resolve(phantom: &str) -> Result<ResolvedScenario, Vec<Finding>> {
     let text = format!(
         "name = \"x\"\n[robot]\nbase_position_mm = [-900, 0, 800]\n[phantom]\n{phantom}\n\
-         [table]\ntop_height_mm = 780\n[[goals]]\nname = \"g\"\n[goals.flange_pose]\n\
-         position_mm = [300, 0, 300]\nrotation_vector_rad = [0, 0, 0]\n"
+         [table]\ntop_height_mm = 780\n[iso9283]\ncube_centre_mm = [0, -300, 150]\n"
     );
     resolve_scenario("x.toml", &text, Path::new(""), &Overrides::default())
 }
@@ -147,8 +146,7 @@ fn obstacle_in_an_arm_is_refused() {
             "name = \"x\"\n[robot]\nbase_position_mm = [-900, 0, 800]\n[phantom]\narms = \"beside\"\n\
              [table]\ntop_height_mm = 780\n[[obstacles]]\nname = \"pole\"\n\
              position_mm = [0, {y_mm}, 900]\nshape = {{ cylinder = {{ radius_mm = 15, length_mm = 200 }} }}\n\
-             [[goals]]\nname = \"g\"\n[goals.flange_pose]\nposition_mm = [300, 0, 300]\n\
-             rotation_vector_rad = [0, 0, 0]\n"
+             [iso9283]\ncube_centre_mm = [0, -300, 150]\n"
         );
         resolve_scenario("x.toml", &text, Path::new(""), &Overrides::default())
     };

@@ -137,7 +137,7 @@ fn value_outside_its_range_is_refused_with_range_and_unit() {
         .key("motion.hold_s")
         .says("900 s, outside 0.1 to 60")
         .hints("in s");
-    refused_with("top_height_mm = 739.5", "length_mm = 2.0")
+    refused_with("top_height_mm = 763.5", "length_mm = 2.0")
         .key("table.length_mm")
         .at("length_mm = 2.0")
         .says("`table.length_mm` is 2 mm, outside 300 to 5000")
@@ -192,8 +192,8 @@ fn goal_inside_the_table_is_refused() {
     // Without `rest_on_table` the phantom may be pushed into the table by mistake.
     let sunk = with_edit(
         SMALL,
-        "position_mm = [148.0, -597.5, 0]",
-        "position_mm = [148.0, -597.5, 660]\nrest_on_table = false",
+        "position_mm = [155.0, -609.5, 0]",
+        "position_mm = [155.0, -609.5, 660]\nrest_on_table = false",
     );
     let text = with_edit(&sunk, FLANGE_POSE, ENTRY_AND_TARGET);
     refused(&text)
@@ -207,7 +207,7 @@ fn goal_inside_the_table_is_refused() {
     let without_phantom = SMALL.replace(&SMALL[start..end], "");
     let text = with_edit(
         &without_phantom,
-        "top_height_mm = 739.5",
+        "top_height_mm = 763.5",
         "top_height_mm = 920",
     );
     refused(&text)
