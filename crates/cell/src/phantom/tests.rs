@@ -530,3 +530,31 @@ proptest! {
         }
     }
 }
+
+/// Volumes, in litres, as models/chest_phantom/README.md states them.
+#[test]
+fn volumes_are_as_documented() {
+    const ROUNDED_L: f64 = 0.0051;
+    for (size, volumes_l) in [
+        ("male-p50", [1.18, 1.50, 0.43, 0.76, 21.1]),
+        ("male-p50-supine", [1.08, 1.37, 0.23, 0.40, 19.6]),
+    ] {
+        let phantom = Phantom::build(&Phantom::size_preset(size).unwrap()).unwrap();
+        let names = ["lung_left", "lung_right", "heart", "liver", "skin"];
+        for (name, stated_l) in names.into_iter().zip(volumes_l) {
+            let Shape::Convex(mesh) = &part(&phantom, name).shape else {
+                panic!("{name} is a mesh");
+            };
+            let volume_l = 1e3 * needlebench_geometry::mesh::volume_m3(&mesh.0);
+            let rounded_l = if name == "skin" {
+                10.0 * ROUNDED_L
+            } else {
+                ROUNDED_L
+            };
+            assert!(
+                (volume_l - stated_l).abs() < rounded_l,
+                "{size} {name}: {volume_l}"
+            );
+        }
+    }
+}
