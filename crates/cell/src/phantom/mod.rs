@@ -170,7 +170,9 @@ impl Phantom {
         };
         let skin_faces = HalfSpaces::of(&skin.solid).expect("the skin is a convex mesh");
 
-        let mut inner = skeleton::bones(parameters, &envelope, &frame);
+        let mut inner = skeleton::skeleton(parameters, &envelope, &frame);
+        inner.extend(ribs::ribs(parameters, &envelope, &frame));
+        inner.extend(scapula::scapulae(parameters, &envelope, &frame));
         inner.extend(organs::organs(parameters, &envelope, &frame));
         for part in &inner {
             let depth_m = skin_faces.depth_of_solid_m(&part.solid);

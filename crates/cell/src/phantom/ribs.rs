@@ -75,7 +75,7 @@ const PIECES_PER_RIB: usize = 10;
 const NECK_ANGLE_RAD: f64 = 0.12;
 /// Space between the pleura and the inside of a rib. A straight piece's middle comes nearer to the
 /// pleura than its ends, by up to 2 mm.
-const RIB_FROM_PLEURA_MM: f64 = 3.5;
+pub(super) const RIB_FROM_PLEURA_MM: f64 = 3.5;
 
 /// Point of a rib's centre line.
 #[derive(Debug, Clone, Copy)]
@@ -208,8 +208,19 @@ fn bone_end(course: &[CoursePoint], rib: &RibCourse) -> usize {
     bone_pieces.count()
 }
 
-/// The ribs, those that reach the sternum with their cartilages.
+/// The ribs with their cartilages.
 pub(super) fn ribs(
+    parameters: &PhantomParameters,
+    envelope: &Envelope,
+    frame: &Frame,
+) -> Vec<PhantomPart> {
+    let mut parts = sternal_and_free_ribs(parameters, envelope, frame);
+    parts.extend(costal_margin(parameters, envelope, frame));
+    parts
+}
+
+/// The ribs, those that reach the sternum with their cartilages.
+fn sternal_and_free_ribs(
     parameters: &PhantomParameters,
     envelope: &Envelope,
     frame: &Frame,
@@ -237,7 +248,7 @@ pub(super) fn ribs(
 
 /// The cartilages of ribs 8 to 10: each from the end of its rib to the end of the one above, the
 /// first to the cartilage of rib 7.
-pub(super) fn costal_margin(
+fn costal_margin(
     parameters: &PhantomParameters,
     envelope: &Envelope,
     frame: &Frame,
@@ -255,8 +266,7 @@ pub(super) fn costal_margin(
     let mut parts = Vec::new();
     for (side, sign) in SIDES {
         let mut above = ON_SEVENTH;
-        for index in 7..10 {
-            let rib = &RIBS[index];
+        for (rib, number) in RIBS[7..10].iter().zip(8..) {
             let end = [rib.cartilage_from_deg, rib.front_mm];
             let points: Vec<CoursePoint> = (0..=PIECES)
                 .map(|k| {
@@ -266,7 +276,7 @@ pub(super) fn costal_margin(
                     cage.point(deg.to_radians(), height_mm, sign)
                 })
                 .collect();
-            let organ = format!("cartilage_{side}_{}", index + 1);
+            let organ = format!("cartilage_{side}_{number}");
             parts.extend(cage.cartilage(&organ, &points));
             above = end;
         }

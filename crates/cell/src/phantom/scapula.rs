@@ -5,6 +5,7 @@ use needlebench_geometry::mesh::convex_hull;
 use needlebench_kinematics::Pose;
 
 use super::envelope::{Envelope, Frame};
+use super::ribs::RIB_FROM_PLEURA_MM;
 use super::skeleton::bone;
 use super::solids::convex;
 use super::{PhantomParameters, PhantomPart};
@@ -17,8 +18,6 @@ const CORNERS: [[f64; 2]; 3] = [[40.0, 158.0], [68.0, 18.0], [104.0, 134.0]];
 /// (assumed), mm.
 const THICKNESS_MM: f64 = 4.0;
 const FROM_RIBS_MM: f64 = 4.0;
-/// Pleura to the outside of a rib, less the rib, mm.
-const RIB_FROM_PLEURA_MM: f64 = 3.5;
 
 /// Both, each of four flat triangles that follow the cage.
 pub(super) fn scapulae(

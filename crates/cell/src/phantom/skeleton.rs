@@ -1,11 +1,9 @@
-//! Sternum and spine; the other bones are put together with them.
+//! Sternum and spine.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use needlebench_geometry::Solid;
 
 use super::envelope::{Envelope, Frame};
-use super::ribs::{costal_margin, ribs};
-use super::scapula::scapulae;
 use super::solids::{cuboid, cylinder, pose};
 use super::{PhantomParameters, PhantomPart, Tissue};
 
@@ -24,20 +22,18 @@ const VERTEBRA_SHARE: f64 = 0.84;
 /// Distance of the vertebral bodies' axis in front of the back of the cage, layout mm.
 const SPINE_FROM_CAGE_MM: f64 = 26.0;
 
-/// All bones, in a fixed order.
-pub(super) fn bones(
+/// Sternum and spine, in a fixed order.
+pub(super) fn skeleton(
     parameters: &PhantomParameters,
     envelope: &Envelope,
     frame: &Frame,
 ) -> Vec<PhantomPart> {
     let mut parts = sternum(parameters, envelope, frame);
     parts.extend(spine(parameters, envelope, frame));
-    parts.extend(ribs(parameters, envelope, frame));
-    parts.extend(costal_margin(parameters, envelope, frame));
-    parts.extend(scapulae(parameters, envelope, frame));
     parts
 }
 
+/// A part of bone.
 pub(super) fn bone(solid: Solid, organ: &str) -> PhantomPart {
     PhantomPart {
         name: solid.name.clone(),
