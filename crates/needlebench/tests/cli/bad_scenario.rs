@@ -11,9 +11,9 @@ position_mm = [194.2, -359.3, 170.1]
 rotation_vector_rad = [-0.8567, 2.7197, -1.1407]
 ";
 
-/// Straight down into the front of the chest: the skin is at -126.3 mm.
+/// Straight down into the front of the chest: the skin is at -106.8 mm.
 const ENTRY_AND_TARGET: &str = "\
-entry_mm = [0, -126, 0]
+entry_mm = [0, -106, 0]
 target_mm = [0, -60, 0]
 ";
 
@@ -165,22 +165,22 @@ fn target_outside_the_phantom_is_refused_with_its_distance() {
     refused_goal_with("[0, -60, 0]", "[0, -200, 0]")
         .at("target_mm")
         .key("goals[0].target_mm")
-        .says("73.5 mm outside the phantom")
+        .says("93.0 mm outside the phantom")
         .hints("phantom frame");
 }
 
 #[test]
 fn entry_off_the_skin_is_refused_with_the_point_on_it() {
-    refused_goal_with("[0, -126, 0]", "[0, -220, 0]")
+    refused_goal_with("[0, -106, 0]", "[0, -220, 0]")
         .at("entry_mm")
         .key("goals[0].entry_mm")
-        .says("93.7 mm before the skin")
-        .hints("meets the skin at [0.0, -126.3, 0.0]");
+        .says("113.2 mm before the skin")
+        .hints("meets the skin at [0.0, -106.8, 0.0]");
 }
 
 #[test]
 fn entry_equal_to_target_is_refused() {
-    refused_goal_with("[0, -60, 0]", "[0, -126, 0]")
+    refused_goal_with("[0, -60, 0]", "[0, -106, 0]")
         .at("entry_mm")
         .key("goals[0].entry_mm")
         .says("same point")
@@ -227,7 +227,7 @@ fn flange_pose_that_points_past_the_phantom_is_refused() {
 
 #[test]
 fn goal_that_contradicts_itself_is_refused() {
-    refused_goal("entry_mm = [0, -126, 0]\n")
+    refused_goal("entry_mm = [0, -106, 0]\n")
         .at("[[goals]]")
         .key("goals[0].target_mm")
         .says("neither `target_mm` nor `lesion`");
@@ -241,7 +241,7 @@ fn goal_that_contradicts_itself_is_refused() {
     .at("lesion")
     .key("goals[0].lesion")
     .says("contradicts `target_mm`");
-    refused_with("approach_mm = 20", "entry_mm = [0, -126, 0]")
+    refused_with("approach_mm = 20", "entry_mm = [0, -106, 0]")
         .at("entry_mm")
         .key("goals[0].entry_mm")
         .says("contradicts `flange_pose`");
@@ -249,7 +249,7 @@ fn goal_that_contradicts_itself_is_refused() {
 
 #[test]
 fn unknown_lesion_is_refused_with_the_one_that_was_meant() {
-    refused_goal("entry_mm = [0, -126, 0]\nlesion = \"left_perihilum\"\n")
+    refused_goal("entry_mm = [0, -106, 0]\nlesion = \"left_perihilum\"\n")
         .at("lesion")
         .key("goals[0].lesion")
         .says("no lesion `left_perihilum`")
