@@ -21,8 +21,8 @@ use needlebench_evaluation::{
 };
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{
-    ConfigurationPlan, GoalPlan, Margin, Planner, PostureMargins, Rejection, Rule, judge_route,
-    needle_route,
+    ConfigurationPlan, GoalPlan, Margin, Planner, PostureMargins, Rejection, Rule,
+    crossed_fissures, judge_route, needle_route,
 };
 
 use crate::adjudication::Adjudicated;
@@ -181,6 +181,7 @@ pub(crate) fn goal_report(
         insertion_length_m: goal.insertion_length_m,
         standoff_m: goal.standoff_m,
         needle_route: route_report(resolved, goal),
+        fissures_crossed: crossed_fissures(resolved, goal),
         configurations: plan
             .configurations
             .iter()

@@ -11,7 +11,7 @@ use needlebench_evaluation::report::{ConfigurationReport, RejectionReport, Route
 use needlebench_evaluation::{first_missed_by_posture, route_is_expected};
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{Member, Planner, Rule};
+use needlebench_planning::{Member, Planner, Rule, crossed_fissures};
 use serde::Serialize;
 
 use crate::assemble::{rejection_report, route_report};
@@ -52,6 +52,8 @@ pub struct GoalPreview {
     /// How the needle keeps away from bone, vessels and organs; none where there is nothing to keep away
     /// from. Configurations are looked at as if it did.
     pub needle_route: Option<RouteReport>,
+    /// Fissures of the lungs that the needle crosses.
+    pub fissures_crossed: Vec<String>,
     /// Where the target lies.
     pub target: TargetPreview,
 }
@@ -137,6 +139,7 @@ fn goal_preview(planner: &Planner<'_>, resolved: &ResolvedScenario, goal: &Goal)
         working: configurations.iter().filter(|each| each.works).count(),
         configurations,
         needle_route: route_report(resolved, goal),
+        fissures_crossed: crossed_fissures(resolved, goal),
         target: target_preview(resolved, goal),
     }
 }

@@ -144,6 +144,8 @@ pub struct GoalReport {
     pub standoff_m: Option<f64>,
     /// What the planned needle keeps away from least; none where there is nothing to keep away from.
     pub needle_route: Option<RouteReport>,
+    /// Fissures of the lungs that the planned needle crosses.
+    pub fissures_crossed: Vec<String>,
     /// All eight configurations.
     pub configurations: Vec<ConfigurationReport>,
     /// The one to choose; none if none works.

@@ -28,7 +28,25 @@ pub fn needle_route<'a>(
     placed: &'a PlacedPhantom,
     goal: &Goal,
 ) -> Option<RouteClearance<'a>> {
-    nearest_of(cell, placed, goal, |_| true)
+    nearest_of(cell, placed, goal, |part| part.tissue != Tissue::Fissure)
+}
+
+/// Names of the fissures of the lungs that the planned needle touches or crosses, in the order of the
+/// phantom's parts: an air leak is likelier then.
+pub fn crossed_fissures(resolved: &ResolvedScenario, goal: &Goal) -> Vec<String> {
+    let Some(placed) = &resolved.phantom else {
+        return Vec::new();
+    };
+    let parts = &placed.phantom.route_obstacles().parts;
+    let fissures = parts.iter().filter(|part| part.tissue == Tissue::Fissure);
+    let is_crossed = |fissure: &&RouteObstacle| {
+        nearest_of(&resolved.cell, placed, goal, |part| part == *fissure)
+            .is_some_and(|nearest| nearest.separation.distance_m - ROUNDING_M <= 0.0)
+    };
+    fissures
+        .filter(is_crossed)
+        .map(|fissure| fissure.name.clone())
+        .collect()
 }
 
 fn nearest_of<'a>(
@@ -91,7 +109,7 @@ fn margin_m(section: &NeedleRouteSection, tissue: Tissue) -> Option<f64> {
         Tissue::Bone => section.bone_mm,
         Tissue::Vessel => section.vessel_mm,
         Tissue::Organ => section.organ_mm,
-        Tissue::Skin | Tissue::Lesion | Tissue::Marker => return None,
+        Tissue::Skin | Tissue::Fissure | Tissue::Lesion | Tissue::Marker => return None,
     };
     Some(margin_mm * 1e-3)
 }

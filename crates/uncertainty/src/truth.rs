@@ -445,6 +445,7 @@ impl Truth {
     pub fn phantom(&self, planned: &PlacedPhantom) -> PlacedPhantom {
         PlacedPhantom {
             phantom: planned.phantom.clone(),
+            limbs: planned.limbs.clone(),
             world_from_phantom: Translation3::from(self.breath_m[0])
                 * self.shift
                 * planned.world_from_phantom,

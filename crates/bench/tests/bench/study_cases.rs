@@ -71,7 +71,7 @@ fn resolved(text: &str) -> ResolvedScenario {
 
 /// The same with the patient elsewhere.
 fn shifted() -> String {
-    let edited = SMALL.replace("[148.0, -597.5, 0]", "[152.0, -590.0, 0]");
+    let edited = SMALL.replace("[155.0, -609.5, 0]", "[159.0, -602.0, 0]");
     assert_ne!(edited, SMALL);
     edited
 }

@@ -180,7 +180,7 @@ pub enum BodyKind {
     GuideTube,
     /// Volume behind the guide that needle and hand need; not a physical body.
     NeedleCorridor,
-    /// The phantom's skin.
+    /// The patient: the phantom's skin, head and arms.
     Phantom,
     /// CT table.
     Table,
@@ -218,7 +218,7 @@ pub struct CollisionBody {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClearanceClass {
-    /// Moving links against the skin.
+    /// Moving links against the patient's skin, head and arms included.
     RobotPhantom,
     /// Links and tool against the table.
     RobotTable,

@@ -162,7 +162,7 @@ impl Envelope {
         )?;
         envelope.sternal_wall_m = cage.back_m() - 2.0 * half_depth_m - skin.front_m();
 
-        let rib_needs_mm = parameters.rib_diameter_mm + TISSUE_AROUND_BONE_MM;
+        let rib_needs_mm = parameters.rib_thickness_mm + TISSUE_AROUND_BONE_MM;
         needs(
             "side wall for the ribs",
             parameters.lateral_wall_mm,

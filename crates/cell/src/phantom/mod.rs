@@ -9,11 +9,14 @@
 mod envelope;
 mod error;
 mod half_spaces;
+mod limbs;
 mod loft;
 mod markers;
 mod organs;
 mod parameters;
+mod ribs;
 mod route_obstacles;
+mod scapula;
 mod skeleton;
 mod skin;
 mod solids;
@@ -29,7 +32,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::PhantomError;
 pub(crate) use parameters::PARAMETERS;
-pub use parameters::{LesionParameters, MarkerParameters, PhantomParameters};
+pub use parameters::{LesionParameters, LimbSizes, MarkerParameters, Measured, PhantomParameters};
 pub use route_obstacles::{RouteObstacle, RouteObstacles};
 
 #[cfg(test)]
@@ -37,14 +40,15 @@ pub(crate) use loft::assert_convex_and_closed;
 
 use envelope::Envelope;
 pub(crate) use half_spaces::HalfSpaces;
+pub(crate) use limbs::{Support, limbs};
 pub(crate) use skin::SkinSurface;
 
 pub(crate) const SKIN_RGBA: [f32; 4] = [0.90, 0.72, 0.60, 0.35];
 pub(crate) const LESION_RGBA: [f32; 4] = [0.95, 0.80, 0.10, 1.0];
 
 /// Names of the shipped sizes.
-pub const SIZE_PRESETS: [&str; 6] = {
-    let mut names = [""; 6];
+pub const SIZE_PRESETS: [&str; parameters::PRESETS.len()] = {
+    let mut names = [""; parameters::PRESETS.len()];
     let mut k = 0;
     while k < names.len() {
         names[k] = parameters::PRESETS[k].0;
@@ -59,12 +63,14 @@ pub const SIZE_PRESETS: [&str; 6] = {
 pub enum Tissue {
     /// The outer surface.
     Skin,
-    /// Ribs with their cartilages, sternum, spine.
+    /// Ribs with their cartilages, sternum, spine, shoulder blades.
     Bone,
     /// Arteries and veins.
     Vessel,
-    /// Lungs, heart, liver.
+    /// Lungs, airways, heart, liver.
     Organ,
+    /// A cleft between two lobes of a lung: no obstacle, but what is said of a needle that crosses it.
+    Fissure,
     /// A target.
     Lesion,
     /// A registration marker on the skin.
@@ -78,6 +84,7 @@ impl fmt::Display for Tissue {
             Self::Bone => "bone",
             Self::Vessel => "vessel",
             Self::Organ => "organ",
+            Self::Fissure => "fissure",
             Self::Lesion => "lesion",
             Self::Marker => "marker",
         })
@@ -163,8 +170,10 @@ impl Phantom {
         };
         let skin_faces = HalfSpaces::of(&skin.solid).expect("the skin is a convex mesh");
 
-        let mut inner = skeleton::bones(parameters, &envelope, &frame);
-        inner.extend(organs::organs(&envelope, &frame));
+        let mut inner = skeleton::skeleton(parameters, &envelope, &frame);
+        inner.extend(ribs::ribs(parameters, &envelope, &frame));
+        inner.extend(scapula::scapulae(parameters, &envelope, &frame));
+        inner.extend(organs::organs(parameters, &envelope, &frame));
         for part in &inner {
             let depth_m = skin_faces.depth_of_solid_m(&part.solid);
             if depth_m < 0.0 {
@@ -217,7 +226,7 @@ impl Phantom {
         }
     }
 
-    /// Bones, vessels and organs, ready for distances; prepared once.
+    /// Bones, vessels, organs and fissures, ready for distances; prepared once.
     pub fn route_obstacles(&self) -> &RouteObstacles {
         self.route_obstacles.of(&self.parts)
     }

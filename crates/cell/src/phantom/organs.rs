@@ -1,20 +1,23 @@
-//! Lungs, heart, liver and great vessels.
+//! Lungs with their fissures, airways, heart, liver and great vessels.
 
 use std::f64::consts::PI;
 
-use nalgebra::{Point2, Point3, UnitQuaternion};
-use needlebench_geometry::Solid;
+use nalgebra::{Point2, Point3, UnitQuaternion, UnitVector3, Vector3};
+use needlebench_geometry::{ConvexMesh, Shape, Solid};
 
 use super::envelope::{Envelope, Frame};
 use super::loft::{Level, ellipsoid, loft};
-use super::solids::{capsule, convex, pose, z_towards};
-use super::{PhantomPart, Tissue};
+use super::ribs::intercostal_vessels;
+use super::solids::{capsule, convex, facing, pose, z_towards};
+use super::{PhantomParameters, PhantomPart, Tissue};
 
 const LUNG_RGBA: [f32; 4] = [0.86, 0.60, 0.62, 0.55];
 const HEART_RGBA: [f32; 4] = [0.72, 0.18, 0.20, 1.0];
 const LIVER_RGBA: [f32; 4] = [0.50, 0.24, 0.18, 1.0];
 const ARTERY_RGBA: [f32; 4] = [0.80, 0.10, 0.12, 1.0];
 const VEIN_RGBA: [f32; 4] = [0.20, 0.28, 0.68, 1.0];
+const AIRWAY_RGBA: [f32; 4] = [0.62, 0.80, 0.84, 1.0];
+const FISSURE_RGBA: [f32; 4] = [0.60, 0.34, 0.40, 0.5];
 
 /// One lung in the layout table.
 ///
@@ -67,16 +70,22 @@ const LUNG_ARC_VERTICES: usize = 17;
 const LUNG_UPPER_BANDS: usize = 9;
 const LUNG_LOWER_BANDS: usize = 5;
 
-/// Lungs, heart, liver and vessels, in a fixed order.
-pub(super) fn organs(envelope: &Envelope, frame: &Frame) -> Vec<PhantomPart> {
-    let mut parts: Vec<PhantomPart> = LUNGS
-        .iter()
-        .map(|lung| organ(lung_solid(lung, envelope, frame), LUNG_RGBA))
-        .collect();
+/// Lungs, heart, liver, airways, vessels and fissures, in a fixed order.
+pub(super) fn organs(
+    parameters: &PhantomParameters,
+    envelope: &Envelope,
+    frame: &Frame,
+) -> Vec<PhantomPart> {
+    let lungs = LUNGS.map(|lung| lung_solid(&lung, envelope, frame));
+    let fissures = fissures(&lungs, frame);
+    let mut parts: Vec<PhantomPart> = lungs.map(|lung| organ(lung, LUNG_RGBA)).into();
     parts.push(organ(heart(frame), HEART_RGBA));
     parts.push(organ(liver(frame), LIVER_RGBA));
+    parts.extend(airways(frame));
     parts.extend(vessels(frame));
-    parts.extend(internal_mammary_arteries(envelope, frame));
+    parts.extend(internal_mammary_vessels(parameters, envelope, frame));
+    parts.extend(intercostal_vessels(parameters, envelope, frame));
+    parts.extend(fissures);
     parts
 }
 
@@ -239,38 +248,224 @@ fn vessels(frame: &Frame) -> Vec<PhantomPart> {
     for (organ, diameter_mm, color_rgba, line) in COURSES {
         let points: Vec<Point3<f64>> = line.iter().map(|&point| frame.point(point)).collect();
         let radius_m = frame.size_m(0.5 * diameter_mm);
-        parts.extend(tube(organ, &points, radius_m, color_rgba));
+        parts.extend(tube(Tissue::Vessel, organ, &points, radius_m, color_rgba));
     }
     parts
 }
 
-/// The arteries behind the costal cartilages on both sides of the sternum.
-fn internal_mammary_arteries(envelope: &Envelope, frame: &Frame) -> Vec<PhantomPart> {
-    /// Distance from the mid-sagittal plane, diameter, depth behind the cage's front, and heights
-    /// of the centre line in the layout table, mm (assumed).
-    const LATERAL_MM: f64 = 33.0;
+/// The arteries and veins behind the costal cartilages on both sides of the sternum.
+fn internal_mammary_vessels(
+    parameters: &PhantomParameters,
+    envelope: &Envelope,
+    frame: &Frame,
+) -> Vec<PhantomPart> {
+    /// Name, colour, and distance from the edge of the sternum to the left and to the right, mm: means
+    /// of 100 CT scans (AJR 1990;155:397-400).
+    const VESSELS: [(&str, [f32; 4], [f64; 2]); 2] = [
+        ("mammary_artery", ARTERY_RGBA, [14.7, 15.7]),
+        ("mammary_vein", VEIN_RGBA, [9.8, 10.3]),
+    ];
+    /// Diameter, depth behind the cage's front, and heights of the centre line in the layout table, mm
+    /// (assumed).
     const DIAMETER_MM: f64 = 2.5;
     const BEHIND_CAGE_MM: f64 = 1.5;
     const HEIGHTS_MM: [f64; 4] = [130.0, 80.0, 40.0, -4.0];
 
     let mut parts = Vec::new();
-    for (side, sign) in [("left", 1.0), ("right", -1.0)] {
-        let points: Vec<Point3<f64>> = HEIGHTS_MM
-            .iter()
-            .map(|&height_mm| {
-                let at = frame.point([LATERAL_MM, 0.0, height_mm]);
-                let front_m = envelope.cage_section(at.z).front_at_m(at.x);
-                Point3::new(sign * at.x, front_m + 1e-3 * BEHIND_CAGE_MM, at.z)
-            })
-            .collect();
-        let name = format!("mammary_artery_{side}");
-        parts.extend(tube(&name, &points, 0.5e-3 * DIAMETER_MM, ARTERY_RGBA));
+    for (vessel, color_rgba, from_sternum_mm) in VESSELS {
+        for ((side, sign), from_edge_mm) in [("left", 1.0), ("right", -1.0)]
+            .into_iter()
+            .zip(from_sternum_mm)
+        {
+            let x_m = 1e-3 * (0.5 * parameters.sternum_width_mm + from_edge_mm);
+            let points: Vec<Point3<f64>> = HEIGHTS_MM
+                .iter()
+                .map(|&height_mm| {
+                    let z_m = frame.height_m(height_mm);
+                    let front_m = envelope.cage_section(z_m).front_at_m(x_m);
+                    Point3::new(sign * x_m, front_m + 1e-3 * BEHIND_CAGE_MM, z_m)
+                })
+                .collect();
+            let name = format!("{vessel}_{side}");
+            let radius_m = 0.5e-3 * DIAMETER_MM;
+            parts.extend(tube(Tissue::Vessel, &name, &points, radius_m, color_rgba));
+        }
     }
     parts
 }
 
+/// Trachea and main bronchi: centre lines in the layout table, mm (assumed).
+fn airways(frame: &Frame) -> Vec<PhantomPart> {
+    const CARINA_MM: [f64; 3] = [-11.0, 20.0, 88.0];
+    /// Name, outer diameter (mm: men's coronal lumen of 18, Pol J Radiol 2011;76:28-31, with 1 mm of wall;
+    /// the bronchi's assumed), centre line.
+    const COURSES: [(&str, f64, &[[f64; 3]]); 3] = [
+        (
+            "trachea",
+            20.0,
+            &[[-5.0, -8.0, 156.0], [-13.0, 15.0, 116.0], CARINA_MM],
+        ),
+        (
+            "main_bronchus_left",
+            13.0,
+            &[CARINA_MM, [14.0, 10.0, 66.0], [42.0, 8.0, 54.0]],
+        ),
+        (
+            "main_bronchus_right",
+            15.0,
+            &[CARINA_MM, [-36.0, 18.0, 72.0]],
+        ),
+    ];
+    let mut parts = Vec::new();
+    for (name, diameter_mm, line) in COURSES {
+        let points: Vec<Point3<f64>> = line.iter().map(|&point| frame.point(point)).collect();
+        let radius_m = frame.size_m(0.5 * diameter_mm);
+        parts.extend(tube(Tissue::Organ, name, &points, radius_m, AIRWAY_RGBA));
+    }
+    parts
+}
+
+/// Clefts between the lobes: flat plates through a lung, which a needle may cross but should not.
+///
+/// Both oblique fissures descend from behind at the third thoracic vertebra to the sixth rib in front;
+/// the right lung's horizontal one runs forwards from it at the fourth costal cartilage (assumed, so that no
+/// shipped lesion lies across one).
+fn fissures(lungs: &[Solid; 2], frame: &Frame) -> Vec<PhantomPart> {
+    /// Drawn thickness, mm.
+    const THICKNESS_MM: f64 = 1.0;
+    /// Points behind and in front that an oblique fissure passes, y and z in the layout table, mm.
+    const OBLIQUE_MM: [[[f64; 2]; 2]; 2] = [
+        [[88.0, 146.0], [-80.0, -4.0]],
+        [[88.0, 140.0], [-80.0, -12.0]],
+    ];
+    const HORIZONTAL_MM: f64 = 46.0;
+
+    let [left, right] = OBLIQUE_MM.map(|ends_mm| {
+        let [behind, front] = ends_mm.map(|[y, z]| frame.point([0.0, y, z]));
+        let along = behind - front;
+        Plane {
+            point: front,
+            // Up and forwards.
+            normal: UnitVector3::new_normalize(Vector3::new(0.0, -along.z, along.y)),
+        }
+    });
+    let horizontal = Plane {
+        point: frame.point([0.0, 0.0, HORIZONTAL_MM]),
+        normal: Vector3::z_axis(),
+    };
+    let [lung_left, lung_right] = lungs;
+    let in_front = clipped(&section(lung_right, &horizontal), &right);
+    let cuts = [
+        ("fissure_oblique_left", section(lung_left, &left), &left),
+        ("fissure_oblique_right", section(lung_right, &right), &right),
+        ("fissure_horizontal_right", in_front, &horizontal),
+    ];
+    cuts.into_iter()
+        .map(|(name, outline, plane)| PhantomPart {
+            tissue: Tissue::Fissure,
+            ..organ(
+                plate(name, &outline, plane, 1e-3 * THICKNESS_MM),
+                FISSURE_RGBA,
+            )
+        })
+        .collect()
+}
+
+/// Points `p` with `normal . (p - point) = 0`.
+struct Plane {
+    point: Point3<f64>,
+    normal: UnitVector3<f64>,
+}
+
+impl Plane {
+    fn height_m(&self, point: &Point3<f64>) -> f64 {
+        self.normal.dot(&(point - self.point))
+    }
+
+    /// Where it is crossed between two points on either side of it.
+    fn crossing(&self, a: &Point3<f64>, b: &Point3<f64>) -> Option<Point3<f64>> {
+        let [from_m, to_m] = [a, b].map(|point| self.height_m(point));
+        let crosses = (from_m < 0.0) != (to_m < 0.0);
+        crosses.then(|| a + (b - a) * (from_m / (from_m - to_m)))
+    }
+}
+
+/// The outline in which a plane cuts a convex mesh, in order about the plane's normal.
+fn section(solid: &Solid, plane: &Plane) -> Vec<Point3<f64>> {
+    let Shape::Convex(mesh) = &solid.shape else {
+        return Vec::new();
+    };
+    let ConvexMesh(mesh) = mesh.as_ref();
+    let at = |i: u32| solid.parent_from_shape * mesh.vertices_m[i as usize];
+    let edges = mesh
+        .triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        // Every edge belongs to two triangles, once in each direction.
+        .filter(|[a, b]| a < b);
+    let mut outline: Vec<Point3<f64>> = edges
+        .filter_map(|[a, b]| plane.crossing(&at(a), &at(b)))
+        .collect();
+    let middle = centroid(&outline);
+    let rotation = facing(&plane.normal);
+    let bearing = |point: &Point3<f64>| {
+        let seen = rotation.inverse() * (point - middle);
+        seen.y.atan2(seen.x)
+    };
+    outline.sort_by(|a, b| bearing(a).total_cmp(&bearing(b)));
+    outline
+}
+
+/// What of an outline is above a plane.
+fn clipped(outline: &[Point3<f64>], plane: &Plane) -> Vec<Point3<f64>> {
+    let mut kept = Vec::with_capacity(outline.len() + 2);
+    for (k, point) in outline.iter().enumerate() {
+        if plane.height_m(point) >= 0.0 {
+            kept.push(*point);
+        }
+        kept.extend(plane.crossing(point, &outline[(k + 1) % outline.len()]));
+    }
+    kept
+}
+
+/// A flat solid with a convex outline in a plane.
+fn plate(name: &str, outline: &[Point3<f64>], plane: &Plane, thickness_m: f64) -> Solid {
+    /// Corners that stand out by less are in the line of their neighbours, m.
+    const STRAIGHT_M: f64 = 5e-5;
+    let rotation = facing(&plane.normal);
+    let middle = centroid(outline);
+    let mut polygon: Vec<Point2<f64>> = outline
+        .iter()
+        .map(|point| Point2::from((rotation.inverse() * (point - middle)).xy()))
+        .collect();
+    let stands_out_m = |polygon: &[Point2<f64>], k: usize| {
+        let count = polygon.len();
+        let (before, after) = (polygon[(k + count - 1) % count], polygon[(k + 1) % count]);
+        let across = (after - before).perp(&(polygon[k] - before));
+        -across / (after - before).norm().max(f64::MIN_POSITIVE)
+    };
+    while let Some(k) = (0..polygon.len()).find(|&k| stands_out_m(&polygon, k) < STRAIGHT_M) {
+        polygon.remove(k);
+    }
+    let levels = [-0.5, 0.5].map(|side| Level {
+        z_m: side * thickness_m,
+        scale: 1.0,
+    });
+    convex(
+        name.to_owned(),
+        loft(&polygon, &levels),
+        pose(middle, rotation),
+    )
+}
+
+fn centroid(points: &[Point3<f64>]) -> Point3<f64> {
+    let sum: Vector3<f64> = points.iter().map(|point| point.coords).sum();
+    Point3::from(sum / points.len().max(1) as f64)
+}
+
 /// A chain of capsules, named `organ.1`, `organ.2`, ...
 fn tube(
+    tissue: Tissue,
     organ: &str,
     points: &[Point3<f64>],
     radius_m: f64,
@@ -283,7 +478,7 @@ fn tube(
             let name = format!("{organ}.{}", piece + 1);
             PhantomPart {
                 name: name.clone(),
-                tissue: Tissue::Vessel,
+                tissue,
                 organ: Some(organ.to_owned()),
                 solid: capsule(name, ends[0], ends[1], radius_m),
                 color_rgba,

@@ -14,6 +14,16 @@ use crate::schema::{FileSchema, LONGEST_NAME, NAME};
 pub(crate) static PARAMETERS: LazyLock<FileSchema> =
     LazyLock::new(FileSchema::of::<PhantomParameters>);
 
+/// How people lay or stood whose chests a phantom's breadth and depth are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Measured {
+    /// Upright, as in surveys of body sizes.
+    Standing,
+    /// On the back, as in CT.
+    Supine,
+}
+
 /// Size and contents of a chest phantom.
 ///
 /// Positions are in the `phantom` frame: anatomical LPS (x to the patient's left, y posterior, z
@@ -21,6 +31,9 @@ pub(crate) static PARAMETERS: LazyLock<FileSchema> =
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhantomParameters {
+    /// How they lay or stood whose breadth and depth these are; not said when the key is left out.
+    #[serde(default)]
+    pub measured: Option<Measured>,
     /// Breadth of the chest over the skin at its widest level, left to right, without arms, mm.
     #[schemars(range(min = ChestSize::BREADTH_MM[0], max = ChestSize::BREADTH_MM[1]))]
     pub breadth_mm: f64,
@@ -44,10 +57,14 @@ pub struct PhantomParameters {
     #[serde(default = "default_posterior_wall_mm")]
     #[schemars(range(min = 15.0, max = 150.0))]
     pub posterior_wall_mm: f64,
-    /// Diameter of a rib (a chain of capsules), mm.
-    #[serde(default = "default_rib_diameter_mm")]
-    #[schemars(range(min = 3.0, max = 16.0))]
-    pub rib_diameter_mm: f64,
+    /// Height of a rib, and of a costal cartilage, along the chest wall, mm.
+    #[serde(default = "default_rib_height_mm")]
+    #[schemars(range(min = 4.0, max = 25.0))]
+    pub rib_height_mm: f64,
+    /// Thickness of a rib, and of a costal cartilage, across the chest wall, mm.
+    #[serde(default = "default_rib_thickness_mm")]
+    #[schemars(range(min = 2.0, max = 16.0))]
+    pub rib_thickness_mm: f64,
     /// Width of the body of the sternum, mm.
     #[serde(default = "default_sternum_width_mm")]
     #[schemars(range(min = 15.0, max = 70.0))]
@@ -68,12 +85,68 @@ pub struct PhantomParameters {
     #[serde(default = "default_marker_thickness_mm")]
     #[schemars(range(min = 0.2, max = 5.0))]
     pub marker_thickness_mm: f64,
+    /// Head and arms, for scenarios that have them.
+    #[serde(default)]
+    pub limbs: LimbSizes,
     /// Lesions; none when the key is left out.
     #[serde(default)]
     pub lesions: Vec<LesionParameters>,
     /// Skin markers; none when the key is left out.
     #[serde(default)]
     pub markers: Vec<MarkerParameters>,
+}
+
+/// Sizes of head and arms; those of the median man (ANSUR II) where they are left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LimbSizes {
+    /// Greatest breadth of the head above the ears, mm.
+    #[schemars(range(min = 100.0, max = 220.0))]
+    pub head_breadth_mm: f64,
+    /// Greatest length of the head, forehead to occiput, mm.
+    #[schemars(range(min = 120.0, max = 280.0))]
+    pub head_length_mm: f64,
+    /// From the suprasternal notch to the top of the head along the body, mm.
+    #[schemars(range(min = 180.0, max = 450.0))]
+    pub notch_to_vertex_mm: f64,
+    /// Circumference of the neck, mm.
+    #[schemars(range(min = 200.0, max = 700.0))]
+    pub neck_circumference_mm: f64,
+    /// Breadth over the deltoid muscles, arms down, mm.
+    #[schemars(range(min = 250.0, max = 800.0))]
+    pub shoulder_breadth_mm: f64,
+    /// Top of the shoulder to elbow, mm.
+    #[schemars(range(min = 180.0, max = 480.0))]
+    pub upper_arm_length_mm: f64,
+    /// Elbow to wrist, mm.
+    #[schemars(range(min = 140.0, max = 400.0))]
+    pub forearm_length_mm: f64,
+    /// Wrist to the tip of the middle finger, mm.
+    #[schemars(range(min = 100.0, max = 280.0))]
+    pub hand_length_mm: f64,
+    /// Greatest circumference of the upper arm, mm.
+    #[schemars(range(min = 150.0, max = 700.0))]
+    pub upper_arm_circumference_mm: f64,
+    /// Greatest circumference of the forearm, mm.
+    #[schemars(range(min = 130.0, max = 600.0))]
+    pub forearm_circumference_mm: f64,
+}
+
+impl Default for LimbSizes {
+    fn default() -> Self {
+        Self {
+            head_breadth_mm: 154.0,
+            head_length_mm: 200.0,
+            notch_to_vertex_mm: 318.0,
+            neck_circumference_mm: 395.0,
+            shoulder_breadth_mm: 509.0,
+            upper_arm_length_mm: 335.0,
+            forearm_length_mm: 267.0,
+            hand_length_mm: 193.0,
+            upper_arm_circumference_mm: 357.0,
+            forearm_circumference_mm: 310.0,
+        }
+    }
 }
 
 /// A spherical lesion.
@@ -117,8 +190,11 @@ fn default_lateral_wall_mm() -> f64 {
 fn default_posterior_wall_mm() -> f64 {
     35.0
 }
-fn default_rib_diameter_mm() -> f64 {
-    9.0
+fn default_rib_height_mm() -> f64 {
+    13.5
+}
+fn default_rib_thickness_mm() -> f64 {
+    7.0
 }
 fn default_sternum_width_mm() -> f64 {
     38.0
@@ -151,13 +227,19 @@ macro_rules! preset {
 }
 
 /// Name and text of each shipped parameter file.
-pub(super) const PRESETS: [(&str, &str); 6] = [
+pub(super) const PRESETS: [(&str, &str); 12] = [
     preset!("male-p5"),
     preset!("male-p50"),
     preset!("male-p95"),
     preset!("female-p5"),
     preset!("female-p50"),
     preset!("female-p95"),
+    preset!("male-p5-supine"),
+    preset!("male-p50-supine"),
+    preset!("male-p95-supine"),
+    preset!("female-p5-supine"),
+    preset!("female-p50-supine"),
+    preset!("female-p95-supine"),
 ];
 
 impl PhantomParameters {
@@ -193,7 +275,7 @@ impl PhantomParameters {
 }
 
 impl Default for PhantomParameters {
-    /// The 50th-percentile man, `male-p50`.
+    /// The 50th-percentile man, standing: `male-p50`, for whom the layout is tabulated.
     fn default() -> Self {
         Self::preset("male-p50").expect("the shipped preset is parsed by a test")
     }

@@ -1,4 +1,4 @@
-//! What a needle keeps away from.
+//! What a needle keeps away from, and what it is said to cross.
 
 use std::sync::OnceLock;
 
@@ -6,7 +6,7 @@ use needlebench_geometry::{PreparedSolids, Solid};
 
 use super::{PhantomPart, Tissue};
 
-/// Bones, vessels and organs of a phantom, made ready for many needles.
+/// Bones, vessels, organs and fissures of a phantom, made ready for many needles.
 #[derive(Debug, Clone)]
 pub struct RouteObstacles {
     /// In the phantom frame, in the order of `parts`.
@@ -20,7 +20,7 @@ pub struct RouteObstacles {
 pub struct RouteObstacle {
     /// Name of the part.
     pub name: String,
-    /// Bone, vessel or organ.
+    /// Bone, vessel, organ or fissure.
     pub tissue: Tissue,
     /// The structure that it is a piece of.
     pub organ: Option<String>,
@@ -50,7 +50,10 @@ impl OnDemand {
     pub fn of(&self, parts: &[PhantomPart]) -> &RouteObstacles {
         self.0.get_or_init(|| {
             let obstacles = parts.iter().filter(|part| {
-                matches!(part.tissue, Tissue::Bone | Tissue::Vessel | Tissue::Organ)
+                matches!(
+                    part.tissue,
+                    Tissue::Bone | Tissue::Vessel | Tissue::Organ | Tissue::Fissure
+                )
             });
             let solids: Vec<Solid> = obstacles.clone().map(|part| part.solid.clone()).collect();
             let parts = obstacles.map(|part| RouteObstacle {

@@ -1,10 +1,13 @@
 //! Placing primitive solids by anatomical points.
 
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_8};
 use std::sync::Arc;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_geometry::{ConvexMesh, Shape, Solid};
 use needlebench_kinematics::Pose;
+
+use super::loft::{Level, loft, superellipse};
 
 /// Capsule around the segment between two points.
 pub(super) fn capsule(name: String, from: Point3<f64>, to: Point3<f64>, radius_m: f64) -> Solid {
@@ -17,6 +20,47 @@ pub(super) fn capsule(name: String, from: Point3<f64>, to: Point3<f64>, radius_m
         },
         parent_from_shape: pose(nalgebra::center(&from, &to), z_towards(&along)),
     }
+}
+
+/// Elliptic cylinder about the segment between two points, with half an ellipsoid at either end; a
+/// polyhedron around it, which goes up to 2 % of its half axes beyond.
+///
+/// `half_axes_m` are across and along `up`, which need not be at a right angle to the segment; the
+/// ends reach the first of them further.
+pub(super) fn elliptic_capsule(
+    name: String,
+    from: Point3<f64>,
+    to: Point3<f64>,
+    half_axes_m: [f64; 2],
+    up: &Vector3<f64>,
+) -> Solid {
+    const PER_QUADRANT: usize = 4;
+    // Around the ellipse, whose affine image of a circle's polygon it is.
+    let around = 1.0 / (FRAC_PI_2 / (2.0 * PER_QUADRANT as f64)).cos();
+    let polygon = superellipse(half_axes_m.map(|half_m| around * half_m), 2.0, PER_QUADRANT);
+    // Around a quarter of a circle: its tangents at 0, 45 and 90 degrees.
+    let tangent = FRAC_PI_8.tan();
+    let along = to - from;
+    let half_m = 0.5 * along.norm();
+    let [near_m, far_m] = [tangent, 1.0].map(|share| half_m + share * half_axes_m[0]);
+    let levels = [
+        (-far_m, tangent),
+        (-near_m, 1.0),
+        (near_m, 1.0),
+        (far_m, tangent),
+    ]
+    .map(|(z_m, scale)| Level { z_m, scale });
+
+    let z = along.normalize();
+    let y = (up - z * up.dot(&z)).normalize();
+    let axes = nalgebra::Matrix3::from_columns(&[y.cross(&z), y, z]);
+    let rotation =
+        UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(axes));
+    convex(
+        name,
+        loft(&polygon, &levels),
+        pose(nalgebra::center(&from, &to), rotation),
+    )
 }
 
 /// Cylinder between the centres of its end faces.
@@ -103,6 +147,42 @@ mod tests {
             assert!((ends[0] - from).norm() < ROUNDING);
             assert!((ends[1] - (from + along)).norm() < ROUNDING);
         }
+    }
+
+    #[test]
+    fn elliptic_capsule_holds_the_smooth_one_and_little_more() {
+        /// The polygon's corners, 1 / cos(pi / 16), at the height's half axis.
+        const BEYOND: f64 = 0.0197;
+        let half_axes_m = [0.0035, 0.00675];
+        let (from, to) = (Point3::new(0.1, -0.2, 0.3), Point3::new(0.12, -0.19, 0.28));
+        let up = Vector3::new(0.1, 0.3, 1.0);
+        let solid = elliptic_capsule(String::new(), from, to, half_axes_m, &up);
+        let Shape::Convex(mesh) = &solid.shape else {
+            panic!("a polyhedron");
+        };
+        super::super::loft::assert_convex_and_closed(mesh);
+        let faces = super::super::HalfSpaces::of(&solid).unwrap();
+        let z = (to - from).normalize();
+        let y = (up - z * up.dot(&z)).normalize();
+        let x = y.cross(&z);
+        let mut least_m = f64::INFINITY;
+        for k in 0..2000 {
+            // Directions all round; the smooth body's support points are those of ends and ellipse.
+            let turn = 0.1 * f64::from(k);
+            let (sine, cosine) = turn.sin_cos();
+            let height = 2.0 * (f64::from(k) + 0.5) / 2000.0 - 1.0;
+            let across = (1.0 - height * height).sqrt();
+            let of_ball = x * (half_axes_m[0] * across * cosine)
+                + y * (half_axes_m[1] * across * sine)
+                + z * (half_axes_m[0] * height);
+            let end = if height > 0.0 { to } else { from };
+            let depth_m = faces.depth_m(&(end + of_ball));
+            assert!(depth_m > -ROUNDING, "{depth_m} m outside");
+            least_m = least_m.min(depth_m);
+        }
+        assert!(least_m < 1e-5);
+        let reach_m = mesh.0.vertices_m.iter().map(|p| p.y).fold(0.0, f64::max);
+        assert!(reach_m / half_axes_m[1] - 1.0 < BEYOND);
     }
 
     #[test]

@@ -23,7 +23,6 @@ mod stl_file;
 mod tool;
 
 use std::path::Path;
-use std::sync::Arc;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use needlebench_kinematics::trajectory::{MotionLimits, ProfileLimits};
@@ -202,11 +201,8 @@ pub(crate) fn resolve(
     if let Some(section) = &scenario.phantom {
         let unplaced = library.phantom(toml, section, base)?;
         notes.extend(unplaced.notes.iter().cloned());
-        phantom = Some(PlacedPhantom {
-            world_from_phantom: place_phantom(toml, section, scenario.table.as_ref(), &unplaced)
-                .map_err(one)?,
-            phantom: Arc::clone(&unplaced.phantom),
-        });
+        let placed = place_phantom(toml, section, scenario.table.as_ref(), &unplaced);
+        phantom = Some(placed.map_err(one)?);
         phantom_source.clone_from(&unplaced.model);
         phantom_parts.clone_from(&unplaced.parts);
         lying = Some(unplaced);
@@ -218,9 +214,8 @@ pub(crate) fn resolve(
     let mut fixtures = Vec::new();
     let mut surroundings = Vec::new();
     if let Some(placed) = &phantom {
-        let mut skin = placed.phantom.skin().clone();
-        skin.parent_from_shape = placed.world_from_phantom * skin.parent_from_shape;
-        surroundings.push(static_body("phantom", BodyKind::Phantom, vec![skin]));
+        let outside = placed.outside().collect();
+        surroundings.push(static_body("phantom", BodyKind::Phantom, outside));
     }
     for (name, kind, fixture) in [
         ("table", BodyKind::Table, table),
@@ -239,7 +234,8 @@ pub(crate) fn resolve(
         let solids = solids.chain(&tool.guide_solids);
         solids.map(|solid| &*solid.name).chain([&*link.name])
     });
-    let parts = phantom.iter().flat_map(|placed| &placed.phantom.parts);
+    let parts = phantom.iter();
+    let parts = parts.flat_map(|placed| placed.phantom.parts.iter().chain(&placed.limbs));
     let taken = arm.chain(parts.map(|part| &*part.name));
     check_obstacle_names(toml, &scenario.obstacles, taken).map_err(one)?;
     let standing = Standing {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::phantom::PlacedPhantom;
-use crate::phantom::Tissue;
+use crate::phantom::{RouteObstacle, Tissue};
 use crate::scenario::NeedleRouteSection;
 use crate::toml_text::TomlText;
 use crate::{Finding, nearest_name};
@@ -17,6 +17,9 @@ pub(super) fn check_needle_route(
 ) -> Result<(), Finding> {
     let tissues = [Tissue::Bone, Tissue::Vessel, Tissue::Organ];
     let parts = phantom.map_or(&[][..], |placed| &placed.phantom.route_obstacles().parts);
+    // Nothing keeps a needle out of a fissure, so none is to be left to pass.
+    let parts = parts.iter().filter(|part| part.tissue != Tissue::Fissure);
+    let parts: Vec<&RouteObstacle> = parts.collect();
     for (index, name) in section.off.iter().enumerate() {
         let is_tissue = tissues.iter().any(|tissue| tissue.to_string() == *name);
         if is_tissue || parts.iter().any(|part| part.is_called(name)) {

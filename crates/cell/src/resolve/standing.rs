@@ -15,6 +15,7 @@ use super::obstacles::PlacedObstacle;
 use super::phantom::UnplacedPhantom;
 use super::{Goal, PlacedPhantom};
 use crate::fixtures::{Fixture, FixtureKind};
+use crate::phantom::{Measured, SIZE_PRESETS};
 use crate::scenario::{MountKind, Scenario, TableSection};
 use crate::toml_text::TomlText;
 use crate::{ClearanceClass, Finding, Robot, Tool};
@@ -30,6 +31,8 @@ const SOFT_M: f64 = 10e-3;
 const CUSHION_M: [f64; 2] = [0.05, 0.3];
 /// Higher than any table or bed, m: the range of `table.top_height_mm` ends here.
 const HIGHEST_TABLE_M: f64 = 2.0;
+/// The key that places the patient.
+const PATIENTS_PLACE: &str = "phantom.position_mm";
 /// Length of a patient beyond the table that is worth a note, m.
 const OVERHANG_M: f64 = 0.05;
 /// A goal this many times farther than the arm could ever be long is a slip, and no question of reach.
@@ -49,12 +52,17 @@ pub(super) struct Standing<'a> {
 impl Standing<'_> {
     /// Everything but the goals.
     pub fn check(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
+        let patient = self
+            .phantom
+            .map(|(placed, skin)| Patient::new(placed, skin));
+        let patient = patient.as_ref();
         self.check_table()?;
         self.check_gantry(notes)?;
         self.check_fixtures()?;
-        self.check_base(notes)?;
-        self.check_phantom(notes)?;
-        self.check_obstacles(notes)
+        self.check_base(patient, notes)?;
+        self.check_phantom(patient, notes)?;
+        self.check_bore(patient)?;
+        self.check_obstacles(patient, notes)
     }
 
     fn fixture(&self, kind: FixtureKind) -> Option<&Fixture> {
@@ -167,7 +175,11 @@ impl Standing<'_> {
     }
 
     /// A base in or under something, and one that stands on nothing.
-    fn check_base(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
+    fn check_base(
+        &self,
+        patient: Option<&Patient<'_>>,
+        notes: &mut Vec<String>,
+    ) -> Result<(), Finding> {
         const KEY: &str = "robot.base_position_mm";
         let robot = self.robot;
         let base: Vec<Solid> = placed(&robot.base.solids, &robot.world_from_base_link).collect();
@@ -187,25 +199,14 @@ impl Standing<'_> {
                 return Err(self.toml.finding(KEY, message).hint(hint));
             }
         }
-        if let Some((placed, unplaced)) = self.phantom {
-            let skin_at = skin_pose(placed);
-            let patient = extent(unplaced.skin_m.iter(), &placed.world_from_phantom);
+        if let Some(patient) = patient {
             let mount = self.fixture(FixtureKind::Mount);
             let column = mount.map_or(&[][..], |mount| &mount.solids);
             for (what, solids) in [
                 ("the robot's base", &base[..]),
                 ("the robot's mount", column),
             ] {
-                let depth_m = solids
-                    .iter()
-                    .filter(|solid| overlap(&solid.bounding_box(), &patient, SOFT_M))
-                    .map(|solid| {
-                        let shape = PreparedShape::new(&solid.shape);
-                        let found =
-                            separation(&shape, &solid.parent_from_shape, unplaced.skin(), &skin_at);
-                        -found.distance_m
-                    })
-                    .fold(0.0, f64::max);
+                let depth_m = patient.depth_of_any_m(solids);
                 if depth_m > SOFT_M {
                     let message =
                         format!("{what} stands {:.1} mm inside the patient", depth_m * 1e3);
@@ -234,13 +235,58 @@ impl Standing<'_> {
         Ok(())
     }
 
-    /// A patient in, under or far above something, or beyond the table.
-    fn check_phantom(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
-        const KEY: &str = "phantom.position_mm";
-        let Some((placed, unplaced)) = self.phantom else {
+    /// A patient who lies with the chest of somebody upright.
+    fn note_standing_size(&self, placed: &PlacedPhantom, notes: &mut Vec<String>) {
+        let (Some(section), Some(size)) = (&self.scenario.phantom, &placed.phantom.parameters)
+        else {
+            return;
+        };
+        let is_given = section.breadth_mm.is_some() && section.depth_mm.is_some();
+        if size.measured != Some(Measured::Standing) || is_given {
+            return;
+        }
+        let lying = format!("{}-supine", section.model);
+        let better = if SIZE_PRESETS.contains(&lying.as_str()) {
+            format!(": `{lying}`")
+        } else {
+            String::new()
+        };
+        notes.push(format!(
+            "the chest of `{}`, {:.0} x {:.0} mm, was measured in people standing; lying on the back it is \
+             broader and flatter{better}",
+            section.model, size.breadth_mm, size.depth_mm
+        ));
+    }
+
+    /// A patient in the gantry's housing.
+    fn check_bore(&self, patient: Option<&Patient<'_>>) -> Result<(), Finding> {
+        let (Some(patient), Some(gantry)) = (patient, self.fixture(FixtureKind::Gantry)) else {
             return Ok(());
         };
-        let refuse = |message: String, hint: &str| Err(self.toml.finding(KEY, message).hint(hint));
+        let depth_m = patient.depth_of_any_m(&gantry.solids);
+        if depth_m <= SOFT_M {
+            return Ok(());
+        }
+        let message = format!(
+            "the patient lies {:.0} mm inside the gantry's housing",
+            depth_m * 1e3
+        );
+        let finding = self.toml.finding(PATIENTS_PLACE, message);
+        Err(finding.hint("move the patient into the bore or out of it"))
+    }
+
+    /// A patient in, under or far above something, or beyond the table.
+    fn check_phantom(
+        &self,
+        patient: Option<&Patient<'_>>,
+        notes: &mut Vec<String>,
+    ) -> Result<(), Finding> {
+        let (Some(body), Some((placed, unplaced))) = (patient, self.phantom) else {
+            return Ok(());
+        };
+        let refuse = |message: String, hint: &str| {
+            Err(self.toml.finding(PATIENTS_PLACE, message).hint(hint))
+        };
         let height = "the third number is the height over the floor, with `rest_on_table` that of a \
                       cushion over the table, in millimetres";
         // Along and across the table, so that its box is the table; z is the world's.
@@ -252,25 +298,6 @@ impl Standing<'_> {
         if low < -SOFT_M {
             let message = format!("the patient lies {:.0} mm under the floor", -low * 1e3);
             return refuse(message, height);
-        }
-        let gantry = self.fixture(FixtureKind::Gantry);
-        if let Some(gantry) = gantry {
-            let skin_at = skin_pose(placed);
-            let in_world = extent(unplaced.skin_m.iter(), &placed.world_from_phantom);
-            for piece in &gantry.solids {
-                if !overlap(&piece.bounding_box(), &in_world, SOFT_M) {
-                    continue;
-                }
-                let shape = PreparedShape::new(&piece.shape);
-                let found = separation(&shape, &piece.parent_from_shape, unplaced.skin(), &skin_at);
-                if found.distance_m < -SOFT_M {
-                    let message = format!(
-                        "the patient lies {:.0} mm inside the gantry's housing",
-                        -found.distance_m * 1e3
-                    );
-                    return refuse(message, "move the patient into the bore or out of it");
-                }
-            }
         }
         let on_nothing = |notes: &mut Vec<String>| {
             if low > HIGHEST_TABLE_M {
@@ -309,24 +336,16 @@ impl Standing<'_> {
                 "`rest_on_table = true` lays the lowest point of the skin on the table",
             );
         }
-        if overlap(&slab, &patient, SOFT_M)
-            && let Some(fixture) = self.fixture(FixtureKind::Table)
-        {
-            let skin_at = skin_pose(placed);
-            for solid in &fixture.solids {
-                let shape = PreparedShape::new(&solid.shape);
-                let found = separation(&shape, &solid.parent_from_shape, unplaced.skin(), &skin_at);
-                if found.distance_m < -SOFT_M {
-                    return refuse(
-                        format!(
-                            "the patient lies {:.0} mm deep in the table",
-                            -found.distance_m * 1e3
-                        ),
-                        "`rest_on_table = true` lays the lowest point of the skin on the table",
-                    );
-                }
+        if let Some(fixture) = self.fixture(FixtureKind::Table) {
+            let depth_m = body.depth_of_any_m(&fixture.solids);
+            if depth_m > SOFT_M {
+                return refuse(
+                    format!("the patient lies {:.0} mm deep in the table", depth_m * 1e3),
+                    "`rest_on_table = true` lays the lowest point of the skin on the table",
+                );
             }
         }
+        self.note_standing_size(placed, notes);
         let gap_m = low - top_m;
         if gap_m > CUSHION_M[1] {
             let message = format!("the patient floats {:.0} mm over the table", gap_m * 1e3);
@@ -347,6 +366,50 @@ impl Standing<'_> {
             ));
         }
         Ok(())
+    }
+}
+
+/// What of a patient can be in something else.
+pub(super) struct Patient<'a> {
+    skin: (&'a PreparedShape, Pose, Corners),
+    limbs: Vec<(PreparedShape, Pose, Corners)>,
+}
+
+impl<'a> Patient<'a> {
+    fn new(placed: &PlacedPhantom, unplaced: &'a UnplacedPhantom) -> Self {
+        let world = &placed.world_from_phantom;
+        let limbs = placed.outside().skip(1).map(|limb| {
+            let shape = PreparedShape::new(&limb.shape);
+            (shape, limb.parent_from_shape, limb.bounding_box())
+        });
+        Self {
+            skin: (
+                unplaced.skin(),
+                world * placed.phantom.skin().parent_from_shape,
+                extent(unplaced.skin_m.iter(), world),
+            ),
+            limbs: limbs.collect(),
+        }
+    }
+
+    /// How deep a solid is in the patient, m, where it is more than [`SOFT_M`]; 0 or an upper bound of the
+    /// depth else.
+    fn depth_m(&self, shape: &PreparedShape, solid: &Solid) -> f64 {
+        let here = solid.bounding_box();
+        let (skin, skin_at, skin_box) = &self.skin;
+        let limbs = self.limbs.iter().map(|(limb, at, reach)| (limb, at, reach));
+        std::iter::once((*skin, skin_at, skin_box))
+            .chain(limbs)
+            .filter(|(_, _, reach)| overlap(&here, reach, SOFT_M))
+            .map(|(part, at, _)| -separation(shape, &solid.parent_from_shape, part, at).distance_m)
+            .fold(0.0, f64::max)
+    }
+
+    fn depth_of_any_m(&self, solids: &[Solid]) -> f64 {
+        let depths = solids
+            .iter()
+            .map(|solid| self.depth_m(&PreparedShape::new(&solid.shape), solid));
+        depths.fold(0.0, f64::max)
     }
 }
 
@@ -493,10 +556,6 @@ fn placed<'s>(
         parent_from_shape: world_from_body * solid.parent_from_shape,
         ..solid.clone()
     })
-}
-
-fn skin_pose(placed: &PlacedPhantom) -> Pose {
-    placed.world_from_phantom * placed.phantom.skin().parent_from_shape
 }
 
 /// Frame in the middle of the table: x along it, z up from the floor.

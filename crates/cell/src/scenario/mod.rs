@@ -62,8 +62,8 @@ pub use obstacles::{
 pub use people::{
     ElbowPreference, Handedness, PeopleSection, PersonSection, Role, Side, StaturePercentile,
 };
+pub use phantom::{Arms, LengthUnit, PartSection, PartTissue, PhantomSection, Posture};
 pub(crate) use phantom::{ChestSize, NO_MODEL};
-pub use phantom::{LengthUnit, PartSection, PartTissue, PhantomSection, Posture};
 pub use planning::{NeedleRouteSection, PlanningSection, RollAim};
 pub use ranking::RankingSection;
 pub use recording::RecordingSection;

@@ -23,12 +23,26 @@ pub enum Posture {
     RightLateral,
 }
 
+/// Where the patient's arms are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Arms {
+    /// Left out: nothing keeps the robot from where they would be.
+    #[default]
+    None,
+    /// At the sides, along the body.
+    Beside,
+    /// Raised above the head, as for a CT of the chest.
+    Overhead,
+}
+
 /// The phantom and where it lies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PhantomSection {
-    /// `male-p5`, `male-p50`, `male-p95`, `female-p5`, `female-p50`, `female-p95`, the path of a
-    /// parameter file relative to this file, or `none` for a phantom of `parts` alone.
+    /// `male-p50-supine` or another shipped size (`male` or `female`, `p5`, `p50` or `p95`, measured in
+    /// people on their backs, or without `-supine` in people upright), the path of a parameter file
+    /// relative to this file, or `none` for a phantom of `parts` alone.
     #[schemars(schema_with = "models")]
     pub model: String,
     /// Breadth of the chest, mm; the model's own if left out.
@@ -54,6 +68,11 @@ pub struct PhantomSection {
     pub position_mm: [f64; 3],
     /// Lays the lowest point of the skin on the table.
     pub rest_on_table: bool,
+    /// Where the patient's arms are: `none` leaves them out, `beside` has them along the body, `overhead`
+    /// above the head. They have the model's sizes and lie no lower than the chest.
+    pub arms: Arms,
+    /// Whether the patient has a head.
+    pub head: bool,
     /// Parts from STL files, besides the model's or in their place.
     pub parts: Vec<PartSection>,
 }
@@ -61,7 +80,7 @@ pub struct PhantomSection {
 impl Default for PhantomSection {
     fn default() -> Self {
         Self {
-            model: "male-p50".to_owned(),
+            model: "male-p50-supine".to_owned(),
             breadth_mm: None,
             depth_mm: None,
             length_mm: None,
@@ -70,6 +89,8 @@ impl Default for PhantomSection {
             body_roll_deg: 0.0,
             position_mm: [0.0; 3],
             rest_on_table: true,
+            arms: Arms::None,
+            head: false,
             parts: Vec::new(),
         }
     }

@@ -155,8 +155,8 @@ fn a_guide_that_stands_metres_away_is_the_flange_poses_fault() {
     // The needle goes where the guide goes, so nothing of the patient can be there.
     let text = text
         .replacen(
-            "position_mm = [148.0, -597.5, 0]",
-            "position_mm = [148.0, -3831.2, 0]",
+            "position_mm = [155.0, -609.5, 0]",
+            "position_mm = [155.0, -3843.2, 0]",
             1,
         )
         .replacen("center_mm = [300, -598]", "center_mm = [300, -3831.7]", 1)

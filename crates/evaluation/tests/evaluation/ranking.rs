@@ -175,6 +175,7 @@ fn goal(configurations: Vec<ConfigurationReport>) -> GoalReport {
         insertion_length_m: 0.1,
         standoff_m: None,
         needle_route: None,
+        fissures_crossed: Vec::new(),
         configurations,
         recommended: None,
         ranking: None,

@@ -74,6 +74,7 @@ fn report(configurations: Vec<ConfigurationReport>) -> Vec<GoalReport> {
         insertion_length_m: 0.1,
         standoff_m: None,
         needle_route: None,
+        fissures_crossed: Vec::new(),
         configurations,
         recommended: None,
         ranking: None,

@@ -8,7 +8,7 @@ use needlebench_bench::Preview;
 use needlebench_bench::preview::BASIS;
 use needlebench_cell::{Finding, ResolvedScenario};
 use needlebench_report::number::value_and_limit;
-use needlebench_report::table::route_in_words;
+use needlebench_report::table::{fissures_in_words, route_in_words};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -161,6 +161,9 @@ fn in_words(
         }
         if let Some(route) = &goal.needle_route {
             write!(text, "\n    {}", route_in_words(route))?;
+        }
+        if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
+            write!(text, "\n    {words}")?;
         }
         let target = &goal.target;
         let lesion = target.lesion.as_ref().map(|name| format!("lesion {name}"));

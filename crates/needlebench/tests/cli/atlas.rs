@@ -123,8 +123,8 @@ fn nothing_that_works_is_a_failed_criterion() {
     );
     let far = with_edit(
         &far,
-        "position_mm = [148.0, -597.5, 0]",
-        "position_mm = [148.0, -1197.5, 0]",
+        "position_mm = [155.0, -609.5, 0]",
+        "position_mm = [155.0, -1209.5, 0]",
     );
     let far = with_edit(&far, "center_mm = [300, -598]", "center_mm = [300, -1198]");
     let bench = Bench::with_scenario(&far);

@@ -410,3 +410,13 @@ fn size_of_a_model_contradicts_a_phantom_without_one() {
         .key("phantom.depth_mm")
         .says("contradicts `model = \"none\"`");
 }
+
+#[test]
+fn head_and_arms_of_a_phantom_without_a_model_are_refused() {
+    for (key, limbs) in [("head", "head = true"), ("arms", "arms = \"overhead\"")] {
+        refused_with("model = \"none\"", &format!("model = \"none\"\n{limbs}"))
+            .key(&format!("phantom.{key}"))
+            .says("has no size")
+            .hints("name a model");
+    }
+}

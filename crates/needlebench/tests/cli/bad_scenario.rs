@@ -11,9 +11,9 @@ position_mm = [194.2, -359.3, 170.1]
 rotation_vector_rad = [-0.8567, 2.7197, -1.1407]
 ";
 
-/// Straight down into the front of the chest: the skin is at -126.3 mm.
+/// Straight down into the front of the chest: the skin is at -106.8 mm.
 const ENTRY_AND_TARGET: &str = "\
-entry_mm = [0, -126, 0]
+entry_mm = [0, -106, 0]
 target_mm = [0, -60, 0]
 ";
 
@@ -137,7 +137,7 @@ fn value_outside_its_range_is_refused_with_range_and_unit() {
         .key("motion.hold_s")
         .says("900 s, outside 0.1 to 60")
         .hints("in s");
-    refused_with("top_height_mm = 739.5", "length_mm = 2.0")
+    refused_with("top_height_mm = 763.5", "length_mm = 2.0")
         .key("table.length_mm")
         .at("length_mm = 2.0")
         .says("`table.length_mm` is 2 mm, outside 300 to 5000")
@@ -165,22 +165,22 @@ fn target_outside_the_phantom_is_refused_with_its_distance() {
     refused_goal_with("[0, -60, 0]", "[0, -200, 0]")
         .at("target_mm")
         .key("goals[0].target_mm")
-        .says("73.5 mm outside the phantom")
+        .says("93.0 mm outside the phantom")
         .hints("phantom frame");
 }
 
 #[test]
 fn entry_off_the_skin_is_refused_with_the_point_on_it() {
-    refused_goal_with("[0, -126, 0]", "[0, -220, 0]")
+    refused_goal_with("[0, -106, 0]", "[0, -220, 0]")
         .at("entry_mm")
         .key("goals[0].entry_mm")
-        .says("93.7 mm before the skin")
-        .hints("meets the skin at [0.0, -126.3, 0.0]");
+        .says("113.2 mm before the skin")
+        .hints("meets the skin at [0.0, -106.8, 0.0]");
 }
 
 #[test]
 fn entry_equal_to_target_is_refused() {
-    refused_goal_with("[0, -60, 0]", "[0, -126, 0]")
+    refused_goal_with("[0, -60, 0]", "[0, -106, 0]")
         .at("entry_mm")
         .key("goals[0].entry_mm")
         .says("same point")
@@ -192,8 +192,8 @@ fn goal_inside_the_table_is_refused() {
     // Without `rest_on_table` the phantom may be pushed into the table by mistake.
     let sunk = with_edit(
         SMALL,
-        "position_mm = [148.0, -597.5, 0]",
-        "position_mm = [148.0, -597.5, 660]\nrest_on_table = false",
+        "position_mm = [155.0, -609.5, 0]",
+        "position_mm = [155.0, -609.5, 660]\nrest_on_table = false",
     );
     let text = with_edit(&sunk, FLANGE_POSE, ENTRY_AND_TARGET);
     refused(&text)
@@ -207,7 +207,7 @@ fn goal_inside_the_table_is_refused() {
     let without_phantom = SMALL.replace(&SMALL[start..end], "");
     let text = with_edit(
         &without_phantom,
-        "top_height_mm = 739.5",
+        "top_height_mm = 763.5",
         "top_height_mm = 920",
     );
     refused(&text)
@@ -227,7 +227,7 @@ fn flange_pose_that_points_past_the_phantom_is_refused() {
 
 #[test]
 fn goal_that_contradicts_itself_is_refused() {
-    refused_goal("entry_mm = [0, -126, 0]\n")
+    refused_goal("entry_mm = [0, -106, 0]\n")
         .at("[[goals]]")
         .key("goals[0].target_mm")
         .says("neither `target_mm` nor `lesion`");
@@ -241,7 +241,7 @@ fn goal_that_contradicts_itself_is_refused() {
     .at("lesion")
     .key("goals[0].lesion")
     .says("contradicts `target_mm`");
-    refused_with("approach_mm = 20", "entry_mm = [0, -126, 0]")
+    refused_with("approach_mm = 20", "entry_mm = [0, -106, 0]")
         .at("entry_mm")
         .key("goals[0].entry_mm")
         .says("contradicts `flange_pose`");
@@ -249,7 +249,7 @@ fn goal_that_contradicts_itself_is_refused() {
 
 #[test]
 fn unknown_lesion_is_refused_with_the_one_that_was_meant() {
-    refused_goal("entry_mm = [0, -126, 0]\nlesion = \"left_perihilum\"\n")
+    refused_goal("entry_mm = [0, -106, 0]\nlesion = \"left_perihilum\"\n")
         .at("lesion")
         .key("goals[0].lesion")
         .says("no lesion `left_perihilum`")
@@ -343,7 +343,8 @@ fn unknown_phantom_is_refused_with_the_shipped_ones() {
         .says("male-p51")
         .hints("did you mean `male-p5");
     refused_with("[phantom]", "[phantom]\nmodel = \"x\"")
-        .hints("female-p5, female-p50, female-p95, male-p5, male-p50, male-p95");
+        .hints("female-p5, female-p5-supine, female-p50, female-p50-supine, female-p95,")
+        .hints("male-p50-supine, male-p95, male-p95-supine");
 }
 
 #[test]

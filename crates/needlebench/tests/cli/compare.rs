@@ -262,8 +262,8 @@ fn scenarios_are_run_and_two_layouts_differ_by_their_input() {
         "lower.toml",
         with_edit(
             SMALL,
-            "position_mm = [148.0, -597.5, 0]",
-            "position_mm = [148.0, -597.5, -1.5]",
+            "position_mm = [155.0, -609.5, 0]",
+            "position_mm = [155.0, -609.5, -1.5]",
         ),
     );
     let answer = bench.run(&["compare", "s.toml", "lower.toml", "--json"]);

@@ -94,7 +94,7 @@ fn studies_of_an_older_version_are_compared_by_todays_names() {
         ),
     ] {
         // Where the patient lay then, whose needle passes a rib at 2.1 mm.
-        let then = with_edit(SMALL, "[148.0, -597.5, 0]", "[146.0, -597.5, 0]");
+        let then = with_edit(SMALL, "[155.0, -609.5, 0]", "[157.0, -609.5, 0]");
         let more = "[planning.needle_route]\noff = [\"bone\"]\n[engines]\nrun = [\"rapier\"]\n";
         let bench = Bench::with_scenario(&format!("{then}{more}"));
         bench.write("former.parquet", name);

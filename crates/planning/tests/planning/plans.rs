@@ -43,7 +43,7 @@ center_mm = [300, -598]
 top_height_mm = 739.5
 [[goals]]
 name = "lesion"
-entry_mm = [-139.1, -42.8, 10]
+entry_mm = [-142.4, -32.9, 4.0]
 lesion = "pleural_based"
 "#;
 
@@ -59,7 +59,7 @@ fn beside() -> ResolvedScenario {
                 .clone()
                 .expect("a hint with the point on the skin");
             let point = hint.rsplit("at ").next().expect("the point").to_owned();
-            scenario(&text.replace("[-139.1, -42.8, 10]", &point))
+            scenario(&text.replace("[-142.4, -32.9, 4.0]", &point))
         }
     }
 }
@@ -174,14 +174,14 @@ fn a_table_in_the_way_is_a_collision_of_named_solids() {
         "center_mm = [300, -298]\nwidth_mm = 1000",
     );
     text = text.replace(
-        "top_height_mm = 739.5",
-        "top_height_mm = 739.5\nthickness_mm = 30",
+        "top_height_mm = 763.5",
+        "top_height_mm = 763.5\nthickness_mm = 30",
     );
     text = text.replace("[mount]", "");
     // Out of the bore, which would not let it through.
     text = text.replace("isocentre_mm = [1300,", "isocentre_mm = [2600,");
     // The elbow axis of Right-Down-Fold lies 18 mm below the base plane at 800 mm.
-    let raised = scenario(&text.replace("top_height_mm = 739.5", "top_height_mm = 770"));
+    let raised = scenario(&text.replace("top_height_mm = 763.5", "top_height_mm = 770"));
     let plan = plan(&raised);
     assert_eq!(
         plan.configurations[0].configuration.label(),
@@ -218,7 +218,7 @@ fn table_text() -> String {
     let entry = placed.world_from_phantom.inverse() * goal.entry_m.unwrap();
     let point = entry.coords * 1e3;
     BESIDE.replace(
-        "[-139.1, -42.8, 10]",
+        "[-142.4, -32.9, 4.0]",
         &format!("[{}, {}, {}]", point.x, point.y, point.z),
     )
 }

@@ -6,7 +6,9 @@ use nalgebra::Point3;
 use needlebench_cell::phantom::Tissue;
 use needlebench_cell::{Overrides, ResolvedScenario, resolve_scenario};
 use needlebench_clearance::ClearanceModel;
-use needlebench_planning::{Planner, Rule, judge_route, route_rejection};
+use needlebench_geometry::{PreparedShape, Shape, separation};
+use needlebench_kinematics::Pose;
+use needlebench_planning::{Planner, Rule, crossed_fissures, judge_route, route_rejection};
 
 /// A needle from a direction to the lesion at the right pleura, with more under `[planning]`.
 fn from_direction(azimuth_deg: f64, elevation_deg: f64, needle_route: &str) -> ResolvedScenario {
@@ -68,6 +70,53 @@ fn needle_that_pierces_something_is_refused_from_every_direction() {
         }
     }
     assert!(refused >= 5 && kept >= 5, "{refused} refused, {kept} kept");
+}
+
+/// Fissures that the needle's axis comes nearer to than its radius, found point by point.
+fn reached_fissures(resolved: &ResolvedScenario) -> Vec<String> {
+    let placed = resolved.phantom.as_ref().unwrap();
+    let goal = &resolved.goals[0];
+    let to_phantom = placed.world_from_phantom.inverse();
+    let entry = to_phantom * goal.entry_m.unwrap();
+    let target = to_phantom * goal.target_m;
+    let radius_m = 0.5 * resolved.cell.tool.needle.outer_diameter_m;
+    let ball = PreparedShape::new(&Shape::Sphere { radius_m });
+    let fissures = placed.phantom.parts.iter();
+    let fissures = fissures.filter(|part| part.tissue == Tissue::Fissure);
+    let reached = fissures.filter(|part| {
+        let plate = PreparedShape::new(&part.solid.shape);
+        (0..=400).any(|k| {
+            let point = entry.coords.lerp(&target.coords, f64::from(k) / 400.0);
+            let at = Pose::translation(point.x, point.y, point.z);
+            separation(&ball, &at, &plate, &part.solid.parent_from_shape).distance_m <= 0.0
+        })
+    });
+    reached.map(|part| part.name.clone()).collect()
+}
+
+#[test]
+fn crossed_fissures_are_those_that_the_needle_reaches() {
+    let (mut crossing, mut clear) = (0, 0);
+    for (azimuth_deg, elevation_deg) in directions() {
+        let resolved = from_direction(azimuth_deg, elevation_deg, "");
+        let crossed = crossed_fissures(&resolved, &resolved.goals[0]);
+        assert_eq!(
+            crossed,
+            reached_fissures(&resolved),
+            "{azimuth_deg} {elevation_deg}"
+        );
+        if crossed.is_empty() {
+            clear += 1;
+        } else {
+            crossing += 1;
+        }
+        let judged = judge_route(&resolved, &resolved.goals[0]);
+        assert!(judged.is_none_or(|judged| judged.nearest.part.tissue != Tissue::Fissure));
+    }
+    assert!(
+        crossing >= 3 && clear >= 3,
+        "{crossing} cross, {clear} do not"
+    );
 }
 
 /// The first direction whose needle pierces a bone.

@@ -8,9 +8,9 @@ use needlebench_evaluation::report::{GoalReport, Report, Status, Verdict};
 use super::escape::{inline, paragraph};
 use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
-use crate::table::route_in_words;
 use crate::table::shown::{Shown, shown_metrics};
 use crate::table::verdict::{counts, status};
+use crate::table::{fissures_in_words, route_in_words};
 
 /// The report as Markdown; `engines` are those that there are, with their titles.
 pub fn markdown(report: &Report, engines: &[&'static dyn Engine]) -> String {
@@ -49,6 +49,9 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
                     format!("**{words}**")
                 }
             )?;
+        }
+        if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
+            writeln!(out, "{words}\n")?;
         }
         for each in &goal.configurations {
             if let Some(first) = each.rejections.first() {

@@ -1,8 +1,8 @@
 //! The cell as surfaces, and the arm's chain.
 
 use needlebench_cell::fixtures::FixtureKind;
-use needlebench_cell::phantom::{Phantom, Tissue};
-use needlebench_cell::{BodyKind, Frame, ResolvedScenario, Tool};
+use needlebench_cell::phantom::Tissue;
+use needlebench_cell::{BodyKind, Frame, PlacedPhantom, ResolvedScenario, Tool};
 use needlebench_geometry::{Shape, Solid, TriangleMesh, Visual};
 use needlebench_kinematics::{Chain, Pose};
 use serde_json::{Value, json};
@@ -114,12 +114,14 @@ impl Surfaces {
         }
     }
 
-    fn add_phantom(&mut self, phantom: &Phantom, place: &Pose) {
-        for part in &phantom.parts {
+    /// A patient, from the phantom's frame.
+    fn add_phantom(&mut self, placed: &PlacedPhantom, place: &Pose) {
+        for part in placed.phantom.parts.iter().chain(&placed.limbs) {
             let (group, opacity) = match part.tissue {
                 Tissue::Skin => ("skin", 0.22),
                 Tissue::Organ => ("organ", 0.4),
                 Tissue::Bone => ("bone", 1.0),
+                Tissue::Fissure => ("organ", 0.5),
                 Tissue::Vessel => ("vessel", 1.0),
                 Tissue::Lesion => ("lesion", 1.0),
                 Tissue::Marker => ("marker", 1.0),
@@ -210,7 +212,7 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
         }
     }
     if let Some(placed) = &resolved.phantom {
-        surfaces.add_phantom(&placed.phantom, &placed.world_from_phantom);
+        surfaces.add_phantom(placed, &placed.world_from_phantom);
     }
     for body in &cell.bodies {
         let (group, color_rgba) = match body.kind {
@@ -245,7 +247,7 @@ pub(super) fn look(resolved: &ResolvedScenario, pack: &mut Pack) -> Value {
     let mut surfaces = Surfaces::default();
     surfaces.add_tool(tool);
     if let Some(placed) = &resolved.phantom {
-        surfaces.add_phantom(&placed.phantom, &Pose::identity());
+        surfaces.add_phantom(placed, &Pose::identity());
     }
     json!({
         "guide": [pose(&tool.flange_from_guide_entry), pose(&tool.flange_from_guide_exit)],

@@ -50,7 +50,7 @@ impl Backdrop {
             }
         }
         if let Some(placed) = &resolved.phantom {
-            for part in &placed.phantom.parts {
+            for part in placed.phantom.parts.iter().chain(&placed.limbs) {
                 let mut color_rgba = part.color_rgba;
                 match part.tissue {
                     Tissue::Skin => color_rgba[3] = 0.22,

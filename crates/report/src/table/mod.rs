@@ -18,4 +18,4 @@ pub mod study_comparison;
 pub(crate) mod verdict;
 
 pub use plain::plain_table;
-pub use run::{report_text, route_in_words};
+pub use run::{fissures_in_words, report_text, route_in_words};

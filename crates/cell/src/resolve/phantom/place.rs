@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Translation3, UnitQuaternion, UnitVector3, Vector3};
+use needlebench_geometry::Solid;
 use needlebench_kinematics::Pose;
 
 use super::UnplacedPhantom;
 use crate::Finding;
-use crate::phantom::Phantom;
-use crate::scenario::{PhantomSection, Posture, TableSection};
+use crate::phantom::{Phantom, PhantomParameters, PhantomPart, Support, limbs};
+use crate::scenario::{Arms, NO_MODEL, PhantomSection, Posture, TableSection};
 use crate::toml_text::TomlText;
 
 /// The phantom, placed.
@@ -18,19 +19,36 @@ pub struct PlacedPhantom {
     pub phantom: Arc<Phantom>,
     /// Its place.
     pub world_from_phantom: Pose,
+    /// Head and arms, as far as the scenario has them; phantom frame.
+    pub limbs: Vec<PhantomPart>,
 }
 
-/// Pose of a phantom in the world.
+impl PlacedPhantom {
+    /// What of the patient can be touched, in the world: the skin of the chest, then head and arms.
+    pub fn outside(&self) -> impl Iterator<Item = Solid> {
+        let limbs = self.limbs.iter().map(|part| &part.solid);
+        let solids = std::iter::once(self.phantom.skin()).chain(limbs);
+        solids.map(|solid| Solid {
+            parent_from_shape: self.world_from_phantom * solid.parent_from_shape,
+            ..solid.clone()
+        })
+    }
+}
+
+/// Lays a phantom into the world.
 pub(crate) fn place_phantom(
     toml: &TomlText<'_>,
     section: &PhantomSection,
     table: Option<&TableSection>,
     phantom: &UnplacedPhantom,
-) -> Result<Pose, Finding> {
+) -> Result<PlacedPhantom, Finding> {
     let mut world_from_phantom = Pose::from_parts(
         Translation3::from(Vector3::from(section.position_mm) * 1e-3),
         orientation(section),
     );
+    let down = world_from_phantom.rotation.inverse() * -Vector3::z();
+    let along = phantom.skin_m.iter().map(|vertex| down.dot(vertex));
+    let lowest_m = along.fold(f64::NEG_INFINITY, f64::max);
     if section.rest_on_table {
         let Some(table) = table else {
             return Err(toml
@@ -38,16 +56,46 @@ pub(crate) fn place_phantom(
                 .hint("add a [table], or set `rest_on_table = false` and give the full position"));
         };
         check_over_table(toml, table, section.position_mm)?;
-        let up = world_from_phantom.rotation.inverse() * Vector3::z();
-        let lowest_m = phantom
-            .skin_m
-            .iter()
-            .map(|vertex| up.dot(vertex))
-            .fold(f64::INFINITY, f64::min);
         world_from_phantom.translation.vector.z =
-            (table.top_height_mm + section.position_mm[2]) * 1e-3 - lowest_m;
+            (table.top_height_mm + section.position_mm[2]) * 1e-3 + lowest_m;
     }
-    Ok(world_from_phantom)
+    let limbs = match limb_sizes(toml, section, &phantom.phantom)? {
+        Some(parameters) => {
+            let support = Support {
+                down: UnitVector3::new_normalize(down),
+                depth_m: lowest_m,
+            };
+            limbs(parameters, section.arms, section.head, &support)
+        }
+        None => Vec::new(),
+    };
+    Ok(PlacedPhantom {
+        phantom: Arc::clone(&phantom.phantom),
+        world_from_phantom,
+        limbs,
+    })
+}
+
+/// What head and arms are made after; none if none are wanted.
+fn limb_sizes<'p>(
+    toml: &TomlText<'_>,
+    section: &PhantomSection,
+    phantom: &'p Phantom,
+) -> Result<Option<&'p PhantomParameters>, Finding> {
+    let (key, wanted) = match section.arms {
+        Arms::None => ("head", section.head),
+        Arms::Beside | Arms::Overhead => ("arms", true),
+    };
+    match &phantom.parameters {
+        _ if !wanted => Ok(None),
+        Some(parameters) => Ok(Some(parameters)),
+        None => Err(toml
+            .finding(
+                &format!("phantom.{key}"),
+                format!("`{key}` has no size: `model` is `{NO_MODEL}`"),
+            )
+            .hint("name a model and let the parts replace what they stand for, or leave it out")),
+    }
 }
 
 /// Refuses a phantom that rests on a table it does not lie over.

@@ -3,7 +3,7 @@
 use needlebench_geometry::{PreparedShape, Solid, separation};
 use needlebench_kinematics::Pose;
 
-use super::{Corners, FOOT_M, RIGID_M, SOFT_M, Standing, extent, overlap, placed, skin_pose};
+use super::{Corners, FOOT_M, Patient, RIGID_M, SOFT_M, Standing, overlap, placed};
 use crate::Finding;
 use crate::fixtures::FixtureKind;
 use crate::resolve::obstacles::PlacedObstacle;
@@ -20,7 +20,11 @@ struct Other<'s> {
 impl Standing<'_> {
     /// Obstacles through the floor, the table, the gantry, the mount, the robot's base or the patient. What
     /// one is fixed to, or counts as, it may go into: it is built into that.
-    pub(super) fn check_obstacles(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
+    pub(super) fn check_obstacles(
+        &self,
+        patient: Option<&Patient<'_>>,
+        notes: &mut Vec<String>,
+    ) -> Result<(), Finding> {
         if self.obstacles.is_empty() {
             return Ok(());
         }
@@ -43,7 +47,9 @@ impl Standing<'_> {
                     return refuse(format!("goes {depth_mm:.1} mm into the {}", other.name));
                 }
             }
-            let depth_m = self.depth_in_patient(obstacle);
+            let depth_m = patient.map_or(0.0, |patient| {
+                patient.depth_m(obstacle.prepared(), &obstacle.solid)
+            });
             if depth_m > SOFT_M {
                 return refuse(format!("goes {:.1} mm into the patient", depth_m * 1e3));
             }
@@ -95,19 +101,6 @@ impl Standing<'_> {
             });
         }
         others
-    }
-
-    fn depth_in_patient(&self, obstacle: &PlacedObstacle) -> f64 {
-        let Some((placed, unplaced)) = self.phantom else {
-            return 0.0;
-        };
-        let patient = extent(unplaced.skin_m.iter(), &placed.world_from_phantom);
-        if !overlap(&obstacle.solid.bounding_box(), &patient, SOFT_M) {
-            return 0.0;
-        }
-        let at = &obstacle.solid.parent_from_shape;
-        let found = separation(obstacle.prepared(), at, unplaced.skin(), &skin_pose(placed));
-        -found.distance_m
     }
 
     /// Whether the floor or anything else is right under or beside an obstacle.

@@ -70,6 +70,13 @@ pub(crate) fn with_mesh_parts(
             notes.push("the markers of the model's skin went with it".to_owned());
         }
     }
+    for side in ["left", "right"] {
+        // Fissures go with the lung that they are in.
+        let lung = format!("lung_{side}");
+        if parts.iter().all(|part| part.name != lung) {
+            parts.retain(|part| part.tissue != Tissue::Fissure || !part.name.ends_with(side));
+        }
+    }
     lesions.retain(|lesion| {
         let name = format!("lesion_{}", lesion.name);
         parts.iter().any(|part| part.name == name)
