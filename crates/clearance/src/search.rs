@@ -72,6 +72,29 @@ impl ClearanceModel {
         counting.found
     }
 
+    /// The pair whose clearance exceeds the floor of its class, m, by least, or is farthest below it.
+    ///
+    /// Classes that do not matter have the floor negative infinity; `None` if none does.
+    pub fn least_excess(
+        &self,
+        q: &Joints,
+        floor_m: impl Fn(ClearanceClass) -> f64,
+    ) -> Option<PairClearance> {
+        let links = self.world_from_links(q).each_ref().map(Placement::new);
+        let look = Look {
+            model: self,
+            links: &links,
+        };
+        let mut least = LeastExcess {
+            floor_m: ClearanceClass::ALL.map(floor_m),
+            excess_m: f64::INFINITY,
+            found: None,
+        };
+        look.search_afresh(&mut Nearby::default(), &mut least);
+        let (couple, separation) = least.found?;
+        Some(look.clearance(couple, &separation))
+    }
+
     /// Most that the clearance of a pair differs between two postures, m: what its two bodies have
     /// travelled from one to the other.
     pub fn travel_m(&self, pair: usize, from: &Joints, to: &Joints) -> f64 {
@@ -572,6 +595,31 @@ impl Wanted for Counting<'_> {
         if counts.floor_m[class] > f64::NEG_INFINITY && excess_m < self.found.excess_m {
             self.found.excess_m = excess_m;
             self.found.excess_of = Some(couple.pair);
+        }
+        true
+    }
+}
+
+/// The couple whose clearance exceeds the floor of its class by least.
+struct LeastExcess {
+    floor_m: [f64; CLASS_COUNT],
+    excess_m: f64,
+    found: Option<(Couple, Separation)>,
+}
+
+impl Wanted for LeastExcess {
+    #[inline]
+    fn cutoff_m(&self, class: ClearanceClass) -> f64 {
+        match self.floor_m[class as usize] {
+            f64::NEG_INFINITY => f64::NEG_INFINITY,
+            floor_m => floor_m + self.excess_m + PRUNING_MARGIN_M,
+        }
+    }
+
+    fn take(&mut self, class: ClearanceClass, couple: Couple, found: &Separation) -> bool {
+        let excess_m = found.distance_m - self.floor_m[class as usize];
+        if excess_m < self.excess_m || self.found.is_none() {
+            (self.excess_m, self.found) = (excess_m, Some((couple, *found)));
         }
         true
     }

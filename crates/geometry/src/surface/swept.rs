@@ -177,19 +177,17 @@ fn block(shape: &PreparedShape, part: u32) -> &OrientedBox {
 
 /// Largest coordinate of a part along a unit vector, m.
 fn highest(shape: &PreparedShape, part: u32, direction: &Vector3<f64>) -> f64 {
-    match shape.surface() {
-        Some(tree) => match tree.parts(part) {
-            Parts::Boxes(_) => tree.block(part).high(direction),
-            Parts::Triangles(triangles) => triangles
-                .as_flattened()
-                .iter()
-                .map(|corner| direction.dot(corner))
-                .fold(f64::NEG_INFINITY, f64::max),
-        },
-        None => {
-            let mut hint = usize::MAX;
-            direction.dot(&shape.core_support(direction, &mut hint)) + shape.radius_m
-        }
+    let Some(tree) = shape.surface() else {
+        let mut hint = usize::MAX;
+        return direction.dot(&shape.core_support(direction, &mut hint)) + shape.radius_m;
+    };
+    match tree.parts(part) {
+        Parts::Boxes(_) => tree.block(part).high(direction),
+        Parts::Triangles(triangles) => triangles
+            .as_flattened()
+            .iter()
+            .map(|corner| direction.dot(corner))
+            .fold(f64::NEG_INFINITY, f64::max),
     }
 }
 
