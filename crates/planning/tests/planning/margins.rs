@@ -408,7 +408,7 @@ fn a_blocked_way_is_named_by_its_deepest_place() {
         let Some(rejection) = plan.rejections.first() else {
             continue;
         };
-        if rejection.rule != Rule::Collision || !rejection.detail.contains("transfer") {
+        if rejection.rule != Rule::Collision || !rejection.detail.contains("in the transfer") {
             continue;
         }
         named += 1;
