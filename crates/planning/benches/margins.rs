@@ -27,8 +27,14 @@ fn main() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let mut names: Vec<_> = std::fs::read_dir(&folder)
         .expect("the shipped scenarios are there")
-        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter(|name| name.ends_with(".toml"))
+        .filter_map(|entry| {
+            let path = entry.ok()?.path();
+            let is_scenario = path.extension().is_some_and(|ending| ending == "toml");
+            path.file_name()
+                .filter(|_| is_scenario)?
+                .to_str()
+                .map(str::to_owned)
+        })
         .collect();
     names.sort();
     println!(

@@ -191,10 +191,12 @@ impl<'a> MotionChecker<'a> {
     /// By how much a posture is below some clearances at most, m, not above 0 where it keeps all of them, and
     /// how much less that gets with each joint, m/rad. `None` where nothing is asked for.
     pub(crate) fn lack(&self, q: &Joints, least_m: &ByClass) -> Option<(f64, Joints)> {
-        let nearest = self.model.least_excess(q, |class| match least_m.get(class) {
-            least_m if class.is_physical() && least_m.is_finite() => least_m,
-            _ => f64::NEG_INFINITY,
-        })?;
+        let nearest = self
+            .model
+            .least_excess(q, |class| match least_m.get(class) {
+                least_m if class.is_physical() && least_m.is_finite() => least_m,
+                _ => f64::NEG_INFINITY,
+            })?;
         let separation = &nearest.separation;
         let robot = &self.cell.robot;
         let base_link_from_world = robot.world_from_base_link.inverse();
