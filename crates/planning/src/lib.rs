@@ -26,4 +26,6 @@ pub use plan::GoalPlan;
 pub use planner::{Candidate, Planner, PostureMargins};
 pub use press::{PressError, PressPlan, stage_press};
 pub use rejection::{Rejection, Rule};
-pub use route::{RouteClearance, RouteJudgement, judge_route, needle_route, route_rejection};
+pub use route::{
+    RouteClearance, RouteJudgement, judge_route, judge_route_beside, needle_route, route_rejection,
+};

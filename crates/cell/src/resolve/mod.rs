@@ -10,6 +10,7 @@ pub mod imperfections;
 pub mod iso9283;
 mod layout;
 mod library;
+mod moved;
 mod names;
 mod needle_route;
 mod obstacles;
@@ -42,11 +43,12 @@ use arm_values::check_brakes;
 pub use expected::Expected;
 use expected::RealThings;
 pub use goals::{Expectation, Goal, Roll};
-use goals::{Surroundings, resolve_goal};
+use goals::{Surroundings, boxes_around, resolve_goal};
 use imperfections::Imperfections;
 use iso9283::{Iso9283Protocol, resolve_iso9283};
 use layout::Layout;
 pub(crate) use library::ModelLibrary;
+pub(crate) use moved::StillLayout;
 use needle_route::check_needle_route;
 use obstacles::{check_obstacle_names, place_obstacles};
 pub use overrides::Overrides;
@@ -57,7 +59,8 @@ pub use robot::load_robot;
 pub use servo::ServoSettings;
 use servo::servo_settings;
 use standing::{
-    Standing, check_distance, check_floor, check_start, note_crowds, note_idle_criteria,
+    KnownDepths, Standing, check_distance, check_floor, check_start, note_crowds,
+    note_idle_criteria,
 };
 
 /// Standard gravity, m/s^2.
@@ -253,21 +256,24 @@ pub(crate) fn resolve(
         robot: &robot,
         fixtures: &fixtures,
         phantom: phantom.as_ref().zip(lying.as_deref()),
+        known: &KnownDepths::default(),
     };
     standing.check(&mut notes).map_err(one)?;
     surroundings.extend(obstacles.bodies(&scenario.obstacles));
     fixtures.extend(obstacles.fixtures());
     note_idle_criteria(&scenario, &mut notes);
     let goals = {
+        let fixtures: Vec<CollisionBody> = surroundings
+            .iter()
+            .filter(|body| body.kind != BodyKind::Phantom)
+            .cloned()
+            .collect();
         let context = Surroundings {
             robot: &robot,
             tool: &tool,
             phantom: phantom.as_ref(),
-            fixtures: &surroundings
-                .iter()
-                .filter(|body| body.kind != BodyKind::Phantom)
-                .cloned()
-                .collect::<Vec<_>>(),
+            fixtures: &fixtures,
+            boxes: &boxes_around(&fixtures),
         };
         let (mut goals, mut findings) = (Vec::new(), Vec::new());
         for (index, section) in scenario.goals.iter().enumerate() {

@@ -3,6 +3,7 @@
 //!
 //! What cannot be is refused; what is odd but possible is noted.
 
+mod depths;
 mod obstacles;
 
 use std::f64::consts::FRAC_PI_2;
@@ -12,12 +13,14 @@ use needlebench_geometry::{PreparedShape, Solid, separation};
 use needlebench_kinematics::{Joints, Pose};
 
 use super::obstacles::PlacedObstacle;
-use super::phantom::UnplacedPhantom;
+use super::phantom::{Corners, UnplacedPhantom};
 use super::{Goal, PlacedPhantom};
 use crate::fixtures::{Fixture, FixtureKind};
 use crate::scenario::{MountKind, Scenario, TableSection};
 use crate::toml_text::TomlText;
 use crate::{ClearanceClass, Finding, Robot, Tool};
+use depths::Beside;
+pub(super) use depths::KnownDepths;
 
 /// Overlap of rigid things that is rounding of a drawing, m.
 const RIGID_M: f64 = 1e-3;
@@ -35,6 +38,9 @@ const OVERHANG_M: f64 = 0.05;
 /// A goal this many times farther than the arm could ever be long is a slip, and no question of reach.
 const TIMES_REACH: f64 = 2.0;
 
+const BASE_KEY: &str = "robot.base_position_mm";
+const BASE_HINT: &str = "the position is in the world: z up, floor at 0, in millimetres";
+
 /// What stands in a cell.
 pub(super) struct Standing<'a> {
     pub toml: &'a TomlText<'a>,
@@ -44,6 +50,8 @@ pub(super) struct Standing<'a> {
     pub fixtures: &'a [Fixture],
     pub phantom: Option<(&'a PlacedPhantom, &'a UnplacedPhantom)>,
     pub obstacles: &'a [PlacedObstacle],
+    /// From where the patient lay before; fresh for a cell of which nothing is known.
+    pub known: &'a KnownDepths,
 }
 
 impl Standing<'_> {
@@ -55,6 +63,22 @@ impl Standing<'_> {
         self.check_base(notes)?;
         self.check_phantom(notes)?;
         self.check_obstacles(notes)
+    }
+
+    /// Where the patient lies alone: what is left of [`Standing::check`] if all else is known to stand.
+    pub fn check_lying(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
+        self.check_base_in_patient(&self.base_solids())?;
+        self.check_phantom(notes)?;
+        self.obstacles
+            .iter()
+            .enumerate()
+            .try_for_each(|(place, obstacle)| self.check_obstacle_in_patient(place, obstacle))
+    }
+
+    /// The robot's base, in the world.
+    fn base_solids(&self) -> Vec<Solid> {
+        let robot = self.robot;
+        placed(&robot.base.solids, &robot.world_from_base_link).collect()
     }
 
     fn fixture(&self, kind: FixtureKind) -> Option<&Fixture> {
@@ -168,10 +192,8 @@ impl Standing<'_> {
 
     /// A base in or under something, and one that stands on nothing.
     fn check_base(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
-        const KEY: &str = "robot.base_position_mm";
         let robot = self.robot;
-        let base: Vec<Solid> = placed(&robot.base.solids, &robot.world_from_base_link).collect();
-        let hint = "the position is in the world: z up, floor at 0, in millimetres";
+        let base = self.base_solids();
         for (kind, name) in [
             (FixtureKind::Table, "table"),
             (FixtureKind::Gantry, "gantry"),
@@ -184,35 +206,10 @@ impl Standing<'_> {
                     "the robot's base stands {} inside the {name}",
                     found.depth()
                 );
-                return Err(self.toml.finding(KEY, message).hint(hint));
+                return Err(self.toml.finding(BASE_KEY, message).hint(BASE_HINT));
             }
         }
-        if let Some((placed, unplaced)) = self.phantom {
-            let skin_at = skin_pose(placed);
-            let patient = extent(unplaced.skin_m.iter(), &placed.world_from_phantom);
-            let mount = self.fixture(FixtureKind::Mount);
-            let column = mount.map_or(&[][..], |mount| &mount.solids);
-            for (what, solids) in [
-                ("the robot's base", &base[..]),
-                ("the robot's mount", column),
-            ] {
-                let depth_m = solids
-                    .iter()
-                    .filter(|solid| overlap(&solid.bounding_box(), &patient, SOFT_M))
-                    .map(|solid| {
-                        let shape = PreparedShape::new(&solid.shape);
-                        let found =
-                            separation(&shape, &solid.parent_from_shape, unplaced.skin(), &skin_at);
-                        -found.distance_m
-                    })
-                    .fold(0.0, f64::max);
-                if depth_m > SOFT_M {
-                    let message =
-                        format!("{what} stands {:.1} mm inside the patient", depth_m * 1e3);
-                    return Err(self.toml.finding(KEY, message).hint(hint));
-                }
-            }
-        }
+        self.check_base_in_patient(&base)?;
         let height_m = robot.world_from_base_link.translation.z;
         let stands_on_something = self.scenario.mount.is_some()
             || height_m <= SOFT_M
@@ -234,6 +231,27 @@ impl Standing<'_> {
         Ok(())
     }
 
+    /// A base, or what carries it, in the patient.
+    fn check_base_in_patient(&self, base: &[Solid]) -> Result<(), Finding> {
+        let mount = self.fixture(FixtureKind::Mount);
+        let column = mount.map_or(&[][..], |mount| &mount.solids);
+        let of_base: fn(usize) -> Beside = Beside::Base;
+        for (what, solids, beside) in [
+            ("the robot's base", base, of_base),
+            ("the robot's mount", column, Beside::Mount),
+        ] {
+            let depths = solids.iter().enumerate();
+            let depth_m = depths
+                .map(|(index, solid)| self.depth_in_patient(beside(index), solid, true))
+                .fold(0.0, f64::max);
+            if depth_m > SOFT_M {
+                let message = format!("{what} stands {:.1} mm inside the patient", depth_m * 1e3);
+                return Err(self.toml.finding(BASE_KEY, message).hint(BASE_HINT));
+            }
+        }
+        Ok(())
+    }
+
     /// A patient in, under or far above something, or beyond the table.
     fn check_phantom(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
         const KEY: &str = "phantom.position_mm";
@@ -247,26 +265,19 @@ impl Standing<'_> {
         let turned = self.scenario.table.as_ref().map(world_from_table);
         let turned = turned.unwrap_or_else(Pose::identity);
         let to_table = turned.inverse() * placed.world_from_phantom;
-        let patient = extent(unplaced.skin_m.iter(), &to_table);
+        let patient = unplaced.extent(&to_table);
         let (low, high) = (patient.0.z, patient.1.z);
         if low < -SOFT_M {
             let message = format!("the patient lies {:.0} mm under the floor", -low * 1e3);
             return refuse(message, height);
         }
-        let gantry = self.fixture(FixtureKind::Gantry);
-        if let Some(gantry) = gantry {
-            let skin_at = skin_pose(placed);
-            let in_world = extent(unplaced.skin_m.iter(), &placed.world_from_phantom);
-            for piece in &gantry.solids {
-                if !overlap(&piece.bounding_box(), &in_world, SOFT_M) {
-                    continue;
-                }
-                let shape = PreparedShape::new(&piece.shape);
-                let found = separation(&shape, &piece.parent_from_shape, unplaced.skin(), &skin_at);
-                if found.distance_m < -SOFT_M {
+        if let Some(gantry) = self.fixture(FixtureKind::Gantry) {
+            for (index, piece) in gantry.solids.iter().enumerate() {
+                let depth_m = self.depth_in_patient(Beside::Gantry(index), piece, true);
+                if depth_m > SOFT_M {
                     let message = format!(
                         "the patient lies {:.0} mm inside the gantry's housing",
-                        -found.distance_m * 1e3
+                        depth_m * 1e3
                     );
                     return refuse(message, "move the patient into the bore or out of it");
                 }
@@ -312,16 +323,11 @@ impl Standing<'_> {
         if overlap(&slab, &patient, SOFT_M)
             && let Some(fixture) = self.fixture(FixtureKind::Table)
         {
-            let skin_at = skin_pose(placed);
-            for solid in &fixture.solids {
-                let shape = PreparedShape::new(&solid.shape);
-                let found = separation(&shape, &solid.parent_from_shape, unplaced.skin(), &skin_at);
-                if found.distance_m < -SOFT_M {
+            for (index, solid) in fixture.solids.iter().enumerate() {
+                let depth_m = self.depth_in_patient(Beside::Table(index), solid, false);
+                if depth_m > SOFT_M {
                     return refuse(
-                        format!(
-                            "the patient lies {:.0} mm deep in the table",
-                            -found.distance_m * 1e3
-                        ),
+                        format!("the patient lies {:.0} mm deep in the table", depth_m * 1e3),
                         "`rest_on_table = true` lays the lowest point of the skin on the table",
                     );
                 }
@@ -507,26 +513,6 @@ fn world_from_table(table: &TableSection) -> Pose {
         nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad),
     )
 }
-
-/// Box about points, along the axes of another frame.
-fn extent<'p>(
-    points: impl Iterator<Item = &'p Vector3<f64>>,
-    frame_from_points: &Pose,
-) -> (Point3<f64>, Point3<f64>) {
-    let rotation = frame_from_points.rotation.to_rotation_matrix();
-    let start = (
-        Vector3::repeat(f64::INFINITY),
-        Vector3::repeat(f64::NEG_INFINITY),
-    );
-    let (low, high) = points.fold(start, |(low, high), point| {
-        let at = rotation * point;
-        (low.inf(&at), high.sup(&at))
-    });
-    let middle = frame_from_points.translation.vector;
-    ((middle + low).into(), (middle + high).into())
-}
-
-type Corners = (Point3<f64>, Point3<f64>);
 
 /// Whether two boxes overlap by more than a depth along every axis: what they hold cannot overlap by
 /// more than that otherwise.

@@ -7,6 +7,7 @@ mod family;
 mod foreign_urdf;
 mod goal_direction;
 mod layouts;
+mod moves;
 mod obstacles;
 mod pair_classes;
 mod schema;

@@ -7,14 +7,16 @@ mod checks;
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
+use needlebench_geometry::Solid;
 use needlebench_kinematics::Pose;
 use needlebench_kinematics::ik::Configuration;
 
-use super::phantom::PlacedPhantom;
+use super::phantom::{Corners, PlacedPhantom};
 use crate::scenario::{EVERY_CONFIGURATION, GoalSection};
 use crate::toml_text::TomlText;
 use crate::{CollisionBody, Finding, Robot, Tool};
 use by_flange::from_flange_pose;
+pub(crate) use by_points::GoalInPhantom;
 use by_points::from_entry_and_target;
 use checks::{check_place, check_target};
 
@@ -80,6 +82,14 @@ pub(crate) struct Surroundings<'a> {
     pub tool: &'a Tool,
     pub phantom: Option<&'a PlacedPhantom>,
     pub fixtures: &'a [CollisionBody],
+    /// Boxes around each solid of each of the fixtures.
+    pub boxes: &'a [Vec<Corners>],
+}
+
+/// Boxes around each solid of each body.
+pub(crate) fn boxes_around(bodies: &[CollisionBody]) -> Vec<Vec<Corners>> {
+    let of_body = |body: &CollisionBody| body.solids.iter().map(Solid::bounding_box).collect();
+    bodies.iter().map(of_body).collect()
 }
 
 pub(crate) fn resolve_goal(
@@ -89,13 +99,43 @@ pub(crate) fn resolve_goal(
     surroundings: &Surroundings<'_>,
     notes: &mut Vec<String>,
 ) -> Result<Goal, Finding> {
+    let in_phantom = goal_in_phantom(text, index, section, surroundings, notes)?;
+    place_goal(text, index, section, in_phantom.as_ref(), surroundings)
+}
+
+/// The goal in the phantom's frame, wherever that lies; none for one by a pose of the flange.
+pub(crate) fn goal_in_phantom(
+    text: &TomlText<'_>,
+    index: usize,
+    section: &GoalSection,
+    surroundings: &Surroundings<'_>,
+    notes: &mut Vec<String>,
+) -> Result<Option<GoalInPhantom>, Finding> {
+    if section.flange_pose.is_some() {
+        return Ok(None);
+    }
     let key = |name: &str| format!("goals[{index}].{name}");
-    let mut goal = if section.flange_pose.is_some() {
-        from_flange_pose(text, &key, section, surroundings)?
-    } else {
-        from_entry_and_target(text, &key, section, surroundings, notes)?
+    let mut goal = from_entry_and_target(text, &key, section, surroundings, notes)?;
+    goal.0.expected = expectations(section);
+    Ok(Some(goal))
+}
+
+/// The goal in the world; `in_phantom` is what [`goal_in_phantom`] says.
+pub(crate) fn place_goal(
+    text: &TomlText<'_>,
+    index: usize,
+    section: &GoalSection,
+    in_phantom: Option<&GoalInPhantom>,
+    surroundings: &Surroundings<'_>,
+) -> Result<Goal, Finding> {
+    let key = |name: &str| format!("goals[{index}].{name}");
+    let goal = match in_phantom.zip(surroundings.phantom) {
+        Some((goal, lying)) => goal.placed(&lying.world_from_phantom),
+        None => Goal {
+            expected: expectations(section),
+            ..from_flange_pose(text, &key, section, surroundings)?
+        },
     };
-    goal.expected = expectations(section);
     check_place(text, &key, &goal, section, surroundings)?;
     check_target(text, &key, &goal, section, surroundings)?;
     let needle_m = surroundings.tool.needle.length_m;

@@ -39,11 +39,7 @@ pub(crate) fn place_phantom(
         };
         check_over_table(toml, table, section.position_mm)?;
         let up = world_from_phantom.rotation.inverse() * Vector3::z();
-        let lowest_m = phantom
-            .skin_m
-            .iter()
-            .map(|vertex| up.dot(vertex))
-            .fold(f64::INFINITY, f64::min);
+        let lowest_m = phantom.lowest_m(&up);
         world_from_phantom.translation.vector.z =
             (table.top_height_mm + section.position_mm[2]) * 1e-3 - lowest_m;
     }

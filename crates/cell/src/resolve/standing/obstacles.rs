@@ -3,7 +3,7 @@
 use needlebench_geometry::{PreparedShape, Solid, separation};
 use needlebench_kinematics::Pose;
 
-use super::{Corners, FOOT_M, RIGID_M, SOFT_M, Standing, extent, overlap, placed, skin_pose};
+use super::{Beside, Corners, FOOT_M, RIGID_M, SOFT_M, Standing, overlap};
 use crate::Finding;
 use crate::fixtures::FixtureKind;
 use crate::resolve::obstacles::PlacedObstacle;
@@ -24,15 +24,10 @@ impl Standing<'_> {
         if self.obstacles.is_empty() {
             return Ok(());
         }
-        let robot = self.robot;
-        let base: Vec<Solid> = placed(&robot.base.solids, &robot.world_from_base_link).collect();
-        for obstacle in self.obstacles {
+        let base = self.base_solids();
+        for (place, obstacle) in self.obstacles.iter().enumerate() {
             let section = &self.scenario.obstacles[obstacle.index];
-            let refuse = |message: String| {
-                let key = format!("obstacles[{}].position_mm", obstacle.index);
-                let message = format!("obstacle `{}` {message}", section.name);
-                Err(self.toml.finding(&key, message).hint(frame(section)))
-            };
+            let refuse = |message: String| Err(self.misplaced(obstacle, &message));
             let (low, _) = obstacle.solid.bounding_box();
             if low.z < -RIGID_M {
                 return refuse(format!("goes {:.1} mm under the floor", -low.z * 1e3));
@@ -43,10 +38,7 @@ impl Standing<'_> {
                     return refuse(format!("goes {depth_mm:.1} mm into the {}", other.name));
                 }
             }
-            let depth_m = self.depth_in_patient(obstacle);
-            if depth_m > SOFT_M {
-                return refuse(format!("goes {:.1} mm into the patient", depth_m * 1e3));
-            }
+            self.check_obstacle_in_patient(place, obstacle)?;
             if section.attached_to == AttachedTo::World && !self.is_carried(obstacle, &base) {
                 notes.push(format!(
                     "obstacle `{}` hangs {:.0} mm over the floor: what carries it is not in the cell",
@@ -97,17 +89,25 @@ impl Standing<'_> {
         others
     }
 
-    fn depth_in_patient(&self, obstacle: &PlacedObstacle) -> f64 {
-        let Some((placed, unplaced)) = self.phantom else {
-            return 0.0;
-        };
-        let patient = extent(unplaced.skin_m.iter(), &placed.world_from_phantom);
-        if !overlap(&obstacle.solid.bounding_box(), &patient, SOFT_M) {
-            return 0.0;
+    /// An obstacle in the patient; `place` is its number among those that are there.
+    pub(super) fn check_obstacle_in_patient(
+        &self,
+        place: usize,
+        obstacle: &PlacedObstacle,
+    ) -> Result<(), Finding> {
+        let depth_m = self.depth_in_patient(Beside::Obstacle(place), &obstacle.solid, true);
+        if depth_m > SOFT_M {
+            let message = format!("goes {:.1} mm into the patient", depth_m * 1e3);
+            return Err(self.misplaced(obstacle, &message));
         }
-        let at = &obstacle.solid.parent_from_shape;
-        let found = separation(obstacle.prepared(), at, unplaced.skin(), &skin_pose(placed));
-        -found.distance_m
+        Ok(())
+    }
+
+    fn misplaced(&self, obstacle: &PlacedObstacle, message: &str) -> Finding {
+        let section = &self.scenario.obstacles[obstacle.index];
+        let key = format!("obstacles[{}].position_mm", obstacle.index);
+        let message = format!("obstacle `{}` {message}", section.name);
+        self.toml.finding(&key, message).hint(frame(section))
     }
 
     /// Whether the floor or anything else is right under or beside an obstacle.

@@ -1,0 +1,160 @@
+//! The phantom of a layout, moved: what [`resolve`](super::resolve) says of another place of it, without
+//! resolving again what stays where it is.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Point3;
+
+use super::goals::{Goal, GoalInPhantom, Surroundings, boxes_around, goal_in_phantom, place_goal};
+use super::library::ModelLibrary;
+use super::obstacles::{PlacedObstacles, place_obstacles};
+use super::people::{PatientSides, check_sides, have_room_by_boxes};
+use super::phantom::{Corners, PlacedPhantom, UnplacedPhantom, place_phantom};
+use super::standing::{KnownDepths, Standing, check_distance};
+use super::{BodyKind, Finding, Frame, ResolvedScenario};
+use crate::CollisionBody;
+use crate::scenario::PhantomSection;
+use crate::toml_text::TomlText;
+
+/// All of a layout of one goal that stays where it is when its phantom is moved.
+#[derive(Debug)]
+pub(crate) struct StillLayout {
+    resolved: ResolvedScenario,
+    phantom: Arc<UnplacedPhantom>,
+    obstacles: PlacedObstacles,
+    /// Bodies that stand in the room, but for the robot's base and the phantom.
+    fixtures: Vec<CollisionBody>,
+    boxes: Vec<Vec<Corners>>,
+    base_boxes: Vec<Corners>,
+    /// None for a goal that does not go with the phantom.
+    goal: Option<GoalInPhantom>,
+    depths: KnownDepths,
+}
+
+impl StillLayout {
+    /// Of a layout that is resolved; none without a phantom and a goal. `library` and `folder` are those that
+    /// it was resolved with.
+    ///
+    /// # Errors
+    /// None that resolving has not had, unless files have changed since.
+    pub fn new(
+        resolved: ResolvedScenario,
+        folder: &Path,
+        library: &ModelLibrary,
+    ) -> Result<Option<Self>, Vec<Finding>> {
+        let one = |finding: Finding| vec![finding];
+        let file = resolved.source.file.clone();
+        let toml = TomlText::without_text(&file);
+        let scenario = &resolved.scenario;
+        let (Some(section), [goal_section]) = (&scenario.phantom, &scenario.goals[..]) else {
+            return Ok(None);
+        };
+        // Of a resolved layout these are there already: notes have been taken.
+        let mut notes = Vec::new();
+        let phantom = library.phantom(&toml, section, folder)?;
+        let obstacles = place_obstacles(
+            &toml,
+            scenario,
+            &resolved.cell.robot.world_from_base_link,
+            |index, section| library.obstacle(&toml, index, section, folder),
+            &mut notes,
+        )?;
+        let bodies = resolved.cell.bodies.iter();
+        let standing = bodies.filter(|body| body.frame == Frame::World);
+        let (base, others): (Vec<_>, Vec<_>) = standing
+            .filter(|body| body.kind != BodyKind::Phantom)
+            .cloned()
+            .partition(|body| body.kind == BodyKind::Base);
+        let boxes = boxes_around(&others);
+        let context = Surroundings {
+            robot: &resolved.cell.robot,
+            tool: &resolved.cell.tool,
+            phantom: resolved.phantom.as_ref(),
+            fixtures: &others,
+            boxes: &boxes,
+        };
+        let goal = goal_in_phantom(&toml, 0, goal_section, &context, &mut notes).map_err(one)?;
+        Ok(Some(Self {
+            base_boxes: boxes_around(&base).concat(),
+            boxes,
+            fixtures: others,
+            phantom,
+            obstacles,
+            goal,
+            depths: KnownDepths::default(),
+            resolved,
+        }))
+    }
+
+    pub fn resolved(&self) -> &ResolvedScenario {
+        &self.resolved
+    }
+
+    /// The phantom and the goal where `section` lays them; none where it takes more to say whether there is
+    /// such a layout. All that it names but the place is that of the layout.
+    ///
+    /// # Errors
+    /// As [`resolve`](super::resolve) has them.
+    pub fn with_phantom_at(
+        &self,
+        section: &PhantomSection,
+    ) -> Result<Option<(PlacedPhantom, Goal)>, Vec<Finding>> {
+        let one = |finding: Finding| vec![finding];
+        let (scenario, cell) = (&self.resolved.scenario, &self.resolved.cell);
+        let toml = TomlText::without_text(&self.resolved.source.file);
+        let mut notes = Vec::new();
+        let placed = PlacedPhantom {
+            world_from_phantom: place_phantom(
+                &toml,
+                section,
+                scenario.table.as_ref(),
+                &self.phantom,
+            )
+            .map_err(one)?,
+            phantom: Arc::clone(&self.phantom.phantom),
+        };
+        let standing = Standing {
+            toml: &toml,
+            scenario,
+            robot: &cell.robot,
+            fixtures: &self.resolved.fixtures,
+            phantom: Some((&placed, &self.phantom)),
+            obstacles: &self.obstacles.placed,
+            known: &self.depths,
+        };
+        standing.check_lying(&mut notes).map_err(one)?;
+        let context = Surroundings {
+            robot: &cell.robot,
+            tool: &cell.tool,
+            phantom: Some(&placed),
+            fixtures: &self.fixtures,
+            boxes: &self.boxes,
+        };
+        let goal =
+            place_goal(&toml, 0, &scenario.goals[0], self.goal.as_ref(), &context).map_err(one)?;
+        let goals = std::slice::from_ref(&goal);
+        check_distance(&toml, scenario, &cell.robot, &cell.tool, goals).map_err(one)?;
+        let sides = PatientSides::new(&placed.world_from_phantom.rotation);
+        check_sides(&toml, &scenario.people, sides.as_ref()).map_err(one)?;
+        let patient = self.phantom.extent(&placed.world_from_phantom);
+        let patient = [widened(&patient)];
+        let boxes = self.boxes.iter().flatten().chain(&self.base_boxes);
+        let have_room = have_room_by_boxes(
+            &scenario.people,
+            &goal,
+            sides.as_ref(),
+            &Point3::from(cell.robot.world_from_base_link.translation.vector),
+            boxes.chain(&patient),
+        );
+        Ok(have_room.then_some((placed, goal)))
+    }
+}
+
+/// A box that holds what rounding may put outside of one.
+fn widened((low, high): &Corners) -> Corners {
+    /// More than the rounding of some metres, m.
+    const ROUNDING_M: f64 = 1e-9;
+    let by = nalgebra::Vector3::repeat(ROUNDING_M);
+    (low - by, high + by)
+}
