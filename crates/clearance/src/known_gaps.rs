@@ -23,7 +23,7 @@ use crate::search::after_travel;
 /// [`needlebench_geometry`]).
 const UNDECIDED_M: f64 = 1e-6;
 
-/// Places that are kept of a pair: about as many queries are saved by 8, and none more by 32.
+/// Places that are kept of a pair.
 const PLACES: usize = 16;
 
 /// Pairs of which some clearance is to be kept, and what is known of their distances.

@@ -22,6 +22,14 @@
 //!
 //! A layout that cannot exist, such as a patient within the table, is neither a break nor a place where
 //! nothing breaks.
+//!
+//! # How a layout is decided
+//!
+//! By its static case. Most layouts are decided without one: the posture at the roll that was ok last is solved
+//! in closed form, its joints and its needle are judged, and that it keeps its clearances is proven by how far
+//! arm and patient have travelled since distances were measured ([`KnownGaps`](needlebench_clearance::KnownGaps)).
+//! What is proven is what the case would say, so all that is reported is the same with
+//! [`by_bounds`](RobustnessSettings::by_bounds) or without.
 
 mod layouts;
 mod proofs;
@@ -124,7 +132,7 @@ pub struct Robustness {
     pub tilt: SmallestFound,
     /// The same with the arm left where it stands; none where it stands in no posture at all.
     pub unaware: Option<Unaware>,
-    /// Layouts that were looked at.
+    /// Layouts that were looked at, whether evaluated or decided by proof.
     pub evaluations: u64,
 }
 
