@@ -7,7 +7,7 @@ use super::key_path::{KeyPath, section};
 use super::setting::Change;
 use crate::resolve::StillLayout;
 use crate::scenario::PhantomSection;
-use crate::schema::Path;
+use crate::schema::{Node, Path};
 use crate::{Finding, Goal, PlacedPhantom, ResolvedScenario};
 
 /// Keys that a shift adds to.
@@ -87,6 +87,7 @@ pub struct PhantomMoves<'f> {
     goal: &'f str,
     changes: &'f [(KeyPath, Change)],
     still: StillLayout,
+    ranges: Ranges,
 }
 
 impl ScenarioFamily {
@@ -101,6 +102,7 @@ impl ScenarioFamily {
     ) -> Result<PhantomMoves<'f>, Vec<Finding>> {
         let resolved = self.vary(goal, changes)?;
         let file = resolved.source.file.clone();
+        let ranges = Ranges::new().map_err(|why| vec![Finding::new(&file, why)])?;
         let still = StillLayout::new(resolved, &self.folder, &self.library)?;
         let Some(still) = still else {
             let finding = Finding::new(file, "there is no phantom to move");
@@ -111,6 +113,7 @@ impl ScenarioFamily {
             goal,
             changes,
             still,
+            ranges,
         })
     }
 }
@@ -135,7 +138,7 @@ impl PhantomMoves<'_> {
     /// As [`PhantomMoves::resolved`].
     pub fn moved(&self, by: &PhantomMove) -> Result<MovedPhantom, Vec<Finding>> {
         let section = self.section_after(by);
-        if is_in_range(&section)
+        if self.ranges.hold(&section)
             && let Some((phantom, goal)) = self.still.with_phantom_at(&section)?
         {
             return Ok(MovedPhantom { phantom, goal });
@@ -157,20 +160,37 @@ impl PhantomMoves<'_> {
     }
 }
 
-/// Whether a place is one that files may give.
-fn is_in_range(of: &PhantomSection) -> bool {
-    let phantom = section("phantom").expect("scenarios may have a phantom");
-    let fits = |key: &str, index: Option<usize>, number: f64| {
-        let node = phantom.key(key).expect("phantoms have it");
-        let node = index.map_or(Ok(node), |index| node.item(index));
-        let mut misfits = Vec::new();
-        let value = Value::Float(number);
-        node.expect("it is a list")
-            .check(Path::Key(&Path::Top, key), &value, &mut misfits);
-        misfits.is_empty()
-    };
-    let mut position = of.position_mm.into_iter().enumerate();
-    position.all(|(index, mm)| fits("position_mm", Some(index), mm))
-        && fits("head_yaw_deg", None, of.head_yaw_deg)
-        && fits("body_roll_deg", None, of.body_roll_deg)
+/// What files may give as a phantom's place.
+#[derive(Debug)]
+struct Ranges {
+    position: [&'static Node; 3],
+    yaw: &'static Node,
+    roll: &'static Node,
+}
+
+impl Ranges {
+    /// # Errors
+    /// Where there are no such keys: a bug.
+    fn new() -> Result<Self, String> {
+        let phantom = section("phantom")?;
+        let position = phantom.key("position_mm")?;
+        Ok(Self {
+            position: [position.item(0)?, position.item(1)?, position.item(2)?],
+            yaw: phantom.key("head_yaw_deg")?,
+            roll: phantom.key("body_roll_deg")?,
+        })
+    }
+
+    /// Whether a place is one that files may give.
+    fn hold(&self, of: &PhantomSection) -> bool {
+        let fits = |node: &Node, number: f64| {
+            let mut misfits = Vec::new();
+            node.check(Path::Top, &Value::Float(number), &mut misfits);
+            misfits.is_empty()
+        };
+        let mut position = self.position.iter().zip(of.position_mm);
+        position.all(|(node, mm)| fits(node, mm))
+            && fits(self.yaw, of.head_yaw_deg)
+            && fits(self.roll, of.body_roll_deg)
+    }
 }

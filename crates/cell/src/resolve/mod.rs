@@ -35,15 +35,15 @@ use crate::files::ModelSource;
 use crate::files::source_of;
 use crate::fixtures::Fixture;
 use crate::input::read_text;
-use crate::model::{BodyKind, Cell, CollisionBody, Frame, NeedleCorridor};
+use crate::model::{BodyKind, Cell, CollisionBody, Frame, NeedleCorridor, placed};
 use crate::scenario::{self, Scenario};
 use crate::toml_text::TomlText;
 use crate::{Finding, Robot};
 use arm_values::check_brakes;
 pub use expected::Expected;
 use expected::RealThings;
+use goals::{BodyBoxes, Surroundings, resolve_goal};
 pub use goals::{Expectation, Goal, Roll};
-use goals::{Surroundings, boxes_around, resolve_goal};
 use imperfections::Imperfections;
 use iso9283::{Iso9283Protocol, resolve_iso9283};
 use layout::Layout;
@@ -249,6 +249,7 @@ pub(crate) fn resolve(
     let parts = phantom.iter().flat_map(|placed| &placed.phantom.parts);
     let taken = arm.chain(parts.map(|part| &*part.name));
     check_obstacle_names(toml, &scenario.obstacles, taken).map_err(one)?;
+    let base_solids = placed(&robot.base.solids, &world_from_base_link);
     let standing = Standing {
         toml,
         obstacles: &obstacles.placed,
@@ -256,6 +257,7 @@ pub(crate) fn resolve(
         robot: &robot,
         fixtures: &fixtures,
         phantom: phantom.as_ref().zip(lying.as_deref()),
+        base: &base_solids,
         known: &KnownDepths::default(),
     };
     standing.check(&mut notes).map_err(one)?;
@@ -273,7 +275,7 @@ pub(crate) fn resolve(
             tool: &tool,
             phantom: phantom.as_ref(),
             fixtures: &fixtures,
-            boxes: &boxes_around(&fixtures),
+            boxes: &fixtures.iter().map(BodyBoxes::new).collect::<Vec<_>>(),
         };
         let (mut goals, mut findings) = (Vec::new(), Vec::new());
         for (index, section) in scenario.goals.iter().enumerate() {
@@ -290,20 +292,11 @@ pub(crate) fn resolve(
     };
 
     let people = {
-        let base = robot
-            .base
-            .solids
-            .iter()
-            .map(|solid| needlebench_geometry::Solid {
-                parent_from_shape: world_from_base_link * solid.parent_from_shape,
-                ..solid.clone()
-            });
-        let base: Vec<_> = base.collect();
         let standing = surroundings
             .iter()
             .flat_map(|body| body.solids.iter().map(|solid| (body.name.as_str(), solid)));
         let solids: Vec<_> = standing
-            .chain(base.iter().map(|solid| ("robot's base", solid)))
+            .chain(base_solids.iter().map(|solid| ("robot's base", solid)))
             .collect();
         let room = Room {
             phantom: phantom.as_ref(),

@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use super::goals::{Goal, GoalInPhantom, Surroundings, boxes_around, goal_in_phantom, place_goal};
+use super::goals::{BodyBoxes, Goal, GoalInPhantom, Surroundings, goal_in_phantom, place_goal};
 use super::library::ModelLibrary;
 use super::obstacles::{PlacedObstacles, place_obstacles};
 use super::people::{PatientSides, check_sides, have_room_by_boxes};
 use super::phantom::{Corners, PlacedPhantom, UnplacedPhantom, place_phantom};
 use super::standing::{KnownDepths, Standing, check_distance};
-use super::{BodyKind, Finding, Frame, ResolvedScenario};
-use crate::CollisionBody;
+use super::{Finding, ResolvedScenario};
+use crate::model::{BodyKind, CollisionBody, Frame, placed};
 use crate::scenario::PhantomSection;
 use crate::toml_text::TomlText;
 
@@ -25,8 +25,10 @@ pub(crate) struct StillLayout {
     obstacles: PlacedObstacles,
     /// Bodies that stand in the room, but for the robot's base and the phantom.
     fixtures: Vec<CollisionBody>,
-    boxes: Vec<Vec<Corners>>,
-    base_boxes: Vec<Corners>,
+    boxes: Vec<BodyBoxes>,
+    /// The robot's base.
+    base: CollisionBody,
+    base_boxes: BodyBoxes,
     /// None for a goal that does not go with the phantom.
     goal: Option<GoalInPhantom>,
     depths: KnownDepths,
@@ -60,13 +62,21 @@ impl StillLayout {
             |index, section| library.obstacle(&toml, index, section, folder),
             &mut notes,
         )?;
-        let bodies = resolved.cell.bodies.iter();
-        let standing = bodies.filter(|body| body.frame == Frame::World);
-        let (base, others): (Vec<_>, Vec<_>) = standing
-            .filter(|body| body.kind != BodyKind::Phantom)
+        let cell = &resolved.cell;
+        let base = CollisionBody {
+            name: cell.robot.base.name.clone(),
+            kind: BodyKind::Base,
+            frame: Frame::World,
+            solids: placed(&cell.robot.base.solids, &cell.robot.world_from_base_link),
+        };
+        let others: Vec<CollisionBody> = cell
+            .bodies
+            .iter()
+            .filter(|body| body.frame == Frame::World)
+            .filter(|body| !matches!(body.kind, BodyKind::Base | BodyKind::Phantom))
             .cloned()
-            .partition(|body| body.kind == BodyKind::Base);
-        let boxes = boxes_around(&others);
+            .collect();
+        let boxes: Vec<BodyBoxes> = others.iter().map(BodyBoxes::new).collect();
         let context = Surroundings {
             robot: &resolved.cell.robot,
             tool: &resolved.cell.tool,
@@ -76,7 +86,8 @@ impl StillLayout {
         };
         let goal = goal_in_phantom(&toml, 0, goal_section, &context, &mut notes).map_err(one)?;
         Ok(Some(Self {
-            base_boxes: boxes_around(&base).concat(),
+            base_boxes: BodyBoxes::new(&base),
+            base,
             boxes,
             fixtures: others,
             phantom,
@@ -121,6 +132,7 @@ impl StillLayout {
             fixtures: &self.resolved.fixtures,
             phantom: Some((&placed, &self.phantom)),
             obstacles: &self.obstacles.placed,
+            base: &self.base.solids,
             known: &self.depths,
         };
         standing.check_lying(&mut notes).map_err(one)?;
@@ -139,13 +151,13 @@ impl StillLayout {
         check_sides(&toml, &scenario.people, sides.as_ref()).map_err(one)?;
         let patient = self.phantom.extent(&placed.world_from_phantom);
         let patient = [widened(&patient)];
-        let boxes = self.boxes.iter().flatten().chain(&self.base_boxes);
+        let boxes = self.boxes.iter().chain([&self.base_boxes]);
         let have_room = have_room_by_boxes(
             &scenario.people,
             &goal,
             sides.as_ref(),
             &Point3::from(cell.robot.world_from_base_link.translation.vector),
-            boxes.chain(&patient),
+            boxes.map(|body| &body.whole).chain(&patient),
         );
         Ok(have_room.then_some((placed, goal)))
     }

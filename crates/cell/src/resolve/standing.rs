@@ -50,6 +50,8 @@ pub(super) struct Standing<'a> {
     pub fixtures: &'a [Fixture],
     pub phantom: Option<(&'a PlacedPhantom, &'a UnplacedPhantom)>,
     pub obstacles: &'a [PlacedObstacle],
+    /// Solids of the robot's base, in the world.
+    pub base: &'a [Solid],
     /// From where the patient lay before; fresh for a cell of which nothing is known.
     pub known: &'a KnownDepths,
 }
@@ -67,18 +69,9 @@ impl Standing<'_> {
 
     /// Where the patient lies alone: what is left of [`Standing::check`] if all else is known to stand.
     pub fn check_lying(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
-        self.check_base_in_patient(&self.base_solids())?;
+        self.check_base_in_patient()?;
         self.check_phantom(notes)?;
-        self.obstacles
-            .iter()
-            .enumerate()
-            .try_for_each(|(place, obstacle)| self.check_obstacle_in_patient(place, obstacle))
-    }
-
-    /// The robot's base, in the world.
-    fn base_solids(&self) -> Vec<Solid> {
-        let robot = self.robot;
-        placed(&robot.base.solids, &robot.world_from_base_link).collect()
+        self.check_obstacles_in_patient()
     }
 
     fn fixture(&self, kind: FixtureKind) -> Option<&Fixture> {
@@ -193,7 +186,7 @@ impl Standing<'_> {
     /// A base in or under something, and one that stands on nothing.
     fn check_base(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
         let robot = self.robot;
-        let base = self.base_solids();
+        let base = self.base;
         for (kind, name) in [
             (FixtureKind::Table, "table"),
             (FixtureKind::Gantry, "gantry"),
@@ -201,7 +194,7 @@ impl Standing<'_> {
             let Some(fixture) = self.fixture(kind) else {
                 continue;
             };
-            if let Some(found) = deepest(&base, &fixture.solids, FOOT_M) {
+            if let Some(found) = deepest(base, &fixture.solids, FOOT_M) {
                 let message = format!(
                     "the robot's base stands {} inside the {name}",
                     found.depth()
@@ -209,7 +202,7 @@ impl Standing<'_> {
                 return Err(self.toml.finding(BASE_KEY, message).hint(BASE_HINT));
             }
         }
-        self.check_base_in_patient(&base)?;
+        self.check_base_in_patient()?;
         let height_m = robot.world_from_base_link.translation.z;
         let stands_on_something = self.scenario.mount.is_some()
             || height_m <= SOFT_M
@@ -232,19 +225,14 @@ impl Standing<'_> {
     }
 
     /// A base, or what carries it, in the patient.
-    fn check_base_in_patient(&self, base: &[Solid]) -> Result<(), Finding> {
+    fn check_base_in_patient(&self) -> Result<(), Finding> {
         let mount = self.fixture(FixtureKind::Mount);
         let column = mount.map_or(&[][..], |mount| &mount.solids);
-        let of_base: fn(usize) -> Beside = Beside::Base;
-        for (what, solids, beside) in [
-            ("the robot's base", base, of_base),
-            ("the robot's mount", column, Beside::Mount),
+        for (what, beside, solids) in [
+            ("the robot's base", Beside::Base, self.base),
+            ("the robot's mount", Beside::Mount, column),
         ] {
-            let depths = solids.iter().enumerate();
-            let depth_m = depths
-                .map(|(index, solid)| self.depth_in_patient(beside(index), solid, true))
-                .fold(0.0, f64::max);
-            if depth_m > SOFT_M {
+            if let Some((_, depth_m)) = self.depth_in_patient(beside, solids.iter(), true) {
                 let message = format!("{what} stands {:.1} mm inside the patient", depth_m * 1e3);
                 return Err(self.toml.finding(BASE_KEY, message).hint(BASE_HINT));
             }
@@ -271,17 +259,15 @@ impl Standing<'_> {
             let message = format!("the patient lies {:.0} mm under the floor", -low * 1e3);
             return refuse(message, height);
         }
-        if let Some(gantry) = self.fixture(FixtureKind::Gantry) {
-            for (index, piece) in gantry.solids.iter().enumerate() {
-                let depth_m = self.depth_in_patient(Beside::Gantry(index), piece, true);
-                if depth_m > SOFT_M {
-                    let message = format!(
-                        "the patient lies {:.0} mm inside the gantry's housing",
-                        depth_m * 1e3
-                    );
-                    return refuse(message, "move the patient into the bore or out of it");
-                }
-            }
+        if let Some(gantry) = self.fixture(FixtureKind::Gantry)
+            && let Some((_, depth_m)) =
+                self.depth_in_patient(Beside::Gantry, gantry.solids.iter(), true)
+        {
+            let message = format!(
+                "the patient lies {:.0} mm inside the gantry's housing",
+                depth_m * 1e3
+            );
+            return refuse(message, "move the patient into the bore or out of it");
         }
         let on_nothing = |notes: &mut Vec<String>| {
             if low > HIGHEST_TABLE_M {
@@ -322,16 +308,13 @@ impl Standing<'_> {
         }
         if overlap(&slab, &patient, SOFT_M)
             && let Some(fixture) = self.fixture(FixtureKind::Table)
+            && let Some((_, depth_m)) =
+                self.depth_in_patient(Beside::Table, fixture.solids.iter(), false)
         {
-            for (index, solid) in fixture.solids.iter().enumerate() {
-                let depth_m = self.depth_in_patient(Beside::Table(index), solid, false);
-                if depth_m > SOFT_M {
-                    return refuse(
-                        format!("the patient lies {:.0} mm deep in the table", depth_m * 1e3),
-                        "`rest_on_table = true` lays the lowest point of the skin on the table",
-                    );
-                }
-            }
+            return refuse(
+                format!("the patient lies {:.0} mm deep in the table", depth_m * 1e3),
+                "`rest_on_table = true` lays the lowest point of the skin on the table",
+            );
         }
         let gap_m = low - top_m;
         if gap_m > CUSHION_M[1] {

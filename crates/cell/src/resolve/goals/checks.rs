@@ -46,7 +46,10 @@ pub(super) fn check_place(
     for (what, point) in points {
         let Some(point) = point else { continue };
         for (fixture, boxes) in surroundings.fixtures.iter().zip(surroundings.boxes) {
-            let mut solids = fixture.solids.iter().zip(boxes);
+            if !is_in(&boxes.whole, &point) {
+                continue;
+            }
+            let mut solids = fixture.solids.iter().zip(&boxes.solids);
             if solids.any(|(solid, corners)| is_in(corners, &point) && solid.contains(&point)) {
                 let name = match what {
                     _ if section.flange_pose.is_some() => "flange_pose",

@@ -82,14 +82,30 @@ pub(crate) struct Surroundings<'a> {
     pub tool: &'a Tool,
     pub phantom: Option<&'a PlacedPhantom>,
     pub fixtures: &'a [CollisionBody],
-    /// Boxes around each solid of each of the fixtures.
-    pub boxes: &'a [Vec<Corners>],
+    /// Boxes around each of the fixtures.
+    pub boxes: &'a [BodyBoxes],
 }
 
-/// Boxes around each solid of each body.
-pub(crate) fn boxes_around(bodies: &[CollisionBody]) -> Vec<Vec<Corners>> {
-    let of_body = |body: &CollisionBody| body.solids.iter().map(Solid::bounding_box).collect();
-    bodies.iter().map(of_body).collect()
+/// Boxes around a body and its solids, along the world's axes.
+#[derive(Debug)]
+pub(crate) struct BodyBoxes {
+    pub whole: Corners,
+    pub solids: Vec<Corners>,
+}
+
+impl BodyBoxes {
+    /// Of a body whose solids are given in the world.
+    pub fn new(body: &CollisionBody) -> Self {
+        let solids: Vec<Corners> = body.solids.iter().map(Solid::bounding_box).collect();
+        let start = (
+            Point3::from(Vector3::repeat(f64::INFINITY)),
+            Point3::from(Vector3::repeat(f64::NEG_INFINITY)),
+        );
+        let whole = solids
+            .iter()
+            .fold(start, |all, each| (all.0.inf(&each.0), all.1.sup(&each.1)));
+        Self { whole, solids }
+    }
 }
 
 pub(crate) fn resolve_goal(

@@ -1,74 +1,117 @@
 //! How deep solids are in the patient, measured where a bound of travel does not say it.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
 
 use needlebench_geometry::{Placement, PreparedShape, Solid, separation};
 
 use super::{Corners, SOFT_M, Standing, overlap, skin_pose};
 
-/// A solid beside which the patient lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// What the patient lies beside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Beside {
-    /// One of the solids of the robot's base.
-    Base(usize),
-    Mount(usize),
-    Table(usize),
-    Gantry(usize),
-    /// One of the obstacles that are there, which have their prepared shapes.
-    Obstacle(usize),
+    Base,
+    Mount,
+    Table,
+    Gantry,
+    /// The obstacles that are there, which have their prepared shapes.
+    Obstacles,
 }
+
+/// Number of kinds.
+const KINDS: usize = 5;
 
 /// What is known of the solids of one cell beside a patient who is moved and of which all else stays.
 ///
 /// It only saves time: no answer depends on it. Fresh, it knows nothing.
 #[derive(Debug, Default)]
-pub(crate) struct KnownDepths(RefCell<BTreeMap<Beside, Known>>);
+pub(crate) struct KnownDepths(RefCell<[KnownKind; KINDS]>);
+
+/// Solids of one kind.
+#[derive(Debug, Default)]
+struct KnownKind {
+    /// Of all of them.
+    gap: Option<Gap>,
+    solids: Vec<KnownSolid>,
+}
 
 #[derive(Debug, Default)]
-struct Known {
+struct KnownSolid {
     shape: Option<PreparedShape>,
     corners: Option<Corners>,
-    /// Where the patient lay when the distance from the skin was measured, and the distance, m.
-    gap: Option<(Placement, f64)>,
+    gap: Option<Gap>,
+}
+
+/// A distance from the skin, m, or less, with the patient at a place.
+#[derive(Debug, Clone, Copy)]
+struct Gap {
+    place: Placement,
+    gap_m: f64,
 }
 
 impl Standing<'_> {
-    /// How deep a solid is in the patient, m; nothing where they are apart. `boxed` leaves out what boxes
-    /// show to be no deeper than [`SOFT_M`].
+    /// The number of the solid that is deepest in the patient, and how deep, m, if that is more than
+    /// [`SOFT_M`]; of all that there are of a kind. `boxed` leaves out what boxes show to be no deeper.
     ///
     /// A distance above zero is less by no more than the patient's travel since it was measured, so that
     /// nobody needs to measure again where more of it is left.
-    pub(super) fn depth_in_patient(&self, beside: Beside, solid: &Solid, boxed: bool) -> f64 {
-        let Some((placed, unplaced)) = self.phantom else {
-            return 0.0;
-        };
+    pub(super) fn depth_in_patient<'s>(
+        &self,
+        beside: Beside,
+        solids: impl Iterator<Item = &'s Solid>,
+        boxed: bool,
+    ) -> Option<(usize, f64)> {
+        let (placed, unplaced) = self.phantom?;
         let mut all = self.known.0.borrow_mut();
-        let known = all.entry(beside).or_default();
+        let known = &mut all[beside as usize];
         let place = Placement::new(&placed.world_from_phantom);
-        let is_apart = |(from, gap_m): &(Placement, f64)| unplaced.travel_m(from, &place) < *gap_m;
-        if known.gap.as_ref().is_some_and(is_apart) {
-            return 0.0;
+        let left_m = |gap: &Gap| gap.gap_m - unplaced.travel_m(&gap.place, &place);
+        if known.gap.as_ref().is_some_and(|gap| left_m(gap) > 0.0) {
+            return None;
         }
-        if boxed {
-            let corners = known.corners.get_or_insert_with(|| solid.bounding_box());
-            if !overlap(
-                corners,
-                &unplaced.extent(&placed.world_from_phantom),
-                SOFT_M,
-            ) {
-                return 0.0;
+        let patient = unplaced.extent(&placed.world_from_phantom);
+        let (mut deepest, mut least_m) = (None, f64::INFINITY);
+        for (index, solid) in solids.enumerate() {
+            if known.solids.len() == index {
+                known.solids.push(KnownSolid::default());
+            }
+            let known = &mut known.solids[index];
+            let left_m = known.gap.as_ref().map_or(f64::NEG_INFINITY, left_m);
+            if left_m > 0.0 {
+                least_m = least_m.min(left_m);
+                continue;
+            }
+            if boxed {
+                let corners = known.corners.get_or_insert_with(|| solid.bounding_box());
+                if !overlap(corners, &patient, SOFT_M) {
+                    least_m = least_m.min(gap_of_boxes_m(corners, &patient));
+                    continue;
+                }
+            }
+            let shape = match beside {
+                Beside::Obstacles => self.obstacles[index].prepared(),
+                _ => known
+                    .shape
+                    .get_or_insert_with(|| PreparedShape::new(&solid.shape)),
+            };
+            let at = &solid.parent_from_shape;
+            let gap_m = separation(shape, at, unplaced.skin(), &skin_pose(placed)).distance_m;
+            known.gap = Some(Gap { place, gap_m });
+            least_m = least_m.min(gap_m);
+            let most_m = deepest.map_or(SOFT_M, |(_, depth_m)| depth_m);
+            if -gap_m > most_m {
+                deepest = Some((index, -gap_m));
             }
         }
-        let shape = match beside {
-            Beside::Obstacle(place) => self.obstacles[place].prepared(),
-            _ => known
-                .shape
-                .get_or_insert_with(|| PreparedShape::new(&solid.shape)),
-        };
-        let at = &solid.parent_from_shape;
-        let found = separation(shape, at, unplaced.skin(), &skin_pose(placed));
-        known.gap = Some((place, found.distance_m));
-        (-found.distance_m).max(0.0)
+        known.gap = Some(Gap {
+            place,
+            gap_m: least_m,
+        });
+        deepest
     }
+}
+
+/// How far two boxes are apart along the axis where that is most, m; negative where they overlap.
+fn gap_of_boxes_m(a: &Corners, b: &Corners) -> f64 {
+    let along = |axis: usize| (a.0[axis] - b.1[axis]).max(b.0[axis] - a.1[axis]);
+    (0..3).map(along).fold(f64::NEG_INFINITY, f64::max)
 }

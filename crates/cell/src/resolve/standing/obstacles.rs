@@ -24,22 +24,20 @@ impl Standing<'_> {
         if self.obstacles.is_empty() {
             return Ok(());
         }
-        let base = self.base_solids();
-        for (place, obstacle) in self.obstacles.iter().enumerate() {
+        for obstacle in self.obstacles {
             let section = &self.scenario.obstacles[obstacle.index];
             let refuse = |message: String| Err(self.misplaced(obstacle, &message));
             let (low, _) = obstacle.solid.bounding_box();
             if low.z < -RIGID_M {
                 return refuse(format!("goes {:.1} mm under the floor", -low.z * 1e3));
             }
-            for other in self.others(section, &base) {
+            for other in self.others(section) {
                 if let Some(depth_m) = depth_in(obstacle, &other) {
                     let depth_mm = depth_m * 1e3;
                     return refuse(format!("goes {depth_mm:.1} mm into the {}", other.name));
                 }
             }
-            self.check_obstacle_in_patient(place, obstacle)?;
-            if section.attached_to == AttachedTo::World && !self.is_carried(obstacle, &base) {
+            if section.attached_to == AttachedTo::World && !self.is_carried(obstacle) {
                 notes.push(format!(
                     "obstacle `{}` hangs {:.0} mm over the floor: what carries it is not in the cell",
                     section.name,
@@ -47,11 +45,11 @@ impl Standing<'_> {
                 ));
             }
         }
-        Ok(())
+        self.check_obstacles_in_patient()
     }
 
     /// What an obstacle must not go into, but for the patient.
-    fn others<'s>(&'s self, section: &ObstacleSection, base: &'s [Solid]) -> Vec<Other<'s>> {
+    fn others<'s>(&'s self, section: &ObstacleSection) -> Vec<Other<'s>> {
         let (fixed_to, counts_as) = (section.attached_to, section.class);
         let mut others = Vec::new();
         for (kind, name, is_part) in [
@@ -82,25 +80,21 @@ impl Standing<'_> {
         if fixed_to != AttachedTo::RobotBase {
             others.push(Other {
                 name: "robot's base",
-                solids: base,
+                solids: self.base,
                 allowed_m: FOOT_M,
             });
         }
         others
     }
 
-    /// An obstacle in the patient; `place` is its number among those that are there.
-    pub(super) fn check_obstacle_in_patient(
-        &self,
-        place: usize,
-        obstacle: &PlacedObstacle,
-    ) -> Result<(), Finding> {
-        let depth_m = self.depth_in_patient(Beside::Obstacle(place), &obstacle.solid, true);
-        if depth_m > SOFT_M {
-            let message = format!("goes {:.1} mm into the patient", depth_m * 1e3);
-            return Err(self.misplaced(obstacle, &message));
-        }
-        Ok(())
+    /// Obstacles in the patient.
+    pub(super) fn check_obstacles_in_patient(&self) -> Result<(), Finding> {
+        let solids = self.obstacles.iter().map(|obstacle| &obstacle.solid);
+        let Some((place, depth_m)) = self.depth_in_patient(Beside::Obstacles, solids, true) else {
+            return Ok(());
+        };
+        let message = format!("goes {:.1} mm into the patient", depth_m * 1e3);
+        Err(self.misplaced(&self.obstacles[place], &message))
     }
 
     fn misplaced(&self, obstacle: &PlacedObstacle, message: &str) -> Finding {
@@ -111,7 +105,7 @@ impl Standing<'_> {
     }
 
     /// Whether the floor or anything else is right under or beside an obstacle.
-    fn is_carried(&self, obstacle: &PlacedObstacle, base: &[Solid]) -> bool {
+    fn is_carried(&self, obstacle: &PlacedObstacle) -> bool {
         let here = obstacle.solid.bounding_box();
         if here.0.z <= SOFT_M {
             return true;
@@ -124,7 +118,7 @@ impl Standing<'_> {
         self.fixtures
             .iter()
             .any(|each| each.solids.iter().any(touches))
-            || base.iter().any(touches)
+            || self.base.iter().any(touches)
             || others.into_iter().any(|other| touches(&other.solid))
     }
 }
