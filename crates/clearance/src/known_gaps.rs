@@ -59,12 +59,12 @@ struct Gap {
 /// The arm seen from something that stands still.
 struct View<'m> {
     model: &'m ClearanceModel,
-    links: LinkPlacements,
+    links: &'m LinkPlacements,
     posture: OnceCell<Posture>,
 }
 
 impl<'m> View<'m> {
-    fn new(model: &'m ClearanceModel, links: LinkPlacements) -> Self {
+    fn new(model: &'m ClearanceModel, links: &'m LinkPlacements) -> Self {
         Self {
             model,
             links,
@@ -87,9 +87,9 @@ impl<'m> View<'m> {
     }
 
     fn gap_m(&self, pair: usize) -> f64 {
-        let posture = || Posture::new(&self.model.bodies, &self.links);
+        let posture = || Posture::new(&self.model.bodies, self.links);
         let posture = self.posture.get_or_init(posture);
-        let nearest = self.model.pair_at(pair, &self.links, posture);
+        let nearest = self.model.pair_at(pair, self.links, posture);
         nearest.map_or(f64::INFINITY, |nearest| nearest.separation.distance_m)
     }
 }
@@ -124,7 +124,7 @@ impl<'m> KnownGaps<'m> {
         let links = model.world_from_links(q).each_ref().map(Placement::new);
         let moved = Placement::new(moved);
         let beside_patient = links.each_ref().map(|link| moved.inverse_after(link));
-        let views = [links, beside_patient].map(|links| View::new(model, links));
+        let views = [&links, &beside_patient].map(|links| View::new(model, links));
         let mut open: Vec<(usize, Placement)> = Vec::new();
         for (index, watched) in self.watched.iter().enumerate() {
             let pair = &model.pairs[watched.pair];
@@ -143,10 +143,9 @@ impl<'m> KnownGaps<'m> {
             if gap_m < watched.limit_m - UNDECIDED_M {
                 return Some(false);
             }
-            // Not a number is not above it either.
-            if !(gap_m >= watched.limit_m + UNDECIDED_M) {
-                all_keep = None;
-            }
+            // What is not a number is not above it either.
+            let is_kept = gap_m >= watched.limit_m + UNDECIDED_M;
+            all_keep = all_keep.filter(|_| is_kept);
         }
         all_keep
     }

@@ -150,14 +150,15 @@ impl StillLayout {
         let sides = PatientSides::new(&placed.world_from_phantom.rotation);
         check_sides(&toml, &scenario.people, sides.as_ref()).map_err(one)?;
         let patient = self.phantom.extent(&placed.world_from_phantom);
-        let patient = [widened(&patient)];
-        let boxes = self.boxes.iter().chain([&self.base_boxes]);
+        let patient = widened(&patient);
+        let bodies = self.boxes.iter().chain([&self.base_boxes]);
+        let boxes: Vec<&Corners> = bodies.map(|body| &body.whole).chain([&patient]).collect();
         let have_room = have_room_by_boxes(
             &scenario.people,
             &goal,
             sides.as_ref(),
             &Point3::from(cell.robot.world_from_base_link.translation.vector),
-            boxes.map(|body| &body.whole).chain(&patient),
+            &boxes,
         );
         Ok(have_room.then_some((placed, goal)))
     }

@@ -1,5 +1,6 @@
 //! What is seen where the phantom is moved to.
 
+use std::borrow::Cow;
 use std::cell::OnceCell;
 
 use needlebench_cell::{Finding, MovedPhantom, PhantomMove, PhantomMoves, ResolvedScenario, Roll};
@@ -187,6 +188,6 @@ impl<'a> Layouts<'a> {
             Question::Aware => Some(self.worker.row(&resolved, self.configuration).detail),
             Question::Unaware(q) => self.worker.clearance_broken(&resolved, &q).ok().flatten(),
         };
-        broken.map(|detail| detail.into_owned()).unwrap_or_default()
+        broken.map(Cow::into_owned).unwrap_or_default()
     }
 }

@@ -113,14 +113,14 @@ pub(crate) fn check_sides(
 
 /// Whether boxes alone show that everybody has room where [`resolve_people`] would place them: otherwise it
 /// has to be asked.
-pub(crate) fn have_room_by_boxes<'b>(
+pub(crate) fn have_room_by_boxes(
     section: &PeopleSection,
     goal: &Goal,
     sides: Option<&PatientSides>,
     robot_base_m: &Point3<f64>,
-    boxes: impl Iterator<Item = &'b Corners> + Clone,
+    boxes: &[&Corners],
 ) -> bool {
-    let is_clear = |spot: &Point3<f64>| !boxes.clone().any(|corners| is_within_body(corners, spot));
+    let is_clear = |spot: &Point3<f64>| !boxes.iter().any(|corners| is_within_body(corners, spot));
     let entry = goal.standing_place();
     let standard = [PersonSection::default()];
     persons_of(section, &standard).iter().all(|person| {
