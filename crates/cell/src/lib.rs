@@ -37,7 +37,9 @@ mod thresholds;
 mod toml_text;
 
 pub use arm::{Arm, Recognition};
-pub use family::{Change, KeyPath, ScenarioFamily, Setting};
+pub use family::{
+    Change, KeyPath, MovedPhantom, PhantomMove, PhantomMoves, ScenarioFamily, Setting,
+};
 pub use files::{ModelSource, PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};
 pub use input::{

@@ -38,6 +38,7 @@
 
 mod body;
 mod certificate;
+mod known_gaps;
 mod model;
 mod pairs;
 mod posture;
@@ -48,6 +49,7 @@ pub use certificate::{
     MotionBound, MotionCertificate, ROUNDING_M, RecordedMotion, Span, certify, certify_enough,
     certify_sampled,
 };
+pub use known_gaps::KnownGaps;
 pub use model::{ClassMinima, ClearanceModel, PairClearance};
 pub use pairs::{
     PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,

@@ -170,13 +170,20 @@ impl ClearanceModel {
         let links = world_from_links.each_ref().map(Placement::new);
         let posture = Posture::new(&self.bodies, &links);
         (0..self.pairs.len())
-            .filter_map(|pair| {
-                let query = self.query(pair, &links, &posture);
-                let mut best = None;
-                query.improve(&mut best);
-                best
-            })
+            .filter_map(|pair| self.pair_at(pair, &links, &posture))
             .collect()
+    }
+
+    /// Clearance of one pair of [`Cell::pairs`].
+    pub(crate) fn pair_at(
+        &self,
+        pair: usize,
+        links: &LinkPlacements,
+        posture: &Posture,
+    ) -> Option<PairClearance> {
+        let mut best = None;
+        self.query(pair, links, posture).improve(&mut best);
+        best
     }
 
     /// The least clearance of each class at joint positions `q`.

@@ -8,16 +8,16 @@
 //!
 //! # Why nothing is missed
 //!
-//! A point of a body at `c + u` from its ball's centre `c`, `|u| <= r`, moves by no more than
-//! `|c' - c| + |R' - R| r`, and `|R' - R| = 2 sin(phi / 2) = sqrt(3 - trace(R' R^T))` where `phi` is the
-//! angle between the two orientations. The signed distance of convex solids changes by no more than the
+//! A body travels by no more than its ball does ([`Placement::travel_m`]). The signed distance of convex solids changes by no more than the
 //! two bodies' travel together, in penetration too: it is the largest gap along any direction. So does
 //! that of a mesh while the bound stays above zero; below, it is given up.
 
 use std::cmp::Ordering;
 
 use needlebench_cell::{ClearanceClass, Frame};
-use needlebench_geometry::{PRUNING_MARGIN_M, Placement, Separation, separation_within};
+use needlebench_geometry::{
+    BoundingCapsule, PRUNING_MARGIN_M, Placement, Separation, separation_within,
+};
 
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
 
@@ -188,10 +188,6 @@ pub(crate) trait Wanted {
     fn take(&mut self, class: ClearanceClass, couple: Couple, found: &Separation) -> bool;
 }
 
-/// Slack of the travel for rounding: of the rotation's trace, and in m.
-const TRACE_SLACK: f64 = 1e-14;
-const TRAVEL_SLACK_M: f64 = 1e-12;
-
 /// Travel that the bounds of a reference are to last for, of the way to it: a bisection's further
 /// steps sum up to the last one, for either body.
 const STEPS_AHEAD: f64 = 2.0;
@@ -204,17 +200,16 @@ fn travel_m(body: &PlacedBody, from: &LinkPlacements, to: &LinkPlacements) -> f6
     let Frame::Link(link) = body.frame else {
         return 0.0;
     };
-    let (from, to) = (&from[link], &to[link]);
-    let trace = from.rotation.dot(&to.rotation);
-    let turn = ((3.0 - trace).max(0.0) + TRACE_SLACK).sqrt();
-    let centre = &body.bound.centre;
-    (to.point(centre) - from.point(centre)).norm()
-        + turn * body.bound.ball_radius_m
-        + TRAVEL_SLACK_M
+    let BoundingCapsule {
+        centre,
+        ball_radius_m,
+        ..
+    } = &body.bound;
+    from[link].travel_m(&to[link], centre, *ball_radius_m)
 }
 
 /// A bound after some travel. NaN stays NaN, which proves nothing.
-fn after_travel(bound_m: f64, travel_m: f64, is_convex: bool) -> f64 {
+pub(crate) fn after_travel(bound_m: f64, travel_m: f64, is_convex: bool) -> f64 {
     let left_m = bound_m - travel_m;
     if is_convex || left_m >= 0.0 || left_m.is_nan() {
         left_m

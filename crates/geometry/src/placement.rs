@@ -12,6 +12,10 @@ pub struct Placement {
     pub translation: Vector3<f64>,
 }
 
+/// Slack of [`Placement::travel_m`] for rounding: of the rotation's trace, and in m.
+const TRACE_SLACK: f64 = 1e-14;
+const TRAVEL_SLACK_M: f64 = 1e-12;
+
 impl Placement {
     /// At the origin, not turned.
     pub const IDENTITY: Self = Self {
@@ -56,5 +60,16 @@ impl Placement {
             rotation: self.rotation.tr_mul(&other.rotation),
             translation: self.inverse_point(&other.translation),
         }
+    }
+    /// Most that a point of a ball moves on the way from this placement to another, m: an upper bound.
+    ///
+    /// A point at `c + u` from the ball's centre `c`, `|u| <= r`, moves by no more than
+    /// `|c' - c| + |R' - R| r`, and `|R' - R| = 2 sin(phi / 2) = sqrt(3 - trace(R' R^T))` where `phi` is the
+    /// angle between the two orientations.
+    #[inline]
+    pub fn travel_m(&self, to: &Self, centre: &Vector3<f64>, radius_m: f64) -> f64 {
+        let trace = self.rotation.dot(&to.rotation);
+        let turn = ((3.0 - trace).max(0.0) + TRACE_SLACK).sqrt();
+        (to.point(centre) - self.point(centre)).norm() + turn * radius_m + TRAVEL_SLACK_M
     }
 }

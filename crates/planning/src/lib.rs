@@ -27,5 +27,6 @@ pub use planner::{Candidate, Planner, PostureMargins};
 pub use press::{PressError, PressPlan, stage_press};
 pub use rejection::{Rejection, Rule};
 pub use route::{
-    RouteClearance, RouteJudgement, crossed_fissures, judge_route, needle_route, route_rejection,
+    RouteClearance, RouteJudgement, crossed_fissures, judge_route, judge_route_beside,
+    needle_route, route_rejection,
 };

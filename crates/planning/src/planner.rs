@@ -201,6 +201,21 @@ impl<'a> Planner<'a> {
         }
     }
 
+    /// Joint positions of a configuration that brings the guide to a goal at a roll, if it reaches it and
+    /// breaks no rule about its joints: what [`Planner::member_at`] says of all but clearances.
+    pub fn reached(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        roll_rad: f64,
+    ) -> Option<Joints> {
+        let pose = self.base_link_from_flange(goal, roll_rad);
+        let kinematics = self.kinematics();
+        let solution = kinematics.branch(&pose, Some(self.start()), configuration)?;
+        let is_sound = self.joint_rules(&solution).is_empty();
+        is_sound.then_some(solution.joints)
+    }
+
     /// Whether a posture breaks no rule: what [`Planner::candidate`] says, without numbers.
     pub(crate) fn works(&self, solution: &Solution, nearby: &mut Nearby) -> bool {
         self.joint_rules(solution).is_empty()

@@ -135,7 +135,15 @@ impl RouteJudgement<'_> {
 /// The margin that the planned needle of a goal keeps least, or misses most; `None` where there is nothing
 /// to keep away from, or it is switched off.
 pub fn judge_route<'a>(resolved: &'a ResolvedScenario, goal: &Goal) -> Option<RouteJudgement<'a>> {
-    let placed = resolved.phantom.as_ref()?;
+    judge_route_beside(resolved, resolved.phantom.as_ref()?, goal)
+}
+
+/// [`judge_route`] with the phantom at another place.
+pub fn judge_route_beside<'a>(
+    resolved: &ResolvedScenario,
+    placed: &'a PlacedPhantom,
+    goal: &Goal,
+) -> Option<RouteJudgement<'a>> {
     let section = &resolved.scenario.planning.needle_route;
     [Tissue::Bone, Tissue::Vessel, Tissue::Organ]
         .into_iter()

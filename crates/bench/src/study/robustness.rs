@@ -22,19 +22,33 @@
 //!
 //! A layout that cannot exist, such as a patient within the table, is neither a break nor a place where
 //! nothing breaks.
+//!
+//! # How a layout is decided
+//!
+//! By its static case. Most layouts are decided without one: the posture at the roll that was ok last is solved
+//! in closed form, its joints and its needle are judged, and that it keeps its clearances is proven by how far
+//! arm and patient have travelled since distances were measured ([`KnownGaps`](needlebench_clearance::KnownGaps)).
+//! What is proven is what the case would say, so all that is reported is the same with
+//! [`by_bounds`](RobustnessSettings::by_bounds) or without.
 
+mod layouts;
+mod proofs;
 mod search;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use needlebench_cell::{Change, Finding, KeyPath, ResolvedScenario, Roll, ScenarioFamily};
+use needlebench_cell::family::{SHIFT_KEYS, TURN_KEYS};
+use needlebench_cell::{Change, Finding, KeyPath, PhantomMove, ScenarioFamily};
+use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Configuration;
-use needlebench_study::Outcome;
 use serde::Serialize;
 
-use super::static_case::StaticWorker;
+use layouts::{Layouts, Question};
+use proofs::Proofs;
 use search::{Search, Verdict, nearest_break};
 
 /// How far and how finely breaks are looked for.
@@ -55,6 +69,9 @@ pub struct RobustnessSettings {
     /// Points along an axis of the ball within the nearest break, none of which may break: of a shift there
     /// are as many to the third power, of a turn, which has two angles, to the second.
     pub points_per_axis: u32,
+    /// Decides by bounds of travel where these prove the answer: the answers are those of evaluating every
+    /// layout, and come sooner.
+    pub by_bounds: bool,
 }
 
 impl Default for RobustnessSettings {
@@ -67,6 +84,7 @@ impl Default for RobustnessSettings {
             shift_directions: 64,
             tilt_directions: 16,
             points_per_axis: 16,
+            by_bounds: true,
         }
     }
 }
@@ -114,7 +132,7 @@ pub struct Robustness {
     pub tilt: SmallestFound,
     /// The same with the arm left where it stands; none where it stands in no posture at all.
     pub unaware: Option<Unaware>,
-    /// Layouts that were looked at.
+    /// Layouts that were looked at, whether evaluated or decided by proof.
     pub evaluations: u64,
 }
 
@@ -128,17 +146,6 @@ pub struct Unaware {
     /// Smallest turn found.
     pub tilt: SmallestFound,
 }
-
-/// Rolls that are tried before a configuration is swept over all of them.
-const MOST_ROLLS: usize = 6;
-
-/// Keys of a shift and of a turn.
-const SHIFT_KEYS: [&str; 3] = [
-    "phantom.position_mm[0]",
-    "phantom.position_mm[1]",
-    "phantom.position_mm[2]",
-];
-const TILT_KEYS: [&str; 2] = ["phantom.head_yaw_deg", "phantom.body_roll_deg"];
 
 /// How far the phantom of a layout may be moved before a configuration breaks. Where it is broken as
 /// it stands, the radius is 0. Deterministic.
@@ -156,72 +163,28 @@ pub fn robustness(
     settings: &RobustnessSettings,
     cancel: Option<&AtomicBool>,
 ) -> Result<Option<Robustness>, Vec<Finding>> {
-    let here = family.vary(goal, changes)?;
-    if here.phantom.is_none() {
-        let finding = Finding::new(&here.source.file, "there is no phantom to move");
-        return Err(vec![finding.key("phantom")]);
-    }
-    let mut worker = StaticWorker::default();
-    let row = worker.row(&here, configuration);
-    let joints_rad = row.measured.joints_rad;
+    let moves = family.phantom_moves(goal, changes)?;
+    let model = ClearanceModel::new(&moves.base().cell);
+    let proofs = if settings.by_bounds {
+        Proofs::of(moves.base(), &model, configuration)
+    } else {
+        None
+    };
+    let mut layouts = Layouts::new(&moves, configuration, proofs);
+    let joints_rad = layouts.joints_rad();
     let mut mover = Mover {
         cancel,
-        family,
-        goal,
-        changes,
         settings,
+        layouts: &mut layouts,
         evaluations: 0,
     };
-    // Rolls that were ok in some layout, the one that was last is the last. Where the goal fixes the roll,
-    // there is no other.
-    let is_free = here
-        .goals
-        .first()
-        .is_some_and(|goal| goal.roll == Roll::Free);
-    let mut rolls_rad: Vec<f64> = Vec::new();
-    let mut aware = |resolved: Result<ResolvedScenario, Vec<Finding>>| match resolved {
-        Ok(resolved) => {
-            // Mostly the posture at the roll of the layout before is ok too, and needs no sweep.
-            let known = rolls_rad.iter().rposition(|&roll_rad| {
-                let row = worker.row_at(&resolved, configuration, roll_rad);
-                row.outcome == Outcome::Ok
-            });
-            if let Some(known) = known {
-                rolls_rad[known..].rotate_left(1);
-                return Verdict::Holds;
-            }
-            let row = worker.row(&resolved, configuration);
-            match row.outcome {
-                Outcome::Ok => {
-                    if let Some(roll_rad) = row.measured.roll_rad.filter(|_| is_free) {
-                        if rolls_rad.len() == MOST_ROLLS {
-                            rolls_rad.remove(0);
-                        }
-                        rolls_rad.push(roll_rad);
-                    }
-                    Verdict::Holds
-                }
-                Outcome::Failed | Outcome::Rejected => Verdict::Breaks(row.detail.into_owned()),
-                Outcome::Invalid => Verdict::Impossible,
-            }
-        }
-        Err(findings) => goal_at_fault(&findings).map_or(Verdict::Impossible, Verdict::Breaks),
-    };
-    let (shift, tilt) = (mover.shift(&mut aware), mover.tilt(&mut aware));
+    let (shift, tilt) = (mover.shift(Question::Aware), mover.tilt(Question::Aware));
     let unaware = joints_rad.map(|joints_rad| {
-        let q = Joints::from_column_slice(&joints_rad);
-        let mut stays = |resolved: Result<ResolvedScenario, Vec<Finding>>| match resolved {
-            Ok(resolved) => match worker.clearance_broken(&resolved, &q) {
-                Ok(None) => Verdict::Holds,
-                Ok(Some(detail)) => Verdict::Breaks(detail.into_owned()),
-                Err(_) => Verdict::Impossible,
-            },
-            Err(findings) => goal_at_fault(&findings).map_or(Verdict::Impossible, Verdict::Breaks),
-        };
+        let stays = Question::Unaware(Joints::from_column_slice(&joints_rad));
         Unaware {
             joints_deg: joints_rad.map(f64::to_degrees),
-            shift: mover.shift(&mut stays),
-            tilt: mover.tilt(&mut stays),
+            shift: mover.shift(stays),
+            tilt: mover.tilt(stays),
         }
     });
     let found = Robustness {
@@ -233,28 +196,16 @@ pub fn robustness(
     Ok(Some(found).filter(|_| !mover.is_cancelled()))
 }
 
-/// The goal's key at fault, where the move leaves the goal without a needle. A place that the phantom
-/// cannot have, in the table or off it, is no evidence of anything: nobody can move it there.
-fn goal_at_fault(findings: &[Finding]) -> Option<String> {
-    let keys = findings.iter().filter_map(|finding| finding.key.clone());
-    keys.into_iter().find(|key| key.starts_with("goals"))
-}
-
 /// Moves the phantom of a layout.
-struct Mover<'a> {
+struct Mover<'a, 'l> {
     cancel: Option<&'a AtomicBool>,
-    family: &'a ScenarioFamily,
-    goal: &'a str,
-    changes: &'a [(KeyPath, Change)],
     settings: &'a RobustnessSettings,
+    layouts: &'a mut Layouts<'l>,
     evaluations: u64,
 }
 
-/// What is seen in a layout.
-type Judge<'j> = dyn FnMut(Result<ResolvedScenario, Vec<Finding>>) -> Verdict + 'j;
-
-impl Mover<'_> {
-    fn shift(&mut self, judge: &mut Judge<'_>) -> SmallestFound {
+impl Mover<'_, '_> {
+    fn shift(&mut self, question: Question) -> SmallestFound {
         let search = Search {
             limit: self.settings.max_shift_mm,
             step: self.settings.step_mm,
@@ -262,10 +213,10 @@ impl Mover<'_> {
             points: self.settings.points_per_axis.pow(3),
         };
         let directions = search::on_sphere(self.settings.shift_directions);
-        self.nearest(&search, &directions, &SHIFT_KEYS, judge)
+        self.nearest(&search, &directions, question, PhantomMove::Shift)
     }
 
-    fn tilt(&mut self, judge: &mut Judge<'_>) -> SmallestFound {
+    fn tilt(&mut self, question: Question) -> SmallestFound {
         let search = Search {
             limit: self.settings.max_tilt_deg,
             step: self.settings.step_deg,
@@ -273,17 +224,16 @@ impl Mover<'_> {
             points: self.settings.points_per_axis.pow(2),
         };
         let directions = search::on_circle(self.settings.tilt_directions);
-        self.nearest(&search, &directions, &TILT_KEYS, judge)
+        self.nearest(&search, &directions, question, PhantomMove::Turn)
     }
 
     fn nearest<const N: usize>(
         &mut self,
         search: &Search,
         directions: &[[f64; N]],
-        keys: &[&str; N],
-        judge: &mut Judge<'_>,
+        question: Question,
+        as_move: fn([f64; N]) -> PhantomMove,
     ) -> SmallestFound {
-        let paths = keys.map(|key| KeyPath::parse(key).expect("a path"));
         let mut evaluations = 0;
         let found = nearest_break(search, directions, |offset| {
             evaluations += 1;
@@ -291,16 +241,16 @@ impl Mover<'_> {
             if self.is_cancelled() {
                 return Verdict::Impossible;
             }
-            judge(self.moved(&paths, offset))
+            self.layouts.verdict(question, &as_move(*offset))
         });
         self.evaluations += evaluations;
-        let breaking = found.nearest.map(|(radius, offset, detail)| {
-            let moved = self.moved(&paths, &offset);
+        let breaking = found.nearest.map(|nearest| {
+            let offset = nearest.offset();
             Breaking {
-                radius,
+                radius: nearest.radius,
                 offset: offset.to_vec(),
-                keys: self.values(moved.as_ref().ok(), keys, &offset),
-                detail,
+                keys: self.keys(&as_move(offset)),
+                detail: self.layouts.detail(question, &as_move(nearest.seen_at)),
             }
         });
         SmallestFound {
@@ -318,42 +268,20 @@ impl Mover<'_> {
             .is_some_and(|cancel| cancel.load(Ordering::Relaxed))
     }
 
-    fn moved<const N: usize>(
-        &self,
-        paths: &[KeyPath; N],
-        offset: &[f64; N],
-    ) -> Result<ResolvedScenario, Vec<Finding>> {
-        let mut changes = self.changes.to_vec();
-        let adds = paths.iter().zip(offset);
-        changes.extend(adds.map(|(path, by)| (path.clone(), Change::Add(*by))));
-        self.family.vary(self.goal, &changes)
-    }
-
-    /// Where the phantom then lies; of a layout that cannot exist, what was added.
-    fn values<const N: usize>(
-        &self,
-        resolved: Option<&ResolvedScenario>,
-        keys: &[&str; N],
-        offset: &[f64; N],
-    ) -> BTreeMap<String, f64> {
-        let phantom = resolved.and_then(|resolved| resolved.scenario.phantom.as_ref());
-        let Some(phantom) = phantom else {
-            let base = self.family.vary(self.goal, self.changes).ok();
-            let from = base.map(|base| self.values(Some(&base), keys, offset));
-            let sums = keys.iter().zip(offset).map(|(key, by)| {
-                let start = from.as_ref().and_then(|from| from.get(*key));
-                ((*key).to_owned(), start.copied().unwrap_or(0.0) + by)
-            });
-            return sums.collect();
-        };
-        let [x, y, z] = phantom.position_mm;
-        let all = [
-            (SHIFT_KEYS[0], x),
-            (SHIFT_KEYS[1], y),
-            (SHIFT_KEYS[2], z),
-            (TILT_KEYS[0], phantom.head_yaw_deg),
-            (TILT_KEYS[1], phantom.body_roll_deg),
+    /// Where the phantom then lies; of a layout that cannot exist, what was moved alone.
+    fn keys(&self, by: &PhantomMove) -> BTreeMap<String, f64> {
+        let moves = self.layouts.moves();
+        let section = moves.section_after(by);
+        let [yaw_key, roll_key] = TURN_KEYS;
+        let position = SHIFT_KEYS.into_iter().zip(section.position_mm);
+        let turns = [
+            (yaw_key, section.head_yaw_deg),
+            (roll_key, section.body_roll_deg),
         ];
-        all.map(|(key, value)| (key.to_owned(), value)).into()
+        let exists = moves.resolved(by).is_ok();
+        let all = position.chain(turns);
+        all.filter(|(key, _)| exists || by.keys().contains(key))
+            .map(|(key, value)| (key.to_owned(), value))
+            .collect()
     }
 }

@@ -2,11 +2,13 @@
 
 mod edit;
 mod key_path;
+mod moves;
 mod setting;
 
 use std::path::{Path, PathBuf};
 
 pub use key_path::KeyPath;
+pub use moves::{MovedPhantom, PhantomMove, PhantomMoves, SHIFT_KEYS, TURN_KEYS};
 pub use setting::{Change, Setting};
 
 use crate::resolve::{ModelLibrary, resolve};

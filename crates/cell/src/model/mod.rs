@@ -489,7 +489,8 @@ impl Cell {
     }
 }
 
-fn placed(solids: &[Solid], new_from_old: &Pose) -> Vec<Solid> {
+/// Solids in another frame.
+pub(crate) fn placed(solids: &[Solid], new_from_old: &Pose) -> Vec<Solid> {
     solids
         .iter()
         .map(|solid| Solid {

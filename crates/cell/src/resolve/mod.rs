@@ -10,6 +10,7 @@ pub mod imperfections;
 pub mod iso9283;
 mod layout;
 mod library;
+mod moved;
 mod names;
 mod needle_route;
 mod obstacles;
@@ -33,19 +34,20 @@ use crate::files::ModelSource;
 use crate::files::source_of;
 use crate::fixtures::Fixture;
 use crate::input::read_text;
-use crate::model::{BodyKind, Cell, CollisionBody, Frame, NeedleCorridor};
+use crate::model::{BodyKind, Cell, CollisionBody, Frame, NeedleCorridor, placed};
 use crate::scenario::{self, Scenario};
 use crate::toml_text::TomlText;
 use crate::{Finding, Robot};
 use arm_values::check_brakes;
 pub use expected::Expected;
 use expected::RealThings;
+use goals::{BodyBoxes, Surroundings, resolve_goal};
 pub use goals::{Expectation, Goal, Roll};
-use goals::{Surroundings, resolve_goal};
 use imperfections::Imperfections;
 use iso9283::{Iso9283Protocol, resolve_iso9283};
 use layout::Layout;
 pub(crate) use library::ModelLibrary;
+pub(crate) use moved::StillLayout;
 use needle_route::check_needle_route;
 use obstacles::{check_obstacle_names, place_obstacles};
 pub use overrides::Overrides;
@@ -56,7 +58,8 @@ pub use robot::load_robot;
 pub use servo::ServoSettings;
 use servo::servo_settings;
 use standing::{
-    Standing, check_distance, check_floor, check_start, note_crowds, note_idle_criteria,
+    KnownDepths, Standing, check_distance, check_floor, check_start, note_crowds,
+    note_idle_criteria,
 };
 
 /// Standard gravity, m/s^2.
@@ -238,6 +241,7 @@ pub(crate) fn resolve(
     let parts = parts.flat_map(|placed| placed.phantom.parts.iter().chain(&placed.limbs));
     let taken = arm.chain(parts.map(|part| &*part.name));
     check_obstacle_names(toml, &scenario.obstacles, taken).map_err(one)?;
+    let base_solids = placed(&robot.base.solids, &world_from_base_link);
     let standing = Standing {
         toml,
         obstacles: &obstacles.placed,
@@ -245,21 +249,25 @@ pub(crate) fn resolve(
         robot: &robot,
         fixtures: &fixtures,
         phantom: phantom.as_ref().zip(lying.as_deref()),
+        base: &base_solids,
+        known: &KnownDepths::default(),
     };
     standing.check(&mut notes).map_err(one)?;
     surroundings.extend(obstacles.bodies(&scenario.obstacles));
     fixtures.extend(obstacles.fixtures());
     note_idle_criteria(&scenario, &mut notes);
     let goals = {
+        let fixtures: Vec<CollisionBody> = surroundings
+            .iter()
+            .filter(|body| body.kind != BodyKind::Phantom)
+            .cloned()
+            .collect();
         let context = Surroundings {
             robot: &robot,
             tool: &tool,
             phantom: phantom.as_ref(),
-            fixtures: &surroundings
-                .iter()
-                .filter(|body| body.kind != BodyKind::Phantom)
-                .cloned()
-                .collect::<Vec<_>>(),
+            fixtures: &fixtures,
+            boxes: &fixtures.iter().map(BodyBoxes::new).collect::<Vec<_>>(),
         };
         let (mut goals, mut findings) = (Vec::new(), Vec::new());
         for (index, section) in scenario.goals.iter().enumerate() {
@@ -276,20 +284,11 @@ pub(crate) fn resolve(
     };
 
     let people = {
-        let base = robot
-            .base
-            .solids
-            .iter()
-            .map(|solid| needlebench_geometry::Solid {
-                parent_from_shape: world_from_base_link * solid.parent_from_shape,
-                ..solid.clone()
-            });
-        let base: Vec<_> = base.collect();
         let standing = surroundings
             .iter()
             .flat_map(|body| body.solids.iter().map(|solid| (body.name.as_str(), solid)));
         let solids: Vec<_> = standing
-            .chain(base.iter().map(|solid| ("robot's base", solid)))
+            .chain(base_solids.iter().map(|solid| ("robot's base", solid)))
             .collect();
         let room = Room {
             phantom: phantom.as_ref(),

@@ -3,6 +3,7 @@
 //!
 //! What cannot be is refused; what is odd but possible is noted.
 
+mod depths;
 mod obstacles;
 
 use std::f64::consts::FRAC_PI_2;
@@ -12,13 +13,15 @@ use needlebench_geometry::{PreparedShape, Solid, separation};
 use needlebench_kinematics::{Joints, Pose};
 
 use super::obstacles::PlacedObstacle;
-use super::phantom::UnplacedPhantom;
+use super::phantom::{Corners, UnplacedPhantom};
 use super::{Goal, PlacedPhantom};
 use crate::fixtures::{Fixture, FixtureKind};
 use crate::phantom::{Measured, SIZE_PRESETS};
 use crate::scenario::{MountKind, Scenario, TableSection};
 use crate::toml_text::TomlText;
 use crate::{ClearanceClass, Finding, Robot, Tool};
+use depths::Beside;
+pub(super) use depths::{KnownDepths, patient_box};
 
 /// Overlap of rigid things that is rounding of a drawing, m.
 const RIGID_M: f64 = 1e-3;
@@ -38,6 +41,9 @@ const OVERHANG_M: f64 = 0.05;
 /// A goal this many times farther than the arm could ever be long is a slip, and no question of reach.
 const TIMES_REACH: f64 = 2.0;
 
+const BASE_KEY: &str = "robot.base_position_mm";
+const BASE_HINT: &str = "the position is in the world: z up, floor at 0, in millimetres";
+
 /// What stands in a cell.
 pub(super) struct Standing<'a> {
     pub toml: &'a TomlText<'a>,
@@ -47,22 +53,30 @@ pub(super) struct Standing<'a> {
     pub fixtures: &'a [Fixture],
     pub phantom: Option<(&'a PlacedPhantom, &'a UnplacedPhantom)>,
     pub obstacles: &'a [PlacedObstacle],
+    /// Solids of the robot's base, in the world.
+    pub base: &'a [Solid],
+    /// From where the patient lay before; fresh for a cell of which nothing is known.
+    pub known: &'a KnownDepths,
 }
 
 impl Standing<'_> {
     /// Everything but the goals.
     pub fn check(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
-        let patient = self
-            .phantom
-            .map(|(placed, skin)| Patient::new(placed, skin));
-        let patient = patient.as_ref();
         self.check_table()?;
         self.check_gantry(notes)?;
         self.check_fixtures()?;
-        self.check_base(patient, notes)?;
-        self.check_phantom(patient, notes)?;
-        self.check_bore(patient)?;
-        self.check_obstacles(patient, notes)
+        self.check_base(notes)?;
+        self.check_phantom(notes)?;
+        self.check_bore()?;
+        self.check_obstacles(notes)
+    }
+
+    /// Where the patient lies alone: what is left of [`Standing::check`] if all else is known to stand.
+    pub fn check_lying(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
+        self.check_base_in_patient()?;
+        self.check_phantom(notes)?;
+        self.check_bore()?;
+        self.check_obstacles_in_patient()
     }
 
     fn fixture(&self, kind: FixtureKind) -> Option<&Fixture> {
@@ -175,15 +189,9 @@ impl Standing<'_> {
     }
 
     /// A base in or under something, and one that stands on nothing.
-    fn check_base(
-        &self,
-        patient: Option<&Patient<'_>>,
-        notes: &mut Vec<String>,
-    ) -> Result<(), Finding> {
-        const KEY: &str = "robot.base_position_mm";
+    fn check_base(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
         let robot = self.robot;
-        let base: Vec<Solid> = placed(&robot.base.solids, &robot.world_from_base_link).collect();
-        let hint = "the position is in the world: z up, floor at 0, in millimetres";
+        let base = self.base;
         for (kind, name) in [
             (FixtureKind::Table, "table"),
             (FixtureKind::Gantry, "gantry"),
@@ -191,29 +199,15 @@ impl Standing<'_> {
             let Some(fixture) = self.fixture(kind) else {
                 continue;
             };
-            if let Some(found) = deepest(&base, &fixture.solids, FOOT_M) {
+            if let Some(found) = deepest(base, &fixture.solids, FOOT_M) {
                 let message = format!(
                     "the robot's base stands {} inside the {name}",
                     found.depth()
                 );
-                return Err(self.toml.finding(KEY, message).hint(hint));
+                return Err(self.toml.finding(BASE_KEY, message).hint(BASE_HINT));
             }
         }
-        if let Some(patient) = patient {
-            let mount = self.fixture(FixtureKind::Mount);
-            let column = mount.map_or(&[][..], |mount| &mount.solids);
-            for (what, solids) in [
-                ("the robot's base", &base[..]),
-                ("the robot's mount", column),
-            ] {
-                let depth_m = patient.depth_of_any_m(solids);
-                if depth_m > SOFT_M {
-                    let message =
-                        format!("{what} stands {:.1} mm inside the patient", depth_m * 1e3);
-                    return Err(self.toml.finding(KEY, message).hint(hint));
-                }
-            }
-        }
+        self.check_base_in_patient()?;
         let height_m = robot.world_from_base_link.translation.z;
         let stands_on_something = self.scenario.mount.is_some()
             || height_m <= SOFT_M
@@ -258,15 +252,31 @@ impl Standing<'_> {
         ));
     }
 
+    /// A base, or what carries it, in the patient.
+    fn check_base_in_patient(&self) -> Result<(), Finding> {
+        let mount = self.fixture(FixtureKind::Mount);
+        let column = mount.map_or(&[][..], |mount| &mount.solids);
+        for (what, beside, solids) in [
+            ("the robot's base", Beside::Base, self.base),
+            ("the robot's mount", Beside::Mount, column),
+        ] {
+            if let Some((_, depth_m)) = self.depth_in_patient(beside, solids.iter(), true) {
+                let message = format!("{what} stands {:.1} mm inside the patient", depth_m * 1e3);
+                return Err(self.toml.finding(BASE_KEY, message).hint(BASE_HINT));
+            }
+        }
+        Ok(())
+    }
+
     /// A patient in the gantry's housing.
-    fn check_bore(&self, patient: Option<&Patient<'_>>) -> Result<(), Finding> {
-        let (Some(patient), Some(gantry)) = (patient, self.fixture(FixtureKind::Gantry)) else {
+    fn check_bore(&self) -> Result<(), Finding> {
+        let Some(gantry) = self.fixture(FixtureKind::Gantry) else {
             return Ok(());
         };
-        let depth_m = patient.depth_of_any_m(&gantry.solids);
-        if depth_m <= SOFT_M {
+        let solids = gantry.solids.iter();
+        let Some((_, depth_m)) = self.depth_in_patient(Beside::Gantry, solids, true) else {
             return Ok(());
-        }
+        };
         let message = format!(
             "the patient lies {:.0} mm inside the gantry's housing",
             depth_m * 1e3
@@ -276,12 +286,8 @@ impl Standing<'_> {
     }
 
     /// A patient in, under or far above something, or beyond the table.
-    fn check_phantom(
-        &self,
-        patient: Option<&Patient<'_>>,
-        notes: &mut Vec<String>,
-    ) -> Result<(), Finding> {
-        let (Some(body), Some((placed, unplaced))) = (patient, self.phantom) else {
+    fn check_phantom(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
+        let Some((placed, unplaced)) = self.phantom else {
             return Ok(());
         };
         let refuse = |message: String, hint: &str| {
@@ -293,7 +299,7 @@ impl Standing<'_> {
         let turned = self.scenario.table.as_ref().map(world_from_table);
         let turned = turned.unwrap_or_else(Pose::identity);
         let to_table = turned.inverse() * placed.world_from_phantom;
-        let patient = extent(unplaced.skin_m.iter(), &to_table);
+        let patient = unplaced.extent(&to_table);
         let (low, high) = (patient.0.z, patient.1.z);
         if low < -SOFT_M {
             let message = format!("the patient lies {:.0} mm under the floor", -low * 1e3);
@@ -336,14 +342,14 @@ impl Standing<'_> {
                 "`rest_on_table = true` lays the lowest point of the skin on the table",
             );
         }
-        if let Some(fixture) = self.fixture(FixtureKind::Table) {
-            let depth_m = body.depth_of_any_m(&fixture.solids);
-            if depth_m > SOFT_M {
-                return refuse(
-                    format!("the patient lies {:.0} mm deep in the table", depth_m * 1e3),
-                    "`rest_on_table = true` lays the lowest point of the skin on the table",
-                );
-            }
+        if let Some(fixture) = self.fixture(FixtureKind::Table)
+            && let Some((_, depth_m)) =
+                self.depth_in_patient(Beside::Table, fixture.solids.iter(), true)
+        {
+            return refuse(
+                format!("the patient lies {:.0} mm deep in the table", depth_m * 1e3),
+                "`rest_on_table = true` lays the lowest point of the skin on the table",
+            );
         }
         self.note_standing_size(placed, notes);
         let gap_m = low - top_m;
@@ -366,50 +372,6 @@ impl Standing<'_> {
             ));
         }
         Ok(())
-    }
-}
-
-/// What of a patient can be in something else.
-pub(super) struct Patient<'a> {
-    skin: (&'a PreparedShape, Pose, Corners),
-    limbs: Vec<(PreparedShape, Pose, Corners)>,
-}
-
-impl<'a> Patient<'a> {
-    fn new(placed: &PlacedPhantom, unplaced: &'a UnplacedPhantom) -> Self {
-        let world = &placed.world_from_phantom;
-        let limbs = placed.outside().skip(1).map(|limb| {
-            let shape = PreparedShape::new(&limb.shape);
-            (shape, limb.parent_from_shape, limb.bounding_box())
-        });
-        Self {
-            skin: (
-                unplaced.skin(),
-                world * placed.phantom.skin().parent_from_shape,
-                extent(unplaced.skin_m.iter(), world),
-            ),
-            limbs: limbs.collect(),
-        }
-    }
-
-    /// How deep a solid is in the patient, m, where it is more than [`SOFT_M`]; 0 or an upper bound of the
-    /// depth else.
-    fn depth_m(&self, shape: &PreparedShape, solid: &Solid) -> f64 {
-        let here = solid.bounding_box();
-        let (skin, skin_at, skin_box) = &self.skin;
-        let limbs = self.limbs.iter().map(|(limb, at, reach)| (limb, at, reach));
-        std::iter::once((*skin, skin_at, skin_box))
-            .chain(limbs)
-            .filter(|(_, _, reach)| overlap(&here, reach, SOFT_M))
-            .map(|(part, at, _)| -separation(shape, &solid.parent_from_shape, part, at).distance_m)
-            .fold(0.0, f64::max)
-    }
-
-    fn depth_of_any_m(&self, solids: &[Solid]) -> f64 {
-        let depths = solids
-            .iter()
-            .map(|solid| self.depth_m(&PreparedShape::new(&solid.shape), solid));
-        depths.fold(0.0, f64::max)
     }
 }
 
@@ -566,26 +528,6 @@ fn world_from_table(table: &TableSection) -> Pose {
         nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad),
     )
 }
-
-/// Box about points, along the axes of another frame.
-fn extent<'p>(
-    points: impl Iterator<Item = &'p Vector3<f64>>,
-    frame_from_points: &Pose,
-) -> (Point3<f64>, Point3<f64>) {
-    let rotation = frame_from_points.rotation.to_rotation_matrix();
-    let start = (
-        Vector3::repeat(f64::INFINITY),
-        Vector3::repeat(f64::NEG_INFINITY),
-    );
-    let (low, high) = points.fold(start, |(low, high), point| {
-        let at = rotation * point;
-        (low.inf(&at), high.sup(&at))
-    });
-    let middle = frame_from_points.translation.vector;
-    ((middle + low).into(), (middle + high).into())
-}
-
-type Corners = (Point3<f64>, Point3<f64>);
 
 /// Whether two boxes overlap by more than a depth along every axis: what they hold cannot overlap by
 /// more than that otherwise.

@@ -8,6 +8,7 @@ mod foreign_urdf;
 mod goal_direction;
 mod layouts;
 mod limbs;
+mod moves;
 mod obstacles;
 mod pair_classes;
 mod schema;

@@ -16,21 +16,39 @@ pub(super) struct Search {
 }
 
 /// What is seen at a place.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
     /// It holds.
     Holds,
-    /// It breaks, and what does.
-    Breaks(String),
+    /// It breaks.
+    Breaks,
     /// There is no such place: neither a break nor a sign that it holds.
     Impossible,
+}
+
+/// A break.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Break<const N: usize> {
+    /// Its distance.
+    pub radius: f64,
+    /// Its direction.
+    pub direction: [f64; N],
+    /// Where it was seen to break: there, up to rounding.
+    pub seen_at: [f64; N],
+}
+
+impl<const N: usize> Break<N> {
+    /// Its place.
+    pub fn offset(&self) -> [f64; N] {
+        self.direction.map(|share| share * self.radius)
+    }
 }
 
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Found<const N: usize> {
-    /// The nearest break: its distance, its place, and what breaks; none within the limit.
-    pub nearest: Option<(f64, [f64; N], String)>,
+    /// The nearest break; none within the limit.
+    pub nearest: Option<Break<N>>,
     /// Points of the last sweep of the ball within it, none of which breaks.
     pub points: u32,
     /// Those of them that are no places.
@@ -62,36 +80,40 @@ pub(super) fn nearest_break<const N: usize>(
         impossible: 0,
         settled: true,
     };
-    if let Verdict::Breaks(detail) = look(&[0.0; N]) {
-        found.nearest = Some((0.0, [0.0; N], detail));
+    if look(&[0.0; N]) == Verdict::Breaks {
+        found.nearest = Some(Break {
+            radius: 0.0,
+            direction: [0.0; N],
+            seen_at: [0.0; N],
+        });
         return found;
     }
     if search.limit <= 0.0 {
         return found;
     }
     // By direction, the nearest first.
-    let mut breaks: Vec<(f64, [f64; N], String)> = Vec::new();
+    let mut breaks: Vec<Break<N>> = Vec::new();
     for direction in directions {
         // Some farther ones are kept: another cone may begin behind the nearest break of the directions.
         let kept = breaks.get(STARTS - 1);
-        let limit = kept.map_or(search.limit, |(radius, ..)| *radius);
-        if let Some((radius, detail)) = first_break(search, direction, limit, &mut look) {
-            let at = breaks.partition_point(|known| known.0 <= radius);
-            breaks.insert(at, (radius, *direction, detail));
+        let limit = kept.map_or(search.limit, |kept| kept.radius);
+        if let Some(found) = first_break(search, direction, limit, &mut look) {
+            let at = breaks.partition_point(|known| known.radius <= found.radius);
+            breaks.insert(at, found);
             breaks.truncate(STARTS);
         }
     }
     // As wide as the directions are apart at first.
     let wide_rad = PI / (directions.len() as f64).powf(1.0 / (N as f64 - 1.0));
-    let mut best: Option<(f64, [f64; N], String)> = None;
+    let mut best: Option<Break<N>> = None;
     for start in breaks {
         let refined = refine(search, start, wide_rad, &mut look);
-        if best.as_ref().is_none_or(|best| refined.0 < best.0) {
+        if best.is_none_or(|best| refined.radius < best.radius) {
             best = Some(refined);
         }
     }
     for sweep in 0..MOST_SWEEPS {
-        let radius = best.as_ref().map_or(search.limit, |best| best.0);
+        let radius = best.map_or(search.limit, |best| best.radius);
         let inner = radius
             - if best.is_some() {
                 search.resolution
@@ -105,13 +127,17 @@ pub(super) fn nearest_break<const N: usize>(
             match look(&offset) {
                 Verdict::Holds => {}
                 Verdict::Impossible => found.impossible += 1,
-                Verdict::Breaks(detail) => {
+                Verdict::Breaks => {
                     let distance = dot(&offset, &offset).sqrt();
                     let direction = offset.map(|share| share / distance);
+                    let here = Break {
+                        radius: distance,
+                        direction,
+                        seen_at: offset,
+                    };
                     // The first one on the way there, if there is another.
-                    let (distance, detail) = first_break(search, &direction, distance, &mut look)
-                        .unwrap_or((distance, detail));
-                    let start = (distance, direction, detail);
+                    let start =
+                        first_break(search, &direction, distance, &mut look).unwrap_or(here);
                     best = Some(refine(search, start, wide_rad, &mut look));
                     found.settled = false;
                     break;
@@ -122,27 +148,26 @@ pub(super) fn nearest_break<const N: usize>(
             break;
         }
     }
-    found.nearest = best
-        .map(|(radius, direction, detail)| (radius, direction.map(|share| share * radius), detail));
+    found.nearest = best;
     found
 }
 
 /// Turns a direction with a break towards nearer ones.
 fn refine<const N: usize>(
     search: &Search,
-    (mut radius, mut direction, mut detail): (f64, [f64; N], String),
+    mut best: Break<N>,
     wide_rad: f64,
     look: &mut impl FnMut(&[f64; N]) -> Verdict,
-) -> (f64, [f64; N], String) {
+) -> Break<N> {
     let mut angle_rad = wide_rad;
     for _ in 0..REFINEMENTS {
         let mut found = true;
         while found {
             found = false;
-            for turned in turned(&direction, angle_rad) {
-                let limit = radius - search.resolution;
-                if let Some((nearer, what)) = first_break(search, &turned, limit, look) {
-                    (radius, direction, detail) = (nearer, turned, what);
+            for turned in turned(&best.direction, angle_rad) {
+                let limit = best.radius - search.resolution;
+                if let Some(nearer) = first_break(search, &turned, limit, look) {
+                    best = nearer;
                     found = true;
                     break;
                 }
@@ -150,30 +175,34 @@ fn refine<const N: usize>(
         }
         angle_rad *= 0.5;
     }
-    (radius, direction, detail)
+    best
 }
 
-/// Distance of the first break along a direction, not beyond the limit. Where there is no place it is
-/// looked on behind it.
+/// The first break along a direction, not beyond the limit. Where there is no place it is looked on behind
+/// it.
 fn first_break<const N: usize>(
     search: &Search,
     direction: &[f64; N],
     limit: f64,
     look: &mut impl FnMut(&[f64; N]) -> Verdict,
-) -> Option<(f64, String)> {
-    let mut at = |radius: f64| look(&direction.map(|share| share * radius));
+) -> Option<Break<N>> {
+    let place = |radius: f64| direction.map(|share| share * radius);
     let mut before = 0.0;
     while before < limit {
         let mut bad = (before + search.step).min(limit);
-        if let Verdict::Breaks(mut detail) = at(bad) {
+        if look(&place(bad)) == Verdict::Breaks {
             while bad - before > search.resolution {
                 let middle = f64::midpoint(before, bad);
-                match at(middle) {
-                    Verdict::Breaks(here) => (bad, detail) = (middle, here),
+                match look(&place(middle)) {
+                    Verdict::Breaks => bad = middle,
                     Verdict::Holds | Verdict::Impossible => before = middle,
                 }
             }
-            return Some((bad, detail));
+            return Some(Break {
+                radius: bad,
+                direction: *direction,
+                seen_at: place(bad),
+            });
         }
         before = bad;
     }
@@ -280,7 +309,7 @@ mod tests {
 
     fn when(is_broken: bool) -> Verdict {
         if is_broken {
-            Verdict::Breaks("broken".to_owned())
+            Verdict::Breaks
         } else {
             Verdict::Holds
         }
@@ -290,9 +319,13 @@ mod tests {
     fn the_distance_of_a_plane_is_found_whatever_its_direction() {
         for normal in on_sphere(25) {
             let found = nearest_break(&SEARCH, &on_sphere(32), |at| when(dot(at, &normal) > 17.3));
-            let (radius, offset, _) = found.nearest.unwrap();
+            let nearest = found.nearest.unwrap();
+            let radius = nearest.radius;
             assert!((0.0..TOLERANCE).contains(&(radius - 17.3)), "{radius}");
-            assert!(dot(&offset, &normal) > 17.3, "the evidence is broken");
+            assert!(
+                dot(&nearest.offset(), &normal) > 17.3,
+                "the evidence is broken"
+            );
         }
     }
 
@@ -304,7 +337,7 @@ mod tests {
             let wrist: [f64; 3] = std::array::from_fn(|i| 585.0 * towards[i] + at[i]);
             when(dot(&wrist, &wrist).sqrt() > 600.0)
         });
-        let (radius, ..) = found.nearest.unwrap();
+        let radius = found.nearest.unwrap().radius;
         assert!((0.0..TOLERANCE).contains(&(radius - 15.0)), "{radius}");
     }
 
@@ -314,7 +347,7 @@ mod tests {
         let found = nearest_break(&SEARCH, &on_circle(16), |[yaw, roll]| {
             when(yaw * cosine + roll * sine < -6.25)
         });
-        let (radius, ..) = found.nearest.unwrap();
+        let radius = found.nearest.unwrap().radius;
         assert!((0.0..TOLERANCE).contains(&(radius - 6.25)), "{radius}");
     }
 
@@ -326,7 +359,7 @@ mod tests {
             (None, 2048, true)
         );
         let found = nearest_break(&SEARCH, &on_sphere(32), |_| when(true));
-        assert_eq!(found.nearest.unwrap().0, 0.0);
+        assert_eq!(found.nearest.unwrap().radius, 0.0);
     }
 
     #[test]
@@ -334,7 +367,7 @@ mod tests {
         let found = nearest_break(&SEARCH, &on_sphere(32), |at| {
             when((11.0..13.5).contains(&at[2]) || at[2] > 30.0)
         });
-        let (radius, ..) = found.nearest.unwrap();
+        let radius = found.nearest.unwrap().radius;
         assert!((0.0..TOLERANCE).contains(&(radius - 11.0)), "{radius}");
     }
 
@@ -346,7 +379,7 @@ mod tests {
             let far = dot(at, at).sqrt();
             when(at[0] > 45.0 || far > 30.0 && dot(at, &axis) > 0.997_6 * far)
         });
-        let (radius, ..) = found.nearest.unwrap();
+        let radius = found.nearest.unwrap().radius;
         assert!((0.0..TOLERANCE).contains(&(radius - 30.0)), "{radius}");
     }
 
@@ -360,7 +393,8 @@ mod tests {
                 when(at[2] > 15.0)
             }
         });
-        let (radius, offset, _) = found.nearest.unwrap();
+        let nearest = found.nearest.unwrap();
+        let (radius, offset) = (nearest.radius, nearest.offset());
         assert!((0.0..TOLERANCE).contains(&(radius - 20.0)), "{radius}");
         assert!(offset[2] >= 20.0 && offset[1] >= 0.0);
         let share = f64::from(found.impossible) / f64::from(found.points);

@@ -15,13 +15,33 @@ use crate::{Finding, nearest_name};
 /// Distance from the skin within which an entry point is moved onto it along the needle.
 const ENTRY_TOLERANCE_M: f64 = 5e-3;
 
+/// A goal by entry and target with its places in the phantom frame: it goes with the phantom wherever that
+/// lies.
+#[derive(Debug, Clone)]
+pub(crate) struct GoalInPhantom(pub(super) Goal);
+
+impl GoalInPhantom {
+    /// The goal with the phantom at a place.
+    pub fn placed(&self, world_from_phantom: &Pose) -> Goal {
+        let Self(goal) = self;
+        let axis = world_from_phantom.rotation * goal.axis.into_inner();
+        Goal {
+            entry_m: goal.entry_m.map(|entry| world_from_phantom * entry),
+            target_m: world_from_phantom * goal.target_m,
+            axis: UnitVector3::new_normalize(axis),
+            world_from_guide_exit: world_from_phantom * goal.world_from_guide_exit,
+            ..goal.clone()
+        }
+    }
+}
+
 pub(super) fn from_entry_and_target(
     text: &TomlText<'_>,
     key: &dyn Fn(&str) -> String,
     section: &GoalSection,
     surroundings: &Surroundings<'_>,
     notes: &mut Vec<String>,
-) -> Result<Goal, Finding> {
+) -> Result<GoalInPhantom, Finding> {
     let Some(placed) = surroundings.phantom else {
         return Err(text
             .finding(
@@ -127,13 +147,13 @@ pub(super) fn from_entry_and_target(
             )
             .hint("the insertion length counts from the guide's exit, stand-off included"));
     }
-    let world = &placed.world_from_phantom;
-    Ok(Goal {
+    let guide_exit = guide_frame(&exit, &axis);
+    let goal = Goal {
         name: section.name.clone(),
-        entry_m: Some(world * on_skin),
-        target_m: world * target,
-        axis: UnitVector3::new_normalize(world.rotation * axis.into_inner()),
-        world_from_guide_exit: world * guide_frame(&exit, &axis),
+        entry_m: Some(on_skin),
+        target_m: target,
+        axis,
+        world_from_guide_exit: guide_exit,
         roll: section
             .roll_deg
             .map_or(Roll::Free, |deg| Roll::Fixed(deg.to_radians())),
@@ -143,7 +163,8 @@ pub(super) fn from_entry_and_target(
         target_organ: organ_at(phantom, &target),
         lesion,
         expected: BTreeMap::new(),
-    })
+    };
+    Ok(GoalInPhantom(goal))
 }
 
 /// Point of the phantom frame.

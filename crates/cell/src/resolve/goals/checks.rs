@@ -5,6 +5,7 @@ use nalgebra::Point3;
 use super::{Goal, Surroundings};
 use crate::Finding;
 use crate::phantom::{Phantom, Tissue};
+use crate::resolve::phantom::Corners;
 use crate::scenario::GoalSection;
 use crate::toml_text::TomlText;
 
@@ -25,6 +26,10 @@ pub(super) fn organ_at(phantom: &Phantom, point: &Point3<f64>) -> Option<String>
         })
 }
 
+fn is_in((low, high): &Corners, point: &Point3<f64>) -> bool {
+    (0..3).all(|axis| (low[axis]..=high[axis]).contains(&point[axis]))
+}
+
 pub(super) fn check_place(
     text: &TomlText<'_>,
     key: &dyn Fn(&str) -> String,
@@ -40,8 +45,12 @@ pub(super) fn check_place(
     ];
     for (what, point) in points {
         let Some(point) = point else { continue };
-        for fixture in surroundings.fixtures {
-            if fixture.solids.iter().any(|solid| solid.contains(&point)) {
+        for (fixture, boxes) in surroundings.fixtures.iter().zip(surroundings.boxes) {
+            if !is_in(&boxes.whole, &point) {
+                continue;
+            }
+            let mut solids = fixture.solids.iter().zip(&boxes.solids);
+            if solids.any(|(solid, corners)| is_in(corners, &point) && solid.contains(&point)) {
                 let name = match what {
                     _ if section.flange_pose.is_some() => "flange_pose",
                     "target" => section.target_key(),

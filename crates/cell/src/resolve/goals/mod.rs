@@ -7,14 +7,16 @@ mod checks;
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
+use needlebench_geometry::Solid;
 use needlebench_kinematics::Pose;
 use needlebench_kinematics::ik::Configuration;
 
-use super::phantom::PlacedPhantom;
+use super::phantom::{Corners, PlacedPhantom};
 use crate::scenario::{EVERY_CONFIGURATION, GoalSection};
 use crate::toml_text::TomlText;
 use crate::{CollisionBody, Finding, Robot, Tool};
 use by_flange::from_flange_pose;
+pub(crate) use by_points::GoalInPhantom;
 use by_points::from_entry_and_target;
 use checks::{check_place, check_target};
 
@@ -80,6 +82,30 @@ pub(crate) struct Surroundings<'a> {
     pub tool: &'a Tool,
     pub phantom: Option<&'a PlacedPhantom>,
     pub fixtures: &'a [CollisionBody],
+    /// Boxes around each of the fixtures.
+    pub boxes: &'a [BodyBoxes],
+}
+
+/// Boxes around a body and its solids, along the world's axes.
+#[derive(Debug)]
+pub(crate) struct BodyBoxes {
+    pub whole: Corners,
+    pub solids: Vec<Corners>,
+}
+
+impl BodyBoxes {
+    /// Of a body whose solids are given in the world.
+    pub fn new(body: &CollisionBody) -> Self {
+        let solids: Vec<Corners> = body.solids.iter().map(Solid::bounding_box).collect();
+        let start = (
+            Point3::from(Vector3::repeat(f64::INFINITY)),
+            Point3::from(Vector3::repeat(f64::NEG_INFINITY)),
+        );
+        let whole = solids
+            .iter()
+            .fold(start, |all, each| (all.0.inf(&each.0), all.1.sup(&each.1)));
+        Self { whole, solids }
+    }
 }
 
 pub(crate) fn resolve_goal(
@@ -89,13 +115,43 @@ pub(crate) fn resolve_goal(
     surroundings: &Surroundings<'_>,
     notes: &mut Vec<String>,
 ) -> Result<Goal, Finding> {
+    let in_phantom = goal_in_phantom(text, index, section, surroundings, notes)?;
+    place_goal(text, index, section, in_phantom.as_ref(), surroundings)
+}
+
+/// The goal in the phantom's frame, wherever that lies; none for one by a pose of the flange.
+pub(crate) fn goal_in_phantom(
+    text: &TomlText<'_>,
+    index: usize,
+    section: &GoalSection,
+    surroundings: &Surroundings<'_>,
+    notes: &mut Vec<String>,
+) -> Result<Option<GoalInPhantom>, Finding> {
+    if section.flange_pose.is_some() {
+        return Ok(None);
+    }
     let key = |name: &str| format!("goals[{index}].{name}");
-    let mut goal = if section.flange_pose.is_some() {
-        from_flange_pose(text, &key, section, surroundings)?
-    } else {
-        from_entry_and_target(text, &key, section, surroundings, notes)?
+    let mut goal = from_entry_and_target(text, &key, section, surroundings, notes)?;
+    goal.0.expected = expectations(section);
+    Ok(Some(goal))
+}
+
+/// The goal in the world; `in_phantom` is what [`goal_in_phantom`] says.
+pub(crate) fn place_goal(
+    text: &TomlText<'_>,
+    index: usize,
+    section: &GoalSection,
+    in_phantom: Option<&GoalInPhantom>,
+    surroundings: &Surroundings<'_>,
+) -> Result<Goal, Finding> {
+    let key = |name: &str| format!("goals[{index}].{name}");
+    let goal = match in_phantom.zip(surroundings.phantom) {
+        Some((goal, lying)) => goal.placed(&lying.world_from_phantom),
+        None => Goal {
+            expected: expectations(section),
+            ..from_flange_pose(text, &key, section, surroundings)?
+        },
     };
-    goal.expected = expectations(section);
     check_place(text, &key, &goal, section, surroundings)?;
     check_target(text, &key, &goal, section, surroundings)?;
     let needle_m = surroundings.tool.needle.length_m;

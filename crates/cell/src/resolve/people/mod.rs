@@ -8,7 +8,7 @@ mod placing;
 pub use crate::scenario::{ElbowPreference, Handedness, Role, Side, StaturePercentile};
 use crate::scenario::{PeopleSection, PersonSection};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-pub(crate) use placing::{Room, resolve_people};
+pub(crate) use placing::{Room, check_sides, have_room_by_boxes, resolve_people};
 
 /// Height of the eyes of a standing adult as a share of the stature.
 ///

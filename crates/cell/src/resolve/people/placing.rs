@@ -9,7 +9,7 @@ use super::{
 };
 use crate::Finding;
 use crate::resolve::goals::Goal;
-use crate::resolve::phantom::PlacedPhantom;
+use crate::resolve::phantom::{Corners, PlacedPhantom};
 use crate::toml_text::TomlText;
 
 /// What people have to stand beside.
@@ -30,46 +30,9 @@ pub(crate) fn resolve_people(
     let sides = room
         .phantom
         .and_then(|placed| PatientSides::new(&placed.world_from_phantom.rotation));
-    let check_side = |key: &str, side: Option<Side>| {
-        let (Some(side), Some(sides)) = (side, &sides) else {
-            return match side {
-                None => Ok(()),
-                Some(side) => Err(toml
-                    .finding(
-                        key,
-                        format!(
-                            "`{}` is a side of the patient, and there is none",
-                            side.name()
-                        ),
-                    )
-                    .hint("add a [phantom], or give `position_mm`")),
-            };
-        };
-        if sides.direction(side).is_some() {
-            return Ok(());
-        }
-        let names: Vec<&str> = sides.iter().map(|(side, _)| side.name()).collect();
-        Err(toml
-            .finding(
-                key,
-                format!(
-                    "nobody can stand on the patient's {}: as the patient lies, it faces the table \
-                     or the ceiling",
-                    side.name()
-                ),
-            )
-            .hint(format!("one of {}", names.join(", "))))
-    };
-    check_side("people.prefer_side", section.prefer_side)?;
-    for (index, person) in section.persons.iter().enumerate() {
-        check_side(&format!("people.persons[{index}].side"), person.side)?;
-    }
+    check_sides(toml, section, sides.as_ref())?;
     let standard = [PersonSection::default()];
-    let persons = if section.persons.is_empty() {
-        &standard[..]
-    } else {
-        &section.persons
-    };
+    let persons = persons_of(section, &standard);
     let obstacles = Obstacles::new(room);
     let mut by_goal = Vec::new();
     for goal in goals {
@@ -105,6 +68,125 @@ pub(crate) fn resolve_people(
     })
 }
 
+/// Refuses sides of the patient on which nobody can be, as the patient lies.
+pub(crate) fn check_sides(
+    toml: &TomlText<'_>,
+    section: &PeopleSection,
+    sides: Option<&PatientSides>,
+) -> Result<(), Finding> {
+    let check_side = |key: &str, side: Option<Side>| {
+        let (Some(side), Some(sides)) = (side, sides) else {
+            return match side {
+                None => Ok(()),
+                Some(side) => Err(toml
+                    .finding(
+                        key,
+                        format!(
+                            "`{}` is a side of the patient, and there is none",
+                            side.name()
+                        ),
+                    )
+                    .hint("add a [phantom], or give `position_mm`")),
+            };
+        };
+        if sides.direction(side).is_some() {
+            return Ok(());
+        }
+        let names: Vec<&str> = sides.iter().map(|(side, _)| side.name()).collect();
+        Err(toml
+            .finding(
+                key,
+                format!(
+                    "nobody can stand on the patient's {}: as the patient lies, it faces the table \
+                     or the ceiling",
+                    side.name()
+                ),
+            )
+            .hint(format!("one of {}", names.join(", "))))
+    };
+    check_side("people.prefer_side", section.prefer_side)?;
+    for (index, person) in section.persons.iter().enumerate() {
+        check_side(&format!("people.persons[{index}].side"), person.side)?;
+    }
+    Ok(())
+}
+
+/// Whether boxes alone show that everybody has room where [`resolve_people`] would place them: otherwise it
+/// has to be asked.
+pub(crate) fn have_room_by_boxes(
+    section: &PeopleSection,
+    goal: &Goal,
+    sides: Option<&PatientSides>,
+    robot_base_m: &Point3<f64>,
+    boxes: &[&Corners],
+) -> bool {
+    let is_clear = |spot: &Point3<f64>| !boxes.iter().any(|corners| is_within_body(corners, spot));
+    let entry = goal.standing_place();
+    let standard = [PersonSection::default()];
+    persons_of(section, &standard).iter().all(|person| {
+        if let Some([x_mm, y_mm]) = person.position_mm {
+            return is_clear(&Point3::new(x_mm * 1e-3, y_mm * 1e-3, 0.0));
+        }
+        let directions = directions(person, &(entry - robot_base_m), sides);
+        let at = |direction: &Vector3<f64>, distance_m: f64| entry + direction * distance_m;
+        match person.distance_mm {
+            Some(distance_mm) => is_clear(&at(&directions[0].1, distance_mm * 1e-3)),
+            None => directions
+                .iter()
+                .any(|(_, direction)| is_clear(&at(direction, way_m(FARTHEST_STEPS - 1)))),
+        }
+    })
+}
+
+fn persons_of<'s>(
+    section: &'s PeopleSection,
+    standard: &'s [PersonSection],
+) -> &'s [PersonSection] {
+    if section.persons.is_empty() {
+        standard
+    } else {
+        &section.persons
+    }
+}
+
+/// Whether a body that stands at a spot may touch what is in a box, seen from above.
+fn is_within_body((low, high): &Corners, spot: &Point3<f64>) -> bool {
+    (0..2).all(|axis| {
+        low[axis] <= spot[axis] + BODY_RADIUS_M && high[axis] >= spot[axis] - BODY_RADIUS_M
+    })
+}
+
+/// Where a person looks for room, from the entry point on, the first way first; `away` is from the robot's
+/// base to the entry point. Sides were checked.
+fn directions(
+    person: &PersonSection,
+    away: &Vector3<f64>,
+    sides: Option<&PatientSides>,
+) -> Vec<(Option<Side>, Vector3<f64>)> {
+    if let Some(sides) = sides {
+        match person.side {
+            Some(side) => vec![(
+                Some(side),
+                sides.direction(side).expect("sides were checked"),
+            )],
+            None => sides.by_preference(away),
+        }
+    } else {
+        let level = Vector3::new(away.x, away.y, 0.0);
+        let across = level.try_normalize(1e-6).unwrap_or_else(Vector3::x);
+        let turned = Vector3::z().cross(&across);
+        [across, turned, -turned].map(|each| (None, each)).to_vec()
+    }
+}
+
+impl Goal {
+    /// Where people stand about: the entry point, or the guide's exit where there is no patient.
+    fn standing_place(&self) -> Point3<f64> {
+        self.entry_m
+            .unwrap_or_else(|| self.world_from_guide_exit.translation.vector.into())
+    }
+}
+
 fn statures_m(person: &PersonSection) -> Vec<f64> {
     match person.stature {
         Some(percentile) => vec![percentile.stature_m()],
@@ -128,9 +210,7 @@ fn place(
 ) -> Result<(Option<Side>, Point3<f64>), Finding> {
     let floor_m = person.step_height_mm * 1e-3;
     let tallest_m = statures_m(person).into_iter().fold(0.0, f64::max);
-    let entry = goal
-        .entry_m
-        .unwrap_or_else(|| goal.world_from_guide_exit.translation.vector.into());
+    let entry = goal.standing_place();
     let key = |name: &str| {
         if given {
             format!("people.persons[{index}].{name}")
@@ -160,20 +240,7 @@ fn place(
         return Ok((side, position));
     }
     let away = entry - obstacles.robot_base_m;
-    let directions = if let Some(sides) = sides {
-        match person.side {
-            Some(side) => vec![(
-                Some(side),
-                sides.direction(side).expect("sides were checked"),
-            )],
-            None => sides.by_preference(&away),
-        }
-    } else {
-        let level = Vector3::new(away.x, away.y, 0.0);
-        let across = level.try_normalize(1e-6).unwrap_or_else(Vector3::x);
-        let turned = Vector3::z().cross(&across);
-        [across, turned, -turned].map(|each| (None, each)).to_vec()
-    };
+    let directions = directions(person, &away, sides);
     let at = |direction: &Vector3<f64>, distance_m: f64| {
         let spot = entry + direction * distance_m;
         Point3::new(spot.x, spot.y, floor_m)
@@ -188,7 +255,7 @@ fn place(
     }
     for (side, direction) in directions {
         for step in 0..FARTHEST_STEPS {
-            let position = at(&direction, BODY_RADIUS_M + f64::from(step) * STEP_M);
+            let position = at(&direction, way_m(step));
             if obstacles.hit(&position, tallest_m).is_none() {
                 return Ok((side, position));
             }
@@ -199,7 +266,7 @@ fn place(
             &key("side"),
             format!(
                 "nobody can stand within {:.1} m of the entry point of goal `{}` there",
-                BODY_RADIUS_M + f64::from(FARTHEST_STEPS) * STEP_M,
+                way_m(FARTHEST_STEPS),
                 goal.name
             ),
         )
@@ -210,12 +277,16 @@ fn place(
 const STEP_M: f64 = 0.01;
 const FARTHEST_STEPS: u32 = 250;
 
+/// Distance from the entry point after some steps, m.
+fn way_m(step: u32) -> f64 {
+    BODY_RADIUS_M + f64::from(step) * STEP_M
+}
+
 /// A solid of the room with a box around it, along the world's axes, m.
 struct Obstacle<'a> {
     body: &'a str,
     solid: &'a Solid,
-    low: Point3<f64>,
-    high: Point3<f64>,
+    corners: Corners,
 }
 
 /// What people cannot stand in.
@@ -226,14 +297,10 @@ struct Obstacles<'a> {
 
 impl<'a> Obstacles<'a> {
     fn new(room: &Room<'a>) -> Self {
-        let solids = room.solids.iter().map(|&(body, solid)| {
-            let (low, high) = solid.bounding_box();
-            Obstacle {
-                body,
-                solid,
-                low,
-                high,
-            }
+        let solids = room.solids.iter().map(|&(body, solid)| Obstacle {
+            body,
+            solid,
+            corners: solid.bounding_box(),
         });
         Self {
             solids: solids.collect(),
@@ -248,12 +315,7 @@ impl<'a> Obstacles<'a> {
         let near: Vec<&Obstacle<'_>> = self
             .solids
             .iter()
-            .filter(|each| {
-                (0..2).all(|axis| {
-                    each.low[axis] <= position[axis] + BODY_RADIUS_M
-                        && each.high[axis] >= position[axis] - BODY_RADIUS_M
-                })
-            })
+            .filter(|each| is_within_body(&each.corners, position))
             .collect();
         let offsets: [Vector3<f64>; RIM_POINTS + 1] = std::array::from_fn(|i| {
             if i == RIM_POINTS {
@@ -265,7 +327,10 @@ impl<'a> Obstacles<'a> {
         let mut height_m = 0.5 * SLICE_M;
         while height_m < stature_m {
             let z_m = position.z + height_m;
-            let at_this_height = |each: &&&Obstacle<'_>| (each.low.z..=each.high.z).contains(&z_m);
+            let at_this_height = |each: &&&Obstacle<'_>| {
+                let (low, high) = &each.corners;
+                (low.z..=high.z).contains(&z_m)
+            };
             if near.iter().any(|each| at_this_height(&each)) {
                 for offset in &offsets {
                     let point = position + offset + Vector3::z() * height_m;

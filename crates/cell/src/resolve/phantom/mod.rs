@@ -6,9 +6,11 @@ mod place;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::Vector3;
-use needlebench_geometry::PreparedShape;
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use needlebench_geometry::{Placement, PreparedShape};
+use needlebench_kinematics::Pose;
 
+use super::cache::Cache;
 use crate::files::ModelSource;
 use crate::files::{Location, source_of};
 use crate::phantom::{PARAMETERS, Phantom, PhantomError, PhantomParameters};
@@ -32,13 +34,69 @@ pub(crate) struct UnplacedPhantom {
     pub notes: Vec<String>,
     /// The skin, ready for distances: see [`UnplacedPhantom::skin`].
     prepared_skin: OnceLock<PreparedShape>,
+    /// Lowest and highest coordinates of the skin, turned, about the phantom's origin.
+    turned: Cache<UnitQuaternion<f64>, (Vector3<f64>, Vector3<f64>)>,
+    /// Lowest coordinate along a direction.
+    lowest_m: Cache<Vector3<f64>, f64>,
+    /// A ball about the skin, phantom frame.
+    ball: OnceLock<(Vector3<f64>, f64)>,
 }
+
+/// Lowest and highest corner of a box.
+pub(super) type Corners = (Point3<f64>, Point3<f64>);
 
 impl UnplacedPhantom {
     /// The skin, ready for distances, in its own frame.
     pub fn skin(&self) -> &PreparedShape {
         self.prepared_skin
             .get_or_init(|| PreparedShape::new(&self.phantom.skin().shape))
+    }
+
+    /// Box about the skin, along the axes of another frame.
+    pub fn extent(&self, frame_from_phantom: &Pose) -> Corners {
+        let turn = frame_from_phantom.rotation;
+        let turned = self.turned.get(
+            |known| *known == turn,
+            || {
+                let rotation = turn.to_rotation_matrix();
+                let start = (
+                    Vector3::repeat(f64::INFINITY),
+                    Vector3::repeat(f64::NEG_INFINITY),
+                );
+                let box_m = self.skin_m.iter().fold(start, |(low, high), point| {
+                    let at = rotation * point;
+                    (low.inf(&at), high.sup(&at))
+                });
+                Ok::<_, std::convert::Infallible>((turn, box_m))
+            },
+        );
+        let turned = turned.unwrap_or_else(|never| match never {});
+        let middle = frame_from_phantom.translation.vector;
+        ((middle + turned.0).into(), (middle + turned.1).into())
+    }
+
+    /// Lowest coordinate of the skin along a direction of the phantom frame, m.
+    fn lowest_m(&self, up: &Vector3<f64>) -> f64 {
+        let lowest_m = self.lowest_m.get(
+            |known| known == up,
+            || {
+                let heights_m = self.skin_m.iter().map(|vertex| up.dot(vertex));
+                let lowest_m = heights_m.fold(f64::INFINITY, f64::min);
+                Ok::<_, std::convert::Infallible>((*up, lowest_m))
+            },
+        );
+        *lowest_m.unwrap_or_else(|never| match never {})
+    }
+
+    /// Most that a point of the skin moves from one place of the phantom to another, m.
+    pub fn travel_m(&self, from: &Placement, to: &Placement) -> f64 {
+        let (centre, radius_m) = self.ball.get_or_init(|| {
+            let (low, high) = self.extent(&Pose::identity());
+            let centre = nalgebra::center(&low, &high).coords;
+            let distances_m = self.skin_m.iter().map(|vertex| (vertex - centre).norm());
+            (centre, distances_m.fold(0.0, f64::max))
+        });
+        from.travel_m(to, centre, *radius_m)
     }
 }
 
@@ -73,6 +131,9 @@ pub(super) fn scenario_phantom(
         parts,
         notes,
         prepared_skin: OnceLock::new(),
+        turned: Cache::default(),
+        lowest_m: Cache::default(),
+        ball: OnceLock::new(),
     })
 }
 

@@ -47,8 +47,8 @@ pub(crate) fn place_phantom(
         orientation(section),
     );
     let down = world_from_phantom.rotation.inverse() * -Vector3::z();
-    let along = phantom.skin_m.iter().map(|vertex| down.dot(vertex));
-    let lowest_m = along.fold(f64::NEG_INFINITY, f64::max);
+    // How far the skin reaches down.
+    let lowest_m = -phantom.lowest_m(&-down);
     if section.rest_on_table {
         let Some(table) = table else {
             return Err(toml

@@ -3,7 +3,7 @@
 use needlebench_geometry::{PreparedShape, Solid, separation};
 use needlebench_kinematics::Pose;
 
-use super::{Corners, FOOT_M, Patient, RIGID_M, SOFT_M, Standing, overlap, placed};
+use super::{Beside, Corners, FOOT_M, RIGID_M, SOFT_M, Standing, overlap};
 use crate::Finding;
 use crate::fixtures::FixtureKind;
 use crate::resolve::obstacles::PlacedObstacle;
@@ -20,40 +20,24 @@ struct Other<'s> {
 impl Standing<'_> {
     /// Obstacles through the floor, the table, the gantry, the mount, the robot's base or the patient. What
     /// one is fixed to, or counts as, it may go into: it is built into that.
-    pub(super) fn check_obstacles(
-        &self,
-        patient: Option<&Patient<'_>>,
-        notes: &mut Vec<String>,
-    ) -> Result<(), Finding> {
+    pub(super) fn check_obstacles(&self, notes: &mut Vec<String>) -> Result<(), Finding> {
         if self.obstacles.is_empty() {
             return Ok(());
         }
-        let robot = self.robot;
-        let base: Vec<Solid> = placed(&robot.base.solids, &robot.world_from_base_link).collect();
         for obstacle in self.obstacles {
             let section = &self.scenario.obstacles[obstacle.index];
-            let refuse = |message: String| {
-                let key = format!("obstacles[{}].position_mm", obstacle.index);
-                let message = format!("obstacle `{}` {message}", section.name);
-                Err(self.toml.finding(&key, message).hint(frame(section)))
-            };
+            let refuse = |message: String| Err(self.misplaced(obstacle, &message));
             let (low, _) = obstacle.solid.bounding_box();
             if low.z < -RIGID_M {
                 return refuse(format!("goes {:.1} mm under the floor", -low.z * 1e3));
             }
-            for other in self.others(section, &base) {
+            for other in self.others(section) {
                 if let Some(depth_m) = depth_in(obstacle, &other) {
                     let depth_mm = depth_m * 1e3;
                     return refuse(format!("goes {depth_mm:.1} mm into the {}", other.name));
                 }
             }
-            let depth_m = patient.map_or(0.0, |patient| {
-                patient.depth_m(obstacle.prepared(), &obstacle.solid)
-            });
-            if depth_m > SOFT_M {
-                return refuse(format!("goes {:.1} mm into the patient", depth_m * 1e3));
-            }
-            if section.attached_to == AttachedTo::World && !self.is_carried(obstacle, &base) {
+            if section.attached_to == AttachedTo::World && !self.is_carried(obstacle) {
                 notes.push(format!(
                     "obstacle `{}` hangs {:.0} mm over the floor: what carries it is not in the cell",
                     section.name,
@@ -61,11 +45,11 @@ impl Standing<'_> {
                 ));
             }
         }
-        Ok(())
+        self.check_obstacles_in_patient()
     }
 
     /// What an obstacle must not go into, but for the patient.
-    fn others<'s>(&'s self, section: &ObstacleSection, base: &'s [Solid]) -> Vec<Other<'s>> {
+    fn others<'s>(&'s self, section: &ObstacleSection) -> Vec<Other<'s>> {
         let (fixed_to, counts_as) = (section.attached_to, section.class);
         let mut others = Vec::new();
         for (kind, name, is_part) in [
@@ -96,15 +80,32 @@ impl Standing<'_> {
         if fixed_to != AttachedTo::RobotBase {
             others.push(Other {
                 name: "robot's base",
-                solids: base,
+                solids: self.base,
                 allowed_m: FOOT_M,
             });
         }
         others
     }
 
+    /// Obstacles in the patient.
+    pub(super) fn check_obstacles_in_patient(&self) -> Result<(), Finding> {
+        let solids = self.obstacles.iter().map(|obstacle| &obstacle.solid);
+        let Some((place, depth_m)) = self.depth_in_patient(Beside::Obstacles, solids, true) else {
+            return Ok(());
+        };
+        let message = format!("goes {:.1} mm into the patient", depth_m * 1e3);
+        Err(self.misplaced(&self.obstacles[place], &message))
+    }
+
+    fn misplaced(&self, obstacle: &PlacedObstacle, message: &str) -> Finding {
+        let section = &self.scenario.obstacles[obstacle.index];
+        let key = format!("obstacles[{}].position_mm", obstacle.index);
+        let message = format!("obstacle `{}` {message}", section.name);
+        self.toml.finding(&key, message).hint(frame(section))
+    }
+
     /// Whether the floor or anything else is right under or beside an obstacle.
-    fn is_carried(&self, obstacle: &PlacedObstacle, base: &[Solid]) -> bool {
+    fn is_carried(&self, obstacle: &PlacedObstacle) -> bool {
         let here = obstacle.solid.bounding_box();
         if here.0.z <= SOFT_M {
             return true;
@@ -117,7 +118,7 @@ impl Standing<'_> {
         self.fixtures
             .iter()
             .any(|each| each.solids.iter().any(touches))
-            || base.iter().any(touches)
+            || self.base.iter().any(touches)
             || others.into_iter().any(|other| touches(&other.solid))
     }
 }
