@@ -294,7 +294,8 @@ fn name_that_is_no_file_name_is_refused() {
 
 #[test]
 fn needle_that_is_too_short_is_refused_with_both_lengths() {
-    refused_with("mount_rotation_deg = 90", "needle_length_mm = 100")
+    let short = "mount_rotation_deg = 90\nneedle_length_mm = 100";
+    refused_with("mount_rotation_deg = 90", short)
         .at("insertion_length_mm")
         .key("goals[0].insertion_length_mm")
         .says("100.0 mm long, but guide and insertion need 136.0 mm")
