@@ -271,7 +271,10 @@ fn no_sample_is_below_a_certificate_of_surfaces() {
                     penetrating += 1;
                 } else {
                     let width_m = certified.width_m();
-                    assert!(width_m <= options.tolerance_m + super::ROUNDING_M, "{width_m}");
+                    assert!(
+                        width_m <= options.tolerance_m + super::ROUNDING_M,
+                        "{width_m}"
+                    );
                 }
             }
         }

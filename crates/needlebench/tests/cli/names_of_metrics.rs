@@ -95,12 +95,15 @@ fn studies_of_an_older_version_are_compared_by_todays_names() {
     ] {
         // The patient who lay there then, whose needle passes a rib.
         let then = [
-            ("[155.0, -609.5, 0]", "[146.0, -597.5, 0]\nmodel = \"male-p50\""),
+            (
+                "[155.0, -609.5, 0]",
+                "[146.0, -597.5, 0]\nmodel = \"male-p50\"",
+            ),
             ("top_height_mm = 763.5", "top_height_mm = 739.5"),
         ];
-        let then = then
-            .iter()
-            .fold(SMALL.to_owned(), |text, (from, to)| with_edit(&text, from, to));
+        let then = then.iter().fold(SMALL.to_owned(), |text, (from, to)| {
+            with_edit(&text, from, to)
+        });
         let more = "[planning.needle_route]\noff = [\"bone\"]\n[engines]\nrun = [\"rapier\"]\n";
         let bench = Bench::with_scenario(&format!("{then}{more}"));
         bench.write("former.parquet", name);

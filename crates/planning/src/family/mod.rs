@@ -119,6 +119,26 @@ pub(crate) struct Glance {
     pub merit: Merit,
 }
 
+/// What clearances have to keep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Level {
+    /// Not to be rejected.
+    Floor,
+    /// Not to fail.
+    Judged,
+    /// All that is planned for.
+    Wanted,
+}
+
+/// What is asked of a member.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Asked {
+    /// Its merit for an aim.
+    Merit(Aim),
+    /// How far it is from breaking a rule if clearances had to keep a level.
+    Surplus(Level),
+}
+
 /// One configuration looked at at one roll after the other: each look is quicker by what the one before
 /// has shown, and the answers do not depend on it.
 pub(crate) struct Sweep<'p> {
@@ -126,8 +146,8 @@ pub(crate) struct Sweep<'p> {
     goal: &'p Goal,
     configuration: Configuration,
     nearby: Nearby,
-    /// What counts for an aim, or for the surplus alone.
-    counts: Option<(Option<Aim>, Counts)>,
+    /// What counts for what was asked for last.
+    counts: Option<(Asked, Counts)>,
 }
 
 impl<'p> Sweep<'p> {
@@ -156,7 +176,12 @@ impl<'p> Sweep<'p> {
 
     /// What an aim's choice needs to know of the member at a roll.
     pub fn glance(&mut self, aim: Aim, roll_rad: f64) -> Glance {
-        self.look(Some(aim), roll_rad)
+        self.look(Asked::Merit(aim), roll_rad)
+    }
+
+    /// Surplus of the member at a roll if clearances had to keep a level, and whether it keeps that.
+    pub fn keeps(&mut self, level: Level, roll_rad: f64) -> Glance {
+        self.look(Asked::Surplus(level), roll_rad)
     }
 
     /// Whether what keeps a roll from working keeps all from working between it and another: it is broken by
@@ -190,7 +215,7 @@ impl<'p> Sweep<'p> {
 
     /// Surplus of the member at a roll, and whether it works.
     pub fn surplus(&mut self, roll_rad: f64) -> (f64, bool) {
-        let seen = self.look(None, roll_rad);
+        let seen = self.keeps(Level::Floor, roll_rad);
         if seen.exists {
             (seen.surplus, seen.works)
         } else {
@@ -198,7 +223,7 @@ impl<'p> Sweep<'p> {
         }
     }
 
-    fn look(&mut self, aim: Option<Aim>, roll_rad: f64) -> Glance {
+    fn look(&mut self, asked: Asked, roll_rad: f64) -> Glance {
         let planner = self.planner;
         let Some(solution) = self.solution(roll_rad) else {
             return Glance {
@@ -213,10 +238,10 @@ impl<'p> Sweep<'p> {
         let margins = planner.margins(q);
         let broken = planner.joint_rules(&solution);
         let mut counts = match &self.counts {
-            Some((known, counts)) if *known == aim => *counts,
+            Some((known, counts)) if *known == asked => *counts,
             _ => {
-                let counts = planner.counts(aim);
-                self.counts = Some((aim, counts));
+                let counts = planner.counts(asked);
+                self.counts = Some((asked, counts));
                 counts
             }
         };
@@ -224,9 +249,10 @@ impl<'p> Sweep<'p> {
         let model = planner.checker.model;
         let found = model.what_counts_near(q, &mut self.nearby, &counts);
         let works = broken.is_empty() && found.excess_m >= 0.0;
-        let merit = match aim.filter(|_| works) {
-            None => Merit::NONE,
-            Some(aim) => planner.merit_of(
+        let merit = match asked {
+            Asked::Surplus(_) => Merit::NONE,
+            Asked::Merit(_) if !works => Merit::NONE,
+            Asked::Merit(aim) => planner.merit_of(
                 self.goal,
                 aim,
                 &Valued {
@@ -295,20 +321,29 @@ pub(crate) fn nearest_missing(grid: Vec<Member>) -> Member {
 }
 
 impl Planner<'_> {
-    /// Up to where clearances count for an aim, and for what is judged; without an aim for the surplus alone.
-    /// What lies beyond changes nothing: a utility is full there.
-    fn counts(&self, aim: Option<Aim>) -> Counts {
+    /// Up to where clearances count for what is asked. What lies beyond changes nothing: a utility is full there.
+    fn counts(&self, asked: Asked) -> Counts {
         const MM: f64 = 1e-3;
         let all = ClearanceClass::ALL;
         let limits = self.limits();
+        let level = match asked {
+            Asked::Merit(_) => Level::Floor,
+            Asked::Surplus(level) => level,
+        };
         let counts = Counts {
             class_cap_m: [f64::NEG_INFINITY; CLASS_COUNT],
             aim_of: [None; CLASS_COUNT],
             aim_cap_m: [f64::NEG_INFINITY; AIMS],
-            floor_m: all.map(|class| limits.get(class).floor_m),
+            floor_m: all.map(|class| match level {
+                Level::Floor => limits.get(class).floor_m,
+                Level::Judged => limits.get(class).judged_m,
+                Level::Wanted => limits.get(class).wanted_m,
+            }),
             excess_cap_m: f64::INFINITY,
         };
-        let Some(aim) = aim else { return counts };
+        let Asked::Merit(aim) = asked else {
+            return counts;
+        };
         let counts = Counts {
             class_cap_m: all.map(|class| limits.get(class).wanted_m),
             ..counts

@@ -6,7 +6,7 @@ use needlebench_cell::Goal;
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
-use super::{Aim, Glance, Member, Merit, Sweep, nearest_missing};
+use super::{Aim, Glance, Level, Member, Merit, Sweep, nearest_missing};
 use crate::Rejection;
 use crate::limits::Shortfall;
 use crate::planner::Planner;
@@ -86,8 +86,8 @@ pub struct Family {
 pub const EDGE_RAD: f64 = 1.745e-4;
 /// Part of the way between a knot's neighbours to which the best roll is found.
 const REFINED: f64 = 1.0 / 64.0;
-/// Half the width of the widest range that may be missed where nothing on the grid works, rad.
-const SCAN_RAD: f64 = 0.01;
+/// Half the width of the widest range that may be missed where nothing on the grid keeps what is wanted, rad.
+const SCAN_RAD: f64 = 2.5e-3;
 /// A local extreme of the surplus is searched where it is nearer to zero than this many times the
 /// rise to its neighbours.
 const CLOSER_LOOK: f64 = 2.0;
@@ -256,21 +256,32 @@ impl Planner<'_> {
             .map(|&roll_rad| Seen::at(&mut sweep, aim, roll_rad))
             .collect();
         let mut best = highest_of_circle(&mut sweep, aim, &grid);
-        let is_enough = |best: &Option<Peak>| {
-            let best = best.as_ref();
-            best.is_some_and(|best| best.merit.shortfall == Shortfall::NONE)
-        };
-        if !is_enough(&best) {
-            let mut all = grid.clone();
-            for (k, here) in grid.iter().enumerate() {
-                let next = unrolled(k + 1, grid.len(), |k| grid[k].roll_rad);
+        let shortfall = best.as_ref().map(|best| best.merit.shortfall);
+        if shortfall != Some(Shortfall::NONE) {
+            // Something between the rolls of the grid may keep more.
+            let is_judged = shortfall.is_some_and(|shortfall| shortfall.judged_m >= 0.0);
+            let level = if is_judged {
+                Level::Wanted
+            } else {
+                Level::Judged
+            };
+            let knots = grid.iter().map(|seen| Seen {
+                glance: sweep.keeps(level, seen.roll_rad),
+                ..*seen
+            });
+            let knots: Vec<Seen> = knots.collect();
+            let mut found = Vec::new();
+            for (k, here) in knots.iter().enumerate() {
                 let next = Seen {
-                    roll_rad: next,
-                    ..grid[(k + 1) % grid.len()]
+                    roll_rad: unrolled(k + 1, knots.len(), |k| knots[k].roll_rad),
+                    ..knots[(k + 1) % knots.len()]
                 };
-                scan(&mut sweep, aim, here, &next, &mut all);
+                scan(&mut sweep, level, here, &next, &mut found);
             }
-            if all.len() > grid.len() {
+            if !found.is_empty() {
+                let mut all = grid.clone();
+                let found = found.into_iter();
+                all.extend(found.map(|roll_rad| Seen::at(&mut sweep, aim, roll_rad)));
                 all.sort_by(|a, b| a.roll_rad.total_cmp(&b.roll_rad));
                 best = highest_of_circle(&mut sweep, aim, &all);
             }
@@ -332,12 +343,12 @@ fn highest_of_circle(sweep: &mut Sweep<'_>, aim: Aim, all: &[Seen]) -> Option<Pe
     })
 }
 
-/// Looks for rolls that work between two that do not, and adds what it finds.
+/// Looks for rolls that keep a level of clearances between two that do not, and adds what it finds.
 ///
-/// A half of the way is left out where what breaks its rule at the end is deeper than the arm moves from there
-/// to the middle: nothing in it works, as far as the arm goes there by the shortest way. What remains is looked at
-/// down to [`SCAN_RAD`].
-fn scan(sweep: &mut Sweep<'_>, aim: Aim, low: &Seen, high: &Seen, found: &mut Vec<Seen>) {
+/// A half of the way is left out where what is broken at the end is broken by more than the arm moves from there
+/// to the middle: nothing in it keeps the level, as far as the arm goes there by the shortest way. What remains is
+/// looked at down to [`SCAN_RAD`].
+fn scan(sweep: &mut Sweep<'_>, level: Level, low: &Seen, high: &Seen, found: &mut Vec<f64>) {
     if low.glance.works || high.glance.works || high.roll_rad - low.roll_rad < 2.0 * SCAN_RAD {
         return;
     }
@@ -346,15 +357,15 @@ fn scan(sweep: &mut Sweep<'_>, aim: Aim, low: &Seen, high: &Seen, found: &mut Ve
     if is_excluded(low) && is_excluded(high) {
         return;
     }
-    let middle = Seen::at(sweep, aim, middle_rad);
+    let middle = Seen {
+        roll_rad: middle_rad,
+        glance: sweep.keeps(level, middle_rad.rem_euclid(TAU)),
+    };
     if middle.glance.works {
-        found.push(Seen {
-            roll_rad: middle_rad.rem_euclid(TAU),
-            ..middle
-        });
+        found.push(middle_rad.rem_euclid(TAU));
     }
-    scan(sweep, aim, low, &middle, found);
-    scan(sweep, aim, &middle, high, found);
+    scan(sweep, level, low, &middle, found);
+    scan(sweep, level, &middle, high, found);
 }
 
 /// The roll of a knot, counted on beyond the last one.
