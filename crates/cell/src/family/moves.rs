@@ -75,6 +75,9 @@ pub struct MovedPhantom {
     pub phantom: PlacedPhantom,
     /// The goal, which goes with it or not.
     pub goal: Goal,
+    /// The patient's limbs lie beside the chest as they did, so that all of him was moved as one: they may not
+    /// where the chest is rolled on what it rests on.
+    pub is_moved_as_one: bool,
 }
 
 /// One layout of a family of which the phantom alone is moved.
@@ -141,12 +144,20 @@ impl PhantomMoves<'_> {
         if self.ranges.hold(&section)
             && let Some((phantom, goal)) = self.still.with_phantom_at(&section)?
         {
-            return Ok(MovedPhantom { phantom, goal });
+            return Ok(self.of(phantom, goal));
         }
         let mut resolved = self.resolved(by)?;
         let phantom = resolved.phantom.take().expect("there is a phantom");
         let goal = resolved.goals.swap_remove(0);
-        Ok(MovedPhantom { phantom, goal })
+        Ok(self.of(phantom, goal))
+    }
+
+    fn of(&self, phantom: PlacedPhantom, goal: Goal) -> MovedPhantom {
+        MovedPhantom {
+            is_moved_as_one: self.still.lies_alike(&phantom),
+            phantom,
+            goal,
+        }
     }
 
     /// The whole layout after a move.

@@ -150,15 +150,14 @@ impl StillLayout {
             &Point3::from(cell.robot.world_from_base_link.translation.vector),
             &boxes,
         );
-        let is_rigid = self.lies_alike(&placed);
-        Ok((have_room && is_rigid).then_some((placed, goal)))
+        Ok(have_room.then_some((placed, goal)))
     }
 }
 
 impl StillLayout {
     /// Whether the patient's limbs lie beside the chest as in the layout: they may not where the chest is
     /// turned on what it rests on.
-    fn lies_alike(&self, placed: &PlacedPhantom) -> bool {
+    pub fn lies_alike(&self, placed: &PlacedPhantom) -> bool {
         /// More than the rounding of a place, m and rad.
         const SAME: f64 = 1e-9;
         let known = self.resolved.phantom.as_ref();

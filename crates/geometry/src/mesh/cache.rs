@@ -1,4 +1,5 @@
-//! What takes a while to make of a mesh, kept in the user's cache folder: convex pieces and trees.
+//! What takes a while to make of a mesh, kept in the user's cache folder: its tree here, its pieces in
+//! [`pieces`](super::pieces).
 //!
 //! A file is named by a hash of all that it is made from, version included, and holds the hash of its
 //! contents; it is written whole or not at all. What cannot be read or written, or is damaged, only costs
@@ -14,34 +15,21 @@ use std::time::SystemTime;
 use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
 
-use super::decompose::decompose;
-use super::fidelity::Fidelity;
-use super::solid::ConvexPieces;
-use super::surface_index::SurfaceIndex;
 use crate::encoding::{Encode, Reader};
 use crate::tree::TriangleTree;
-use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
+use crate::triangle_mesh::TriangleMesh;
 
 /// What is kept of meshes.
-struct Kind<T> {
+pub(super) struct Kind<T> {
     /// Folder of its files.
-    folder: &'static str,
+    pub folder: &'static str,
     /// First bytes of a file, and of what its name is the hash of: changes whenever what is made does.
-    version: &'static [u8],
+    pub version: &'static [u8],
     /// Meshes with fewer triangles are not worth a file.
-    worth_keeping: usize,
-    encode: fn(&T, &TriangleMesh) -> Vec<u8>,
-    decode: fn(&mut Reader<'_>, &TriangleMesh) -> Option<T>,
+    pub worth_keeping: usize,
+    pub encode: fn(&T, &TriangleMesh) -> Vec<u8>,
+    pub decode: fn(&mut Reader<'_>, &TriangleMesh) -> Option<T>,
 }
-
-/// Convex pieces.
-const PIECES: Kind<ConvexPieces> = Kind {
-    folder: "pieces",
-    version: b"needlebench pieces 3\n",
-    worth_keeping: 500,
-    encode: |pieces, _| encoded_pieces(pieces),
-    decode: |reader, _| decoded_pieces(reader),
-};
 
 /// Trees of triangles.
 const TREES: Kind<TriangleTree> = Kind {
@@ -55,22 +43,13 @@ const TREES: Kind<TriangleTree> = Kind {
 /// Most bytes of a folder.
 const MOST_BYTES: u64 = 1 << 28;
 
-/// Pieces of a solid and how well they stand for it.
-pub(super) fn pieces_of(solid: &SurfaceIndex) -> ConvexPieces {
-    kept(&PIECES, solid.mesh(), || {
-        let hulls = decompose(solid);
-        let fidelity = Fidelity::measure(solid, &hulls);
-        ConvexPieces { hulls, fidelity }
-    })
-}
-
 /// The tree of a mesh.
 pub(super) fn tree_of(mesh: &TriangleMesh) -> TriangleTree {
     kept(&TREES, mesh, || TriangleTree::new(mesh))
 }
 
 /// From the cache if it is there, with the same bits.
-fn kept<T>(kind: &Kind<T>, mesh: &TriangleMesh, make: impl FnOnce() -> T) -> T {
+pub(super) fn kept<T>(kind: &Kind<T>, mesh: &TriangleMesh, make: impl FnOnce() -> T) -> T {
     let cache = folder().filter(|_| mesh.triangles.len() >= kind.worth_keeping);
     let Some(cache) = cache else {
         return make();
@@ -171,47 +150,8 @@ fn folder() -> Option<PathBuf> {
         })
 }
 
-/// Fidelity, number of pieces, pieces.
-fn encoded_pieces(pieces: &ConvexPieces) -> Vec<u8> {
-    let Fidelity {
-        pieces: _,
-        overhang_m,
-        mean_overhang_m,
-        uncovered_m,
-        spacing_m,
-    } = pieces.fidelity;
-    let mut bytes = Vec::new();
-    for number in [overhang_m, mean_overhang_m, uncovered_m, spacing_m] {
-        number.encode(&mut bytes);
-    }
-    pieces.hulls.len().encode(&mut bytes);
-    for hull in &pieces.hulls {
-        hull.0.encode(&mut bytes);
-    }
-    bytes
-}
-
-fn decoded_pieces(reader: &mut Reader<'_>) -> Option<ConvexPieces> {
-    let [overhang_m, mean_overhang_m, uncovered_m, spacing_m] = [
-        reader.number()?,
-        reader.number()?,
-        reader.number()?,
-        reader.number()?,
-    ];
-    let count = reader.count()?;
-    let hulls = reader.list(count, 16, |reader| reader.mesh().map(ConvexMesh))?;
-    let fidelity = Fidelity {
-        pieces: hulls.len(),
-        overhang_m,
-        mean_overhang_m,
-        uncovered_m,
-        spacing_m,
-    };
-    Some(ConvexPieces { hulls, fidelity })
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::sample_solids::{bowl, ell, torus};
 
@@ -229,7 +169,7 @@ mod tests {
 
     /// What is kept has the same bits as what is made, is not made again, and is made anew wherever its file
     /// was damaged.
-    fn is_kept<T: PartialEq + std::fmt::Debug>(
+    pub fn is_kept<T: PartialEq + std::fmt::Debug>(
         kind: &Kind<T>,
         mesh: &TriangleMesh,
         make: impl Fn() -> T,
@@ -260,16 +200,6 @@ mod tests {
     }
 
     #[test]
-    fn pieces_come_back_with_the_same_bits_and_damage_is_seen() {
-        let solid = SurfaceIndex::new(ell());
-        is_kept(&PIECES, solid.mesh(), || {
-            let hulls = decompose(&solid);
-            let fidelity = Fidelity::measure(&solid, &hulls);
-            ConvexPieces { hulls, fidelity }
-        });
-    }
-
-    #[test]
     fn trees_come_back_with_the_same_bits_and_damage_is_seen() {
         for mesh in [ell(), bowl(), torus(24, 12)] {
             is_kept(&TREES, &mesh, || TriangleTree::new(&mesh));
@@ -285,25 +215,18 @@ mod tests {
         assert_ne!(name_of(b"1", &one), name_of(b"2", &one));
     }
 
-    /// A file that no longer says what is made now would be a wrong answer: who changes trees or pieces
-    /// changes their version, and these hashes of what an L of 12 corners comes to.
+    /// Beginning of the hash of the file of a thing, in hexadecimal digits. A file that no longer says what is
+    /// made now would be a wrong answer: who changes what is made changes its version, and this.
+    pub fn hash_of<T>(kind: &Kind<T>, mesh: &TriangleMesh, thing: &T) -> String {
+        let hash = Sha256::digest(sealed(kind, mesh, thing));
+        hash[..8].iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
     #[test]
-    fn versions_change_with_what_is_made() {
-        let solid = SurfaceIndex::new(ell());
-        let short = |bytes: &[u8]| -> String {
-            let hash = Sha256::digest(bytes);
-            hash[..8].iter().map(|byte| format!("{byte:02x}")).collect()
-        };
-        let pieces = pieces_of(&solid);
-        assert_eq!(
-            short(&sealed(&PIECES, solid.mesh(), &pieces)),
-            "55828a7291e64a72"
-        );
-        let tree = TriangleTree::new(solid.mesh());
-        assert_eq!(
-            short(&sealed(&TREES, solid.mesh(), &tree)),
-            "cc62928852c1b945"
-        );
+    fn the_version_of_trees_changes_with_them() {
+        let mesh = ell();
+        let tree = TriangleTree::new(&mesh);
+        assert_eq!(hash_of(&TREES, &mesh, &tree), "cc62928852c1b945");
     }
 
     #[test]

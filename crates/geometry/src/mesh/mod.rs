@@ -6,6 +6,7 @@ mod decompose;
 mod fidelity;
 mod hull;
 mod mend;
+mod pieces;
 mod solid;
 mod stl;
 mod surface_index;
@@ -16,7 +17,8 @@ pub use decompose::decompose;
 pub use fidelity::{Fidelity, points_on};
 pub use hull::{HullError, check_thickness, convex_hull, simplified_hull};
 pub use mend::{Mended, mend};
-pub use solid::{ConvexPieces, SolidMesh};
+pub use pieces::ConvexPieces;
+pub use solid::SolidMesh;
 pub use stl::{StlError, read_stl};
 pub use surface_index::SurfaceIndex;
 

@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::cache::pieces_of;
 use super::fidelity::Fidelity;
+use super::pieces::{ConvexPieces, pieces_of};
 use super::surface_index::SurfaceIndex;
 use crate::tree::TriangleTree;
 use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
@@ -16,15 +16,6 @@ use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 pub struct SolidMesh {
     index: SurfaceIndex,
     pieces: OnceLock<ConvexPieces>,
-}
-
-/// Convex pieces that together stand for a solid.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ConvexPieces {
-    /// The pieces; none if neither the solid nor a part of it has a hull with a volume.
-    pub hulls: Vec<ConvexMesh>,
-    /// How well they stand for it.
-    pub fidelity: Fidelity,
 }
 
 impl PartialEq for SolidMesh {

@@ -104,7 +104,7 @@ fn studies_of_an_older_version_are_compared_by_todays_names() {
         let then = then.iter().fold(SMALL.to_owned(), |text, (from, to)| {
             with_edit(&text, from, to)
         });
-        let more = "[planning.needle_route]\noff = [\"bone\"]\n[engines]\nrun = [\"rapier\"]\n";
+        let more = "[planning.needle_route]\noff = [\"bone\", \"vessel\", \"organ\"]\n[engines]\nrun = [\"rapier\"]\n";
         let bench = Bench::with_scenario(&format!("{then}{more}"));
         bench.write("former.parquet", name);
         bench.write("study.toml", study(mode));

@@ -145,7 +145,7 @@ fn the_best_roll_of_a_range_is_as_good_as_every_roll_of_a_fine_grid() {
                     let reserve_m = chosen.shortfall.reserve_m - other.shortfall.reserve_m;
                     assert!(judged_m >= -SHORTFALL_M, "{} at {roll_rad}", says());
                     assert!(
-                        judged_m > SHORTFALL_M || reserve_m >= -SHORTFALL_M,
+                        judged_m > 0.0 || reserve_m >= -SHORTFALL_M,
                         "{} at {roll_rad}",
                         says()
                     );

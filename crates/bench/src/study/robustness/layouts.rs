@@ -109,7 +109,8 @@ impl<'a> Layouts<'a> {
         };
         if self.proofs.is_some() {
             match self.moves.moved(by) {
-                Ok(moved) => layout.moved = Some(moved),
+                // Of one who does not lie as he did, distances do not follow travel.
+                Ok(moved) => layout.moved = Some(moved).filter(|moved| moved.is_moved_as_one),
                 Err(findings) => return verdict_on(&findings),
             }
         }

@@ -76,6 +76,7 @@ impl<'a> Proofs<'a> {
         let here = MovedPhantom {
             phantom: placed.clone(),
             goal: goal.clone(),
+            is_moved_as_one: true,
         };
         let goes_along = resolved.scenario.goals[0].flange_pose.is_none();
         Some(Self {
@@ -127,7 +128,7 @@ impl<'a> Proofs<'a> {
 /// How much farther the needle's route is from what it has to keep away from than it has to be, m; infinite
 /// where there is nothing.
 fn route_surplus_m(resolved: &ResolvedScenario, moved: &MovedPhantom) -> f64 {
-    let MovedPhantom { phantom, goal } = moved;
+    let MovedPhantom { phantom, goal, .. } = moved;
     let judged = judge_route_beside(resolved, phantom, goal);
     let by_rule_m = judged.map(|judged| judged.distance_m - judged.margin_m);
     let criteria = &resolved.scenario.criteria.min_clearance_mm;
