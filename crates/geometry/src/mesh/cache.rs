@@ -219,7 +219,11 @@ pub(super) mod tests {
     /// made now would be a wrong answer: who changes what is made changes its version, and this.
     pub fn hash_of<T>(kind: &Kind<T>, mesh: &TriangleMesh, thing: &T) -> String {
         let hash = Sha256::digest(sealed(kind, mesh, thing));
-        hash[..8].iter().map(|byte| format!("{byte:02x}")).collect()
+        let mut text = String::new();
+        for byte in &hash[..8] {
+            write!(text, "{byte:02x}").unwrap();
+        }
+        text
     }
 
     #[test]
