@@ -23,7 +23,7 @@
 //! let (link, table) = nearest.solid_names(&scenario.cell);
 //! println!("{link} is {:.1} mm from {table}", nearest.separation.distance_m * 1e3);
 //! assert_eq!((link, table), ("upper_arm.0", "table"));
-//! assert!((0.267..0.269).contains(&nearest.separation.distance_m));
+//! assert!((0.253..0.255).contains(&nearest.separation.distance_m));
 //! ```
 //!
 //! # Accuracy
