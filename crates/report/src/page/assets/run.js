@@ -325,8 +325,8 @@ NB.RunPage = class {
       const color = new THREE.Color(NB.styleOf(name).color);
       const rgba = [color.r, color.g, color.b].map((c) => (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055)).concat(1);
       const [a, b] = found.witness_points_m;
-      view.rod('witness', a, b, 0.002, rgba);
-      for (const end of [a, b]) view.ball('witness', end, 0.005, rgba);
+      view.rod('witness', a, b, 0.002, rgba, true);
+      for (const end of [a, b]) view.ball('witness', end, 0.005, rgba, true);
       view.label('witness', `${NB.words(name)} ${NB.mm(found.minimum_m)} mm${found.time_s === null ? '' : ` at ${found.time_s.toFixed(2)} s`}`, a.map((value, k) => (value + b[k]) / 2));
     }
     view.draw();

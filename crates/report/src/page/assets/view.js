@@ -219,23 +219,35 @@ NB.View = class {
   }
 
   /** A straight line as a thin rod. */
-  rod(name, from, to, radius, color) {
+  /** What is marked is seen through all that stands before it. */
+  marked(material) {
+    material.depthTest = false;
+    material.transparent = true;
+    return material;
+  }
+
+  rod(name, from, to, radius, color, isMark = false) {
     if (!this.works) return;
     const [a, b] = [new THREE.Vector3(...from), new THREE.Vector3(...to)];
     const along = b.clone().sub(a);
     const length = Math.max(along.length(), 1e-6);
     const mesh = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, length, 10), this.material(color, false));
+    if (isMark) this.marked(mesh.material);
     mesh.position.copy(a).addScaledVector(along, 0.5);
     mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.normalize());
     mesh.renderOrder = 30;
     this.group(name).add(mesh);
   }
 
-  ball(name, at, radius, color) {
+  ball(name, at, radius, color, isMark = false) {
     if (!this.works) return;
     const mesh = new THREE.Mesh(new THREE.SphereGeometry(radius, 20, 14), this.material(color));
     mesh.position.set(...at);
     mesh.renderOrder = color[3] < 1 ? 12 : 0;
+    if (isMark) {
+      this.marked(mesh.material);
+      mesh.renderOrder = 30;
+    }
     this.group(name).add(mesh);
   }
 
