@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/` and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 14] = [
+const LAYERS: [(&str, &[&str]); 15] = [
     ("kinematics", &[]),
     ("geometry", &["kinematics"]),
     ("cell", &["geometry", "kinematics"]),
@@ -21,6 +21,7 @@ const LAYERS: [(&str, &[&str]); 14] = [
     ("render", &["geometry", "kinematics"]),
     ("uncertainty", &["engine", "cell", "kinematics"]),
     ("study", &["cell", "kinematics"]),
+    ("recorded", &["cell", "kinematics"]),
     (
         "evaluation",
         &[
@@ -35,6 +36,7 @@ const LAYERS: [(&str, &[&str]); 14] = [
     (
         "bench",
         &[
+            "recorded",
             "study",
             "evaluation",
             "uncertainty",
@@ -50,6 +52,7 @@ const LAYERS: [(&str, &[&str]); 14] = [
         &[
             "render",
             "bench",
+            "recorded",
             "study",
             "evaluation",
             "uncertainty",
@@ -81,6 +84,7 @@ const LAYERS: [(&str, &[&str]); 14] = [
             "paper",
             "report",
             "bench",
+            "recorded",
             "study",
             "evaluation",
             "engine",

@@ -16,6 +16,7 @@
 //! | [`phantom`], [`fixtures`] | chests and furniture as solids |
 //! | `resolve` with [`imperfections`], [`people`], [`iso9283`] | from sections to a [`Cell`] with goals in the world |
 //! | [`family`], [`study`], `thresholds` | many scenarios from one, and what is asked of them |
+//! | `log_columns` | which column of a recorded log is what |
 
 pub mod arm;
 mod engine_name;
@@ -25,6 +26,7 @@ mod finding;
 pub mod fixtures;
 mod input;
 mod limit;
+mod log_columns;
 mod model;
 pub mod phantom;
 mod printable;
@@ -46,6 +48,7 @@ pub use input::{
     InputError, MOST_DATA_BYTES, MOST_TEXT_BYTES, open_input, read_data, read_data_text, read_text,
 };
 pub use limit::{Limit, digits_apart};
+pub use log_columns::{LogColumns, MappedColumns};
 pub use model::{
     AppliedCalibration, ArmInUse, ArmReport, BodyKind, BodyPair, Cell, ClearanceClass,
     CollisionBody, Frame, LeftOut, Link, LinkMember, Needle, NeedleCorridor, PairRule, Robot, Tool,

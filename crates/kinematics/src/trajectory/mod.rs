@@ -1,11 +1,13 @@
 //! Joint trajectories: straight joint motions, straight tool lines, holds.
 //!
-//! Every moving segment starts and ends at rest and follows a seven-phase (double-S) profile, so
-//! position, velocity and acceleration are continuous and the jerk is bounded.
+//! Every planned segment starts and ends at rest and follows a seven-phase (double-S) profile, so
+//! position, velocity and acceleration are continuous and the jerk is bounded. What was recorded
+//! elsewhere goes through its set-points.
 
 mod line;
 mod path;
 mod profile;
+mod sampled;
 mod slowing;
 mod through;
 mod travel;
@@ -13,7 +15,9 @@ mod travel;
 pub use line::LineError;
 pub use path::{JointPath, PathPoint};
 pub use profile::{DoubleS, ProfileLimits};
+pub use sampled::NotSampled;
 
+use sampled::Sampled;
 use slowing::Slowing;
 
 use crate::{JOINT_COUNT, Joints};
@@ -72,6 +76,8 @@ pub enum Phase {
     Release,
     /// From the moment of a stop on.
     Stop,
+    /// Along the set-points of a recorded run.
+    Replay,
 }
 
 impl Phase {
@@ -86,6 +92,7 @@ impl Phase {
             Self::Press => "press",
             Self::Release => "release",
             Self::Stop => "stop",
+            Self::Replay => "replay",
         }
     }
 }
@@ -108,6 +115,8 @@ enum Course {
     Hold { position: Joints },
     /// Along another trajectory, slower and slower until it stands.
     Slowing(Slowing),
+    /// Through set-points.
+    Sampled(Sampled),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -328,6 +337,7 @@ impl JointTrajectory {
             }
             Course::Hold { position } => JointState::at_rest(*position),
             Course::Slowing(slowing) => slowing.sample(local_s),
+            Course::Sampled(sampled) => sampled.sample(local_s),
         }
     }
 

@@ -84,6 +84,7 @@ impl Segment {
             }
             Course::Hold { .. } => Joints::zeros(),
             Course::Slowing(slowing) => slowing.travel(from_s, to_s),
+            Course::Sampled(sampled) => padded(&sampled.travel(from_s, to_s)),
         }
     }
 
@@ -101,6 +102,8 @@ impl Segment {
                 padded(&path.chord_deviation(s_m(from_s), s_m(to_s)))
             }
             Course::Slowing(slowing) => slowing.chord_deviation(from_s, to_s),
+            // Both ends together are no farther from any point of the way than its length.
+            Course::Sampled(sampled) => padded(&(sampled.travel(from_s, to_s) * 0.5)),
         }
     }
 }

@@ -1,0 +1,336 @@
+//! Logs of ROS: `sensor_msgs/JointState` in an MCAP file, as CDR or JSON.
+
+use std::collections::BTreeMap;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use mcap::io::MessageReader;
+use needlebench_cell::{Finding, open_input};
+use needlebench_kinematics::{JOINT_COUNT, JOINT_NAMES};
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+
+use crate::raw::RawLog;
+use crate::{EffortMeaning, Quantity, ReadOptions};
+
+/// First bytes of an MCAP file.
+const MAGIC: &[u8] = &[0x89, b'M', b'C', b'A', b'P'];
+
+/// Names in one message; no robot has more joints.
+const MOST_JOINTS: usize = 1000;
+
+/// Whether a file is one of MCAP, by its first bytes.
+pub(crate) fn is_mcap(path: &Path) -> bool {
+    let mut first = [0; MAGIC.len()];
+    open_input(path).is_ok_and(|mut file| file.read_exact(&mut first).is_ok() && first == MAGIC)
+}
+
+/// A message, as ROS 2 and JSON writers have it.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct JointState {
+    header: Header,
+    name: Vec<String>,
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    effort: Vec<f64>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Header {
+    stamp: Stamp,
+}
+
+#[derive(Debug, Default, Clone, Copy, Deserialize)]
+#[serde(default)]
+struct Stamp {
+    sec: i64,
+    #[serde(alias = "nsec")]
+    nanosec: u32,
+}
+
+impl Stamp {
+    fn seconds(self) -> Option<f64> {
+        let zero = self.sec == 0 && self.nanosec == 0;
+        (!zero).then(|| self.sec as f64 + f64::from(self.nanosec) * 1e-9)
+    }
+}
+
+/// Reads all joint states of one topic; with them the SHA-256 of the file.
+pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String), Vec<Finding>> {
+    let file = path.display().to_string();
+    let refuse = |message: String, hint: &str| vec![Finding::new(&file, message).hint(hint)];
+    let open = || {
+        open_input(path).map_err(|error| {
+            let hint = error.hint("the path is relative to the working directory");
+            refuse(format!("cannot read the log: {error}"), hint)
+        })
+    };
+    let hash = hash_of(open()?).map_err(|error| refuse(error.to_string(), "is it still there?"))?;
+    let topic = choose_topic(&file, BufReader::new(open()?), options.topic.as_deref())?;
+    let mut raw = RawLog::default();
+    let quantities = [
+        Quantity::Time,
+        Quantity::ActualQ,
+        Quantity::ActualQd,
+        Quantity::ActualTorque,
+    ];
+    raw.expect(quantities, 0);
+    let (mut broken, mut without_stamp, mut others) = (None, 0, 0);
+    for message in MessageReader::new(BufReader::with_capacity(1 << 20, open()?)) {
+        let message = match message {
+            Ok(message) => message,
+            Err(error) => {
+                broken = Some(error.to_string());
+                break;
+            }
+        };
+        if message.channel.topic != topic {
+            continue;
+        }
+        raw.rows_in_file += 1;
+        let number = raw.rows_in_file;
+        let parsed = match message.channel.message_encoding.as_str() {
+            "json" => serde_json::from_slice(&message.data).map_err(|error| error.to_string()),
+            _ => from_cdr(&message.data).ok_or_else(|| "it is cut off".to_owned()),
+        };
+        let state: JointState = parsed.map_err(|error| {
+            let message = format!("message {number} of {topic} is no joint state: {error}");
+            refuse(message, "joint states are read as CDR and as JSON")
+        })?;
+        let Some(places) = places(&state.name).map_err(|name| {
+            let message = format!("message {number} of {topic} has two joints `{name}`");
+            refuse(
+                message,
+                "record one arm a topic, or choose another one: --topic NAME",
+            )
+        })?
+        else {
+            others += 1;
+            continue;
+        };
+        let stamp_s = state.header.stamp.seconds();
+        without_stamp += usize::from(stamp_s.is_none());
+        let time_s = stamp_s.unwrap_or(message.log_time as f64 * 1e-9);
+        let of = |values: &[f64]| places.map(|at| values.get(at).copied().unwrap_or(f64::NAN));
+        let mut cut = None;
+        raw.add(Quantity::Time, &[time_s], &mut cut);
+        raw.add(Quantity::ActualQ, &of(&state.position), &mut cut);
+        raw.add(Quantity::ActualQd, &of(&state.velocity), &mut cut);
+        raw.add(Quantity::ActualTorque, &of(&state.effort), &mut cut);
+        raw.end_row(number, cut);
+    }
+    if let Some(error) = broken {
+        if raw.rows() == 0 {
+            let hint = "the file may be cut off: `mcap recover` mends what can be mended";
+            return Err(refuse(format!("cannot read the log: {error}"), hint));
+        }
+        raw.notes.push(format!(
+            "the file breaks off after {} messages of {topic} ({error})",
+            raw.rows_in_file
+        ));
+    }
+    if raw.rows() == 0 {
+        let message = format!("no message of {topic} has the six joints of a UR arm");
+        let hint = format!("names end in {}", JOINT_NAMES.join(", "));
+        return Err(refuse(message, &hint));
+    }
+    if others > 0 {
+        raw.notes.push(format!(
+            "{others} of {} messages of {topic} are of other joints: left out",
+            raw.rows_in_file
+        ));
+    }
+    if without_stamp > 0 {
+        raw.notes.push(format!(
+            "{without_stamp} messages have no stamp: their times are when they were logged"
+        ));
+    }
+    name_effort(&file, &mut raw, options.effort)?;
+    Ok((raw, hash))
+}
+
+/// Gives `effort` its meaning, if the log has any.
+fn name_effort(
+    file: &str,
+    raw: &mut RawLog,
+    meaning: Option<EffortMeaning>,
+) -> Result<(), Vec<Finding>> {
+    let effort = &raw.values[&Quantity::ActualTorque];
+    if effort
+        .iter()
+        .all(|value| !value.is_finite() || *value == 0.0)
+    {
+        raw.values.remove(&Quantity::ActualTorque);
+        return Ok(());
+    }
+    match meaning {
+        None => Err(vec![
+            Finding::new(
+                file,
+                "`effort` of joint states of UR arms has had three meanings, and the log does not \
+                 say which",
+            )
+            .hint(
+                "--effort current (A: drivers for PolyScope before 5.23, and later ones by option), \
+                 --effort torque (N m, gravity included) or --effort compensated (N m without the \
+                 share of gravity: newer drivers)",
+            ),
+        ]),
+        Some(EffortMeaning::Current) => {
+            let current = raw.values.remove(&Quantity::ActualTorque);
+            raw.values.extend(current.map(|values| (Quantity::ActualCurrent, values)));
+            Ok(())
+        }
+        Some(EffortMeaning::Torque | EffortMeaning::Compensated) => Ok(()),
+    }
+}
+
+fn hash_of(file: std::fs::File) -> std::io::Result<String> {
+    let mut digest = Sha256::new();
+    let mut reader = BufReader::with_capacity(1 << 20, file);
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        let count = reader.read(&mut buffer)?;
+        if count == 0 {
+            let hash = digest.finalize();
+            return Ok(hash
+                .iter()
+                .fold(String::new(), |text, byte| text + &format!("{byte:02x}")));
+        }
+        digest.update(&buffer[..count]);
+    }
+}
+
+/// The topic of joint states: the only one, or the one that is named.
+fn choose_topic(
+    file: &str,
+    input: impl Read,
+    wanted: Option<&str>,
+) -> Result<String, Vec<Finding>> {
+    let mut topics: BTreeMap<String, usize> = BTreeMap::new();
+    for message in MessageReader::new(input) {
+        let Ok(message) = message else { break };
+        let schema = message.channel.schema.as_ref();
+        if schema.is_some_and(|schema| schema.name.ends_with("JointState")) {
+            *topics.entry(message.channel.topic.clone()).or_default() += 1;
+        }
+    }
+    let names: Vec<&str> = topics.keys().map(String::as_str).collect();
+    let refuse = |message: String, hint: String| Err(vec![Finding::new(file, message).hint(hint)]);
+    match (wanted, names.as_slice()) {
+        (_, []) => refuse(
+            "the log has no joint states".to_owned(),
+            "messages of sensor_msgs/JointState are read: record /joint_states".to_owned(),
+        ),
+        (Some(wanted), names) if !names.contains(&wanted) => refuse(
+            format!("the log has no joint states on `{wanted}`"),
+            format!("there are: {}", names.join(", ")),
+        ),
+        (Some(wanted), _) => Ok(wanted.to_owned()),
+        (None, [only]) => Ok((*only).to_owned()),
+        (None, several) => refuse(
+            format!("the log has joint states on {} topics", several.len()),
+            format!("choose one with --topic: {}", several.join(", ")),
+        ),
+    }
+}
+
+/// Places of the six joints among names, which may have a prefix; none if one is missing.
+///
+/// # Errors
+/// A joint that is there twice.
+fn places(names: &[String]) -> Result<Option<[usize; JOINT_COUNT]>, &'static str> {
+    let mut found = [None; JOINT_COUNT];
+    for (at, name) in names.iter().enumerate() {
+        let joint = JOINT_NAMES.iter().position(|joint| name.ends_with(joint));
+        if let Some(joint) = joint
+            && found[joint].replace(at).is_some()
+        {
+            return Err(JOINT_NAMES[joint]);
+        }
+    }
+    let mut whole = [0; JOINT_COUNT];
+    for (place, found) in whole.iter_mut().zip(found) {
+        let Some(found) = found else {
+            return Ok(None);
+        };
+        *place = found;
+    }
+    Ok(Some(whole))
+}
+
+/// A message in OMG's common data representation (plain CDR, version 1), little or big endian.
+fn from_cdr(data: &[u8]) -> Option<JointState> {
+    let (head, body) = data.split_at_checked(4)?;
+    let mut cdr = Cdr {
+        body,
+        at: 0,
+        little: head[1] & 1 == 1,
+    };
+    let sec = i64::from(cdr.u32()?.cast_signed());
+    let nanosec = cdr.u32()?;
+    cdr.string()?;
+    let count = cdr.count()?;
+    let name = (0..count).map(|_| cdr.string()).collect::<Option<_>>()?;
+    Some(JointState {
+        header: Header {
+            stamp: Stamp { sec, nanosec },
+        },
+        name,
+        position: cdr.doubles()?,
+        velocity: cdr.doubles()?,
+        effort: cdr.doubles()?,
+    })
+}
+
+struct Cdr<'a> {
+    body: &'a [u8],
+    at: usize,
+    little: bool,
+}
+
+impl<'a> Cdr<'a> {
+    fn take(&mut self, count: usize, alignment: usize) -> Option<&'a [u8]> {
+        let start = self.at.next_multiple_of(alignment);
+        let bytes = self.body.get(start..start.checked_add(count)?)?;
+        self.at = start + count;
+        Some(bytes)
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        let bytes = self.take(4, 4)?.try_into().ok()?;
+        Some(if self.little {
+            u32::from_le_bytes(bytes)
+        } else {
+            u32::from_be_bytes(bytes)
+        })
+    }
+
+    fn count(&mut self) -> Option<usize> {
+        let count = usize::try_from(self.u32()?).ok()?;
+        (count <= MOST_JOINTS).then_some(count)
+    }
+
+    fn string(&mut self) -> Option<String> {
+        let count = usize::try_from(self.u32()?).ok()?;
+        let bytes = self.take(count, 1)?;
+        let text = bytes.strip_suffix(&[0]).unwrap_or(bytes);
+        String::from_utf8(text.to_vec()).ok()
+    }
+
+    fn doubles(&mut self) -> Option<Vec<f64>> {
+        let count = self.count()?;
+        let mut found = Vec::with_capacity(count);
+        for _ in 0..count {
+            let bytes = self.take(8, 8)?.try_into().ok()?;
+            found.push(if self.little {
+                f64::from_le_bytes(bytes)
+            } else {
+                f64::from_be_bytes(bytes)
+            });
+        }
+        Some(found)
+    }
+}
