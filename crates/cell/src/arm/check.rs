@@ -106,6 +106,7 @@ impl Check<'_> {
             ),
             ("servo.source", data.servo.as_ref().map(|t| &t.source)),
             ("rotors.source", data.rotors.as_ref().map(|t| &t.source)),
+            ("motors.source", data.motors.as_ref().map(|t| &t.source)),
             ("control.source", data.control.as_ref().map(|t| &t.source)),
             ("gears.source", data.gears.as_ref().map(|t| &t.source)),
             ("friction.source", data.friction.as_ref().map(|t| &t.source)),

@@ -46,6 +46,9 @@ pub struct ArmData {
     /// Rotor inertia.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotors: Option<RotorData>,
+    /// Torque constants of the motors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motors: Option<MotorData>,
     /// The controller.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub control: Option<ControlData>,
@@ -76,7 +79,7 @@ pub struct ArmData {
 pub type Lacks = std::collections::BTreeMap<String, String>;
 
 /// Names of the tables that may be left out.
-pub(super) const TABLES: [&str; 16] = [
+pub(super) const TABLES: [&str; 17] = [
     "inertia",
     "limits",
     "enclosure",
@@ -86,6 +89,7 @@ pub(super) const TABLES: [&str; 16] = [
     "repeatability",
     "servo",
     "rotors",
+    "motors",
     "control",
     "gears",
     "friction",
@@ -220,6 +224,17 @@ pub struct RotorData {
     /// Rotor inertia per joint, seen at the joint, kg m^2.
     #[schemars(inner(range(min = 0.0, max = 10.0)))]
     pub inertia_kgm2: [f64; 6],
+    /// A citation, or `assumed: ` and why.
+    pub source: String,
+}
+
+/// Torque constants of the motors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotorData {
+    /// Torque at the joint per ampere that the controller shows, per joint, N m/A.
+    #[schemars(inner(range(min = 0.1, max = 1000.0)))]
+    pub torque_constant_nm_a: [f64; 6],
     /// A citation, or `assumed: ` and why.
     pub source: String,
 }
