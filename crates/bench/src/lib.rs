@@ -1,6 +1,6 @@
 //! What a run is: a scenario planned, simulated, measured and judged; and likewise its events, a test
-//! by ISO 9283, the engines beside the referee, the atlas of a goal, the servo's data sheet and a case
-//! of a study.
+//! by ISO 9283, the engines beside the referee, the atlas of a goal, the servo's data sheet, the replay of
+//! a recorded run and a case of a study.
 //!
 //! Gives values only: nothing here prints, draws or writes files.
 //!
@@ -20,6 +20,7 @@ pub mod preview;
 pub mod progress;
 pub mod provenance;
 mod real_cell;
+pub mod replay;
 mod run;
 mod runnable;
 mod scenario_run;
@@ -29,6 +30,7 @@ mod simulate;
 pub mod study;
 
 pub use atlas::{GoalAtlas, goal_atlas};
+pub use control::Control;
 pub use events::{EngineEvents, EventRun, StagedStop};
 pub use preview::Preview;
 pub use real_cell::servo_of;

@@ -2,7 +2,7 @@
 
 use needlebench_cell::ResolvedScenario;
 use needlebench_clearance::ClearanceModel;
-use needlebench_engine::{Motion, MotionJob, MotionSettings, Servo};
+use needlebench_engine::{Keep, Motion, MotionJob, MotionSettings, Servo};
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::trajectory::JointTrajectory;
@@ -54,6 +54,7 @@ impl<'a> Setup<'a> {
             actuation: self.real.actuation(),
             trajectory,
             braking: None,
+            keep: Keep::Steps,
         }
     }
 

@@ -69,6 +69,12 @@ impl Location {
         Self::Disk(base.join(reference))
     }
 
+    /// The shipped file that a name with `builtin:` says, if it does.
+    pub(crate) fn builtin(name: &str) -> Option<Self> {
+        let path = Path::new(name.strip_prefix(BUILTIN_PREFIX)?);
+        Some(Self::Builtin(path.components().collect()))
+    }
+
     /// Names of the shipped folders that hold a file of this name.
     pub(crate) fn builtin_folders_with(file: &str) -> Vec<String> {
         let mut names: Vec<String> = BUILTIN

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 use needlebench_cell::{Cell, Overrides, load_scenario};
 use needlebench_engine::mujoco::{HarnessProcess, ensure};
 use needlebench_engine::{
-    Actuation, Fleet, Hooks, Motion, MujocoFleet, MujocoPlant, MujocoSettings, Plant, RapierPlant,
-    RapierSettings, Recording, Servo, ServoGains, simulate, simulate_fleet,
+    Actuation, Fleet, Hooks, Keep, Motion, MujocoFleet, MujocoPlant, MujocoSettings, Plant,
+    RapierPlant, RapierSettings, Recording, Servo, ServoGains, simulate, simulate_fleet,
 };
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
@@ -129,6 +129,7 @@ impl Bench {
             actuation: &self.actuation,
             trajectory: &self.trajectory,
             braking: None,
+            keep: Keep::Steps,
         }; ARMS];
         let bare = std::cell::RefCell::new(&mut bare);
         let replay = |look| {

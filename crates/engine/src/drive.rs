@@ -1,6 +1,6 @@
 //! One motion of one arm: what torque the plant gets next, and what it did.
 
-use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_kinematics::trajectory::{JointState, JointTrajectory};
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, JOINT_LABELS, Joints};
 
 use crate::actuation::Drives;
@@ -29,6 +29,19 @@ pub struct Motion<'a> {
     pub trajectory: &'a JointTrajectory,
     /// From when on the arm is braked instead, if ever.
     pub braking: Option<Braking<'a>>,
+    /// What is recorded.
+    pub keep: Keep<'a>,
+}
+
+/// Which states of a motion its recording has.
+#[derive(Debug, Clone, Copy, Default)]
+pub enum Keep<'a> {
+    /// Every one.
+    #[default]
+    Steps,
+    /// The one nearest to each of these times (s), which increase; each state once. What lies between
+    /// needs no memory.
+    Near(&'a [f64]),
 }
 
 /// From a moment on the drives are off and the brakes act.
@@ -57,6 +70,15 @@ pub(crate) struct Drive<'a> {
     drives: Drives<'a>,
     steps: usize,
     braking: Option<Braking<'a>>,
+    keep: Keep<'a>,
+    /// State and reference after the last step.
+    now: Option<(PlantState, JointState)>,
+    /// Steps that were made.
+    step: usize,
+    /// Times that states were kept for.
+    kept_times: usize,
+    /// Whether the state after the last step was kept.
+    is_kept: bool,
     recording: Recording,
 }
 
@@ -80,24 +102,34 @@ impl<'a> Drive<'a> {
             actuation,
             trajectory,
             braking,
+            keep,
         } = *motion;
         servo.check()?;
         actuation.check()?;
         let steps = step_count(trajectory.duration_s(), timestep_s);
+        let kept = match keep {
+            Keep::Steps => steps,
+            Keep::Near(times_s) => times_s.len(),
+        };
         Ok(Self {
             trajectory,
             drives: Drives::new(servo, actuation, timestep_s, velocity_age_s),
             steps,
             braking,
+            keep,
+            now: None,
+            step: 0,
+            kept_times: 0,
+            is_kept: false,
             recording: Recording {
                 engine,
                 timestep_s,
                 velocity_age_s,
-                time_s: Vec::with_capacity(steps + 1),
-                state: Vec::with_capacity(steps + 1),
-                reference: Vec::with_capacity(steps + 1),
-                torque_nm: Vec::with_capacity(steps),
-                drive_nm: Vec::with_capacity(steps),
+                time_s: Vec::with_capacity(kept + 1),
+                state: Vec::with_capacity(kept + 1),
+                reference: Vec::with_capacity(kept + 1),
+                torque_nm: Vec::with_capacity(kept),
+                drive_nm: Vec::with_capacity(kept),
                 saturated_steps: 0,
                 saturation: Default::default(),
                 cost: Cost::default(),
@@ -113,12 +145,11 @@ impl<'a> Drive<'a> {
     /// # Panics
     /// If no state was recorded yet.
     pub(crate) fn torque(&mut self) -> Result<Option<Joints>, EngineError> {
-        let step = self.recording.torque_nm.len();
-        if step >= self.steps {
+        if self.step >= self.steps {
             return Ok(None);
         }
-        let state = self.recording.state.last().expect("recorded after reset");
-        let time_s = step as f64 * self.recording.timestep_s;
+        let (state, planned) = self.now.expect("recorded after reset");
+        let time_s = self.step as f64 * self.recording.timestep_s;
         let braking = self
             .braking
             .filter(|braking| time_s >= braking.from_s - STEP_SLACK * self.recording.timestep_s);
@@ -134,11 +165,10 @@ impl<'a> Drive<'a> {
                 saturated: [false; JOINT_COUNT],
             }
         } else {
-            let planned = self.recording.reference.last();
             self.drives.torque(
                 self.trajectory,
                 time_s,
-                planned.expect("recorded with its state"),
+                &planned,
                 &state.position,
                 &state.velocity,
             )
@@ -151,8 +181,11 @@ impl<'a> Drive<'a> {
                 joint.first_time_s.get_or_insert(time_s);
             }
         }
-        self.recording.torque_nm.push(torque.link_nm);
-        self.recording.drive_nm.push(torque.drive_nm);
+        if self.is_kept {
+            self.recording.torque_nm.push(torque.link_nm);
+            self.recording.drive_nm.push(torque.drive_nm);
+        }
+        self.step += 1;
         Ok(Some(torque.link_nm))
     }
 
@@ -161,12 +194,31 @@ impl<'a> Drive<'a> {
     /// # Errors
     /// [`EngineError::Diverged`] if it left every sensible range; it is kept all the same.
     pub(crate) fn record(&mut self, state: PlantState) -> Result<(), EngineError> {
+        let time_s = self.step as f64 * self.recording.timestep_s;
+        let reference = self.trajectory.sample(time_s);
+        self.now = Some((state, reference));
+        self.is_kept = self.is_wanted(time_s);
         let recording = &mut self.recording;
-        let time_s = recording.state.len() as f64 * recording.timestep_s;
-        recording.time_s.push(time_s);
-        recording.state.push(state);
-        recording.reference.push(self.trajectory.sample(time_s));
+        if self.is_kept {
+            recording.time_s.push(time_s);
+            recording.state.push(state);
+            recording.reference.push(reference);
+        }
         check_state(recording.engine.name, time_s, &state)
+    }
+
+    /// Whether the state at a time is to be kept.
+    fn is_wanted(&mut self, time_s: f64) -> bool {
+        let Keep::Near(times_s) = self.keep else {
+            return true;
+        };
+        let until_s = time_s + 0.5 * self.recording.timestep_s;
+        let passed = times_s[self.kept_times..]
+            .iter()
+            .take_while(|wanted_s| **wanted_s < until_s);
+        let passed = passed.count();
+        self.kept_times += passed;
+        passed > 0
     }
 
     /// The recording; its cost is the caller's to fill in.

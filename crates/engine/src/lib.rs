@@ -38,7 +38,7 @@ pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFric
 pub use brakes::{Brakes, loaded, stretched};
 pub use closed_loop::ClosedLoop;
 pub use deviations::{KNOWN_DEVIATIONS, KnownDeviation};
-pub use drive::{Braking, Motion};
+pub use drive::{Braking, Keep, Motion};
 pub use engine::{ArmSpec, Engine, EngineCheck, EngineSession};
 pub use error::EngineError;
 pub use fleet::Fleet;

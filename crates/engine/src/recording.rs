@@ -10,7 +10,8 @@ use crate::{EngineIdentity, PlantState};
 /// Motion of one plant under one servo.
 ///
 /// All vectors but the torques have one entry more than there were steps; entry 0 is the state
-/// after the reset. Everything but `cost` is the same, bit for bit, whenever it is computed.
+/// after the reset. Where not all states were kept ([`Keep::Near`](crate::Keep)), entries are those that
+/// were, and the last one may lack its torque. Everything but `cost` is the same, bit for bit, whenever it is computed.
 #[derive(Debug, Clone)]
 pub struct Recording {
     /// The engine.

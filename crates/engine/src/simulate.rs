@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::JointTrajectory;
 
-use crate::drive::{Drive, Motion};
+use crate::drive::{Drive, Keep, Motion};
 use crate::fleet::{Fleet, Lone};
 use crate::{Actuation, EngineError, Plant, Recording, Servo};
 
@@ -35,6 +35,7 @@ pub fn simulate(
         actuation,
         trajectory,
         braking: None,
+        keep: Keep::Steps,
     };
     simulate_motion(plant, &motion, hooks)
 }

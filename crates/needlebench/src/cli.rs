@@ -8,7 +8,8 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, FkArguments,
     ISO9283_HELP, IkArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments,
-    RunArguments, STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
+    REPLAY_HELP, ReplayArguments, RunArguments, STUDY_HELP, SchemaFormat, ServoArguments,
+    StudyArguments,
 };
 use crate::exit::ExitStatus;
 use crate::output::complain;
@@ -77,6 +78,12 @@ enum Command {
         after_long_help = ISO9283_HELP
     )]
     Iso9283(Iso9283Arguments),
+    /// A recorded run of a real arm: what it says of the arm, and the same set-points in the engines.
+    #[command(
+        after_help = "Example: needlebench replay models/ur3e/recorded/ur3e_rad_20211005.csv",
+        after_long_help = REPLAY_HELP
+    )]
+    Replay(Box<ReplayArguments>),
     /// Every pair of bodies: measured or left out, why, and the evidence; and checks an SRDF.
     #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
     Pairs(PairsArguments),
@@ -136,6 +143,7 @@ fn run() -> ExitCode {
         Command::Study(arguments) => command::study(&arguments),
         Command::Merge(arguments) => command::merge(&arguments),
         Command::Iso9283(arguments) => command::iso9283(&arguments),
+        Command::Replay(arguments) => command::replay(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),

@@ -117,6 +117,10 @@ impl Check<'_> {
                 "population.source",
                 data.population.as_ref().map(|t| &t.source),
             ),
+            (
+                "calibration.source",
+                data.calibration.as_ref().map(|t| &t.source),
+            ),
         ] {
             all.extend(source.map(|source| (key, source)));
         }

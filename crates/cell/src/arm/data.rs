@@ -15,7 +15,7 @@ use crate::schema::FileSchema;
 pub struct ArmData {
     /// The maker's name, such as `UR3e`.
     pub name: String,
-    /// The URDF, relative to this file.
+    /// The URDF, relative to this file; `builtin:ur3e/ur3e.urdf` for a shipped one.
     pub urdf: String,
     /// Nominal lengths, by which a URDF from elsewhere is recognised.
     pub geometry: GeometryData,
@@ -70,6 +70,9 @@ pub struct ArmData {
     /// Factory calibrations of real arms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub population: Option<PopulationData>,
+    /// The factory calibration of this very arm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<OwnCalibration>,
     /// Why a table is left out, by its name.
     #[serde(default, skip_serializing_if = "Lacks::is_empty")]
     pub lacks: Lacks,
@@ -79,7 +82,7 @@ pub struct ArmData {
 pub type Lacks = std::collections::BTreeMap<String, String>;
 
 /// Names of the tables that may be left out.
-pub(super) const TABLES: [&str; 17] = [
+pub(super) const TABLES: [&str; 18] = [
     "inertia",
     "limits",
     "enclosure",
@@ -97,6 +100,7 @@ pub(super) const TABLES: [&str; 17] = [
     "cell",
     "iso9283",
     "population",
+    "calibration",
 ];
 
 /// Where numbers that stand in the URDF are from.
@@ -224,6 +228,17 @@ pub struct RotorData {
     /// Rotor inertia per joint, seen at the joint, kg m^2.
     #[schemars(inner(range(min = 0.0, max = 10.0)))]
     pub inertia_kgm2: [f64; 6],
+    /// A citation, or `assumed: ` and why.
+    pub source: String,
+}
+
+/// The factory calibration of one arm: the data are of this one then, and not of its type.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OwnCalibration {
+    /// What ROS's `ur_calibration` writes, relative to this file. Used unless the scenario or the command
+    /// line gives another.
+    pub file: String,
     /// A citation, or `assumed: ` and why.
     pub source: String,
 }
@@ -406,7 +421,8 @@ pub struct PopulationData {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationData {
-    /// What ROS's `ur_calibration` wrote, relative to this file.
+    /// What ROS's `ur_calibration` wrote, relative to this file; `builtin:ur3/calibrations/ur3-1.yaml` for
+    /// a shipped one.
     pub file: String,
     /// Type of the arm, such as `UR3e`, if it is not this one. It counts by its deviations from that
     /// type's nominal joint origins.
@@ -415,6 +431,18 @@ pub struct CalibrationData {
     pub of: Option<String>,
     /// Who published it.
     pub source: String,
+}
+
+impl ArmData {
+    /// The text of an `arm.toml` with these data, under some lines of comment.
+    ///
+    /// # Panics
+    /// Never: whatever an `arm.toml` holds can be written.
+    pub fn to_toml(&self, comment: &str) -> String {
+        let lines: String = comment.lines().map(|line| format!("# {line}\n")).collect();
+        let text = toml::to_string(self).expect("tables of numbers and texts can be written");
+        format!("{lines}\n{text}")
+    }
 }
 
 fn joints(_: &mut SchemaGenerator) -> Schema {

@@ -156,7 +156,13 @@ impl Arm {
 
     /// Where a file that the data name is.
     pub(crate) fn file(&self, name: &str) -> Location {
-        self.location.beside(name)
+        Location::builtin(name).unwrap_or_else(|| self.location.beside(name))
+    }
+
+    /// A file that the data name, as data that stand elsewhere can name it: of a shipped arm with
+    /// `builtin:`, else its path.
+    pub fn file_from_elsewhere(&self, name: &str) -> String {
+        self.file(name).display()
     }
 
     /// The arm's own URDF.

@@ -126,7 +126,8 @@ impl Editable {
                     people,
                     expected,
                     imperfections,
-                    events
+                    events,
+                    replay
                 ]
             );
         }
@@ -174,6 +175,7 @@ impl Scenario {
             expected: self.expected.clone(),
             imperfections: self.imperfections.clone(),
             events: self.events.clone(),
+            replay: self.replay.clone(),
         }
     }
 }

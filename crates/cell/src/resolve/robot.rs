@@ -30,6 +30,7 @@ pub fn load_robot(overrides: &Overrides) -> Result<Robot, Finding> {
         arm.as_ref(),
     )?;
     calibrate(&mut robot, overrides)?;
+    calibrate_by_data(&mut robot)?;
     Ok(robot)
 }
 
@@ -39,6 +40,28 @@ fn calibrate(robot: &mut Robot, overrides: &Overrides) -> Result<(), Finding> {
         Some(path) => Calibration::load(path)?.apply_to(robot),
         None => Ok(()),
     }
+}
+
+/// The same by the arm's own data, if they are of one arm and nobody gave it another calibration.
+fn calibrate_by_data(robot: &mut Robot) -> Result<(), Finding> {
+    let Some(used) = robot.arm.as_ref().filter(|_| robot.calibration.is_none()) else {
+        return Ok(());
+    };
+    let Some(own) = &used.arm.data.calibration else {
+        return Ok(());
+    };
+    let location = used.arm.file(&own.file);
+    let file = location.display();
+    let text = location.read().map_err(|error| {
+        Finding::new(
+            &used.arm.source.file,
+            format!("cannot read the calibration {file}: {error}"),
+        )
+        .key("calibration.file")
+        .hint("the path is relative to the arm's data")
+    })?;
+    let text = String::from_utf8_lossy(&text);
+    Calibration::parse(&file, &text)?.apply_to(robot)
 }
 
 /// The scenario's robot, with its `base_link` at the world's origin.
@@ -83,6 +106,7 @@ pub(super) fn scenario_robot(
         }
         Calibration::load(&path).and_then(|calibration| calibration.apply_to(&mut robot))?;
     }
+    calibrate_by_data(&mut robot)?;
     Ok(robot)
 }
 

@@ -178,6 +178,31 @@ impl Calibration {
         }
     }
 
+    /// The text of a file with the joint origins of a chain from `base_link` whose flange is the last
+    /// link; reads back to the same numbers but for rounding of the angles (1e-15 rad).
+    ///
+    /// `comment` stands above it.
+    pub fn written(chain: &Chain, comment: &str) -> String {
+        use std::fmt::Write;
+        let mut text: String = comment.lines().map(|line| format!("# {line}\n")).collect();
+        text += "kinematics:\n";
+        for (i, link) in LINKS.iter().enumerate() {
+            let mut origin = chain.joints[i].parent_from_joint;
+            if i == 0 {
+                origin = base_from_base_link() * origin;
+            }
+            let [x, y, z] = origin.translation.vector.into();
+            let (roll, pitch, yaw) = origin.rotation.euler_angles();
+            // Writing to a text cannot fail.
+            let _ = write!(text, "  {link}:\n    x: {x}\n    y: {y}\n    z: {z}\n");
+            let _ = write!(
+                text,
+                "    roll: {roll}\n    pitch: {pitch}\n    yaw: {yaw}\n"
+            );
+        }
+        text
+    }
+
     /// How far the origins are from those of an arm with these lengths.
     ///
     /// Frames are compared as rotations: the many triples of roll, pitch and yaw that mean the same

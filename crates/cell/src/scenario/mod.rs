@@ -22,6 +22,7 @@ mod phantom;
 mod planning;
 pub mod ranking;
 mod recording;
+mod replay;
 mod robot;
 mod switch;
 mod tool;
@@ -67,6 +68,7 @@ pub(crate) use phantom::{ChestSize, NO_MODEL};
 pub use planning::{NeedleRouteSection, PlanningSection, RollAim};
 pub use ranking::RankingSection;
 pub use recording::RecordingSection;
+pub use replay::ReplaySection;
 pub use robot::RobotSection;
 pub(crate) use tool::NEEDLE_OUTER_DIAMETER_MM;
 pub use tool::ToolSection;
@@ -151,6 +153,9 @@ pub struct Scenario {
     /// Contacts, stops and the way back, simulated besides the planned motion; none if left out.
     #[serde(default)]
     pub events: Option<EventsSection>,
+    /// What a recorded run of a real arm is held against.
+    #[serde(default)]
+    pub replay: ReplaySection,
 }
 
 impl Scenario {

@@ -7,8 +7,8 @@ use needlebench_cell::scenario::EnginesSection;
 use needlebench_cell::{BodyKind, Cell, CollisionBody, Frame};
 use needlebench_engine::{
     Actuation, ArmSpec, ENGINES, Engine, EngineError, EngineIdentity, EnginePool, EngineSession,
-    Hooks, Motion, MotionJob, MotionSettings, MotionsDone, Plant, PlantState, Recording, Servo,
-    ServoGains, run_motions, simulate_motion,
+    Hooks, Keep, Motion, MotionJob, MotionSettings, MotionsDone, Plant, PlantState, Recording,
+    Servo, ServoGains, run_motions, simulate_motion,
 };
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
@@ -85,6 +85,7 @@ impl Jobs {
                 actuation: &self.actuation,
                 trajectory,
                 braking: None,
+                keep: Keep::Steps,
             },
         })
         .collect()

@@ -4,8 +4,8 @@ use crate::process as harness;
 use needlebench_cell::Cell;
 use needlebench_cell::arm::{BrakeFigure, BrakeFigures};
 use needlebench_engine::{
-    Actuation, Brakes, Braking, Hooks, Motion, MujocoPlant, MujocoSettings, Plant, RapierPlant,
-    RapierSettings, Recording, Servo, ServoGains, loaded, simulate_motion, stretched,
+    Actuation, Brakes, Braking, Hooks, Keep, Motion, MujocoPlant, MujocoSettings, Plant,
+    RapierPlant, RapierSettings, Recording, Servo, ServoGains, loaded, simulate_motion, stretched,
 };
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
 use needlebench_kinematics::{Joints, Pose};
@@ -91,6 +91,7 @@ fn stop(plant: &mut dyn Plant, cell: &Cell, joint: usize, sign: f64) -> Recordin
         actuation: &Actuation::default(),
         trajectory: &trajectory,
         braking: Some(braking),
+        keep: Keep::Steps,
     };
     simulate_motion(plant, &motion, Hooks::default()).unwrap()
 }

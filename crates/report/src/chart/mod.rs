@@ -28,6 +28,7 @@ pub mod budget;
 pub mod iso9283;
 pub mod press;
 pub mod ranking;
+pub mod replay;
 pub mod servo;
 
 pub use axis::{Axis, Scale};

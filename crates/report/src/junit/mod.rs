@@ -2,11 +2,13 @@
 
 mod comparison;
 mod failure;
+mod replay;
 mod run;
 mod study;
 mod study_comparison;
 
 pub use comparison::comparison_junit;
+pub use replay::replay_junit;
 pub use run::junit;
 pub use study::study_junit;
 pub use study_comparison::study_comparison_junit;

@@ -15,6 +15,7 @@ mod further_engine_tests;
 mod mesh;
 mod motion;
 mod pack;
+mod replay;
 mod room;
 mod run;
 mod scene;
@@ -22,4 +23,5 @@ pub mod study;
 mod viewer;
 
 pub use atlas::atlas_page;
+pub use replay::replay_page;
 pub use run::run_page;

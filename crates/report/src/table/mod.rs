@@ -9,6 +9,7 @@ pub mod iso9283;
 mod plain;
 pub(crate) mod ranking;
 mod referee;
+pub mod replay;
 mod run;
 mod saturation;
 pub mod servo;

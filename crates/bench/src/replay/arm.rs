@@ -1,0 +1,198 @@
+//! The arm that is replayed: the log's load, identified rotors, and friction that the controller makes up
+//! for.
+
+use nalgebra::{Matrix3, Vector3};
+use needlebench_cell::{BodyKind, Cell, NeedleCorridor, ResolvedScenario, Tool};
+use needlebench_engine::{Actuation, JointFriction, Servo};
+use needlebench_kinematics::{Body, JOINT_COUNT, Joints};
+use needlebench_recorded::{Identification, Load, RecordedRun};
+
+use crate::servo_of;
+
+/// Stands for the needle's corridor, which a replay does not measure, m.
+const NO_CORRIDOR_M: f64 = 1e-3;
+
+/// Arms, one per load of the log, and their drives.
+pub(super) struct ReplayedArm {
+    /// The cells, by load.
+    pub cells: Vec<Cell>,
+    /// The servos, by load.
+    pub servos: Vec<Servo>,
+    pub actuation: Actuation,
+    /// Torque per current, N m/A; none where nothing is known.
+    pub torque_constants: [Option<f64>; JOINT_COUNT],
+    /// How it was set up.
+    pub words: Vec<String>,
+}
+
+impl ReplayedArm {
+    pub fn new(
+        run: &RecordedRun,
+        resolved: &ResolvedScenario,
+        identification: &Identification,
+    ) -> Self {
+        let mut words = Vec::new();
+        let rotors = rotors(resolved, identification, &mut words);
+        let loads: Vec<Option<Load>> = if run.loads.is_empty() {
+            words.push("load: the scenario's tool, for the log says nothing of it".to_owned());
+            vec![None]
+        } else {
+            let kg: Vec<String> = run
+                .loads
+                .iter()
+                .map(|(_, load)| format!("{} kg", load.mass_kg))
+                .collect();
+            words.push(format!("load: as the log has it, {}", kg.join(", ")));
+            run.loads.iter().map(|(_, load)| Some(*load)).collect()
+        };
+        let cells: Vec<Cell> = loads
+            .iter()
+            .map(|load| cell(resolved, *load, rotors))
+            .collect();
+        let usual = servo_of(resolved);
+        let servos = cells
+            .iter()
+            .map(|cell| Servo {
+                dynamics: cell.dynamics(),
+                gains: usual.gains,
+                effort_limit_nm: usual.effort_limit_nm,
+            })
+            .collect();
+        let friction = friction(resolved, identification, &mut words);
+        let data = resolved.cell.robot.arm.as_ref().map(|used| &used.arm.data);
+        let of_data = data.and_then(|data| data.motors.as_ref());
+        let of_log = identification.current.as_ref();
+        Self {
+            cells,
+            servos,
+            actuation: Actuation {
+                friction,
+                ..Actuation::default()
+            },
+            torque_constants: std::array::from_fn(|joint| {
+                of_log
+                    .and_then(|law| law.joints[joint].torque_constant_nm_a.known())
+                    .or(of_data.map(|motors| motors.torque_constant_nm_a[joint]))
+            }),
+            words,
+        }
+    }
+}
+
+/// Rotors as identified, else as they are known.
+fn rotors(
+    resolved: &ResolvedScenario,
+    identification: &Identification,
+    words: &mut Vec<String>,
+) -> Joints {
+    let known = resolved.cell.armature_kgm2;
+    let controller = identification.controller.as_ref();
+    let measured = identification.measured.as_ref();
+    let mut identified = 0;
+    let rotors = Joints::from_fn(|joint, _| {
+        let of_controller = controller.and_then(|fit| fit.rotor_inertia_kgm2[joint].known());
+        let found =
+            of_controller.or(measured.and_then(|fit| fit.rotor_inertia_kgm2[joint].known()));
+        identified += usize::from(found.is_some());
+        found.map_or(known[joint], |found| found.max(0.0))
+    });
+    words.push(match identified {
+        JOINT_COUNT => "rotor inertia: identified from this log".to_owned(),
+        0 => format!("rotor inertia: {}", resolved.servo.armature_source),
+        count => format!(
+            "rotor inertia: identified from this log at {count} joints, else {}",
+            resolved.servo.armature_source
+        ),
+    });
+    rotors
+}
+
+/// Friction as the arm's data have it, sliding and viscous as identified; none without data.
+fn friction(
+    resolved: &ResolvedScenario,
+    identification: &Identification,
+    words: &mut Vec<String>,
+) -> Option<JointFriction> {
+    let data = resolved.cell.robot.arm.as_ref().map(|used| &used.arm.data);
+    let Some(known) = data.and_then(|data| data.friction.as_ref()) else {
+        words.push("friction: none, for the arm's data have none".to_owned());
+        return None;
+    };
+    let law = identification.current.as_ref();
+    let pick = |of_law: &dyn Fn(usize) -> Option<f64>, known: [f64; JOINT_COUNT]| {
+        Joints::from_fn(|joint, _| of_law(joint).map_or(known[joint], |found| found.max(0.0)))
+    };
+    let coulomb_nm = pick(
+        &|joint| law?.joints[joint].coulomb_nm.known(),
+        known.coulomb_nm,
+    );
+    let viscous = pick(
+        &|joint| law?.joints[joint].viscous_nms_rad.known(),
+        known.viscous_nms_rad,
+    );
+    words.push(format!(
+        "friction: {}, and the controller makes up for all of it while a joint moves",
+        if law.is_some() {
+            "sliding and viscous as identified from this log where it shows them, else the arm's data"
+        } else {
+            "the arm's data"
+        }
+    ));
+    // Break-away keeps its ratio to sliding.
+    let stiction_nm = Joints::from_fn(|joint, _| {
+        let ratio = known.stiction_nm[joint] / known.coulomb_nm[joint].max(f64::MIN_POSITIVE);
+        coulomb_nm[joint] * ratio.max(1.0)
+    });
+    Some(JointFriction {
+        coulomb_nm,
+        stiction_nm,
+        stribeck_rad_s: Joints::from(known.stribeck_deg_s.map(f64::to_radians)),
+        viscous_nms_per_rad: viscous,
+        bristle_stiffness_nm_per_rad: Joints::from(known.bristle_stiffness_nm_rad),
+        bristle_damping_nms_per_rad: Joints::from(known.bristle_damping_nms_rad),
+        compensation: 1.0,
+        true_over_nominal: Joints::repeat(1.0),
+    })
+}
+
+/// The cell with a load in place of its tool, or with its tool if nothing is said of a load.
+fn cell(resolved: &ResolvedScenario, load: Option<Load>, rotors: Joints) -> Cell {
+    let cell = &resolved.cell;
+    let surroundings = cell.bodies.iter().filter(|body| {
+        !matches!(
+            body.kind,
+            BodyKind::Base
+                | BodyKind::Link
+                | BodyKind::Tool
+                | BodyKind::GuideTube
+                | BodyKind::NeedleCorridor
+        )
+    });
+    let tool = match load {
+        None => cell.tool.clone(),
+        Some(load) => Tool {
+            name: "load".to_owned(),
+            solids: Vec::new(),
+            guide_solids: Vec::new(),
+            visuals: Vec::new(),
+            body: Body {
+                mass_kg: load.mass_kg,
+                com_m: Vector3::from(load.centre_m),
+                inertia_kgm2: Matrix3::zeros(),
+            },
+            ..cell.tool.clone()
+        },
+    };
+    Cell::assemble(
+        cell.robot.clone(),
+        tool,
+        NeedleCorridor {
+            radius_m: NO_CORRIDOR_M,
+            length_m: NO_CORRIDOR_M,
+            hand_cone_half_angle_rad: 0.0,
+        },
+        surroundings.cloned().collect(),
+        rotors,
+        cell.gravity_m_s2,
+    )
+}

@@ -1,0 +1,47 @@
+//! A replay: a case for each criterion.
+
+use needlebench_bench::replay::{ReplayReport, SUBJECT};
+use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
+
+use super::failure::{failure, not_judged};
+use crate::number::value_and_limit;
+
+/// A replay as a JUnit document. Contains no times: two replays give the same bytes.
+pub fn replay_junit(report: &ReplayReport) -> Result<String, SerializeError> {
+    let mut document = quick_junit::Report::new("needlebench");
+    let name = format!("{SUBJECT}.{}", report.log.source.file);
+    let mut suite = TestSuite::new(name.clone());
+    let of = |engine: &Option<String>| {
+        engine
+            .as_ref()
+            .map_or(String::new(), |engine| format!(" ({engine})"))
+    };
+    for result in &report.criteria {
+        let status = if result.pass {
+            TestCaseStatus::success()
+        } else {
+            let of = |value: Option<f64>| value.unwrap_or(f64::NAN);
+            let (value, limit) = value_and_limit(of(result.value), of(result.limit), result.unit);
+            failure(&format!("{}: {value}, limit {limit}", result.detail))
+        };
+        let mut case = TestCase::new(
+            format!("{}{}", result.criterion, of(&result.engine)),
+            status,
+        );
+        case.set_classname(name.clone());
+        suite.add_test_case(case);
+    }
+    for open in &report.not_judged {
+        let title = format!("{}{}", open.criterion, of(&open.engine));
+        let mut case = TestCase::new(title, not_judged(&open.reason));
+        case.set_classname(name.clone());
+        suite.add_test_case(case);
+    }
+    for broken in &report.engine_failures {
+        let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
+        status.set_message(broken.message.clone());
+        suite.add_test_case(TestCase::new(broken.engine.clone(), status));
+    }
+    document.add_test_suite(suite);
+    document.to_string()
+}
