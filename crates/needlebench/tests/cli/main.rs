@@ -29,6 +29,7 @@ mod people;
 #[cfg(target_os = "linux")]
 mod process;
 mod referee;
+mod replay;
 mod robust_io;
 mod run;
 mod schema;

@@ -1,0 +1,223 @@
+//! Recorded runs of real arms.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::support::{Answer, Bench, mujoco_is_ready, workspace};
+
+fn shipped() -> String {
+    let path = workspace().join("models/ur3e/recorded/ur3e_rad_20211005.csv");
+    path.to_str().unwrap().to_owned()
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// A replay in rapier alone, without pictures.
+fn quick(bench: &Bench, log: &str, more: &[&str]) -> Answer {
+    let mut arguments = vec![
+        "replay",
+        log,
+        "--engine",
+        "rapier",
+        "--no-pictures",
+        "--no-page",
+    ];
+    arguments.extend(more);
+    bench.run(&arguments)
+}
+
+#[test]
+fn the_shipped_log_is_replayed_in_both_engines_and_meets_its_criteria() {
+    mujoco_is_ready();
+    let bench = Bench::new();
+    let log = shipped();
+    let limits = [
+        "--max-moment-rms",
+        "0.02",
+        "--max-calibration",
+        "0.1",
+        "--max-tracking",
+        "0.5",
+        "--max-current-rms",
+        "0.2",
+    ];
+    let mut arguments = vec!["replay", log.as_str(), "--json"];
+    arguments.extend(limits);
+    let report = bench.run(&arguments).exits_with(0).json();
+    assert_eq!(report["verdict"], "pass");
+    assert_eq!(report["arm"]["name"], "UR3e");
+    assert_eq!(report["log"]["rows"], 888);
+    // One for moment and calibration, two of each engine.
+    assert_eq!(report["criteria"].as_array().unwrap().len(), 6);
+    let lag_s = number(&report["real"]["lag_of_all_s"]["value"]);
+    assert!((lag_s - 0.5e-3).abs() < 0.1e-3, "{lag_s}");
+    assert!(number(&report["calibration"]["held_out"]["rms_m"]) < 1e-4);
+    for engine in ["rapier", "mujoco"] {
+        let found = &report["engines"][engine];
+        assert_eq!(found["rows"], 888);
+        // The currents of the real arm are met as well as its own law meets them.
+        for (joint, rms) in found["current_rms_a"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .enumerate()
+        {
+            assert!(number(rms) < 0.15, "{engine} {joint}: {rms}");
+        }
+    }
+    // What the engines do differs by far less than either from the arm.
+    let tip = |engine: &str| number(&report["engines"][engine]["tracking"]["tip_rms_m"]);
+    assert!((tip("rapier") - tip("mujoco")).abs() < 2e-6);
+    let folder = bench.path("out/ur3e_rad_20211005");
+    for file in [
+        "replay.json",
+        "replay.txt",
+        "replay.html",
+        "junit.xml",
+        "replay.png",
+        "replay.svg",
+        "course.rapier.csv",
+        "course.mujoco.csv",
+        "arm.toml",
+        "calibration.yaml",
+    ] {
+        assert!(folder.join(file).exists(), "{file}");
+    }
+    let junit = fs::read_to_string(folder.join("junit.xml")).unwrap();
+    assert!(
+        junit.contains("tests=\"6\"") && junit.contains("failures=\"0\""),
+        "{junit}"
+    );
+}
+
+#[test]
+fn the_arms_data_that_are_written_are_used_by_scenarios() {
+    let bench = Bench::new();
+    quick(&bench, &shipped(), &[]).exits_with(0);
+    let scenario = "name = \"mine\"\n[robot]\narm = \"out/ur3e_rad_20211005/arm.toml\"\n\
+                    base_rpy_deg = [0, 0, 180]\n[[goals]]\nname = \"g\"\ninsertion_length_mm = 100\n\
+                    [goals.flange_pose]\nposition_mm = [194.2, -359.3, 170.1]\n\
+                    rotation_vector_rad = [-0.8567, 2.7197, -1.1407]\n";
+    bench.write("mine.toml", scenario);
+    let checked = bench.run(&["check", "mine.toml"]).exits_with(0);
+    assert!(
+        checked.stdout.contains("calibration.yaml"),
+        "{}",
+        checked.stdout
+    );
+    // The calibration is that of the arm: its log is met by it to the digits of the log.
+    let overridden = bench.run(&[
+        "fk",
+        "--joints",
+        "0,-1.57,-1,-1.57,1.57,0",
+        "--calibration",
+        "out/ur3e_rad_20211005/calibration.yaml",
+        "--robot",
+        "ur3e",
+    ]);
+    overridden.exits_with(0);
+    let sheet = bench.run(&["servo", "mine.toml", "--engine", "rapier", "--no-pictures"]);
+    assert!(sheet.exits_with(0).stdout.contains("identified from"));
+}
+
+#[test]
+fn another_arm_is_refused_with_both_distances() {
+    let bench = Bench::new();
+    let refused = quick(&bench, &shipped(), &["--arm", "ur3"]).exits_with(2);
+    for part in [
+        "a UR3e's log",
+        "the arm is a UR3",
+        "18.3 mm",
+        "0.46 mm",
+        "--arm ur3e",
+    ] {
+        assert!(refused.stderr.contains(part), "{part}: {}", refused.stderr);
+    }
+}
+
+#[test]
+fn limits_that_are_missed_or_cannot_be_judged_fail() {
+    let bench = Bench::new();
+    let missed = quick(&bench, &shipped(), &["--max-tracking", "0.01"]).exits_with(1);
+    assert!(
+        missed.stdout.contains("FAILED max_tracking_mm in rapier"),
+        "{}",
+        missed.stdout
+    );
+    // Without set-points there is nothing to replay, and that is said.
+    let text = fs::read_to_string(shipped())
+        .unwrap()
+        .replacen("target_", "x_target_", 1000);
+    bench.write("untargeted.csv", &text);
+    let open = quick(&bench, "untargeted.csv", &["--max-tracking", "1"]).exits_with(1);
+    for part in [
+        "INCOMPLETE",
+        "NOT JUDGED max_tracking_mm",
+        "nothing to replay",
+    ] {
+        assert!(open.stdout.contains(part), "{part}: {}", open.stdout);
+    }
+    quick(&bench, "untargeted.csv", &[]).exits_with(0);
+}
+
+#[test]
+fn what_is_wrong_with_a_log_is_said_with_its_place() {
+    let bench = Bench::new();
+    let text = fs::read_to_string(shipped()).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    let swapped = lines[10].replacen("1550297", "1550290", 1);
+    lines[10] = &swapped;
+    bench.write("back.csv", &(lines.join("\n") + "\n"));
+    let refused = quick(&bench, "back.csv", &[]).exits_with(2);
+    assert!(refused.stderr.contains("back.csv:"), "{}", refused.stderr);
+    assert!(
+        refused.stderr.contains("the clock goes back"),
+        "{}",
+        refused.stderr
+    );
+    // Without poses the arm has to be named.
+    let anonymous = text.replacen("TCP_pose", "TCP_place", 1000);
+    bench.write("anonymous.csv", &anonymous);
+    let refused = quick(&bench, "anonymous.csv", &[]).exits_with(2);
+    assert!(
+        refused.stderr.contains("does not say which arm"),
+        "{}",
+        refused.stderr
+    );
+    quick(&bench, "anonymous.csv", &["--arm", "ur3e"]).exits_with(0);
+    quick(&bench, "missing.csv", &[]).exits_with(2);
+}
+
+#[test]
+fn a_scenario_gives_criteria_and_the_command_line_goes_before_it() {
+    let bench = Bench::new();
+    let scenario = "name = \"s\"\n[robot]\narm = \"ur3e\"\n[[goals]]\nname = \"g\"\n\
+                    insertion_length_mm = 100\n[goals.flange_pose]\nposition_mm = [200, -300, 200]\n\
+                    rotation_vector_rad = [0, 3.14, 0]\n[replay]\nmax_moment_rms_nm = 1e-6\n";
+    bench.write("s.toml", scenario);
+    let missed = quick(&bench, &shipped(), &["--scenario", "s.toml"]).exits_with(1);
+    assert!(
+        missed.stdout.contains("FAILED max_moment_rms_nm"),
+        "{}",
+        missed.stdout
+    );
+    let more = ["--scenario", "s.toml", "--max-moment-rms", "0.02"];
+    quick(&bench, &shipped(), &more).exits_with(0);
+}
+
+#[test]
+fn the_same_log_gives_the_same_bytes() {
+    let bench = Bench::new();
+    let log = shipped();
+    let read = || {
+        quick(&bench, &log, &[]).exits_with(0);
+        ["replay.json", "course.rapier.csv", "arm.toml"]
+            .map(|file| fs::read(bench.path("out/ur3e_rad_20211005").join(file)).unwrap())
+    };
+    assert_eq!(read(), read());
+}
