@@ -15,7 +15,8 @@ use crate::table::replay::{shown, small};
 
 const STYLE: &str = concat!(
     include_str!("assets/page.css"),
-    "\n.chart svg { max-width: 100%; height: auto; }\n"
+    "\n.chart svg { max-width: 100%; height: auto; }\n\
+     thead th.number { white-space: normal; min-width: 70px; max-width: 170px; }\n"
 );
 
 /// The page of a recorded run.
