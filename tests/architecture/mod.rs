@@ -97,7 +97,7 @@ const LAYERS: [(&str, &[&str]); 15] = [
 ];
 
 /// Dependencies that one crate alone has, hidden behind its own types.
-const OWNERS: [(&str, &str); 14] = [
+const OWNERS: [(&str, &str); 15] = [
     ("rapier3d-f64", "engine"),
     ("parry3d-f64", "geometry"),
     ("toml", "cell"),
@@ -108,6 +108,7 @@ const OWNERS: [(&str, &str); 14] = [
     ("parquet", "study"),
     ("zstd", "study"),
     ("crc32fast", "study"),
+    ("mcap", "recorded"),
     ("png", "render"),
     ("quick-junit", "report"),
     ("indicatif", "needlebench"),

@@ -250,7 +250,9 @@ fn controller(context: &Context<'_>, torque_nm: &[Joints], known: &KnownArm<'_>)
     let estimate = |of: &dyn Fn(&Fit) -> Option<f64>| estimate(best, &without, of);
     ControllerFit {
         rotor_inertia_kgm2: from_fn(|joint| {
-            estimate(&|fit| fit.rotor(joint)).within(coarsest::ROTOR.0, coarsest::ROTOR.1)
+            estimate(&|fit| fit.rotor(joint))
+                .within(coarsest::ROTOR.0, coarsest::ROTOR.1)
+                .not_negative()
         }),
         loads: loads(context.loads, best, &without),
         gravity_m_s2: estimate(&|fit| fit.gravity())
@@ -342,13 +344,19 @@ fn measured(
     Some(MeasuredFit {
         source,
         rotor_inertia_kgm2: from_fn(|joint| {
-            estimate(&|fit| fit.rotor(joint)).within(coarsest::ROTOR.0, coarsest::ROTOR.1)
+            estimate(&|fit| fit.rotor(joint))
+                .within(coarsest::ROTOR.0, coarsest::ROTOR.1)
+                .not_negative()
         }),
         coulomb_nm: from_fn(|joint| {
-            estimate(&|fit| fit.coulomb(joint)).within(coarsest::COULOMB.0, coarsest::COULOMB.1)
+            estimate(&|fit| fit.coulomb(joint))
+                .within(coarsest::COULOMB.0, coarsest::COULOMB.1)
+                .not_negative()
         }),
         viscous_nms_rad: from_fn(|joint| {
-            estimate(&|fit| fit.viscous(joint)).within(coarsest::VISCOUS.0, coarsest::VISCOUS.1)
+            estimate(&|fit| fit.viscous(joint))
+                .within(coarsest::VISCOUS.0, coarsest::VISCOUS.1)
+                .not_negative()
         }),
         loads: loads(context.loads, best, &without),
         gravity_m_s2,
@@ -375,7 +383,8 @@ fn loads(logged: &[Option<Load>], fit: &Fit, without: &[Fit]) -> Vec<IdentifiedL
     each.map(|(at, logged)| IdentifiedLoad {
         logged: *logged,
         mass_kg: estimate(fit, without, &|fit| fit.mass(at))
-            .within(coarsest::MASS.0, coarsest::MASS.1),
+            .within(coarsest::MASS.0, coarsest::MASS.1)
+            .not_negative(),
         centre_m: from_fn(|axis| {
             estimate(fit, without, &|fit| fit.centre(at, axis))
                 .within(coarsest::CENTRE.0, coarsest::CENTRE.1)

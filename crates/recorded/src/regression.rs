@@ -42,6 +42,16 @@ impl Estimate {
         self.value.filter(|_| self.identifiable)
     }
 
+    /// Not identifiable if it is negative by more than its interval: what cannot be negative and comes out
+    /// so is of torques that the equation does not describe.
+    #[must_use]
+    pub(crate) fn not_negative(mut self) -> Self {
+        if let (Some(value), Some(half)) = (self.value, self.half_width) {
+            self.identifiable &= value >= -half;
+        }
+        self
+    }
+
     /// Identifiable if the interval is no wider, to each side, than `coarsest` or a share of the value.
     #[must_use]
     pub(crate) fn within(mut self, coarsest: f64, share: f64) -> Self {

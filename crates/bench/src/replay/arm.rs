@@ -3,11 +3,17 @@
 
 use nalgebra::{Matrix3, Vector3};
 use needlebench_cell::{BodyKind, Cell, NeedleCorridor, ResolvedScenario, Tool};
-use needlebench_engine::{Actuation, JointFriction, Servo};
-use needlebench_kinematics::{Body, JOINT_COUNT, Joints};
+use needlebench_engine::{Actuation, JointFriction, Servo, ServoGains};
+use needlebench_kinematics::{Body, JOINT_COUNT, JOINT_LABELS, Joints};
 use needlebench_recorded::{Identification, Load, RecordedRun};
 
 use crate::servo_of;
+
+/// A rotor of less than this share of the known one is none.
+const LEAST_ROTOR: f64 = 0.05;
+
+/// Largest ratio of [`Servo::stability_ratio`] of a joint by its rotor alone; stable below 1.
+const STABLE: f64 = 0.8;
 
 /// Stands for the needle's corridor, which a replay does not measure, m.
 const NO_CORRIDOR_M: f64 = 1e-3;
@@ -49,7 +55,9 @@ impl ReplayedArm {
             .iter()
             .map(|load| cell(resolved, *load, rotors))
             .collect();
-        let usual = servo_of(resolved);
+        let mut usual = servo_of(resolved);
+        let timestep_s = resolved.scenario.engines.timestep_ms * 1e-3;
+        softened(&mut usual.gains, &rotors, timestep_s, &mut words);
         let servos = cells
             .iter()
             .map(|cell| Servo {
@@ -79,6 +87,31 @@ impl ReplayedArm {
     }
 }
 
+/// Gains of joints whose rotors are too light for them at this time step, scaled down.
+fn softened(gains: &mut ServoGains, rotors: &Joints, timestep_s: f64, words: &mut Vec<String>) {
+    let mut soft = Vec::new();
+    for (joint, rotor) in rotors.iter().enumerate() {
+        let (kp, kd) = (gains.kp_nm_per_rad[joint], gains.kd_nms_per_rad[joint]);
+        let ratio = (2.0 * kd * timestep_s + kp * timestep_s.powi(2)) / (4.0 * rotor);
+        if ratio > STABLE {
+            gains.kp_nm_per_rad[joint] *= STABLE / ratio;
+            gains.kd_nms_per_rad[joint] *= STABLE / ratio;
+            soft.push(format!(
+                "{} times {:.2}",
+                JOINT_LABELS[joint],
+                STABLE / ratio
+            ));
+        }
+    }
+    if !soft.is_empty() {
+        words.push(format!(
+            "servo gains are scaled down where rotors are too light for them at steps of {} ms: {}",
+            timestep_s * 1e3,
+            soft.join(", ")
+        ));
+    }
+}
+
 /// Rotors as identified, else as they are known.
 fn rotors(
     resolved: &ResolvedScenario,
@@ -89,13 +122,25 @@ fn rotors(
     let controller = identification.controller.as_ref();
     let measured = identification.measured.as_ref();
     let mut identified = 0;
+    let mut senseless = Vec::new();
     let rotors = Joints::from_fn(|joint, _| {
         let of_controller = controller.and_then(|fit| fit.rotor_inertia_kgm2[joint].known());
         let found =
             of_controller.or(measured.and_then(|fit| fit.rotor_inertia_kgm2[joint].known()));
+        if found.is_some_and(|found| found < LEAST_ROTOR * known[joint]) {
+            senseless.push(JOINT_LABELS[joint]);
+            return known[joint];
+        }
         identified += usize::from(found.is_some());
-        found.map_or(known[joint], |found| found.max(0.0))
+        found.unwrap_or(known[joint])
     });
+    if !senseless.is_empty() {
+        words.push(format!(
+            "rotor inertia identified at {} is not positive, or next to nothing: not used; do the torques \
+             of the log belong to its motion?",
+            senseless.join(", ")
+        ));
+    }
     words.push(match identified {
         JOINT_COUNT => "rotor inertia: identified from this log".to_owned(),
         0 => format!("rotor inertia: {}", resolved.servo.armature_source),

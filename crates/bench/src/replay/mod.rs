@@ -20,8 +20,8 @@ use needlebench_engine::{Engine, EngineIdentity, EnginePool};
 use needlebench_evaluation::report::{CriterionResult, EngineFailure, NotJudged, Verdict};
 use needlebench_kinematics::{Joints, UrGeometry};
 use needlebench_recorded::{
-    ArmFit, CalibrationFit, Identification, KnownArm, LogKind, LogSource, RecordedRun, Tracking,
-    arm_fits, calibrate, identify, tracking,
+    ArmFit, CalibrationFit, Estimate, Identification, KnownArm, LogKind, LogSource, RecordedRun,
+    Tracking, arm_fits, calibrate, identify, tracking,
 };
 use serde::Serialize;
 
@@ -145,7 +145,7 @@ pub fn named_by(run: &RecordedRun) -> Option<&'static str> {
 /// # Errors
 /// A log that is of another arm.
 pub fn replay(
-    run: RecordedRun,
+    mut run: RecordedRun,
     resolved: &ResolvedScenario,
     how_found: &str,
     criteria: &ReplaySection,
@@ -188,6 +188,8 @@ pub fn replay(
     notes.extend(identification.notes.iter().cloned());
     notes.extend(remarks(&identification, calibration.as_ref()));
     notes.extend(resolved.notes.iter().cloned());
+    // What nobody needs any more: of a long run it is a third of the memory.
+    (run.actual_qd, run.target_current_a, run.tcp, run.effort_nm) = (None, None, None, None);
     let (mut replays, mut courses, mut failures) = (BTreeMap::new(), Vec::new(), Vec::new());
     let mut identities: Vec<EngineIdentity> = Vec::new();
     let mut replayed = Vec::new();
@@ -326,6 +328,24 @@ fn remarks(identification: &Identification, calibration: Option<&CalibrationFit>
             fit.held_out.rms_m * 1e3,
             fit.nominal_held_out.rms_m * 1e3
         ));
+    }
+    let controller = identification.controller.iter();
+    let controller = controller.map(|fit| ("target_moment", &fit.rotor_inertia_kgm2, &fit.loads));
+    let measured = identification.measured.iter();
+    let measured = measured.map(|fit| (fit.source.as_str(), &fit.rotor_inertia_kgm2, &fit.loads));
+    for (source, rotors, loads) in controller.chain(measured) {
+        let masses = loads.iter().map(|load| &load.mass_kg);
+        let is_negative = |each: &Estimate| {
+            each.value
+                .zip(each.half_width)
+                .is_some_and(|(value, half)| value < -half)
+        };
+        if rotors.iter().chain(masses).any(is_negative) {
+            notes.push(format!(
+                "rotors or loads by {source} come out negative: these are not the torques of this arm on \
+                 this motion, and nothing identified from them should be trusted"
+            ));
+        }
     }
     let (Some(controller), Some(measured)) = (&identification.controller, &identification.measured)
     else {

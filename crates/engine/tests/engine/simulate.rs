@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use needlebench_engine::{
-    Actuation, EngineError, Hooks, RapierPlant, RapierSettings, Recording, Servo, ServoGains,
-    simulate,
+    Actuation, EngineError, Hooks, Keep, Motion, RapierPlant, RapierSettings, Recording, Servo,
+    ServoGains, simulate, simulate_motion,
 };
 use needlebench_kinematics::Joints;
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
@@ -47,6 +47,37 @@ fn run(servo: &Servo, timestep_s: f64, hooks: Hooks<'_>) -> Result<Recording, En
         &trajectory(),
         hooks,
     )
+}
+
+/// What is kept of a motion is what the whole recording has at those times; nothing else changes.
+#[test]
+fn states_near_given_times_are_those_of_the_whole_recording() {
+    let whole = run(&servo(), TIMESTEP_S, Hooks::default()).unwrap();
+    let end_s = whole.time_s[whole.steps()];
+    // Off the steps, at them, twice within one, and after the end.
+    let times_s = [0.0, 0.010_3, 0.010_4, 0.5, end_s - 0.000_2, end_s + 1.0];
+    let cell = crate::common::ur3(Vec::new());
+    let mut plant = RapierPlant::new(&cell, TIMESTEP_S, &RapierSettings::default()).unwrap();
+    let (servo, trajectory) = (servo(), trajectory());
+    let motion = Motion {
+        servo: &servo,
+        actuation: &Actuation::default(),
+        trajectory: &trajectory,
+        braking: None,
+        keep: Keep::Near(&times_s),
+    };
+    let kept = simulate_motion(&mut plant, &motion, Hooks::default()).unwrap();
+    let wanted = [0, 10, 500, whole.steps()];
+    assert_eq!(kept.time_s, wanted.map(|step| whole.time_s[step]));
+    assert_eq!(kept.state, wanted.map(|step| whole.state[step]));
+    assert_eq!(kept.reference, wanted.map(|step| whole.reference[step]));
+    // After the last state there is no torque.
+    let torques: Vec<Joints> = wanted[..3]
+        .iter()
+        .map(|step| whole.torque_nm[*step])
+        .collect();
+    assert_eq!(kept.torque_nm, torques);
+    assert_eq!(kept.saturated_steps, whole.saturated_steps);
 }
 
 #[test]

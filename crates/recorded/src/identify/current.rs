@@ -168,7 +168,9 @@ impl Data {
         };
         let torque_constant_nm_a = estimate(&constant).within(0.0, CONSTANT);
         let friction = |place: usize, (coarsest, of_value): (f64, f64)| {
-            let mut found = estimate(&share(place)).within(coarsest, of_value);
+            let mut found = estimate(&share(place))
+                .within(coarsest, of_value)
+                .not_negative();
             found.identifiable &= torque_constant_nm_a.identifiable;
             found
         };

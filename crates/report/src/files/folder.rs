@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::atomic::write_atomically;
+use super::atomic::{stream_atomically, write_atomically};
 use super::error::FilesError;
 use crate::chart::Chart;
 use needlebench_render::Image;
@@ -33,6 +33,16 @@ impl Folder<'_> {
     pub fn write(self, name: &str, bytes: impl AsRef<[u8]>) -> Result<(), FilesError> {
         let path = self.path(name);
         write_atomically(&path, bytes.as_ref()).map_err(|source| FilesError::Write { path, source })
+    }
+
+    /// Writes a file bit by bit.
+    pub fn stream(
+        self,
+        name: &str,
+        write: &mut dyn FnMut(&mut dyn io::Write) -> io::Result<()>,
+    ) -> Result<(), FilesError> {
+        let path = self.path(name);
+        stream_atomically(&path, write).map_err(|source| FilesError::Write { path, source })
     }
 
     /// Writes a value as JSON for people and programs.

@@ -1,6 +1,6 @@
 //! Files of a replay.
 
-use std::fmt::Write;
+use std::io::Write;
 
 use needlebench_bench::replay::{ArmFiles, Course, Replay};
 use needlebench_kinematics::JOINT_COUNT;
@@ -26,7 +26,8 @@ pub fn write_replay(
     folder.write("replay.txt", text(&replay.report) + "\n")?;
     folder.write("junit.xml", replay_junit(&replay.report)?)?;
     for (engine, course) in &replay.courses {
-        folder.write(&format!("course.{engine}.csv"), course_csv(replay, course))?;
+        let name = format!("course.{engine}.csv");
+        folder.stream(&name, &mut |out| write_course(out, replay, course))?;
     }
     for (name, content) in [
         ("arm.toml", arm.map(|arm| &arm.arm)),
@@ -57,17 +58,16 @@ pub fn write_replay(
 
 /// Errors from the set-points (rad), torques at the links and of the motors (N m), a line per row of the log; empty
 /// where nothing was compared.
-fn course_csv(replay: &Replay, course: &Course) -> String {
-    let mut out = String::from("time_s");
+fn write_course(out: &mut dyn Write, replay: &Replay, course: &Course) -> std::io::Result<()> {
+    write!(out, "time_s")?;
     for name in ["error_rad", "link_nm", "motor_nm"] {
         for joint in 0..JOINT_COUNT {
-            // Writing to a text cannot fail, here and below.
-            let _ = write!(out, ",{name}_{joint}");
+            write!(out, ",{name}_{joint}")?;
         }
     }
-    out.push('\n');
+    writeln!(out)?;
     for (row, time_s) in replay.run.time_s.iter().enumerate() {
-        let _ = write!(out, "{time_s}");
+        write!(out, "{time_s}")?;
         for values in [
             &course.error[row],
             &course.link_nm[row],
@@ -75,13 +75,13 @@ fn course_csv(replay: &Replay, course: &Course) -> String {
         ] {
             for value in values {
                 if value.is_finite() {
-                    let _ = write!(out, ",{value:.9}");
+                    write!(out, ",{value:.9}")?;
                 } else {
-                    out.push(',');
+                    write!(out, ",")?;
                 }
             }
         }
-        out.push('\n');
+        writeln!(out)?;
     }
-    out
+    Ok(())
 }
