@@ -107,6 +107,7 @@ impl Check<'_> {
             ("servo.source", data.servo.as_ref().map(|t| &t.source)),
             ("rotors.source", data.rotors.as_ref().map(|t| &t.source)),
             ("control.source", data.control.as_ref().map(|t| &t.source)),
+            ("gravity.source", data.gravity.as_ref().map(|t| &t.source)),
             ("gears.source", data.gears.as_ref().map(|t| &t.source)),
             ("friction.source", data.friction.as_ref().map(|t| &t.source)),
             ("brakes.source", data.brakes.as_ref().map(|t| &t.source)),
