@@ -102,6 +102,7 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         iso9283: None,
         engine_failures: results.failures,
         arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
+        gravity: resolved.gravity.clone(),
         enclosure: enclosures(&resolved.cell.robot),
         notes: notes(resolved, results.engines),
         expected: resolved.expected.as_ref().map(expected_report),

@@ -20,7 +20,8 @@ pub(crate) type Budgets = Vec<Vec<Option<Result<ErrorBudget, String>>>>;
 /// draws are for is how far 95 % of them stay within.
 pub(crate) fn budgets(setup: &Setup<'_>, plans: &[GoalPlan], threads: usize) -> Budgets {
     let seed = setup.resolved.scenario.seed;
-    let is_own = setup.resolved.imperfections.is_some();
+    let expected = setup.resolved.expected.as_ref();
+    let is_own = expected.is_some_and(|expected| expected.class.is_none());
     of_each(setup, plans, threads, |case| {
         let total = case.imperfections.budget_samples;
         let each_source = if is_own { total } else { 0 };

@@ -55,7 +55,10 @@ pub fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentity>) -> 
         engines,
         inputs,
         seed: resolved.scenario.seed,
-        truth: if resolved.imperfections.is_some() {
+        truth: if resolved.scenario.imperfections.is_none() && resolved.imperfections.is_some() {
+            "nominal robot whose controller believes in another gravity: errors are those of that \
+             belief, of inverse kinematics, control and simulation"
+        } else if resolved.imperfections.is_some() {
             "an imperfect robot and phantom, drawn from the seed: errors are those of the \
              scenario's imperfections, of control and of simulation"
         } else if calibration.is_some() {

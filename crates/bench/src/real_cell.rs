@@ -200,11 +200,12 @@ pub fn drawn_truth(resolved: &ResolvedScenario) -> Option<Result<Truth, Registra
     ))
 }
 
-/// The servo as it believes the robot to be.
+/// The servo as it believes the robot, and gravity, to be.
 pub fn servo_of(resolved: &ResolvedScenario) -> Servo {
     let settings = &resolved.servo;
+    let believed = resolved.gravity.believed();
     Servo {
-        dynamics: resolved.cell.dynamics(),
+        dynamics: resolved.cell.dynamics_under(&believed),
         gains: ServoGains {
             kp_nm_per_rad: settings.stiffness_nm_rad,
             kd_nms_per_rad: settings.damping_nms_rad,

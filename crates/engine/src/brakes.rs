@@ -30,6 +30,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use needlebench_cell::arm::{BrakeFigure, BrakeFigures};
+use needlebench_cell::scenario::STANDARD_GRAVITY_M_S2;
 use needlebench_kinematics::{Body, Dynamics, JOINT_COUNT, Joints};
 
 /// Speed below which a joint counts as standing, rad/s: a few millimetres a second at the end of the arm,
@@ -153,7 +154,8 @@ impl Brakes {
     }
 }
 
-/// The arm with the load of the published stops at its flange, level.
+/// The arm with the load of the published stops at its flange, level, in standard gravity: makers stop their
+/// arms on Earth.
 ///
 /// The mass and the inertia of a tool that is part of the last body stay: a needle guide weighs little
 /// beside the load.
@@ -165,7 +167,7 @@ pub fn loaded(dynamics: &Dynamics, load_kg: f64) -> Dynamics {
         inertia_kgm2: Matrix3::zeros(),
     };
     loaded.bodies[JOINT_COUNT - 1] = loaded.bodies[JOINT_COUNT - 1].combined_with(&load);
-    loaded.gravity_m_s2 = -Vector3::z() * dynamics.gravity_m_s2.norm();
+    loaded.gravity_m_s2 = -Vector3::z() * STANDARD_GRAVITY_M_S2;
     loaded
 }
 

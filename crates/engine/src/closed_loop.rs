@@ -231,6 +231,7 @@ impl ClosedLoop {
 mod tests {
     use super::*;
     use crate::{JointFriction, ServoGains};
+    use nalgebra::Complex;
     use needlebench_kinematics::random::SplitMix64;
 
     const POSTURE: Joints = Joints::new(0.3, -1.2, 1.4, -0.3, 0.7, 0.2);
@@ -251,10 +252,14 @@ mod tests {
         let (inertia, h) = (0.4, 1e-3);
         let mass = Matrix6::identity() * inertia;
         let radius = ClosedLoop::new(&mass, &servo, &Actuation::default(), h).spectral_radius();
-        let (a, b) = (2000.0 * h * h / inertia, 60.0 * h / inertia);
-        let half = 0.5 * (2.0 - a - b);
-        let root = (half * half - (1.0 - b)).sqrt();
-        let expected = f64::max((half + root).abs(), (half - root).abs());
+        let gains = servo.gains.kp_nm_per_rad.iter();
+        let largest = gains.zip(&servo.gains.kd_nms_per_rad).map(|(kp, kd)| {
+            let (a, b) = (kp * h * h / inertia, kd * h / inertia);
+            let half = Complex::from(0.5 * (2.0 - a - b));
+            let root = (half * half - (1.0 - b)).sqrt();
+            f64::max((half + root).norm(), (half - root).norm())
+        });
+        let expected = largest.fold(0.0, f64::max);
         assert!((radius - expected).abs() < 1e-8, "{radius} {expected}");
     }
 
@@ -301,7 +306,7 @@ mod tests {
     #[test]
     fn noise_at_rest_has_the_covariance_of_the_loops_own_motion() {
         let mut servo = servo();
-        // With a step of delay, 60 N m s/rad on the wrists' armature would be unstable.
+        // With a step of delay, 43 N m s/rad on the wrists' armature is near to unstable.
         servo.gains.kd_nms_per_rad = [20.0; JOINT_COUNT];
         let mass = servo.dynamics.mass_matrix(&POSTURE);
         let friction = JointFriction {

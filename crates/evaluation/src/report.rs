@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::{ArmReport, LinkEnclosure};
+use needlebench_cell::{ArmReport, GravitySettings, LinkEnclosure};
 use needlebench_engine::EngineIdentity;
 use needlebench_uncertainty::budget::ErrorBudget;
 use serde::Serialize;
@@ -43,6 +43,8 @@ pub struct Report {
     pub engine_failures: Vec<EngineFailure>,
     /// The arm whose data the robot has; none if its lengths are those of no arm that is known.
     pub arm: Option<ArmReport>,
+    /// Gravity of the world, and what the controller takes it for.
+    pub gravity: GravitySettings,
     /// What the enclosing primitives of that arm's own URDF would cost beside the meshes of the robot
     /// in use; empty unless that robot has meshes of its own.
     pub enclosure: Vec<LinkEnclosure>,

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from model import (
+    GRAVITY_M_S2,
     MODELS,
     Arm,
     defaults,
@@ -47,12 +48,17 @@ SAME_POINT_M = 1e-9
 
 
 def arm_data(path: Path, scenario: dict) -> dict:
-    """A shipped arm's data, with the gains that a scenario's controller has instead."""
+    """A shipped arm's data, with the gains that a scenario's controller has instead.
+
+    And gravity, m/s^2: the world's, and what the controller takes it for, which is the world's unless it says.
+    """
     data = read_toml(path)
     controller = scenario.get("controller", {})
     for key in ("stiffness_nm_rad", "damping_nms_rad"):
         if key in controller:
             data["servo"][key] = controller[key]
+    data["world_m_s2"] = scenario.get("engines", {}).get("gravity_m_s2", GRAVITY_M_S2)
+    data["believed_m_s2"] = controller.get("gravity_m_s2", data["world_m_s2"])
     return data
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from model import (
+    GRAVITY_M_S2,
     Arm,
     Array,
     Chain,
@@ -524,10 +525,14 @@ def rest(case: Case, truth: Truth, random: np.random.Generator) -> Array:
     believed = gravity_torque(
         arm, arm.chain, target, np.array([body.mass]), body.com[None]
     )
+    believed *= arm.data["believed_m_s2"] / GRAVITY_M_S2
+    here = arm.data["world_m_s2"] / GRAVITY_M_S2
     stuck = friction_error(case, truth) if truth.friction is not None else 0.0
     q = target
     for _ in range(BALANCE_STEPS):
-        load = gravity_torque(arm, truth.chain, q, truth.tool_mass, truth.tool_com)
+        load = here * gravity_torque(
+            arm, truth.chain, q, truth.tool_mass, truth.tool_com
+        )
         q = (
             target
             - (load - believed) / kp

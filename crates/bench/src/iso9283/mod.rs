@@ -256,6 +256,7 @@ fn empty_report(
         iso9283: None,
         engine_failures: Vec::new(),
         arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
+        gravity: resolved.gravity.clone(),
         enclosure: Vec::new(),
         notes: resolved.notes.clone(),
         provenance: provenance(resolved, identities),

@@ -58,12 +58,30 @@ impl ReplayedArm {
         let mut usual = servo_of(resolved);
         let timestep_s = resolved.scenario.engines.timestep_ms * 1e-3;
         softened(&mut usual.gains, &rotors, timestep_s, &mut words);
+        let believed = believed_gravity(resolved, identification, &mut words);
+        let as_points = identification
+            .controller
+            .as_ref()
+            .is_some_and(|controller| !controller.has_tensors);
+        if as_points {
+            words.push("feed-forward: links as points, as the controller has them".to_owned());
+        }
         let servos = cells
             .iter()
-            .map(|cell| Servo {
-                dynamics: cell.dynamics(),
-                gains: usual.gains,
-                effort_limit_nm: usual.effort_limit_nm,
+            .map(|cell| {
+                let mut dynamics = cell.dynamics_under(&believed);
+                if as_points {
+                    let mut points = cell.clone();
+                    for body in &mut points.robot.bodies {
+                        body.inertia_kgm2 = Matrix3::zeros();
+                    }
+                    dynamics = points.dynamics_under(&believed);
+                }
+                Servo {
+                    dynamics,
+                    gains: usual.gains,
+                    effort_limit_nm: usual.effort_limit_nm,
+                }
             })
             .collect();
         let friction = friction(resolved, identification, &mut words);
@@ -84,6 +102,35 @@ impl ReplayedArm {
             }),
             words,
         }
+    }
+}
+
+/// Gravity that the controller counts with, world axes, m/s^2: as identified, as the scenario has it, or as
+/// the arm's data have it.
+fn believed_gravity(
+    resolved: &ResolvedScenario,
+    identification: &Identification,
+    words: &mut Vec<String>,
+) -> Vector3<f64> {
+    let down = -Vector3::z();
+    let controller = identification.controller.as_ref();
+    if let Some(found) = controller.and_then(|fit| fit.gravity_m_s2.known()) {
+        words.push(format!(
+            "feed-forward: gravity {found:.3} m/s^2, identified from this log"
+        ));
+        return down * found;
+    }
+    let data = resolved.cell.robot.arm.as_ref().map(|used| &used.arm.data);
+    let of_data = data.and_then(|data| data.gravity.as_ref());
+    match (resolved.scenario.controller.gravity_m_s2, of_data) {
+        (None, Some(of_data)) => {
+            words.push(format!(
+                "feed-forward: gravity {} m/s^2, the arm's data",
+                of_data.believed_m_s2
+            ));
+            down * of_data.believed_m_s2
+        }
+        _ => resolved.gravity.believed(),
     }
 }
 

@@ -1,6 +1,8 @@
 //! What a log says of an arm, as data that scenarios use: `[robot] arm = "my_arm.toml"`.
 
-use needlebench_cell::arm::data::{ArmData, FrictionData, MotorData, OwnCalibration, RotorData};
+use needlebench_cell::arm::data::{
+    ArmData, FrictionData, GravityData, MotorData, OwnCalibration, RotorData,
+};
 use needlebench_cell::{Calibration, Robot};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS};
 use needlebench_recorded::Estimate;
@@ -115,6 +117,13 @@ pub fn arm_files(report: &ReplayReport, robot: &Robot, calibration_file: &str) -
                 source,
             })
             .or(of_type.motors.clone()),
+        gravity: controller
+            .and_then(|fit| Some((fit.gravity_m_s2.known()?, fit.gravity_m_s2.half_width?)))
+            .map(|(value, half)| GravityData {
+                believed_m_s2: rounded(value, half),
+                source: format!("{whence}, 95 %: +-{half:.1e}"),
+            })
+            .or(of_type.gravity.clone()),
         friction,
         population,
         calibration: calibration.map(|fit| OwnCalibration {

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::linear::Linear;
 
-/// Amplitude at which the loop is linear, rad: a torque of 2 N m at the default gains.
+/// Amplitude at which the loop is linear, rad: a torque of 1 to 3 N m at the default gains.
 pub const SMALL_RAD: f64 = 1e-3;
 
 /// A large step asks for this many times the torque that the joint has.

@@ -67,6 +67,18 @@ pub fn settings(resolved: &ResolvedScenario, servo: &Servo) -> Vec<Setting> {
             chosen_servo.armature_source.clone(),
         ),
         per_joint(
+            "gravity of the world",
+            "m/s^2",
+            vec![resolved.gravity.world_m_s2],
+            resolved.gravity.world_source.clone(),
+        ),
+        per_joint(
+            "gravity that the controller believes",
+            "m/s^2",
+            vec![resolved.gravity.believed_m_s2],
+            resolved.gravity.believed_source.clone(),
+        ),
+        per_joint(
             "torque limit",
             "N m",
             servo.effort_limit_nm.iter().copied().collect(),

@@ -108,6 +108,7 @@ impl Check<'_> {
             ("rotors.source", data.rotors.as_ref().map(|t| &t.source)),
             ("motors.source", data.motors.as_ref().map(|t| &t.source)),
             ("control.source", data.control.as_ref().map(|t| &t.source)),
+            ("gravity.source", data.gravity.as_ref().map(|t| &t.source)),
             ("gears.source", data.gears.as_ref().map(|t| &t.source)),
             ("friction.source", data.friction.as_ref().map(|t| &t.source)),
             ("brakes.source", data.brakes.as_ref().map(|t| &t.source)),

@@ -52,6 +52,9 @@ pub struct ArmData {
     /// The controller.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub control: Option<ControlData>,
+    /// What the maker's controller takes gravity for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<GravityData>,
     /// Elasticity of the gears.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gears: Option<GearData>,
@@ -82,7 +85,7 @@ pub struct ArmData {
 pub type Lacks = std::collections::BTreeMap<String, String>;
 
 /// Names of the tables that may be left out.
-pub(super) const TABLES: [&str; 18] = [
+pub(super) const TABLES: [&str; 19] = [
     "inertia",
     "limits",
     "enclosure",
@@ -94,6 +97,7 @@ pub(super) const TABLES: [&str; 18] = [
     "rotors",
     "motors",
     "control",
+    "gravity",
     "gears",
     "friction",
     "brakes",
@@ -261,6 +265,17 @@ pub struct ControlData {
     /// Time between two set-points, ms.
     #[schemars(range(min = 0.01, max = 1000.0))]
     pub period_ms: f64,
+    /// A citation, or `assumed: ` and why.
+    pub source: String,
+}
+
+/// What the maker's controller takes gravity for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GravityData {
+    /// Acceleration of gravity in the controller's feed-forward, m/s^2.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub believed_m_s2: f64,
     /// A citation, or `assumed: ` and why.
     pub source: String,
 }

@@ -90,20 +90,23 @@ fn unknown_keys_are_refused_with_the_likeliest() {
 fn values_that_cannot_be_are_refused_at_their_line() {
     let finding = refused("kg = 3.0", "kg = 3000.0");
     says(&finding, "payload.kg", &["3000 kg", "outside 0.1 to 100"]);
-    let finding = refused("ratio = 2.0", "ratio = 0.5");
+    let finding = refused("ratio = 1.0", "ratio = 0.5");
     says(&finding, "brakes.standing.ratio", &["outside 1 to 10"]);
-    let finding = refused("stiction_nm = [4.1,", "stiction_nm = [3.1,");
+    let finding = refused("stiction_nm = [4.0,", "stiction_nm = [3.1,");
     says(&finding, "friction.stiction_nm[0]", &["break-away"]);
 }
 
 #[test]
 fn a_value_without_a_source_is_refused() {
     let finding = refused(
-        "source = \"assumed: UR publishes none\"",
+        "source = \"assumed: derived from the UR3e, whose were identified from a recorded run; README step 8\"",
         "source = \"assumed: \"",
     );
     says(&finding, "rotors.source", &["says nothing", "a citation"]);
-    let finding = refused("source = \"assumed: UR publishes none\"\n", "\n");
+    let finding = refused(
+        "source = \"assumed: derived from the UR3e, whose were identified from a recorded run; README step 8\"\n",
+        "\n",
+    );
     says(&finding, "rotors.source", &["is missing"]);
 }
 

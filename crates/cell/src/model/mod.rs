@@ -457,6 +457,11 @@ impl Cell {
 
     /// The arm with its tool as rigid bodies, for inverse dynamics.
     pub fn dynamics(&self) -> Dynamics {
+        self.dynamics_under(&self.gravity_m_s2)
+    }
+
+    /// The same under another gravity, world axes, m/s^2: one that a controller believes in.
+    pub fn dynamics_under(&self, gravity_m_s2: &Vector3<f64>) -> Dynamics {
         let mut bodies = self.robot.bodies;
         let tool_in_link = self
             .tool
@@ -467,7 +472,7 @@ impl Cell {
             chain: self.robot.chain,
             bodies,
             armature_kgm2: self.armature_kgm2,
-            gravity_m_s2: self.robot.world_from_base_link.rotation.inverse() * self.gravity_m_s2,
+            gravity_m_s2: self.robot.world_from_base_link.rotation.inverse() * gravity_m_s2,
         }
     }
 

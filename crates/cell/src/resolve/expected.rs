@@ -4,8 +4,8 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::GRAVITY_M_S2;
 use super::arm_values::gear_twist;
+use super::gravity::makers_gravity;
 use super::imperfections::{Elasticity, Imperfections, resolve_imperfections};
 use super::library::ModelLibrary;
 use crate::scenario::{ArmClass, BreathState, ImperfectionsSection, Scenario};
@@ -31,6 +31,8 @@ pub(crate) struct RealThings<'a> {
     pub tool: &'a Tool,
     pub base: &'a Path,
     pub timestep_ms: f64,
+    /// Of the world.
+    pub gravity_m_s2: f64,
 }
 
 impl RealThings<'_> {
@@ -55,11 +57,11 @@ impl RealThings<'_> {
                     let tool = carried.then_some(self.tool);
                     // Makers measure their arms upright; one that is measured here stands or hangs as it
                     // does here.
-                    let down = Vector3::new(0.0, 0.0, -GRAVITY_M_S2);
                     let gravity_m_s2 = if carried {
-                        self.robot.world_from_base_link.rotation.inverse() * down
+                        let here = Vector3::new(0.0, 0.0, -self.gravity_m_s2);
+                        self.robot.world_from_base_link.rotation.inverse() * here
                     } else {
-                        down
+                        makers_gravity()
                     };
                     self.library
                         .absorbed_sag(self.robot, tool, &gears, gravity_m_s2)

@@ -6,6 +6,7 @@ mod expected;
 mod fixtures;
 mod gears;
 mod goals;
+mod gravity;
 pub mod imperfections;
 pub mod iso9283;
 mod layout;
@@ -43,6 +44,8 @@ pub use expected::Expected;
 use expected::RealThings;
 use goals::{BodyBoxes, Surroundings, resolve_goal};
 pub use goals::{Expectation, Goal, Roll};
+pub use gravity::GravitySettings;
+use gravity::gravity_settings;
 use imperfections::Imperfections;
 use iso9283::{Iso9283Protocol, resolve_iso9283};
 use layout::Layout;
@@ -56,14 +59,11 @@ pub use phantom::PlacedPhantom;
 use phantom::place_phantom;
 pub use robot::load_robot;
 pub use servo::ServoSettings;
-use servo::servo_settings;
+use servo::{note_assumed_drives, servo_settings};
 use standing::{
     KnownDepths, Standing, check_distance, check_floor, check_start, note_crowds,
     note_idle_criteria,
 };
-
-/// Standard gravity, m/s^2.
-const GRAVITY_M_S2: f64 = 9.80665;
 
 /// A scenario with everything that it names read, checked and placed.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,6 +86,8 @@ pub struct ResolvedScenario {
     pub start: Joints,
     /// The joint servo.
     pub servo: ServoSettings,
+    /// Gravity, and what the controller takes it for.
+    pub gravity: GravitySettings,
     /// Limits of the motion: the scenario's and the URDF's, whichever are lower.
     pub motion: MotionLimits,
     /// Parameter file of the phantom.
@@ -328,23 +330,35 @@ pub(crate) fn resolve(
         tool: &tool,
         base,
         timestep_ms: scenario.engines.timestep_ms,
+        gravity_m_s2: scenario.engines.gravity_m_s2,
     };
     let imperfections = scenario.imperfections.as_ref();
     let imperfections = imperfections.map(|section| real.resolve(section, &mut notes));
-    let imperfections = imperfections.transpose().map_err(one)?;
+    let mut imperfections = imperfections.transpose().map_err(one)?;
     let expected = real
         .expected(&scenario, imperfections.as_ref(), &mut notes)
         .map_err(one)?;
     check_brakes(toml, &scenario, &robot, &mut notes).map_err(one)?;
     let file = &source.file;
     let servo = servo_settings(file, &scenario.controller, &robot, &tool, &mut notes);
+    let with_friction = |each: &Imperfections| each.friction.is_some();
+    let has_friction = imperfections.as_ref().is_some_and(with_friction)
+        || expected
+            .as_ref()
+            .is_some_and(|expected| with_friction(&expected.imperfections));
+    note_assumed_drives(&scenario, &robot, has_friction, &mut notes);
+    let gravity = gravity_settings(file, &scenario, &robot, &mut notes);
+    if gravity.is_believed_wrongly() {
+        // An arm that is not what its controller believes.
+        imperfections.get_or_insert_with(Imperfections::none);
+    }
     let cell = Cell::assemble(
         robot,
         tool,
         corridor,
         surroundings,
         Joints::from_column_slice(&servo.armature_kgm2),
-        Vector3::new(0.0, 0.0, -GRAVITY_M_S2),
+        gravity.world(),
     );
     Ok(ResolvedScenario {
         scenario,
@@ -356,6 +370,7 @@ pub(crate) fn resolve(
         iso9283,
         start,
         servo,
+        gravity,
         motion,
         phantom_source,
         phantom_parts,

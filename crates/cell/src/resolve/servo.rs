@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints};
 use serde::Serialize;
 
-use crate::scenario::ControllerSection;
+use crate::scenario::{ControllerSection, Scenario};
 use crate::{Robot, Tool};
 
 /// Frequency at which the rule lets the stretched-out arm swing about its heaviest joint, Hz.
@@ -94,6 +94,44 @@ pub(crate) fn servo_settings(
     }
 }
 
+/// A note of what an arm's data assume of its drives, where a scenario leaves that to the arm; by the first
+/// clause of the reason that they give.
+pub(crate) fn note_assumed_drives(
+    scenario: &Scenario,
+    robot: &Robot,
+    has_friction: bool,
+    notes: &mut Vec<String>,
+) {
+    let Some(used) = &robot.arm else {
+        return;
+    };
+    let data = &used.arm.data;
+    let rotors = data.rotors.as_ref().map(|rotors| &rotors.source);
+    let rotors = rotors.filter(|_| scenario.controller.armature_kgm2.is_none());
+    let block = scenario.imperfections.as_ref();
+    let block = block.and_then(|block| block.friction.as_ref());
+    let is_given =
+        block.is_some_and(|block| block.coulomb_nm.is_some() && block.viscous_nms_rad.is_some());
+    let friction = data.friction.as_ref().map(|friction| &friction.source);
+    let friction = friction.filter(|_| has_friction && !is_given);
+    let reason = |source: &String| {
+        let reason = source.strip_prefix("assumed:")?;
+        Some(reason.split(';').next()?.trim().to_owned())
+    };
+    let assumed = match (rotors.and_then(reason), friction.and_then(reason)) {
+        (Some(rotors), Some(friction)) if rotors == friction => {
+            format!("rotor inertia and friction ({rotors})")
+        }
+        (Some(rotors), Some(friction)) => {
+            format!("rotor inertia ({rotors}), friction ({friction})")
+        }
+        (Some(rotors), None) => format!("rotor inertia ({rotors})"),
+        (None, Some(friction)) => format!("friction ({friction})"),
+        (None, None) => return,
+    };
+    notes.push(format!("assumed of the {}: {assumed}", data.name));
+}
+
 /// The rule in words.
 const RULE: &str = "assumed: the stretched-out arm swings at 6 Hz, damped at 0.6, and rotors are heavy \
                     enough for steps of 1 ms";
@@ -136,11 +174,12 @@ mod tests {
     use super::*;
     use crate::{Overrides, load_scenario};
 
-    /// The rule for arms of which nothing is known, from which the UR3's gains come too.
+    /// The rule for arms of which nothing is known swings the same shoulder as the UR3's own gains do, at the
+    /// same frequency with the same damping: but without the rated load, and with a light rotor.
     #[test]
-    fn the_general_rule_gives_about_the_gains_of_a_ur3() {
-        /// The rule swings links, tool and rotor, 0.92 kg m^2; the UR3's gains are for 1.4 kg m^2.
-        const LIKENESS: f64 = 0.35;
+    fn the_general_rule_swings_a_ur3_as_its_own_gains_do() {
+        /// The UR3's gains are rounded to two digits.
+        const DIGITS: f64 = 0.025;
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("s.toml");
         let scenario = "name = \"s\"\n[robot]\nbase_rpy_deg = [0, 0, 180]\n[[goals]]\nname = \"g\"\n\
@@ -151,14 +190,23 @@ mod tests {
         let cell = &resolved.cell;
         let rule = General::of(&cell.robot, &cell.tool);
         let servo = &resolved.servo;
-        assert_eq!(servo.stiffness_nm_rad, [2000.0; JOINT_COUNT]);
-        for (ours, arms) in [
-            (rule.stiffness_nm_rad, servo.stiffness_nm_rad[0]),
-            (rule.damping_nms_rad, servo.damping_nms_rad[0]),
-            (rule.armature_kgm2, servo.armature_kgm2[0]),
-        ] {
-            println!("{ours} {arms}");
-            assert!((ours / arms - 1.0).abs() < LIKENESS, "{ours} {arms}");
+        // Of the rule: links and tool, 0.85 kg m^2, and its rotor.
+        let swung_kgm2 = rule.stiffness_nm_rad / (TAU * NATURAL_FREQUENCY_HZ).powi(2);
+        assert!((0.8..1.0).contains(&swung_kgm2), "{swung_kgm2}");
+        // A lighter arm needs less of both gains, by the same factor.
+        let factors = [
+            servo.stiffness_nm_rad[1] / rule.stiffness_nm_rad,
+            servo.damping_nms_rad[1] / rule.damping_nms_rad,
+        ];
+        assert!(
+            (factors[0] / factors[1] - 1.0).abs() < DIGITS,
+            "{factors:?}"
+        );
+        // Wrists: velocity gain by rotor inertia is that of the rule.
+        for wrist in 3..JOINT_COUNT {
+            let per_rotor_per_s = servo.damping_nms_rad[wrist] / servo.armature_kgm2[wrist];
+            let ratio = per_rotor_per_s / (rule.damping_nms_rad / rule.armature_kgm2);
+            assert!((ratio - 1.0).abs() < DIGITS, "{ratio}");
         }
     }
 }

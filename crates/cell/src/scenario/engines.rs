@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::envelope::EnvelopeSection;
 use crate::engine_name::EngineName;
 
+/// Standard gravity, m/s^2 (3rd General Conference on Weights and Measures, 1901).
+pub const STANDARD_GRAVITY_M_S2: f64 = 9.80665;
+
 /// The physics engines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -15,6 +18,10 @@ pub struct EnginesSection {
     /// Time step, ms.
     #[schemars(range(min = 0.01, max = 5.0))]
     pub timestep_ms: f64,
+    /// Acceleration of gravity in the world, m/s^2: what engines, referee, statics and sagging gears have.
+    /// Standard gravity if left out. On Earth it is 9.76 to 9.84.
+    #[schemars(range(min = 0.0, max = 20.0), extend("x-hint" = "it is the magnitude, in m/s^2: 9.80665"))]
+    pub gravity_m_s2: f64,
     /// Time without an answer after which the MuJoCo process is given up, s.
     #[schemars(range(min = 0.1, max = 3600.0))]
     pub harness_timeout_s: f64,
@@ -85,6 +92,7 @@ impl Default for EnginesSection {
         Self {
             run: None,
             timestep_ms: 1.0,
+            gravity_m_s2: STANDARD_GRAVITY_M_S2,
             harness_timeout_s: 30.0,
             friction: 0.0,
             rapier: RapierSection::default(),

@@ -39,7 +39,7 @@ use crate::{ClearanceClass, Finding};
 
 pub use controller::ControllerSection;
 pub use criteria::{ClearanceCriteria, CriteriaSection};
-pub use engines::{EnginesSection, MujocoSection, RapierSection};
+pub use engines::{EnginesSection, MujocoSection, RapierSection, STANDARD_GRAVITY_M_S2};
 pub use envelope::EnvelopeSection;
 pub use events::{EventsSection, PressClass, PressSection, StopSection};
 pub use fixtures::{GantrySection, MountKind, MountSection, TableSection};

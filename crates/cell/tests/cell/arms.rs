@@ -1,11 +1,12 @@
 //! The arms that ship: each loads, moves, and has its data or says what it lacks.
 
+use nalgebra::{Matrix3, Vector3};
 use needlebench_cell::{
     Arm, Change, KeyPath, Overrides, Recognition, ResolvedScenario, ScenarioFamily, Setting,
     load_robot, load_scenario,
 };
-use needlebench_kinematics::Joints;
 use needlebench_kinematics::ik::Kinematics;
+use needlebench_kinematics::{Body, Dynamics, Joints};
 
 fn named(arm: &str) -> Overrides {
     Overrides {
@@ -65,6 +66,122 @@ fn every_shipped_arm_reaches_what_its_inverse_kinematics_say() {
                 assert!(off_m < RESIDUAL_M, "{}: {off_m}", arm.key);
             }
         }
+    }
+}
+
+/// Gains swing the stretched arm with its rated load at 6 Hz about the shoulder, damped at 0.6, and a wrist
+/// by its rotor: the rule that their sources name.
+#[test]
+fn gains_of_shipped_arms_are_those_of_their_rule() {
+    /// Gains are rounded to two digits.
+    const DIGITS: f64 = 0.025;
+    const PER_ROTOR: [f64; 2] = [20_000.0, 600.0];
+    for arm in Arm::shipped() {
+        let robot = load_robot(&named(&arm.key)).unwrap();
+        let servo = arm.data.servo.as_ref().unwrap();
+        let rotors = arm.data.rotors.as_ref().unwrap().inertia_kgm2;
+        let mut bodies = robot.bodies;
+        let load = Body {
+            mass_kg: arm.data.payload.as_ref().unwrap().kg,
+            com_m: robot.chain.wrist_3_from_flange.translation.vector,
+            inertia_kgm2: Matrix3::zeros(),
+        };
+        bodies[5] = bodies[5].combined_with(&load);
+        let stretched = Dynamics {
+            chain: robot.chain,
+            bodies,
+            armature_kgm2: rotors.into(),
+            gravity_m_s2: Vector3::zeros(),
+        };
+        let inertia_kgm2 = stretched.mass_matrix(&Joints::zeros())[(1, 1)];
+        let (kp, kd) = (servo.stiffness_nm_rad[1], servo.damping_nms_rad[1]);
+        let frequency_hz = (kp / inertia_kgm2).sqrt() / std::f64::consts::TAU;
+        let damping = 0.5 * kd / (kp * inertia_kgm2).sqrt();
+        println!(
+            "{}: {inertia_kgm2:.3} kg m^2, {frequency_hz:.3} Hz, {damping:.3}",
+            arm.key
+        );
+        assert!((frequency_hz / 6.0 - 1.0).abs() < DIGITS, "{}", arm.key);
+        assert!((damping / 0.6 - 1.0).abs() < DIGITS, "{}", arm.key);
+        for wrist in 3..6 {
+            let gains = [servo.stiffness_nm_rad[wrist], servo.damping_nms_rad[wrist]];
+            for (gain, per_rotor) in gains.iter().zip(PER_ROTOR) {
+                let ratio = gain / (per_rotor * rotors[wrist]);
+                assert!((ratio - 1.0).abs() < DIGITS, "{} {wrist}: {ratio}", arm.key);
+            }
+        }
+    }
+}
+
+/// What a UR3's drives are derived from is said where the scenario leaves them to the arm.
+#[test]
+fn drives_that_are_assumed_are_noted() {
+    let noted = |robot: &str, more: &str| {
+        let resolved = scenario(&with_robot(robot, more)).unwrap();
+        let notes = resolved.notes.into_iter();
+        notes
+            .filter(|note| note.starts_with("assumed of"))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        noted("urdf = \"ur3\"", ""),
+        [
+            "assumed of the UR3: rotor inertia and friction (derived from the UR3e, whose were identified \
+          from a recorded run)"
+        ]
+    );
+    let own = "[controller]\narmature_kgm2 = [0.6, 0.6, 0.2, 0.1, 0.1, 0.1]\n";
+    assert_eq!(
+        noted("urdf = \"ur3\"", own),
+        [
+            "assumed of the UR3: friction (derived from the UR3e, whose were identified from a recorded run)"
+        ]
+    );
+    assert!(noted("urdf = \"ur3e\"", "").is_empty());
+}
+
+/// The controller believes in the world's gravity until the scenario says otherwise.
+#[test]
+fn gravity_is_the_worlds_and_the_controllers() {
+    let with = |more: &str| scenario(&with_robot("urdf = \"ur3e\"", more));
+    let resolved = with("").unwrap();
+    let gravity = &resolved.gravity;
+    assert_eq!(
+        (gravity.world_m_s2, gravity.believed_m_s2),
+        (9.80665, 9.80665)
+    );
+    assert!(
+        gravity.believed_source.contains("9.82"),
+        "{}",
+        gravity.believed_source
+    );
+    assert!(resolved.imperfections.is_none());
+    let is_noted =
+        |resolved: &ResolvedScenario| resolved.notes.iter().any(|note| note.contains("gravity"));
+    assert!(!is_noted(&resolved), "{:?}", resolved.notes);
+
+    let lunar = with("[engines]\ngravity_m_s2 = 1.62\n").unwrap();
+    assert_eq!(lunar.cell.gravity_m_s2, Vector3::new(0.0, 0.0, -1.62));
+    assert_eq!(lunar.gravity.believed_m_s2, 1.62);
+    assert!(is_noted(&lunar));
+
+    let real = with("[controller]\ngravity_m_s2 = 9.82\n").unwrap();
+    assert_eq!(real.cell.gravity_m_s2, Vector3::new(0.0, 0.0, -9.80665));
+    assert_eq!(real.gravity.believed_m_s2, 9.82);
+    assert!(
+        real.imperfections.is_some(),
+        "an arm that is not what its controller believes"
+    );
+    assert!(is_noted(&real));
+
+    for (key, value) in [
+        ("engines", "-9.81"),
+        ("controller", "9820"),
+        ("engines", "\"9.81\""),
+    ] {
+        let refused = with(&format!("[{key}]\ngravity_m_s2 = {value}\n")).unwrap_err();
+        assert!(refused.contains("gravity_m_s2"), "{refused}");
+        println!("{refused}");
     }
 }
 
@@ -232,7 +349,12 @@ fn a_urdf_with_the_lengths_of_a_ur5e_has_a_ur5es_data_and_no_value_of_a_ur3() {
         sources.iter().all(|source| source.file.contains("ur5e")),
         "{sources:?}"
     );
-    let notes = resolved.notes.join("\n").to_lowercase();
+    // But for what its own data are derived from.
+    let notes = resolved
+        .notes
+        .iter()
+        .filter(|note| !note.starts_with("assumed of the UR5e"));
+    let notes = notes.cloned().collect::<Vec<_>>().join("\n").to_lowercase();
     assert!(!notes.contains("ur3"), "{notes}");
     // Its own figures, or a refusal that says why there are none.
     match load("[events.stop]\ncategory = 0\n") {

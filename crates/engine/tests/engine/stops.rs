@@ -15,11 +15,18 @@ const TIMESTEP_S: f64 = 1e-3;
 /// Half of the last digit that is published.
 const PUBLISHED_DISTANCE_RAD: f64 = 0.005;
 
-/// Three steps; 2 ms is seen for the shoulder: gravity is constant in the derivation.
+/// Three steps; 1 ms is seen for the shoulder: gravity is constant in the derivation.
 const PUBLISHED_TIME_S: f64 = 3e-3;
 
-/// 1.4e-9 rad is seen.
+/// 7.4e-10 rad is seen.
 const ENGINES_RAD: f64 = 1e-7;
+
+/// The same where another joint gives way and is caught again: dry friction, which jumps at no speed, makes more
+/// of the engines' differences of second order. 1.5e-7 rad is seen.
+const ENGINES_YIELDING_RAD: f64 = 5e-7;
+
+/// A joint that moved by more than this has given way, rad.
+const GIVEN_WAY_RAD: f64 = 1e-4;
 
 /// Speed of a joint that stands, rad/s.
 const STANDING_RAD_S: f64 = 1e-3;
@@ -142,18 +149,28 @@ fn stops_that_the_brakes_are_fitted_to_come_out_in_both_engines() {
         let sign = if gravity[joint] > 0.0 { -1.0 } else { 1.0 };
         let plants: [&mut dyn Plant; 2] = [&mut rapier, &mut mujoco];
         let recordings = plants.map(|plant| stop(plant, &cell, joint, sign));
+        let mut engines_rad = ENGINES_RAD;
         for recording in &recordings {
             let (distance_rad, time_s) = measured(recording, joint, sign);
             println!(
                 "{} joint {joint}: {distance_rad:.4} rad in {time_s:.4} s",
                 recording.engine.name
             );
+            // The other joints stand, though a standing brake holds no more than a slipping one.
+            let [start, end] = [0, recording.state.len() - 1].map(|k| recording.state[k].position);
+            let mut yielded = end - start;
+            yielded[joint] = 0.0;
+            println!("others give way by {:.4} rad", yielded.amax());
+            assert!(yielded.amax() < PUBLISHED_DISTANCE_RAD);
+            if yielded.amax() > GIVEN_WAY_RAD {
+                engines_rad = ENGINES_YIELDING_RAD;
+            }
             assert!((distance_rad - published_rad).abs() < PUBLISHED_DISTANCE_RAD);
             assert!((time_s - published_s).abs() < PUBLISHED_TIME_S);
         }
         let [a, b] = recordings.map(|recording| recording.state.last().unwrap().position);
         println!("engines differ by {:e} rad", (a - b).amax());
-        assert!((a - b).amax() < ENGINES_RAD);
+        assert!((a - b).amax() < engines_rad);
     }
     assert_eq!(published, 3, "base, shoulder and elbow");
 }

@@ -84,6 +84,45 @@ fn engines_and_balance_of_torques_agree_on_where_an_imperfect_arm_ends() {
     );
 }
 
+/// A controller that believes in another gravity than the world's: the arm is the nominal one, and stands
+/// off all the same.
+#[test]
+fn engines_and_balance_of_torques_agree_on_an_arm_under_another_gravity() {
+    /// What a second leaves of the transient, and rounding.
+    const UNEXPLAINED_M: f64 = 1e-11;
+    mujoco_is_ready();
+    let text = with_edit(SMALL, "hold_s = 0.1", "hold_s = 1.0");
+    let text = format!("{text}\n[controller]\ngravity_m_s2 = 9.82\n");
+    let bench = Bench::with_scenario(&text);
+    let answer = bench.run(&["run", "s.toml", "--out", "a"]);
+    for part in [
+        "of the nominal arm under another gravity than its controller believes in",
+        "note: the controller believes in a gravity of 9.82 m/s^2, where it is 9.80665 m/s^2",
+    ] {
+        assert!(answer.stdout.contains(part), "no `{part}` in {answer:#?}");
+    }
+    let report = report(&bench, "a/small/report.json");
+    let gravity = &report["gravity"];
+    assert_eq!(gravity["world_m_s2"], 9.80665);
+    assert_eq!(gravity["believed_m_s2"], 9.82);
+    assert_eq!(gravity["believed_source"], "s.toml: controller");
+    let configurations = report["goals"][0]["configurations"].as_array().unwrap();
+    let mut names = Vec::new();
+    for each in configurations {
+        for (name, engine) in each["engines"].as_object().unwrap() {
+            let error_m = engine["tip_position_error_m"].as_f64().unwrap();
+            let predicted_m = each["predicted"]["tip_position_error_m"].as_f64().unwrap();
+            let unexplained_m = engine["unexplained_tip_m"].as_f64().unwrap();
+            println!("{name}: {error_m:e} {predicted_m:e} {unexplained_m:e}");
+            assert!((1e-7..1e-4).contains(&error_m), "{error_m:e}");
+            assert!((predicted_m - error_m).abs() < UNEXPLAINED_M);
+            assert!(unexplained_m < UNEXPLAINED_M, "{unexplained_m:e}");
+            names.push(name.clone());
+        }
+    }
+    assert!(names.contains(&"rapier".to_owned()) && names.contains(&"mujoco".to_owned()));
+}
+
 #[test]
 fn unstable_gains_are_explained_before_anything_moves() {
     let text = format!(

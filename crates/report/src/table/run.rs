@@ -256,7 +256,12 @@ fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::
 
 /// Which arm the engines have simulated.
 fn simulated_arm(report: &Report) -> &'static str {
-    if report.truth.is_some() {
+    let of_class = report.expected.as_ref();
+    let of_class = of_class.is_some_and(|expected| expected.arm.is_some());
+    if report.truth.is_some() && of_class {
+        // Without [imperfections] of its own.
+        "of the nominal arm under another gravity than its controller believes in"
+    } else if report.truth.is_some() {
         "of the one arm and patient that the seed draws"
     } else {
         "of an arm that is just what its controller believes: nothing of a real arm's accuracy"

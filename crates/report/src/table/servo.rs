@@ -30,10 +30,12 @@ pub fn text(report: &ServoReport) -> String {
         "source",
     ]);
     for setting in &report.settings {
+        // Standard gravity has five.
+        let decimals = if setting.unit == "m/s^2" { 5 } else { 4 };
         let values: Vec<String> = setting
             .values
             .iter()
-            .map(|value| rounded(*value, 4))
+            .map(|value| rounded(*value, decimals))
             .collect();
         let same = values.iter().all(|value| *value == values[0]);
         table.add_row([

@@ -59,6 +59,31 @@ pub struct Imperfections {
     pub sources: Vec<ModelSource>,
 }
 
+impl Imperfections {
+    /// Nothing imperfect.
+    pub(crate) fn none() -> Self {
+        Self {
+            budget_samples: 0,
+            calibration: None,
+            encoder: None,
+            elasticity: None,
+            payload: None,
+            friction: None,
+            drive_limit_nm: None,
+            control: None,
+            guide_clearance_m: None,
+            hand_eye: None,
+            registration: None,
+            skin_markers: None,
+            imaging_m: None,
+            needle: None,
+            indentation: None,
+            breathing: None,
+            sources: Vec::new(),
+        }
+    }
+}
+
 /// Elasticity of the gears.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Elasticity {

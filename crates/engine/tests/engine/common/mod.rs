@@ -269,7 +269,7 @@ pub fn ur3(surroundings: Vec<CollisionBody>) -> Cell {
             hand_cone_half_angle_rad: 0.0,
         },
         surroundings,
-        Joints::new(0.1, 0.1, 0.1, 0.05, 0.05, 0.05),
+        Joints::new(0.612, 0.612, 0.212, 0.0714, 0.0714, 0.0716),
         Vector3::new(0.0, 0.0, -9.81),
     )
 }
