@@ -54,7 +54,7 @@ pub use model::{
 pub use printable::{printable, printable_json, printable_line};
 pub use resolve::{
     Expectation, Expected, Goal, Overrides, PlacedPhantom, ResolvedScenario, Roll, ServoSettings,
-    imperfections, iso9283, load_robot, load_scenario, people, resolve_scenario,
+    excitation, imperfections, iso9283, load_robot, load_scenario, people, resolve_scenario,
 };
 pub use robot::{
     Calibration, DisabledPair, LinkEnclosure, MOVING_LINK_LABELS, MissingInertia, OriginDeviation,
