@@ -21,6 +21,7 @@ pub mod preview;
 pub mod progress;
 pub mod provenance;
 mod real_cell;
+pub mod record_plan;
 mod rtde;
 mod run;
 mod runnable;

@@ -8,7 +8,7 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, FkArguments,
     ISO9283_HELP, IkArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments,
-    RunArguments, STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
+    RecordPlanArguments, RunArguments, STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
 };
 use crate::exit::ExitStatus;
 use crate::output::complain;
@@ -77,6 +77,12 @@ enum Command {
         after_long_help = ISO9283_HELP
     )]
     Iso9283(Iso9283Arguments),
+    /// A safe run that excites every joint, for a log from which an arm is calibrated and identified: as a
+    /// scenario and as URScript, with its proven clearances.
+    #[command(
+        after_help = "Example: needlebench record-plan --arm ur3e --payload-kg 0,1 --out out"
+    )]
+    RecordPlan(Box<RecordPlanArguments>),
     /// Every pair of bodies: measured or left out, why, and the evidence; and checks an SRDF.
     #[command(after_help = "Example: needlebench pairs scenarios/table3.toml --srdf arm.srdf")]
     Pairs(PairsArguments),
@@ -136,6 +142,7 @@ fn run() -> ExitCode {
         Command::Study(arguments) => command::study(&arguments),
         Command::Merge(arguments) => command::merge(&arguments),
         Command::Iso9283(arguments) => command::iso9283(&arguments),
+        Command::RecordPlan(arguments) => command::record_plan(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),

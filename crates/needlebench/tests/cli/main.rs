@@ -28,6 +28,7 @@ mod paper;
 mod people;
 #[cfg(target_os = "linux")]
 mod process;
+mod record_plan;
 mod referee;
 mod robust_io;
 mod run;
