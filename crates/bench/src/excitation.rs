@@ -8,8 +8,8 @@ use needlebench_cell::ResolvedScenario;
 use needlebench_cell::excitation::ExcitationProtocol;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{
-    Engine, EngineError, EngineIdentity, EnginePool, Hooks, MotionJob, Recording, engine_names,
-    run_motions,
+    Actuation, Engine, EngineError, EngineIdentity, EnginePool, Hooks, Motion, MotionJob,
+    Recording, engine_names, run_motions,
 };
 use needlebench_evaluation::excitation::{
     ExcitationReport, LoadMeasurement, LoadReport, MotionReport, SUBJECT, judge,
@@ -174,9 +174,28 @@ fn simulate(
         let mut tell = |text: &str| control.progress.notice(text);
         // Why it could not start is told again to whoever asks it for a motion.
         let _ = pool.start(engine, settings, &mut tell);
+        // One arm, but other noise with each payload.
+        let actuations: Vec<Actuation> = setups
+            .iter()
+            .enumerate()
+            .map(|(load, setup)| {
+                let actuation = setup.real.actuation();
+                Actuation {
+                    seed: actuation.seed ^ ((load as u64) << 32),
+                    ..actuation.clone()
+                }
+            })
+            .collect();
         let jobs: Vec<MotionJob<'_>> = setups
             .iter()
-            .map(|setup| setup.job(&plan.trajectory))
+            .zip(&actuations)
+            .map(|(setup, actuation)| MotionJob {
+                motion: Motion {
+                    actuation,
+                    ..setup.motion(&plan.trajectory)
+                },
+                ..setup.job(&plan.trajectory)
+            })
             .collect();
         let hooks = Hooks {
             cancel: Some(control.cancel),
@@ -188,7 +207,13 @@ fn simulate(
             control.progress.step();
             match result {
                 Ok(recording) => {
-                    made[index] = Some(measured(&setups[index], protocol, plan, &recording));
+                    made[index] = Some(measured(
+                        &setups[index],
+                        &actuations[index],
+                        protocol,
+                        plan,
+                        &recording,
+                    ));
                 }
                 Err(error) if failed.as_ref().is_none_or(|(first, _)| index < *first) => {
                     failed = Some((index, error));
@@ -221,6 +246,7 @@ fn simulate(
 /// A recording as what is kept of it.
 fn measured(
     setup: &Setup<'_>,
+    actuation: &Actuation,
     protocol: &ExcitationProtocol,
     plan: &ExcitationPlan,
     recording: &Recording,
@@ -238,7 +264,9 @@ fn measured(
         period_s,
         tolerance_m,
     );
-    let log = RtdeSource::of(setup).log(recording, &plan.trajectory, period_s);
+    let log = RtdeSource::of(setup)
+        .driven_by(actuation)
+        .log(recording, &plan.trajectory, period_s);
     let errors = || {
         log.rows
             .iter()

@@ -74,6 +74,14 @@ impl RtdeSource {
         }
     }
 
+    /// The same with other drives.
+    pub(crate) fn driven_by(self, actuation: &Actuation) -> Self {
+        Self {
+            actuation: actuation.clone(),
+            ..self
+        }
+    }
+
     /// The log of a recording of this run, a row every `period_s`.
     pub fn log(
         &self,

@@ -147,9 +147,12 @@ pub fn judge(report: &ExcitationReport, general: &CriteriaSection, engines: &[&s
                 );
             }
             if !general.allow_contact {
-                let value = effort.map(|effort| match effort.contact.occurred {
-                    true => effort.contact.peak_force_n.max(f64::MIN_POSITIVE),
-                    false => 0.0,
+                let value = effort.map(|effort| {
+                    if effort.contact.occurred {
+                        effort.contact.peak_force_n.max(f64::MIN_POSITIVE)
+                    } else {
+                        0.0
+                    }
                 });
                 judged.add(at_most(engine, "allow_contact", value, 0.0, "N"), missing);
             }

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use needlebench_bench::Runnable;
 use needlebench_bench::record_plan::PlanReport;
-use needlebench_cell::excitation::{ExcitationSection, FEWEST_POSTURES, SweepSection};
+use needlebench_cell::excitation::{ExcitationSection, FEWEST_POSTURES, Load, SweepSection};
 use needlebench_cell::scenario::PayloadSection;
 use needlebench_cell::{ExcitationText, Finding, Overrides, read_text, resolve_scenario};
 use needlebench_clearance::ClearanceModel;
@@ -32,6 +32,10 @@ const SWEEP_SPEEDS_DEG_S: [f64; 2] = [6.0, 40.0];
 /// Time between two rows of a simulated log, ms: 125 Hz, which every controller has.
 const PERIOD_MS: f64 = 8.0;
 
+/// Distance of a payload's centre from the axis of the last joint, mm: with 1 kg half a newton metre, several times what
+/// a current is uncertain by.
+const BESIDE_AXIS_MM: f64 = 50.0;
+
 /// Searches with other seeds where what was found between looks turns out too near.
 const ATTEMPTS: u64 = 5;
 
@@ -51,21 +55,17 @@ pub(crate) struct RecordPlanArguments {
         long,
         value_name = "KG[,KG]",
         value_delimiter = ',',
-        default_value = "0,1"
-    )]
-    pub payload_kg: Vec<f64>,
-    /// Centre of a payload in the flange frame, mm; left out, half of its depth before the flange.
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_delimiter = ',',
-        num_args = 3,
+        default_value = "0,1",
         allow_negative_numbers = true
     )]
-    pub payload_centre_mm: Option<Vec<f64>>,
+    pub payload_kg: Vec<f64>,
+    /// Centre of a payload in the flange frame, mm; left out, half of its depth before the flange and 50 mm
+    /// beside its axis, so that gravity loads the last joint too.
+    #[arg(long, value_name = "X,Y,Z", allow_negative_numbers = true)]
+    pub payload_centre_mm: Option<Three>,
     /// Edges of the box around a payload, mm; left out, a cube of steel of its mass.
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3)]
-    pub payload_size_mm: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y,Z")]
+    pub payload_size_mm: Option<Three>,
     /// Speed of the leading joint between postures, deg/s; every other motion has half of it.
     #[arg(long, value_name = "DEG_S", default_value_t = 60.0)]
     pub speed: f64,
@@ -83,6 +83,30 @@ pub(crate) struct RecordPlanArguments {
     pub json: bool,
     #[command(flatten)]
     pub robot: RobotArguments,
+}
+
+/// Three finite numbers between commas.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Three([f64; 3]);
+
+impl std::str::FromStr for Three {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let numbers: Vec<f64> = text
+            .split(',')
+            .map(|word| {
+                let number = word.trim().parse::<f64>().ok();
+                let finite = number.filter(|number| number.is_finite());
+                finite.ok_or_else(|| format!("`{}` is no number", word.trim()))
+            })
+            .collect::<Result<_, _>>()?;
+        let count = numbers.len();
+        let three = numbers.try_into();
+        three
+            .map(Self)
+            .map_err(|_| format!("needs three numbers separated by commas, got {count}"))
+    }
 }
 
 /// Finds a run, writes it as a scenario and as a program, and says what it keeps and what it tells.
@@ -256,21 +280,9 @@ fn wanted(arguments: &RecordPlanArguments) -> Result<ExcitationSection, Finding>
             return refuse("--payload-kg", message, "the run is made once with each");
         }
     }
-    let three = |values: &Option<Vec<f64>>| -> Option<[f64; 3]> {
-        values
-            .as_ref()
-            .and_then(|values| values.clone().try_into().ok())
-    };
-    let centre_mm = three(&arguments.payload_centre_mm);
-    let size_mm = three(&arguments.payload_size_mm);
-    let payloads = arguments
-        .payload_kg
-        .iter()
-        .map(|&mass_kg| PayloadSection {
-            mass_kg,
-            centre_mm: centre_mm.filter(|_| mass_kg > 0.0),
-            size_mm: size_mm.filter(|_| mass_kg > 0.0),
-        })
+    let payloads = arguments.payload_kg.iter();
+    let payloads = payloads
+        .map(|&mass_kg| payload(arguments, mass_kg))
         .collect();
     Ok(ExcitationSection {
         speeds_deg_s: vec![arguments.speed, 0.5 * arguments.speed],
@@ -284,6 +296,27 @@ fn wanted(arguments: &RecordPlanArguments) -> Result<ExcitationSection, Finding>
         self_clearance_mm: arguments.self_clearance_mm,
         ..ExcitationSection::default()
     })
+}
+
+/// A payload as the section has it.
+fn payload(arguments: &RecordPlanArguments, mass_kg: f64) -> PayloadSection {
+    if mass_kg == 0.0 {
+        return PayloadSection::default();
+    }
+    let on_axis = PayloadSection {
+        mass_kg,
+        centre_mm: None,
+        size_mm: arguments.payload_size_mm.map(|three| three.0),
+    };
+    let depth_mm = Load::of(&on_axis).body.com_m.z * 1e3;
+    let centre_mm = arguments.payload_centre_mm.map_or(
+        [BESIDE_AXIS_MM, 0.0, (depth_mm * 10.0).round() / 10.0],
+        |three| three.0,
+    );
+    PayloadSection {
+        centre_mm: Some(centre_mm),
+        ..on_axis
+    }
 }
 
 /// The cell: of the scenario, or an arm alone on a bench.
@@ -325,6 +358,8 @@ fn cell_text(
 /// A finding about a key of the run, said of the argument that it came from.
 fn of_arguments(finding: Finding) -> Finding {
     let argument = match finding.key.as_deref() {
+        Some(key) if key.contains(".size_mm") => "--payload-size-mm",
+        Some(key) if key.contains(".centre_mm") => "--payload-centre-mm",
         Some(key) if key.starts_with("excitation.payloads") => "--payload-kg",
         Some(key) if key.starts_with("excitation.speeds") => "--speed",
         Some("robot.arm") => "--arm",

@@ -46,14 +46,14 @@ impl Aim {
     /// In words, for reports.
     pub fn in_words(self) -> String {
         let place = |posture: usize| match posture {
-            0 => "the start posture".to_owned(),
-            number => format!("posture {number}"),
+            0 => "start".to_owned(),
+            number => number.to_string(),
         };
         match self {
             Self::Posture(number) => format!("to posture {number}"),
-            Self::Start => "back to the start posture".to_owned(),
+            Self::Start => "back to start".to_owned(),
             Self::Turn { joint, posture } => {
-                format!("sweep of {} at {}", JOINT_LABELS[joint], place(posture))
+                format!("{} sweep at {}", JOINT_LABELS[joint], place(posture))
             }
             Self::Back { joint, posture } => {
                 format!("{} back at {}", JOINT_LABELS[joint], place(posture))

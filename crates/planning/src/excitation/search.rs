@@ -95,7 +95,7 @@ pub struct FoundRun {
 pub enum SearchError {
     /// The start posture is too near to something.
     #[error(
-        "the start posture keeps {distance_mm:.1} mm between {a} and {b}, less than the {least_mm:.1} mm that are asked for"
+        "the start posture keeps {distance_mm:.1} mm between {a} and {b}, less than the {least_mm:.1} mm that are asked for with a reserve of 3 mm"
     )]
     Start {
         /// One solid.
@@ -104,7 +104,7 @@ pub enum SearchError {
         b: String,
         /// Their distance, mm.
         distance_mm: f64,
-        /// What is asked for, mm.
+        /// What is asked for, reserve included, mm.
         least_mm: f64,
     },
     /// Too few postures keep the clearances.
@@ -231,7 +231,7 @@ impl<'a> Search<'a> {
         &self.resolved.start
     }
 
-    /// The start posture itself keeps the clearances, without the reserve of those that are chosen.
+    /// The start posture itself keeps the clearances.
     fn check_start(&self) -> Result<(), SearchError> {
         let limit_m = |class: ClearanceClass| self.least_m.get(class);
         let below: Option<PairClearance> = self.checker.model.first_below(self.start(), limit_m);

@@ -8,7 +8,7 @@ use needlebench_evaluation::excitation::{ExcitationReport, MotionReport, proven_
 use needlebench_evaluation::report::ClearanceReport;
 
 use super::plain_table;
-use crate::number::{small_length, three_digits};
+use crate::number::{rounded, small_length, three_digits};
 
 /// What a run prints.
 pub fn report_text(report: &ExcitationReport) -> String {
@@ -28,11 +28,11 @@ fn write_report(out: &mut String, report: &ExcitationReport) -> std::fmt::Result
     )?;
     let mut table = plain_table(&[
         "engine",
-        "payload",
-        "proven clearance\nothers / itself (mm)",
-        "tracking\nrms / peak (mrad)",
+        "added\n(kg)",
+        "proven (mm)\nothers / itself",
+        "tracking (mrad)\nrms / peak",
         "torque\nof limit",
-        "torque cut\n(steps)",
+        "cut\n(steps)",
         "contact",
     ]);
     table.add_row([
@@ -50,7 +50,7 @@ fn write_report(out: &mut String, report: &ExcitationReport) -> std::fmt::Result
             let load = &report.loads[each.load - 1];
             table.add_row([
                 engine.clone(),
-                format!("{} kg + tool", load.added_kg),
+                load.added_kg.to_string(),
                 both(&each.clearance),
                 format!(
                     "{:.3} / {:.3}",
@@ -92,6 +92,15 @@ fn both(clearance: &ClearanceReport) -> String {
     format!("{others} / {itself}")
 }
 
+/// A deviation: nobody needs more of it than two digits.
+fn two_digits(value: f64) -> String {
+    match value {
+        value if value >= 9.5 => format!("{value:.0}"),
+        value if value >= 0.95 => format!("{value:.1}"),
+        value => format!("{value:.2}"),
+    }
+}
+
 /// Proven clearances: by class, and motion by motion.
 pub fn clearances_text(report: &PlanReport) -> String {
     let mut text = format!(
@@ -102,7 +111,7 @@ pub fn clearances_text(report: &PlanReport) -> String {
         report.self_clearance_limit_m * 1e3
     );
     let _ = writeln!(text, "{}", class_table(report));
-    let mut table = plain_table(&["motion", "others (mm)", "itself (mm)", "nearest"]);
+    let mut table = plain_table(&["motion", "others\n(mm)", "itself\n(mm)", "nearest"]);
     for each in &report.motions {
         let [others, itself] = proven_m(&each.clearance)
             .map(|value| value.map_or("-".to_owned(), |metres| format!("{:.1}", metres * 1e3)));
@@ -170,8 +179,9 @@ fn write_plan(out: &mut String, report: &PlanReport) -> std::fmt::Result {
     if report.over_start > 0 {
         writeln!(
             out,
-            "{} ways lead over the start posture, which is counted as a posture there",
-            report.over_start
+            "{} of the ways lead{} over the start posture, which is counted as a posture there",
+            report.over_start,
+            if report.over_start == 1 { "s" } else { "" }
         )?;
     }
     writeln!(out, "tool: {:.3} kg, always mounted", report.tool_kg)?;
@@ -218,23 +228,26 @@ fn write_plan(out: &mut String, report: &PlanReport) -> std::fmt::Result {
     writeln!(out, "{table}")?;
     let mut table = plain_table(&[
         "joint",
-        "rotor\n(kg m^2)",
-        "torque\nconstant (%)",
+        "rotor\n(g m^2)",
+        "constant\n(%)",
         "Coulomb\n(N m)",
-        "viscous\n(N m s/rad)",
-        "standing torque\n(N m)",
+        "viscous\n(Nms/rad)",
+        "standing\n(N m)",
     ]);
     for (a, b) in here.joints.iter().zip(&random.joints) {
         let pair = |value: fn(&JointTelling) -> Option<f64>, factor: f64| {
-            format!("{} / {}", known(value(a), factor), known(value(b), factor))
+            let two = |each: &JointTelling| {
+                value(each).map_or("-".to_owned(), |value| two_digits(value * factor))
+            };
+            format!("{}/{}", two(a), two(b))
         };
         table.add_row([
             a.joint.to_owned(),
-            pair(|each| each.rotor_kgm2, 1.0),
+            pair(|each| each.rotor_kgm2, 1e3),
             pair(|each| each.torque_constant_share, 100.0),
             pair(|each| each.coulomb_nm, 1.0),
             pair(|each| each.viscous_nms_rad, 1.0),
-            format!("{:.1} to {:.1}", a.standing_nm[0], a.standing_nm[1]),
+            a.standing_nm.map(|torque| rounded(torque, 1)).join(", "),
         ]);
     }
     for column in table.column_iter_mut().skip(1) {
