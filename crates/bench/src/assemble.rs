@@ -100,6 +100,7 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         not_judged: judged.not_judged,
         goals,
         iso9283: None,
+        excitation: None,
         engine_failures: results.failures,
         arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
         gravity: resolved.gravity.clone(),

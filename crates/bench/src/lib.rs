@@ -1,6 +1,6 @@
 //! What a run is: a scenario planned, simulated, measured and judged; and likewise its events, a test
-//! by ISO 9283, the engines beside the referee, the atlas of a goal, the servo's data sheet, the replay of
-//! a recorded run and a case of a study.
+//! by ISO 9283, a run that excites every joint, the engines beside the referee, the atlas of a goal, the
+//! servo's data sheet, the replay of a recorded run and a case of a study.
 //!
 //! Gives values only: nothing here prints, draws or writes files.
 //!
@@ -13,6 +13,7 @@ pub mod atlas;
 mod budgets;
 mod control;
 mod events;
+pub mod excitation;
 mod iso9283;
 mod parallel;
 mod plan;
@@ -20,7 +21,9 @@ pub mod preview;
 pub mod progress;
 pub mod provenance;
 mod real_cell;
+pub mod record_plan;
 pub mod replay;
+mod rtde;
 mod run;
 mod runnable;
 mod scenario_run;
@@ -34,8 +37,11 @@ pub use control::Control;
 pub use events::{EngineEvents, EventRun, StagedStop};
 pub use preview::Preview;
 pub use real_cell::servo_of;
+pub use rtde::{RtdeLog, RtdeRow, RtdeSource};
 pub use run::{run, run_scenario};
 pub use runnable::Runnable;
-pub use scenario_run::{ProtocolRun, RealArm, RunError, RunOptions, ScenarioRun, StoppedRun};
+pub use scenario_run::{
+    ExcitationRun, ProtocolRun, RealArm, RunError, RunOptions, ScenarioRun, StoppedRun,
+};
 pub use setup::SetupError;
 pub use simulate::EngineRun;

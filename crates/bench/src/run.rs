@@ -17,10 +17,12 @@ use crate::assemble::{Results, assemble};
 use crate::budgets::budgets;
 use crate::control::Control;
 use crate::events::{self, EventRun};
+use crate::excitation;
 use crate::iso9283;
 use crate::parallel::in_parallel;
 use crate::plan::{Job, jobs, plan_goals};
 use crate::progress::{Progress, Silent};
+use crate::rtde::RtdeSource;
 use crate::runnable::Runnable;
 use crate::scenario_run::{RealArm, RunError, RunOptions, ScenarioRun, StoppedRun};
 use crate::setup::Setup;
@@ -42,6 +44,9 @@ pub fn run(
         cancel,
         progress,
     };
+    if let Some(plan) = runnable.excitation() {
+        return excitation::run(runnable.scenario(), plan, &engines, &control);
+    }
     match runnable.protocol() {
         Some(plan) => iso9283::run(runnable.scenario(), plan, &engines, &control),
         None => run_goals(runnable.scenario(), options, &engines, &control),
@@ -144,6 +149,8 @@ fn run_goals(
         events,
         stopped,
         iso9283: None,
+        excitation: None,
+        rtde: Some(RtdeSource::of(&setup)),
         interrupted,
         real_arm,
     })

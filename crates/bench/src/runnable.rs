@@ -2,14 +2,16 @@
 
 use needlebench_cell::{Finding, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
+use needlebench_planning::excitation::{ExcitationError, ExcitationPlan, plan_excitation};
 use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan, plan_protocol};
 
-/// A scenario, with the plan of its test by ISO 9283 if it has one: a plan that cannot be made is found
+/// A scenario, with the plan of its test by ISO 9283 or of its excitation if it has one: a plan that cannot be made is found
 /// before anything long begins, and nobody makes it again.
 #[derive(Debug, Clone)]
 pub struct Runnable {
     resolved: ResolvedScenario,
     protocol: Option<Result<ProtocolPlan, ProtocolError>>,
+    excitation: Option<Result<ExcitationPlan, ExcitationError>>,
 }
 
 impl Runnable {
@@ -19,7 +21,15 @@ impl Runnable {
             let model = ClearanceModel::new(&resolved.cell);
             plan_protocol(&resolved, protocol, &model)
         });
-        Self { resolved, protocol }
+        let excitation = resolved.excitation.as_ref().map(|protocol| {
+            let model = ClearanceModel::new(&resolved.cell);
+            plan_excitation(&resolved, protocol, &model)
+        });
+        Self {
+            resolved,
+            protocol,
+            excitation,
+        }
     }
 
     /// The same for a scenario of which nothing is wrong.
@@ -49,6 +59,11 @@ impl Runnable {
         self.protocol.as_ref()
     }
 
+    /// The plan of the run that excites every joint, if it has one.
+    pub fn excitation(&self) -> Option<&Result<ExcitationPlan, ExcitationError>> {
+        self.excitation.as_ref()
+    }
+
     fn obstacle(&self) -> Option<Finding> {
         let file = &self.resolved.source.file;
         if let Some(protocol) = &self.protocol {
@@ -56,6 +71,10 @@ impl Runnable {
             let error = protocol.as_ref().err()?;
             let finding = Finding::new(file, error.to_string());
             return Some(finding.key("iso9283").hint(error.hint()));
+        }
+        if let Some(Err(error)) = &self.excitation {
+            let finding = Finding::new(file, error.to_string());
+            return Some(finding.key(error.key()).hint(error.hint()));
         }
         let cell = &self.resolved.cell;
         let model = ClearanceModel::new(cell);

@@ -9,6 +9,7 @@ use needlebench_kinematics::{Chain, Pose};
 use needlebench_planning::GoalPlan;
 
 use crate::events::EventRun;
+use crate::rtde::{RtdeLog, RtdeSource};
 use crate::setup::SetupError;
 use crate::simulate::EngineRun;
 
@@ -77,6 +78,10 @@ pub struct ScenarioRun {
     pub stopped: Vec<StoppedRun>,
     /// What a test by ISO 9283 left besides its report.
     pub iso9283: Option<ProtocolRun>,
+    /// What a run that excites every joint left besides its report.
+    pub excitation: Option<ExcitationRun>,
+    /// What makes logs of the recordings; none where there are none.
+    pub rtde: Option<RtdeSource>,
     /// It was interrupted; what was finished until then is here.
     pub interrupted: bool,
     /// The arm that was simulated.
@@ -103,6 +108,13 @@ pub struct ProtocolRun {
     pub engines: Vec<(&'static str, Vec<Attained>, Vec<Arrival>)>,
     /// Half-width of the band of the stabilisation time, m.
     pub limit_band_m: f64,
+}
+
+/// What a simulated run that excites every joint leaves besides its report.
+#[derive(Debug)]
+pub struct ExcitationRun {
+    /// Engine, number of the payload from 0, and the log.
+    pub logs: Vec<(&'static str, usize, RtdeLog)>,
 }
 
 /// The arm that was simulated: the nominal one, or one draw of the imperfections.

@@ -14,12 +14,14 @@
 //! | `robot` | robots and tools from URDFs, calibrations, enclosures |
 //! | [`scenario`], `engine_name` | the sections of a scenario file: plain structs, ranges at their fields |
 //! | [`phantom`], [`fixtures`] | chests and furniture as solids |
-//! | `resolve` with [`imperfections`], [`people`], [`iso9283`] | from sections to a [`Cell`] with goals in the world |
+//! | `resolve` with [`imperfections`], [`people`], [`iso9283`], [`excitation`] | from sections to a [`Cell`] with goals in the world |
+//! | `excitation_text` | the text of a scenario, given a run that excites every joint |
 //! | [`family`], [`study`], `thresholds` | many scenarios from one, and what is asked of them |
 //! | `log_columns` | which column of a recorded log is what |
 
 pub mod arm;
 mod engine_name;
+mod excitation_text;
 pub mod family;
 mod files;
 mod finding;
@@ -39,6 +41,7 @@ mod thresholds;
 mod toml_text;
 
 pub use arm::{Arm, Recognition};
+pub use excitation_text::ExcitationText;
 pub use family::{
     Change, KeyPath, MovedPhantom, PhantomMove, PhantomMoves, ScenarioFamily, Setting,
 };
@@ -57,7 +60,8 @@ pub use model::{
 pub use printable::{printable, printable_json, printable_line};
 pub use resolve::{
     Expectation, Expected, Goal, GravitySettings, Overrides, PlacedPhantom, ResolvedScenario, Roll,
-    ServoSettings, imperfections, iso9283, load_robot, load_scenario, people, resolve_scenario,
+    ServoSettings, excitation, imperfections, iso9283, load_robot, load_scenario, people,
+    resolve_scenario,
 };
 pub use robot::{
     Calibration, DisabledPair, LinkEnclosure, MOVING_LINK_LABELS, MissingInertia, OriginDeviation,

@@ -237,6 +237,19 @@ pub struct ActuatedTorque {
     pub saturated: [bool; JOINT_COUNT],
 }
 
+/// What a controller has of one moment of a motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// What the servo is told to follow.
+    pub target: JointState,
+    /// Torque that the controller's model of arm and payload needs for it, N m, without friction.
+    pub moment_nm: Joints,
+    /// Friction that the controller adds to it, N m.
+    pub friction_nm: Joints,
+    /// Joint positions that the encoders read, rad: at the motors, so with the twist of the gears.
+    pub position: Joints,
+}
+
 /// The drives of one run: their settings, and what they remember.
 #[derive(Debug, Clone)]
 pub(crate) struct Drives<'a> {
@@ -354,6 +367,39 @@ impl<'a> Drives<'a> {
                 velocity: timing.at(trajectory, velocity_s).velocity,
                 ..timing.at(trajectory, time_s)
             },
+        }
+    }
+
+    /// What the controller is told, believes and reads of a state of a recording: states in their order, each
+    /// once, as in the run itself.
+    pub(crate) fn reading(
+        &mut self,
+        trajectory: &JointTrajectory,
+        time_s: f64,
+        planned: &JointState,
+        position: &Joints,
+        link_nm: &Joints,
+    ) -> Reading {
+        let target = self
+            .actuation
+            .commands
+            .map_or(*planned, |timing| timing.at(trajectory, time_s));
+        let reference = self.reference(trajectory, time_s, planned);
+        let error = if self.ideal {
+            Joints::zeros()
+        } else {
+            self.encoder_error(&reference.velocity)
+        };
+        Reading {
+            target,
+            moment_nm: self.servo.forward_nm(&target),
+            friction_nm: self
+                .actuation
+                .friction
+                .map_or_else(Joints::zeros, |friction| {
+                    friction.compensation_nm(&target.velocity)
+                }),
+            position: position + self.actuation.gears.twist_rad(link_nm) + error,
         }
     }
 

@@ -34,7 +34,7 @@ mod state;
 mod test_cell;
 mod unstable_servo;
 
-pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFriction};
+pub use actuation::{ActuatedTorque, Actuation, CommandTiming, Encoder, JointFriction, Reading};
 pub use brakes::{Brakes, loaded, stretched};
 pub use closed_loop::ClosedLoop;
 pub use deviations::{KNOWN_DEVIATIONS, KnownDeviation};

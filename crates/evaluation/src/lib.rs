@@ -10,6 +10,7 @@ mod contact;
 mod criteria;
 mod engine_pairs;
 pub mod events;
+pub mod excitation;
 pub mod iso9283;
 mod judge;
 pub mod metric;

@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::adjudication::Adjudication;
 pub use crate::class_clearance::{ClassClearance, ClearanceReport};
 use crate::events::EventsReport;
+use crate::excitation::ExcitationReport;
 use crate::iso9283::Iso9283Report;
 use crate::motion::{EngineDifference, MotionMeasurement};
 use crate::needle::NeedleMeasurement;
@@ -39,6 +40,9 @@ pub struct Report {
     /// The test by ISO 9283, in place of goals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iso9283: Option<Iso9283Report>,
+    /// The run that excites every joint, in place of goals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub excitation: Option<ExcitationReport>,
     /// Engines that failed, and how; their results are missing.
     pub engine_failures: Vec<EngineFailure>,
     /// The arm whose data the robot has; none if its lengths are those of no arm that is known.

@@ -8,8 +8,8 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, FkArguments,
     ISO9283_HELP, IkArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments,
-    REPLAY_HELP, ReplayArguments, RunArguments, STUDY_HELP, SchemaFormat, ServoArguments,
-    StudyArguments,
+    REPLAY_HELP, RecordPlanArguments, ReplayArguments, RunArguments, STUDY_HELP, SchemaFormat,
+    ServoArguments, StudyArguments,
 };
 use crate::exit::ExitStatus;
 use crate::output::complain;
@@ -78,6 +78,12 @@ enum Command {
         after_long_help = ISO9283_HELP
     )]
     Iso9283(Iso9283Arguments),
+    /// A safe run that excites every joint, for a log from which an arm is calibrated and identified: as a
+    /// scenario and as URScript, with its proven clearances.
+    #[command(
+        after_help = "Example: needlebench record-plan --arm ur3e --payload-kg 0,1 --out out"
+    )]
+    RecordPlan(Box<RecordPlanArguments>),
     /// A recorded run of a real arm: what it says of the arm, and the same set-points in the engines.
     #[command(
         after_help = "Example: needlebench replay models/ur3e/recorded/ur3e_rad_20211005.csv",
@@ -143,6 +149,7 @@ fn run() -> ExitCode {
         Command::Study(arguments) => command::study(&arguments),
         Command::Merge(arguments) => command::merge(&arguments),
         Command::Iso9283(arguments) => command::iso9283(&arguments),
+        Command::RecordPlan(arguments) => command::record_plan(&arguments),
         Command::Replay(arguments) => command::replay(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments),

@@ -4,6 +4,7 @@
 //! cannot work carries the rules that reject it, the first failing one first.
 
 mod blocked;
+pub mod excitation;
 mod family;
 pub mod iso9283;
 mod limits;

@@ -13,8 +13,10 @@ pub mod picture;
 #[path = "../../engine/tests/engine/common/replay.rs"]
 mod replay;
 pub mod table;
+mod urscript;
 
 pub use files::write_atomically;
 pub use junit::{comparison_junit, junit, study_comparison_junit, study_junit};
 pub use markdown::{comparison_markdown, markdown, study_comparison_markdown};
 pub use table::{plain_table, report_text};
+pub use urscript::excitation_script;

@@ -46,7 +46,7 @@ pub(crate) fn run(
     timings.insert("planning_s".to_owned(), started.elapsed().as_secs_f64());
     let plan = match plan {
         Ok(plan) => plan,
-        Err(error) => return Ok(unplanned(resolved, &error.to_string(), timings)),
+        Err(error) => return Ok(unplanned(resolved, SUBJECT, &error.to_string(), timings)),
     };
     let chosen = engine_names(engines);
     let outcomes = simulate_engines(&setup, protocol, plan, engines, control);
@@ -114,6 +114,8 @@ pub(crate) fn run(
             engines,
             limit_band_m: protocol.limit_band_m,
         }),
+        excitation: None,
+        rtde: None,
         interrupted,
         real_arm: RealArm::of(setup.real.cell()),
     })
@@ -204,13 +206,14 @@ fn difference(
 }
 
 /// The report of a protocol that cannot be carried out.
-fn unplanned(
+pub(crate) fn unplanned(
     resolved: &ResolvedScenario,
+    subject: &str,
     reason: &str,
     timings: BTreeMap<String, f64>,
 ) -> ScenarioRun {
     let criterion = CriterionResult {
-        goal: SUBJECT.to_owned(),
+        goal: subject.to_owned(),
         label: None,
         engine: None,
         criterion: "planned".to_owned(),
@@ -230,12 +233,15 @@ fn unplanned(
         plans: Vec::new(),
         runs: Vec::new(),
         iso9283: None,
+        excitation: None,
+        rtde: None,
         interrupted: false,
         real_arm: RealArm::of(&resolved.cell),
     }
 }
 
-fn empty_report(
+/// The report of a scenario without goals, as far as it does not depend on what was done.
+pub(crate) fn empty_report(
     resolved: &ResolvedScenario,
     identities: Vec<EngineIdentity>,
     timings: BTreeMap<String, f64>,
@@ -254,6 +260,7 @@ fn empty_report(
         not_judged: Vec::new(),
         goals: Vec::new(),
         iso9283: None,
+        excitation: None,
         engine_failures: Vec::new(),
         arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
         gravity: resolved.gravity.clone(),

@@ -26,7 +26,7 @@ pub(super) fn case_setup<'a>(
     resolved: &'a ResolvedScenario,
     model: &'a ClearanceModel,
 ) -> Result<Setup<'a>, String> {
-    if resolved.goals.len() != 1 || resolved.iso9283.is_some() {
+    if resolved.goals.len() != 1 || resolved.iso9283.is_some() || resolved.excitation.is_some() {
         return Err(format!(
             "a case has one goal, `{}` has {}",
             resolved.source.file,

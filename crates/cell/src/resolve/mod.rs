@@ -2,6 +2,7 @@
 
 mod arm_values;
 mod cache;
+pub mod excitation;
 mod expected;
 mod fixtures;
 mod gears;
@@ -40,6 +41,7 @@ use crate::scenario::{self, Scenario};
 use crate::toml_text::TomlText;
 use crate::{Finding, Robot};
 use arm_values::check_brakes;
+use excitation::{ExcitationProtocol, check_sweeps, resolve_excitation};
 pub use expected::Expected;
 use expected::RealThings;
 use goals::{BodyBoxes, Surroundings, resolve_goal};
@@ -82,6 +84,8 @@ pub struct ResolvedScenario {
     pub goals: Vec<Goal>,
     /// The test by ISO 9283, in place of goals.
     pub iso9283: Option<Iso9283Protocol>,
+    /// The run that excites every joint, in place of goals.
+    pub excitation: Option<ExcitationProtocol>,
     /// Where every motion starts.
     pub start: Joints,
     /// The joint servo.
@@ -192,6 +196,12 @@ pub(crate) fn resolve(
         .iso9283
         .as_ref()
         .map(|section| resolve_iso9283(toml, section, &robot, &mut tool, &mut notes))
+        .transpose()
+        .map_err(one)?;
+    let excitation = scenario
+        .excitation
+        .as_ref()
+        .map(|section| resolve_excitation(toml, &scenario, section, &robot, &mut tool, &mut notes))
         .transpose()
         .map_err(one)?;
     check_floor(toml, &robot).map_err(one)?;
@@ -314,6 +324,9 @@ pub(crate) fn resolve(
         )));
     }
     check_start(toml, &robot, &start).map_err(one)?;
+    if let Some(protocol) = &excitation {
+        check_sweeps(toml, protocol, &robot, &start).map_err(one)?;
+    }
     let motion = motion_limits(&scenario, &robot.limits.velocities_rad_s());
     let corridor = NeedleCorridor {
         radius_m: scenario.tool.corridor_radius_mm * 1e-3,
@@ -368,6 +381,7 @@ pub(crate) fn resolve(
         fixtures,
         goals,
         iso9283,
+        excitation,
         start,
         servo,
         gravity,

@@ -10,6 +10,7 @@ mod criteria;
 mod engines;
 pub mod envelope;
 mod events;
+mod excitation;
 mod fixtures;
 mod goals;
 mod imperfections;
@@ -42,6 +43,7 @@ pub use criteria::{ClearanceCriteria, CriteriaSection};
 pub use engines::{EnginesSection, MujocoSection, RapierSection, STANDARD_GRAVITY_M_S2};
 pub use envelope::EnvelopeSection;
 pub use events::{EventsSection, PressClass, PressSection, StopSection};
+pub use excitation::{ExcitationSection, PayloadSection, SweepSection};
 pub use fixtures::{GantrySection, MountKind, MountSection, TableSection};
 pub(crate) use goals::EVERY_CONFIGURATION;
 pub use goals::{FlangePose, GoalSection, REJECTION_RULES};
@@ -110,12 +112,15 @@ pub struct Scenario {
     /// What else the arm may hit: equipment in the room, on the table, the gantry or the robot.
     #[serde(default)]
     pub obstacles: Vec<ObstacleSection>,
-    /// Where needles are to go. Needed unless there is an `[iso9283]`.
+    /// Where needles are to go. Needed unless there is an `[iso9283]` or an `[excitation]`.
     #[serde(default)]
     pub goals: Vec<GoalSection>,
     /// The test of the robot by ISO 9283, instead of goals.
     #[serde(default)]
     pub iso9283: Option<Iso9283Section>,
+    /// A run that excites every joint, for what is identified from its log, instead of goals.
+    #[serde(default)]
+    pub excitation: Option<ExcitationSection>,
     /// Where every motion starts.
     #[serde(default)]
     pub start: StartSection,
@@ -202,7 +207,7 @@ pub(crate) fn check_together(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Fi
     findings.extend(goals::check(
         toml,
         &scenario.goals,
-        scenario.iso9283.is_none(),
+        scenario.iso9283.is_none() && scenario.excitation.is_none(),
     ));
     findings.extend(ranking::check(toml, &scenario.ranking));
     findings.extend(events::check(toml, scenario));
@@ -210,5 +215,6 @@ pub(crate) fn check_together(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Fi
         findings.extend(imperfections::check(toml, section));
     }
     findings.extend(iso9283::check(toml, scenario));
+    findings.extend(excitation::check(toml, scenario));
     findings
 }

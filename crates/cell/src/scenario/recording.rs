@@ -16,6 +16,8 @@ pub struct RecordingSection {
     pub period_ms: f64,
     /// Write a picture of each configuration.
     pub pictures: bool,
+    /// Write a log of each simulated motion by the names of UR's real-time data exchange (RTDE) too.
+    pub rtde: bool,
 }
 
 impl Default for RecordingSection {
@@ -23,6 +25,7 @@ impl Default for RecordingSection {
         Self {
             period_ms: 10.0,
             pictures: true,
+            rtde: false,
         }
     }
 }

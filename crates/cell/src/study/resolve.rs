@@ -151,7 +151,7 @@ fn goals(
         if known.is_empty() {
             return Err(toml
                 .finding("scenario", "the scenario has no goals to study")
-                .hint("a scenario with [iso9283] has none; name another one"));
+                .hint("a scenario with [iso9283] or [excitation] has none; name another one"));
         }
         return Ok(known);
     };

@@ -117,9 +117,14 @@ fn in_words(
     is_ok: bool,
 ) -> Result<String, std::fmt::Error> {
     let mut text = String::new();
-    let purpose = match resolved.iso9283 {
-        Some(_) => "test by ISO 9283".to_owned(),
-        None => format!("{} goals", resolved.goals.len()),
+    let purpose = match (&resolved.iso9283, &resolved.excitation) {
+        (Some(_), _) => "test by ISO 9283".to_owned(),
+        (None, Some(run)) => format!(
+            "excitation run, {} postures, {} payloads",
+            run.postures.len(),
+            run.loads.len()
+        ),
+        (None, None) => format!("{} goals", resolved.goals.len()),
     };
     write!(
         text,

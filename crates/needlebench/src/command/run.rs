@@ -48,6 +48,10 @@ pub(crate) struct RunArguments {
     /// Threads; the number of cores if left out. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub jobs: Option<u16>,
+    /// Write a log of each motion by the names of UR's real-time data exchange too, as its recorder
+    /// would write it of the real arm.
+    #[arg(long)]
+    pub rtde: bool,
     /// Draw no pictures.
     #[arg(long)]
     pub no_pictures: bool,
@@ -119,6 +123,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     let mut status = ExitStatus::Success;
     let mut reports = Vec::new();
     let outputs = Outputs {
+        rtde: arguments.rtde,
         pictures: !arguments.no_pictures,
         page: !arguments.no_page,
         text: !arguments.json,
@@ -154,6 +159,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(super) struct Outputs {
+    /// Logs as a controller writes them, whatever the scenario wants.
+    pub rtde: bool,
     /// Pictures, if the scenario wants any.
     pub pictures: bool,
     /// The page.
@@ -177,6 +184,7 @@ pub(super) fn run_into(
     let mut finished = needlebench_bench::run(runnable, options, cancel, &progress)?;
     let resolved = runnable.scenario();
     let files = RunFiles {
+        rtde: outputs.rtde,
         pictures: outputs.pictures,
         page: outputs.page,
         jobs: options.jobs,

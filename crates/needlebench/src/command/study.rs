@@ -371,6 +371,7 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
     let mut status = ExitStatus::Success;
     let mut reports = Vec::new();
     let outputs = Outputs {
+        rtde: false,
         pictures: true,
         page: !arguments.results.no_page,
         text: !arguments.results.json,

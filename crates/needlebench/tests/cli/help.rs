@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "run",
     "check",
     "ik",
@@ -11,6 +11,7 @@ const COMMANDS: [&str; 13] = [
     "atlas",
     "compare",
     "iso9283",
+    "record-plan",
     "pairs",
     "paper",
     "schema",

@@ -28,6 +28,7 @@ mod paper;
 mod people;
 #[cfg(target_os = "linux")]
 mod process;
+mod record_plan;
 mod referee;
 mod replay;
 mod robust_io;

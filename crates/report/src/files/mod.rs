@@ -6,6 +6,7 @@
 mod atlas;
 mod atomic;
 mod error;
+mod excitation;
 mod folder;
 mod iso9283;
 mod pictures;
@@ -18,6 +19,7 @@ mod study;
 pub use atlas::write_atlas;
 pub use atomic::write_atomically;
 pub use error::FilesError;
+pub use excitation::write_plan;
 pub use folder::Folder;
 pub use iso9283::{write_measured, write_test};
 pub use replay::{CALIBRATION_FILE, write_replay};

@@ -10,11 +10,12 @@ use needlebench_engine::Engine;
 use needlebench_planning::GoalPlan;
 
 use super::error::FilesError;
+use super::excitation::write_logs;
 use super::folder::Folder;
 use super::iso9283::write_test;
 use super::pictures::{Pictures, remove_pictures};
 use crate::chart::press::press_chart;
-use crate::csv::{press_csv, recording_csv, recording_name};
+use crate::csv::{press_csv, recording_csv, recording_name, rtde_csv};
 use crate::junit::junit;
 use crate::markdown::markdown;
 use crate::page::run_page;
@@ -22,6 +23,8 @@ use crate::page::run_page;
 /// Which files a run leaves besides its report, and how they are made.
 #[derive(Debug, Clone, Copy)]
 pub struct RunFiles<'a> {
+    /// A log of each recording by the names of UR's real-time data exchange, whatever the scenario wants.
+    pub rtde: bool,
     /// Pictures and charts, if the scenario wants any.
     pub pictures: bool,
     /// The page.
@@ -48,6 +51,9 @@ pub fn write_run(
     let started = Instant::now();
     let pictures = resolved.scenario.recording.pictures && wanted.pictures;
     let mut names = write_recordings(resolved, finished, folder)?;
+    if wanted.rtde || resolved.scenario.recording.rtde {
+        write_rtde(resolved, finished, folder, &mut names)?;
+    }
     for run in &finished.events {
         let of_run = write_events(resolved, run, &finished.plans, folder, pictures)?;
         names[run.goal][run.configuration].extend(of_run);
@@ -74,6 +80,9 @@ pub fn write_run(
     if let (Some(run), Some(report)) = (&finished.iso9283, &mut finished.report.iso9283) {
         let name = &resolved.scenario.name;
         report.files = write_test(name, report, run, folder, pictures)?;
+    }
+    if let (Some(run), Some(report)) = (&finished.excitation, &mut finished.report.excitation) {
+        report.files = write_logs(run, folder)?;
     }
     if wanted.page {
         progress.message("writing the page");
@@ -127,6 +136,38 @@ fn write_recordings(
         names[goal][configuration].push(name);
     }
     Ok(names)
+}
+
+/// Logs of all motions that came to their end, as the controller of a UR arm would write them.
+fn write_rtde(
+    resolved: &ResolvedScenario,
+    finished: &ScenarioRun,
+    folder: Folder<'_>,
+    names: &mut Names,
+) -> Result<(), FilesError> {
+    let Some(source) = &finished.rtde else {
+        return Ok(());
+    };
+    let period_s = resolved.scenario.recording.period_ms * 1e-3;
+    for (goal, runs) in finished.runs.iter().enumerate() {
+        for (configuration, runs) in runs.iter().enumerate() {
+            let plan = &finished.plans[goal].configurations[configuration];
+            let Some(trajectory) = &plan.trajectory else {
+                continue;
+            };
+            for run in runs {
+                let log = source.log(&run.recording, trajectory, period_s);
+                let label = plan.configuration;
+                let name = format!(
+                    "{}/{label}.{}.rtde.csv",
+                    resolved.goals[goal].name, run.engine
+                );
+                folder.write(&name, rtde_csv(&log))?;
+                names[goal][configuration].push(name);
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Recordings of the contacts that were asked for, and a chart of each.

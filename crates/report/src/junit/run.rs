@@ -1,7 +1,7 @@
 //! A run: a suite for each goal, a case for each configuration.
 
-use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::report::{CriterionResult, Report, Status};
+use needlebench_evaluation::{excitation, iso9283};
 use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::failure::{failure, not_judged};
@@ -62,8 +62,13 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
             suite.add_test_case(case);
             document.add_test_suite(suite);
         }
-        if report.iso9283.is_some() || report.criteria.iter().any(|each| each.goal == SUBJECT) {
-            document.add_test_suite(iso9283_suite(report));
+        for (subject, is_there) in [
+            (iso9283::SUBJECT, report.iso9283.is_some()),
+            (excitation::SUBJECT, report.excitation.is_some()),
+        ] {
+            if is_there || report.criteria.iter().any(|each| each.goal == subject) {
+                document.add_test_suite(suite_of(report, subject));
+            }
         }
         if !report.engine_failures.is_empty() {
             let mut suite = TestSuite::new(format!("{}.engines", report.scenario.name));
@@ -88,11 +93,11 @@ fn open(report: &Report, goal: &str, label: Option<&str>) -> String {
     texts.join("; ")
 }
 
-/// A test by ISO 9283: a case for each criterion.
-fn iso9283_suite(report: &Report) -> TestSuite {
-    let name = format!("{}.{SUBJECT}", report.scenario.name);
+/// A test by ISO 9283, or a run that excites every joint: a case for each criterion.
+fn suite_of(report: &Report, subject: &str) -> TestSuite {
+    let name = format!("{}.{subject}", report.scenario.name);
     let mut suite = TestSuite::new(name.clone());
-    for result in report.criteria.iter().filter(|each| each.goal == SUBJECT) {
+    for result in report.criteria.iter().filter(|each| each.goal == subject) {
         let status = if result.pass {
             TestCaseStatus::success()
         } else {
@@ -102,17 +107,16 @@ fn iso9283_suite(report: &Report) -> TestSuite {
             .engine
             .as_ref()
             .map_or(String::new(), |engine| format!(" ({engine})"));
-        let mut case = TestCase::new(format!("{}{engine}", result.criterion), status);
+        let what = case_of(subject, result.label.as_deref(), &result.criterion);
+        let mut case = TestCase::new(format!("{what}{engine}"), status);
         case.set_classname(name.clone());
         suite.add_test_case(case);
     }
-    for each in report.not_judged.iter().filter(|each| each.goal == SUBJECT) {
+    for each in report.not_judged.iter().filter(|each| each.goal == subject) {
         let engine = each.engine.as_ref();
         let engine = engine.map_or(String::new(), |engine| format!(" ({engine})"));
-        let mut case = TestCase::new(
-            format!("{}{engine}", each.criterion),
-            not_judged(&each.reason),
-        );
+        let what = case_of(subject, each.label.as_deref(), &each.criterion);
+        let mut case = TestCase::new(format!("{what}{engine}"), not_judged(&each.reason));
         case.set_classname(name.clone());
         suite.add_test_case(case);
     }
@@ -134,5 +138,13 @@ fn described(result: &CriterionResult) -> String {
             text.trim_end().to_owned()
         }
         _ => format!("{}{engine}: {}", result.criterion, result.detail),
+    }
+}
+
+/// Name of a criterion's case: with its payload, of which a run has several.
+fn case_of(subject: &str, label: Option<&str>, criterion: &str) -> String {
+    match label.filter(|_| subject == excitation::SUBJECT) {
+        Some(label) => format!("{criterion}, {label}"),
+        None => criterion.to_owned(),
     }
 }

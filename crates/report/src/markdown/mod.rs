@@ -2,6 +2,7 @@
 
 mod comparison;
 pub(crate) mod escape;
+mod excitation;
 mod iso9283;
 mod ranking;
 mod run;

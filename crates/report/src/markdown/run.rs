@@ -77,6 +77,9 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     if let Some(iso9283) = &report.iso9283 {
         out.push_str(&super::iso9283::report_markdown(iso9283));
     }
+    if let Some(excitation) = &report.excitation {
+        out.push_str(&super::excitation::report_markdown(excitation));
+    }
     let failed: Vec<_> = report
         .criteria
         .iter()

@@ -5,6 +5,7 @@ pub(crate) mod budget;
 pub mod comparison;
 pub(crate) mod engine_headings;
 pub(crate) mod events;
+pub mod excitation;
 pub mod iso9283;
 mod plain;
 pub(crate) mod ranking;

@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use comfy_table::{Cell, CellAlignment, Color, Table};
 use needlebench_engine::Engine;
+use needlebench_evaluation::excitation;
 use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::metric::Heading;
 use needlebench_evaluation::report::{
@@ -92,6 +93,10 @@ fn write_report(
         out.push_str(&super::iso9283::report_text(iso9283));
         write_missed(out, report, SUBJECT)?;
     }
+    if let Some(excitation) = &report.excitation {
+        out.push_str(&super::excitation::report_text(excitation));
+    }
+    write_missed(out, report, excitation::SUBJECT)?;
     for failure in &report.engine_failures {
         let during = failure
             .during

@@ -84,9 +84,11 @@ NB.RunPage = class {
     for (const [name, on] of Object.entries(this.layers)) this.view.show(name, on);
     for (const group of ['collision', 'corridor']) arm.layer(group, false);
     this.view.frame(this.framed([]), [-0.75, 0.45, -0.55]);
-    app.append(this.view.element, NB.section('ISO 9283', false, NB.el('p', {
-      text: 'The table of the test and its curves are in report.json and in the files named there.',
-    }), NB.tree(this.report.iso9283)));
+    const [title, what] = this.report.excitation
+      ? ['Excitation', 'Proven clearances by motion are in report.json; the logs are in the files named there.']
+      : ['ISO 9283', 'The table of the test and its curves are in report.json and in the files named there.'];
+    app.append(this.view.element, NB.section(title, false, NB.el('p', { text: what }),
+      NB.tree(this.report.excitation || this.report.iso9283)));
   }
 
   /** Base and shoulders of the arm, and points of the goal. */
