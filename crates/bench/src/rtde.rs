@@ -34,6 +34,8 @@ pub struct RtdeLog {
     pub payload_kg: f64,
     /// Its centre in the flange frame, m.
     pub payload_cog_m: [f64; 3],
+    /// Its inertia about its centre along the flange's axes, kg m^2: xx, yy, zz, xy, xz, yz.
+    pub payload_inertia_kgm2: [f64; 6],
 }
 
 /// One row.
@@ -118,6 +120,8 @@ impl RtdeSource {
             rows,
             payload_kg: self.payload.mass_kg,
             payload_cog_m: self.payload.com_m.into(),
+            payload_inertia_kgm2: [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+                .map(|place| self.payload.inertia_kgm2[place]),
         }
     }
 

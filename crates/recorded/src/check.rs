@@ -148,7 +148,8 @@ pub(crate) fn checked(
     let loads = {
         let mass = take(Quantity::Payload);
         let centre = take(Quantity::PayloadCog);
-        loads(mass, centre, &keep)
+        let inertia = take(Quantity::PayloadInertia);
+        loads(mass, centre, inertia, &keep)
     };
     let kind = kind(&actual_q, target.as_deref(), raw.draws_current);
     if kind == LogKind::Simulator {
@@ -397,7 +398,12 @@ fn target(
 }
 
 /// Loads, each from a row on.
-fn loads(mass: Option<Vec<f64>>, centre: Option<Vec<f64>>, keep: &[usize]) -> Vec<(usize, Load)> {
+fn loads(
+    mass: Option<Vec<f64>>,
+    centre: Option<Vec<f64>>,
+    inertia: Option<Vec<f64>>,
+    keep: &[usize],
+) -> Vec<(usize, Load)> {
     let Some(mass) = mass else {
         return Vec::new();
     };
@@ -407,6 +413,9 @@ fn loads(mass: Option<Vec<f64>>, centre: Option<Vec<f64>>, keep: &[usize]) -> Ve
         let load = Load {
             mass_kg: mass[*at],
             centre_m: [centre[3 * at], centre[3 * at + 1], centre[3 * at + 2]],
+            inertia_kgm2: std::array::from_fn(|k| {
+                inertia.as_ref().map_or(0.0, |inertia| inertia[6 * at + k])
+            }),
         };
         if loads.last().is_none_or(|(_, last)| *last != load) {
             loads.push((row, load));

@@ -29,6 +29,8 @@ pub enum Quantity {
     Payload,
     /// Its centre in the flange frame.
     PayloadCog,
+    /// Its inertia about its centre, flange axes: xx, yy, zz, xy, xz, yz.
+    PayloadInertia,
     /// The controller's mode.
     RobotMode,
     /// The controller's safety mode.
@@ -45,7 +47,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Time,
         Self::TargetQ,
         Self::TargetQd,
@@ -59,6 +61,7 @@ impl Quantity {
         Self::ActualTcp,
         Self::Payload,
         Self::PayloadCog,
+        Self::PayloadInertia,
         Self::RobotMode,
         Self::SafetyMode,
         Self::JointMode,
@@ -83,6 +86,7 @@ impl Quantity {
             Self::ActualTcp => "actual_TCP_pose",
             Self::Payload => "payload",
             Self::PayloadCog => "payload_cog",
+            Self::PayloadInertia => "payload_inertia",
             Self::RobotMode => "robot_mode",
             Self::SafetyMode => "safety_mode",
             Self::JointMode => "joint_mode",

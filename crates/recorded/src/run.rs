@@ -78,13 +78,16 @@ pub enum LogKind {
     Simulator,
 }
 
-/// A load at the flange, as a point.
+/// A load at the flange.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Load {
     /// Mass, kg.
     pub mass_kg: f64,
     /// Centre in the flange frame, m.
     pub centre_m: [f64; 3],
+    /// Inertia about its centre along the flange's axes, kg m^2: xx, yy, zz, xy, xz, yz; 0 where the log
+    /// does not say, which counts it as a point.
+    pub inertia_kgm2: [f64; 6],
 }
 
 impl RecordedRun {

@@ -270,7 +270,10 @@ fn cell(resolved: &ResolvedScenario, load: Option<Load>, rotors: Joints) -> Cell
             body: Body {
                 mass_kg: load.mass_kg,
                 com_m: Vector3::from(load.centre_m),
-                inertia_kgm2: Matrix3::zeros(),
+                inertia_kgm2: {
+                    let [xx, yy, zz, xy, xz, yz] = load.inertia_kgm2;
+                    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+                },
             },
             ..cell.tool.clone()
         },

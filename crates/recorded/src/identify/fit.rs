@@ -80,7 +80,8 @@ type Grams = Vec<Vec<Gram>>;
 /// The sums of a run, by block.
 pub(super) struct Data {
     blocks: Vec<Grams>,
-    loads: usize,
+    /// Inertia of each load about its own centre, as the log has it, kg m^2.
+    loads: Vec<[f64; 6]>,
 }
 
 impl Data {
@@ -109,15 +110,16 @@ impl Data {
                 }
             }
         }
+        let own = |load: &Option<Load>| load.map_or([0.0; 6], |load| load.inertia_kgm2);
         Self {
             blocks: found,
-            loads,
+            loads: context.loads.iter().map(own).collect(),
         }
     }
 
     /// Sums of the blocks that are wanted.
     fn sum(&self, wanted: impl Fn(usize) -> bool) -> Grams {
-        let mut total = vec![vec![Gram::ZERO; JOINT_COUNT]; self.loads];
+        let mut total = vec![vec![Gram::ZERO; JOINT_COUNT]; self.loads.len()];
         for (_, block) in self.blocks.iter().enumerate().filter(|(at, _)| wanted(*at)) {
             for (total, grams) in total.iter_mut().zip(block) {
                 for (total, gram) in total.iter_mut().zip(grams) {
@@ -135,7 +137,7 @@ impl Data {
         gravity_m_s2: f64,
         loads: &[Option<Load>],
     ) -> [f64; JOINT_COUNT] {
-        let mut values = DVector::zeros(LOADS + 4 * self.loads);
+        let mut values = DVector::zeros(LOADS + 4 * self.loads.len());
         let mut inertia = Vec::new();
         for (at, load) in loads.iter().enumerate() {
             let (mass_kg, centre_m) = load.map_or((0.0, Vector3::zeros()), |load| {
@@ -145,7 +147,7 @@ impl Data {
             for axis in 0..3 {
                 values[LOADS + 4 * at + 1 + axis] = mass_kg * centre_m[axis];
             }
-            inertia.push(point_inertia(mass_kg, &centre_m));
+            inertia.push(sum(&self.loads[at], &point_inertia(mass_kg, &centre_m)));
         }
         for (joint, rotor) in rotors.iter().enumerate() {
             values[joint] = *rotor;
@@ -157,6 +159,7 @@ impl Data {
                 gravity_m_s2: Some(gravity_m_s2),
             },
             gravity_m_s2,
+            own_inertia: self.loads.clone(),
             inertia,
             determined: vec![true; values.len()],
             values,
@@ -182,7 +185,9 @@ pub(super) struct Fit {
     model: Model,
     gravity_m_s2: f64,
     gravity_is_determined: bool,
-    /// Inertia of each load about the flange's origin, as a point, kg m^2.
+    /// Inertia of each load about its own centre, kg m^2.
+    own_inertia: Vec<[f64; 6]>,
+    /// The same about the flange's origin, by the mass and centre that were found, kg m^2.
     inertia: Vec<[f64; 6]>,
     values: DVector<f64>,
     determined: Vec<bool>,
@@ -201,7 +206,7 @@ impl Fit {
     /// A fit of the whole run, each joint weighted by its own error.
     pub fn weighted(data: &Data, model: Model) -> Self {
         let total = data.sum(|_| true);
-        let mut fit = Self::start(data.loads, model, [1.0; JOINT_COUNT]);
+        let mut fit = Self::start(&data.loads, model, [1.0; JOINT_COUNT]);
         for _ in 0..ROUNDS {
             fit.improve(&total);
             let rms = fit.rms_of(&total);
@@ -213,13 +218,14 @@ impl Fit {
         fit
     }
 
-    fn start(loads: usize, model: Model, weights: [f64; JOINT_COUNT]) -> Self {
-        let count = LOADS + 4 * loads;
+    fn start(loads: &[[f64; 6]], model: Model, weights: [f64; JOINT_COUNT]) -> Self {
+        let count = LOADS + 4 * loads.len();
         Self {
             model,
             gravity_m_s2: model.gravity_m_s2.unwrap_or(STANDARD_GRAVITY),
             gravity_is_determined: false,
-            inertia: vec![[0.0; 6]; loads],
+            own_inertia: loads.to_vec(),
+            inertia: loads.to_vec(),
             values: DVector::zeros(count),
             determined: vec![false; count],
             weights,
@@ -252,9 +258,9 @@ impl Fit {
                     let centre_m = Vector3::from_fn(|axis, _| {
                         self.values[LOADS + 4 * load + 1 + axis] / mass_kg
                     });
-                    point_inertia(mass_kg, &centre_m)
+                    sum(&self.own_inertia[load], &point_inertia(mass_kg, &centre_m))
                 } else {
-                    [0.0; 6]
+                    self.own_inertia[load]
                 };
             }
         }
@@ -463,6 +469,10 @@ impl Fit {
     pub fn gravity(&self) -> Option<f64> {
         self.gravity_is_determined.then_some(self.gravity_m_s2)
     }
+}
+
+fn sum(a: &[f64; 6], b: &[f64; 6]) -> [f64; 6] {
+    std::array::from_fn(|k| a[k] + b[k])
 }
 
 fn cost(normal: &Normal, values: &DVector<f64>) -> f64 {

@@ -43,13 +43,21 @@ pub fn rtde_csv(log: &RtdeLog) -> String {
     for index in 0..6 {
         let _ = write!(out, ",joint_mode_{index}");
     }
-    out.push_str(",safety_mode,speed_scaling,payload,payload_cog_0,payload_cog_1,payload_cog_2\n");
+    out.push_str(",safety_mode,speed_scaling,payload,payload_cog_0,payload_cog_1,payload_cog_2");
+    for index in 0..6 {
+        let _ = write!(out, ",payload_inertia_{index}");
+    }
+    out.push('\n');
     let mut end = format!(",{ROBOT_MODE}");
     for _ in 0..6 {
         let _ = write!(end, ",{JOINT_MODE}");
     }
     let _ = write!(end, ",{SAFETY_MODE},1,{}", number(log.payload_kg, 9));
-    for value in log.payload_cog_m {
+    for value in log
+        .payload_cog_m
+        .into_iter()
+        .chain(log.payload_inertia_kgm2)
+    {
         let _ = write!(end, ",{}", number(value, 9));
     }
     for row in &log.rows {

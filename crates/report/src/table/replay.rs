@@ -31,7 +31,13 @@ pub fn shown(estimate: &Estimate, unit: f64) -> String {
     };
     let (value, half) = (value * unit, half * unit);
     let decimals = decimals(half, value);
-    let text = format!("{value:.decimals$} +-{half:.decimals$}");
+    let shown_half = format!("{half:.decimals$}");
+    let is_nothing = shown_half.bytes().all(|digit| matches!(digit, b'0' | b'.'));
+    let text = if is_nothing && half > 0.0 {
+        format!("{} +-{half:.0e}", rounded(value, decimals))
+    } else {
+        format!("{value:.decimals$} +-{shown_half}")
+    };
     if estimate.identifiable {
         text
     } else {
