@@ -221,3 +221,92 @@ fn the_same_log_gives_the_same_bytes() {
     };
     assert_eq!(read(), read());
 }
+
+/// An arm of ours, miscalibrated and with friction of its own, is recorded on a planned run, and its log
+/// gives back what was put in.
+#[test]
+fn a_recorded_run_of_ours_gives_back_what_was_put_in() {
+    /// Estimates are within this many of their own intervals: of thirty of 95 % one or two are outside one.
+    const INTERVALS: f64 = 2.5;
+    let bench = Bench::new();
+    let plan = [
+        "record-plan",
+        "--arm",
+        "ur3e",
+        "--poses",
+        "12",
+        "--payload-kg",
+        "0.8",
+        "--out",
+        "out",
+    ];
+    bench.run(&plan).exits_with(0);
+    let mut scenario = String::from_utf8(bench.read("out/ur3e/excitation.toml")).unwrap();
+    scenario += "\n[imperfections.calibration]\narm = \"population\"\n[imperfections.friction]\n\
+                 [imperfections.encoder]\n";
+    bench.write("mine.toml", &scenario);
+    bench
+        .run(&[
+            "run",
+            "mine.toml",
+            "--engine",
+            "rapier",
+            "--quiet",
+            "--no-pictures",
+        ])
+        .exits_with(0);
+    let folder = bench.path("out/ur3e_excitation");
+    let logs: Vec<_> = fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.to_string_lossy().ends_with(".rtde.csv"))
+        .collect();
+    assert_eq!(logs.len(), 1, "{logs:?}");
+    let truth = bench.read_json("out/ur3e_excitation/report.json")["truth"].clone();
+    let report = quick(&bench, logs[0].to_str().unwrap(), &["--json"])
+        .exits_with(0)
+        .json();
+    assert_eq!(report["arm"]["name"], "UR3e");
+    // Calibration: nominal lengths are off, the fitted ones predict what they have not seen.
+    let calibration = &report["calibration"];
+    assert_eq!(calibration["is_worth"], true);
+    assert!(number(&calibration["nominal_held_out"]["rms_m"]) > 5e-5);
+    assert!(number(&calibration["held_out"]["rms_m"]) < 1e-6);
+    let identification = &report["identification"];
+    let near = |estimate: &Value, wanted: f64| {
+        assert_eq!(estimate["identifiable"], true, "{estimate} {wanted}");
+        let (value, half) = (number(&estimate["value"]), number(&estimate["half_width"]));
+        // Digits of the log.
+        let slack = INTERVALS * half + 1e-6;
+        assert!((value - wanted).abs() < slack, "{estimate} {wanted}");
+    };
+    // The arm's own data, and friction as it was drawn about them.
+    let data = fs::read_to_string(workspace().join("models/ur3e/arm.toml")).unwrap();
+    let of_data = |key: &str| -> Vec<f64> {
+        let line = data.lines().find(|line| line.starts_with(key)).unwrap();
+        let list = line.split_once('[').unwrap().1.trim_end_matches(']');
+        list.split(',')
+            .map(|number| number.trim().parse().unwrap())
+            .collect()
+    };
+    let (rotors, coulomb, viscous) = (
+        of_data("inertia_kgm2"),
+        of_data("coulomb_nm"),
+        of_data("viscous_nms_rad"),
+    );
+    for joint in 0..6 {
+        let share = number(&truth["friction_true_over_nominal"][joint]);
+        let measured = &identification["measured"];
+        near(
+            &identification["controller"]["rotor_inertia_kgm2"][joint],
+            rotors[joint],
+        );
+        near(&measured["rotor_inertia_kgm2"][joint], rotors[joint]);
+        near(&measured["coulomb_nm"][joint], share * coulomb[joint]);
+        near(&measured["viscous_nms_rad"][joint], share * viscous[joint]);
+    }
+    let load = &identification["measured"]["loads"][0];
+    let logged = number(&load["logged"]["mass_kg"]);
+    assert!((logged - 0.8).abs() < 0.3, "{load}");
+    near(&load["mass_kg"], logged);
+}
