@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "run",
     "check",
     "ik",
@@ -13,6 +13,7 @@ const COMMANDS: [&str; 13] = [
     "iso9283",
     "pairs",
     "paper",
+    "report",
     "schema",
     "doctor",
     "completions",

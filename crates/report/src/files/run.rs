@@ -9,6 +9,7 @@ use needlebench_cell::ResolvedScenario;
 use needlebench_engine::Engine;
 use needlebench_planning::GoalPlan;
 
+use super::accuracy::remove_accuracy;
 use super::error::FilesError;
 use super::folder::Folder;
 use super::iso9283::write_test;
@@ -46,6 +47,7 @@ pub fn write_run(
     progress: &dyn Progress,
 ) -> Result<(), FilesError> {
     let started = Instant::now();
+    remove_accuracy(folder)?;
     let pictures = resolved.scenario.recording.pictures && wanted.pictures;
     let mut names = write_recordings(resolved, finished, folder)?;
     for run in &finished.events {
