@@ -31,12 +31,13 @@ QUANTITIES = {
     "depth_error": ("mm", [f"depth_error{end}_mm" for end in ("", "_predicted", "_static")]),
     "duration": ("s", ["motion_time_s"]),
 }
-# Needles of a table as a condition on rows; of static cases the best has the largest clearance of those that are ok.
+# Needles of a table as a condition on rows. Of static cases the best is the one with the largest clearance of those
+# that are ok, the first of equal ones.
 NEEDLES = {
-    "every": "outcome IN ('ok', 'failed')",
-    "Right-Up-Fold": "outcome IN ('ok', 'failed') AND configuration = 'Right-Up-Fold'",
-    "best": "outcome = 'ok' AND clearance_static_mm = max(CASE WHEN outcome = 'ok' THEN clearance_static_mm END)"
-    " OVER (PARTITION BY \"case\")",
+    "every": "WHERE outcome IN ('ok', 'failed')",
+    "Right-Up-Fold": "WHERE outcome IN ('ok', 'failed') AND configuration = 'Right-Up-Fold'",
+    "best": """WHERE outcome = 'ok' AND clearance_static_mm IS NOT NULL QUALIFY 1 = row_number() OVER (
+        PARTITION BY "case" ORDER BY clearance_static_mm DESC, file_row_number)""",
 }
 STUDIES = {
     "static": ('mode = "static"', 12, [("best", "goal"), ("every", "goal"), ("every", "configuration"), ("best", "side")]),
@@ -84,13 +85,10 @@ def differing(name: str, table: Path, found: Path, needles: str, by: str) -> lis
     values = []
     for key, (_, columns) in QUANTITIES.items():
         present = [f"{column}::DOUBLE" for column in columns if column in known]
-        values.append(f"coalesce({', '.join(present)}) AS {key}" if len(present) > 1 else f"{(present or ['NULL::DOUBLE'])[0]} AS {key}")
+        values.append(f"coalesce({', '.join([*present, 'NULL::DOUBLE'])}) AS {key}")
     query = f"""
         SELECT "case", configuration, goal, draw, side::VARCHAR AS side, {", ".join(values)}
-        FROM (SELECT * FROM read_parquet(?) QUALIFY {NEEDLES[needles]})
-    """ if needles == "best" else f"""
-        SELECT "case", configuration, goal, draw, side::VARCHAR AS side, {", ".join(values)}
-        FROM read_parquet(?) WHERE {NEEDLES[needles]}
+        FROM read_parquet(?, file_row_number = true) {NEEDLES[needles]}
     """
     rows = duckdb.execute(query, [str(table)]).df()
 

@@ -165,8 +165,8 @@ fn radius(
     let of_scenario = resolved.scenario.criteria.max_tip_position_error_mm;
     let found = [
         (request.hit_radius_mm, "--hit-radius"),
-        (of_study, "the study's `max_tip_error_mm`"),
-        (of_scenario, "the scenario's `max_tip_position_error_mm`"),
+        (of_study, "the study's max_tip_error_mm"),
+        (of_scenario, "the scenario's max_tip_position_error_mm"),
     ];
     found.into_iter().find_map(|(radius_mm, source)| {
         Some(HitRadius {

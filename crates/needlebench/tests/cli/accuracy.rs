@@ -34,6 +34,7 @@ fn a_run_leaves_the_table_in_three_formats_and_takes_it_away_again() {
         "nothing of a real arm's accuracy",
         "Published, not before insertion",
         "doi 10.1002/rcs.1440",
+        "in accuracy.md with their DOIs",
     ] {
         let words: Vec<&str> = answer.stdout.split_whitespace().collect();
         assert!(

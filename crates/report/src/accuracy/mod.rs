@@ -99,17 +99,19 @@ fn caption(table: &AccuracyTable) -> Vec<String> {
         table.name,
         table.by.join(" and ")
     )];
-    lines.push(
-        "All errors are before insertion (robot and registration): where the needle would go through the \
-         guide as it stands."
-            .to_owned(),
-    );
     if has_insertion_effects(table) {
         lines.push(format!(
-            "Drawn beside them and in the errors: {}, which act on the needle only on its way in; so no figure \
-             before insertion is a peer of these.",
+            "Errors are those before insertion (robot and registration: where the needle would go through the \
+             guide as it stands) and what is drawn besides: {}, which act on the needle only on its way in. So \
+             no figure before insertion is a peer of these.",
             table.insertion_effects.join(", ")
         ));
+    } else {
+        lines.push(
+            "All errors are before insertion (robot and registration): where the needle would go through the \
+             guide as it stands."
+                .to_owned(),
+        );
     }
     lines.extend(table.notes.iter().cloned());
     lines
@@ -119,9 +121,9 @@ fn caption(table: &AccuracyTable) -> Vec<String> {
 fn footnotes(table: &AccuracyTable) -> Vec<String> {
     let mut lines = vec![
         "ND: normal distance of the planned point from the needle's line; ED: Euclidean distance, at the entry \
-         along the skin's surface point that the line meets, at the target of the tip. Depth: deeper is \
-         positive. Axial, sagittal: the angle as these planes of the patient show it. Standard deviation with \
-         n - 1; range: least to largest."
+         of where the line meets the skin, at the target of the tip. Depth: deeper is positive. Axial, sagittal: \
+         the angle as these planes of the patient show it. Standard deviation with n - 1; range: least to \
+         largest."
             .to_owned(),
     ];
     let columns = table.columns.iter().flatten();
@@ -137,12 +139,12 @@ fn footnotes(table: &AccuracyTable) -> Vec<String> {
     }
     if is_predicted {
         kinds.push(
-            "by the balance of torques at the end of the planned motion (columns `*_predicted`)",
+            "by the balance of torques at the end of the planned motion (columns with _predicted)",
         );
     }
     if is_static {
         kinds.push(
-            "by the balance of torques in final postures only, without a motion (columns `*_static`)",
+            "by the balance of torques in final postures only, without a motion (columns with _static)",
         );
     }
     if !kinds.is_empty() {
@@ -158,7 +160,7 @@ fn footnotes(table: &AccuracyTable) -> Vec<String> {
     let mut rows = table.groups.iter().chain([&table.all]);
     let has_gap = |row: &AccuracyRow| measured(table).any(|at| row.spreads[at].is_none());
     if rows.any(has_gap) {
-        lines.push("- : not measured.".to_owned());
+        lines.push("A dash: not measured.".to_owned());
     }
     match &table.hit_radius {
         Some(radius) => lines.push(format!(

@@ -43,8 +43,9 @@ pub fn accuracy_text(table: &AccuracyTable) -> String {
         "",
     ));
     text.extend(before.into_iter().map(line));
-    text.push_str(&wrapped(&format!("{APART}."), ""));
-    text.extend(apart.into_iter().map(line));
+    let count = apart.len();
+    let more = format!("{APART}: {count} figures, in accuracy.md with their DOIs.");
+    text.push_str(&wrapped(&more, ""));
     text
 }
 

@@ -88,7 +88,7 @@ fn the_caption_says_before_insertion_and_what_is_left_out() {
         let text = words.join(" ");
         for part in [
             "before insertion (robot and registration)",
-            "columns `*_static`",
+            "columns with _static",
             "Slice thickness: not applicable",
             "Corrections: not applicable",
             "within 2 mm of the target (--hit-radius)",
@@ -123,6 +123,7 @@ fn totals_never_stand_among_figures_before_insertion() {
     let text = accuracy_markdown(&table);
     assert!(text.contains("No peers of this table"), "{text}");
     assert!(text.contains("needle, which act on the needle only on its way in"));
+    assert!(!text.contains("All errors are before insertion"));
 }
 
 #[test]
