@@ -4,8 +4,8 @@ use needlebench_cell::published::Anchor;
 use needlebench_evaluation::accuracy::{AccuracyRow, AccuracyTable, QUANTITIES};
 
 use super::{
-    APART, BEFORE, before_in_words, caption, cell, figure, footnotes, hits, is_tested, measured,
-    own_figures, p_value, published,
+    APART, BEFORE, before_in_words, caption, figure, footnotes, hits, is_tested, mean_and_sd,
+    measured, own_figures, p_value, published, range,
 };
 
 /// Stands for the sign until all else is escaped.
@@ -16,7 +16,7 @@ pub fn accuracy_latex(table: &AccuracyTable) -> String {
     let mut lines = vec![
         "% \\usepackage{booktabs}".to_owned(),
         "\\begin{table}".to_owned(),
-        "\\footnotesize\\centering".to_owned(),
+        "\\scriptsize\\centering\\setlength{\\tabcolsep}{3pt}".to_owned(),
     ];
     lines.push(format!(
         "\\caption{{{}}}",
@@ -41,9 +41,10 @@ pub fn accuracy_latex(table: &AccuracyTable) -> String {
     units.push(String::new());
     lines.push(row_of(&units));
     lines.push("\\midrule".to_owned());
-    lines.extend(table.groups.iter().map(|row| row_of(&cells(row, &columns))));
+    let row_of_group = |row: &AccuracyRow| line_of(&cells(row, &columns));
+    lines.extend(table.groups.iter().map(row_of_group));
     lines.push("\\midrule".to_owned());
-    lines.push(row_of(&cells(&table.all, &columns)));
+    lines.push(row_of_group(&table.all));
     if is_tested(table) {
         let mut row = vec!["p".to_owned(), String::new()];
         row.extend(columns.iter().map(|at| p_value(&table.tests[*at])));
@@ -104,15 +105,35 @@ fn published_table(lines: &mut Vec<String>, caption: &str, rows: &[Vec<String>])
     lines.extend(["\\bottomrule", "\\end{tabular}", "\\end{table}", ""].map(str::to_owned));
 }
 
+/// Cells of a row, escaped: the range stands under mean and deviation.
 fn cells(row: &AccuracyRow, columns: &[usize]) -> Vec<String> {
-    let mut cells = vec![row.label.clone(), row.n.to_string()];
-    cells.extend(columns.iter().map(|at| cell(row, *at, PLUS_MINUS)));
+    let mut cells = vec![escaped(&row.label), row.n.to_string()];
+    cells.extend(columns.iter().map(|at| {
+        let Some(spread) = &row.spreads[*at] else {
+            return "-".to_owned();
+        };
+        let mut lines = vec![mean_and_sd(spread, PLUS_MINUS)];
+        lines.extend(range(spread).map(|range| format!("({range})")));
+        if spread.count < row.n {
+            lines.push(format!("n = {}", spread.count));
+        }
+        let lines: Vec<String> = lines.iter().map(|line| escaped(line)).collect();
+        match lines.as_slice() {
+            [line] => line.clone(),
+            lines => format!("\\shortstack[r]{{{}}}", lines.join("\\\\")),
+        }
+    }));
     cells.push(hits(row));
     cells
 }
 
 fn row_of(cells: &[String]) -> String {
     let cells: Vec<String> = cells.iter().map(|text| escaped(text)).collect();
+    line_of(&cells)
+}
+
+/// A line of cells that are escaped.
+fn line_of(cells: &[String]) -> String {
     // A row that begins with a bracket would be taken for an argument of the line before.
     format!("{{}}{} \\\\", cells.join(" & "))
 }

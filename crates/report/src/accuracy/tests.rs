@@ -169,7 +169,7 @@ fn latex_has_no_command_but_ours() {
     let text = accuracy_latex(&table());
     assert!(text.contains("50 \\% \\& $<$b$>$$|$x$|$"), "{text}");
     assert!(
-        text.contains("lung, right\\_upper & 12 & 91.00 $\\pm$"),
+        text.contains("lung, right\\_upper & 12 & \\shortstack[r]{91.00 $\\pm$"),
         "{text}"
     );
     assert!(text.contains("\\toprule") && text.contains("\\bottomrule"));
