@@ -1,11 +1,15 @@
 """Whether others read a study's tables as they were meant.
 
     cargo build --release -p needlebench-study --example synthetic
+    cargo build --release -p needlebench
     python3 -m venv env && env/bin/pip install -r tests/results/requirements.txt
-    env/bin/python tests/results/check.py --maker target/release/examples/synthetic
+    env/bin/python tests/results/check.py --maker target/release/examples/synthetic \\
+        --program target/release/needlebench
 
 Makes the tables of a study without physics, runs the examples beside this file on both, and compares
-every cell of `results.csv` with `results.parquet`. Exit status 1 where anything differs.
+every cell of `results.csv` with `results.parquet`. With the program it also makes small studies of an imperfect
+arm and compares every cell of their accuracy tables with what DuckDB makes of the Parquet tables
+(`accuracy.py`). Exit status 1 where anything differs.
 """
 
 import argparse
@@ -14,6 +18,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import accuracy
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
@@ -46,8 +51,10 @@ def differing_columns(parquet: Path, csv: Path) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--maker", type=Path, required=True)
-    maker = parser.parse_args().maker.resolve()
-    failures = []
+    parser.add_argument("--program", type=Path)
+    arguments = parser.parse_args()
+    maker = arguments.maker.resolve()
+    failures = accuracy.failures(arguments.program.resolve()) if arguments.program else []
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([maker, folder, str(CASES), "2", "0", "csv"], check=True)
         tables = [Path(folder, name) for name in ("results.parquet", "results.csv")]

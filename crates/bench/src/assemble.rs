@@ -98,6 +98,7 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         verdict,
         criteria: judged.results,
         not_judged: judged.not_judged,
+        trace: Vec::new(), // when all is judged
         goals,
         iso9283: None,
         excitation: None,
@@ -105,12 +106,19 @@ pub(crate) fn assemble(setup: &Setup<'_>, results: Results<'_>) -> Report {
         arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
         gravity: resolved.gravity.clone(),
         enclosure: enclosures(&resolved.cell.robot),
+        assumed: assumed(resolved),
         notes: notes(resolved, results.engines),
         expected: resolved.expected.as_ref().map(expected_report),
         truth: setup.real.report(),
         provenance: provenance(resolved, results.identities),
         timings: results.timings,
     }
+}
+
+/// Values of the arm that are assumed.
+pub(crate) fn assumed(resolved: &ResolvedScenario) -> BTreeMap<String, String> {
+    let arm = resolved.cell.robot.arm.as_ref();
+    arm.map_or_else(BTreeMap::new, |arm| arm.arm.data.assumed())
 }
 
 /// The notes of a scenario, and where engines ran of what they collide with.
@@ -281,6 +289,7 @@ fn configuration_report(
             postures_drawn: effort.samples,
             seed: effort.seed,
         }),
+        entry_to_target_m: candidate.and(goal.entry_to_target_m()),
         commanded,
         engines,
         engine_difference,

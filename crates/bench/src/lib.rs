@@ -7,11 +7,13 @@
 //! A run is a row of stages, each of which takes what those before it made: `plan`, `simulate`,
 //! `events`, `adjudication`, `budgets`, `assemble`. A case of a study goes through the same ones.
 
+pub mod accuracy;
 mod adjudication;
 mod assemble;
 pub mod atlas;
 mod budgets;
 mod control;
+pub mod credibility;
 mod events;
 pub mod excitation;
 mod iso9283;

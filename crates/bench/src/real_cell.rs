@@ -162,7 +162,7 @@ impl<'a> RealCell<'a> {
         let depth_m = self.resolved.goals[goal].insertion_length_m;
         Some(PredictedNeedle {
             tip_m: truth.needle_points(nominal, &position, [0.0, depth_m])[1],
-            needle: measure_needle(cell, None, self.goal(goal), &flange),
+            needle: measure_needle(cell, self.phantom(), self.goal(goal), &flange),
         })
     }
 }
@@ -171,7 +171,7 @@ impl<'a> RealCell<'a> {
 pub struct PredictedNeedle {
     /// Its tip, world.
     pub tip_m: Point3<f64>,
-    /// What would be measured of it, but for its place in the skin.
+    /// What would be measured of it.
     pub needle: NeedleMeasurement,
 }
 

@@ -10,6 +10,7 @@ use needlebench_cell::ResolvedScenario;
 use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::report::EngineFailure;
+use needlebench_evaluation::trace::trace;
 use needlebench_planning::GoalPlan;
 
 use crate::adjudication::Adjudicator;
@@ -44,13 +45,16 @@ pub fn run(
         cancel,
         progress,
     };
-    if let Some(plan) = runnable.excitation() {
-        return excitation::run(runnable.scenario(), plan, &engines, &control);
-    }
-    match runnable.protocol() {
-        Some(plan) => iso9283::run(runnable.scenario(), plan, &engines, &control),
-        None => run_goals(runnable.scenario(), options, &engines, &control),
-    }
+    let mut finished = if let Some(plan) = runnable.excitation() {
+        excitation::run(runnable.scenario(), plan, &engines, &control)?
+    } else if let Some(plan) = runnable.protocol() {
+        iso9283::run(runnable.scenario(), plan, &engines, &control)?
+    } else {
+        run_goals(runnable.scenario(), options, &engines, &control)?
+    };
+    let requirements = &runnable.scenario().scenario.requirements;
+    trace(&mut finished.report, requirements);
+    Ok(finished)
 }
 
 /// Runs a scenario without progress and without a way to interrupt it.

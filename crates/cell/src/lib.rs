@@ -10,9 +10,11 @@
 //! | `finding`, `files`, `limit` | what is wrong with an input; shipped files and files on disk |
 //! | `schema`, `toml_text` | what a file may hold: one source of its JSON schema and of the reader's checks; texts with places |
 //! | [`arm`] | what is known of an arm besides its URDF |
+//! | [`published`] | what others have published of needle robots |
 //! | `model` | the resolved cell: robot, tool, bodies, pairs |
 //! | `robot` | robots and tools from URDFs, calibrations, enclosures |
 //! | [`scenario`], `engine_name` | the sections of a scenario file: plain structs, ranges at their fields |
+//! | [`requirements`], [`judgement`] | what criteria stand for; what people state about results |
 //! | [`phantom`], [`fixtures`] | chests and furniture as solids |
 //! | `resolve` with [`imperfections`], [`people`], [`iso9283`], [`excitation`] | from sections to a [`Cell`] with goals in the world |
 //! | `excitation_text` | the text of a scenario, given a run that excites every joint |
@@ -27,11 +29,14 @@ mod files;
 mod finding;
 pub mod fixtures;
 mod input;
+pub mod judgement;
 mod limit;
 mod log_columns;
 mod model;
 pub mod phantom;
 mod printable;
+pub mod published;
+pub mod requirements;
 mod resolve;
 mod robot;
 pub mod scenario;

@@ -121,6 +121,7 @@ pub fn check_configuration(
             checked.engine.map(|(_, report)| report),
             criteria,
         ),
+        requirement: None,
     };
     let missing = |engine: Option<&str>, criterion: &str, reason: String| NotJudged {
         goal: goal.to_owned(),
@@ -128,6 +129,7 @@ pub fn check_configuration(
         engine: engine.map(str::to_owned),
         criterion: criterion.to_owned(),
         reason,
+        requirement: None,
     };
     let mut judged = Judged::default();
     for checked in of_engines(configuration, criteria, mode) {
@@ -234,6 +236,7 @@ fn within_envelope<'a>(
             unit: judged.unit,
             pass: limit.is_met_by(Some(judged.value)),
             detail: sentence(judged).unwrap_or_default(),
+            requirement: None,
         }
     })
 }

@@ -195,6 +195,7 @@ fn about(engine: Option<(&str, usize)>, criterion: &str) -> CriterionResult {
             Some(_) => String::new(),
             None => "of the planned motions".to_owned(),
         },
+        requirement: None,
     }
 }
 

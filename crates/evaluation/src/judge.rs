@@ -73,6 +73,7 @@ pub fn judge(
                             engine: None,
                             criterion: result.criterion,
                             reason: DEPENDS.to_owned(),
+                            requirement: None,
                         });
                     } else {
                         failed |= !result.pass;
@@ -105,6 +106,7 @@ pub fn judge(
             unit: "1",
             pass: working >= wanted,
             detail: String::new(),
+            requirement: None,
         };
         failed |= known && !result.pass;
         all.add(result, || DEPENDS.to_owned());
@@ -141,6 +143,7 @@ fn check_route(goal: &Goal, route: &RouteReport) -> CriterionResult {
             "the planned needle {does} {} ({})",
             route.part, route.tissue
         ),
+        requirement: None,
     }
 }
 
@@ -172,5 +175,6 @@ fn check_expectation(
         unit: "1",
         pass: actual == wanted,
         detail: format!("expected {wanted}, got {actual}"),
+        requirement: None,
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! Definitions are those of the field: see each field's documentation. SI units and radians.
 
+pub mod accuracy;
 pub mod adjudication;
 mod class_clearance;
 mod clearance;
@@ -27,6 +28,7 @@ pub mod room;
 mod sensitivity;
 mod stored;
 mod threshold;
+pub mod trace;
 mod verdict;
 
 pub use clearance::{
@@ -41,7 +43,7 @@ pub use motion::{
     ContactMeasurement, EngineDifference, MotionMeasurement, SaturatedJoint, engine_difference,
     measure_motion,
 };
-pub use needle::{NeedleMeasurement, measure_guide, measure_needle, tip_of};
+pub use needle::{LEAST_SHADOW, NeedleMeasurement, measure_guide, measure_needle, tip_of};
 pub use sensitivity::tip_sensitivity;
 pub use stored::{StoredConfiguration, StoredReport};
 pub use threshold::{BEST, Compared, EVERY, Loss, Rate, Subject, Threshold, ThresholdError};

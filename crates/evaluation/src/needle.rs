@@ -25,6 +25,34 @@ pub struct NeedleMeasurement {
     /// Distance from the planned entry point to where the actual axis meets the skin, m; none
     /// without a phantom or where the axis misses it.
     pub entry_point_error_m: Option<f64>,
+    /// `|(I - v v^T)(e - g)|`, m: distance of the planned entry point `e` from the actual axis; none
+    /// without an entry point.
+    pub entry_lateral_error_m: Option<f64>,
+    /// Angle between planned and actual axis as the patient's axial plane shows them (left and posterior),
+    /// rad; none without a phantom, and where the needle stands too steep to that plane
+    /// ([`LEAST_SHADOW`]).
+    pub axial_angle_error_rad: Option<f64>,
+    /// The same in the sagittal plane (posterior and superior).
+    pub sagittal_angle_error_rad: Option<f64>,
+}
+
+/// Shortest shadow of the planned needle's direction on a plane in which an angle is still measured: that of
+/// a needle 60 degrees out of the plane. The angle of shadows is larger than that of needles by one over
+/// it: beyond, it would say more about the plane than about the needle. Assumed.
+pub const LEAST_SHADOW: f64 = 0.5;
+
+/// Angle between the shadows of two directions on the plane of two axes, rad.
+fn angle_of_shadows(
+    planned: &Vector3<f64>,
+    actual: &Vector3<f64>,
+    axes: [usize; 2],
+) -> Option<f64> {
+    let [u, v] = [planned, actual].map(|each| [each[axes[0]], each[axes[1]]]);
+    if u[0].hypot(u[1]) < LEAST_SHADOW {
+        return None;
+    }
+    let turned = (u[0] * v[1] - u[1] * v[0]).atan2(u[0] * v[0] + u[1] * v[1]);
+    Some(turned.abs())
 }
 
 /// Tip of the needle in the world for a pose of the flange.
@@ -57,6 +85,11 @@ pub fn measure_guide(
     let tip = exit * Point3::new(0.0, 0.0, goal.insertion_length_m);
     let miss = tip - goal.target_m;
     let to_target = goal.target_m - exit_point;
+    let off_axis_m = |to: Vector3<f64>| (to - actual * actual.dot(&to)).norm();
+    let in_plane = |axes: [usize; 2]| {
+        let to_phantom = phantom?.world_from_phantom.rotation.inverse();
+        angle_of_shadows(&(to_phantom * planned), &(to_phantom * actual), axes)
+    };
     let entry_point_error_m = phantom.zip(goal.entry_m).and_then(|(placed, entry)| {
         let to_phantom = placed.world_from_phantom.inverse();
         let axis = UnitVector3::new_normalize(actual);
@@ -69,10 +102,13 @@ pub fn measure_guide(
     NeedleMeasurement {
         tip_position_error_m: miss.norm(),
         depth_error_m: miss.dot(&planned),
-        lateral_error_m: (to_target - actual * actual.dot(&to_target)).norm(),
+        lateral_error_m: off_axis_m(to_target),
         needle_angle_error_rad: planned.cross(&actual).norm().atan2(planned.dot(&actual)),
         guide_position_error_m: (exit_point.coords - goal.world_from_guide_exit.translation.vector)
             .norm(),
         entry_point_error_m,
+        entry_lateral_error_m: goal.entry_m.map(|entry| off_axis_m(entry - exit_point)),
+        axial_angle_error_rad: in_plane([0, 1]),
+        sagittal_angle_error_rad: in_plane([1, 2]),
     }
 }

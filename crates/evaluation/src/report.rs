@@ -17,6 +17,7 @@ use crate::needle::NeedleMeasurement;
 use crate::ranking_report::{Dominance, GoalRanking, RankingReport};
 use crate::referee::RefereeReport;
 use crate::room::RoomReport;
+pub use crate::trace::{TraceOutcome, TraceRow};
 pub use crate::verdict::{CriterionResult, Judged, NotJudged, Verdict};
 
 /// Version of the report's keys.
@@ -35,6 +36,10 @@ pub struct Report {
     pub criteria: Vec<CriterionResult>,
     /// Every criterion that was to be judged and could not be.
     pub not_judged: Vec<NotJudged>,
+    /// Requirements with the criteria that stand for them and what came of these; empty where the scenario
+    /// has none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub trace: Vec<TraceRow>,
     /// The goals.
     pub goals: Vec<GoalReport>,
     /// The test by ISO 9283, in place of goals.
@@ -52,6 +57,8 @@ pub struct Report {
     /// What the enclosing primitives of that arm's own URDF would cost beside the meshes of the robot
     /// in use; empty unless that robot has meshes of its own.
     pub enclosure: Vec<LinkEnclosure>,
+    /// Values of the arm that are assumed, each by its key in the arm's data, and why.
+    pub assumed: BTreeMap<String, String>,
     /// What was assumed or adjusted.
     pub notes: Vec<String>,
     /// What arm and patient the expected tip errors (`configurations[].budget`) are of; none if there are
@@ -347,6 +354,8 @@ pub struct ConfigurationReport {
     pub search: Option<SearchReport>,
     /// What the planned motion keeps of the clearance that its posture allows; none without a motion.
     pub margin: Option<MarginReport>,
+    /// From the planned entry point on the skin to the target; none without a phantom.
+    pub entry_to_target_m: Option<f64>,
     /// Needle metrics of the commanded posture, by our forward kinematics.
     pub commanded: Option<NeedleMeasurement>,
     /// Measurements per engine: `rapier`, `mujoco`.
@@ -414,6 +423,7 @@ impl ConfigurationReport {
             retreat_clearance: ClearanceReport::default(),
             search: None,
             margin: None,
+            entry_to_target_m: None,
             commanded: None,
             engines: BTreeMap::new(),
             engine_difference: None,

@@ -50,6 +50,9 @@ pub struct NotJudged {
     pub criterion: String,
     /// Why: what is missing.
     pub reason: String,
+    /// The requirement that it stands for, where the scenario says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub requirement: Option<String>,
 }
 
 /// Criteria, as far as they could be judged.
@@ -79,6 +82,7 @@ impl Judged {
                 engine: result.engine,
                 criterion: result.criterion,
                 reason: reason(),
+                requirement: None,
             });
         }
     }
@@ -119,4 +123,7 @@ pub struct CriterionResult {
     pub pass: bool,
     /// What it is about, in words.
     pub detail: String,
+    /// The requirement that it stands for, where the scenario says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub requirement: Option<String>,
 }

@@ -1,6 +1,7 @@
 //! Arguments that several commands have.
 
 mod engine;
+mod table;
 
 use std::path::PathBuf;
 
@@ -11,6 +12,7 @@ use needlebench_cell::MissingInertia;
 use needlebench_kinematics::UrModel;
 
 pub(crate) use engine::{EngineArgument, EngineParser};
+pub(crate) use table::{TableArguments, leave};
 
 /// Another robot than the scenario's, and whose data it has.
 #[derive(Debug, Clone, Default, Args)]

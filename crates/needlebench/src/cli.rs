@@ -8,8 +8,8 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, FkArguments,
     ISO9283_HELP, IkArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments,
-    REPLAY_HELP, RecordPlanArguments, ReplayArguments, RunArguments, STUDY_HELP, SchemaFormat,
-    ServoArguments, StudyArguments,
+    REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments, ReportArguments, RunArguments,
+    STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
 };
 use crate::exit::ExitStatus;
 use crate::output::complain;
@@ -96,6 +96,12 @@ enum Command {
     /// The joint servo's data sheet: settings with sources, closed loop, step and sine responses.
     #[command(after_help = "Example: needlebench servo scenarios/table3.toml --joint wrist_1")]
     Servo(ServoArguments),
+    /// Evidence for the credibility of results, in the frame of ASME V&V 40.
+    #[command(
+        after_help = "Example: needlebench report out/table3 --credibility",
+        after_long_help = REPORT_HELP
+    )]
+    Report(ReportArguments),
     /// Reproduce the paper: Table 3, every equation, both methods, and Figure 6.
     #[command(after_help = "Example: needlebench paper --out out/paper")]
     Paper(PaperArguments),
@@ -153,6 +159,7 @@ fn run() -> ExitCode {
         Command::Replay(arguments) => command::replay(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments),
+        Command::Report(arguments) => command::report(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),
         Command::Schema { format } => command::schema(format),
         Command::Doctor { json } => command::doctor(json),

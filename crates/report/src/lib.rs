@@ -1,7 +1,9 @@
 //! Results for people and other programs: tables, Markdown, JUnit, CSV, charts, pictures and pages,
 //! and the folders that they are written into.
 
+pub mod accuracy;
 pub mod chart;
+pub mod credibility;
 pub mod csv;
 pub mod files;
 mod junit;

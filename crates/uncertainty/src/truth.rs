@@ -97,7 +97,7 @@ impl Source {
     }
 
     /// Whether the imperfections have it.
-    pub(crate) fn is_in(self, all: &Imperfections) -> bool {
+    pub fn is_in(self, all: &Imperfections) -> bool {
         match self {
             Self::Calibration => all.calibration.is_some(),
             Self::Encoder => all.encoder.is_some(),

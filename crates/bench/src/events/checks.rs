@@ -41,6 +41,7 @@ pub(super) fn checks(
             unit,
             pass: value.is_some_and(|value| value <= limit),
             detail: detail.to_owned(),
+            requirement: None,
         };
         if value.is_none() && missing == Missing::Never {
             judged.results.push(result);

@@ -19,7 +19,7 @@ use needlebench_evaluation::report::{
 use needlebench_evaluation::{EngineDifference, pairs};
 use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan};
 
-use crate::assemble::notes;
+use crate::assemble::{assumed, notes};
 use crate::control::Control;
 use crate::parallel::in_parallel;
 use crate::provenance::provenance;
@@ -222,6 +222,7 @@ pub(crate) fn unplanned(
         unit: "1",
         pass: false,
         detail: reason.to_owned(),
+        requirement: None,
     };
     ScenarioRun {
         events: Vec::new(),
@@ -258,6 +259,7 @@ pub(crate) fn empty_report(
         verdict: Verdict::Fail,
         criteria: Vec::new(),
         not_judged: Vec::new(),
+        trace: Vec::new(),
         goals: Vec::new(),
         iso9283: None,
         excitation: None,
@@ -265,6 +267,7 @@ pub(crate) fn empty_report(
         arm: resolved.cell.robot.arm.as_ref().map(ArmInUse::report),
         gravity: resolved.gravity.clone(),
         enclosure: Vec::new(),
+        assumed: assumed(resolved),
         notes: resolved.notes.clone(),
         provenance: provenance(resolved, identities),
         timings,

@@ -1,5 +1,6 @@
 //! Whether a recorded run and its replay are as near as they are to be.
 
+use needlebench_cell::requirements::{Requirements, requirement_of};
 use needlebench_cell::scenario::ReplaySection;
 use needlebench_evaluation::report::{CriterionResult, NotJudged, Verdict};
 use needlebench_recorded::LogKind;
@@ -10,8 +11,14 @@ use super::ReplayReport;
 pub const SUBJECT: &str = "replay";
 
 /// Judges every criterion that is given, in every engine that was to run.
-pub(super) fn judge(report: &mut ReplayReport, criteria: &ReplaySection, engines: &[&'static str]) {
+pub(super) fn judge(
+    report: &mut ReplayReport,
+    criteria: &ReplaySection,
+    requirements: &Requirements,
+    engines: &[&'static str],
+) {
     let mut judge = Judge {
+        requirements,
         results: Vec::new(),
         open: Vec::new(),
     };
@@ -96,12 +103,13 @@ pub(super) fn judge(report: &mut ReplayReport, criteria: &ReplaySection, engines
     report.not_judged = judge.open;
 }
 
-struct Judge {
+struct Judge<'a> {
+    requirements: &'a Requirements,
     results: Vec<CriterionResult>,
     open: Vec<NotJudged>,
 }
 
-impl Judge {
+impl Judge<'_> {
     #[expect(clippy::too_many_arguments, reason = "the parts of one line")]
     fn add(
         &mut self,
@@ -114,6 +122,7 @@ impl Judge {
         missing: &str,
     ) {
         let (goal, engine) = (SUBJECT.to_owned(), engine.map(str::to_owned));
+        let requirement = requirement_of(self.requirements, criterion).map(str::to_owned);
         let criterion = criterion.to_owned();
         match value.filter(|value| value.is_finite()) {
             Some(value) => self.results.push(CriterionResult {
@@ -126,6 +135,7 @@ impl Judge {
                 unit,
                 pass: value <= limit,
                 detail: detail.to_owned(),
+                requirement,
             }),
             None => self.open.push(NotJudged {
                 goal,
@@ -133,6 +143,7 @@ impl Judge {
                 engine,
                 criterion,
                 reason: missing.to_owned(),
+                requirement,
             }),
         }
     }

@@ -252,7 +252,12 @@ pub fn replay(
         provenance: provenance(resolved, identities),
     };
     let names: Vec<&'static str> = engines.iter().map(|engine| engine.name()).collect();
-    judge::judge(&mut report, criteria, &names);
+    judge::judge(
+        &mut report,
+        criteria,
+        &resolved.scenario.requirements,
+        &names,
+    );
     Ok(Replay {
         report,
         run,

@@ -1,7 +1,7 @@
 //! Where the needle comes to rest in a posture, without any engine.
 
-use needlebench_cell::ResolvedScenario;
 use needlebench_cell::imperfections::Imperfections;
+use needlebench_cell::{PlacedPhantom, ResolvedScenario};
 use needlebench_engine::Servo;
 use needlebench_evaluation::{NeedleMeasurement, measure_guide};
 use needlebench_kinematics::Dynamics;
@@ -34,6 +34,8 @@ pub(super) struct Prediction<'a> {
 struct Real {
     truth: Truth,
     dynamics: Dynamics,
+    /// Where the phantom really is.
+    phantom: Option<PlacedPhantom>,
 }
 
 impl<'a> Prediction<'a> {
@@ -47,6 +49,7 @@ impl<'a> Prediction<'a> {
                 let truth = truth.map_err(|_| "imperfections.registration.markers_mm")?;
                 Ok::<_, &'static str>(Real {
                     dynamics: truth.dynamics(&resolved.cell),
+                    phantom: resolved.phantom.as_ref().map(|each| truth.phantom(each)),
                     truth,
                 })
             })
@@ -81,7 +84,7 @@ impl<'a> Prediction<'a> {
             motion.as_ref().and_then(|motion| self.needle(real, motion))
         } else {
             let exit = self.resolved.cell.world_from_guide_exit(&candidate.joints);
-            Some(measure_guide(None, goal, &exit))
+            Some(measure_guide(self.resolved.phantom.as_ref(), goal, &exit))
         };
         Predicted {
             needle,
@@ -95,7 +98,8 @@ impl<'a> Prediction<'a> {
         let exit = real
             .truth
             .world_from_guide_exit(&self.resolved.cell, &settled.position);
-        Some(measure_guide(None, &real.truth.goal(goal), &exit))
+        let goal = real.truth.goal(goal);
+        Some(measure_guide(real.phantom.as_ref(), &goal, &exit))
     }
 
     fn budget(&self, motion: &JointTrajectory) -> Option<ErrorBudget> {

@@ -206,6 +206,7 @@ fn row(
     set_clearances(posture, &candidate.clearance);
     let goal = &resolved.goals[0];
     posture.tip_sensitivity_m_per_rad = Some(planner.tip_sensitivity(goal, candidate));
+    posture.entry_to_target_m = goal.entry_to_target_m();
     let predicted = prediction.of(planner, candidate);
     posture.predicted = predicted.needle;
     posture.budget = predicted.budget;

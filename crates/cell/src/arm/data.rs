@@ -107,6 +107,47 @@ pub(super) const TABLES: [&str; 19] = [
     "calibration",
 ];
 
+impl ArmData {
+    /// Sources that begin with `assumed`, by their keys.
+    pub fn assumed(&self) -> std::collections::BTreeMap<String, String> {
+        fn collect(
+            at: &str,
+            value: &serde_json::Value,
+            found: &mut std::collections::BTreeMap<String, String>,
+        ) {
+            match value {
+                serde_json::Value::Object(entries) => {
+                    for (key, inner) in entries {
+                        let path = if at.is_empty() {
+                            key.clone()
+                        } else {
+                            format!("{at}.{key}")
+                        };
+                        match inner.as_str() {
+                            Some(text)
+                                if key.ends_with("source") && text.starts_with("assumed") =>
+                            {
+                                found.insert(path, text.to_owned());
+                            }
+                            _ => collect(&path, inner, found),
+                        }
+                    }
+                }
+                serde_json::Value::Array(items) => {
+                    for (index, inner) in items.iter().enumerate() {
+                        collect(&format!("{at}[{index}]"), inner, found);
+                    }
+                }
+                _ => {}
+            }
+        }
+        let mut found = std::collections::BTreeMap::new();
+        let value = serde_json::to_value(self).expect("data of arms have string keys");
+        collect("", &value, &mut found);
+        found
+    }
+}
+
 /// Where numbers that stand in the URDF are from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -34,6 +34,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::engine_name::EngineName;
+use crate::requirements::{Requirements, scenario_requirements};
 use crate::schema::{FileSchema, LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
 use crate::{ClearanceClass, Finding};
@@ -139,6 +140,12 @@ pub struct Scenario {
     /// What every working configuration has to reach.
     #[serde(default)]
     pub criteria: CriteriaSection,
+    /// What criteria stand for: the id or text of a requirement by the key of its criterion, such as
+    /// `max_tip_position_error_mm = "SRS-12: tip within 0.1 mm"`; keys with a dot stand in quotes. Carried to
+    /// reports, with a trace matrix.
+    #[serde(default)]
+    #[schemars(schema_with = "scenario_requirements")]
+    pub requirements: Requirements,
     /// How the configurations that work are ranked.
     #[serde(default)]
     pub ranking: RankingSection,

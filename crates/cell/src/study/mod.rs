@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
 use crate::input::read_text;
+use crate::requirements::{Requirements, study_requirements};
 use crate::scenario::EngineName;
 use crate::schema::{COLUMN, FileSchema, LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
@@ -64,6 +65,11 @@ pub struct StudyFile {
     /// What is asked of the results.
     #[serde(default)]
     pub criteria: StudyCriteria,
+    /// What criteria stand for: the id or text of a requirement by the key of its criterion, such as
+    /// `min_layouts_working = "SRS-1: works in 95 % of patients"`. Carried to reports, with a trace matrix.
+    #[serde(default)]
+    #[schemars(schema_with = "study_requirements")]
+    pub requirements: Requirements,
     /// The smallest shift and tilt of the phantom that break a configuration; not computed if left
     /// out.
     #[serde(default)]

@@ -73,9 +73,18 @@ fn scattered(round: usize, k: usize) -> usize {
 }
 
 fn key(steps: &[Step]) -> String {
+    // Names with other characters than those of bare keys stand in quotes.
+    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    let quoted = |key: &str| {
+        if key.chars().all(is_bare) {
+            key.to_owned()
+        } else {
+            format!("\"{key}\"")
+        }
+    };
     steps.iter().fold(String::new(), |text, step| match step {
-        Step::Key(key) if text.is_empty() => key.clone(),
-        Step::Key(key) => format!("{text}.{key}"),
+        Step::Key(key) if text.is_empty() => quoted(key),
+        Step::Key(key) => format!("{text}.{}", quoted(key)),
         Step::Index(index) => format!("{text}[{index}]"),
     })
 }

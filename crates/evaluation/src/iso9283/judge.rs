@@ -40,6 +40,7 @@ pub fn judge(
             unit,
             pass: value.is_some_and(|value| value <= limit),
             detail,
+            requirement: None,
         };
         match missing {
             Some(reason) => judged.add(result, || reason.to_owned()),
@@ -169,6 +170,7 @@ pub fn judge(
                 engine: Some(name.to_owned()),
                 criterion: "measured".to_owned(),
                 reason: unmeasured_by(name),
+                requirement: None,
             });
         }
     }

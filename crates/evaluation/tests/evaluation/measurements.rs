@@ -5,7 +5,9 @@ use std::path::Path;
 use nalgebra::{Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_cell::{Overrides, ResolvedScenario, load_scenario};
 use needlebench_engine::{Contact, Cost, EngineIdentity, PlantState, Recording, Saturation};
-use needlebench_evaluation::{engine_difference, measure_motion, measure_needle};
+use needlebench_evaluation::{
+    LEAST_SHADOW, engine_difference, measure_guide, measure_motion, measure_needle,
+};
 use needlebench_kinematics::trajectory::{
     JointState, JointTrajectory, MotionLimits, Phase, ProfileLimits,
 };
@@ -39,6 +41,10 @@ fn the_planned_pose_has_no_error() {
     assert!(found.lateral_error_m < ROUNDING && found.depth_error_m.abs() < ROUNDING);
     assert!(found.needle_angle_error_rad < ROUNDING && found.guide_position_error_m < ROUNDING);
     assert!(found.entry_point_error_m.expect("there is a phantom") < ROUNDING);
+    assert!(found.entry_lateral_error_m.expect("there is an entry") < ROUNDING);
+    for angle in [found.axial_angle_error_rad, found.sagittal_angle_error_rad] {
+        assert!(angle.is_none_or(|angle| angle < ROUNDING));
+    }
 }
 
 #[test]
@@ -71,7 +77,9 @@ fn a_shift_across_the_needle_is_a_lateral_error() {
     assert!((found.lateral_error_m - 0.002).abs() < ROUNDING);
     assert!((found.tip_position_error_m - 0.002).abs() < ROUNDING);
     assert!(found.depth_error_m.abs() < ROUNDING);
+    assert!((found.entry_lateral_error_m.unwrap() - 0.002).abs() < ROUNDING);
     assert_eq!(found.entry_point_error_m, None);
+    assert_eq!(found.axial_angle_error_rad, None);
 }
 
 #[test]
@@ -93,6 +101,37 @@ fn a_tilt_about_the_exit_grows_with_the_insertion() {
     assert!((found.lateral_error_m - length_m * tilt_rad.sin()).abs() < ROUNDING);
     assert!((found.needle_angle_error_rad - tilt_rad).abs() < ROUNDING);
     assert!(found.guide_position_error_m < ROUNDING);
+    // The entry lies the stand-off behind the exit.
+    let standoff_m = goal.standoff_m.unwrap();
+    let entry_m = found.entry_lateral_error_m.unwrap();
+    assert!((entry_m - standoff_m * tilt_rad.sin()).abs() < ROUNDING);
+}
+
+#[test]
+fn a_turn_about_the_normal_of_a_plane_shows_in_that_plane_as_it_is() {
+    let resolved = table3();
+    let goal = &resolved.goals[0];
+    let phantom = resolved.phantom.as_ref().unwrap();
+    let planned = goal.world_from_guide_exit;
+    let needle = phantom.world_from_phantom.rotation.inverse() * goal.axis.into_inner();
+    let mut measured = 0;
+    // The axial plane's normal is the patient's z, the sagittal one's his x.
+    for (normal, plane) in [(Vector3::z(), 0), (Vector3::x(), 1)] {
+        for turn_rad in [0.01, -0.03_f64] {
+            let about = UnitVector3::new_normalize(phantom.world_from_phantom.rotation * normal);
+            let turn = UnitQuaternion::from_axis_angle(&about, turn_rad);
+            let exit = Pose::from_parts(planned.translation, turn * planned.rotation);
+            let found = measure_guide(Some(phantom), goal, &exit);
+            let angles = [found.axial_angle_error_rad, found.sagittal_angle_error_rad];
+            let shadow = (needle - normal * normal.dot(&needle)).norm();
+            assert_eq!(angles[plane].is_some(), shadow >= LEAST_SHADOW, "{shadow}");
+            if let Some(angle) = angles[plane] {
+                assert!((angle - turn_rad.abs()).abs() < ROUNDING, "{angle}");
+                measured += 1;
+            }
+        }
+    }
+    assert!(measured >= 2, "one of the planes shows the needle");
 }
 
 fn trajectory(resolved: &ResolvedScenario) -> JointTrajectory {

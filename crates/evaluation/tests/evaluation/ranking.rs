@@ -38,6 +38,10 @@ fn needle(tip_error_m: f64) -> NeedleMeasurement {
         lateral_error_m: 1e-4,
         needle_angle_error_rad: 1e-3,
         guide_position_error_m: 1e-4,
+        entry_point_error_m: Some(1e-4),
+        entry_lateral_error_m: Some(1e-4),
+        axial_angle_error_rad: Some(1e-3),
+        sagittal_angle_error_rad: Some(1e-3),
         ..NeedleMeasurement::default()
     }
 }
@@ -146,6 +150,7 @@ fn configuration(index: usize) -> ConfigurationReport {
         clearance: ClearanceReport::new(BTreeMap::from(classes)),
         posture_clearance_m,
         surplus_m: Some(0.02),
+        entry_to_target_m: Some(0.08),
         predicted: Some(needle(2e-4)),
         tip_sensitivity_m_per_rad: Some(0.8),
         ..ConfigurationReport::new(Configuration::ALL[index].label())

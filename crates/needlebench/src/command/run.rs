@@ -1,6 +1,6 @@
 //! `needlebench run`.
 
-use crate::arguments::{EngineArgument, EngineParser, RobotArguments};
+use crate::arguments::{EngineArgument, EngineParser, RobotArguments, TableArguments, leave};
 use crate::output::{complain, shown};
 use clap::Args;
 use std::fs::OpenOptions;
@@ -19,6 +19,7 @@ use super::{load_runnable, overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::progress::TerminalProgress;
+use needlebench_bench::accuracy::{accuracy_of_run, check_run};
 use needlebench_bench::{RunOptions, Runnable, ScenarioRun};
 use needlebench_report::files::{Folder, RunFiles, write_run};
 use needlebench_report::{junit, markdown, report_text, write_atomically};
@@ -62,6 +63,8 @@ pub(crate) struct RunArguments {
     #[arg(long)]
     pub quiet: bool,
     #[command(flatten)]
+    pub table: TableArguments,
+    #[command(flatten)]
     pub robot: RobotArguments,
 }
 
@@ -91,6 +94,16 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     if let Some(finding) = repeated_name(&scenarios) {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
+    }
+    let table = arguments.table.request();
+    if let Some(request) = &table {
+        let all = scenarios.iter();
+        let wrong = all.filter_map(|each| check_run(request, each.scenario()).err());
+        let wrong: Vec<Finding> = wrong.collect();
+        if !wrong.is_empty() {
+            print_findings(&wrong);
+            return Ok(ExitStatus::BadInput);
+        }
     }
     let folders = match prepare_folders(arguments, &scenarios) {
         Ok(folders) => folders,
@@ -132,6 +145,14 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     for (runnable, folder) in scenarios.iter().zip(&folders) {
         let (outcome, report) = run_into(runnable, &options, folder, outputs, &cancel)?;
         status = status.max(outcome);
+        // What was interrupted is no sample of anything.
+        if let Some(request) = table
+            .as_ref()
+            .filter(|_| outcome != ExitStatus::Interrupted)
+        {
+            let table = accuracy_of_run(&report, runnable.scenario(), request);
+            leave(&table, folder, outputs.text)?;
+        }
         reports.push(report);
         if outcome == ExitStatus::Interrupted {
             break;

@@ -17,13 +17,14 @@ use needlebench_study::{
 
 use super::run::{Outputs, prepare_folder, probe_file, run_into};
 use super::{overrides, print_json, print_text};
-use crate::arguments::RobotArguments;
+use crate::arguments::{RobotArguments, leave};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 use arguments::StudyResultArguments;
 pub(crate) use arguments::{MergeArguments, STUDY_HELP, StudyArguments};
+use needlebench_bench::accuracy::{AccuracyError, accuracy_of_study, check_study};
 use needlebench_bench::progress::Progress as _;
 use needlebench_bench::study::{PreparedStudy, StudyCase, StudyEvaluator, in_words, time_per_case};
 use needlebench_bench::{RunOptions, Runnable};
@@ -44,7 +45,7 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
         return cases(arguments, &prepared);
     }
     let folder = arguments.out.join(&prepared.study.file.name);
-    if let Err(finding) = prepare_outputs(&folder, arguments.results.junit.as_deref()) {
+    if let Err(finding) = prepare_outputs(&folder, &prepared, &arguments.results) {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
@@ -111,7 +112,7 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
         return Ok(ExitStatus::BadInput);
     };
     let folder = arguments.out.join(&prepared.study.file.name);
-    if let Err(finding) = prepare_outputs(&folder, arguments.results.junit.as_deref()) {
+    if let Err(finding) = prepare_outputs(&folder, &prepared, &arguments.results) {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
@@ -162,8 +163,16 @@ fn foreign_shard(prepared: &PreparedStudy, shards: &[PathBuf]) -> Option<StudyEr
         })
 }
 
-fn prepare_outputs(folder: &Path, junit: Option<&Path>) -> Result<(), Finding> {
+fn prepare_outputs(
+    folder: &Path,
+    prepared: &PreparedStudy,
+    wanted: &StudyResultArguments,
+) -> Result<(), Finding> {
+    if let Some(request) = wanted.table.request() {
+        check_study(&request, prepared)?;
+    }
     prepare_folder(folder)?;
+    let junit = wanted.junit.as_deref();
     junit.map_or(Ok(()), |path| probe_file(path, "--junit"))
 }
 
@@ -281,6 +290,16 @@ fn finish(
         print_json(&finished.summary)?;
     } else {
         print_text(&format!("{}results: {}", finished.text, shown(folder)))?;
+    }
+    if let Some(request) = arguments.table.request() {
+        match accuracy_of_study(prepared, &results, &request) {
+            Ok(table) => leave(&table, folder, !arguments.json)?,
+            Err(AccuracyError::Results(error)) => return Ok(failed(&error.into())),
+            Err(AccuracyError::Request(finding)) => {
+                print_findings(&[finding]);
+                return Ok(ExitStatus::BadInput);
+            }
+        }
     }
     Ok(ExitStatus::of(finished.verdict))
 }

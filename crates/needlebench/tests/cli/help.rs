@@ -14,6 +14,7 @@ const COMMANDS: [&str; 14] = [
     "record-plan",
     "pairs",
     "paper",
+    "report",
     "schema",
     "doctor",
     "completions",

@@ -1,5 +1,6 @@
 //! The program from outside: what it prints, writes, refuses, and how it ends.
 
+mod accuracy;
 mod arguments;
 mod arms;
 mod atlas;
@@ -11,6 +12,7 @@ mod check;
 mod clearance;
 mod compare;
 mod compare_studies;
+mod credibility;
 mod determinism;
 #[cfg(target_os = "linux")]
 mod environment;

@@ -3,6 +3,7 @@
 //! Charts and pictures are drawn here and not before: they are large, and soon on the disk. Nothing
 //! of an earlier run stays that somebody could take for a result of this one.
 
+mod accuracy;
 mod atlas;
 mod atomic;
 mod error;
@@ -16,6 +17,7 @@ mod run;
 mod servo;
 mod study;
 
+pub use accuracy::write_accuracy;
 pub use atlas::write_atlas;
 pub use atomic::write_atomically;
 pub use error::FilesError;

@@ -9,6 +9,7 @@ use needlebench_cell::ResolvedScenario;
 use needlebench_engine::Engine;
 use needlebench_planning::GoalPlan;
 
+use super::accuracy::remove_accuracy;
 use super::error::FilesError;
 use super::excitation::write_logs;
 use super::folder::Folder;
@@ -49,6 +50,7 @@ pub fn write_run(
     progress: &dyn Progress,
 ) -> Result<(), FilesError> {
     let started = Instant::now();
+    remove_accuracy(folder)?;
     let pictures = resolved.scenario.recording.pictures && wanted.pictures;
     let mut names = write_recordings(resolved, finished, folder)?;
     if wanted.rtde || resolved.scenario.recording.rtde {

@@ -7,13 +7,15 @@ use std::sync::atomic::AtomicBool;
 use needlebench_bench::study::{
     ENGINE_FAILURE, PreparedStudy, Replanned, RobustnessResult, StudyCase, robustness_of,
 };
-use needlebench_evaluation::report::Verdict;
+use needlebench_cell::requirements::{Requirements, requirement_of};
+use needlebench_evaluation::report::{TraceOutcome, Verdict};
 use needlebench_study::ParquetResults;
 use needlebench_study::statistics::{
     CriterionResult, Summary, SummaryOptions, judge_study, summarise,
 };
 use serde::Serialize;
 
+use super::accuracy::remove_accuracy;
 use super::atomic::write_atomically;
 use super::error::FilesError;
 use super::folder::Folder;
@@ -21,7 +23,7 @@ use super::replan::replan;
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
 use crate::page::study::StudyPage;
-use crate::table::study::document::{Block, blocks};
+use crate::table::study::document::{Block, blocks, table};
 use crate::table::study::postures::{Postures, postures_blocks, postures_headline};
 use crate::table::study::robustness::{robustness_blocks, robustness_method};
 use crate::table::study::text::summary_text;
@@ -99,6 +101,7 @@ pub fn write_study(
     progress: &dyn Progress,
 ) -> Result<FinishedStudy, FilesError> {
     let file = &prepared.study.file;
+    remove_accuracy(Folder(output.folder))?;
     progress.message("statistics");
     let options = SummaryOptions {
         sampling: file.sampling.method,
@@ -106,7 +109,11 @@ pub fn write_study(
     };
     let options = options.judged_by(&file.criteria);
     let mut statistics = summarise(results, &options)?;
-    let criteria = judge_study(&statistics, &file.criteria);
+    let mut criteria = judge_study(&statistics, &file.criteria);
+    for each in &mut criteria {
+        let found = requirement_of(&file.requirements, &each.criterion);
+        each.requirement = found.map(str::to_owned);
+    }
     let replanned = replan(
         prepared,
         results,
@@ -162,6 +169,7 @@ pub fn write_study(
     let mut blocks = blocks(&summary.statistics, &summary.criteria, more);
     let head = postures_blocks(headline, summary.replanned.as_ref());
     blocks.splice(0..0, head);
+    blocks.extend(requirements_blocks(&file.requirements, &summary.criteria));
     blocks.extend(last_line(&summary).map(|line| Block::Lines(vec![line])));
     let title = match postures {
         Postures::All => format!("{} (postures only)", file.name),
@@ -206,6 +214,45 @@ pub fn write_study(
         summary,
         text,
     })
+}
+
+/// The trace matrix: requirements, the criteria that stand for them, and what came of these.
+fn requirements_blocks(requirements: &Requirements, criteria: &[CriterionResult]) -> Vec<Block> {
+    if requirements.is_empty() {
+        return Vec::new();
+    }
+    let mut rows: Vec<Vec<String>> = requirements
+        .iter()
+        .map(|(key, requirement)| {
+            let of_it = criteria.iter().filter(|each| each.criterion == *key);
+            let count = |is: &dyn Fn(&CriterionResult) -> bool| {
+                of_it.clone().filter(|each| is(each)).count() as u64
+            };
+            let met = count(&|each| each.is_judged() && each.pass);
+            let missed = count(&CriterionResult::is_missed);
+            let open = count(&|each| !each.is_judged());
+            let outcome = TraceOutcome::of(met, missed, open).words().to_owned();
+            let counts = [met, missed, open].map(|count| count.to_string());
+            let mut row = vec![requirement.clone(), key.clone(), outcome];
+            row.extend(counts);
+            row
+        })
+        .collect();
+    rows.sort();
+    vec![
+        Block::Heading("requirements".to_owned()),
+        table(
+            [
+                "requirement",
+                "<criterion",
+                "<outcome",
+                "met",
+                "missed",
+                "not judged",
+            ],
+            rows,
+        ),
+    ]
 }
 
 /// What was to be judged and could not be: criteria without values, and motions that engines could not

@@ -4,6 +4,7 @@ use needlebench_bench::replay::{ReplayReport, SUBJECT};
 use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::failure::{failure, not_judged};
+use super::run::REQUIREMENT;
 use crate::number::value_and_limit;
 
 /// A replay as a JUnit document. Contains no times: two replays give the same bytes.
@@ -28,12 +29,18 @@ pub fn replay_junit(report: &ReplayReport) -> Result<String, SerializeError> {
             format!("{}{}", result.criterion, of(&result.engine)),
             status,
         );
+        if let Some(requirement) = &result.requirement {
+            case.add_property((REQUIREMENT, requirement.as_str()));
+        }
         case.set_classname(name.clone());
         suite.add_test_case(case);
     }
     for open in &report.not_judged {
         let title = format!("{}{}", open.criterion, of(&open.engine));
         let mut case = TestCase::new(title, not_judged(&open.reason));
+        if let Some(requirement) = &open.requirement {
+            case.add_property((REQUIREMENT, requirement.as_str()));
+        }
         case.set_classname(name.clone());
         suite.add_test_case(case);
     }

@@ -1,6 +1,8 @@
 //! A run: a suite for each goal, a case for each configuration.
 
-use needlebench_evaluation::report::{CriterionResult, Report, Status};
+use std::collections::BTreeMap;
+
+use needlebench_evaluation::report::{CriterionResult, Report, Status, TraceOutcome};
 use needlebench_evaluation::{excitation, iso9283};
 use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
@@ -40,6 +42,7 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                     TestCaseStatus::success()
                 };
                 let mut case = TestCase::new(configuration.label, status);
+                add_requirements(&mut case, report, &goal.name, Some(configuration.label));
                 case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
                 suite.add_test_case(case);
             }
@@ -58,6 +61,7 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                 TestCaseStatus::success()
             };
             let mut case = TestCase::new("goal", status);
+            add_requirements(&mut case, report, &goal.name, None);
             case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
             suite.add_test_case(case);
             document.add_test_suite(suite);
@@ -81,6 +85,37 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
         }
     }
     document.to_string()
+}
+
+/// Name of the properties of requirements.
+pub(super) const REQUIREMENT: &str = "requirement";
+
+/// The requirements that criteria on a configuration stand for, or on a goal as a whole: each once, with the
+/// criterion and what came of it.
+fn add_requirements(case: &mut TestCase, report: &Report, goal: &str, label: Option<&str>) {
+    let mut counts: BTreeMap<(&str, &str), [u64; 3]> = BTreeMap::new();
+    for each in &report.criteria {
+        if each.goal == goal
+            && each.label.as_deref() == label
+            && let Some(requirement) = &each.requirement
+        {
+            let count = counts.entry((requirement, &each.criterion)).or_default();
+            count[usize::from(!each.pass)] += 1;
+        }
+    }
+    for each in &report.not_judged {
+        if each.goal == goal
+            && each.label.as_deref() == label
+            && let Some(requirement) = &each.requirement
+        {
+            counts.entry((requirement, &each.criterion)).or_default()[2] += 1;
+        }
+    }
+    for ((requirement, criterion), [met, missed, open]) in counts {
+        let outcome = TraceOutcome::of(met, missed, open).words();
+        let text = format!("{requirement} ({criterion}: {outcome})");
+        case.add_property((REQUIREMENT, text.as_str()));
+    }
 }
 
 /// What was not judged of a configuration, or of the goal as a whole: criteria and why.
@@ -109,6 +144,9 @@ fn suite_of(report: &Report, subject: &str) -> TestSuite {
             .map_or(String::new(), |engine| format!(" ({engine})"));
         let what = case_of(subject, result.label.as_deref(), &result.criterion);
         let mut case = TestCase::new(format!("{what}{engine}"), status);
+        if let Some(requirement) = &result.requirement {
+            case.add_property((REQUIREMENT, requirement.as_str()));
+        }
         case.set_classname(name.clone());
         suite.add_test_case(case);
     }
@@ -117,6 +155,9 @@ fn suite_of(report: &Report, subject: &str) -> TestSuite {
         let engine = engine.map_or(String::new(), |engine| format!(" ({engine})"));
         let what = case_of(subject, each.label.as_deref(), &each.criterion);
         let mut case = TestCase::new(format!("{what}{engine}"), not_judged(&each.reason));
+        if let Some(requirement) = &each.requirement {
+            case.add_property((REQUIREMENT, requirement.as_str()));
+        }
         case.set_classname(name.clone());
         suite.add_test_case(case);
     }

@@ -4,6 +4,7 @@ use needlebench_study::statistics::CriterionResult;
 use quick_junit::{SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::failure::{failure, not_judged};
+use super::run::REQUIREMENT;
 
 /// The criteria of a study as one JUnit document; `headline` says what the study is no answer to.
 pub fn study_junit(
@@ -39,6 +40,9 @@ pub fn study_junit(
         };
         let mut case = TestCase::new(format!("{}{of}", criterion.criterion), status);
         case.set_classname(name.to_owned());
+        if let Some(requirement) = &criterion.requirement {
+            case.add_property((REQUIREMENT, requirement.as_str()));
+        }
         case.set_system_out(match headline {
             Some(headline) => format!("{}\n{headline}", criterion.detail),
             None => criterion.detail.clone(),

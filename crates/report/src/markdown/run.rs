@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use needlebench_engine::Engine;
-use needlebench_evaluation::report::{GoalReport, Report, Status, Verdict};
+use needlebench_evaluation::report::{GoalReport, Report, Status, TraceOutcome, Verdict};
 
 use super::escape::{inline, paragraph};
 use super::ranking::ranking_markdown;
@@ -104,6 +104,30 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
             inline(&label),
             inline(reason)
         )?;
+    }
+    if !report.trace.is_empty() {
+        writeln!(out, "\n## Requirements\n")?;
+        writeln!(
+            out,
+            "| Requirement | Criterion | Outcome | Met | Missed | Not judged |\n|---|---|---|--:|--:|--:|"
+        )?;
+        for row in &report.trace {
+            let outcome = match row.outcome {
+                TraceOutcome::Met => "met",
+                TraceOutcome::Missed => "**missed**",
+                TraceOutcome::NotJudged => "**not judged**",
+            };
+            writeln!(
+                out,
+                "| {} | {} | {outcome} | {} | {} | {} |",
+                inline(&row.requirement),
+                inline(&row.criterion),
+                row.met,
+                row.missed,
+                row.not_judged
+            )?;
+        }
+        writeln!(out)?;
     }
     for failure in &report.engine_failures {
         writeln!(

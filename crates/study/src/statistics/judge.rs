@@ -34,6 +34,9 @@ pub struct CriterionResult {
     pub detail: String,
     /// Numbers of the worst cases, whatever the verdict.
     pub cases: Vec<u64>,
+    /// The requirement that it stands for, where the study says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub requirement: Option<String>,
 }
 
 impl CriterionResult {
@@ -91,6 +94,7 @@ impl Judged {
             confidence,
             detail,
             cases: self.cases,
+            requirement: None,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What the statistics need to know of a case.
 
 use crate::column::Measures;
-use crate::{CaseResult, FactorValue, Outcome, Results, ResultsError, Row};
+use crate::{CaseResult, FactorValue, MetricColumn, Outcome, Results, ResultsError, Row};
 
 /// Number of configurations.
 pub(crate) const CONFIGURATIONS: usize = 8;
@@ -62,6 +62,23 @@ impl Layout {
     /// Whether a configuration is ok.
     pub(crate) fn works(&self, configuration: usize) -> bool {
         self.ok >> configuration & 1 == 1
+    }
+}
+
+/// Which configuration of a layout is the best.
+#[derive(Debug, Clone)]
+pub struct BestConfiguration(Measures);
+
+impl BestConfiguration {
+    /// By the columns of a table.
+    pub fn new(columns: &[MetricColumn]) -> Self {
+        Self(Measures::new(columns))
+    }
+
+    /// Index of the configuration with the largest clearance of those that are ok, the first of equal
+    /// ones; none where none is ok or the layout cannot exist.
+    pub fn of(&self, result: &CaseResult) -> Option<usize> {
+        Layout::of(result, &self.0)?.best
     }
 }
 

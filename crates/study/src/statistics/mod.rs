@@ -39,6 +39,7 @@ pub use evidence::{CaseValue, ConfigurationEvidence, Evidence, MOST_CASES, Worst
 pub use gap::{ANY, Gap, ReplannedCase, gaps};
 pub use interval::{CONFIDENCE, Interval, Rate, clopper_pearson, mcnemar};
 pub use judge::{CriterionResult, judge_study};
+pub use layout::BestConfiguration;
 pub use methods::Method;
 pub use regions::{RegionCell, RegionMap, Regions};
 pub use spread::{BEST, PROBABILITIES, QuantileValue, Spread};

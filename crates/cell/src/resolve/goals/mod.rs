@@ -74,6 +74,11 @@ impl Goal {
     pub fn world_from_guide_exit_at(&self, roll_rad: f64) -> Pose {
         self.world_from_guide_exit * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll_rad)
     }
+
+    /// Length of the planned needle in the patient, m; `None` without a phantom.
+    pub fn entry_to_target_m(&self) -> Option<f64> {
+        Some((self.target_m - self.entry_m?).norm())
+    }
 }
 
 /// What resolving goals needs to know.

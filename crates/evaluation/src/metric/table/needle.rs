@@ -107,6 +107,63 @@ pub(super) const PREDICTED: &[Metric] = &[
     .known(Value, ThisDraw, FinalPosture)
     .in_static_cases("depth_error_static")
     .show(Show::SmallLength),
+    Metric::new(
+        "entry_error_predicted",
+        "predicted entry error",
+        "distance of where the needle's axis meets the skin from the planned entry point, by the balance of \
+         torques",
+        Length,
+        Configuration(|each| each.predicted?.entry_point_error_m),
+    )
+    .family("entry_error")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("entry_error_static")
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength),
+    Metric::new(
+        "entry_lateral_error_predicted",
+        "predicted lateral error at the entry",
+        "distance of the planned entry point from the needle's axis, by the balance of torques",
+        Length,
+        Configuration(|each| each.predicted?.entry_lateral_error_m),
+    )
+    .family("entry_lateral_error")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("entry_lateral_error_static")
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength),
+    Metric::new(
+        "needle_angle_axial_predicted",
+        "predicted needle angle error, axial",
+        "angle between planned and actual needle as the patient's axial plane shows them, by the balance of \
+         torques; none where the needle stands more than 60 deg out of that plane",
+        Angle,
+        Configuration(|each| each.predicted?.axial_angle_error_rad),
+    )
+    .family("needle_angle_axial")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("needle_angle_axial_static")
+    .better(Less, NEEDLE_RESOLUTION_RAD),
+    Metric::new(
+        "needle_angle_sagittal_predicted",
+        "predicted needle angle error, sagittal",
+        "angle between planned and actual needle as the patient's sagittal plane shows them, by the balance of \
+         torques; none where the needle stands more than 60 deg out of that plane",
+        Angle,
+        Configuration(|each| each.predicted?.sagittal_angle_error_rad),
+    )
+    .family("needle_angle_sagittal")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("needle_angle_sagittal_static")
+    .better(Less, NEEDLE_RESOLUTION_RAD),
+    Metric::new(
+        "entry_target_length",
+        "entry-target length",
+        "length of the planned needle from the skin to the target",
+        Length,
+        Configuration(|each| each.entry_to_target_m),
+    )
+    .in_static_cases("entry_target_length"),
 ];
 
 /// The needle as it settles in the engines.
@@ -178,6 +235,46 @@ pub(super) const SIMULATED: &[Metric] = &[
     )
     .known(Value, ThisDraw, Simulated)
     .show(Show::SmallLength),
+    Metric::new(
+        "entry_error",
+        "entry error",
+        "settled distance of where the needle's axis meets the skin from the planned entry point",
+        Length,
+        Engines(|each| each.needle.entry_point_error_m),
+    )
+    .known(Value, ThisDraw, Simulated)
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength),
+    Metric::new(
+        "entry_lateral_error",
+        "lateral error at the entry",
+        "settled distance of the planned entry point from the needle's axis",
+        Length,
+        Engines(|each| each.needle.entry_lateral_error_m),
+    )
+    .known(Value, ThisDraw, Simulated)
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength),
+    Metric::new(
+        "needle_angle_axial",
+        "needle angle error, axial",
+        "settled angle between planned and actual needle as the patient's axial plane shows them; none where \
+         the needle stands more than 60 deg out of that plane",
+        Angle,
+        Engines(|each| each.needle.axial_angle_error_rad),
+    )
+    .known(Value, ThisDraw, Simulated)
+    .better(Less, NEEDLE_RESOLUTION_RAD),
+    Metric::new(
+        "needle_angle_sagittal",
+        "needle angle error, sagittal",
+        "settled angle between planned and actual needle as the patient's sagittal plane shows them; none \
+         where the needle stands more than 60 deg out of that plane",
+        Angle,
+        Engines(|each| each.needle.sagittal_angle_error_rad),
+    )
+    .known(Value, ThisDraw, Simulated)
+    .better(Less, NEEDLE_RESOLUTION_RAD),
 ];
 
 /// The needle over all arms and patients.

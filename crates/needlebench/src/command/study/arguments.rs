@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use needlebench_study::Shard;
 
-use crate::arguments::RobotArguments;
+use crate::arguments::{RobotArguments, TableArguments};
 
 pub(crate) const STUDY_HELP: &str = "\
 A study is one TOML file: a scenario, factors that vary it, and what is asked of the results. Every case \
@@ -16,6 +16,7 @@ study goes on with --resume. Shards may run on several machines; `merge` joins t
 
 Example: needlebench study scenarios/studies/layouts.toml
 Example: needlebench study scenarios/studies/layouts.toml --case 1234
+Example: needlebench study scenarios/studies/accuracy_budget.toml --table accuracy --by source
 Example: needlebench study scenarios/studies/layouts.toml --shard 1/3 --out shard1
 Example: needlebench merge scenarios/studies/layouts.toml shard1/layouts shard2/layouts shard3/layouts";
 
@@ -38,7 +39,7 @@ pub(crate) struct StudyArguments {
     #[arg(long, value_name = "K/N")]
     pub shard: Option<Shard>,
     /// Compute these cases alone and print their rows; nothing is written.
-    #[arg(long, value_name = "ID", conflicts_with_all = ["resume", "shard", "csv"])]
+    #[arg(long, value_name = "ID", conflicts_with_all = ["resume", "shard", "csv", "table"])]
     pub case: Vec<u64>,
     /// With --case: run it with engines, pictures and a page, as `run` does, into the study's folder.
     #[arg(long, requires = "case")]
@@ -89,4 +90,6 @@ pub(crate) struct StudyResultArguments {
     /// Show no progress.
     #[arg(long)]
     pub quiet: bool,
+    #[command(flatten)]
+    pub table: TableArguments,
 }

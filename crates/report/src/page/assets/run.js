@@ -19,7 +19,7 @@ NB.RunPage = class {
     this.view = new NB.View(page.scene, `Cell of ${this.report.scenario.name}`);
     if (this.report.goals.length) this.build(app);
     else this.buildWithoutGoals(app);
-    app.append(this.criteria(), this.provenance());
+    app.append(this.criteria(), this.requirements(), this.provenance());
   }
 
   head() {
@@ -575,6 +575,23 @@ NB.RunPage = class {
     return NB.section(`Criteria (${sorted.length}${open.length ? `, ${open.length} not judged` : ''})`, open.length > 0 || sorted.some((each) => !each.pass),
       NB.table('What was checked, missed ones first', columns, sorted, { class: 'small' }),
       open.length ? NB.table('What was to be judged and was not', unjudged, open, { class: 'small' }) : null);
+  }
+
+  requirements() {
+    const rows = this.report.trace || [];
+    const words = { met: '\u2713 met', missed: '\u2717 missed', not_judged: 'not judged' };
+    const columns = [
+      { title: 'Requirement', cell: (r) => r.requirement },
+      { title: 'Criterion', cell: (r) => NB.words(r.criterion) },
+      { title: 'Outcome', cell: (r) => NB.el('span', { class: r.outcome === 'met' ? 'good' : 'bad', text: words[r.outcome] }) },
+      { title: 'Met', numeric: true, cell: (r) => String(r.met) },
+      { title: 'Missed', numeric: true, cell: (r) => String(r.missed) },
+      { title: 'Not judged', numeric: true, cell: (r) => String(r.not_judged) },
+    ];
+    return NB.el('div', null, rows.length
+      ? NB.section(`Requirements (${rows.length})`, true,
+        NB.table('Requirements, the criteria that stand for them, and how often these were met', columns, rows, { class: 'small' }))
+      : null);
   }
 
   provenance() {

@@ -1,0 +1,84 @@
+//! `needlebench report`.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use needlebench_bench::credibility::Credibility;
+use needlebench_cell::judgement::Judgement;
+use needlebench_report::credibility::credibility_markdown;
+use needlebench_report::files::Folder;
+
+use super::run::prepare_folder;
+use super::{print_json, print_text};
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::output::shown;
+
+pub(crate) const REPORT_HELP: &str = "\
+Collects what folders of results know - versions, hashes of inputs, tests against closed forms, the engines' \
+difference, halved time steps, criteria, assumptions, held-out errors against a recorded run - and what people \
+state in a TOML file, in the frame of ASME V&V 40. It claims no conformity.
+
+Example: needlebench report out/table3 --credibility --judgement judgement.toml
+Example: needlebench report --template > judgement.toml";
+
+#[derive(Debug, Args)]
+pub(crate) struct ReportArguments {
+    /// Folders of results of `run` or `replay`, such as out/table3.
+    #[arg(required_unless_present = "template", value_name = "RESULTS_FOLDER")]
+    pub folders: Vec<PathBuf>,
+    /// Evidence for the credibility of the results: credibility.md and credibility.json.
+    #[arg(long, required_unless_present = "template")]
+    pub credibility: bool,
+    /// What people state: question, context of use, risk, applicability, limitations.
+    #[arg(long, value_name = "FILE")]
+    pub judgement: Option<PathBuf>,
+    /// Print an empty file for --judgement.
+    #[arg(long, conflicts_with_all = ["folders", "credibility", "judgement", "out", "json"])]
+    pub template: bool,
+    /// Folder for the documents; that of the first results if left out.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print the JSON document instead of the Markdown.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Collects evidence, writes and prints it.
+pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitStatus> {
+    if arguments.template {
+        print_text(Judgement::template().trim_end())?;
+        return Ok(ExitStatus::Success);
+    }
+    let judgement = match &arguments.judgement {
+        Some(path) => Judgement::load(path),
+        None => Ok(Judgement::default()),
+    };
+    let collected = judgement.and_then(|judged| Credibility::collect(&arguments.folders, judged));
+    let document = match collected {
+        Ok(document) => document,
+        Err(findings) => {
+            print_findings(&findings);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let first = arguments.folders.first();
+    let folder = arguments.out.as_ref().or(first).context("no folder")?;
+    if let Err(finding) = prepare_folder(folder) {
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
+    let markdown = credibility_markdown(&document);
+    let written = Folder(folder)
+        .write("credibility.md", &markdown)
+        .and_then(|()| Folder(folder).write_json("credibility.json", &document));
+    written.with_context(|| format!("cannot write to {}", folder.display()))?;
+    if arguments.json {
+        print_json(&document)?;
+    } else {
+        let place = shown(&folder.join("credibility.md"));
+        print_text(&format!("{markdown}\nreport: {place}"))?;
+    }
+    Ok(ExitStatus::Success)
+}
