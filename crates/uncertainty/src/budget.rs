@@ -25,7 +25,8 @@ pub struct BudgetCase<'a> {
     pub goal: &'a Goal,
     /// The phantom's planned place, if there is one.
     pub place: Option<&'a Pose>,
-    /// The servo.
+    /// The servo. Where it believes in another gravity than the cell has, the bias of every source has what
+    /// that does.
     pub servo: &'a Servo,
     /// All imperfections.
     pub imperfections: &'a Imperfections,

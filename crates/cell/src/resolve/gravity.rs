@@ -70,17 +70,17 @@ pub(super) fn gravity_settings(
     }
     let data = robot.arm.as_ref().map(|used| &used.arm.data);
     let makers = data.and_then(|data| Some((&data.name, data.gravity.as_ref()?)));
-    let (believed_m_s2, believed_source) = match scenario.controller.gravity_m_s2 {
-        Some(given) => (given, format!("{file}: controller")),
-        None => {
-            let makers = makers.map_or_else(String::new, |(name, known)| {
-                format!(
-                    "; a {name}'s own controller has {} ({})",
-                    known.believed_m_s2, known.source
-                )
-            });
-            (world_m_s2, format!("the world's{makers}"))
-        }
+    let given = scenario.controller.gravity_m_s2;
+    let (believed_m_s2, believed_source) = if let Some(given) = given {
+        (given, format!("{file}: controller"))
+    } else {
+        let makers = makers.map_or_else(String::new, |(name, known)| {
+            format!(
+                "; a {name}'s own controller has {} ({})",
+                known.believed_m_s2, known.source
+            )
+        });
+        (world_m_s2, format!("the world's{makers}"))
     };
     let settings = GravitySettings {
         world_m_s2,

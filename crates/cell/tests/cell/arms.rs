@@ -103,10 +103,10 @@ fn gains_of_shipped_arms_are_those_of_their_rule() {
         );
         assert!((frequency_hz / 6.0 - 1.0).abs() < DIGITS, "{}", arm.key);
         assert!((damping / 0.6 - 1.0).abs() < DIGITS, "{}", arm.key);
-        for wrist in 3..6 {
+        for (wrist, rotor_kgm2) in rotors.iter().enumerate().skip(3) {
             let gains = [servo.stiffness_nm_rad[wrist], servo.damping_nms_rad[wrist]];
             for (gain, per_rotor) in gains.iter().zip(PER_ROTOR) {
-                let ratio = gain / (per_rotor * rotors[wrist]);
+                let ratio = gain / (per_rotor * rotor_kgm2);
                 assert!((ratio - 1.0).abs() < DIGITS, "{} {wrist}: {ratio}", arm.key);
             }
         }

@@ -104,7 +104,11 @@ fn studies_of_an_older_version_are_compared_by_todays_names() {
         let then = then.iter().fold(SMALL.to_owned(), |text, (from, to)| {
             with_edit(&text, from, to)
         });
-        let more = "[planning.needle_route]\noff = [\"bone\", \"vessel\", \"organ\"]\n[engines]\nrun = [\"rapier\"]\n";
+        // And what the drives of a UR3 were assumed to be.
+        let more = "[planning.needle_route]\noff = [\"bone\", \"vessel\", \"organ\"]\n[engines]\nrun = [\"rapier\"]\n\
+                    [controller]\nstiffness_nm_rad = [2000, 2000, 2000, 2000, 2000, 2000]\n\
+                    damping_nms_rad = [60, 60, 60, 60, 60, 60]\n\
+                    armature_kgm2 = [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]\n";
         let bench = Bench::with_scenario(&format!("{then}{more}"));
         bench.write("former.parquet", name);
         bench.write("study.toml", study(mode));
