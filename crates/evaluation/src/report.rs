@@ -17,8 +17,7 @@ use crate::needle::NeedleMeasurement;
 use crate::ranking_report::{Dominance, GoalRanking, RankingReport};
 use crate::referee::RefereeReport;
 use crate::room::RoomReport;
-pub use crate::trace::{TraceOutcome, TraceRow};
-pub use crate::verdict::{CriterionResult, Judged, NotJudged, Verdict};
+pub use crate::verdict::{CriterionResult, Judged, NotJudged, TraceOutcome, TraceRow, Verdict};
 
 /// Version of the report's keys.
 pub const SCHEMA_VERSION: u32 = 1;

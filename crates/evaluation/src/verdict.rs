@@ -127,3 +127,66 @@ pub struct CriterionResult {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub requirement: Option<String>,
 }
+
+/// What came of a criterion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TraceOutcome {
+    /// Wherever it was to be judged it was, and met.
+    Met,
+    /// It was missed somewhere.
+    Missed,
+    /// It was not missed, but not judged everywhere, or nowhere at all.
+    NotJudged,
+}
+
+impl TraceOutcome {
+    /// Of how often it was met, missed and not judged.
+    pub fn of(met: u64, missed: u64, not_judged: u64) -> Self {
+        match (met, missed, not_judged) {
+            (_, 1.., _) => Self::Missed,
+            (1.., 0, 0) => Self::Met,
+            _ => Self::NotJudged,
+        }
+    }
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Met => "met",
+            Self::Missed => "missed",
+            Self::NotJudged => "not judged",
+        }
+    }
+}
+
+/// One criterion that stands for a requirement.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct TraceRow {
+    /// The requirement, as the scenario has it.
+    pub requirement: String,
+    /// Key of the criterion.
+    pub criterion: String,
+    /// What came of it.
+    pub outcome: TraceOutcome,
+    /// How often it was met, over goals, configurations and engines.
+    pub met: u64,
+    /// How often it was missed.
+    pub missed: u64,
+    /// How often it was to be judged and could not be; 0 with nothing met nor missed: nothing of this run
+    /// was to be judged by it.
+    pub not_judged: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_not_judged_is_never_met() {
+        assert_eq!(TraceOutcome::of(3, 0, 0), TraceOutcome::Met);
+        assert_eq!(TraceOutcome::of(3, 0, 1), TraceOutcome::NotJudged);
+        assert_eq!(TraceOutcome::of(0, 0, 0), TraceOutcome::NotJudged);
+        assert_eq!(TraceOutcome::of(3, 1, 1), TraceOutcome::Missed);
+    }
+}

@@ -24,6 +24,7 @@ mod planning;
 pub mod ranking;
 mod recording;
 mod replay;
+mod requirements;
 mod robot;
 mod switch;
 mod tool;
@@ -34,10 +35,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::engine_name::EngineName;
-use crate::requirements::{Requirements, scenario_requirements};
+use crate::requirements::Requirements;
 use crate::schema::{FileSchema, LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
 use crate::{ClearanceClass, Finding};
+use requirements::scenario_requirements;
 
 pub use controller::ControllerSection;
 pub use criteria::{ClearanceCriteria, CriteriaSection};

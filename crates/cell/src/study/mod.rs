@@ -11,14 +11,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
 use crate::input::read_text;
-use crate::requirements::{Requirements, study_requirements};
+use crate::requirements::Requirements;
 use crate::scenario::EngineName;
 use crate::schema::{COLUMN, FileSchema, LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
 use crate::{Finding, ModelSource, Overrides};
 use criteria::StudyCriteria;
+use requirements::study_requirements;
 
 pub mod criteria;
+mod requirements;
 mod resolve;
 
 /// What a study file may hold.

@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 16] = [
     "run",
     "check",
     "ik",
@@ -12,6 +12,7 @@ const COMMANDS: [&str; 14] = [
     "compare",
     "iso9283",
     "record-plan",
+    "replay",
     "pairs",
     "paper",
     "report",
