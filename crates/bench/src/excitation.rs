@@ -226,8 +226,9 @@ fn simulate(
         let during = |index: usize| format!("the run with payload {}", index + 1);
         let failure = match (done.error, failed) {
             (Some(EngineError::Cancelled), _) | (None, None) => None,
-            (Some(error), _) => Some((None, error)),
-            (None, Some((_, error @ EngineError::NotMade { .. }))) => Some((None, error)),
+            (Some(error), _) | (None, Some((_, error @ EngineError::NotMade { .. }))) => {
+                Some((None, error))
+            }
             (None, Some((index, error))) => Some((Some(during(index)), error)),
         };
         EngineMade {

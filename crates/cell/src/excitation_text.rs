@@ -199,7 +199,7 @@ fn make_absolute(value: &mut Value, base: &Path) {
                 && let Ok(absolute) = std::path::absolute(&path)
                 && let Some(absolute) = absolute.to_str()
             {
-                *text = absolute.to_owned();
+                absolute.clone_into(text);
             }
         }
         Value::Array(values) => values.iter_mut().for_each(|each| make_absolute(each, base)),

@@ -1,5 +1,6 @@
 //! `needlebench record-plan`.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -424,10 +425,8 @@ fn head(report: &PlanReport) -> String {
     for (class, found) in &report.planned.classes {
         if *class != "needle_corridor" {
             let proven = millimetres(found.certified_lower_bound_m);
-            text.push_str(&format!(
-                "  {class}: {proven} ({})\n",
-                found.pair.join(" - ")
-            ));
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "  {class}: {proven} ({})", found.pair.join(" - "));
         }
     }
     text.push_str("Beside each posture: proven clearances of the way to it, from everything else / itself, mm.\n\n");

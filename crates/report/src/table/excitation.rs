@@ -80,7 +80,7 @@ fn write_report(out: &mut String, report: &ExcitationReport) -> std::fmt::Result
             small_length(difference.settled_tip_m)
         )?;
     }
-    for file in report.files.iter().filter(|file| file.ends_with(".csv")) {
+    for file in &report.files {
         writeln!(out, "log: {file}")?;
     }
     Ok(())
@@ -255,13 +255,12 @@ fn write_plan(out: &mut String, report: &PlanReport) -> std::fmt::Result {
     }
     writeln!(out, "{table}")?;
     for each in &here.joints {
-        match each.torque_constant_identified {
-            Some(false) => writeln!(
+        if each.torque_constant_identified == Some(false) {
+            writeln!(
                 out,
                 "not identified to a tenth: torque constant of {}: gravity and acceleration load it too little",
                 each.joint
-            )?,
-            Some(true) | None => {}
+            )?;
         }
     }
     if here
