@@ -23,6 +23,7 @@ mod pieces;
 mod plant;
 mod pool;
 mod rapier;
+mod readings;
 mod recording;
 mod referee;
 mod registry;

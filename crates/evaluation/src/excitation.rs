@@ -6,9 +6,11 @@ use needlebench_cell::ClearanceClass;
 use needlebench_cell::scenario::CriteriaSection;
 use serde::Serialize;
 
+use crate::class_clearance::ClearanceReport;
 use crate::iso9283::Effort;
 use crate::motion::EngineDifference;
-use crate::report::{ClearanceReport, CriterionResult, Judged, TruthReport};
+use crate::truth::TruthReport;
+use crate::verdict::{CriterionResult, Judged};
 use crate::verdict::{UNCOMPARED, unmeasured_by};
 
 /// What criteria of such a run are said to be about, in place of a goal.

@@ -29,6 +29,7 @@ mod sensitivity;
 mod stored;
 mod threshold;
 pub mod trace;
+mod truth;
 mod verdict;
 
 pub use clearance::{

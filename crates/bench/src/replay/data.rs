@@ -103,7 +103,7 @@ pub fn arm_files(report: &ReplayReport, robot: &Robot, calibration_file: &str) -
         }
         population
     });
-    let data = ArmData {
+    let mut data = ArmData {
         urdf: used.arm.file_from_elsewhere(&of_type.urdf),
         rotors: rotors
             .map(|(inertia_kgm2, source)| RotorData {
@@ -137,6 +137,17 @@ pub fn arm_files(report: &ReplayReport, robot: &Robot, calibration_file: &str) -
         }),
         ..of_type.clone()
     };
+    // What is known now is lacking no more.
+    for (table, is_there) in [
+        ("rotors", data.rotors.is_some()),
+        ("motors", data.motors.is_some()),
+        ("gravity", data.gravity.is_some()),
+        ("calibration", data.calibration.is_some()),
+    ] {
+        if is_there {
+            data.lacks.remove(table);
+        }
+    }
     let comment = format!(
         "One {}, by needlebench replay of {}. What the run does not show is that of its type.",
         of_type.name, log.source.file

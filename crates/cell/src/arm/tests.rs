@@ -70,7 +70,8 @@ fn shipped_arms_are_told_apart_by_their_lengths() {
 fn shipped_arms_have_every_table_or_say_why_not() {
     for arm in Arm::shipped() {
         let value = toml::Value::try_from(&arm.data).unwrap();
-        for table in TABLES {
+        // A calibration makes data those of one arm, and these are of a type.
+        for table in TABLES.into_iter().filter(|table| *table != "calibration") {
             let is_there = value.get(table).is_some();
             let is_said = arm.data.lacks.contains_key(table);
             assert!(is_there != is_said, "{}: [{table}]", arm.key);

@@ -75,6 +75,7 @@ pub struct SweepSection {
     #[schemars(schema_with = "joints")]
     pub joint: String,
     /// The posture at which it is made, counted from 1 as `postures_deg` are; 0 for the start posture.
+    #[schemars(range(min = 0, max = 500))]
     pub posture: usize,
     /// By how much the joint moves, deg.
     #[schemars(range(min = -360.0, max = 360.0))]
