@@ -56,6 +56,14 @@ fn is_hidden(character: char) -> bool {
     turns || character.is_control() && !matches!(character, '\n' | '\t')
 }
 
+/// Lines of a comment, as TOML and YAML have them.
+pub(crate) fn commented(text: &str) -> String {
+    text.lines().fold(String::new(), |mut out, line| {
+        out.extend(["# ", line, "\n"]);
+        out
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -149,7 +149,7 @@ pub(crate) fn checked(
         let mass = take(Quantity::Payload);
         let centre = take(Quantity::PayloadCog);
         let inertia = take(Quantity::PayloadInertia);
-        loads(mass, centre, inertia, &keep)
+        loads(mass, centre, inertia.as_deref(), &keep)
     };
     let kind = kind(&actual_q, target.as_deref(), raw.draws_current);
     if kind == LogKind::Simulator {
@@ -401,7 +401,7 @@ fn target(
 fn loads(
     mass: Option<Vec<f64>>,
     centre: Option<Vec<f64>>,
-    inertia: Option<Vec<f64>>,
+    inertia: Option<&[f64]>,
     keep: &[usize],
 ) -> Vec<(usize, Load)> {
     let Some(mass) = mass else {
@@ -414,7 +414,7 @@ fn loads(
             mass_kg: mass[*at],
             centre_m: [centre[3 * at], centre[3 * at + 1], centre[3 * at + 2]],
             inertia_kgm2: std::array::from_fn(|k| {
-                inertia.as_ref().map_or(0.0, |inertia| inertia[6 * at + k])
+                inertia.map_or(0.0, |inertia| inertia[6 * at + k])
             }),
         };
         if loads.last().is_none_or(|(_, last)| *last != load) {

@@ -87,10 +87,10 @@ impl Arm {
             }
             if i > 0 {
                 let arm = links[i].translation.vector - links[i - 1].translation.vector;
-                for kind in 0..3 {
-                    let (force, moment) = wrenches[i][kind];
-                    wrenches[i - 1][kind].0 += force;
-                    wrenches[i - 1][kind].1 += moment + arm.cross(&force);
+                let (before, from) = wrenches.split_at_mut(i);
+                for (sum, (force, moment)) in before[i - 1].iter_mut().zip(from[0]) {
+                    sum.0 += force;
+                    sum.1 += moment + arm.cross(&force);
                 }
             }
         }

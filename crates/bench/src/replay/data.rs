@@ -197,8 +197,8 @@ fn merged(
     }
     let mut source = format!("{whence}, 95 %: {}", of_log.join(", "));
     if let (false, Some((_, known))) = (of_type.is_empty(), known) {
-        source += &format!(
-            "; {}, which the run does not show: {known}",
+        source = format!(
+            "{source}; {}, which the run does not show: {known}",
             of_type.join(", ")
         );
     }

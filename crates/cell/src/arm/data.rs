@@ -6,6 +6,7 @@ use needlebench_kinematics::{JOINT_LABELS, UrGeometry, UrModel};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
+use crate::printable::commented;
 use crate::schema::FileSchema;
 
 /// What is known of an arm. Only the name, the URDF and the lengths are needed; what else is left out
@@ -495,9 +496,8 @@ impl ArmData {
     /// # Panics
     /// Never: whatever an `arm.toml` holds can be written.
     pub fn to_toml(&self, comment: &str) -> String {
-        let lines: String = comment.lines().map(|line| format!("# {line}\n")).collect();
         let text = toml::to_string(self).expect("tables of numbers and texts can be written");
-        format!("{lines}\n{text}")
+        format!("{}\n{text}", commented(comment))
     }
 }
 

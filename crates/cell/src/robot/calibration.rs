@@ -25,6 +25,7 @@ use crate::files::ModelSource;
 use crate::files::source_of;
 use crate::input::read_text;
 use crate::model::AppliedCalibration;
+use crate::printable::commented;
 use crate::{Finding, Robot, nearest_name};
 
 /// Links in the order of the chain, as the file names them.
@@ -184,7 +185,7 @@ impl Calibration {
     /// `comment` stands above it.
     pub fn written(chain: &Chain, comment: &str) -> String {
         use std::fmt::Write;
-        let mut text: String = comment.lines().map(|line| format!("# {line}\n")).collect();
+        let mut text = commented(comment);
         text += "kinematics:\n";
         for (i, link) in LINKS.iter().enumerate() {
             let mut origin = chain.joints[i].parent_from_joint;

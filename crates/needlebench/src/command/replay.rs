@@ -45,6 +45,10 @@ Example: needlebench replay log.csv --arm ur3e --max-tracking 0.5 --engine rapie
 Example: needlebench replay run.mcap --arm ur5e --effort current";
 
 #[derive(Debug, Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a flag of the command line"
+)]
 pub(crate) struct ReplayArguments {
     /// The recorded run: CSV or MCAP.
     #[arg(value_name = "LOG")]
@@ -225,7 +229,7 @@ fn arm_alone(
     run: &RecordedRun,
     mut overrides: Overrides,
 ) -> Result<(ResolvedScenario, String), Vec<Finding>> {
-    let mut found = "as the command line names it".to_owned();
+    let mut found = "as the command line names it";
     if overrides.arm.is_none() && overrides.robot_urdf.is_none() {
         let refuse = |message: String, hint: String| {
             Err(vec![
@@ -251,7 +255,7 @@ fn arm_alone(
                 "give its URDF: --robot URDF, or its data: --arm my_arm.toml".to_owned(),
             );
         }
-        found = "by the poses in the log".to_owned();
+        found = "by the poses in the log";
         overrides.arm = Some(key);
     }
     // A goal that nothing is planned for: a replay has none.
@@ -263,7 +267,7 @@ fn arm_alone(
     resolved
         .notes
         .retain(|note| note.starts_with("arm data") || note.contains("servo of"));
-    Ok((resolved, found))
+    Ok((resolved, found.to_owned()))
 }
 
 fn replayed(

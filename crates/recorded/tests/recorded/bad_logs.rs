@@ -306,11 +306,9 @@ fn what_is_no_log_is_refused() {
     for text in ["", "a,b\n1,2\n", "\u{0}\u{1}\n"] {
         read_text(text, &ReadOptions::default()).unwrap_err();
     }
-    let few: String = shipped_text()
-        .lines()
-        .take(8)
-        .map(|line| format!("{line}\n"))
-        .collect();
+    let text = shipped_text();
+    let few: Vec<&str> = text.lines().take(8).collect();
+    let few = few.join("\n") + "\n";
     assert!(refused(&few).message.contains("too few"));
     let missing = read_log("nowhere.csv".as_ref(), &ReadOptions::default()).unwrap_err();
     assert!(missing[0].message.contains("cannot read"), "{}", missing[0]);

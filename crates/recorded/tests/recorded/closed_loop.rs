@@ -158,12 +158,8 @@ fn loads_rotors_friction_and_constants_come_back() {
     // Without noise: rounding of the sums.
     near(controller.gravity_m_s2.known(), BELIEVED_GRAVITY, 1e-5);
     near(controller.loads[0].mass_kg.known(), BELIEVED_KG, 1e-5);
-    for joint in 0..6 {
-        near(
-            controller.rotor_inertia_kgm2[joint].known(),
-            ROTORS[joint],
-            1e-5,
-        );
+    for (found, rotor) in controller.rotor_inertia_kgm2.iter().zip(ROTORS) {
+        near(found.known(), rotor, 1e-5);
     }
     let law = found.current.unwrap();
     for joint in 0..6 {
@@ -189,8 +185,8 @@ fn loads_rotors_friction_and_constants_come_back() {
         assert!((value - wanted).abs() < 2.0 * half, "{found:?} {wanted}");
     };
     check(&measured.loads[0].mass_kg, TRUE_KG);
-    for axis in 0..3 {
-        check(&measured.loads[0].centre_m[axis], CENTRE_M[axis]);
+    for (found, centre_m) in measured.loads[0].centre_m.iter().zip(CENTRE_M) {
+        check(found, centre_m);
     }
     for joint in 0..6 {
         check(&measured.rotor_inertia_kgm2[joint], ROTORS[joint]);

@@ -16,7 +16,7 @@ fn order() -> [usize; 6] {
 fn cdr(time_s: f64, position: &[f64; 6], effort: &[f64; 6], prefix: &str) -> Vec<u8> {
     let mut bytes = vec![0, 1, 0, 0];
     let body = |bytes: &mut Vec<u8>, alignment: usize| {
-        while (bytes.len() - 4) % alignment != 0 {
+        while !(bytes.len() - 4).is_multiple_of(alignment) {
             bytes.push(0);
         }
     };

@@ -54,12 +54,18 @@ pub fn replay_chart(replay: &Replay) -> Chart {
     chart
 }
 
+/// A number of the real arm, by row.
+type OfRow<'a> = Box<dyn Fn(usize) -> f64 + 'a>;
+
+/// A number of an engine, by row.
+type OfCourse<'a> = Box<dyn Fn(&Course, usize) -> f64 + 'a>;
+
 /// What is shown of a real arm and of an engine, by row.
 struct Column<'a> {
     label: &'static str,
     what: &'static str,
-    real: Option<Box<dyn Fn(usize) -> f64 + 'a>>,
-    engine: Option<Box<dyn Fn(&Course, usize) -> f64 + 'a>>,
+    real: Option<OfRow<'a>>,
+    engine: Option<OfCourse<'a>>,
 }
 
 fn columns(replay: &Replay, joint: usize) -> [Column<'_>; COLUMNS] {
@@ -72,7 +78,7 @@ fn columns(replay: &Replay, joint: usize) -> [Column<'_>; COLUMNS] {
         Column {
             label: "error (mrad)",
             what: "angle less set-point",
-            real: target.map(|target| -> Box<dyn Fn(usize) -> f64> {
+            real: target.map(|target| -> OfRow<'_> {
                 Box::new(move |row| (run.actual_q[row][joint] - target[row].position[joint]) * 1e3)
             }),
             engine: Some(Box::new(move |course, row| course.error[row][joint] * 1e3)),
@@ -80,18 +86,14 @@ fn columns(replay: &Replay, joint: usize) -> [Column<'_>; COLUMNS] {
         Column {
             label: "torque (N m)",
             what: "at the links; real: target_moment",
-            real: moment.map(|moment| -> Box<dyn Fn(usize) -> f64> {
-                Box::new(move |row| moment[row][joint])
-            }),
+            real: moment.map(|moment| -> OfRow<'_> { Box::new(move |row| moment[row][joint]) }),
             engine: Some(Box::new(move |course, row| course.link_nm[row][joint])),
         },
         Column {
             label: "current (A)",
             what: "of the motor, as measured",
-            real: current.map(|current| -> Box<dyn Fn(usize) -> f64> {
-                Box::new(move |row| current[row][joint])
-            }),
-            engine: constant.map(|constant| -> Box<dyn Fn(&Course, usize) -> f64> {
+            real: current.map(|current| -> OfRow<'_> { Box::new(move |row| current[row][joint]) }),
+            engine: constant.map(|constant| -> OfCourse<'_> {
                 Box::new(move |course, row| course.motor_nm[row][joint] / constant)
             }),
         },
