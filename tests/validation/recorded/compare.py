@@ -102,7 +102,7 @@ def main():
     def torques(gravity):
         model, _ = model_with(load_kg, load_centre, gravity)
         data = model.createData()
-        return np.array([pin.rnea(model, data, *row) for row in zip(q, qd, qdd)])
+        return np.array([pin.rnea(model, data, *row) for row in zip(q, qd, qdd, strict=True)])
 
     controller = report["identification"]["controller"]
     rotors = np.array([rotor["value"] for rotor in controller["rotor_inertia_kgm2"]])
@@ -140,7 +140,7 @@ def main():
         pin.forwardKinematics(model, data, joints)
         return (data.oMi[6] * flange).act(np.array([0.0, 0.0, TIP_M]))
 
-    distance = np.array([np.linalg.norm(tip(a) - tip(b)) for a, b in zip(actual, q)])
+    distance = np.array([np.linalg.norm(tip(a) - tip(b)) for a, b in zip(actual, q, strict=True)])
     rms = math.sqrt(np.mean(distance**2))
     check("tip, rms and largest (m)", [report["real"][key] for key in ("tip_rms_m", "tip_largest_m")], [rms, distance.max()], TIP_SAME_M)
 
@@ -149,9 +149,9 @@ def main():
     poses = columns(rows, "actual_TCP_pose")
     # `base_link_inertia`, whose frame the file is in, is the controller's `base`.
     worst = 0.0
-    for joints, pose in zip(actual, poses):
+    for joints, pose in zip(actual, poses, strict=True):
         at = pin.SE3.Identity()
-        for origin, angle in zip(origins, joints):
+        for origin, angle in zip(origins, joints, strict=True):
             at = at * origin * pin.SE3(pin.utils.rotate("z", angle), np.zeros(3))
         worst = max(worst, float(np.linalg.norm((at * tool).translation - pose[:3])))
     check("poses by the calibration (m)", worst, 0.0, CALIBRATION_M)
