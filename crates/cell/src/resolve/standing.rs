@@ -209,7 +209,10 @@ impl Standing<'_> {
         }
         self.check_base_in_patient()?;
         let height_m = robot.world_from_base_link.translation.z;
+        let obstacles = &self.scenario.obstacles;
         let stands_on_something = self.scenario.mount.is_some()
+            // What the user says is the robot's mount.
+            || obstacles.iter().any(|each| each.present && each.class.class() == ClearanceClass::RobotMount)
             || height_m <= SOFT_M
             || self.fixtures.iter().any(|fixture| {
                 let near = |solid: &Solid| {
