@@ -13,7 +13,7 @@ use needlebench_cell::{
     Arm, Finding, LogColumns, Overrides, ResolvedScenario, load_scenario, resolve_scenario,
 };
 use needlebench_recorded::{
-    AngleUnit, EffortMeaning, ReadOptions, RecordedRun, TimeUnit, read_log,
+    AngleUnit, EffortMeaning, ReadOptions, RecordedRun, TimeUnit, arm_fits, read_log,
 };
 use needlebench_report::files::{CALIBRATION_FILE, Folder, write_replay};
 use needlebench_report::table::replay::text;
@@ -240,6 +240,17 @@ fn arm_alone(
         };
         let names: Vec<&str> = Arm::shipped_names().collect();
         let Some(name) = named_by(run) else {
+            if let Some(best) = arm_fits(run).first() {
+                let message = format!(
+                    "the log's poses are those of no known arm: those of the {}, which fit best, are off by \
+                     {:.1} mm rms",
+                    best.arm,
+                    best.rms_m * 1e3
+                );
+                let hint = "are angles and positions in the units that they seem to be (--angle-unit), \
+                            and did the tool's point stay the same?";
+                return refuse(message, hint.to_owned());
+            }
             return refuse(
                 "the log does not say which arm it is of".to_owned(),
                 format!(

@@ -180,6 +180,13 @@ fn what_is_wrong_with_a_log_is_said_with_its_place() {
         "{}",
         refused.stderr
     );
+    // A unit that the log has not.
+    let refused = quick(&bench, &shipped(), &["--angle-unit", "deg"]).exits_with(2);
+    assert!(
+        refused.stderr.contains("those of no known arm"),
+        "{}",
+        refused.stderr
+    );
     // Without poses the arm has to be named.
     let anonymous = text.replacen("TCP_pose", "TCP_place", 1000);
     bench.write("anonymous.csv", &anonymous);
