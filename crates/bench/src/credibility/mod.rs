@@ -115,7 +115,12 @@ impl Comparison {
                 .filter(|found| found.is_array())
                 .cloned(),
             tips_m,
-            verdict: text_at(&["/verdict"]),
+            // Where nothing was to be judged a verdict says nothing.
+            verdict: text_at(&["/verdict"]).filter(|_| {
+                let lists = ["/criteria", "/not_judged"].into_iter();
+                let mut lists = lists.filter_map(|at| value.pointer(at)?.as_array());
+                lists.any(|list| !list.is_empty())
+            }),
         })
     }
 }
