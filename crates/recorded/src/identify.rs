@@ -28,7 +28,7 @@ use serde::Serialize;
 
 use crate::derivative::slopes;
 pub use crate::regression::Estimate;
-use crate::regression::{half_width, spans};
+use crate::regression::{BLOCKS, estimate, spans};
 use crate::run::Effort;
 use crate::terms::Arm;
 use crate::{Load, RecordedRun};
@@ -244,7 +244,7 @@ fn controller(context: &Context<'_>, torque_nm: &[Joints], known: &KnownArm<'_>)
     } else {
         (points, tensors)
     };
-    let without: Vec<Fit> = (0..crate::regression::BLOCKS)
+    let without: Vec<Fit> = (0..BLOCKS)
         .map(|block| best.without(&data, block))
         .collect();
     let estimate = |of: &dyn Fn(&Fit) -> Option<f64>| estimate(best, &without, of);
@@ -337,7 +337,7 @@ fn measured(
     let fits = [false, true].map(|has_tensors| Fit::weighted(&data, model(has_tensors)));
     let has_tensors = fits[1].unlikelihood(&data) < fits[0].unlikelihood(&data);
     let best = &fits[usize::from(has_tensors)];
-    let without: Vec<Fit> = (0..crate::regression::BLOCKS)
+    let without: Vec<Fit> = (0..BLOCKS)
         .map(|block| best.without(&data, block))
         .collect();
     let estimate = |of: &dyn Fn(&Fit) -> Option<f64>| estimate(best, &without, of);
@@ -364,18 +364,6 @@ fn measured(
         rms_nm: best.rms_nm(&data),
         held_out_rms_nm: best.held_out_rms_nm(&data),
     })
-}
-
-fn estimate(fit: &Fit, without: &[Fit], of: &dyn Fn(&Fit) -> Option<f64>) -> Estimate {
-    let Some(value) = of(fit) else {
-        return Estimate::NONE;
-    };
-    let others: Option<Vec<f64>> = without.iter().map(of).collect();
-    Estimate {
-        value: Some(value),
-        half_width: others.map(|values| half_width(&values)),
-        identifiable: false,
-    }
 }
 
 fn loads(logged: &[Option<Load>], fit: &Fit, without: &[Fit]) -> Vec<IdentifiedLoad> {

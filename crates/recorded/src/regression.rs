@@ -95,6 +95,20 @@ pub(crate) fn half_width(without: &[f64]) -> f64 {
     STUDENT * ((count - 1.0) / count * square).sqrt()
 }
 
+/// A figure of fits: of all blocks, with the interval by those without a block each. A fit that does not
+/// show it leaves no interval.
+pub(crate) fn estimate<T>(all: &T, without: &[T], of: &dyn Fn(&T) -> Option<f64>) -> Estimate {
+    let Some(value) = of(all) else {
+        return Estimate::NONE;
+    };
+    let others: Option<Vec<f64>> = without.iter().map(of).collect();
+    Estimate {
+        value: Some(value),
+        half_width: others.map(|values| half_width(&values)),
+        identifiable: false,
+    }
+}
+
 /// A least-squares solution.
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {

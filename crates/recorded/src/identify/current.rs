@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::{MOVING_RAD_S, coarsest};
 use crate::RecordedRun;
-use crate::regression::{BLOCKS, Estimate, Solution, half_width, solve, spans};
+use crate::regression::{BLOCKS, Estimate, Solution, estimate, solve, spans};
 
 /// Coarsest interval of a torque constant, as a share of it.
 const CONSTANT: f64 = 0.05;
@@ -145,17 +145,7 @@ impl Data {
         let without: Vec<Solution> = (0..BLOCKS)
             .map(|block| self.fit(joint, |at| at != block))
             .collect();
-        let estimate = |of: &dyn Fn(&Solution) -> Option<f64>| {
-            let Some(value) = of(&all) else {
-                return Estimate::NONE;
-            };
-            let others: Option<Vec<f64>> = without.iter().map(of).collect();
-            Estimate {
-                value: Some(value),
-                half_width: others.map(|values| half_width(&values)),
-                identifiable: false,
-            }
-        };
+        let estimate = |of: &dyn Fn(&Solution) -> Option<f64>| estimate(&all, &without, of);
         let constant = |fit: &Solution| {
             let per_nm = fit.values[0];
             (fit.determined[0] && per_nm > 0.0).then(|| 1.0 / per_nm)

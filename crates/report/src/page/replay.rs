@@ -5,13 +5,13 @@ use std::fmt::Write;
 use needlebench_bench::replay::ReplayReport;
 use needlebench_evaluation::report::Verdict;
 use needlebench_kinematics::JOINT_LABELS;
-use needlebench_recorded::{Estimate, PoseError, Tracking};
+use needlebench_recorded::{Estimate, Tracking};
 use quick_xml::escape::escape;
 
 use super::document::Document;
 use crate::chart::Chart;
 use crate::number::{rounded, value_and_limit};
-use crate::table::replay::{shown, small};
+use crate::table::replay::{pose_errors, shown, small};
 
 const STYLE: &str = concat!(
     include_str!("assets/page.css"),
@@ -264,17 +264,7 @@ fn calibration(out: &mut String, report: &ReplayReport) -> std::fmt::Result {
         "<p>{}: what counts is the error on poses that it has not seen.</p>",
         if fit.is_worth { "Kept" } else { "Not kept" }
     )?;
-    let rows: [(&str, &PoseError); 5] = [
-        ("nominal lengths, all rows", &fit.nominal),
-        ("calibrated, all rows", &fit.fitted),
-        ("nominal, held out by fifths", &fit.nominal_held_out),
-        ("calibrated, held out by fifths", &fit.held_out),
-        (
-            "calibrated on the first half, on the second",
-            &fit.second_half,
-        ),
-    ];
-    let rows = rows.map(|(name, error)| {
+    let rows = pose_errors(fit).map(|(name, error)| {
         vec![
             name.to_owned(),
             small(error.rms_m * 1e3),

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use needlebench_bench::replay::{ReplayReport, TIP_M};
 use needlebench_kinematics::JOINT_LABELS;
-use needlebench_recorded::{Estimate, LogKind, PoseError};
+use needlebench_recorded::{CalibrationFit, Estimate, LogKind, PoseError};
 
 use super::plain_table;
 use crate::number::{rounded, value_and_limit};
@@ -110,6 +110,20 @@ fn head(out: &mut String, report: &ReplayReport) {
     let _ = writeln!(out);
 }
 
+/// What nominal lengths and the calibration leave of the log's poses, in words.
+pub fn pose_errors(fit: &CalibrationFit) -> [(&'static str, &PoseError); 5] {
+    [
+        ("nominal lengths, all rows", &fit.nominal),
+        ("calibrated, all rows", &fit.fitted),
+        ("nominal, held out by fifths", &fit.nominal_held_out),
+        ("calibrated, held out by fifths", &fit.held_out),
+        (
+            "calibrated on the first half, on the second",
+            &fit.second_half,
+        ),
+    ]
+}
+
 fn calibration(out: &mut String, report: &ReplayReport) {
     let Some(fit) = &report.calibration else {
         let _ = writeln!(
@@ -119,17 +133,7 @@ fn calibration(out: &mut String, report: &ReplayReport) {
         return;
     };
     let mut table = plain_table(&["poses of the tool's point", "rms (mm)", "largest (mm)"]);
-    let rows: [(&str, &PoseError); 5] = [
-        ("nominal lengths, all rows", &fit.nominal),
-        ("calibrated, all rows", &fit.fitted),
-        ("nominal, held out by fifths", &fit.nominal_held_out),
-        ("calibrated, held out by fifths", &fit.held_out),
-        (
-            "calibrated on the first half, on the second",
-            &fit.second_half,
-        ),
-    ];
-    for (name, error) in rows {
+    for (name, error) in pose_errors(fit) {
         table.add_row([
             name.to_owned(),
             small(error.rms_m * 1e3),
