@@ -5,7 +5,7 @@
 //! clearances. Motions and engines can only take configurations away, so a goal for which too few are left
 //! here fails in every run.
 
-use needlebench_cell::{ClearanceClass, Finding, Goal, ResolvedScenario};
+use needlebench_cell::{ClearanceClass, Finding, Goal, ResolvedScenario, part_in_words};
 use needlebench_clearance::ClearanceModel;
 use needlebench_evaluation::report::{ConfigurationReport, RejectionReport, RouteReport};
 use needlebench_evaluation::{first_missed_by_posture, route_is_expected};
@@ -258,15 +258,16 @@ fn route_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
         return None;
     }
     let RouteReport { part, tissue, .. } = route;
+    let words = part_in_words(part);
     let mm = route.distance_m * 1e3;
     let message = if mm < 0.0 {
         format!(
-            "the needle of goal `{}` goes {:.1} mm deep through {part} ({tissue})",
+            "the needle of goal `{}` goes {:.1} mm deep through {words} ({tissue}, `{part}`)",
             goal.name, -mm
         )
     } else {
         format!(
-            "the needle of goal `{}` passes {part} ({tissue}) at {mm:.1} mm, nearer than {:.1} mm",
+            "the needle of goal `{}` passes {words} ({tissue}, `{part}`) at {mm:.1} mm, nearer than {:.1} mm",
             goal.name,
             limit_m * 1e3
         )

@@ -79,7 +79,7 @@ impl Runnable {
         let cell = &self.resolved.cell;
         let model = ClearanceModel::new(cell);
         let pair = model.first_below(&self.resolved.start, |_| 0.0)?;
-        let (a, b) = pair.solid_names(cell);
+        let [a, b] = pair.in_words(cell);
         let depth_mm = -pair.separation.distance_m * 1e3;
         let finding = Finding::new(
             file,

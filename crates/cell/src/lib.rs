@@ -7,6 +7,7 @@
 //!
 //! | Modules | What they are |
 //! |---|---|
+//! | `words` | what people call parts of the room |
 //! | `finding`, `files`, `limit` | what is wrong with an input; shipped files and files on disk |
 //! | `schema`, `toml_text` | what a file may hold: one source of its JSON schema and of the reader's checks; texts with places |
 //! | [`arm`] | what is known of an arm besides its URDF |
@@ -44,6 +45,7 @@ mod schema;
 pub mod study;
 mod thresholds;
 mod toml_text;
+mod words;
 
 pub use arm::{Arm, Recognition};
 pub use excitation_text::ExcitationText;
@@ -75,3 +77,4 @@ pub use robot::{
 pub use scenario::{REJECTION_RULES, envelope, ranking};
 pub use study::criteria as study_criteria;
 pub use thresholds::ThresholdsFile;
+pub use words::{pair_in_words, part_in_words};

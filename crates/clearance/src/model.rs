@@ -1,8 +1,9 @@
 //! Clearances of a whole cell.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
-use needlebench_cell::{Cell, ClearanceClass, Frame};
+use needlebench_cell::{Cell, ClearanceClass, Frame, part_in_words};
 use needlebench_geometry::{PRUNING_MARGIN_M, Placement, Separation, separation_within};
 use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 
@@ -35,6 +36,12 @@ impl PairClearance {
             &cell.bodies[pair.a].solids[self.solid_a].name,
             &cell.bodies[pair.b].solids[self.solid_b].name,
         )
+    }
+
+    /// What people call the two closest solids, `a` first.
+    pub fn in_words<'c>(&self, cell: &'c Cell) -> [Cow<'c, str>; 2] {
+        let (a, b) = self.solid_names(cell);
+        [a, b].map(part_in_words)
     }
 }
 

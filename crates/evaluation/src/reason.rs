@@ -3,6 +3,7 @@
 use crate::metric::Metric;
 use crate::ranking_report::{GoalRanking, RankingReport, SAME_SCORE, Term};
 use crate::report::ConfigurationReport;
+use needlebench_cell::part_in_words;
 
 /// Terms that are named for the first choice and, of the runner-up's leads, against it.
 const NAMED: (usize, usize) = (3, 2);
@@ -19,8 +20,8 @@ pub(crate) fn reason(
         format!(
             "least clearance {:.1} mm ({} to {} in the {})",
             found.minimum_m * 1e3,
-            found.pair[0],
-            found.pair[1],
+            part_in_words(&found.pair[0]),
+            part_in_words(&found.pair[1]),
             found.phase
         )
     });

@@ -18,7 +18,7 @@ impl Planner<'_> {
         search: Option<&SearchEffort>,
     ) -> Option<Rejection> {
         if let Some(pair) = self.checker.posture(self.start(), &mut Nearby::default()).1 {
-            let (a, b) = pair.solid_names(self.cell());
+            let [a, b] = pair.in_words(self.cell());
             return Some(Rejection {
                 rule: Rule::Collision,
                 value: pair.separation.distance_m,
@@ -32,7 +32,7 @@ impl Planner<'_> {
             });
         }
         if let Some(found) = self.deepest(approach) {
-            let (a, b) = found.attained.solid_names(self.cell());
+            let [a, b] = found.attained.in_words(self.cell());
             let class = found.attained.class;
             return Some(Rejection {
                 rule: Rule::Collision,
@@ -51,7 +51,7 @@ impl Planner<'_> {
             });
         }
         let found = self.deepest(&way.certificate)?;
-        let (a, b) = found.attained.solid_names(self.cell());
+        let [a, b] = found.attained.in_words(self.cell());
         let class = found.attained.class;
         let place = format!(
             "{a} and {b} in the {} at {:.2} s, at their nearest",

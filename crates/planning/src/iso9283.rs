@@ -9,6 +9,7 @@ use needlebench_kinematics::trajectory::{
     JointPath, JointTrajectory, LineError, MotionLimits, Phase, ProfileLimits,
 };
 use needlebench_kinematics::{JOINT_LABELS, Joints, NotUrGeometry, Pose};
+use std::borrow::Cow;
 
 use crate::limits::ClassLimits;
 use crate::motion::MotionChecker;
@@ -284,11 +285,11 @@ fn check_collisions(
         return Ok(());
     };
     let towards = cycle.stops.iter().find(|stop| stop.end_s >= found.time_s);
-    let (a, b) = found.pair.solid_names(cell);
+    let [a, b] = found.pair.in_words(cell).map(Cow::into_owned);
     Err(ProtocolError::Collision {
         pose: towards.map_or(1, |stop| stop.pose + 1),
-        a: a.to_owned(),
-        b: b.to_owned(),
+        a,
+        b,
         distance_mm: found.pair.separation.distance_m * 1e3,
         limit_mm: found.limit_m * 1e3,
     })

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 use needlebench_cell::scenario::PlanningSection;
-use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, Roll};
+use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, Roll, part_in_words};
 use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby};
 use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
@@ -314,7 +314,7 @@ impl<'a> Planner<'a> {
                 limit: self.checker.limit_m(pair.class),
                 unit: "m",
                 detail: {
-                    let (a, b) = pair.solid_names(&self.resolved.cell);
+                    let [a, b] = pair.in_words(&self.resolved.cell);
                     format!("{a} and {b} in the final posture")
                 },
                 class: Some(pair.class),
@@ -334,7 +334,7 @@ impl<'a> Planner<'a> {
                 value: corridor.separation.distance_m,
                 limit: 0.0,
                 unit: "m",
-                detail: format!("{blocker} stands behind the guide"),
+                detail: format!("{} stands behind the guide", part_in_words(blocker)),
                 class: Some(ClearanceClass::NeedleCorridor),
             });
         }

@@ -5,6 +5,7 @@ use needlebench_cell::{Cell, ClearanceClass, Frame};
 use needlebench_clearance::{ClearanceModel, PairClearance};
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase, ProfileLimits};
 use needlebench_kinematics::{Joints, Pose};
+use std::borrow::Cow;
 
 /// Steps of the search for a posture of a given depth.
 const TRIES: usize = 60;
@@ -121,11 +122,8 @@ pub fn stage_press(
             })
             .copied();
         if let Some(other) = other {
-            let (a, b) = other.solid_names(&moved);
-            return Err(PressError::Blocked {
-                a: a.to_owned(),
-                b: b.to_owned(),
-            });
+            let [a, b] = other.in_words(&moved).map(Cow::into_owned);
+            return Err(PressError::Blocked { a, b });
         }
     }
     let (a, b) = at.solid_names(&moved);

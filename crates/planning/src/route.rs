@@ -3,7 +3,9 @@
 use nalgebra::Point3;
 use needlebench_cell::phantom::{PhantomPart, RouteObstacle, Tissue};
 use needlebench_cell::scenario::NeedleRouteSection;
-use needlebench_cell::{Cell, ClearanceClass, Goal, PlacedPhantom, ResolvedScenario};
+use needlebench_cell::{
+    Cell, ClearanceClass, Goal, PlacedPhantom, ResolvedScenario, part_in_words,
+};
 use needlebench_clearance::ROUNDING_M;
 use needlebench_geometry::Separation;
 
@@ -167,6 +169,7 @@ pub fn judge_route_beside<'a>(
 pub fn route_rejection(resolved: &ResolvedScenario, goal: &Goal) -> Option<Rejection> {
     let judged = judge_route(resolved, goal).filter(|judged| !judged.is_kept())?;
     let RouteObstacle { name, tissue, .. } = judged.nearest.part;
+    let name = part_in_words(name);
     let does = if judged.distance_m < 0.0 {
         "goes through"
     } else {

@@ -24,6 +24,7 @@ mod servo;
 mod standing;
 mod stl_file;
 mod tool;
+mod words;
 
 use std::path::Path;
 

@@ -1,6 +1,7 @@
 //! Criteria of a test by ISO 9283.
 
 use needlebench_cell::iso9283::Iso9283Criteria;
+use needlebench_cell::part_in_words;
 use needlebench_cell::scenario::CriteriaSection;
 
 use super::{EngineMeasurement, Iso9283Report};
@@ -134,7 +135,9 @@ pub fn judge(
             (!general.allow_contact).then_some(0.0),
             "N",
             force_n,
-            pair.map_or(String::new(), |[a, b]| format!("{a} touches {b}")),
+            pair.map_or(String::new(), |[a, b]| {
+                format!("{} touches {}", part_in_words(a), part_in_words(b))
+            }),
             missing,
         );
     }

@@ -1,6 +1,6 @@
 //! How metrics are read from a configuration's part of the report.
 
-use needlebench_cell::ClearanceClass;
+use needlebench_cell::{ClearanceClass, part_in_words};
 use needlebench_uncertainty::budget::Moments;
 
 use crate::report::{ClassClearance, ConfigurationReport, EngineReport};
@@ -80,9 +80,12 @@ pub(super) fn of_posture(
 pub(super) fn nearest(report: &ConfigurationReport, class: ClearanceClass) -> String {
     let found = report.clearance.classes.get(class.name());
     found.map_or(String::new(), |found| {
+        let [a, b] = &found.pair;
         format!(
             "{} and {} in the {}",
-            found.pair[0], found.pair[1], found.phase
+            part_in_words(a),
+            part_in_words(b),
+            found.phase
         )
     })
 }
@@ -138,6 +141,7 @@ pub(super) fn first_contact(engine: Option<&EngineReport>) -> String {
     let pair = contact.and_then(|contact| Some((contact, contact.first_pair.as_ref()?)));
     pair.map_or(String::new(), |(contact, [a, b])| {
         let time_s = contact.first_time_s.unwrap_or(0.0);
+        let (a, b) = (part_in_words(a), part_in_words(b));
         format!("{a} touches {b} at {time_s:.2} s")
     })
 }

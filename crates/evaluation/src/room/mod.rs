@@ -78,6 +78,8 @@ pub struct RoomReport {
 pub struct SightReport {
     /// Who.
     pub person: String,
+    /// The same in words: who, where and of which stature.
+    pub person_in_words: String,
     /// Stature.
     pub stature_m: f64,
     /// Side of the patient.
@@ -232,6 +234,7 @@ impl<'a> RoomModel<'a> {
                 let seen = measure_sight(&robot, &surroundings, &eyes_m, moves_m, &targets);
                 sight.push(SightReport {
                     person: person.name.clone(),
+                    person_in_words: person.in_words(stature_m),
                     stature_m,
                     side: person.side,
                     eyes_m: eyes_m.coords.into(),

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use needlebench_bench::Preview;
 use needlebench_bench::preview::BASIS;
-use needlebench_cell::{Finding, ResolvedScenario};
+use needlebench_cell::{Finding, ResolvedScenario, part_in_words};
 use needlebench_report::number::value_and_limit;
 use needlebench_report::table::{fissures_in_words, route_in_words};
 use serde::Serialize;
@@ -139,8 +139,10 @@ fn in_words(
     {
         write!(
             text,
-            "\n  start posture: within the limits, {:.1} mm clearance ({a} to {b})",
-            least_m * 1e3
+            "\n  start posture: within the limits, {:.1} mm clearance ({} to {})",
+            least_m * 1e3,
+            part_in_words(a),
+            part_in_words(b)
         )?;
     }
     for goal in &preview.goals {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use needlebench_cell::Cell;
+use needlebench_cell::{Cell, part_in_words};
 use needlebench_clearance::{ClearanceModel, PairClearance};
 use needlebench_kinematics::Joints;
 use serde::Serialize;
@@ -120,8 +120,8 @@ pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus> {
         table.add_row([
             (*class).to_owned(),
             format!("{:.3}", answer.minimum_m * 1e3),
-            answer.pair[0].clone(),
-            answer.pair[1].clone(),
+            part_in_words(&answer.pair[0]).into_owned(),
+            part_in_words(&answer.pair[1]).into_owned(),
         ]);
     }
     print_text(&table.to_string())?;

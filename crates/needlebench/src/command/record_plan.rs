@@ -9,7 +9,9 @@ use needlebench_bench::Runnable;
 use needlebench_bench::record_plan::PlanReport;
 use needlebench_cell::excitation::{ExcitationSection, FEWEST_POSTURES, Load, SweepSection};
 use needlebench_cell::scenario::PayloadSection;
-use needlebench_cell::{ExcitationText, Finding, Overrides, read_text, resolve_scenario};
+use needlebench_cell::{
+    ExcitationText, Finding, Overrides, pair_in_words, read_text, resolve_scenario,
+};
 use needlebench_clearance::ClearanceModel;
 use needlebench_evaluation::excitation::proven_m;
 use needlebench_kinematics::{JOINT_LABELS, Joints};
@@ -426,7 +428,7 @@ fn head(report: &PlanReport) -> String {
         if *class != "needle_corridor" {
             let proven = millimetres(found.certified_lower_bound_m);
             // Writing to a String cannot fail.
-            let _ = writeln!(text, "  {class}: {proven} ({})", found.pair.join(" - "));
+            let _ = writeln!(text, "  {class}: {proven} ({})", pair_in_words(&found.pair));
         }
     }
     text.push_str("Beside each posture: proven clearances of the way to it, from everything else / itself, mm.\n\n");

@@ -9,6 +9,7 @@ use needlebench_cell::{Cell, ClearanceClass, ResolvedScenario};
 use needlebench_clearance::{CertificateOptions, ClearanceModel, MotionCertificate, certify};
 use needlebench_kinematics::trajectory::{JointTrajectory, MotionLimits, Phase};
 use needlebench_kinematics::{JOINT_LABELS, Joints};
+use std::borrow::Cow;
 
 pub use information::{
     CALIBRATION_UNKNOWNS, CalibrationInformation, IDENTIFIED_SHARE, Identification,
@@ -245,7 +246,7 @@ fn check(
     let Some((found, least_m)) = lacking else {
         return Ok(());
     };
-    let (a, b) = found.attained.solid_names(cell);
+    let [a, b] = found.attained.in_words(cell).map(Cow::into_owned);
     Err(ExcitationError::Clearance {
         motion: leg.aim.in_words(),
         posture: match leg.aim {
@@ -253,8 +254,8 @@ fn check(
             Aim::Start => protocol.postures.len(),
             Aim::Turn { posture, .. } | Aim::Back { posture, .. } => posture,
         },
-        a: a.to_owned(),
-        b: b.to_owned(),
+        a,
+        b,
         distance_mm: found.attained.separation.distance_m * 1e3,
         proven_mm: found.lower_bound_m * 1e3,
         limit_mm: least_m * 1e3,

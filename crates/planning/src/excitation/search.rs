@@ -6,6 +6,7 @@
 //! and of the torques of gravity), one after the other and then by exchange, ordered so that motions are short,
 //! and every motion is certified.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix2, Vector2};
@@ -238,10 +239,10 @@ impl<'a> Search<'a> {
         let Some(pair) = below else {
             return Ok(());
         };
-        let (a, b) = pair.solid_names(&self.resolved.cell);
+        let [a, b] = pair.in_words(&self.resolved.cell).map(Cow::into_owned);
         Err(SearchError::Start {
-            a: a.to_owned(),
-            b: b.to_owned(),
+            a,
+            b,
             distance_mm: pair.separation.distance_m * 1e3,
             least_mm: limit_m(pair.class) * 1e3,
         })

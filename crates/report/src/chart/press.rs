@@ -1,6 +1,7 @@
 //! Force and clearance of a contact that was asked for, over time.
 
 use needlebench_bench::EventRun;
+use needlebench_cell::pair_in_words;
 use needlebench_engine::Recording;
 use needlebench_planning::PressPlan;
 
@@ -55,7 +56,7 @@ pub fn press_chart(title: &str, press: &PressPlan, run: &EventRun, index: usize)
             end_s,
         })
         .collect();
-    let title = format!("{title}: {}", press.solids.join(" against "));
+    let title = format!("{title}: {}", pair_in_words(&press.solids));
     chart(&title, press.trajectory.duration_s(), &phases, &curves)
 }
 

@@ -1,5 +1,6 @@
 //! Markdown summary, for pull requests and CI pages.
 
+use needlebench_cell::pair_in_words;
 use std::fmt::Write;
 
 use needlebench_engine::Engine;
@@ -224,7 +225,8 @@ fn write_configurations(
             write!(out, " {} |", shown.text(each))?;
             if is_least(shown) {
                 let least = each.clearance.least();
-                let pair = least.map_or("-".to_owned(), |found| inline(&found.pair.join(", ")));
+                let pair =
+                    least.map_or("-".to_owned(), |found| inline(&pair_in_words(&found.pair)));
                 write!(out, " {pair} |")?;
             }
         }

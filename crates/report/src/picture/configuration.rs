@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
 use needlebench_cell::phantom::Tissue;
-use needlebench_cell::{Goal, ResolvedScenario};
+use needlebench_cell::{Goal, ResolvedScenario, pair_in_words};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Status};
 use needlebench_geometry::Visual;
 use needlebench_kinematics::{Joints, Pose};
@@ -118,10 +118,9 @@ pub fn configuration_picture(
     if let Some(found) = report.clearance.least() {
         scene.labels.push(Label {
             text: format!(
-                "least clearance {} mm\n{} - {}\n({})",
+                "least clearance {} mm\n{}\n({})",
                 millimetres(found.minimum_m),
-                found.pair[0],
-                found.pair[1],
+                pair_in_words(&found.pair),
                 found.phase
             ),
             anchor: Anchor::BottomLeft,

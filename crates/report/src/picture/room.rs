@@ -155,8 +155,8 @@ impl<'a> RoomPictures<'a> {
                 if let Some(seen) = seen {
                     scene.labels.push(Label {
                         text: format!(
-                            "{} {stature_m:.2} m sees {:.0} %",
-                            person.name,
+                            "{} sees {:.0} %",
+                            seen.person_in_words,
                             100.0 * seen.fraction
                         ),
                         anchor: Anchor::World(eyes_m),

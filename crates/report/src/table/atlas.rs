@@ -73,7 +73,7 @@ fn row(cell: &Cell, atlas: &GoalAtlas, label: String, range: &RollRange) -> Vec<
             format!("{:.1}", pair.separation.distance_m * 1e3)
         }),
         least.map_or(String::new(), |pair| {
-            let (a, b) = pair.solid_names(cell);
+            let [a, b] = pair.in_words(cell);
             format!("{a}, {b}")
         }),
         margin(margins.map(|margins| margins.joint_limit)),

@@ -1,5 +1,6 @@
 //! A run that excites every joint as text.
 
+use needlebench_cell::pair_in_words;
 use std::fmt::Write;
 
 use comfy_table::CellAlignment;
@@ -132,7 +133,7 @@ fn nearest(motion: &MotionReport) -> String {
         .filter(|(name, _)| **name != "self" && **name != "needle_corridor")
         .min_by(|a, b| a.1.minimum_m.total_cmp(&b.1.minimum_m));
     let found = others.or_else(|| classes.clone().find(|(name, _)| **name == "self"));
-    found.map_or(String::new(), |(_, found)| found.pair.join(" - "))
+    found.map_or(String::new(), |(_, found)| pair_in_words(&found.pair))
 }
 
 fn class_table(report: &PlanReport) -> comfy_table::Table {
@@ -147,7 +148,7 @@ fn class_table(report: &PlanReport) -> comfy_table::Table {
                 .certified_lower_bound_m
                 .map_or("-".to_owned(), |metres| format!("{:.1}", metres * 1e3)),
             format!("{:.1}", found.minimum_m * 1e3),
-            found.pair.join(" - "),
+            pair_in_words(&found.pair),
         ]);
     }
     for column in table.column_iter_mut().skip(1).take(2) {

@@ -1,5 +1,6 @@
 //! The table that a run prints.
 
+use needlebench_cell::part_in_words;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -204,7 +205,9 @@ fn write_constant(out: &mut String, goal: &GoalReport, constant: &[Column]) -> s
             let least = sizes().fold(f64::INFINITY, f64::min);
             let most = sizes().fold(f64::NEG_INFINITY, f64::max);
             parts.push(format!(
-                "the arm's own {a} and {b} are {least:.1} to {most:.1} mm apart by its build"
+                "the arm's own {} and {} are {least:.1} to {most:.1} mm apart by its build",
+                part_in_words(a),
+                part_in_words(b)
             ));
         } else {
             parts.push(format!("{} {text}", name.trim()));
@@ -396,7 +399,12 @@ fn room_table(goal: &GoalReport) -> Table {
             row.push(percent(room.sight_fraction));
             row.extend(room.sight.iter().map(|seen| percent(seen.fraction)));
             row.push(format!("{:.1}", room.hand_cone_half_angle_rad.to_degrees()));
-            row.push(room.hand_cone_blocker.clone().unwrap_or("-".to_owned()));
+            row.push(
+                room.hand_cone_blocker
+                    .as_deref()
+                    .map_or("-".into(), part_in_words)
+                    .into_owned(),
+            );
             row.push(if room.elbow_up { "up" } else { "down" }.to_owned());
             row.push(format!("{:.0}", 1e3 * room.elbow_over_entry_m));
         } else {
@@ -480,6 +488,7 @@ fn write_missed(out: &mut String, report: &Report, goal: &str) -> std::fmt::Resu
 pub fn route_in_words(route: &RouteReport) -> String {
     let mm = 1e3 * route.distance_m;
     let RouteReport { part, tissue, .. } = route;
+    let part = part_in_words(part);
     let where_it_goes = if mm < 0.0 {
         format!("{:.1} mm deep through {part} ({tissue})", -mm)
     } else {
@@ -500,7 +509,11 @@ pub fn fissures_in_words(crossed: &[String]) -> Option<String> {
     (!crossed.is_empty()).then(|| {
         format!(
             "needle crosses {}: the odds of a pneumothorax are {ODDS} times those without",
-            crossed.join(", ")
+            crossed
+                .iter()
+                .map(|name| part_in_words(name))
+                .collect::<Vec<_>>()
+                .join(", ")
         )
     })
 }

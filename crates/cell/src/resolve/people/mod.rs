@@ -29,6 +29,8 @@ const DEFAULT_STATURES_M: [f64; 3] = [1.60, 1.75, 1.90];
 pub struct Person {
     /// `doctor`, `assistant`; with a number from the second of its role on.
     pub name: String,
+    /// The same in words, with the place: `doctor across the table`.
+    pub words: String,
     /// What the person does.
     pub role: Role,
     /// Side of the patient that was asked for, or on which the person stands; `None` without a
@@ -45,6 +47,11 @@ pub struct Person {
 }
 
 impl Person {
+    /// Who it is, if of this stature: `doctor across the table, 1.75 m`.
+    pub fn in_words(&self, stature_m: f64) -> String {
+        format!("{}, {stature_m:.2} m", self.words)
+    }
+
     /// Middle of the ball in which the eyes of this person may be, if of this stature.
     pub fn eyes_m(&self, stature_m: f64) -> Point3<f64> {
         self.position_m + Vector3::z() * (EYE_HEIGHT_PER_STATURE * stature_m)

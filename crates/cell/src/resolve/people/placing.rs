@@ -5,7 +5,7 @@ use needlebench_geometry::Solid;
 
 use super::{
     BODY_RADIUS_M, DEFAULT_STATURES_M, PatientSides, People, PeopleSection, Person, PersonSection,
-    Side,
+    Role, Side,
 };
 use crate::Finding;
 use crate::resolve::goals::Goal;
@@ -34,6 +34,7 @@ pub(crate) fn resolve_people(
     let standard = [PersonSection::default()];
     let persons = persons_of(section, &standard);
     let obstacles = Obstacles::new(room);
+    let in_words = PlaceWords::new(room, sides.as_ref());
     let mut by_goal = Vec::new();
     for goal in goals {
         let mut placed: Vec<Person> = Vec::new();
@@ -50,6 +51,7 @@ pub(crate) fn resolve_people(
             let (side, position_m) =
                 place(toml, index, given, person, goal, sides.as_ref(), &obstacles)?;
             placed.push(Person {
+                words: in_words.of(person.role, &position_m, goal),
                 name,
                 role: person.role,
                 side,
@@ -59,6 +61,7 @@ pub(crate) fn resolve_people(
                 handedness: person.handedness,
             });
         }
+        tell_apart(&mut placed);
         by_goal.push(placed);
     }
     Ok(People {
@@ -66,6 +69,56 @@ pub(crate) fn resolve_people(
         prefer_side: section.prefer_side,
         prefer_elbow: section.prefer_elbow,
     })
+}
+
+/// What says where a person stands.
+struct PlaceWords<'a> {
+    sides: Option<&'a PatientSides>,
+    robot_base_m: Point3<f64>,
+    /// What lies between the robot and who stands opposite.
+    between: &'static str,
+}
+
+impl<'a> PlaceWords<'a> {
+    fn new(room: &Room<'_>, sides: Option<&'a PatientSides>) -> Self {
+        let has_table = room.solids.iter().any(|(body, _)| *body == "table");
+        Self {
+            sides,
+            robot_base_m: room.robot_base_m,
+            between: match (has_table, sides) {
+                (true, _) => "across the table",
+                (false, Some(_)) => "across the patient",
+                (false, None) => "across from the robot",
+            },
+        }
+    }
+
+    /// Role and place: at the head or the feet, else across the table from the robot or on its side.
+    fn of(&self, role: Role, position: &Point3<f64>, goal: &Goal) -> String {
+        let entry = goal.standing_place();
+        let offset = position - entry;
+        let away = entry - self.robot_base_m;
+        let is_across = offset.x * away.x + offset.y * away.y > 0.0;
+        let place = match self.sides.and_then(|sides| sides.nearest(&offset)) {
+            Some(Side::Head) => "at the head",
+            Some(Side::Feet) => "at the feet",
+            _ if is_across => self.between,
+            _ => "on the robot's side",
+        };
+        format!("{} {place}", role.name())
+    }
+}
+
+/// Numbers people whom role and place do not tell apart.
+fn tell_apart(people: &mut [Person]) {
+    let words: Vec<String> = people.iter().map(|each| each.words.clone()).collect();
+    for (index, person) in people.iter_mut().enumerate() {
+        let is_same = |each: &&String| **each == words[index];
+        if words.iter().filter(is_same).count() > 1 {
+            let number = words[..=index].iter().filter(is_same).count();
+            person.words = format!("{} ({number})", words[index]);
+        }
+    }
 }
 
 /// Refuses sides of the patient on which nobody can be, as the patient lies.

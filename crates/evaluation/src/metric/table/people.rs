@@ -6,6 +6,7 @@ use crate::metric::entry::Source::Configuration;
 use crate::metric::entry::{Metric, Show};
 use crate::metric::quantity::Quantity::{Angle, Ratio};
 use crate::metric::readers::{preference, room};
+use needlebench_cell::part_in_words;
 
 pub(super) const PEOPLE: &[Metric] = &[
     Metric::new(
@@ -58,7 +59,7 @@ pub(super) const PEOPLE: &[Metric] = &[
             .room
             .as_ref()
             .and_then(|room| room.hand_cone_blocker.as_ref());
-        blocker.map_or(String::new(), |blocker| format!("blocked by {blocker}"))
+        blocker.map_or(String::new(), |blocker| format!("blocked by {}", part_in_words(blocker)))
     }),
     Metric::new(
         "preference",

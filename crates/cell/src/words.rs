@@ -1,0 +1,160 @@
+//! The words in which people read parts of the room.
+//!
+//! Bodies and solids have names for machines, such as `wrist_2.1` and `intercostal_vessels_right_5.7`: these
+//! stand in JSON, Parquet and criteria, and stay as they are. Sentences, tables, charts and pages say
+//! [`part_in_words`]. What a scenario names itself, an obstacle or a part of its own, keeps that name.
+
+use std::borrow::Cow;
+
+/// Parts that are there once.
+const SINGLE: [(&str, &str); 27] = [
+    ("base", "base"),
+    ("shoulder", "shoulder"),
+    ("upper_arm", "upper arm"),
+    ("forearm", "forearm"),
+    ("wrist_1", "wrist 1"),
+    ("wrist_2", "wrist 2"),
+    ("wrist_3", "wrist 3"),
+    ("tool", "tool"),
+    ("guide_tube", "needle guide"),
+    ("needle_corridor", "space behind the guide"),
+    ("hand_cone", "space behind the guide"),
+    ("skin", "skin"),
+    ("head", "patient's head"),
+    ("neck", "patient's neck"),
+    ("phantom", "patient"),
+    ("table", "table"),
+    ("gantry", "gantry"),
+    ("mount", "mount"),
+    ("sternum_body", "body of the sternum"),
+    ("manubrium", "manubrium of the sternum"),
+    ("xiphoid", "xiphoid process of the sternum"),
+    ("heart", "heart"),
+    ("liver", "liver"),
+    ("pulmonary_trunk", "pulmonary trunk"),
+    ("vena_cava_superior", "superior vena cava"),
+    ("vena_cava_inferior", "inferior vena cava"),
+    ("spine", "spine"),
+];
+
+/// Parts that are there on the left and on the right, as `NAME_SIDE`.
+const SIDED: [(&str, &str); 9] = [
+    ("arm", "arm"),
+    ("lung", "lung"),
+    ("scapula", "shoulder blade"),
+    ("pulmonary_artery", "pulmonary artery"),
+    ("main_bronchus", "main bronchus"),
+    ("mammary_artery", "internal mammary artery"),
+    ("mammary_vein", "internal mammary vein"),
+    ("fissure_oblique", "oblique fissure"),
+    ("fissure_horizontal", "horizontal fissure"),
+];
+
+/// Parts of each rib, as `NAME_SIDE_NUMBER`, and what stands before the rib's own words.
+const OF_RIBS: [(&str, &str); 3] = [
+    ("rib", ""),
+    ("cartilage", "cartilage of the "),
+    ("intercostal_vessels", "intercostal vessels of the "),
+];
+
+/// What people call a body or a solid: `wrist 2` for `wrist_2.1`, `intercostal vessels of the right 5th rib`
+/// for `intercostal_vessels_right_5.7`. A name that is none of the program's own stays as it is.
+pub fn part_in_words(name: &str) -> Cow<'_, str> {
+    let body = name.split_once('.').map_or(name, |(body, _)| body);
+    if let Some((_, words)) = SINGLE.iter().find(|(known, _)| *known == body) {
+        return Cow::Borrowed(words);
+    }
+    let composed = sided(body).or_else(|| of_rib(body)).or_else(|| named(body));
+    composed.map_or(Cow::Borrowed(name), Cow::Owned)
+}
+
+/// What people call two bodies or solids that are near each other.
+pub fn pair_in_words(pair: &[String; 2]) -> String {
+    let [a, b] = pair;
+    format!("{} to {}", part_in_words(a), part_in_words(b))
+}
+
+/// `left lung` for `lung_left`.
+fn sided(body: &str) -> Option<String> {
+    let (what, side) = body.rsplit_once('_')?;
+    let (_, words) = SIDED.iter().find(|(known, _)| *known == what)?;
+    let whose = if what == "arm" { "patient's " } else { "" };
+    is_side(side).then(|| format!("{whose}{side} {words}"))
+}
+
+/// `right 5th rib` for `rib_right_5`.
+fn of_rib(body: &str) -> Option<String> {
+    let (what, number) = body.rsplit_once('_')?;
+    let (what, side) = what.rsplit_once('_')?;
+    let (_, before) = OF_RIBS.iter().find(|(known, _)| *known == what)?;
+    let number: u8 = number.parse().ok()?;
+    is_side(side).then(|| format!("{before}{side} {number}{} rib", ordinal(number)))
+}
+
+/// `vertebra T5` for `vertebra_t5`, `lesion pleural_based` for `lesion_pleural_based`.
+fn named(body: &str) -> Option<String> {
+    match body.split_once('_')? {
+        (what @ "vertebra", level) => Some(format!("{what} {}", level.to_uppercase())),
+        (what @ "lesion", name) => Some(format!("{what} {name}")),
+        _ => None,
+    }
+}
+
+fn is_side(word: &str) -> bool {
+    ["left", "right"].contains(&word)
+}
+
+/// Ending of the numbers of ribs.
+fn ordinal(number: u8) -> &'static str {
+    match number {
+        1 => "st",
+        2 => "nd",
+        3 => "rd",
+        _ => "th",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_the_room_have_words() {
+        for (name, words) in [
+            ("wrist_2.1", "wrist 2"),
+            ("wrist_2", "wrist 2"),
+            ("upper_arm.3", "upper arm"),
+            ("guide_tube", "needle guide"),
+            ("gantry.12", "gantry"),
+            ("mount.wedge", "mount"),
+            ("rib_right_5.7", "right 5th rib"),
+            ("rib_left_1", "left 1st rib"),
+            ("cartilage_left_2.1", "cartilage of the left 2nd rib"),
+            (
+                "intercostal_vessels_right_3.7",
+                "intercostal vessels of the right 3rd rib",
+            ),
+            ("lung_left", "left lung"),
+            ("arm_right.forearm", "patient's right arm"),
+            ("fissure_oblique_left", "left oblique fissure"),
+            ("vertebra_t5.process", "vertebra T5"),
+            ("lesion_pleural_based", "lesion pleural_based"),
+        ] {
+            assert_eq!(part_in_words(name), words, "{name}");
+        }
+    }
+
+    #[test]
+    fn names_of_others_stay_as_they_are() {
+        for name in [
+            "iv_pole",
+            "lamp.2",
+            "rib_spreader",
+            "arm_rest",
+            "monitor_left",
+            "",
+        ] {
+            assert_eq!(part_in_words(name), name);
+        }
+    }
+}
