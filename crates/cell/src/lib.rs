@@ -9,6 +9,7 @@
 //! |---|---|
 //! | `words` | what people call parts of the room |
 //! | `finding`, `files`, `limit` | what is wrong with an input; shipped files and files on disk |
+//! | `file_kind` | what a file is that was taken for something else |
 //! | `schema`, `toml_text` | what a file may hold: one source of its JSON schema and of the reader's checks; texts with places |
 //! | [`arm`] | what is known of an arm besides its URDF |
 //! | [`published`] | what others have published of needle robots |
@@ -26,6 +27,7 @@ pub mod arm;
 mod engine_name;
 mod excitation_text;
 pub mod family;
+mod file_kind;
 mod files;
 mod finding;
 pub mod fixtures;
@@ -52,6 +54,7 @@ pub use excitation_text::ExcitationText;
 pub use family::{
     Change, KeyPath, MovedPhantom, PhantomMove, PhantomMoves, ScenarioFamily, Setting,
 };
+pub use file_kind::{FileKind, or_wrong_kind, wrong_kind};
 pub use files::{ModelSource, PackagePaths, sha256_hex};
 pub use finding::{Finding, nearest_name};
 pub use input::{
@@ -77,4 +80,4 @@ pub use robot::{
 pub use scenario::{REJECTION_RULES, envelope, ranking};
 pub use study::criteria as study_criteria;
 pub use thresholds::ThresholdsFile;
-pub use words::{pair_in_words, part_in_words};
+pub use words::{pair_in_words, part_in_words, rule_in_words};

@@ -74,6 +74,26 @@ pub fn pair_in_words(pair: &[String; 2]) -> String {
     format!("{} to {}", part_in_words(a), part_in_words(b))
 }
 
+/// Rules that reject configurations, and what a configuration that one rejects suffers from.
+const RULES: [(&str, &str); 10] = [
+    ("needle_route", "needle route"),
+    ("unreachable", "out of reach"),
+    ("merged", "same as another"),
+    ("joint_limit", "joint limit"),
+    ("singular", "singular"),
+    ("collision", "collision"),
+    ("needle_corridor", "guide blocked"),
+    ("approach", "no approach"),
+    ("nearest_only", "not exact"),
+    ("no_motion", "no motion"),
+];
+
+/// What people call a rule that rejects configurations: one of [`crate::REJECTION_RULES`].
+pub fn rule_in_words(rule: &str) -> &str {
+    let known = RULES.iter().find(|(name, _)| *name == rule);
+    known.map_or(rule, |(_, words)| words)
+}
+
 /// `left lung` for `lung_left`.
 fn sided(body: &str) -> Option<String> {
     let (what, side) = body.rsplit_once('_')?;
@@ -141,6 +161,14 @@ mod tests {
             ("lesion_pleural_based", "lesion pleural_based"),
         ] {
             assert_eq!(part_in_words(name), words, "{name}");
+        }
+    }
+
+    #[test]
+    fn every_rule_has_words() {
+        for rule in crate::scenario::REJECTION_RULES {
+            assert!(!rule_in_words(rule).contains('_'), "{rule}");
+            assert!(RULES.iter().any(|(name, _)| *name == rule), "{rule}");
         }
     }
 

@@ -17,7 +17,7 @@ use crate::pareto::{Scale, dominates, pareto_set};
 pub use crate::ranking_report::{
     Dominance, GoalRanking, RankedMetric, RankingReport, SAME_SCORE, Term, WeightChange,
 };
-use crate::reason::reason;
+use crate::reason::{one_sentence, reason};
 use crate::report::{ConfigurationReport, GoalReport, Recommendation, Status};
 
 /// A metric that counts, with the values of all configurations that work.
@@ -109,13 +109,12 @@ pub fn rank_goal(goal: &mut GoalReport, ranking: &RankingSection) {
     }
     goal.recommended = order.first().map(|&first| {
         let at = |position: usize| order.get(position).map(|&at| working[at]);
+        let chosen = &goal.configurations[working[first]];
+        let next = at(1).map(|index| &goal.configurations[index]);
         Recommendation {
-            label: goal.configurations[working[first]].label.to_owned(),
-            reason: reason(
-                &goal.configurations[working[first]],
-                at(1).map(|index| &goal.configurations[index]),
-                &summary,
-            ),
+            label: chosen.label.to_owned(),
+            summary: one_sentence(chosen, next, &summary),
+            reason: reason(chosen, next, &summary),
         }
     });
     goal.ranking = Some(summary);

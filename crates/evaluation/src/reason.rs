@@ -3,7 +3,7 @@
 use crate::metric::Metric;
 use crate::ranking_report::{GoalRanking, RankingReport, SAME_SCORE, Term};
 use crate::report::ConfigurationReport;
-use needlebench_cell::part_in_words;
+use needlebench_cell::{pair_in_words, part_in_words};
 
 /// Terms that are named for the first choice and, of the runner-up's leads, against it.
 const NAMED: (usize, usize) = (3, 2);
@@ -31,6 +31,54 @@ pub(crate) fn reason(
     };
     clauses.extend(nearest);
     clauses.join("; ")
+}
+
+/// The same in one sentence: what it beats, in what, and how near anything comes.
+pub(crate) fn one_sentence(
+    first: &ConfigurationReport,
+    second: Option<&ConfigurationReport>,
+    ranking: &GoalRanking,
+) -> String {
+    let why = second.map_or_else(
+        || "the only one that works".to_owned(),
+        |second| beside(first, second, ranking),
+    );
+    match first.clearance.least() {
+        Some(found) => format!(
+            "{why}; least clearance {:.1} mm ({})",
+            found.minimum_m * 1e3,
+            pair_in_words(&found.pair)
+        ),
+        None => why,
+    }
+}
+
+/// Score and place of the first choice, and what puts it before the second.
+fn beside(
+    first: &ConfigurationReport,
+    second: &ConfigurationReport,
+    ranking: &GoalRanking,
+) -> String {
+    let count = ranking.order.len();
+    let (Some(mine), Some(theirs)) = (&first.ranking, &second.ranking) else {
+        return format!("first in the table of {count} that work");
+    };
+    let scores = format!(
+        "score {:.1} of 100, best of {count} that work; next is {} with {:.1}",
+        mine.score * 100.0,
+        second.label,
+        theirs.score * 100.0
+    );
+    let (ahead, _) = differences(mine, theirs);
+    let leads: Vec<&str> = ahead
+        .iter()
+        .take(2)
+        .map(|each| words(each.mine.metric))
+        .collect();
+    if leads.is_empty() {
+        return scores;
+    }
+    format!("{scores}, behind in {}", leads.join(" and "))
 }
 
 /// What speaks for the first choice and against it beside the second.

@@ -157,7 +157,9 @@ pub struct RouteReport {
 pub struct Recommendation {
     /// Its label.
     pub label: String,
-    /// Why.
+    /// Why, in one sentence.
+    pub summary: String,
+    /// Why, with all that speaks for it and against it.
     pub reason: String,
 }
 

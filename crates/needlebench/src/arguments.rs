@@ -1,6 +1,7 @@
 //! Arguments that several commands have.
 
 mod engine;
+mod pictures;
 mod table;
 
 use std::path::PathBuf;
@@ -12,6 +13,7 @@ use needlebench_cell::MissingInertia;
 use needlebench_kinematics::UrModel;
 
 pub(crate) use engine::{EngineArgument, EngineParser};
+pub(crate) use pictures::PicturesArguments;
 pub(crate) use table::{TableArguments, leave};
 
 /// Another robot than the scenario's, and whose data it has.

@@ -12,7 +12,7 @@ use crate::command::{
     STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
 };
 use crate::exit::ExitStatus;
-use crate::output::complain;
+use crate::output::{complain, keep_to_width};
 
 /// Testbench for needle-guide robots: which of the eight arm configurations put the needle guide
 /// on its place, how far off the needle's tip is, and how close anything comes to anything.
@@ -30,7 +30,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Plan, simulate and measure every configuration of every goal.
-    #[command(after_help = "Example: needlebench run scenarios/table3.toml --out out/table3")]
+    #[command(after_help = "Example: needlebench run scenarios/table3.toml ")]
     Run(RunArguments),
     /// Parse, resolve and validate scenarios without simulating.
     #[command(after_help = "Example: needlebench check scenarios/*.toml")]
@@ -144,6 +144,7 @@ pub fn main() -> ExitCode {
 
 fn run() -> ExitCode {
     let cli = Cli::parse();
+    keep_to_width();
     let result = match cli.command {
         Command::Run(arguments) => command::run(&arguments),
         Command::Check(arguments) => command::check(&arguments),

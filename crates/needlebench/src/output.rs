@@ -3,16 +3,41 @@
 //! What cannot be written is lost, never a panic: a reader that has gone is its own choice, and a full
 //! standard error has nobody to tell.
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use needlebench_cell::{printable, printable_line};
+use needlebench_report::layout;
 
-/// Writes text and a line end to standard output.
+/// Tells tables and sentences how wide they may be: `COLUMNS`, else the terminal's width, else that of a log.
+pub(crate) fn keep_to_width() {
+    let asked = std::env::var("COLUMNS").ok();
+    let asked = asked.and_then(|text| text.trim().parse().ok());
+    let terminal = || terminal_size::terminal_size_of(std::io::stdout());
+    let of_terminal = || terminal().map(|(terminal_size::Width(width), _)| usize::from(width));
+    let width = asked.filter(|width| *width > 0).or_else(of_terminal);
+    layout::set_width(Some(width.unwrap_or(layout::DEFAULT_WIDTH)));
+}
+
+/// Breaks nothing from now on: tables are as wide as they are.
+pub(crate) fn print_wide() {
+    layout::set_width(None);
+}
+
+/// Writes text for people and a line end to standard output; on a terminal lines are broken at spaces.
+pub(crate) fn print_text(text: &str) -> Result<()> {
+    if std::io::stdout().is_terminal() {
+        print_as_it_is(&layout::wrapped(text))
+    } else {
+        print_as_it_is(text)
+    }
+}
+
+/// Writes text for programs and a line end to standard output.
 ///
 /// A reader that stops reading is no error: what the command found decides its exit status.
-pub(crate) fn print_text(text: &str) -> Result<()> {
+pub(crate) fn print_as_it_is(text: &str) -> Result<()> {
     let mut out = anstream::stdout().lock();
     let text = without_commands(text);
     match writeln!(out, "{text}").and_then(|()| out.flush()) {

@@ -1,60 +1,169 @@
-//! Progress on a terminal; silence elsewhere.
+//! Progress: a bar on a terminal, lines of a log elsewhere.
 
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use needlebench_bench::progress::Progress;
 
 use crate::output::complain;
 
-/// A progress bar on standard error, if that is a terminal.
-#[derive(Debug, Clone)]
-pub(crate) struct TerminalProgress(ProgressBar);
+/// Progress on standard error.
+#[derive(Debug)]
+pub(crate) enum TerminalProgress {
+    /// A bar, on a terminal.
+    Bar(ProgressBar),
+    /// Lines, in a log.
+    Log(Mutex<Log>),
+    /// Nothing at all.
+    Hidden,
+}
 
 impl TerminalProgress {
     /// `quiet` hides it everywhere.
     pub(crate) fn new(quiet: bool) -> Self {
-        let bar = ProgressBar::new(0);
-        bar.set_draw_target(if quiet {
-            ProgressDrawTarget::hidden()
-        } else {
-            ProgressDrawTarget::stderr() // draws nothing unless it is a terminal
-        });
+        if quiet {
+            return Self::Hidden;
+        }
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        if bar.is_hidden() {
+            return Self::Log(Mutex::new(Log::new(Instant::now())));
+        }
+        bar.set_length(0);
         if let Ok(style) =
             ProgressStyle::with_template("{spinner} {msg} [{bar:30}] {pos}/{len} {elapsed}")
         {
             bar.set_style(style.progress_chars("=> "));
         }
-        if !bar.is_hidden() {
-            bar.enable_steady_tick(Duration::from_millis(120));
-        }
-        Self(bar)
+        bar.enable_steady_tick(Duration::from_millis(120));
+        Self::Bar(bar)
     }
 
     pub(crate) fn finish(&self) {
-        self.0.finish_and_clear();
+        if let Self::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+
+    /// Changes what the log knows, and writes its line if one is due.
+    fn log(&self, change: impl FnOnce(&mut Log)) {
+        if let Self::Log(log) = self {
+            let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
+            change(&mut log);
+            if let Some(line) = log.line(Instant::now()) {
+                complain(&line);
+            }
+        }
     }
 }
 
 impl Progress for TerminalProgress {
     fn message(&self, text: &str) {
-        self.0.set_message(text.to_owned());
+        if let Self::Bar(bar) = self {
+            bar.set_message(text.to_owned());
+        }
+        self.log(|log| text.clone_into(&mut log.message));
     }
 
     fn notice(&self, text: &str) {
-        self.0.suspend(|| complain(text));
+        match self {
+            Self::Bar(bar) => bar.suspend(|| complain(text)),
+            Self::Log(_) => complain(text),
+            Self::Hidden => {}
+        }
     }
 
     fn expect(&self, steps: u64) {
-        self.0.inc_length(steps);
+        if let Self::Bar(bar) = self {
+            bar.inc_length(steps);
+        }
+        self.log(|log| log.total += steps);
     }
 
     fn at(&self, done: u64, total: u64) {
-        self.0.set_length(total);
-        self.0.set_position(done);
+        if let Self::Bar(bar) = self {
+            bar.set_length(total);
+            bar.set_position(done);
+        }
+        self.log(|log| (log.done, log.total) = (done, total));
     }
 
     fn step(&self) {
-        self.0.inc(1);
+        if let Self::Bar(bar) = self {
+            bar.inc(1);
+        }
+        self.log(|log| log.done += 1);
+    }
+}
+
+/// What is logged, and when the last line was.
+#[derive(Debug)]
+pub(crate) struct Log {
+    started: Instant,
+    last: Instant,
+    message: String,
+    done: u64,
+    total: u64,
+}
+
+/// Least time between two lines; what takes less has none.
+const LEAST: Duration = Duration::from_secs(1);
+/// Lines of long work are rarer: this share of the time that it took so far.
+const SHARE: f64 = 0.05;
+
+impl Log {
+    fn new(now: Instant) -> Self {
+        Self {
+            started: now,
+            last: now,
+            message: String::new(),
+            done: 0,
+            total: 0,
+        }
+    }
+
+    /// The next line, if it is time for one.
+    fn line(&mut self, now: Instant) -> Option<String> {
+        let elapsed = now - self.started;
+        if now - self.last < LEAST.max(elapsed.mul_f64(SHARE)) {
+            return None;
+        }
+        self.last = now;
+        let count = match self.total {
+            0 => String::new(),
+            total => format!(" {} of {total}", self.done.min(total)),
+        };
+        Some(format!("[{} s] {}{count}", elapsed.as_secs(), self.message))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_has_a_line_a_second_at_most_and_none_for_short_work() {
+        let start = Instant::now();
+        let mut log = Log::new(start);
+        "simulating".clone_into(&mut log.message);
+        (log.done, log.total) = (3, 8);
+        let mut lines = Vec::new();
+        for tenth in 0..50 {
+            lines.extend(log.line(start + Duration::from_millis(100 * tenth)));
+        }
+        assert_eq!(lines.len(), 4, "{lines:?}");
+        assert_eq!(lines[0], "[1 s] simulating 3 of 8");
+        assert_eq!(
+            Log::new(start).line(start + Duration::from_millis(999)),
+            None
+        );
+    }
+
+    #[test]
+    fn an_hour_has_a_hundred_lines_and_not_thousands() {
+        let start = Instant::now();
+        let mut log = Log::new(start);
+        let lines = (0..3600).filter_map(|second| log.line(start + Duration::from_secs(second)));
+        assert!((50..150).contains(&lines.count()));
     }
 }

@@ -33,6 +33,7 @@ use needlebench_kinematics::trajectory::{MotionLimits, ProfileLimits};
 use needlebench_kinematics::{JOINT_LABELS, Joints, Pose};
 
 use crate::engine_name::check_engine_names;
+use crate::file_kind::{FileKind, or_wrong_kind};
 use crate::files::ModelSource;
 use crate::files::source_of;
 use crate::fixtures::Fixture;
@@ -117,6 +118,11 @@ pub struct ResolvedScenario {
 /// # Errors
 /// Every [`Finding`] of the first stage that has any: text, values, models, goals.
 pub fn load_scenario(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
+    read_scenario(path, overrides)
+        .map_err(|findings| or_wrong_kind(path, FileKind::Scenario, findings))
+}
+
+fn read_scenario(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
     let file = path.display().to_string();
     let text = read_text(path).map_err(|error| {
         let hint = error.hint("scenarios are TOML files, such as scenarios/table3.toml");

@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
+use crate::file_kind::{FileKind, or_wrong_kind};
 use crate::input::read_text;
 use crate::requirements::Requirements;
 use crate::scenario::EngineName;
@@ -364,10 +365,12 @@ pub fn load_study(path: &Path, overrides: &Overrides) -> Result<ResolvedStudy, V
     let file = path.display().to_string();
     let text = read_text(path).map_err(|error| {
         let hint = error.hint("studies are TOML files, such as scenarios/studies/layouts.toml");
-        vec![Finding::new(&file, format!("cannot read the study: {error}")).hint(hint)]
+        let finding = Finding::new(&file, format!("cannot read the study: {error}")).hint(hint);
+        or_wrong_kind(path, FileKind::Study, vec![finding])
     })?;
     let base = path.parent().unwrap_or(Path::new(""));
     resolve::resolve(&file, &text, base, overrides)
+        .map_err(|findings| or_wrong_kind(path, FileKind::Study, findings))
 }
 
 /// The JSON schema (draft-07) of study files, for editors.

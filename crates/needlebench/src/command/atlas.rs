@@ -1,6 +1,6 @@
 //! `needlebench atlas`.
 
-use crate::arguments::RobotArguments;
+use crate::arguments::{PicturesArguments, RobotArguments};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -40,9 +40,8 @@ pub(crate) struct AtlasArguments {
     /// Print the atlas as one JSON document instead of the table.
     #[arg(long)]
     pub json: bool,
-    /// Draw no pictures.
-    #[arg(long)]
-    pub no_pictures: bool,
+    #[command(flatten)]
+    pub pictures: PicturesArguments,
     /// Write no page.
     #[arg(long)]
     pub no_page: bool,
@@ -120,7 +119,7 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
         &atlases,
         &report,
         Folder(&folder),
-        [!arguments.no_pictures, !arguments.no_page],
+        [arguments.pictures.are_wanted(false), !arguments.no_page],
     )?;
     if arguments.json {
         print_json(&report)?;

@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use super::{print_json, print_text};
 
+use crate::arguments::PicturesArguments;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use needlebench_report::files::{Folder, write_measured};
@@ -73,9 +74,8 @@ pub(crate) struct Iso9283Arguments {
     /// Print one JSON document.
     #[arg(long)]
     pub json: bool,
-    /// Draw no picture.
-    #[arg(long)]
-    pub no_pictures: bool,
+    #[command(flatten)]
+    pub pictures: PicturesArguments,
 }
 
 /// Units of length.
@@ -276,7 +276,7 @@ fn write_results(
     let files = Folder(folder);
     files.write_json("report.json", judged)?;
     let report = judged.report;
-    let pictures = !arguments.no_pictures;
+    let pictures = arguments.pictures.are_wanted(false);
     write_measured(&report.log, &report.statistics, attained, files, pictures)?;
     Ok(())
 }

@@ -48,7 +48,7 @@ use needlebench_bench::Runnable;
 use crate::arguments::{RobotArguments, UrdfArguments};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
-use crate::output::print_text;
+use crate::output::{print_as_it_is, print_text};
 
 /// Reads a scenario; prints what is wrong with it and gives `None` if it cannot be used.
 fn load(path: &Path, overrides: &Overrides) -> Option<ResolvedScenario> {
@@ -93,7 +93,7 @@ fn urdf_overrides(arguments: &UrdfArguments) -> Result<Overrides, Finding> {
 /// Prints one JSON document to standard output.
 fn print_json(value: &impl Serialize) -> Result<()> {
     let document = serde_json::to_string_pretty(value).map_err(std::io::Error::from)?;
-    print_text(&printable_json(&document))
+    print_as_it_is(&printable_json(&document))
 }
 
 /// Prints completions for a shell.
@@ -103,6 +103,6 @@ pub(crate) fn completions(
 ) -> Result<ExitStatus> {
     let mut script = Vec::new();
     clap_complete::generate(shell, command_line, "needlebench", &mut script);
-    print_text(String::from_utf8_lossy(&script).trim_end())?;
+    print_as_it_is(String::from_utf8_lossy(&script).trim_end())?;
     Ok(ExitStatus::Success)
 }

@@ -11,6 +11,7 @@ use super::run::prepare_folder;
 use super::{print_json, print_text};
 use crate::output::{complain, shown};
 
+use crate::arguments::PicturesArguments;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::progress::TerminalProgress;
@@ -25,9 +26,8 @@ pub(crate) struct PaperArguments {
     /// Print the results as one JSON document instead of the tables.
     #[arg(long)]
     pub json: bool,
-    /// Draw no pictures.
-    #[arg(long)]
-    pub no_pictures: bool,
+    #[command(flatten)]
+    pub pictures: PicturesArguments,
     /// Show no progress.
     #[arg(long)]
     pub quiet: bool,
@@ -48,7 +48,7 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
         cancel: &cancel,
         progress: &progress,
     };
-    let found = reproduce(!arguments.no_pictures, &watch);
+    let found = reproduce(arguments.pictures.are_wanted(arguments.quiet), &watch);
     progress.finish();
     let mut found = match found {
         Ok(found) => found,

@@ -20,7 +20,7 @@ use needlebench_report::table::replay::text;
 
 use super::run::prepare_folder;
 use super::{overrides, print_json, print_text};
-use crate::arguments::{EngineArgument, EngineParser, RobotArguments};
+use crate::arguments::{EngineArgument, EngineParser, PicturesArguments, RobotArguments};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::output::{complain, shown};
@@ -99,9 +99,8 @@ pub(crate) struct ReplayArguments {
     /// Print one JSON document instead of the tables.
     #[arg(long)]
     pub json: bool,
-    /// Draw no pictures.
-    #[arg(long)]
-    pub no_pictures: bool,
+    #[command(flatten)]
+    pub pictures: PicturesArguments,
     /// Write no page.
     #[arg(long)]
     pub no_page: bool,
@@ -174,6 +173,7 @@ type Prepared = (RecordedRun, ResolvedScenario, String, PathBuf);
 
 fn prepared(arguments: &ReplayArguments) -> Result<Prepared, Vec<Finding>> {
     let one = |finding: Finding| vec![finding];
+    let of_log = |finding| or_wrong_kind(&arguments.log, FileKind::Table, vec![finding]);
     let options = ReadOptions {
         time: arguments.time_unit.map(|unit| match unit {
             TimeArgument::S => TimeUnit::Seconds,
@@ -324,7 +324,10 @@ fn replayed(
         &done,
         arm.as_ref(),
         Folder(folder),
-        [!arguments.no_pictures, !arguments.no_page],
+        [
+            arguments.pictures.are_wanted(arguments.quiet),
+            !arguments.no_page,
+        ],
     )
     .with_context(|| format!("cannot write the results to {}", shown(folder)))?;
     if arguments.json {

@@ -48,7 +48,7 @@ pub(crate) struct ReportArguments {
 /// Collects evidence, writes and prints it.
 pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitStatus> {
     if arguments.template {
-        print_text(Judgement::template().trim_end())?;
+        print_as_it_is(Judgement::template().trim_end())?;
         return Ok(ExitStatus::Success);
     }
     let judgement = match &arguments.judgement {
@@ -78,7 +78,7 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitStatus> {
         print_json(&document)?;
     } else {
         let place = shown(&folder.join("credibility.md"));
-        print_text(&format!("{markdown}\nreport: {place}"))?;
+        print_as_it_is(&format!("{markdown}\nreport: {place}"))?;
     }
     Ok(ExitStatus::Success)
 }

@@ -1,7 +1,9 @@
 //! `needlebench run`.
 
-use crate::arguments::{EngineArgument, EngineParser, RobotArguments, TableArguments, leave};
-use crate::output::{complain, shown};
+use crate::arguments::{
+    EngineArgument, EngineParser, PicturesArguments, RobotArguments, TableArguments, leave,
+};
+use crate::output::{complain, print_wide, shown};
 use clap::Args;
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -22,7 +24,7 @@ use crate::progress::TerminalProgress;
 use needlebench_bench::accuracy::{accuracy_of_run, check_run};
 use needlebench_bench::{RunOptions, Runnable, ScenarioRun};
 use needlebench_report::files::{Folder, RunFiles, write_run};
-use needlebench_report::{junit, markdown, report_text, write_atomically};
+use needlebench_report::{junit, markdown, report_screen, report_text, write_atomically};
 
 #[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
@@ -53,15 +55,17 @@ pub(crate) struct RunArguments {
     /// would write it of the real arm.
     #[arg(long)]
     pub rtde: bool,
-    /// Draw no pictures.
-    #[arg(long)]
-    pub no_pictures: bool,
+    #[command(flatten)]
+    pub pictures: PicturesArguments,
     /// Write no report page.
     #[arg(long)]
     pub no_page: bool,
     /// Show no progress.
     #[arg(long)]
     pub quiet: bool,
+    /// Print all tables, as wide as they are, instead of one screen.
+    #[arg(long, conflicts_with = "json")]
+    pub wide: bool,
     #[command(flatten)]
     pub table: TableArguments,
     #[command(flatten)]
@@ -76,6 +80,9 @@ struct SeveralReports<'a> {
 
 /// Runs scenarios, writes their results and prints them.
 pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
+    if arguments.wide {
+        print_wide();
+    }
     let overrides = match overrides(&arguments.robot) {
         Ok(overrides) => overrides,
         Err(finding) => {
@@ -137,9 +144,13 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     let mut reports = Vec::new();
     let outputs = Outputs {
         rtde: arguments.rtde,
-        pictures: !arguments.no_pictures,
+        pictures: arguments.pictures.are_wanted(arguments.quiet),
         page: !arguments.no_page,
-        text: !arguments.json,
+        text: match (arguments.json, arguments.wide) {
+            (true, _) => Printed::Nothing,
+            (false, false) => Printed::Screen,
+            (false, true) => Printed::All,
+        },
         quiet: arguments.quiet,
     };
     for (runnable, folder) in scenarios.iter().zip(&folders) {
@@ -151,7 +162,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
             .filter(|_| outcome != ExitStatus::Interrupted)
         {
             let table = accuracy_of_run(&report, runnable.scenario(), request);
-            leave(&table, folder, outputs.text)?;
+            leave(&table, folder, outputs.text != Printed::Nothing)?;
         }
         reports.push(report);
         if outcome == ExitStatus::Interrupted {
@@ -186,10 +197,21 @@ pub(super) struct Outputs {
     pub pictures: bool,
     /// The page.
     pub page: bool,
-    /// The table on standard output.
-    pub text: bool,
+    /// What is on standard output.
+    pub text: Printed,
     /// No progress.
     pub quiet: bool,
+}
+
+/// What a run prints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Printed {
+    /// Nothing: its JSON document is printed elsewhere.
+    Nothing,
+    /// One screen.
+    Screen,
+    /// All tables.
+    All,
 }
 
 /// Runs one scenario and writes its results into a folder that is there.
@@ -215,10 +237,22 @@ pub(super) fn run_into(
     let written = write_run(resolved, &mut finished, Folder(folder), files, &progress);
     progress.finish();
     written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
-    if outputs.text {
-        let name = &resolved.scenario.name;
-        let text = report_text(&finished.report, ENGINES);
-        print_text(&format!("{name}\n{text}results: {}", shown(folder)))?;
+    match outputs.text {
+        Printed::Nothing => {}
+        Printed::Screen => {
+            let text = report_screen(&finished.report, ENGINES);
+            let page = if outputs.page {
+                ", to look at: report.html"
+            } else {
+                ""
+            };
+            print_text(&format!("{text}results: {}{page}", shown(folder)))?;
+        }
+        Printed::All => {
+            let name = &resolved.scenario.name;
+            let text = report_text(&finished.report, ENGINES);
+            print_text(&format!("{name}\n{text}results: {}", shown(folder)))?;
+        }
     }
     if finished.interrupted {
         complain(&format!(

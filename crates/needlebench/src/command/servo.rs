@@ -1,6 +1,6 @@
 //! `needlebench servo`.
 
-use crate::arguments::{EngineArgument, EngineParser, RobotArguments};
+use crate::arguments::{EngineArgument, EngineParser, PicturesArguments, RobotArguments};
 use crate::output::{complain, shown};
 use anyhow::{Context, Result};
 use clap::Args;
@@ -40,9 +40,8 @@ pub(crate) struct ServoArguments {
     /// Print one JSON document instead of the tables.
     #[arg(long)]
     pub json: bool,
-    /// Draw no pictures.
-    #[arg(long)]
-    pub no_pictures: bool,
+    #[command(flatten)]
+    pub pictures: PicturesArguments,
     #[command(flatten)]
     pub robot: RobotArguments,
 }
@@ -107,8 +106,12 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus> {
         );
         status = ExitStatus::CriterionFailed;
     }
-    write_servo(&report, Folder(&folder), !arguments.no_pictures)
-        .with_context(|| format!("cannot write the results to {}", shown(&folder)))?;
+    write_servo(
+        &report,
+        Folder(&folder),
+        arguments.pictures.are_wanted(false),
+    )
+    .with_context(|| format!("cannot write the results to {}", shown(&folder)))?;
     if arguments.json {
         print_json(&report)?;
     } else {

@@ -391,9 +391,13 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
     let mut reports = Vec::new();
     let outputs = Outputs {
         rtde: false,
-        pictures: true,
+        pictures: arguments.pictures.are_wanted(arguments.results.quiet),
         page: !arguments.results.no_page,
-        text: !arguments.results.json,
+        text: if arguments.results.json {
+            Printed::Nothing
+        } else {
+            Printed::Screen
+        },
         quiet: arguments.results.quiet,
     };
     for (runnable, folder, options) in &runs {

@@ -6,6 +6,7 @@ use needlebench_bench::{ExcitationRun, RtdeLog};
 use super::error::FilesError;
 use super::folder::Folder;
 use crate::csv::rtde_csv;
+use crate::layout;
 use crate::table::excitation::clearances_text;
 
 /// Writes the log of each engine and payload; gives the names of the files.
@@ -33,7 +34,10 @@ pub fn write_plan(
 ) -> Result<(), FilesError> {
     folder.write("excitation.toml", scenario)?;
     folder.write("excitation.script", script)?;
-    folder.write("clearances.txt", clearances_text(report))?;
+    folder.write(
+        "clearances.txt",
+        layout::for_file(|| clearances_text(report)),
+    )?;
     report.files = [
         "excitation.toml",
         "excitation.script",

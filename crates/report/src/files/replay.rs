@@ -9,6 +9,7 @@ use super::error::FilesError;
 use super::folder::Folder;
 use crate::chart::replay::replay_chart;
 use crate::junit::replay_junit;
+use crate::layout;
 use crate::page::replay_page;
 use crate::table::replay::text;
 
@@ -23,7 +24,10 @@ pub fn write_replay(
     [pictures, page]: [bool; 2],
 ) -> Result<(), FilesError> {
     folder.write_json("replay.json", &replay.report)?;
-    folder.write("replay.txt", text(&replay.report) + "\n")?;
+    folder.write(
+        "replay.txt",
+        layout::for_file(|| text(&replay.report)) + "\n",
+    )?;
     folder.write("junit.xml", replay_junit(&replay.report)?)?;
     for (engine, course) in &replay.courses {
         let name = format!("course.{engine}.csv");

@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use comfy_table::{Cell, CellAlignment, Table};
+use comfy_table::{Cell, CellAlignment};
 use needlebench_evaluation::events::{PressEngineReport, RIGID_FORCE_MEANS};
 use needlebench_evaluation::report::GoalReport;
 
-use super::plain_table;
+use super::{Table, plain_table};
 use crate::number::{millimetres, percent_with, small_length};
 
 /// What the events of a goal's configurations measured; none where none were asked for.

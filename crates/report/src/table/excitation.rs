@@ -8,7 +8,7 @@ use needlebench_bench::record_plan::{JointTelling, PlanReport};
 use needlebench_evaluation::excitation::{ExcitationReport, MotionReport, proven_m};
 use needlebench_evaluation::report::ClearanceReport;
 
-use super::plain_table;
+use super::{Table, plain_table};
 use crate::number::{rounded, small_length, three_digits};
 
 /// What a run prints.
@@ -136,7 +136,7 @@ fn nearest(motion: &MotionReport) -> String {
     found.map_or(String::new(), |(_, found)| pair_in_words(&found.pair))
 }
 
-fn class_table(report: &PlanReport) -> comfy_table::Table {
+fn class_table(report: &PlanReport) -> Table {
     let mut table = plain_table(&["class", "proven (mm)", "attained (mm)", "pair"]);
     for (class, found) in &report.planned.classes {
         if *class == "needle_corridor" {

@@ -19,5 +19,5 @@ pub mod study;
 pub mod study_comparison;
 pub(crate) mod verdict;
 
-pub use plain::plain_table;
-pub use run::{fissures_in_words, report_text, route_in_words};
+pub use plain::{Table, plain_table};
+pub use run::{fissures_in_words, report_screen, report_text, route_in_words};

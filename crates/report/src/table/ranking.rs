@@ -1,11 +1,12 @@
 //! The comparison table of a goal: rank, score, Pareto set and what the score is made of.
 
-use comfy_table::{Cell, CellAlignment, Color, Table};
+use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_evaluation::metric::Metric;
 use needlebench_evaluation::ranking::{GoalRanking, RankedMetric, RankingReport};
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 
-use super::plain_table;
+use super::{Table, plain_table};
+use crate::layout;
 
 /// A row of the table: configurations that were ranked, first choice first.
 pub(crate) struct Row<'a> {
@@ -99,20 +100,11 @@ pub(crate) fn words(metric: &'static str) -> &'static str {
 
 /// Heading of a metric in two or three short lines: words and weight.
 fn heading(metric: &RankedMetric) -> String {
-    let words = words(metric.name);
-    let mut lines = vec![String::new()];
-    for word in words.split(' ') {
-        let last = lines.last_mut().expect("starts with one line");
-        if !last.is_empty() && last.len() + 1 + word.len() > 14 {
-            lines.push(word.to_owned());
-        } else {
-            if !last.is_empty() {
-                last.push(' ');
-            }
-            last.push_str(word);
-        }
-    }
-    format!("{}\nx {}", lines.join("\n"), metric.weight)
+    format!(
+        "{}\nx {}",
+        layout::in_lines(words(metric.name), 14),
+        metric.weight
+    )
 }
 
 /// The comparison table and what there is to say of it; none if fewer than two configurations
@@ -130,7 +122,10 @@ pub(crate) fn comparison_text(goal: &GoalReport) -> Option<String> {
             .iter()
             .map(|metric| format!("{} x {}", words(metric.name), metric.weight))
             .collect();
-        lines.push(format!("decide less or nothing: {}", words.join(", ")));
+        lines.push(format!(
+            "these count too, but differ less or not at all: {}",
+            words.join(", ")
+        ));
     }
     Some(lines.join("\n"))
 }

@@ -1,10 +1,10 @@
 //! The engines beside the referee, as a table.
 
-use comfy_table::{Cell, CellAlignment, Color, Table};
+use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_evaluation::referee::RefereeComparison;
 use needlebench_evaluation::report::GoalReport;
 
-use super::plain_table;
+use super::{Table, plain_table};
 use crate::number::small_length;
 
 /// One row for each configuration and engine; none unless the referee was called.

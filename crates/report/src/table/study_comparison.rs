@@ -1,6 +1,6 @@
 //! Two studies side by side.
 
-use comfy_table::{Cell, CellAlignment, Color, ContentArrangement};
+use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_study::compare::{
     Change, Paired, StudyComparison, StudyFailure, StudySide, Transition, value_text, what,
 };
@@ -8,8 +8,6 @@ use needlebench_study::compare::{
 use super::plain_table;
 use crate::number::percent_with;
 
-/// Columns that the table fits into.
-const WIDTH: u16 = 100;
 /// Smallest difference of values that is shown as one, in their unit: 1 um, 0.01 %.
 const SAME: f64 = 1e-3;
 const SAME_SHARE: f64 = 1e-4;
@@ -159,8 +157,6 @@ pub fn study_comparison_text(comparison: &StudyComparison, all: bool) -> String 
     let same = comparison.changes.len() - rows.len();
     if !rows.is_empty() {
         let mut table = plain_table(&["what", "A", "B", "B less A", ""]);
-        table.set_content_arrangement(ContentArrangement::Dynamic);
-        table.set_width(WIDTH);
         for change in rows {
             let [what, a, b, difference, outcome] = row(change);
             let right = |text: String| Cell::new(text).set_alignment(CellAlignment::Right);

@@ -171,7 +171,7 @@ pub(super) const CLEARANCE: &[Metric] = {
             _ => metric.statistics(nearest),
         };
         let metric = match (metric.bound, metric.stage) {
-            (Attained, Simulated) => metric.table(9, "least of\nall (mm)"),
+            (Attained, Simulated) => metric.table(9, "nearest\nof all (mm)"),
             (Certified, Simulated) => metric.formerly(&["certified_clearance"]),
             _ => metric,
         };
@@ -289,7 +289,7 @@ pub(super) const SELF_CLEARANCE: &[Metric] = {
             (Certified, _) => metric.statistics(Statistics::SPREAD),
             _ => metric.statistics(nearest),
         };
-        let metric = headed(metric, Some((8, "self\n(mm)")), (7, "From itself"));
+        let metric = headed(metric, Some((8, "arm to\nitself (mm)")), (7, "From itself"));
         ranked(in_case(metric, 1, "self\nmm"), "self_clearance_mm")
     }
     clearance_of_class!(

@@ -292,7 +292,7 @@ pub(super) const BUDGET: &[Metric] = &[
     .ranked("tip_error_mm")
     .pareto()
     .show(Show::SmallLength)
-    .table(0, "expected\nrms")
+    .table(0, "tip error\nrms")
     .summary(0, "Expected tip error, rms")
     .page(0, "Expected rms")
     .page_side(0, "Expected rms")
@@ -312,7 +312,7 @@ pub(super) const BUDGET: &[Metric] = &[
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .table(1, "95 %\nwithin")
+    .table(1, "tip error\nin 95 %")
     .summary(1, "95 % within")
     .page(1, "95 % within")
     .page_side(1, "95 % within"),
@@ -326,7 +326,7 @@ pub(super) const BUDGET: &[Metric] = &[
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .table(2, "\nbias")
+    .table(2, "tip error\nbias")
     .page(2, "Bias"),
     Metric::new(
         "tip_rms_breathing_freely",
@@ -338,7 +338,7 @@ pub(super) const BUDGET: &[Metric] = &[
     .known(Value, OverBudget, FinalPosture)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .table(3, "if breath\nis free"),
+    .table(3, "tip error\nbreathing"),
     Metric::new(
         "tip_lateral_rms_before_insertion",
         "rms lateral tip error before the insertion",

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use needlebench_study::Shard;
 
-use crate::arguments::{RobotArguments, TableArguments};
+use crate::arguments::{PicturesArguments, RobotArguments, TableArguments};
 
 pub(crate) const STUDY_HELP: &str = "\
 A study is one TOML file: a scenario, factors that vary it, and what is asked of the results. Every case \
@@ -44,6 +44,8 @@ pub(crate) struct StudyArguments {
     /// With --case: run it with engines, pictures and a page, as `run` does, into the study's folder.
     #[arg(long, requires = "case")]
     pub run: bool,
+    #[command(flatten)]
+    pub pictures: PicturesArguments,
     #[command(flatten)]
     pub results: StudyResultArguments,
     #[command(flatten)]

@@ -1,16 +1,18 @@
-//! The table that a run prints.
+//! What a run prints: one screen, or all tables.
+
+mod screen;
 
 use needlebench_cell::part_in_words;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use comfy_table::{Cell, CellAlignment, Color, Table};
+use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_engine::Engine;
 use needlebench_evaluation::excitation;
 use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::metric::Heading;
 use needlebench_evaluation::report::{
-    ConfigurationReport, GoalReport, Report, RouteReport, Status,
+    ConfigurationReport, CriterionResult, GoalReport, Report, RouteReport, Status,
 };
 use needlebench_planning::Rule;
 use needlebench_uncertainty::budget::ErrorBudget;
@@ -18,13 +20,16 @@ use needlebench_uncertainty::budget::ErrorBudget;
 use super::budget::{ALLOWED_M, CLINICAL_LATERAL_M, CLINICAL_M, budget_text, budgets, mm};
 use super::engine_headings::{EngineHeading, engine_headings};
 use super::events::events_text;
-use super::plain_table;
 use super::ranking::comparison_text;
 use super::shown::{Shown, shown_metrics};
 use super::verdict::{capitals, counts, missed_as_expected, status};
+use super::{Table, plain_table};
+use crate::layout;
 use crate::number::value_and_limit;
 
-/// The whole report as text; `engines` are those that there are, with their titles.
+pub use screen::report_screen;
+
+/// All tables of a report; `engines` are those that there are, with their titles.
 pub fn report_text(report: &Report, engines: &[&'static dyn Engine]) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
@@ -57,7 +62,7 @@ fn write_report(
         {
             writeln!(
                 out,
-                "check of control and integration, {}",
+                "what the engines leave of the motion, {}",
                 simulated_arm(report)
             )?;
             writeln!(out, "{}", goal_table(report, goal, &checks, Mostly::Left))?;
@@ -188,29 +193,37 @@ fn own_pair(goal: &GoalReport) -> Option<[&str; 2]> {
     pairs.all(|pair| pair == first).then_some(first)
 }
 
+/// How near the arm comes to itself by its build, in words; `pair` is that of [`own_pair`].
+fn own_pair_in_words(goal: &GoalReport, [a, b]: [&str; 2]) -> Option<String> {
+    let all = goal.configurations.iter();
+    let sizes = all.filter_map(|each| Some(each.clearance.classes.get("self")?.minimum_m * 1e3));
+    let (least, most) = sizes.fold(None, |range: Option<(f64, f64)>, mm| {
+        let (least, most) = range.unwrap_or((mm, mm));
+        Some((least.min(mm), most.max(mm)))
+    })?;
+    let [a, b] = [a, b].map(part_in_words);
+    Some(format!(
+        "the arm's own {a} and {b} are {least:.1} to {most:.1} mm apart by its build"
+    ))
+}
+
 /// What is the same in all configurations, in one line.
 fn write_constant(out: &mut String, goal: &GoalReport, constant: &[Column]) -> std::fmt::Result {
     let mut parts = Vec::new();
     for column in constant {
-        let values = || {
-            let all = goal.configurations.iter();
-            all.filter_map(|each| column.metric.value(each))
-        };
-        let Some((_, text)) = values().next() else {
+        let mut values = goal
+            .configurations
+            .iter()
+            .filter_map(|each| column.metric.value(each));
+        let Some((_, text)) = values.next() else {
             continue;
         };
         let name = column.heading.replace('\n', " ");
-        if let (Some([a, b]), "self_clearance") = (own_pair(goal), column.metric.metric().family) {
-            let sizes = || values().map(|(value, _)| value * 1e3);
-            let least = sizes().fold(f64::INFINITY, f64::min);
-            let most = sizes().fold(f64::NEG_INFINITY, f64::max);
-            parts.push(format!(
-                "the arm's own {} and {} are {least:.1} to {most:.1} mm apart by its build",
-                part_in_words(a),
-                part_in_words(b)
-            ));
-        } else {
-            parts.push(format!("{} {text}", name.trim()));
+        match own_pair(goal) {
+            Some(pair) if column.metric.metric().family == "self_clearance" => {
+                parts.extend(own_pair_in_words(goal, pair));
+            }
+            _ => parts.push(format!("{} {text}", name.trim())),
         }
     }
     if parts.is_empty() {
@@ -231,7 +244,7 @@ fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::
     };
     writeln!(
         out,
-        "expected tip error: over all arms and patients - {arm}: {}; the patient {breath}",
+        "tip error: expected over all arms and patients ({arm}): {}; the patient {breath}",
         expected.arm_in_words
     )?;
     let budgets = budgets(goal);
@@ -250,8 +263,8 @@ fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::
     if let (Some(before), Some(after)) = (before, after) {
         writeln!(
             out,
-            "like with like: across the needle before it goes in {before} (needle robots {} to {}); at \
-             the target {after} ({} to {}); allowed {}",
+            "published needle robots: across the needle before it goes in {} to {} mm, here {before}; at the target \
+             {} to {} mm, here {after}, allowed {} mm",
             mm(CLINICAL_LATERAL_M[0]),
             mm(CLINICAL_LATERAL_M[1]),
             mm(CLINICAL_M[0]),
@@ -268,11 +281,12 @@ fn simulated_arm(report: &Report) -> &'static str {
     let of_class = of_class.is_some_and(|expected| expected.arm.is_some());
     if report.truth.is_some() && of_class {
         // Without [imperfections] of its own.
-        "of the nominal arm under another gravity than its controller believes in"
+        "with the nominal arm under another gravity than its controller believes in"
     } else if report.truth.is_some() {
-        "of the one arm and patient that the seed draws"
+        "with the one arm and patient that the seed draws"
     } else {
-        "of an arm that is just what its controller believes: nothing of a real arm's accuracy"
+        "with an arm that is just what its controller believes: errors of control and integration alone, nothing of \
+         a real arm's accuracy"
     }
 }
 
@@ -359,21 +373,15 @@ fn room_table(goal: &GoalReport) -> Table {
         .flat_map(|room| room.regions.keys().copied())
         .collect();
     // The same people for all: those of the first that has any.
-    let people: Vec<(String, f64)> = rooms().next().map_or(Vec::new(), |room| {
-        let named = room
-            .sight
-            .iter()
-            .map(|each| (each.person.clone(), each.stature_m));
+    let people: Vec<String> = rooms().next().map_or(Vec::new(), |room| {
+        let sight = room.sight.iter();
+        let named = sight.map(|each| layout::in_lines(&each.person_in_words, 14));
         named.collect()
     });
     let mut header = vec!["configuration".to_owned(), "free\n(%)".to_owned()];
     header.extend(regions.iter().map(|region| format!("\n{region}")));
     header.push("sight\n(%)".to_owned());
-    header.extend(
-        people
-            .iter()
-            .map(|(name, stature_m)| format!("{name}\n{stature_m:.2} m")),
-    );
+    header.extend(people);
     header.extend(
         [
             "hand cone\n(deg)",
@@ -458,30 +466,35 @@ fn write_missed(out: &mut String, report: &Report, goal: &str) -> std::fmt::Resu
         .iter()
         .filter(|result| result.goal == goal && !result.pass)
     {
-        let measured = result.value.zip(result.limit).map(|(value, limit)| {
-            let (value, limit) = value_and_limit(value, limit, result.unit);
-            format!("{value}, limit {limit}")
-        });
-        let parts = [
-            result.label.clone(),
-            result.engine.clone(),
-            Some(format!("{}:", result.criterion)),
-            measured,
-            Some(result.detail.clone()),
-        ];
-        let parts: Vec<String> = parts
-            .into_iter()
-            .flatten()
-            .filter(|p| !p.is_empty())
-            .collect();
         let word = if missed_as_expected(report, result) {
             "missed as expected:"
         } else {
             "FAILED"
         };
-        writeln!(out, "{word} {}", parts.join(" "))?;
+        writeln!(out, "{word} {}", missed_in_words(result))?;
     }
     Ok(())
+}
+
+/// A criterion that was not met: of what, value and limit.
+fn missed_in_words(result: &CriterionResult) -> String {
+    let measured = result.value.zip(result.limit).map(|(value, limit)| {
+        let (value, limit) = value_and_limit(value, limit, result.unit);
+        format!("{value}, limit {limit}")
+    });
+    let parts = [
+        result.label.clone(),
+        result.engine.clone(),
+        Some(format!("{}:", result.criterion)),
+        measured,
+        Some(result.detail.clone()),
+    ];
+    let parts: Vec<String> = parts
+        .into_iter()
+        .flatten()
+        .filter(|part| !part.is_empty())
+        .collect();
+    parts.join(" ")
 }
 
 /// How the planned needle keeps away from what it must not meet, in a sentence.

@@ -1,0 +1,69 @@
+//! Whether pictures are drawn.
+
+use clap::Args;
+
+use crate::output::complain;
+
+/// Pictures are most of the time and of the size of results, and nobody looks at them in continuous
+/// integration.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub(crate) struct PicturesArguments {
+    /// Draw pictures although the environment variable CI is set, which leaves them out.
+    #[arg(long)]
+    pub pictures: bool,
+    /// Draw no pictures.
+    #[arg(long, conflicts_with = "pictures")]
+    pub no_pictures: bool,
+}
+
+impl PicturesArguments {
+    /// Whether to draw; says so where nobody asked for none and none are drawn.
+    pub fn are_wanted(self, quiet: bool) -> bool {
+        if self.pictures || self.no_pictures {
+            return self.pictures;
+        }
+        let is_left_out = is_ci(std::env::var("CI").ok().as_deref());
+        if is_left_out && !quiet {
+            complain("no pictures, because CI is set; --pictures draws them");
+        }
+        !is_left_out
+    }
+}
+
+/// Whether a value of the variable `CI` says that this is continuous integration.
+fn is_ci(value: Option<&str>) -> bool {
+    let value = value.unwrap_or_default().trim().to_ascii_lowercase();
+    !["", "0", "false"].contains(&value.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ci_is_set_unless_it_is_empty_false_or_0() {
+        for value in ["true", "1", "yes", "woodpecker"] {
+            assert!(is_ci(Some(value)), "{value}");
+        }
+        for value in [
+            None,
+            Some(""),
+            Some("false"),
+            Some("False"),
+            Some("0"),
+            Some(" "),
+        ] {
+            assert!(!is_ci(value), "{value:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_asked_for_goes_before_the_environment() {
+        let asked = |pictures, no_pictures| PicturesArguments {
+            pictures,
+            no_pictures,
+        };
+        assert!(asked(true, false).are_wanted(true));
+        assert!(!asked(false, true).are_wanted(true));
+    }
+}
