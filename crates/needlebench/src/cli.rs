@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser, Subcommand};
 use needlebench_bench::provenance::PROGRAM_VERSION;
 
+use crate::clock::elapsed;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, FkArguments,
     ISO9283_HELP, IkArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments,
@@ -143,6 +144,7 @@ pub fn main() -> ExitCode {
 }
 
 fn run() -> ExitCode {
+    elapsed();
     let cli = Cli::parse();
     keep_to_width();
     let result = match cli.command {

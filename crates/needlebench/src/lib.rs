@@ -4,6 +4,7 @@
 
 mod arguments;
 mod cli;
+mod clock;
 mod command;
 pub mod exit;
 mod findings;

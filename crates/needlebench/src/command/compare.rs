@@ -8,12 +8,12 @@ mod thresholds;
 pub(crate) use help::compare_help;
 
 use crate::arguments::{EngineArgument, EngineParser};
-use crate::output::complain;
+use crate::output::{complain, print_wide};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use needlebench_cell::{Finding, Overrides, read_data_text};
+use needlebench_cell::{FileKind, Finding, Overrides, or_wrong_kind, read_data_text};
 use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::compare::{CompareOptions, compare as compare_reports};
 use needlebench_evaluation::{Compared, StoredReport};
@@ -24,11 +24,12 @@ use case::case_of_study;
 use studies::{compare_if_studies, is_study};
 use thresholds::thresholds;
 
+use crate::clock::elapsed;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::progress::TerminalProgress;
 use needlebench_bench::{RunOptions, Runnable};
-use needlebench_report::table::comparison::comparison_text;
+use needlebench_report::table::comparison::{comparison_screen, comparison_text};
 use needlebench_report::{comparison_junit, comparison_markdown, write_atomically};
 
 #[derive(Debug, Args)]
@@ -69,7 +70,10 @@ pub(crate) struct CompareArguments {
     /// Do not fail where a goal, a configuration, a metric or cases of A are missing in B.
     #[arg(long)]
     pub allow_lost: bool,
-    /// List values that did not change too.
+    /// Print a row for each configuration and metric, as wide as it is, instead of one screen.
+    #[arg(long, conflicts_with = "json")]
+    pub wide: bool,
+    /// With --wide, which it implies: list values that did not change too.
     #[arg(long)]
     pub all: bool,
     /// Print one JSON document.
@@ -117,8 +121,17 @@ impl From<Finding> for Refused {
     }
 }
 
+impl CompareArguments {
+    fn is_wide(&self) -> bool {
+        self.wide || self.all
+    }
+}
+
 /// Compares two results.
 pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus> {
+    if arguments.is_wide() {
+        print_wide();
+    }
     if let Some(status) = compare_if_studies(arguments)? {
         return Ok(status);
     }
@@ -139,7 +152,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus> {
                     .with_context(|| format!("cannot write {}", path.display()))
             };
             if let Some(path) = &arguments.junit {
-                write(path, comparison_junit(&comparison)?)?;
+                write(path, comparison_junit(&comparison, elapsed())?)?;
             }
             if let Some(path) = &arguments.markdown {
                 write(path, comparison_markdown(&comparison))?;
@@ -147,7 +160,12 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus> {
             if arguments.json {
                 print_json(&comparison)?;
             } else {
-                print_text(comparison_text(&comparison, arguments.all).trim_end())?;
+                let text = if arguments.is_wide() {
+                    comparison_text(&comparison, arguments.all)
+                } else {
+                    comparison_screen(&comparison)
+                };
+                print_text(text.trim_end())?;
             }
             Ok(ExitStatus::of(comparison.verdict))
         }
@@ -245,7 +263,9 @@ fn input(path: &Path, case: Option<u64>) -> Result<Input, Refused> {
         ));
         Refused::from(finding)
     })?;
-    let stored = StoredReport::parse(&file.display().to_string(), &text)?;
+    let stored = StoredReport::parse(&file.display().to_string(), &text)
+        .map_err(|finding| or_wrong_kind(&file, FileKind::Report, vec![finding]))
+        .map_err(Refused::Input)?;
     Ok(Input::Stored(stored))
 }
 

@@ -6,20 +6,23 @@ use std::path::Path;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use needlebench_cell::{Finding, read_data_text};
+use needlebench_cell::{FileKind, Finding, or_wrong_kind, read_data_text};
 use needlebench_evaluation::iso9283::{
     Attained, LogUnits, MeasuredReport, RotationColumns, measured_report, read_commanded, read_log,
 };
 use needlebench_evaluation::report::Verdict;
 use serde::Serialize;
 
+use super::run::probe_file;
 use super::{print_json, print_text};
 
 use crate::arguments::PicturesArguments;
+use crate::clock::elapsed;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use needlebench_report::files::{Folder, write_measured};
 use needlebench_report::table::iso9283::measured_text;
+use needlebench_report::{JudgedLimit, limits_junit, write_atomically};
 
 pub(crate) const ISO9283_HELP: &str = "\
 Both files are tables whose first line names the columns and their units; comma, semicolon (with \
@@ -71,6 +74,9 @@ pub(crate) struct Iso9283Arguments {
     /// Folder for report.json, the measurements in the base frame, and a picture.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Write JUnit XML of the limits to this file.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
     /// Print one JSON document.
     #[arg(long)]
     pub json: bool,
@@ -138,19 +144,36 @@ struct Judged<'a> {
     #[serde(flatten)]
     report: &'a MeasuredReport,
     verdict: Verdict,
-    limits: Vec<JudgedLimit>,
+    limits: Vec<Limit>,
 }
 
 #[derive(Serialize)]
-struct JudgedLimit {
+struct Limit {
     criterion: &'static str,
     value_m: Option<f64>,
     limit_m: f64,
     pass: bool,
 }
 
+impl Limit {
+    fn in_words(&self) -> JudgedLimit {
+        JudgedLimit {
+            criterion: self.criterion.to_owned(),
+            value: self.value_m.map(|metres| format!("{:.4} mm", metres * 1e3)),
+            limit: format!("{} mm", self.limit_m * 1e3),
+            pass: self.pass,
+        }
+    }
+}
+
 /// Evaluates a tracker's log.
 pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus> {
+    if let Some(path) = &arguments.junit
+        && let Err(finding) = probe_file(path, "--junit")
+    {
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
     let (report, attained) = match measured(arguments) {
         Ok(measured) => measured,
         Err(findings) => {
@@ -172,6 +195,12 @@ pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus> {
     if let Some(folder) = &arguments.out {
         write_results(folder, arguments, &judged, &attained)
             .with_context(|| format!("cannot write the results to {}", folder.display()))?;
+    }
+    if let Some(path) = &arguments.junit {
+        let limits: Vec<JudgedLimit> = judged.limits.iter().map(Limit::in_words).collect();
+        let document = limits_junit(&arguments.csv.display().to_string(), &limits, elapsed())?;
+        write_atomically(path, document.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))?;
     }
     if arguments.json {
         print_json(&judged)?;
@@ -217,8 +246,11 @@ fn measured(arguments: &Iso9283Arguments) -> Result<(MeasuredReport, Vec<Attaine
     let commanded_file = arguments.commanded.display().to_string();
     let log_text = read(&arguments.csv)?;
     let commanded_text = read(&arguments.commanded)?;
-    let commanded = read_commanded(&commanded_file, &commanded_text, units)?;
-    let log = read_log(&log_file, &log_text, &commanded, units)?;
+    let or_other = |path: &Path, findings| or_wrong_kind(path, FileKind::Table, findings);
+    let commanded = read_commanded(&commanded_file, &commanded_text, units)
+        .map_err(|findings| or_other(&arguments.commanded, findings))?;
+    let log = read_log(&log_file, &log_text, &commanded, units)
+        .map_err(|findings| or_other(&arguments.csv, findings))?;
     measured_report(
         &log_file,
         &commanded_file,
@@ -246,7 +278,7 @@ fn read(path: &Path) -> Result<String, Vec<Finding>> {
     })
 }
 
-fn limits(arguments: &Iso9283Arguments, report: &MeasuredReport) -> Vec<JudgedLimit> {
+fn limits(arguments: &Iso9283Arguments, report: &MeasuredReport) -> Vec<Limit> {
     let statistics = &report.statistics;
     [
         ("max_ap", arguments.max_ap, Some(statistics.ap_m)),
@@ -256,7 +288,7 @@ fn limits(arguments: &Iso9283Arguments, report: &MeasuredReport) -> Vec<JudgedLi
     .into_iter()
     .filter_map(|(criterion, limit_mm, value_m)| {
         let limit_m = limit_mm? * 1e-3;
-        Some(JudgedLimit {
+        Some(Limit {
             criterion,
             value_m,
             limit_m,

@@ -10,7 +10,8 @@ use needlebench_bench::RunOptions;
 use needlebench_bench::replay::{arm_files, named_by, replay as replay_run};
 use needlebench_cell::scenario::ReplaySection;
 use needlebench_cell::{
-    Arm, Finding, LogColumns, Overrides, ResolvedScenario, load_scenario, resolve_scenario,
+    Arm, FileKind, Finding, LogColumns, Overrides, ResolvedScenario, load_scenario, or_wrong_kind,
+    resolve_scenario,
 };
 use needlebench_recorded::{
     AngleUnit, EffortMeaning, ReadOptions, RecordedRun, TimeUnit, arm_fits, read_log,
@@ -21,6 +22,7 @@ use needlebench_report::table::replay::text;
 use super::run::prepare_folder;
 use super::{overrides, print_json, print_text};
 use crate::arguments::{EngineArgument, EngineParser, PicturesArguments, RobotArguments};
+use crate::clock::elapsed;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::output::{complain, shown};
@@ -173,7 +175,6 @@ type Prepared = (RecordedRun, ResolvedScenario, String, PathBuf);
 
 fn prepared(arguments: &ReplayArguments) -> Result<Prepared, Vec<Finding>> {
     let one = |finding: Finding| vec![finding];
-    let of_log = |finding| or_wrong_kind(&arguments.log, FileKind::Table, vec![finding]);
     let options = ReadOptions {
         time: arguments.time_unit.map(|unit| match unit {
             TimeArgument::S => TimeUnit::Seconds,
@@ -208,7 +209,12 @@ fn prepared(arguments: &ReplayArguments) -> Result<Prepared, Vec<Finding>> {
     let name = file_name(&arguments.log);
     let folder = arguments.out.join(name);
     prepare_folder(&folder).map_err(one)?;
-    let run = read_log(&arguments.log, &options)?;
+    let run = read_log(&arguments.log, &options).map_err(|findings| {
+        match FileKind::of(&arguments.log) {
+            Some(FileKind::Mcap) => findings,
+            _ => or_wrong_kind(&arguments.log, FileKind::Table, findings),
+        }
+    })?;
     let (resolved, found) = match of_scenario {
         Some(resolved) => (resolved, "the scenario's".to_owned()),
         None => arm_alone(&run, overrides)?,
@@ -328,6 +334,7 @@ fn replayed(
             arguments.pictures.are_wanted(arguments.quiet),
             !arguments.no_page,
         ],
+        elapsed(),
     )
     .with_context(|| format!("cannot write the results to {}", shown(folder)))?;
     if arguments.json {

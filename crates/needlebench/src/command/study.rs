@@ -18,6 +18,7 @@ use needlebench_study::{
 use super::run::{Outputs, prepare_folder, probe_file, run_into};
 use super::{overrides, print_json, print_text};
 use crate::arguments::{RobotArguments, leave};
+use crate::clock::elapsed;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::output::{complain, shown};
@@ -271,6 +272,7 @@ fn finish(
     let output = StudyOutput {
         folder,
         junit: arguments.junit.as_deref(),
+        elapsed: elapsed(),
         page: !arguments.no_page,
         threads,
         cancel,

@@ -1,6 +1,7 @@
 //! Files of a replay.
 
 use std::io::Write;
+use std::time::Duration;
 
 use needlebench_bench::replay::{ArmFiles, Course, Replay};
 use needlebench_kinematics::JOINT_COUNT;
@@ -16,19 +17,20 @@ use crate::table::replay::text;
 /// Name of the calibration beside the arm's data.
 pub const CALIBRATION_FILE: &str = "calibration.yaml";
 
-/// Writes report, tables, JUnit, courses, the arm's data, the chart and the page.
+/// Writes report, tables, JUnit, courses, the arm's data, the chart and the page. `elapsed` is what it took.
 pub fn write_replay(
     replay: &Replay,
     arm: Option<&ArmFiles>,
     folder: Folder<'_>,
     [pictures, page]: [bool; 2],
+    elapsed: Duration,
 ) -> Result<(), FilesError> {
     folder.write_json("replay.json", &replay.report)?;
     folder.write(
         "replay.txt",
         layout::for_file(|| text(&replay.report)) + "\n",
     )?;
-    folder.write("junit.xml", replay_junit(&replay.report)?)?;
+    folder.write("junit.xml", replay_junit(&replay.report, elapsed)?)?;
     for (engine, course) in &replay.courses {
         let name = format!("course.{engine}.csv");
         folder.stream(&name, &mut |out| write_course(out, replay, course))?;

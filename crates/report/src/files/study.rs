@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use needlebench_bench::study::{
     ENGINE_FAILURE, PreparedStudy, Replanned, RobustnessResult, StudyCase, robustness_of,
@@ -75,6 +76,8 @@ pub struct StudyOutput<'a> {
     pub folder: &'a Path,
     /// Where JUnit goes, if anywhere.
     pub junit: Option<&'a Path>,
+    /// How long the command took so far.
+    pub elapsed: Duration,
     /// Whether the page is written.
     pub page: bool,
     /// Threads for what is computed on the way.
@@ -180,7 +183,7 @@ pub fn write_study(
     folder.write("summary.md", markdown)?;
     let text = summary_text(&blocks);
     if let Some(path) = output.junit {
-        let document = study_junit(&file.name, headline, &summary.criteria)?;
+        let document = study_junit(&file.name, headline, &summary.criteria, output.elapsed)?;
         write_atomically(path, document.as_bytes()).map_err(|source| FilesError::Write {
             path: path.to_owned(),
             source,

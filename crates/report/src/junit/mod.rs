@@ -2,12 +2,15 @@
 
 mod comparison;
 mod failure;
+mod limits;
 mod replay;
 mod run;
 mod study;
 mod study_comparison;
+mod times;
 
 pub use comparison::comparison_junit;
+pub use limits::{JudgedLimit, limits_junit};
 pub use replay::replay_junit;
 pub use run::junit;
 pub use study::study_junit;

@@ -1,14 +1,18 @@
 //! A replay: a case for each criterion.
 
+use std::time::Duration;
+
 use needlebench_bench::replay::{ReplayReport, SUBJECT};
 use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::failure::{failure, not_judged};
 use super::run::REQUIREMENT;
+use super::times::share_time;
 use crate::number::value_and_limit;
 
-/// A replay as a JUnit document. Contains no times: two replays give the same bytes.
-pub fn replay_junit(report: &ReplayReport) -> Result<String, SerializeError> {
+/// A replay as a JUnit document. Of two replays its times alone differ: `elapsed`,
+/// shared evenly among its cases.
+pub fn replay_junit(report: &ReplayReport, elapsed: Duration) -> Result<String, SerializeError> {
     let mut document = quick_junit::Report::new("needlebench");
     let name = format!("{SUBJECT}.{}", report.log.source.file);
     let mut suite = TestSuite::new(name.clone());
@@ -18,12 +22,14 @@ pub fn replay_junit(report: &ReplayReport) -> Result<String, SerializeError> {
             .map_or(String::new(), |engine| format!(" ({engine})"))
     };
     for result in &report.criteria {
+        let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        let (value, limit) =
+            value_and_limit(number(result.value), number(result.limit), result.unit);
+        let text = format!("{}: {value}, limit {limit}", result.detail);
         let status = if result.pass {
             TestCaseStatus::success()
         } else {
-            let of = |value: Option<f64>| value.unwrap_or(f64::NAN);
-            let (value, limit) = value_and_limit(of(result.value), of(result.limit), result.unit);
-            failure(&format!("{}: {value}, limit {limit}", result.detail))
+            failure(&text)
         };
         let mut case = TestCase::new(
             format!("{}{}", result.criterion, of(&result.engine)),
@@ -33,6 +39,7 @@ pub fn replay_junit(report: &ReplayReport) -> Result<String, SerializeError> {
             case.add_property((REQUIREMENT, requirement.as_str()));
         }
         case.set_classname(name.clone());
+        case.set_system_out(text);
         suite.add_test_case(case);
     }
     for open in &report.not_judged {
@@ -50,5 +57,6 @@ pub fn replay_junit(report: &ReplayReport) -> Result<String, SerializeError> {
         suite.add_test_case(TestCase::new(broken.engine.clone(), status));
     }
     document.add_test_suite(suite);
+    share_time(&mut document, elapsed);
     document.to_string()
 }

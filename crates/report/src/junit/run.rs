@@ -1,20 +1,25 @@
 //! A run: a suite for each goal, a case for each configuration.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use needlebench_evaluation::report::{CriterionResult, Report, Status, TraceOutcome};
 use needlebench_evaluation::{excitation, iso9283};
 use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::failure::{failure, not_judged};
+use super::times::{seconds, share_time};
 use crate::number::value_and_limit;
 
-/// Reports as one JUnit document. Contains no times: two runs give the same bytes.
+/// Reports as one JUnit document. Of two runs of the same inputs its times alone differ: each report's time
+/// of planning and simulation, shared evenly among its cases.
 ///
 /// A rejected configuration counts as skipped unless that contradicts what is expected of it.
 pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
     let mut document = quick_junit::Report::new("needlebench");
+    let mut total = Duration::ZERO;
     for report in reports {
+        let mut of_report = quick_junit::Report::new("");
         for goal in &report.goals {
             let mut suite = TestSuite::new(format!("{}.{}", report.scenario.name, goal.name));
             for configuration in &goal.configurations {
@@ -43,6 +48,7 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                 };
                 let mut case = TestCase::new(configuration.label, status);
                 add_requirements(&mut case, report, &goal.name, Some(configuration.label));
+                add_values(&mut case, report, &goal.name, Some(configuration.label));
                 case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
                 suite.add_test_case(case);
             }
@@ -62,16 +68,17 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
             };
             let mut case = TestCase::new("goal", status);
             add_requirements(&mut case, report, &goal.name, None);
+            add_values(&mut case, report, &goal.name, None);
             case.set_classname(format!("{}.{}", report.scenario.name, goal.name));
             suite.add_test_case(case);
-            document.add_test_suite(suite);
+            of_report.add_test_suite(suite);
         }
         for (subject, is_there) in [
             (iso9283::SUBJECT, report.iso9283.is_some()),
             (excitation::SUBJECT, report.excitation.is_some()),
         ] {
             if is_there || report.criteria.iter().any(|each| each.goal == subject) {
-                document.add_test_suite(suite_of(report, subject));
+                of_report.add_test_suite(suite_of(report, subject));
             }
         }
         if !report.engine_failures.is_empty() {
@@ -81,9 +88,15 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                 status.set_message(broken.message.clone());
                 suite.add_test_case(TestCase::new(broken.engine.clone(), status));
             }
-            document.add_test_suite(suite);
+            of_report.add_test_suite(suite);
         }
+        let took = ["planning_s", "simulation_s", "referee_s"].map(|key| report.timings.get(key));
+        let took = seconds(took.into_iter().flatten().sum());
+        share_time(&mut of_report, took);
+        document.add_test_suites(of_report.test_suites);
+        total += took;
     }
+    document.set_time(total);
     document.to_string()
 }
 
@@ -118,6 +131,22 @@ fn add_requirements(case: &mut TestCase, report: &Report, goal: &str, label: Opt
     }
 }
 
+/// What was judged of a configuration, or of the goal as a whole: each value with its limit, a line each.
+fn add_values(case: &mut TestCase, report: &Report, goal: &str, label: Option<&str>) {
+    let all = report.criteria.iter();
+    let of_it = all.filter(|each| each.goal == goal && each.label.as_deref() == label);
+    let lines: Vec<String> = of_it.map(judged).collect();
+    if !lines.is_empty() {
+        case.set_system_out(lines.join("\n"));
+    }
+}
+
+/// `met` or `missed`, and of what.
+fn judged(result: &CriterionResult) -> String {
+    let word = if result.pass { "met" } else { "missed" };
+    format!("{word}: {}", described(result))
+}
+
 /// What was not judged of a configuration, or of the goal as a whole: criteria and why.
 fn open(report: &Report, goal: &str, label: Option<&str>) -> String {
     let all = report.not_judged.iter();
@@ -148,6 +177,7 @@ fn suite_of(report: &Report, subject: &str) -> TestSuite {
             case.add_property((REQUIREMENT, requirement.as_str()));
         }
         case.set_classname(name.clone());
+        case.set_system_out(judged(result));
         suite.add_test_case(case);
     }
     for each in report.not_judged.iter().filter(|each| each.goal == subject) {

@@ -1,16 +1,21 @@
 //! The criteria of a study.
 
+use std::time::Duration;
+
 use needlebench_study::statistics::CriterionResult;
 use quick_junit::{SerializeError, TestCase, TestCaseStatus, TestSuite};
 
 use super::failure::{failure, not_judged};
 use super::run::REQUIREMENT;
+use super::times::share_time;
 
-/// The criteria of a study as one JUnit document; `headline` says what the study is no answer to.
+/// The criteria of a study as one JUnit document; `headline` says what the study is no answer to, and
+/// `elapsed` is shared evenly among the cases.
 pub fn study_junit(
     name: &str,
     headline: Option<&str>,
     criteria: &[CriterionResult],
+    elapsed: Duration,
 ) -> Result<String, SerializeError> {
     let mut document = quick_junit::Report::new("needlebench study");
     let mut suite = TestSuite::new(name.to_owned());
@@ -30,12 +35,11 @@ pub fn study_junit(
         } else if !criterion.is_judged() {
             not_judged(&criterion.detail)
         } else {
-            let value = criterion
-                .value
-                .map_or_else(|| "nothing".to_owned(), |value| format!("{value:.4}"));
             failure(&format!(
-                "{}: {value}, limit {} {}; cases {:?}",
-                criterion.detail, criterion.limit, criterion.unit, criterion.cases
+                "{}: {}; cases {:?}",
+                criterion.detail,
+                value_and_limit(criterion),
+                criterion.cases
             ))
         };
         let mut case = TestCase::new(format!("{}{of}", criterion.criterion), status);
@@ -43,12 +47,21 @@ pub fn study_junit(
         if let Some(requirement) = &criterion.requirement {
             case.add_property((REQUIREMENT, requirement.as_str()));
         }
+        let text = format!("{}: {}", criterion.detail, value_and_limit(criterion));
         case.set_system_out(match headline {
-            Some(headline) => format!("{}\n{headline}", criterion.detail),
-            None => criterion.detail.clone(),
+            Some(headline) => format!("{text}\n{headline}"),
+            None => text,
         });
         suite.add_test_case(case);
     }
     document.add_test_suite(suite);
+    share_time(&mut document, elapsed);
     document.to_string()
+}
+
+fn value_and_limit(criterion: &CriterionResult) -> String {
+    let value = criterion.value;
+    let value = value.map_or_else(|| "no value".to_owned(), |value| format!("{value:.4}"));
+    let text = format!("{value}, limit {} {}", criterion.limit, criterion.unit);
+    text.trim_end().to_owned()
 }

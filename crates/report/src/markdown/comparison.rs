@@ -3,9 +3,9 @@
 use needlebench_evaluation::compare::Comparison;
 use needlebench_evaluation::report::Verdict;
 
-use super::escape::{code, inline};
+use super::escape::{code, inline, paragraph};
 use crate::table::comparison::{
-    failure_text, goal_title, metric_texts, remarks, rows, side_text, unchanged,
+    failure_text, goal_title, metric_texts, remarks, rows, side_text, unchanged, verdict,
 };
 
 /// The comparison as Markdown, for pull requests: what changed alone.
@@ -21,6 +21,7 @@ pub fn comparison_markdown(comparison: &Comparison) -> String {
             }
         ),
         String::new(),
+        format!("{}.\n", paragraph(&verdict(comparison))),
         format!("- {}", inline(&side_text("A", &comparison.a))),
         format!("- {}", inline(&side_text("B", &comparison.b))),
     ];

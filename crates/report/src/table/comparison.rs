@@ -5,7 +5,8 @@ use needlebench_evaluation::compare::{
     Change, Comparison, ConfigurationComparison, GoalComparison, MetricComparison, Side,
 };
 
-use super::plain_table;
+use super::verdict::capitals;
+use super::{Table, plain_table};
 
 fn change_text(change: Change) -> &'static str {
     match change {
@@ -138,8 +139,188 @@ pub(crate) fn unchanged(goal: &GoalComparison) -> usize {
     rows(goal, true).iter().filter(|row| same(row)).count()
 }
 
-/// The comparison as text; `all` lists metrics that did not change too.
-pub fn comparison_text(comparison: &Comparison, all: bool) -> String {
+/// Losses that one screen lists, and metrics; of more the number is said.
+const MOST_LISTED: usize = 8;
+const MOST_METRICS: usize = 12;
+
+/// The comparison in one screen: verdict, losses, what became of each goal, and of each metric how many
+/// configurations are better or worse by it.
+pub fn comparison_screen(comparison: &Comparison) -> String {
+    let mut lines = vec![verdict(comparison)];
+    let failures = &comparison.failures;
+    let listed = failures.iter().take(MOST_LISTED);
+    lines.extend(listed.map(|failure| format!("  lost: {}", failure_text(failure))));
+    if failures.len() > MOST_LISTED {
+        lines.push(format!("  and {} more", failures.len() - MOST_LISTED));
+    }
+    lines.extend(sides(comparison));
+    let goals: Vec<&GoalComparison> = comparison.goals.iter().collect();
+    if goals.iter().any(|goal| has_news(goal)) {
+        lines.push(String::new());
+        lines.push(goals_table(&goals).to_string());
+    }
+    let metrics = metric_changes(&goals);
+    if metrics.is_empty() {
+        lines.push("no value changed beyond its resolution".to_owned());
+    } else {
+        lines.push(String::new());
+        lines.push(metrics_table(&metrics).to_string());
+        if metrics.len() > MOST_METRICS {
+            lines.push(format!("and {} more metrics", metrics.len() - MOST_METRICS));
+        }
+        lines.push("each configuration by itself: --wide".to_owned());
+    }
+    lines.join("\n")
+}
+
+/// Whether something of a goal changed that is not a metric, or metrics did.
+fn has_news(goal: &GoalComparison) -> bool {
+    goal.a.is_none()
+        || goal.b.is_none()
+        || !remarks(goal).is_empty()
+        || !rows(goal, false).is_empty()
+}
+
+/// How many configurations work, which is recommended, and how many values changed.
+fn goals_table(goals: &[&GoalComparison]) -> Table {
+    let mut table = plain_table(&[
+        "goal",
+        "work\nA to B",
+        "recommended\nA to B",
+        "values\nbetter",
+        "\nworse",
+    ]);
+    for goal in goals {
+        let work = |status: fn(&ConfigurationComparison) -> &Option<String>| {
+            let all = goal.configurations.iter();
+            all.filter(|each| status(each).as_deref() == Some("ok"))
+                .count()
+        };
+        let works = [work(|each| &each.status_a), work(|each| &each.status_b)];
+        let [a, b] = [&goal.recommended_a, &goal.recommended_b]
+            .map(|label| label.as_deref().unwrap_or("none"));
+        let recommended = if a == b {
+            a.to_owned()
+        } else {
+            format!("{a} to {b}")
+        };
+        let changed = rows(goal, false);
+        let count = |way: Change| {
+            changed
+                .iter()
+                .filter(|(_, found)| found.outcome == way)
+                .count()
+        };
+        let worse = count(Change::Worse) + count(Change::Lost);
+        let name = match (&goal.a, &goal.b) {
+            (Some(_), None) => format!("{}, not in B", goal.name()),
+            (None, Some(_)) => format!("{}, not in A", goal.name()),
+            _ => goal.name().to_owned(),
+        };
+        let works = if works[1] < works[0] {
+            Cell::new(format!("{} to {}", works[0], works[1])).fg(Color::Red)
+        } else {
+            Cell::new(format!("{} to {}", works[0], works[1]))
+        };
+        let right = |count: usize| Cell::new(count).set_alignment(CellAlignment::Right);
+        let better = count(Change::Better) + count(Change::New);
+        table.add_row(vec![
+            Cell::new(name),
+            works,
+            Cell::new(recommended),
+            right(better),
+            right(worse),
+        ]);
+    }
+    table
+}
+
+/// A metric that changed, over all goals and configurations.
+struct MetricChanges<'a> {
+    words: String,
+    better: usize,
+    worse: usize,
+    /// The largest change for the worse, or where there is none the largest, and of what.
+    largest: Option<(
+        &'a GoalComparison,
+        &'a ConfigurationComparison,
+        &'a MetricComparison,
+    )>,
+}
+
+fn metric_changes<'a>(goals: &[&'a GoalComparison]) -> Vec<MetricChanges<'a>> {
+    let mut all: Vec<MetricChanges<'a>> = Vec::new();
+    for goal in goals {
+        for (configuration, found) in rows(goal, false) {
+            let words = found.key.words();
+            let at = all
+                .iter()
+                .position(|each| each.words == words)
+                .unwrap_or_else(|| {
+                    let (better, worse) = (0, 0);
+                    all.push(MetricChanges {
+                        words,
+                        better,
+                        worse,
+                        largest: None,
+                    });
+                    all.len() - 1
+                });
+            let changes = &mut all[at];
+            match found.outcome {
+                Change::Better | Change::New => changes.better += 1,
+                Change::Worse | Change::Lost => changes.worse += 1,
+                Change::Changed | Change::Same => {}
+            }
+            let size = |found: &MetricComparison| {
+                let is_loss = matches!(found.outcome, Change::Worse | Change::Lost);
+                (is_loss, found.change.map_or(f64::INFINITY, f64::abs))
+            };
+            let is_larger = changes.largest.is_none_or(|(_, _, known)| {
+                let (new, old) = (size(found), size(known));
+                new.0.cmp(&old.0).then(new.1.total_cmp(&old.1)).is_gt()
+            });
+            if is_larger {
+                changes.largest = Some((goal, configuration, found));
+            }
+        }
+    }
+    // What got worse most often comes first; the order of the table of metrics breaks ties.
+    all.sort_by_key(|each| std::cmp::Reverse((each.worse, each.better)));
+    all
+}
+
+fn metrics_table(metrics: &[MetricChanges<'_>]) -> Table {
+    let mut table = plain_table(&["metric", "better", "worse", "largest change", "where"]);
+    for each in metrics.iter().take(MOST_METRICS) {
+        let right = |count: usize| Cell::new(count).set_alignment(CellAlignment::Right);
+        let (largest, place) = each
+            .largest
+            .map_or_else(Default::default, |(goal, of, found)| {
+                let [_, a, b, ..] = metric_texts(found);
+                (
+                    format!("{a} to {b}"),
+                    format!("{} {}", goal.name(), of.label),
+                )
+            });
+        let worse = if each.worse > 0 {
+            right(each.worse).fg(Color::Red)
+        } else {
+            right(each.worse)
+        };
+        table.add_row(vec![
+            Cell::new(&each.words),
+            right(each.better),
+            worse,
+            Cell::new(largest),
+            Cell::new(place),
+        ]);
+    }
+    table
+}
+
+/// The two results, what else differs between them, and notes.
+fn sides(comparison: &Comparison) -> Vec<String> {
     let mut lines = vec![side_text("A", &comparison.a), side_text("B", &comparison.b)];
     for difference in &comparison.provenance_differences {
         let text = |side: &Option<String>| side.clone().unwrap_or_else(|| "none".to_owned());
@@ -151,6 +332,13 @@ pub fn comparison_text(comparison: &Comparison, all: bool) -> String {
         ));
     }
     lines.extend(comparison.notes.iter().map(|note| format!("note: {note}")));
+    lines
+}
+
+/// The comparison with a row for each configuration and metric; `all` lists metrics that did not change too.
+pub fn comparison_text(comparison: &Comparison, all: bool) -> String {
+    let mut lines = vec![verdict(comparison)];
+    lines.extend(sides(comparison));
     for goal in &comparison.goals {
         lines.push(String::new());
         lines.push(goal_title(goal));
@@ -197,21 +385,36 @@ pub fn comparison_text(comparison: &Comparison, all: bool) -> String {
     lines.join("\n")
 }
 
-fn verdict(comparison: &Comparison) -> String {
-    let incomplete = comparison.incomplete.join("; ");
-    match (comparison.failures.len(), comparison.incomplete.is_empty()) {
-        (0, true) => "PASS: nothing was lost beyond what is allowed".to_owned(),
-        (0, false) => format!("INCOMPLETE: nothing is known to be lost, but {incomplete}"),
-        (count, complete) => {
-            let losses = if count == 1 { "loss" } else { "losses" };
-            let more = if complete {
-                String::new()
-            } else {
-                format!("; {incomplete}")
-            };
-            format!("FAIL: {count} {losses}{more}")
-        }
+/// The verdict in a line: what was compared, what was lost, what changed.
+pub(crate) fn verdict(comparison: &Comparison) -> String {
+    let count = |way: &[Change]| {
+        let rows = comparison.goals.iter().flat_map(|goal| rows(goal, false));
+        rows.filter(|(_, found)| way.contains(&found.outcome))
+            .count()
+    };
+    let goals = comparison.goals.len();
+    let configurations: usize = comparison
+        .goals
+        .iter()
+        .map(|goal| goal.configurations.len())
+        .sum();
+    let losses = match comparison.failures.len() {
+        0 => "nothing was lost beyond what is allowed".to_owned(),
+        1 => "1 loss".to_owned(),
+        count => format!("{count} losses"),
+    };
+    let mut text = format!(
+        "{}: {losses}; {goals} {}, {configurations} configurations; of those that work {} values are better, {} worse",
+        capitals(comparison.verdict),
+        if goals == 1 { "goal" } else { "goals" },
+        count(&[Change::Better, Change::New]),
+        count(&[Change::Worse, Change::Lost])
+    );
+    for reason in &comparison.incomplete {
+        text.push_str("; ");
+        text.push_str(reason);
     }
+    text
 }
 
 pub(crate) fn failure_text(failure: &needlebench_evaluation::compare::ComparisonFailure) -> String {

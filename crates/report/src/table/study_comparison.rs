@@ -150,11 +150,41 @@ pub(crate) fn failure_text(failure: &StudyFailure) -> String {
     }
 }
 
-/// The comparison as text; `all` lists what did not change too.
-pub fn study_comparison_text(comparison: &StudyComparison, all: bool) -> String {
-    let mut lines = intro(comparison);
-    let rows = shown(comparison, all);
+/// Rates and quantiles that one screen lists; of more the number is said.
+const MOST_LISTED: usize = 16;
+
+/// How much of a comparison is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Listed {
+    /// One screen of what changed.
+    Screen,
+    /// All that changed.
+    Changed,
+    /// What did not change too.
+    All,
+}
+
+/// The comparison as text, its verdict first.
+pub fn study_comparison_text(comparison: &StudyComparison, listed: Listed) -> String {
+    let mut lines = vec![verdict(comparison)];
+    let failures = comparison.failures.iter();
+    lines.extend(failures.map(|failure| format!("  lost: {}", failure_text(failure))));
+    lines.extend(intro(comparison));
+    let all = listed == Listed::All;
+    let mut rows = shown(comparison, all);
     let same = comparison.changes.len() - rows.len();
+    let mut more = 0;
+    if listed == Listed::Screen && rows.len() > MOST_LISTED {
+        // What is worse beyond chance first, then what is better, then what may be chance.
+        rows.sort_by_key(|change| {
+            (
+                !change.beyond_chance,
+                change.loss.is_none_or(|loss| loss <= 0.0),
+            )
+        });
+        more = rows.len() - MOST_LISTED;
+        rows.truncate(MOST_LISTED);
+    }
     if !rows.is_empty() {
         let mut table = plain_table(&["what", "A", "B", "B less A", ""]);
         for change in rows {
@@ -175,6 +205,9 @@ pub fn study_comparison_text(comparison: &StudyComparison, all: bool) -> String 
         }
         lines.push(table.to_string());
     }
+    if more > 0 {
+        lines.push(format!("and {more} more that changed: --wide"));
+    }
     if !all {
         lines.push(format!("{same} rates and quantiles are the same"));
     }
@@ -185,13 +218,26 @@ pub fn study_comparison_text(comparison: &StudyComparison, all: bool) -> String 
             threshold.threshold, threshold.limit, threshold.detail
         ));
     }
-    for failure in &comparison.failures {
-        lines.push(format!("FAILED {}", failure_text(failure)));
-    }
-    lines.push(match comparison.failures.len() {
-        0 => "PASS: nothing was lost beyond what is allowed".to_owned(),
-        1 => "FAIL: 1 loss".to_owned(),
-        count => format!("FAIL: {count} losses"),
-    });
-    lines.join("\n")
+    lines.join("\n").trim_end().to_owned()
+}
+
+/// The verdict in a line: what was lost, and how many rates and quantiles changed.
+pub(crate) fn verdict(comparison: &StudyComparison) -> String {
+    let beyond = |worse: bool| {
+        let changes = shown(comparison, false).into_iter();
+        let sure = changes.filter(|change| change.beyond_chance);
+        sure.filter(|change| (change.loss.unwrap_or_default() > 0.0) == worse)
+            .count()
+    };
+    let (word, losses) = match comparison.failures.len() {
+        0 => ("PASS", "nothing was lost beyond what is allowed".to_owned()),
+        1 => ("FAIL", "1 loss".to_owned()),
+        count => ("FAIL", format!("{count} losses")),
+    };
+    format!(
+        "{word}: {losses}; {} rates and quantiles, beyond chance {} worse and {} better",
+        comparison.changes.len(),
+        beyond(true),
+        beyond(false)
+    )
 }

@@ -17,10 +17,11 @@ use super::super::run::probe_file;
 use super::super::{print_json, print_text};
 use super::CompareArguments;
 use super::thresholds::{Given, thresholds};
+use crate::clock::elapsed;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
-use crate::output::shown;
-use needlebench_report::table::study_comparison::study_comparison_text;
+use crate::output::{print_wide, shown};
+use needlebench_report::table::study_comparison::{Listed, study_comparison_text};
 use needlebench_report::{study_comparison_junit, study_comparison_markdown, write_atomically};
 
 /// Whether a path is a study's folder, or its table.
@@ -36,6 +37,9 @@ pub(super) fn compare_if_studies(arguments: &CompareArguments) -> Result<Option<
     let studies = [&arguments.a, &arguments.b].map(|path| is_study(path));
     if studies != [true, true] {
         return Ok(None);
+    }
+    if arguments.is_wide() {
+        print_wide();
     }
     let prepared = match prepare(arguments) {
         Ok(prepared) => prepared,
@@ -56,7 +60,7 @@ pub(super) fn compare_if_studies(arguments: &CompareArguments) -> Result<Option<
             .with_context(|| format!("cannot write {}", path.display()))
     };
     if let Some(path) = &arguments.junit {
-        write(path, study_comparison_junit(&comparison)?)?;
+        write(path, study_comparison_junit(&comparison, elapsed())?)?;
     }
     if let Some(path) = &arguments.markdown {
         write(path, study_comparison_markdown(&comparison))?;
@@ -64,7 +68,12 @@ pub(super) fn compare_if_studies(arguments: &CompareArguments) -> Result<Option<
     if arguments.json {
         print_json(&comparison)?;
     } else {
-        print_text(study_comparison_text(&comparison, arguments.all).trim_end())?;
+        let listed = match (arguments.all, arguments.is_wide()) {
+            (true, _) => Listed::All,
+            (false, true) => Listed::Changed,
+            (false, false) => Listed::Screen,
+        };
+        print_text(study_comparison_text(&comparison, listed).trim_end())?;
     }
     Ok(Some(if comparison.pass {
         ExitStatus::Success
