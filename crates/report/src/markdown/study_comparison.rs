@@ -2,8 +2,8 @@
 
 use needlebench_study::compare::StudyComparison;
 
-use super::escape::inline;
-use crate::table::study_comparison::{failure_text, intro, row, shown};
+use super::escape::{inline, paragraph};
+use crate::table::study_comparison::{failure_text, intro, row, shown, verdict as summary_line};
 
 /// The comparison as Markdown, for pull requests: what changed alone.
 pub fn study_comparison_markdown(comparison: &StudyComparison) -> String {
@@ -13,6 +13,7 @@ pub fn study_comparison_markdown(comparison: &StudyComparison) -> String {
         inline(&comparison.a.source),
         inline(&comparison.b.source)
     )];
+    lines.push(format!("{}.\n", paragraph(&summary_line(comparison))));
     lines.extend(
         intro(comparison)
             .into_iter()
