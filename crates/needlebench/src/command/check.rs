@@ -7,8 +7,7 @@ use clap::Args;
 use needlebench_bench::Preview;
 use needlebench_bench::preview::BASIS;
 use needlebench_cell::{Finding, ResolvedScenario, part_in_words};
-use needlebench_report::number::value_and_limit;
-use needlebench_report::table::{fissures_in_words, route_in_words};
+use needlebench_report::table::{fissures_in_words, rejected_in_words, route_in_words};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -139,10 +138,10 @@ fn in_words(
     {
         write!(
             text,
-            "\n  start posture: within the limits, {:.1} mm clearance ({} to {})",
-            least_m * 1e3,
+            "\n  start posture: within the joints' limits; nearest are {} and {}, {:.1} mm apart",
             part_in_words(a),
-            part_in_words(b)
+            part_in_words(b),
+            least_m * 1e3
         )?;
     }
     for goal in &preview.goals {
@@ -151,19 +150,18 @@ fn in_words(
             "\n  goal {}: {} of 8 configurations can work ({BASIS})",
             goal.name, goal.working
         )?;
-        for each in goal.configurations.iter().filter(|each| !each.works) {
-            write!(text, "\n    {}: ", each.label)?;
-            match each.rejections.first() {
-                Some(rejection) => {
-                    let (value, limit) =
-                        value_and_limit(rejection.value, rejection.limit, rejection.unit);
-                    write!(
-                        text,
-                        "{}: {value} (limit {limit}): {}",
-                        rejection.rule, rejection.detail
-                    )?;
+        let rejected = goal.configurations.iter().filter(|each| !each.works);
+        let by_rules = rejected.clone();
+        let by_rules = by_rules.filter_map(|each| Some((each.label, each.rejections.first()?)));
+        for reason in rejected_in_words(by_rules) {
+            write!(text, "\n    {reason}")?;
+        }
+        for each in rejected.filter(|each| each.rejections.is_empty()) {
+            match each.missed {
+                Some(criterion) => {
+                    write!(text, "\n    misses {criterion}: {}", each.label)?;
                 }
-                None => text += each.missed.unwrap_or("does not work"),
+                None => write!(text, "\n    does not work: {}", each.label)?,
             }
         }
         if let Some(route) = &goal.needle_route {
@@ -174,7 +172,10 @@ fn in_words(
         }
         let target = &goal.target;
         let lesion = target.lesion.as_ref().map(|name| format!("lesion {name}"));
-        let organ = target.organ.as_ref().map(|name| format!("in {name}"));
+        let organ = target
+            .organ
+            .as_ref()
+            .map(|name| format!("in {}", part_in_words(name)));
         let holds: Vec<String> = lesion.into_iter().chain(organ).collect();
         if let Some(beyond_m) = target.beyond_lesion_m {
             write!(

@@ -1,9 +1,9 @@
 //! The atlas as a table.
 
 use needlebench_bench::GoalAtlas;
-use needlebench_cell::{Cell, Goal, Roll};
+use needlebench_cell::{Cell, Goal, Roll, rule_in_words};
 use needlebench_kinematics::ik::Configuration;
-use needlebench_planning::{Edge, Member, RollRange};
+use needlebench_planning::{Aim, Edge, Member, RollRange};
 
 use super::plain_table;
 
@@ -11,14 +11,14 @@ use super::plain_table;
 pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas) -> String {
     let mut table = plain_table(&[
         "configuration",
-        "works from",
-        "to (deg)",
-        "begins behind",
-        "ends at",
-        "best roll",
-        "least (mm)",
+        "works\nfrom (deg)",
+        "\nto (deg)",
+        "before it",
+        "after it",
+        "best\nroll (deg)",
+        "nearest\n(mm)",
         "between",
-        "joint margin",
+        "joint\nmargin",
         "|sin q5|",
         "|sin q3|",
     ]);
@@ -28,6 +28,7 @@ pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas) -> String {
             table.add_row([
                 label.clone(),
                 "nowhere".to_owned(),
+                String::new(),
                 nearest_miss(atlas, family.configuration),
             ]);
         }
@@ -40,18 +41,30 @@ pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas) -> String {
         Roll::Free => String::new(),
     };
     format!(
-        "goal {}: {} rolls, best for {}{fixed}\n{table}",
+        "goal {}: {} rolls of the guide about the needle; the best roll is best for {}{fixed}\n{table}",
         goal.name,
         atlas.rolls_rad.len(),
-        atlas.aim.name().replace('_', " "),
+        aim_in_words(atlas.aim),
     )
+}
+
+/// What a roll is best at.
+fn aim_in_words(aim: Aim) -> &'static str {
+    match aim {
+        Aim::Clearance => "clearance",
+        Aim::JointMargin => "distance from the joint limits",
+        Aim::Singularity => "distance from singularities",
+        Aim::TipAccuracy => "accuracy of the tip",
+        Aim::Balanced => "all aims together",
+    }
 }
 
 fn row(cell: &Cell, atlas: &GoalAtlas, label: String, range: &RollRange) -> Vec<String> {
     let degrees = |rad: f64| format!("{:.2}", rad.to_degrees());
     let edge = |edge: &Option<Edge>| {
-        edge.as_ref()
-            .map_or(String::new(), |edge| edge.rejection.rule.name().to_owned())
+        edge.as_ref().map_or(String::new(), |edge| {
+            rule_in_words(edge.rejection.rule.name()).to_owned()
+        })
     };
     let best = &range.best_for(atlas.aim).member;
     let least = best.least_clearance();
@@ -92,6 +105,10 @@ fn nearest_miss(atlas: &GoalAtlas, configuration: Configuration) -> String {
                 .rejections
                 .first()
                 .map_or("", |rejection| rejection.rule.name());
-            format!("{rule} at {:.0}", member.roll_rad.to_degrees())
+            format!(
+                "{} at {:.0} deg",
+                rule_in_words(rule),
+                member.roll_rad.to_degrees()
+            )
         })
 }

@@ -20,4 +20,4 @@ pub mod study_comparison;
 pub(crate) mod verdict;
 
 pub use plain::{Table, plain_table};
-pub use run::{fissures_in_words, report_screen, report_text, route_in_words};
+pub use run::{fissures_in_words, rejected_in_words, report_screen, report_text, route_in_words};

@@ -12,7 +12,7 @@ use needlebench_evaluation::excitation;
 use needlebench_evaluation::iso9283::SUBJECT;
 use needlebench_evaluation::metric::Heading;
 use needlebench_evaluation::report::{
-    ConfigurationReport, CriterionResult, GoalReport, Report, RouteReport, Status,
+    ConfigurationReport, CriterionResult, GoalReport, RejectionReport, Report, RouteReport, Status,
 };
 use needlebench_planning::Rule;
 use needlebench_uncertainty::budget::ErrorBudget;
@@ -495,6 +495,39 @@ fn missed_in_words(result: &CriterionResult) -> String {
         .filter(|part| !part.is_empty())
         .collect();
     parts.join(" ")
+}
+
+/// Why configurations cannot work, a sentence for each reason with all that it holds for; of each its label and the
+/// first rule that it breaks.
+pub fn rejected_in_words<'r>(
+    rejected: impl Iterator<Item = (&'r str, &'r RejectionReport)>,
+) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for (label, first) in rejected {
+        let reason = first.detail.split(';').next().unwrap_or_default();
+        let text = format!("{label}{}", by_how_much(first));
+        match reasons.iter_mut().find(|(known, _)| *known == reason) {
+            Some((_, labels)) => labels.push(text),
+            None => reasons.push((reason, vec![text])),
+        }
+    }
+    let in_words = reasons.into_iter();
+    in_words
+        .map(|(reason, labels)| format!("{reason}: {}", labels.join(", ")))
+        .collect()
+}
+
+/// By how much a rule is broken; of some it is no number.
+fn by_how_much(rejection: &RejectionReport) -> String {
+    let is_rule = |rule: Rule| rejection.rule == rule.name();
+    let (value, limit) = value_and_limit(rejection.value, rejection.limit, rejection.unit);
+    if is_rule(Rule::Merged) {
+        String::new()
+    } else if is_rule(Rule::Unreachable) {
+        format!(" ({value} short)")
+    } else {
+        format!(" ({value}, at least {limit})")
+    }
 }
 
 /// How the planned needle keeps away from what it must not meet, in a sentence.

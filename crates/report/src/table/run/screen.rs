@@ -8,14 +8,14 @@ use std::fmt::Write;
 use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_cell::rule_in_words;
 use needlebench_engine::Engine;
-use needlebench_evaluation::report::{
-    ConfigurationReport, GoalReport, RejectionReport, Report, Status,
-};
-use needlebench_planning::Rule;
+use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status};
 
-use super::{fissures_in_words, goal_heading, missed_in_words, route_in_words, write_expected};
+use super::{
+    fissures_in_words, goal_heading, missed_in_words, rejected_in_words, route_in_words,
+    write_expected,
+};
 use crate::layout;
-use crate::number::{millimetres, value_and_limit};
+use crate::number::millimetres;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::plain::{Table, plain_table};
 use crate::table::ranking::words;
@@ -334,35 +334,17 @@ fn state(status: &str) -> Cell {
 
 /// Configurations that cannot work, those with the same reason together.
 fn write_rejected(out: &mut String, goal: &GoalReport) -> std::fmt::Result {
-    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
-    let mut count = 0;
-    for each in &goal.configurations {
-        let Some(first) = each.rejections.first() else {
-            continue;
-        };
-        count += 1;
-        let reason = first.detail.split(';').next().unwrap_or_default();
-        let text = format!("{}{}", each.label, by_how_much(first));
-        match reasons.iter_mut().find(|(known, _)| *known == reason) {
-            Some((_, labels)) => labels.push(text),
-            None => reasons.push((reason, vec![text])),
-        }
-    }
+    let all = goal.configurations.iter();
+    let rejected = all.filter_map(|each| Some((each.label, each.rejections.first()?)));
+    let reasons = rejected_in_words(rejected.clone());
+    let count = rejected.count();
     if count > 0 {
         writeln!(out, "{count} of {} cannot work:", goal.configurations.len())?;
     }
-    for (reason, labels) in reasons {
-        writeln!(out, "  {reason}: {}", labels.join(", "))?;
+    for reason in reasons {
+        writeln!(out, "  {reason}")?;
     }
     Ok(())
-}
-
-fn by_how_much(rejection: &RejectionReport) -> String {
-    if rejection.rule == Rule::Merged.name() {
-        return String::new();
-    }
-    let (value, limit) = value_and_limit(rejection.value, rejection.limit, rejection.unit);
-    format!(" ({value}, limit {limit})")
 }
 
 // ---- Several goals ----
