@@ -31,7 +31,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Plan, simulate and measure every configuration of every goal.
-    #[command(after_help = "Example: needlebench run scenarios/table3.toml ")]
+    #[command(after_help = "Example: needlebench run scenarios/table3.toml")]
     Run(RunArguments),
     /// Parse, resolve and validate scenarios without simulating.
     #[command(after_help = "Example: needlebench check scenarios/*.toml")]

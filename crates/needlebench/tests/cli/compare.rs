@@ -48,7 +48,7 @@ fn result_against_itself_passes_and_lists_nothing() {
     let bench = bench(|_| ());
     let text = compare(&bench, &["--max-loss", "clearance=0mm"]).exits_with(0);
     assert!(text.stdout.contains("PASS"), "{text:#?}");
-    assert!(!text.stdout.contains('│'), "{text:#?}");
+    assert!(!text.stdout.contains('─'), "{text:#?}");
     assert_eq!(text.stderr, "");
     let all = compare(&bench, &["--all"]).exits_with(0).stdout;
     assert!(all.contains("tip error") && all.contains("same"), "{all}");
@@ -134,7 +134,7 @@ fn status_that_got_worse_exits_with_1_unless_that_is_allowed() {
         configuration["status"] = json!("rejected");
         configuration["rejections"] = json!([{"rule": "collision", "detail": "forearm and skin"}]);
     });
-    let answer = compare(&bench, &[]).exits_with(1);
+    let answer = compare(&bench, &["--wide"]).exits_with(1);
     let line = "Right-Up-Fold: worse: ok -> rejected (collision: forearm and skin)";
     assert!(answer.stdout.contains(line), "{answer:#?}");
     compare(&bench, &["--allow-status-change"]).exits_with(0);
@@ -145,7 +145,7 @@ fn goal_with_another_name_is_matched_when_told() {
     let bench = bench(|report| report["goals"][0]["name"] = json!("entry"));
     let answer = compare(&bench, &[]).exits_with(2);
     answer.complains(["no goal in common", "pose", "entry", "--goal A=B"]);
-    let answer = compare(&bench, &["--goal", "pose=entry"]).exits_with(0);
+    let answer = compare(&bench, &["--goal", "pose=entry", "--wide"]).exits_with(0);
     assert!(
         answer.stdout.contains("goal pose, in B entry"),
         "{answer:#?}"
@@ -297,7 +297,8 @@ fn report_of_a_version_before_rankings_is_read() {
             }
         }
     });
-    let answer = bench.run(&["compare", "b.json", "a.json"]).exits_with(0);
+    let answer = bench.run(&["compare", "b.json", "a.json", "--wide"]);
+    let answer = answer.exits_with(0);
     assert!(answer.stdout.contains("new"), "{answer:#?}");
     compare(&bench, &["--max-loss", "motion_time=1s"]).exits_with(1);
 }

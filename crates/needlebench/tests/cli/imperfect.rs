@@ -47,7 +47,7 @@ fn engines_and_balance_of_torques_agree_on_where_an_imperfect_arm_ends() {
     mujoco_is_ready();
     let text = with_edit(&imperfect(BLOCKS), "hold_s = 0.1", "hold_s = 0.6");
     let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["run", "s.toml", "--out", "a", "--jobs", "1"]);
+    let answer = bench.run(&["run", "s.toml", "--out", "a", "--jobs", "1", "--wide"]);
     assert!(
         answer.stdout.contains("error budget of the needle's tip"),
         "{answer:#?}"
@@ -94,9 +94,9 @@ fn engines_and_balance_of_torques_agree_on_an_arm_under_another_gravity() {
     let text = with_edit(SMALL, "hold_s = 0.1", "hold_s = 1.0");
     let text = format!("{text}\n[controller]\ngravity_m_s2 = 9.82\n");
     let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["run", "s.toml", "--out", "a"]);
+    let answer = bench.run(&["run", "s.toml", "--out", "a", "--wide"]);
     for part in [
-        "of the nominal arm under another gravity than its controller believes in",
+        "with the nominal arm under another gravity than its controller believes in",
         "note: the controller believes in a gravity of 9.82 m/s^2, where it is 9.80665 m/s^2",
     ] {
         assert!(answer.stdout.contains(part), "no `{part}` in {answer:#?}");

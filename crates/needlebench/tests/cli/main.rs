@@ -36,5 +36,6 @@ mod replay;
 mod robust_io;
 mod run;
 mod schema;
+mod screen;
 mod study;
 mod support;

@@ -98,7 +98,7 @@ fn room_is_reported_for_every_posture_with_people_or_without() {
     }
 
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["run", "s.toml", "--engine", "rapier"]);
+    let answer = bench.run(&["run", "s.toml", "--engine", "rapier", "--wide"]);
     assert!(answer.exits_with(0).stdout.contains("room for people"));
     let report = bench.read_json("out/small/report.json");
     for room in rooms(&report) {

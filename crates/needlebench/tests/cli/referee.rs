@@ -21,7 +21,9 @@ fn simulated(report: &Value) -> Vec<&Value> {
 fn referee_measures_both_engines_and_their_order() {
     mujoco_is_ready();
     let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["run", "s.toml", "--referee"]).exits_with(0);
+    let answer = bench
+        .run(&["run", "s.toml", "--referee", "--wide"])
+        .exits_with(0);
     assert!(answer.stdout.contains("each engine beside the referee"));
     let report = bench.read_json("out/small/report.json");
     let engines = report["provenance"]["engines"].as_array().unwrap();

@@ -133,7 +133,9 @@ impl Bench {
         command
             .args(arguments)
             .current_dir(self.folder.path())
+            .env_remove("CI")
             .env_remove("CLICOLOR_FORCE")
+            .env_remove("COLUMNS")
             .env_remove("GITHUB_STEP_SUMMARY")
             .env_remove("NEEDLEBENCH_HARNESS_COMMAND")
             .stdin(Stdio::null());

@@ -149,7 +149,7 @@ pub fn comparison_screen(comparison: &Comparison) -> String {
     let mut lines = vec![verdict(comparison)];
     let failures = &comparison.failures;
     let listed = failures.iter().take(MOST_LISTED);
-    lines.extend(listed.map(|failure| format!("  lost: {}", failure_text(failure))));
+    lines.extend(listed.map(|failure| format!("  FAILED {}", failure_text(failure))));
     if failures.len() > MOST_LISTED {
         lines.push(format!("  and {} more", failures.len() - MOST_LISTED));
     }

@@ -168,7 +168,7 @@ pub enum Listed {
 pub fn study_comparison_text(comparison: &StudyComparison, listed: Listed) -> String {
     let mut lines = vec![verdict(comparison)];
     let failures = comparison.failures.iter();
-    lines.extend(failures.map(|failure| format!("  lost: {}", failure_text(failure))));
+    lines.extend(failures.map(|failure| format!("  FAILED {}", failure_text(failure))));
     lines.extend(intro(comparison));
     let all = listed == Listed::All;
     let mut rows = shown(comparison, all);

@@ -526,7 +526,7 @@ fn by_how_much(rejection: &RejectionReport) -> String {
     } else if is_rule(Rule::Unreachable) {
         format!(" ({value} short)")
     } else {
-        format!(" ({value}, at least {limit})")
+        format!(" ({value}, limit {limit})")
     }
 }
 

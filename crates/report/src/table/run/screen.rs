@@ -39,7 +39,7 @@ fn write_screen(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     let name = &report.scenario.name;
     writeln!(
         out,
-        "{}: {name}: {}",
+        "{} {name}: {}",
         capitals(report.verdict),
         counts(report)
     )?;
@@ -76,10 +76,10 @@ fn write_failures(out: &mut String, report: &Report) -> std::fmt::Result {
         .criteria
         .iter()
         .filter(|result| !result.pass && !missed_as_expected(report, result))
-        .map(|result| format!("{}: {}", result.goal, missed_in_words(result)))
+        .map(|result| format!("{} {}", result.goal, missed_in_words(result)))
         .collect();
     for each in missed.iter().take(MOST_MISSED) {
-        writeln!(out, "  missed: {each}")?;
+        writeln!(out, "  FAILED {each}")?;
     }
     if missed.len() > MOST_MISSED {
         writeln!(out, "  and {} more", missed.len() - MOST_MISSED)?;
