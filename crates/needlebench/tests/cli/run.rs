@@ -393,6 +393,16 @@ fn several_scenarios_come_in_one_document_and_the_worst_status_counts() {
     for part in ["<testsuites", "small", "strict", "<failure"] {
         assert!(junit.contains(part), "{junit}");
     }
+    // Each case says how long it took, and what was judged against which limit.
+    let cases = || junit.split("<testcase ").skip(1);
+    assert_eq!(cases().count(), 18);
+    for case in cases() {
+        let open = case.split_once('>').unwrap().0;
+        assert!(open.contains(" time=\""), "{case}");
+        if !case.contains("<skipped") {
+            assert!(case.contains("limit 1.00 mm"), "{case}");
+        }
+    }
 }
 
 #[test]

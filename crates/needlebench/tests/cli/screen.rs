@@ -67,7 +67,7 @@ fn wide_prints_all_tables_however_wide() {
 #[test]
 fn several_goals_are_summed_up_and_not_listed() {
     let second = SMALL.split_once("[[goals]]").expect("it has a goal").1;
-    let second = second.split("\n[").next().unwrap_or_default();
+    let second = second.split("\n[motion]").next().unwrap_or_default();
     let second = second.replacen("name = \"pose\"", "name = \"second_pose\"", 1);
     let text = SMALL.replacen("[[goals]]", &format!("[[goals]]{second}\n\n[[goals]]"), 1);
     let bench = Bench::with_scenario(&text);

@@ -159,6 +159,18 @@ impl Bench {
     }
 }
 
+/// JUnit XML without its times, which alone differ between two runs of the same inputs.
+pub fn without_times(junit: &[u8]) -> String {
+    let text = String::from_utf8(junit.to_vec()).unwrap();
+    let mut parts = text.split(" time=\"");
+    let mut rest = parts.next().unwrap().to_owned();
+    for part in parts {
+        rest.push_str(part.split_once('"').unwrap().1);
+    }
+    assert_ne!(rest, text, "it has times");
+    rest
+}
+
 /// Makes the MuJoCo environment if this machine has none yet, so that no test has to wait for it.
 #[track_caller]
 pub fn mujoco_is_ready() {
