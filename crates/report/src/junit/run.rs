@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use needlebench_cell::rule_in_words;
 use needlebench_evaluation::report::{CriterionResult, Report, Status, TraceOutcome};
 use needlebench_evaluation::{excitation, iso9283};
 use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, TestSuite};
@@ -38,7 +39,11 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                 } else if configuration.status == Status::Rejected {
                     let mut status = TestCaseStatus::skipped();
                     if let Some(rejection) = configuration.rejections.first() {
-                        status.set_message(format!("{}: {}", rejection.rule, rejection.detail));
+                        status.set_message(format!(
+                            "{}: {}",
+                            rule_in_words(rejection.rule),
+                            rejection.detail
+                        ));
                     }
                     status
                 } else if configuration.engines.is_empty() {

@@ -1,8 +1,8 @@
 //! Markdown summary, for pull requests and CI pages.
 
-use needlebench_cell::pair_in_words;
 use std::fmt::Write;
 
+use needlebench_cell::{pair_in_words, rule_in_words};
 use needlebench_engine::Engine;
 use needlebench_evaluation::report::{GoalReport, Report, Status, TraceOutcome, Verdict};
 
@@ -31,6 +31,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     if !report.scenario.description.is_empty() {
         writeln!(out, "{}\n", paragraph(&report.scenario.description))?;
     }
+    write_judged(out, report)?;
     for goal in &report.goals {
         writeln!(out, "## {}\n", inline(&goal.name))?;
         write_configurations(out, report, goal, engines)?;
@@ -57,7 +58,12 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         for each in &goal.configurations {
             if let Some(first) = each.rejections.first() {
                 let detail = inline(&first.detail);
-                writeln!(out, "- {}: {}: {detail}", each.label, first.rule)?;
+                writeln!(
+                    out,
+                    "- {}: {}: {detail}",
+                    each.label,
+                    rule_in_words(first.rule)
+                )?;
             }
         }
         if goal
@@ -70,7 +76,9 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         match &goal.recommended {
             Some(found) => {
                 let reason = inline(&found.reason);
-                writeln!(out, "Recommended: **{}** - {reason}\n", found.label)?;
+                let summary = inline(&found.summary);
+                writeln!(out, "Recommended: **{}** - {summary}\n", found.label)?;
+                writeln!(out, "In full: {reason}\n")?;
             }
             None => writeln!(out, "No configuration works.\n")?,
         }
@@ -80,31 +88,6 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     }
     if let Some(excitation) = &report.excitation {
         out.push_str(&super::excitation::report_markdown(excitation));
-    }
-    let failed: Vec<_> = report
-        .criteria
-        .iter()
-        .filter(|result| !result.pass)
-        .collect();
-    writeln!(out, "{}.", paragraph(&counts(report)))?;
-    for result in failed {
-        writeln!(
-            out,
-            "- {} {} {}: {} {}",
-            inline(&result.goal),
-            result.label.as_deref().unwrap_or(""),
-            result.engine.as_deref().unwrap_or(""),
-            result.criterion,
-            inline(&result.detail)
-        )?;
-    }
-    for (label, reason, criteria) in not_judged(report) {
-        writeln!(
-            out,
-            "- not judged: {}: {criteria} ({})",
-            inline(&label),
-            inline(reason)
-        )?;
     }
     if !report.trace.is_empty() {
         writeln!(out, "\n## Requirements\n")?;
@@ -174,6 +157,39 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     )
 }
 
+/// What was met, what was missed and what was not judged.
+fn write_judged(out: &mut String, report: &Report) -> std::fmt::Result {
+    let failed: Vec<_> = report
+        .criteria
+        .iter()
+        .filter(|result| !result.pass)
+        .collect();
+    writeln!(out, "{}.\n", paragraph(&counts(report)))?;
+    for result in failed {
+        writeln!(
+            out,
+            "- {} {} {}: {} {}",
+            inline(&result.goal),
+            result.label.as_deref().unwrap_or(""),
+            result.engine.as_deref().unwrap_or(""),
+            result.criterion,
+            inline(&result.detail)
+        )?;
+    }
+    for (label, reason, criteria) in not_judged(report) {
+        writeln!(
+            out,
+            "- not judged: {}: {criteria} ({})",
+            inline(&label),
+            inline(reason)
+        )?;
+    }
+    if report.verdict != Verdict::Pass {
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
 /// What was not judged: goal and configuration, why, and which criteria, those of one reason together.
 fn not_judged(report: &Report) -> Vec<(String, &str, String)> {
     let mut found: Vec<(String, &str, String)> = Vec::new();
@@ -213,7 +229,7 @@ fn write_configurations(
     writeln!(out)?;
     for each in &goal.configurations {
         let status = match (each.status, each.rejections.first()) {
-            (Status::Rejected, Some(first)) => format!("rejected: {}", first.rule),
+            (Status::Rejected, Some(first)) => format!("rejected: {}", rule_in_words(first.rule)),
             _ => status(report, &goal.name, each).to_owned(),
         };
         let mark = match &goal.recommended {

@@ -2,11 +2,11 @@
 
 mod screen;
 
-use needlebench_cell::part_in_words;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use comfy_table::{Cell, CellAlignment, Color};
+use needlebench_cell::{part_in_words, rule_in_words};
 use needlebench_engine::Engine;
 use needlebench_evaluation::excitation;
 use needlebench_evaluation::iso9283::SUBJECT;
@@ -325,9 +325,11 @@ fn goal_table(report: &Report, goal: &GoalReport, columns: &[Column], mostly: Mo
         };
         let status = match (configuration.status, configuration.rejections.first()) {
             (Status::Rejected, Some(first)) if first.rule == Rule::NeedleRoute.name() => {
-                Cell::new(first.rule).fg(Color::Red)
+                Cell::new(rule_in_words(first.rule)).fg(Color::Red)
             }
-            (Status::Rejected, Some(first)) => Cell::new(first.rule).fg(Color::Yellow),
+            (Status::Rejected, Some(first)) => {
+                Cell::new(rule_in_words(first.rule)).fg(Color::Yellow)
+            }
             _ => match status(report, &goal.name, configuration) {
                 failed @ "failed" => Cell::new(failed).fg(Color::Red),
                 incomplete @ "incomplete" => Cell::new(incomplete).fg(Color::Yellow),
@@ -613,7 +615,9 @@ fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::f
             writeln!(
                 out,
                 "{}: {}: {value} (limit {limit}): {}",
-                configuration.label, rejection.rule, rejection.detail
+                configuration.label,
+                rule_in_words(rejection.rule),
+                rejection.detail
             )?;
         }
     }
