@@ -165,6 +165,7 @@ fn write_judged(out: &mut String, report: &Report) -> std::fmt::Result {
         .filter(|result| !result.pass)
         .collect();
     writeln!(out, "{}.\n", paragraph(&counts(report)))?;
+    let is_list = !failed.is_empty() || !report.not_judged.is_empty();
     for result in failed {
         writeln!(
             out,
@@ -184,7 +185,7 @@ fn write_judged(out: &mut String, report: &Report) -> std::fmt::Result {
             inline(reason)
         )?;
     }
-    if report.verdict != Verdict::Pass {
+    if is_list {
         writeln!(out)?;
     }
     Ok(())
