@@ -15,3 +15,4 @@ mod schema;
 mod schema_probes;
 mod study;
 mod urdf_slips;
+mod words;
