@@ -10,7 +10,7 @@ use needlebench_report::credibility::credibility_markdown;
 use needlebench_report::files::Folder;
 
 use super::run::prepare_folder;
-use super::{print_json, print_text};
+use super::{print_as_it_is, print_json};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::output::shown;

@@ -15,7 +15,7 @@ use needlebench_study::{
     StudyRun, merge as merge_shards, write_csv,
 };
 
-use super::run::{Outputs, prepare_folder, probe_file, run_into};
+use super::run::{Outputs, Printed, prepare_folder, probe_file, run_into};
 use super::{overrides, print_json, print_text};
 use crate::arguments::{RobotArguments, leave};
 use crate::clock::elapsed;
