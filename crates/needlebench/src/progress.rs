@@ -131,7 +131,8 @@ impl Log {
         self.last = now;
         let count = match self.total {
             0 => String::new(),
-            total => format!(" {} of {total}", self.done.min(total)),
+            total if self.done >= total => String::new(),
+            total => format!(" {} of {total}", self.done),
         };
         Some(format!("[{} s] {}{count}", elapsed.as_secs(), self.message))
     }

@@ -16,7 +16,7 @@ const WORDS: usize = 20;
 /// Heading over a line, two spaces between columns.
 const LOOK: TableStyle = TableStyle::new()
     .header_lines(ContentLineStyle::none())
-    .header_separator(LineStyle::none().fill('─').junction('─'))
+    .header_separator(LineStyle::none().fill('─'))
     .content_lines(ContentLineStyle::none());
 
 /// A table that keeps to the width of [`crate::layout`] when it is shown.

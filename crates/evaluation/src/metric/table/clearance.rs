@@ -171,7 +171,7 @@ pub(super) const CLEARANCE: &[Metric] = {
             _ => metric.statistics(nearest),
         };
         let metric = match (metric.bound, metric.stage) {
-            (Attained, Simulated) => metric.table(9, "nearest\nof all (mm)"),
+            (Attained, Simulated) => metric.table(9, "clearance\n(mm)"),
             (Certified, Simulated) => metric.formerly(&["certified_clearance"]),
             _ => metric,
         };

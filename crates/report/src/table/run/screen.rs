@@ -6,7 +6,7 @@
 use std::fmt::Write;
 
 use comfy_table::{Cell, CellAlignment, Color};
-use needlebench_cell::rule_in_words;
+use needlebench_cell::{ClearanceClass, rule_in_words};
 use needlebench_engine::Engine;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status};
 
@@ -203,7 +203,7 @@ fn split(
             let values = rows.iter().map(|each| Some(shown.value(each)?.1)).collect();
             let urgency = match shown.metric().family {
                 "tip_rms" => 1,
-                "tip_within_95" => 6,
+                "tip_within_95" => 4,
                 "tip_bias" | "tip_rms_breathing_freely" => 8,
                 "motion_time" => 3,
                 _ => 2,
@@ -214,8 +214,8 @@ fn split(
     columns.extend(
         shown_metrics(engines, |heading| heading.summary).filter_map(|(_, shown)| {
             let (heading, urgency) = match shown.metric().family {
-                "sight_fraction" => ("sight", 4),
-                "free_fraction" => ("free\nspace", 5),
+                "sight_fraction" => ("sight", 5),
+                "free_fraction" => ("free\nspace", 6),
                 "hand_cone" => ("hand cone\n(deg)", 7),
                 _ => return None,
             };
@@ -385,7 +385,7 @@ fn goals_table(goals: &[GoalReport]) -> Table {
         "work",
         "recommended",
         "tip error\nrms (mm)",
-        "nearest\nof all (mm)",
+        "clearance\n(mm)",
         "needle\nroute (mm)",
         "motion\n(s)",
     ]);
@@ -404,7 +404,13 @@ fn goals_table(goals: &[GoalReport]) -> Table {
         let of_tip = |each: &ConfigurationReport| {
             Some(each.budget.as_ref()?.total.at_target.analytic.rms_m * 1e3)
         };
-        let nearest = |each: &ConfigurationReport| Some(each.clearance.least()?.minimum_m);
+        let nearest = |each: &ConfigurationReport| {
+            let classes = each.clearance.classes.iter();
+            let around = classes.filter(|(name, _)| {
+                ClearanceClass::named(name).is_some_and(ClearanceClass::is_surroundings)
+            });
+            around.map(|(_, found)| found.minimum_m).reduce(f64::min)
+        };
         let end_s = |each: &ConfigurationReport| {
             let moving = each.motion.iter().filter(|phase| phase.phase != "hold");
             moving.map(|phase| phase.end_s).reduce(f64::max)
