@@ -6,7 +6,7 @@
 use std::fmt::Write;
 
 use comfy_table::{Cell, CellAlignment, Color};
-use needlebench_cell::{ClearanceClass, rule_in_words};
+use needlebench_cell::rule_in_words;
 use needlebench_engine::Engine;
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, Status};
 
@@ -47,7 +47,7 @@ fn write_screen(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     match report.goals.as_slice() {
         [] => {}
         [goal] => write_goal(out, report, goal, engines)?,
-        goals => write_goals(out, report, goals)?,
+        goals => write_goals(out, report, goals, engines)?,
     }
     if let Some(iso9283) = &report.iso9283 {
         out.push_str(&crate::table::iso9283::report_text(iso9283));
@@ -349,8 +349,13 @@ fn write_rejected(out: &mut String, goal: &GoalReport) -> std::fmt::Result {
 
 // ---- Several goals ----
 
-fn write_goals(out: &mut String, report: &Report, goals: &[GoalReport]) -> std::fmt::Result {
-    writeln!(out, "\n{}\n", goals_table(goals))?;
+fn write_goals(
+    out: &mut String,
+    report: &Report,
+    goals: &[GoalReport],
+    engines: &[EngineHeading],
+) -> std::fmt::Result {
+    writeln!(out, "\n{}\n", goals_table(goals, engines))?;
     writeln!(out, "{}", works_where(report, goals))?;
     writeln!(
         out,
@@ -378,62 +383,45 @@ fn write_goals(out: &mut String, report: &Report, goals: &[GoalReport]) -> std::
     Ok(())
 }
 
+/// Families of the metrics that a goal's row shows of its recommended configuration.
+const OF_THE_RECOMMENDED: [&str; 3] = ["tip_rms", "clearance", "motion_time"];
+
 /// A row for each goal: how many configurations work, and figures of the recommended one.
-fn goals_table(goals: &[GoalReport]) -> Table {
-    let mut table = plain_table(&[
-        "goal",
-        "work",
-        "recommended",
-        "tip error\nrms (mm)",
-        "clearance\n(mm)",
-        "needle\nroute (mm)",
-        "motion\n(s)",
-    ]);
-    for goal in goals {
-        let work = goal
-            .configurations
-            .iter()
-            .filter(|each| each.status == Status::Ok)
-            .count();
-        let recommended = goal.recommended.as_ref();
-        let chosen = recommended.and_then(|found| {
-            let mut all = goal.configurations.iter();
-            all.find(|each| each.label == found.label)
-        });
-        let metres = |value: Option<f64>| value.map_or("-".to_owned(), millimetres);
-        let of_tip = |each: &ConfigurationReport| {
-            Some(each.budget.as_ref()?.total.at_target.analytic.rms_m * 1e3)
-        };
-        let nearest = |each: &ConfigurationReport| {
-            let classes = each.clearance.classes.iter();
-            let around = classes.filter(|(name, _)| {
-                ClearanceClass::named(name).is_some_and(ClearanceClass::is_surroundings)
-            });
-            around.map(|(_, found)| found.minimum_m).reduce(f64::min)
-        };
-        let end_s = |each: &ConfigurationReport| {
-            let moving = each.motion.iter().filter(|phase| phase.phase != "hold");
-            moving.map(|phase| phase.end_s).reduce(f64::max)
-        };
-        let two = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
-        let label = recommended.map_or(Cell::new("none").fg(Color::Red), |found| {
-            Cell::new(&found.label).fg(Color::Green)
-        });
-        let mut cells = vec![
-            Cell::new(&goal.name),
-            Cell::new(format!("{work} of {}", goal.configurations.len())),
-            label,
-        ];
-        let numbers = [
-            two(chosen.and_then(of_tip)),
-            metres(chosen.and_then(nearest)),
-            metres(goal.needle_route.as_ref().map(|route| route.distance_m)),
-            two(chosen.and_then(end_s)),
-        ];
-        cells.extend(numbers.map(|text| Cell::new(text).set_alignment(CellAlignment::Right)));
+fn goals_table(goals: &[GoalReport], engines: &[EngineHeading]) -> Table {
+    let chosen: Vec<Option<&ConfigurationReport>> = goals.iter().map(recommended).collect();
+    let mut columns: Vec<Column> = shown_metrics(engines, |heading| heading.table)
+        .filter(|(_, shown)| OF_THE_RECOMMENDED.contains(&shown.metric().family))
+        .map(|(heading, shown)| {
+            let values = chosen.iter().map(|each| Some(shown.value((*each)?)?.1));
+            Column::new(&heading, values.collect(), 0)
+        })
+        .collect();
+    let routes = goals.iter().map(|goal| {
+        let route = goal.needle_route.as_ref()?;
+        Some(millimetres(route.distance_m))
+    });
+    columns.push(Column::new("needle\nroute (mm)", routes.collect(), 0));
+    columns.retain(|column| column.texts.iter().any(|text| text != "-"));
+    let mut header = vec!["goal", "work", "recommended"];
+    header.extend(columns.iter().map(|column| column.heading.as_str()));
+    let mut table = plain_table(&header);
+    for (at, goal) in goals.iter().enumerate() {
+        let all = &goal.configurations;
+        let work = all.iter().filter(|each| each.status == Status::Ok).count();
+        let label = chosen[at].map_or(Cell::new("none").fg(Color::Red), |found| label(goal, found));
+        let work = Cell::new(format!("{work} of {}", all.len()));
+        let mut cells = vec![Cell::new(&goal.name), work, label];
+        let texts = columns.iter().map(|column| &column.texts[at]);
+        cells.extend(texts.map(|text| Cell::new(text).set_alignment(CellAlignment::Right)));
         table.add_row(cells);
     }
     table
+}
+
+fn recommended(goal: &GoalReport) -> Option<&ConfigurationReport> {
+    let found = goal.recommended.as_ref()?;
+    let mut all = goal.configurations.iter();
+    all.find(|each| each.label == found.label)
 }
 
 /// Which configuration works for which goal, and why not.
