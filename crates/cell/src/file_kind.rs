@@ -177,11 +177,22 @@ impl FileKind {
     }
 }
 
+impl FileKind {
+    /// What a command wants, in words.
+    fn wanted_words(self) -> &'static str {
+        match self {
+            Self::Table => "a log",
+            Self::Report => "the report of a run, nor its folder",
+            other => other.words(),
+        }
+    }
+}
+
 /// What is wrong with a file of another kind than `wanted`; `None` if it is of that kind or of none that is
 /// known.
 pub fn wrong_kind(path: &Path, wanted: FileKind) -> Option<Finding> {
     let kind = FileKind::of(path).filter(|kind| *kind != wanted)?;
-    let message = format!("this is {}, not {}", kind.words(), wanted.words());
+    let message = format!("this is {}, not {}", kind.words(), wanted.wanted_words());
     Some(Finding::new(path.display().to_string(), message).hint(kind.hint(path)))
 }
 

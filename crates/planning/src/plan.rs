@@ -301,7 +301,7 @@ impl Planner<'_> {
         first.detail = match goal.roll {
             Roll::Free => {
                 let detail = &first.detail;
-                format!("{detail}; some rule is broken at every roll, least here: {others}")
+                format!("{detail}; every other roll of the guide is as bad or worse: {others}")
             }
             Roll::Fixed(roll_rad) => {
                 let fixed = format!("the goal fixes its roll at {}", degrees(roll_rad));

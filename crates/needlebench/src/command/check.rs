@@ -156,13 +156,17 @@ fn in_words(
         for reason in rejected_in_words(by_rules) {
             write!(text, "\n    {reason}")?;
         }
-        for each in rejected.filter(|each| each.rejections.is_empty()) {
-            match each.missed {
-                Some(criterion) => {
-                    write!(text, "\n    misses {criterion}: {}", each.label)?;
-                }
-                None => write!(text, "\n    does not work: {}", each.label)?,
+        let by_criteria = rejected.filter(|each| each.rejections.is_empty());
+        let mut missed: Vec<(&str, Vec<&str>)> = Vec::new();
+        for each in by_criteria {
+            let criterion = each.missed.unwrap_or("a criterion");
+            match missed.iter_mut().find(|(known, _)| *known == criterion) {
+                Some((_, labels)) => labels.push(each.label),
+                None => missed.push((criterion, vec![each.label])),
             }
+        }
+        for (criterion, labels) in missed {
+            write!(text, "\n    {criterion} is missed: {}", labels.join(", "))?;
         }
         if let Some(route) = &goal.needle_route {
             write!(text, "\n    {}", route_in_words(route))?;

@@ -124,7 +124,7 @@ pub(super) fn from_entry_and_target(
     }
     if enters_m.abs() > 1e-6 {
         notes.push(format!(
-            "goal `{}`: the entry point was moved {:.2} mm along the needle onto the skin",
+            "goal `{}`: the entry point was moved {:.3} mm along the needle onto the skin",
             section.name,
             enters_m * 1e3
         ));
