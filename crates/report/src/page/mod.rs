@@ -14,6 +14,8 @@ pub mod document;
 mod further_engine_tests;
 mod mesh;
 mod motion;
+#[cfg(test)]
+mod number_tests;
 mod pack;
 mod replay;
 mod room;

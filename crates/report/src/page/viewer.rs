@@ -9,6 +9,7 @@ use super::pack::Pack;
 const STYLE: &str = include_str!("assets/page.css");
 const THREE: &str = include_str!("assets/three.bundle.js");
 const CORE: &str = include_str!("assets/core.js");
+const NUMBER: &str = include_str!("assets/number.js");
 const VIEW: &str = include_str!("assets/view.js");
 const PLOT: &str = include_str!("assets/plot.js");
 
@@ -41,7 +42,7 @@ impl Viewer<'_> {
             title: &format!("{}: {} - needlebench", self.kind, self.name),
             style: STYLE,
             body: &body,
-            scripts: &[THREE, CORE, VIEW, PLOT, self.script],
+            scripts: &[THREE, CORE, NUMBER, VIEW, PLOT, self.script],
         }
         .html()
     }
@@ -66,18 +67,18 @@ mod tests {
         assert!(html.contains(
             "<h1>&lt;/script&gt;&lt;img src=x onerror=&quot;alert(&apos;1&apos;)&quot;&gt;&amp;amp;</h1>"
         ));
-        // The payload and the five scripts, opened and closed.
-        assert_eq!(html.matches("<script").count(), 6);
-        assert_eq!(html.matches("</script>").count(), 6);
+        // The payload and the six scripts, opened and closed.
+        assert_eq!(html.matches("<script").count(), 7);
+        assert_eq!(html.matches("</script>").count(), 7);
     }
 
     #[test]
     fn no_script_can_close_itself_or_reach_out() {
-        for script in [THREE, CORE, VIEW, PLOT] {
+        for script in [THREE, CORE, NUMBER, VIEW, PLOT] {
             assert!(!script.to_lowercase().contains("</script"));
             assert!(!script.to_lowercase().contains("<!--"));
         }
-        for script in [CORE, VIEW, PLOT] {
+        for script in [CORE, NUMBER, VIEW, PLOT] {
             for name in [
                 "innerHTML",
                 "outerHTML",

@@ -80,6 +80,7 @@ NB.start = async function (build) {
     }
     const page = await NB.read();
     app.replaceChildren();
+    for (const [name, words] of Object.entries(page.words || {})) NB.dictionary.set(name, words);
     build(page, app);
     requestAnimationFrame(() => requestAnimationFrame(() => {
       NB.timing.firstView = performance.now();
@@ -91,46 +92,54 @@ NB.start = async function (build) {
   }
 };
 
-// Numbers. Minus signs are minus signs; what is missing is a dash.
-NB.minus = (text) => text.replace('-', '\u2212');
-NB.fixed = (value, digits) => (value === null || value === undefined || Number.isNaN(value) ? '\u2013' : NB.minus((Number(value.toFixed(digits)) || 0).toFixed(digits)));
-NB.mm = (metres, digits = 1) => NB.fixed(metres === null || metres === undefined ? NaN : metres * 1e3, digits);
-NB.deg = (radians, digits = 1) => NB.fixed(radians === null || radians === undefined ? NaN : radians * 180 / Math.PI, digits);
-NB.percent = (share) => NB.fixed(share === null || share === undefined ? NaN : share * 100, 0);
 /** Columns of metrics, described by the page: the first of their keys that a configuration has is shown. */
 NB.metricColumns = (columns) => columns.map(({ title, unit, format, keys, help }) => ({
   title, unit, help, numeric: true,
   cell: ({ metrics }) => NB.formats[format](keys.map((key) => metrics[key]).find((value) => value !== undefined)),
 }));
-NB.formats = {
-  millimetres: (value) => NB.mm(value), length: (value) => NB.length(value), number: (value) => NB.fixed(value, 2),
-  percent: (value) => NB.percent(value), degrees: (value) => NB.deg(value),
+/**
+ * A name from a scenario or a report as people in the room say it: the document's own words for it, else
+ * the name itself, without the number of a solid and without underscores.
+ */
+NB.words = (name) => NB.dictionary.get(String(name)) ?? String(name).replace(/\.\d+$/, '').replaceAll('_', ' ');
+NB.dictionary = new Map();
+
+/**
+ * What a page's address says of the view, as in `report.html#goal=pose&time=2.4`: it can be sent, and survives
+ * a reload. Works from disk, too.
+ */
+NB.address = {
+  /** The choices of the address, all of them texts. */
+  read: () => Object.fromEntries(new URLSearchParams(location.hash.slice(1))),
+
+  /** Puts choices into the address, soon and without a step of the history; null takes one out. */
+  write(choices) {
+    const all = { ...NB.address.read(), ...NB.address.pending, ...choices };
+    NB.address.pending = all;
+    clearTimeout(NB.address.timer);
+    NB.address.timer = setTimeout(() => {
+      const kept = Object.entries(all).filter(([, value]) => value !== null && value !== undefined && value !== '');
+      NB.address.pending = {};
+      NB.address.written = `#${new URLSearchParams(kept)}`;
+      if (location.hash !== NB.address.written) history.replaceState(null, '', NB.address.written);
+    }, 150);
+  },
+
+  /** Calls `apply(choices)` when somebody changes the address of the open page. */
+  watch(apply) {
+    window.addEventListener('hashchange', () => { if (location.hash !== NB.address.written) apply(NB.address.read()); });
+  },
+  pending: {},
 };
-/** A length in the unit that suits it. */
-NB.length = function (metres) {
-  if (metres === null || metres === undefined || Number.isNaN(metres)) return '\u2013';
-  const size = Math.abs(metres);
-  if (size === 0) return '0 mm';
-  if (size < 1e-10) return '< 0.1 nm';
-  if (size < 1e-7) return `${NB.fixed(metres * 1e9, 1)} nm`;
-  if (size < 1e-4) return `${NB.fixed(metres * 1e6, 1)} \u00b5m`;
-  return `${NB.fixed(metres * 1e3, 2)} mm`;
+
+/** A button that puts the address with its choices on the clipboard. */
+NB.copyLink = function () {
+  const button = NB.el('button', { type: 'button', class: 'no-print', title: 'Address of this page with what is chosen now', onclick: () => {
+    const said = (text) => { button.textContent = text; setTimeout(() => { button.textContent = 'Copy link'; }, 2000); };
+    setTimeout(() => (navigator.clipboard ? navigator.clipboard.writeText(location.href) : Promise.reject()).then(() => said('Copied'), () => said('It is in the address bar')), 200);
+  } }, 'Copy link');
+  return button;
 };
-/** A value with its SI unit as people read it. */
-NB.quantity = function (value, unit) {
-  if (value === null || value === undefined) return '\u2013';
-  if (unit === 'm') return NB.length(value);
-  if (unit === 'rad') return `${NB.deg(value, 2)}\u00b0`;
-  if (unit === '1' || unit === '') return NB.significant(value);
-  if (unit === 'm/rad') return `${NB.fixed(value, 2)} mm/mrad`;
-  return `${NB.significant(value)} ${unit}`;
-};
-NB.significant = function (value) {
-  if (value === null || value === undefined || Number.isNaN(value)) return '\u2013';
-  if (Number.isInteger(value) && Math.abs(value) < 1e7) return NB.minus(String(value));
-  return NB.minus(String(Number(value.toPrecision(4))));
-};
-NB.words = (name) => String(name).replaceAll('_', ' ');
 
 /** A table with a caption: `columns` of `{ title, unit, numeric, cell(row) }`. */
 NB.table = function (caption, columns, rows, options = {}) {

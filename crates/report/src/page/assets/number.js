@@ -1,0 +1,98 @@
+// Numbers as people read them: the same texts as crates/report/src/number.rs gives, which tests/page/numbers.json
+// and the tests of both sides hold against each other. `NB.typeset` is all that a page adds.
+'use strict';
+
+{
+  /** Pages have signs that terminals may lack: minus, micro, degree. */
+  const typeset = (text) => text.replace(/^-/, '\u2212').replace(/ um$/, ' \u00b5m').replace(/ deg$/, '\u00b0').replace(/e-/, 'e\u2212');
+  const absent = (value) => value === null || value === undefined || Number.isNaN(value);
+  const NONE = '\u2013';
+
+  /** So many decimals; halves go to the even digit, as in Rust. */
+  const fixed = function (value, digits) {
+    const text = value.toFixed(digits);
+    const exact = Math.abs(value) < 1e15 ? value.toFixed(Math.min(100, digits + 60)) : '';
+    const point = exact.indexOf('.');
+    const rest = point < 0 ? '' : exact.slice(point + 1 + digits);
+    if (!/^50*$/.test(rest)) return text;
+    const cut = exact.slice(0, digits ? point + 1 + digits : point);
+    return Number(cut.at(-1)) % 2 === 0 ? cut : text;
+  };
+
+  const LENGTHS = [['pm', 1e-12, 1e12], ['nm', 1e-9, 1e9], ['um', 1e-6, 1e6], ['mm', 1e-3, 1e3]];
+  const unitOfLength = (metres) => LENGTHS.findLast(([, length]) => Math.abs(metres) >= length) || LENGTHS[0];
+
+  const smallLength = function (metres) {
+    const [name, length, perMetre] = unitOfLength(metres);
+    return Math.abs(metres) < length ? `< 1 ${name}` : `${fixed(metres * perMetre, 2)} ${name}`;
+  };
+
+  /** Digits that show on which side of a limit a value is, at least three. */
+  const digitsApart = function (value, limit) {
+    const rounded = (number, digits) => Number(number.toExponential(digits - 1));
+    const side = Math.sign(value - limit);
+    let digits = 3;
+    while (digits < 17 && Math.sign(rounded(value, digits) - limit) !== side) digits++;
+    const size = Math.abs(value);
+    return value === 0 || (size >= 1e-3 && size < 1e7) ? String(rounded(value, digits)) : value.toExponential(digits - 1).replace('e+', 'e');
+  };
+
+  const degrees = (radians) => radians * 180 / Math.PI;
+  const valueAndLimit = function (value, limit, unit) {
+    const text = function (each) {
+      if (unit === 'm') return limit !== 0 && Math.abs(limit) < 1e-3 ? smallLength(each) : `${fixed(each * 1e3, 2)} mm`;
+      if (unit === 'rad') return `${fixed(degrees(each), 4)} deg`;
+      if (unit === '1') return Number.isInteger(value) && Number.isInteger(limit) && Number.isInteger(each) ? String(each) : fixed(each, 4);
+      return `${fixed(each, 3)} ${unit}`;
+    };
+    const texts = [text(value), text(limit)];
+    if (texts[0] !== texts[1] || value === limit) return texts;
+    const [factor, name] = unit === 'm' ? [1e3, ' mm'] : unit === 'rad' ? [degrees(1), ' deg'] : [1, unit === '1' ? '' : ` ${unit}`];
+    return [`${digitsApart(value * factor, limit * factor)}${name}`, `${digitsApart(limit * factor, value * factor)}${name}`];
+  };
+
+  const percent = function (share) {
+    if (share === 0 || share === 1) return `${fixed(share * 100, 0)} %`;
+    if (share > 0.9995) return '> 99.9 %';
+    if (share < 0.0005) return '< 0.1 %';
+    return `${fixed(share * 100, 1)} %`;
+  };
+
+  const shown = {
+    millimetres: (value) => fixed(value * 1e3, 1), length: smallLength, number: (value) => fixed(value, 2),
+    percent: (value) => fixed(100 * value, 0), degrees: (value) => fixed(degrees(value), 1),
+  };
+
+  /** Texts as number.rs writes them; for the test. */
+  NB.plain = { smallLength, valueAndLimit, percent, shown };
+
+  NB.minus = (text) => text.replace('-', '\u2212');
+  NB.fixed = (value, digits) => (absent(value) ? NONE : typeset(fixed(Number(fixed(value, digits)) || 0, digits)));
+  NB.mm = (metres, digits = 1) => NB.fixed(absent(metres) ? NaN : metres * 1e3, digits);
+  NB.deg = (radians, digits = 1) => NB.fixed(absent(radians) ? NaN : degrees(radians), digits);
+  NB.percent = (share) => NB.fixed(absent(share) ? NaN : share * 100, 0);
+  /** A share that is nearly none or nearly all and reads so. */
+  NB.share = (share) => (absent(share) ? NONE : percent(share));
+  /** A length in the unit that suits it. */
+  NB.length = (metres) => (absent(metres) ? NONE : metres === 0 ? '0' : typeset(smallLength(metres)));
+  NB.formats = Object.fromEntries(Object.entries(shown).map(([name, text]) => [name, (value) => (absent(value) ? NONE : typeset(text(value)))]));
+  /** A value and its limit, or two dashes. */
+  NB.valueAndLimit = function (value, limit, unit) {
+    if (absent(value) || absent(limit)) return [NB.quantity(value, unit), NB.quantity(limit, unit)];
+    return valueAndLimit(value, limit, unit || '1').map(typeset);
+  };
+  /** A value with its SI unit as people read it. */
+  NB.quantity = function (value, unit) {
+    if (absent(value)) return NONE;
+    if (unit === 'm') return NB.length(value);
+    if (unit === 'rad') return `${NB.deg(value, 2)}\u00b0`;
+    if (unit === '1' || unit === '') return NB.significant(value);
+    if (unit === 'm/rad') return `${NB.fixed(value, 2)} mm/mrad`;
+    return `${NB.significant(value)} ${unit}`;
+  };
+  NB.significant = function (value) {
+    if (absent(value)) return NONE;
+    if (Number.isInteger(value) && Math.abs(value) < 1e7) return NB.minus(String(value));
+    return typeset(String(Number(value.toPrecision(4))));
+  };
+}
