@@ -1,6 +1,5 @@
 //! The second stage: planned motions in an engine, with the clearances along them.
 
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use needlebench_engine::{
@@ -148,11 +147,7 @@ impl Simulation<'_> {
         let (trajectory, period_s) = (self.trajectory(job), self.period_s());
         let mut clearance = match self.detail {
             Detail::Series => measure_clearance(cell, model, trajectory, &recording, period_s),
-            Detail::Least => ClearanceSeries {
-                minima: BTreeMap::new(),
-                time_s: Vec::new(),
-                distance_m: BTreeMap::new(),
-            },
+            Detail::Least => ClearanceSeries::default(),
         };
         let planning = &self.setup.resolved.scenario.planning;
         let tolerance_m = planning.certificate_tolerance_mm * 1e-3;

@@ -14,7 +14,7 @@ use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
 use crate::report::ClassClearance;
 
 /// Least clearance per class over a motion, and its course.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ClearanceSeries {
     /// Least clearance per class.
     pub minima: BTreeMap<ClearanceClass, ClassClearance>,
@@ -22,6 +22,52 @@ pub struct ClearanceSeries {
     pub time_s: Vec<f64>,
     /// Clearance per class at those times, m.
     pub distance_m: BTreeMap<ClearanceClass, Vec<f64>>,
+    /// What is nearest of all that should not touch at those times; none where nothing is near.
+    pub nearest: Vec<Option<Nearest>>,
+    /// Names of the solids that `nearest` refers to.
+    pub nearest_pairs: Vec<[String; 2]>,
+}
+
+/// The two solids that are nearest to each other at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nearest {
+    /// Their class.
+    pub class: ClearanceClass,
+    /// Index of their names in [`ClearanceSeries::nearest_pairs`].
+    pub pair: usize,
+    /// Their nearest (or deepest) points, in the world.
+    pub witness_points_m: [[f64; 3]; 2],
+}
+
+impl ClearanceSeries {
+    /// Adds what is nearest in a posture of a cell.
+    fn add_nearest(&mut self, cell: &Cell, minima: &ClassMinima) {
+        let unwanted = minima.iter().filter(|pair| pair.class.is_unwanted());
+        let least =
+            unwanted.min_by(|a, b| a.separation.distance_m.total_cmp(&b.separation.distance_m));
+        let found = least.map(|pair| {
+            let (a, b) = pair.solid_names(cell);
+            let known = self
+                .nearest_pairs
+                .iter()
+                .position(|[x, y]| x == a && y == b);
+            let index = known.unwrap_or_else(|| {
+                self.nearest_pairs.push([a.to_owned(), b.to_owned()]);
+                self.nearest_pairs.len() - 1
+            });
+            let Separation {
+                point_on_a,
+                point_on_b,
+                ..
+            } = pair.separation;
+            Nearest {
+                class: pair.class,
+                pair: index,
+                witness_points_m: [point_on_a, point_on_b].map(|point| [point.x, point.y, point.z]),
+            }
+        });
+        self.nearest.push(found);
+    }
 }
 
 /// Samples the clearance of a recorded motion every `period_s`, first and last state included.
@@ -34,17 +80,14 @@ pub fn measure_clearance(
     recording: &Recording,
     period_s: f64,
 ) -> ClearanceSeries {
-    let mut series = ClearanceSeries {
-        minima: BTreeMap::new(),
-        time_s: Vec::new(),
-        distance_m: BTreeMap::new(),
-    };
+    let mut series = ClearanceSeries::default();
     let mut nearby = Nearby::default();
     for index in sample_indices(recording, period_s) {
         let time_s = recording.time_s[index];
         let minima = model.minimum_per_class_near(&recording.state[index].position, &mut nearby);
         let phase = trajectory.phase_at(time_s);
         series.time_s.push(time_s);
+        series.add_nearest(cell, &minima);
         for pair in minima.iter() {
             series
                 .distance_m

@@ -33,8 +33,8 @@ mod truth;
 mod verdict;
 
 pub use clearance::{
-    ClearanceSeries, certified_clearance, certify_recording, measure_clearance, planned_clearance,
-    posture_clearance, recorded_clearance, route_clearance, sample_indices,
+    ClearanceSeries, Nearest, certified_clearance, certify_recording, measure_clearance,
+    planned_clearance, posture_clearance, recorded_clearance, route_clearance, sample_indices,
 };
 pub use contact::{ContactEpisode, ForceBalance, add_approach_speeds, force_balance};
 pub use criteria::{check_configuration, first_missed_by_posture};

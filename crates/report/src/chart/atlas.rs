@@ -1,7 +1,7 @@
 //! The atlas as a chart: a band per configuration, roll from left to right.
 //!
 //! The upper part of a band is the least clearance of the final posture, red where it is negative and
-//! blue where it is positive; the lower part is the rule that rejects it. A tick marks the best roll
+//! blue where it is positive; the lower part is the rule that rejects it, or blue where it works. A tick marks the best roll
 //! of each range.
 
 use std::f64::consts::TAU;
@@ -11,7 +11,7 @@ use needlebench_cell::{Goal, Roll};
 use needlebench_planning::{Member, Rule};
 
 use super::drawing::{Anchor, Chart, Mark, Size};
-use super::legend::{Sample, legend};
+use super::legend::{ROW_PX, Sample, legend};
 use super::paint::{Paint, Rgb, Stroke};
 
 /// Width of the map, px: three per degree.
@@ -31,21 +31,27 @@ const LEGEND_PX: f64 = 60.0;
 /// Clearance at both ends of the colour scale, m.
 const SCALE_M: f64 = 0.05;
 
-const WORKS: Rgb = [0, 158, 115];
-const NO_POSTURE: Rgb = [196, 196, 196];
+/// What works, and where there is no posture.
+const WORKS: Rgb = [0, 114, 178];
+const NO_POSTURE: Rgb = [200, 203, 207];
 
-/// Rules in the order of the legend with their colours: dark and light ones in turn, as colours
-/// alone are not told apart by everybody.
+/// Rules in the order of the legend with their colours, which people with any colour vision tell apart.
 const RULES: [(Rule, Rgb); 8] = [
-    (Rule::NeedleRoute, [230, 60, 20]),
-    (Rule::Collision, [176, 30, 40]),
-    (Rule::NeedleCorridor, [240, 180, 60]),
-    (Rule::Singular, [88, 60, 150]),
-    (Rule::JointLimit, [110, 74, 44]),
+    (Rule::NeedleRoute, [150, 50, 110]),
+    (Rule::Collision, [213, 94, 0]),
+    (Rule::NeedleCorridor, [255, 200, 60]),
+    (Rule::Singular, [204, 121, 167]),
+    (Rule::JointLimit, [120, 66, 20]),
     (Rule::Unreachable, NO_POSTURE),
     (Rule::Merged, [20, 20, 20]),
-    (Rule::NearestOnly, [235, 140, 200]),
+    (Rule::NearestOnly, [140, 205, 245]),
 ];
+
+/// Colour of what rejects a posture, by the rule's name, and under `works` of what does not.
+pub fn rule_colors() -> impl Iterator<Item = (&'static str, Rgb)> {
+    let rules = RULES.iter().map(|(rule, color)| (rule.name(), *color));
+    std::iter::once(("works", WORKS)).chain(rules)
+}
 
 /// The chart of a goal's atlas.
 pub fn atlas_chart(scenario: &str, goal: &Goal, atlas: &GoalAtlas) -> Chart {
@@ -54,7 +60,7 @@ pub fn atlas_chart(scenario: &str, goal: &Goal, atlas: &GoalAtlas) -> Chart {
         "{scenario}, goal {}: least clearance by configuration and roll",
         goal.name
     );
-    let size = [LEFT_PX + MAP_PX + RIGHT_PX, foot + LEGEND_PX + 110.0];
+    let size = [LEFT_PX + MAP_PX + RIGHT_PX, foot + LEGEND_PX + 130.0];
     let mut chart = Chart::new(size, &*title);
     chart.write_large([20.0, 24.0], title);
     for (index, family) in atlas.families.iter().enumerate() {
@@ -166,7 +172,8 @@ fn key(chart: &mut Chart, top: f64, atlas: &GoalAtlas) {
     /// Width of the colour scale and of one of its steps, px.
     const SCALE_PX: f64 = 400.0;
     const STEPS: u32 = 200;
-    chart.write(Anchor::Start, [20.0, top + 9.0], "least clearance (mm)");
+    chart.write(Anchor::Start, [20.0, top + 9.0], "upper strip:");
+    chart.write(Anchor::Start, [20.0, top + 29.0], "least clearance (mm)");
     for step in 0..STEPS {
         let share = (2.0 * f64::from(step) + 1.0) / f64::from(STEPS) - 1.0;
         let width = SCALE_PX / f64::from(STEPS);
@@ -196,13 +203,18 @@ fn key(chart: &mut Chart, top: f64, atlas: &GoalAtlas) {
     let best = format!("mark: best roll for {}", atlas.aim.name().replace('_', " "));
     chart.write(Anchor::Start, [right + 290.0, top + 9.0], best);
     let row = top + 70.0;
-    chart.write(Anchor::Start, [20.0, row], "rejected by");
+    chart.write(Anchor::Start, [20.0, row], "lower strip");
+    let works = [(Sample::Area(Paint::Fixed(WORKS)), "works")];
+    legend(chart, [LEFT_PX, row], MAP_PX, works);
+    chart.write(Anchor::Start, [20.0, row + ROW_PX], "rejected by");
     let rules = RULES.iter().filter(|(rule, _)| occurs(atlas, *rule));
-    let rules = rules.map(|(rule, color)| (rule.name(), *color));
-    let entries = std::iter::once(("works", WORKS))
-        .chain(rules)
-        .map(|(name, color)| (Sample::Area(Paint::Fixed(color)), name));
-    legend(chart, [LEFT_PX, row], MAP_PX + RIGHT_PX, entries);
+    let names: Vec<(String, Rgb)> = rules
+        .map(|(rule, color)| (rule.name().replace('_', " "), *color))
+        .collect();
+    let entries = names
+        .iter()
+        .map(|(name, color)| (Sample::Area(Paint::Fixed(*color)), name.as_str()));
+    legend(chart, [LEFT_PX, row + ROW_PX], MAP_PX + RIGHT_PX, entries);
 }
 
 fn occurs(atlas: &GoalAtlas, rule: Rule) -> bool {
@@ -279,7 +291,14 @@ mod tests {
     use needlebench_planning::Aim;
 
     use super::super::drawing::tests::assert_legible;
+    use super::super::paint::tests::assert_told_apart;
     use super::*;
+
+    #[test]
+    fn rules_are_told_apart_with_any_colour_vision() {
+        let colors: Vec<Rgb> = rule_colors().map(|(_, color)| color).collect();
+        assert_told_apart(&colors);
+    }
 
     #[test]
     fn atlases_are_legible_and_their_strips_have_no_gaps() {

@@ -12,7 +12,7 @@ use super::panel::Panel;
 use crate::table::budget::{ALLOWED_M, budgets, mm};
 
 /// Side of a panel, px.
-const PANEL_PX: f64 = 240.0;
+const PANEL_PX: f64 = 170.0;
 /// From the left end of a tile to its panels, and from one panel to the next, px.
 const BESIDE_PX: f64 = 58.0;
 /// From the top of a tile to its panels, and from their foot to the bar of shares, px.
@@ -22,8 +22,10 @@ const BAR_PX: f64 = 14.0;
 /// Width and height of a tile, and the space around it, px.
 const TILE_PX: [f64; 2] = [
     2.0 * (BESIDE_PX + PANEL_PX),
-    ABOVE_PX + PANEL_PX + BELOW_PX + BAR_PX + 24.0,
+    ABOVE_PX + PANEL_PX + BELOW_PX + BAR_PX + SHARES_ROWS as f64 * ROW_PX + 6.0,
 ];
+/// Rows of names below the bar of shares.
+const SHARES_ROWS: usize = 2;
 const GAP_PX: f64 = 20.0;
 const COLUMNS: usize = 2;
 
@@ -60,8 +62,27 @@ pub fn budget_chart(goal: &GoalReport) -> Option<Chart> {
     Some(chart(&goal.name, &tiles))
 }
 
+/// The same of one configuration, on the scale of all of its goal, narrow enough for a column of a paper;
+/// none without imperfections.
+pub fn budget_figure(goal: &GoalReport, label: &str) -> Option<Chart> {
+    let budgets = budgets(goal);
+    let of_all: Vec<(&str, &ErrorBudget)> = budgets
+        .into_iter()
+        .map(|(configuration, budget)| (configuration.label, budget))
+        .collect();
+    let (label, budget) = of_all.iter().find(|(each, _)| *each == label)?;
+    let title = format!("{}, {label}: where the needle goes", goal.name);
+    Some(tiles(title, &[(label, budget)], reach_m(&of_all)))
+}
+
 fn chart(goal: &str, budgets: &[(&str, &ErrorBudget)]) -> Chart {
-    let reach_m = budgets
+    let title = format!("{goal}: where the needle goes");
+    tiles(title, budgets, reach_m(budgets))
+}
+
+/// Half the side of all panels, m.
+fn reach_m(budgets: &[(&str, &ErrorBudget)]) -> f64 {
+    budgets
         .iter()
         .flat_map(|(_, budget)| [budget.total.at_target, budget.total.at_skin])
         .map(|point| {
@@ -69,11 +90,16 @@ fn chart(goal: &str, budgets: &[(&str, &ErrorBudget)]) -> Chart {
             moments.bias().amax() + ELLIPSE_95 * moments.principal()[0].0
         })
         .fold(ALLOWED_M, f64::max)
-        * 1.08;
-    let width = COLUMNS as f64 * (TILE_PX[0] + GAP_PX) + GAP_PX;
-    let title = format!("{goal}: where the needle goes");
+        * 1.08
+}
+
+fn tiles(title: String, budgets: &[(&str, &ErrorBudget)], reach_m: f64) -> Chart {
+    let columns = COLUMNS.min(budgets.len());
+    let width = columns as f64 * (TILE_PX[0] + GAP_PX) + GAP_PX;
     let mut chart = Chart::new([width, 0.0], &*title);
-    chart.write_large([GAP_PX, 24.0], title);
+    if columns == COLUMNS {
+        chart.write_large([GAP_PX, 24.0], title);
+    }
     let allowed = format!("{} mm: what radiologists allow on average", mm(ALLOWED_M));
     let entries = [
         (Sample::Line(TARGET), "95 % at the target"),
@@ -81,16 +107,17 @@ fn chart(goal: &str, budgets: &[(&str, &ErrorBudget)]) -> Chart {
         (Sample::Line(DRAWN), "95 % at the target, by draws"),
         (Sample::Circle(8.0, limit()), &*allowed),
     ];
-    let rows = legend(&mut chart, [GAP_PX, 56.0], width - 2.0 * GAP_PX, entries);
-    let top = 56.0 + ROW_PX * rows as f64;
+    let key = if columns == COLUMNS { 56.0 } else { 20.0 };
+    let rows = legend(&mut chart, [GAP_PX, key], width - 2.0 * GAP_PX, entries);
+    let top = key + ROW_PX * rows as f64;
     for (index, (label, budget)) in budgets.iter().enumerate() {
         let corner = [
-            GAP_PX + (index % COLUMNS) as f64 * (TILE_PX[0] + GAP_PX),
-            top + (index / COLUMNS) as f64 * (TILE_PX[1] + GAP_PX),
+            GAP_PX + (index % columns) as f64 * (TILE_PX[0] + GAP_PX),
+            top + (index / columns) as f64 * (TILE_PX[1] + GAP_PX),
         ];
         tile(&mut chart, corner, label, budget, reach_m);
     }
-    let rows = budgets.len().div_ceil(COLUMNS) as f64;
+    let rows = budgets.len().div_ceil(columns) as f64;
     chart.size[1] = top + rows * (TILE_PX[1] + GAP_PX);
     chart
 }
@@ -102,7 +129,7 @@ fn limit() -> Stroke {
 fn tile(chart: &mut Chart, [left, top]: [f64; 2], label: &str, budget: &ErrorBudget, reach_m: f64) {
     let total = &budget.total;
     let heading = format!(
-        "{label}   {} mm rms, {} mm across",
+        "{label}: {} mm rms, {} mm across",
         mm(total.at_target.analytic.rms_m),
         mm(total.at_target.analytic.lateral_rms_m)
     );
@@ -194,16 +221,19 @@ fn shares(chart: &mut Chart, [left, top]: [f64; 2], width: f64, budget: &ErrorBu
         }
     }
     names.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let (mut x, y) = (left, top + BAR_PX + 13.0);
+    let (mut x, mut y, mut row) = (left, top + BAR_PX + 13.0, 1);
     for (_, color, name) in names {
-        let text = x + 10.0 + SPACE_PX[0];
-        let end = text + Size::Small.width(&name);
-        if end > left + width {
-            break;
+        let length = 10.0 + SPACE_PX[0] + Size::Small.width(&name);
+        if x > left && x + length > left + width {
+            row += 1;
+            if row > SHARES_ROWS {
+                break;
+            }
+            (x, y) = (left, y + ROW_PX);
         }
         chart.fill([x, y - 5.0], [10.0, 10.0], color);
-        chart.write(Anchor::Start, [text, y], name);
-        x = end + SPACE_PX[1];
+        chart.write(Anchor::Start, [x + 10.0 + SPACE_PX[0], y], name);
+        x += length + SPACE_PX[1];
     }
 }
 
@@ -257,6 +287,11 @@ mod tests {
             let budgets = [("Right-Down-Unfold", &budget), ("Left-Up-Fold", &budget)];
             for count in [1, 2] {
                 assert_legible(&chart("a_goal", &budgets[..count]));
+                // At 85 mm, 8 pt are a thirtieth of the width: 13 px of 400.
+                if count == 1 {
+                    let narrow = chart("a_goal", &budgets[..1]).size[0];
+                    assert!(narrow <= 500.0, "{narrow}");
+                }
             }
         }
     }

@@ -136,7 +136,7 @@ impl Overlay {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// Seen by somebody without red (protanopia) or without green (deuteranopia) receptors:
@@ -163,19 +163,24 @@ mod tests {
         })
     }
 
-    #[test]
-    fn series_are_told_apart_with_any_colour_vision() {
+    /// Asserts that colours differ to people with any colour vision.
+    pub(crate) fn assert_told_apart(colors: &[Rgb]) {
         /// Two greys that are 20 of 255 apart are told apart side by side.
         const LEAST: f64 = 20.0 / 255.0 * 1.732;
         for vision in &VISIONS {
-            for (index, a) in SERIES.iter().enumerate() {
-                for b in &SERIES[..index] {
+            for (index, a) in colors.iter().enumerate() {
+                for b in &colors[..index] {
                     let (x, y) = (seen(*a, vision), seen(*b, vision));
                     let apart = (0..3).map(|k| (x[k] - y[k]).powi(2)).sum::<f64>().sqrt();
                     assert!(apart > LEAST, "{a:?} and {b:?}: {apart}");
                 }
             }
         }
+    }
+
+    #[test]
+    fn series_are_told_apart_with_any_colour_vision() {
+        assert_told_apart(&SERIES);
     }
 
     #[test]

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::pack::Pack;
 use super::scene::{pose, surroundings};
 use super::viewer::Viewer;
+use crate::chart::atlas::rule_colors;
 use needlebench_bench::atlas::{AtlasReport, BranchReport, GoalAtlas, GoalAtlasReport};
 
 const SCRIPT: &str = include_str!("assets/atlas.js");
@@ -32,6 +33,8 @@ pub fn atlas_page(
         "scenario": report.scenario,
         "provenance": report.provenance,
         "goals": goals,
+        "ruleColors": rule_colors().map(|(name, [red, green, blue])| (name.to_owned(), json!(format!("#{red:02x}{green:02x}{blue:02x}")))).collect::<serde_json::Map<_, _>>(),
+        "words": super::words::words(resolved),
         "scene": surroundings(resolved, &mut pack),
     });
     let page = Viewer {

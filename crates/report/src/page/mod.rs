@@ -9,6 +9,7 @@
 //! The same results give the same bytes: wall-clock times are left out.
 
 mod atlas;
+mod charts;
 pub mod document;
 #[cfg(test)]
 mod further_engine_tests;
@@ -23,6 +24,7 @@ mod run;
 mod scene;
 pub mod study;
 mod viewer;
+mod words;
 
 pub use atlas::atlas_page;
 pub use replay::replay_page;

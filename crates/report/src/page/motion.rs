@@ -17,6 +17,7 @@ const MOST_POINTS: usize = 700;
 pub(super) fn motion(run: &EngineRun, stopped: bool, pack: &mut Pack) -> Value {
     let (time_s, joints) = postures(&run.recording, pack);
     let (curve_time_s, curves) = curves(&run.clearance, pack);
+    let nearest = nearest(&run.clearance, pack);
     json!({
         "engine": run.engine,
         "stopped": stopped,
@@ -24,6 +25,59 @@ pub(super) fn motion(run: &EngineRun, stopped: bool, pack: &mut Pack) -> Value {
         "joints": joints,
         "curveTime": curve_time_s,
         "curves": curves,
+        "nearest": nearest,
+    })
+}
+
+/// What is nearest over time: pairs by their names, and per sample its time, its pair (255 for none) and
+/// the two nearest points in the world.
+fn nearest(series: &ClearanceSeries, pack: &mut Pack) -> Value {
+    let period_s = |window: &[f64]| window[1] - window[0];
+    let sample_s = series.time_s.windows(2).map(period_s).next();
+    let stride = sample_s.map_or(1.0, |sample_s| POSTURE_PERIOD_S / sample_s);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a few dozen samples"
+    )]
+    let stride = stride.round().max(1.0) as usize;
+    let last = series.nearest.len().saturating_sub(1);
+    let kept: Vec<usize> = (0..series.nearest.len())
+        .filter(|index| index % stride == 0 || *index == last)
+        .collect();
+    let pairs: Vec<u8> = kept
+        .iter()
+        .map(|&index| {
+            let pair = series.nearest[index].map(|found| found.pair);
+            pair.and_then(|pair| u8::try_from(pair).ok())
+                .unwrap_or(u8::MAX)
+        })
+        .collect();
+    let classes: Vec<&str> = (0..series.nearest_pairs.len())
+        .filter_map(|pair| {
+            let mut all = series.nearest.iter().flatten();
+            all.find(|found| found.pair == pair)
+                .map(|found| found.class.name())
+        })
+        .collect();
+    let columns: Vec<Value> = (0..6)
+        .map(|axis| {
+            let column: Vec<f64> = kept
+                .iter()
+                .map(|&index| {
+                    let found = series.nearest[index];
+                    found.map_or(f64::NAN, |found| found.witness_points_m[axis / 3][axis % 3])
+                })
+                .collect();
+            pack.column(&column, true)
+        })
+        .collect();
+    json!({
+        "names": series.nearest_pairs,
+        "classes": classes,
+        "time": pack.f32s(kept.iter().map(|&index| series.time_s[index])),
+        "pair": pack.u8s(&pairs),
+        "points": columns,
     })
 }
 

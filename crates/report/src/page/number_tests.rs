@@ -13,13 +13,35 @@ const WRITE: &str = "WRITE_NUMBERS";
 
 /// Sizes from rounding errors to a cell, with halves that round to even and what has to be told apart.
 const VALUES: [f64; 22] = [
-    0.0, 2.243e-16, 9e-13, 1e-12, 2.5e-12, 3.21e-9, 1.638e-8, 9.999e-7, 1e-6, 4.5e-5, 0.000_125,
-    9.999e-4, 1e-3, 0.002_704_3, 0.0027, 0.010_638, 0.5, 0.125, 1.5, 2.5, 12.3456, 1234.5,
+    0.0,
+    2.243e-16,
+    9e-13,
+    1e-12,
+    2.5e-12,
+    3.21e-9,
+    1.638e-8,
+    9.999e-7,
+    1e-6,
+    4.5e-5,
+    0.000_125,
+    9.999e-4,
+    1e-3,
+    0.002_704_3,
+    0.0027,
+    0.010_638,
+    0.5,
+    0.125,
+    1.5,
+    2.5,
+    12.3456,
+    1234.5,
 ];
 
 fn cases() -> Value {
     let signed = || VALUES.into_iter().flat_map(|value| [value, -value]);
-    let lengths: Vec<Value> = signed().map(|value| json!([value, small_length(value)])).collect();
+    let lengths: Vec<Value> = signed()
+        .map(|value| json!([value, small_length(value)]))
+        .collect();
     let shares = [0.0, 1e-5, 4.9e-4, 0.0125, 0.123, 0.999, 0.9996, 1.0];
     let shares: Vec<Value> = shares.map(|share| json!([share, percent(share)])).into();
     let shows = [
@@ -30,7 +52,9 @@ fn cases() -> Value {
     ];
     let shows: Vec<Value> = shows
         .into_iter()
-        .flat_map(|(name, show)| signed().map(move |value| json!([name, value, shown(show, value)])))
+        .flat_map(|(name, show)| {
+            signed().map(move |value| json!([name, value, shown(show, value)]))
+        })
         .collect();
     let limits: Vec<Value> = ["m", "rad", "1", "N", "N m", "s"]
         .into_iter()

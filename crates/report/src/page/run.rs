@@ -8,6 +8,7 @@ use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::Joints;
 use serde_json::{Value, json};
 
+use super::charts;
 use super::motion::motion;
 use super::pack::Pack;
 use super::room;
@@ -43,6 +44,8 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
         .map(|goal| self::goal(resolved, finished, &room, goal, &mut pack))
         .collect();
     document["goals"] = json!(goals);
+    document["iso9283"] = json!(charts::of_test(resolved, finished, &mut pack));
+    document["words"] = super::words::words(resolved);
     let page = Viewer {
         kind: "run",
         name: &report.scenario.name,
@@ -115,6 +118,7 @@ fn goal(
             json!({
                 "runs": runs,
                 "flange": flange,
+                "charts": charts::of_configuration(finished, goal, index),
                 "room": room::configuration(resolved, room, goal, configuration, pack),
             })
         })
@@ -125,6 +129,7 @@ fn goal(
             "side": columns(report, &engines, |heading| heading.page_side),
         },
         "guideExit": pose(&resolved.goals[goal].world_from_guide_exit),
+        "charts": charts::of_goal(finished, goal),
         "room": room::people(resolved, room, goal),
         "configurations": configurations,
     })
