@@ -1,6 +1,6 @@
 //! Why a configuration is recommended, in words.
 
-use crate::metric::Metric;
+use crate::metric::{Bound, Metric};
 use crate::ranking_report::{GoalRanking, RankingReport, SAME_SCORE, Term};
 use crate::report::ConfigurationReport;
 use needlebench_cell::{pair_in_words, part_in_words};
@@ -137,13 +137,14 @@ struct Difference<'a> {
 
 impl Difference<'_> {
     fn text(&self) -> String {
-        let text = |value: f64| {
-            Metric::of_key(self.mine.metric)
-                .map_or(value.to_string(), |metric| metric.quantity.text(value))
-        };
+        let metric = Metric::of_key(self.mine.metric);
+        let text = |value: f64| metric.map_or(value.to_string(), |metric| metric.quantity.text(value));
+        // A table beside it has what was attained, which is a little more.
+        let proven = metric.is_some_and(|metric| metric.bound == Bound::Certified);
         format!(
-            "{} ({} against {}: {:+.3})",
+            "{} ({}{} against {}: {:+.3})",
             words(self.mine.metric),
+            if proven { "proven " } else { "" },
             text(self.mine.value),
             text(self.theirs.value),
             self.lead

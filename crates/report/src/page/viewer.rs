@@ -12,6 +12,7 @@ const CORE: &str = include_str!("assets/core.js");
 const NUMBER: &str = include_str!("assets/number.js");
 const VIEW: &str = include_str!("assets/view.js");
 const PLOT: &str = include_str!("assets/plot.js");
+const SVG: &str = include_str!("assets/svg.js");
 
 /// What a page says before its scripts run, and which script is its own.
 pub(super) struct Viewer<'a> {
@@ -42,7 +43,7 @@ impl Viewer<'_> {
             title: &format!("{}: {} - needlebench", self.kind, self.name),
             style: STYLE,
             body: &body,
-            scripts: &[THREE, CORE, NUMBER, VIEW, PLOT, self.script],
+            scripts: &[THREE, CORE, NUMBER, VIEW, PLOT, SVG, self.script],
         }
         .html()
     }
@@ -67,18 +68,18 @@ mod tests {
         assert!(html.contains(
             "<h1>&lt;/script&gt;&lt;img src=x onerror=&quot;alert(&apos;1&apos;)&quot;&gt;&amp;amp;</h1>"
         ));
-        // The payload and the six scripts, opened and closed.
-        assert_eq!(html.matches("<script").count(), 7);
-        assert_eq!(html.matches("</script>").count(), 7);
+        // The payload and the seven scripts, opened and closed.
+        assert_eq!(html.matches("<script").count(), 8);
+        assert_eq!(html.matches("</script>").count(), 8);
     }
 
     #[test]
     fn no_script_can_close_itself_or_reach_out() {
-        for script in [THREE, CORE, NUMBER, VIEW, PLOT] {
+        for script in [THREE, CORE, NUMBER, VIEW, PLOT, SVG] {
             assert!(!script.to_lowercase().contains("</script"));
             assert!(!script.to_lowercase().contains("<!--"));
         }
-        for script in [CORE, NUMBER, VIEW, PLOT] {
+        for script in [CORE, NUMBER, VIEW, PLOT, SVG] {
             for name in [
                 "innerHTML",
                 "outerHTML",

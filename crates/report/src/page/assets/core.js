@@ -154,9 +154,32 @@ NB.table = function (caption, columns, rows, options = {}) {
       ? NB.el('th', { scope: 'row' }, isNode ? content : String(content))
       : NB.el('td', attributes, isNode ? content : String(content));
   })));
-  return NB.el('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': caption },
-    NB.el('table', { class: options.class },
-      NB.el('caption', { text: caption }), NB.el('thead', null, head), NB.el('tbody', null, body)));
+  return NB.scroll(caption, NB.el('table', { class: options.class },
+    NB.el('caption', { text: caption }), NB.el('thead', null, head), NB.el('tbody', null, body)));
+};
+
+/** A box that scrolls sideways where its contents are wider than it, and says so. */
+NB.scroll = function (label, content) {
+  const box = NB.el('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': label }, content);
+  const hint = NB.el('p', { class: 'hint no-print', 'aria-hidden': 'true' });
+  const element = NB.el('div', { class: 'scrolled' }, box, hint);
+  const look = () => {
+    const rest = box.scrollWidth - box.clientWidth - box.scrollLeft;
+    const hides = box.scrollWidth > box.clientWidth + 1;
+    element.classList.toggle('hides', hides);
+    element.classList.toggle('more', rest > 1);
+    if (!hides) return;
+    const edge = box.getBoundingClientRect().right;
+    const heads = [...(box.querySelector('thead tr')?.cells || [])];
+    const beyond = heads.filter((cell) => cell.getBoundingClientRect().right > edge + 1).length;
+    hint.textContent = rest <= 1 ? '\u2190 the rest is to the left'
+      : heads.length ? `${beyond} more column${beyond === 1 ? '' : 's'}: scroll sideways \u2192` : 'scroll sideways for the rest \u2192';
+  };
+  box.addEventListener('scroll', look, { passive: true });
+  const observer = new ResizeObserver(look);
+  observer.observe(box);
+  observer.observe(content);
+  return element;
 };
 
 /** A fold-out section. */
@@ -207,9 +230,9 @@ NB.mark = function (rows, chosen) {
   });
 };
 
-/** Every details element is open on paper, and nothing scrolls. */
+/** Every details element but those that are not for paper is open there, and nothing scrolls. */
 window.addEventListener('beforeprint', () => {
-  for (const details of document.querySelectorAll('details:not([open])')) {
+  for (const details of document.querySelectorAll('details:not([open]):not(.no-print)')) {
     details.dataset.closed = 'true';
     details.open = true;
   }

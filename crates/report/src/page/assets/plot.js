@@ -185,6 +185,24 @@ NB.Curves = class {
     this.draw();
   }
 
+  /** The curves as they are shown, for a paper. */
+  svg(title) {
+    const names = [...new Set(this.curves.map((curve) => curve.name))].filter((name) => !this.hidden.has(name));
+    const legend = names.map((name) => {
+      const { color, dash } = this.curves.find((curve) => curve.name === name);
+      return { text: NB.words(name), draw: (context, x, y) => {
+        context.strokeStyle = color;
+        context.lineWidth = 1.8;
+        context.setLineDash(dash);
+        context.beginPath(); context.moveTo(x - 14, y); context.lineTo(x + 14, y); context.stroke();
+      } };
+    });
+    const svg = NB.paper(title, (...all) => this.paint(...all), 220, legend);
+    // The axes were those of the paper.
+    this.draw();
+    return svg;
+  }
+
   /** The values of the first curve of each name at the cursor. */
   seek(x) {
     this.cursor = x;
