@@ -2,7 +2,7 @@
 //
 //   npm ci && node test.mjs --out SCREENSHOTS PAGE.html...
 //
-// Checks that nothing is blank, no error is logged, nothing is asked of the network, every switch and
+// Checks that pages are whole at five widths, that nothing is blank, no error is logged, nothing is asked of the network, every switch and
 // the replay work, the keyboard reaches everything, and the page still works without WebGL. Takes an
 // installed Chromium (or the one that CHROMIUM names), else the one that comes with the packages, which
 // CHROMIUM=packaged asks for.
@@ -11,6 +11,9 @@ import { existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
 import { resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { chromium } from 'playwright-core';
+import { testLayout } from './layout.mjs';
+import { testNumbers } from './numbers.mjs';
+import { MOST_SHEETS, sheets, testAddress, testCharts, testEvents, testGhosts, testNearest, testPoses, testSaving } from './run.mjs';
 
 // A study's hundred thousand cases take a moment to unpack.
 const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000 };
@@ -133,8 +136,15 @@ async function testRun(page, judge, name) {
   });
   assert.ok(worst < 1e-9, `flange off by ${worst} m`);
   const hasGoals = await page.evaluate(() => NB.current.report.goals.length > 0);
-  if (!hasGoals) return;
+  if (!hasGoals) {
+    if (await page.evaluate(() => Boolean(NB.current.report.iso9283))) await testPoses(page, picture);
+    return;
+  }
   await notBlank(judge, page.locator('.curves .plot canvas'), 'the clearance plot');
+  await testNumbers(page);
+  await testSaving(page);
+  await testEvents(page);
+  await testCharts(page);
   const count = await toggles(page);
   console.log(`  ${count} switches work`);
 
@@ -174,6 +184,10 @@ async function testRun(page, judge, name) {
   // The end of the recorded motion is where the report says.
   const options = await page.locator('select[aria-label="Engine"] option').count();
   assert.ok(options >= 1);
+
+  await testNearest(page, settle);
+  await testGhosts(page, settle);
+  await testAddress(page, settle);
 
   // Every goal and every configuration can be shown.
   for (const goal of await page.evaluate(() => NB.current.report.goals.map((_, index) => index))) {
@@ -275,10 +289,14 @@ for (const given of words) {
   await page.screenshot({ path: `${out}/${name}-whole.png`, fullPage: true });
   assert.equal(await page.evaluate(() => window.attacked), undefined, 'a name became a script');
   assert.equal(await page.locator('img[src="x"]').count(), 0, 'a name became an element');
+  await testLayout(page, { judge, notBlank, settle, shot: (width) => `${out}/${name}-${width}.png` });
   console.log(`  the keyboard reaches ${await walk(page)} controls`);
   await tests[kind](page, judge, name);
   // On paper: the picture in place of the view, no controls.
-  await page.pdf({ path: `${out}/${name}.pdf`, preferCSSPageSize: true, printBackground: true });
+  await page.setViewportSize(SIZE);
+  const count = sheets(await page.pdf({ path: `${out}/${name}.pdf`, preferCSSPageSize: true, printBackground: true }));
+  console.log(`  ${count} sheets of paper`);
+  if (kind === 'run') assert.ok(count >= 1 && count <= MOST_SHEETS, `${count} sheets of paper`);
   if (await page.locator('.view').count()) {
     await page.emulateMedia({ media: 'print' });
     assert.ok(await page.evaluate(() => document.querySelector('.view-image').src.startsWith('data:image/png')), 'no picture for paper');

@@ -18,7 +18,11 @@ use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::shown::{Shown, shown_metrics};
 use needlebench_bench::ScenarioRun;
 
-const SCRIPT: &str = include_str!("assets/run.js");
+const SCRIPT: &str = concat!(
+    include_str!("assets/run_sections.js"),
+    include_str!("assets/iso9283.js"),
+    include_str!("assets/run.js")
+);
 
 /// The page of a finished run: everything of its report but the timings, the cell, and all recorded
 /// motions.

@@ -1,13 +1,10 @@
 // The page of an atlas: what works at which roll, by what margin, and why not.
 'use strict';
 
-/** Colours of the rules that reject; hatching and the text under the cursor tell them apart, too. */
-NB.ruleStyle = function (name) {
-  const styles = {
-    unreachable: ['#8a8f96', 0], merged: ['#b8bcc2', 1], nearest_only: ['#b8bcc2', 2], joint_limit: ['#cc79a7', 1], singular: ['#f0e442', 2],
-    collision: ['#d55e00', 1], needle_corridor: ['#e69f00', 2], approach: ['#009e73', 1], no_motion: ['#009e73', 3],
-  };
-  return styles[name] || ['#999999', 3];
+/** Colour and hatching of what works and of the rules that reject; the text under the cursor tells them apart, too. */
+NB.ruleStyle = function (colors, name) {
+  const at = Object.keys(colors).indexOf(name);
+  return [colors[name] || '#999999', name === 'works' || name === 'unreachable' || at < 0 ? 0 : at % 3 + 1];
 };
 
 NB.AtlasPage = class {
@@ -46,23 +43,44 @@ NB.AtlasPage = class {
     this.side = NB.el('div', { class: 'panel' });
     this.table = NB.el('div');
     const present = new Set(page.scene.parts.map((part) => part.group));
-    const names = { robot: 'robot', tool: 'tool', collision: 'collision shapes', table: 'table', gantry: 'gantry', mount: 'mount', obstacle: 'obstacles', skin: 'skin', bone: 'bones', organ: 'organs', vessel: 'vessels', lesion: 'lesions', marker: 'markers', corridor: 'needle corridor', needle: 'needle line' };
+    const layerNames = { robot: 'robot', tool: 'tool', collision: 'collision shapes', table: 'table', gantry: 'gantry', mount: 'mount', obstacle: 'obstacles', skin: 'skin', bone: 'bones', organ: 'organs', vessel: 'vessels', lesion: 'lesions', marker: 'markers', corridor: 'needle corridor', needle: 'needle line' };
     app.append(
-      NB.el('div', { class: 'bar' }, NB.el('strong', { text: 'Goal' }), NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons)),
+      NB.el('p', { class: 'soft', text: 'Every configuration over the roll of the guide about the needle: where it works, how near anything comes in its final posture, and what stands against it elsewhere. Motions are not planned here.' }),
+      NB.el('div', { class: 'bar' }, NB.el('strong', { text: 'Goal' }), NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons), NB.copyLink(),
+        NB.pngButton(this.view, 'The view', () => this.fileName(`${NB.plain.shown.millimetres(this.roll / 1e3)}deg`))),
       NB.el('div', { class: 'grid' },
         NB.el('div', null, this.view.element,
           NB.el('div', { class: 'replay', role: 'group', 'aria-label': 'Roll' }, NB.el('span', { text: 'Roll' }), this.slider, this.clock),
-          NB.el('section', { class: 'panel curves' }, NB.el('h3', { text: 'What works at which roll' }), this.strips.element, this.stripLegend),
-          NB.el('section', { class: 'panel' }, this.title = NB.el('h3'), this.curves.element)),
+          NB.el('section', { class: 'panel curves' },
+            NB.el('div', { class: 'figure-head' }, NB.el('h3', { text: 'What works at which roll' }),
+              NB.saveButton('SVG', 'What works at which roll', () => [`${this.fileName('atlas')}.svg`, this.stripsSvg(), 'image/svg+xml'])),
+            this.strips.element, this.stripLegend),
+          NB.el('section', { class: 'panel' },
+            NB.el('div', { class: 'figure-head' }, this.title = NB.el('h3'),
+              NB.saveButton('SVG', 'Clearance over roll', () => [`${this.fileName('clearance')}.svg`, this.curves.svg(this.title.textContent), 'image/svg+xml'])),
+            this.curves.element)),
         NB.el('div', null, this.side, NB.el('div', { class: 'panel no-print' }, NB.el('h3', { text: 'Show' }),
-          Object.entries(names).filter(([name]) => present.has(name) || name === 'needle').map(([name, text]) => NB.checkbox(text, this.layers[name], (on) => { this.layers[name] = on; this.applyLayers(); }))))),
-      NB.section('Ranges', true, this.table),
+          Object.entries(layerNames).filter(([name]) => present.has(name) || name === 'needle').map(([name, text]) => NB.checkbox(text, this.layers[name], (on) => { this.layers[name] = on; this.applyLayers(); }))))),
+      NB.section('Ranges of roll that work', true, this.table),
       NB.section('Where the numbers come from', false, NB.provenance(page.provenance)));
     this.branchIndex = 0;
     this.roll = 0;
     this.setGoal(0);
     this.applyLayers();
+    this.fromAddress(NB.address.read());
+    NB.address.watch((choices) => this.fromAddress(choices));
   }
+
+  /** Shows what the page's address asks for: goal, configuration, roll in degrees. */
+  fromAddress({ goal, configuration, roll }) {
+    const at = this.page.goals.findIndex((each) => each.name === goal);
+    if (at >= 0 && at !== this.goalIndex) this.setGoal(at);
+    const index = this.goal.branches.findIndex((each) => each.label === configuration);
+    if (index >= 0 && index !== this.branchIndex) this.setBranch(index);
+    if (roll !== undefined && Number.isFinite(Number(roll))) this.setRoll(Number(roll));
+  }
+
+  fileName(...words) { return NB.fileName(this.page.scenario, this.goal.name, this.branch.label, ...words); }
 
   applyLayers() {
     for (const [name, on] of Object.entries(this.layers)) {
@@ -146,6 +164,7 @@ NB.AtlasPage = class {
     this.curves.seek(this.roll);
     this.strips.draw();
     this.view.draw();
+    NB.address.write({ goal: goal.name, configuration: branch.label, roll: String(Math.round(this.roll * 1e3) / 1e3) });
     goal.branches.forEach((each, index) => {
       const decoded = this.decode(each);
       const code = decoded.rules[at];
@@ -170,15 +189,15 @@ NB.AtlasPage = class {
     const { goal } = this;
     const rows = goal.branches.flatMap((branch, index) => (branch.ranges.length ? branch.ranges.map((range) => ({ branch, range, index })) : [{ branch, range: null, index }]));
     const edge = (found) => (found ? `${NB.words(found.rule)}: ${found.detail}` : '');
-    const table = NB.table(`Goal ${NB.words(goal.name)}: ranges of roll that work, and what ends them; best for ${NB.words(goal.aim)}`, [
+    const table = NB.table(`Goal ${NB.words(goal.name)}: what stands against the rolls before and after each range; best roll for ${NB.words(goal.aim)}`, [
       { title: 'Configuration', cell: ({ branch }) => branch.label },
       { title: 'From', unit: 'deg', numeric: true, cell: ({ range }) => (range ? (range.is_whole_circle ? 'all round' : NB.deg(range.from_rad, 2)) : 'nowhere') },
       { title: 'To', unit: 'deg', numeric: true, cell: ({ range }) => (range && !range.is_whole_circle ? NB.deg(range.to_rad, 2) : '') },
-      { title: 'Begins behind', text: true, cell: ({ range }) => edge(range?.before) },
-      { title: 'Ends at', text: true, cell: ({ range }) => edge(range?.after) },
+      { title: 'Before it', text: true, cell: ({ range }) => edge(range?.before) },
+      { title: 'After it', text: true, cell: ({ range }) => edge(range?.after) },
       { title: 'Best roll', unit: 'deg', numeric: true, cell: ({ range }) => (range ? NB.deg(range.best[goal.aim].roll_rad, 2) : '') },
       { title: 'Least clearance there', unit: 'mm', numeric: true, cell: ({ range }) => (range ? NB.mm(range.best[goal.aim].least_clearance_m) : '') },
-      { title: 'Between', cell: ({ range }) => (range?.best[goal.aim].pair || []).join(' \u2013 ') },
+      { title: 'Between', cell: ({ range }) => [...new Set((range?.best[goal.aim].pair || []).map(NB.words))].join(' to ') },
     ], rows, { class: 'choose small' });
     const elements = [...table.querySelectorAll('tbody tr')];
     NB.rows(elements, (at) => {
@@ -192,7 +211,8 @@ NB.AtlasPage = class {
 
   paint(context, width, height) {
     const { goal } = this;
-    const box = { left: 150, top: 8, width: width - 166, height: height - 50 };
+    const left = width < 420 ? 106 : 150;
+    const box = { left, top: 8, width: width - left - 16, height: height - 50 };
     const axes = new NB.Axes(box, { low: 0, high: 360, title: 'roll (deg)' }, { low: -0.5, high: 7.5, title: '', labels: goal.branches.map((branch) => branch.label).reverse() });
     this.axes = axes;
     axes.draw(context);
@@ -206,7 +226,7 @@ NB.AtlasPage = class {
         if (at < goal.rolls && branch.rules[at] === branch.rules[start]) continue;
         const rule = branch.rules[start];
         const name = rule === 255 ? 'works' : branch.ruleNames[rule];
-        const style = rule === 255 ? ['#0072b2', 0] : NB.ruleStyle(name);
+        const style = NB.ruleStyle(this.page.ruleColors, name);
         used.set(name, style);
         // A roll stands for half a step on both sides.
         const [from, to] = [axes.px(Math.max(0, 360 * (start - 0.5) / goal.rolls)), axes.px(Math.min(360, 360 * (at - 0.5) / goal.rolls))];
@@ -237,15 +257,29 @@ NB.AtlasPage = class {
       context.beginPath(); context.moveTo(fixed, box.top); context.lineTo(fixed, box.top + box.height); context.stroke();
       context.setLineDash([]);
     }
+    this.used = used;
     const names = [...used.keys()].join();
     if (names !== this.legendNames) {
       this.legendNames = names;
-      NB.clear(this.stripLegend, [...used].map(([name, style]) => {
+      const key = ([name, style]) => {
         const canvas = NB.el('canvas', { width: '26', height: '14', 'aria-hidden': 'true' });
         this.block(canvas.getContext('2d'), style, 0, 0, 26, 14);
         return NB.el('span', { class: 'key' }, canvas, NB.words(name));
-      }), NB.el('span', { class: 'soft small', text: 'black frame: a range that works; diamond: its best roll; dashed line: the roll that the goal fixes' }));
+      };
+      const rejecting = [...used].filter(([name]) => name !== 'works');
+      NB.clear(this.stripLegend, [...used].filter(([name]) => name === 'works').map(key),
+        rejecting.length ? NB.el('strong', { class: 'small', text: 'Rejected by:' }) : null, rejecting.map(key),
+        NB.el('span', { class: 'soft small', text: 'Black frame: a range that works, to the exact angle; diamond: its best roll; dashed line: the roll that the goal fixes.' }));
     }
+  }
+
+  stripsSvg() {
+    const title = `${NB.words(this.goal.name)}: what works at which roll`;
+    const words = (name) => (name === 'works' ? 'works' : `rejected by: ${NB.words(name)}`);
+    const legend = [...this.used].map(([name, style]) => ({ text: words(name), draw: (context, x, y) => this.block(context, style, x - 13, y - 6, 26, 12) }));
+    const svg = NB.paper(title, (...all) => this.paint(...all), 230, legend);
+    this.strips.draw();
+    return svg;
   }
 
   fixedMark(goal) { return goal.fixedRoll === null ? null : (goal.fixedRoll * 180 / Math.PI % 360 + 360) % 360; }

@@ -173,7 +173,7 @@ NB.scroll = function (label, content) {
     const heads = [...(box.querySelector('thead tr')?.cells || [])];
     const beyond = heads.filter((cell) => cell.getBoundingClientRect().right > edge + 1).length;
     hint.textContent = rest <= 1 ? '\u2190 the rest is to the left'
-      : heads.length ? `${beyond} more column${beyond === 1 ? '' : 's'}: scroll sideways \u2192` : 'scroll sideways for the rest \u2192';
+      : beyond ? `${beyond} more column${beyond === 1 ? '' : 's'}: scroll sideways \u2192` : 'scroll sideways for the rest \u2192';
   };
   box.addEventListener('scroll', look, { passive: true });
   const observer = new ResizeObserver(look);

@@ -11,7 +11,6 @@ NB.RunPage = class {
       organ: true, vessel: true, lesion: true, marker: true, corridor: false, needle: true, witness: true,
       people: false, space: false, cone: false, ellipsoids: true,
     };
-    this.witness = 'least';
     this.magnify = 10;
     this.time = 0;
     this.speed = 1;
@@ -19,7 +18,25 @@ NB.RunPage = class {
     this.view = new NB.View(page.scene, `Cell of ${this.report.scenario.name}`);
     if (this.report.goals.length) this.build(app);
     else this.buildWithoutGoals(app);
-    app.append(this.criteria(), this.requirements(), this.provenance());
+    app.append(NB.sections.criteria(this.report), NB.sections.requirements(this.report) || '', NB.sections.provenance(this.report));
+    this.fromAddress(NB.address.read());
+    NB.address.watch((choices) => this.fromAddress(choices));
+  }
+
+  /** Shows what the page's address asks for: goal, configuration, time. */
+  fromAddress({ goal, configuration, time }) {
+    if (!this.report.goals.length) return;
+    const at = this.report.goals.findIndex((each) => each.name === goal);
+    if (at >= 0 && at !== this.goalIndex) this.setGoal(at);
+    const index = this.goal.configurations.findIndex((each) => each.label === configuration);
+    if (index >= 0 && index !== this.configurationIndex) this.setConfiguration(index);
+    const seconds = Number(time);
+    if (time !== undefined && Number.isFinite(seconds) && this.shown.length) this.seek(Math.min(Math.max(seconds, 0), this.end));
+  }
+
+  toAddress() {
+    const isEnd = !this.shown?.length || this.time >= this.end;
+    NB.address.write({ goal: this.goal.name, configuration: this.configuration.label, time: isEnd ? null : this.time.toFixed(2) });
   }
 
   head() {
@@ -32,6 +49,7 @@ NB.RunPage = class {
     return NB.el('div', { class: 'bar' },
       NB.verdict(verdict),
       NB.el('span', { text: counts }),
+      NB.copyLink(),
       failures.map((each) => NB.el('span', { class: 'error', text: `${each.engine} failed${each.during ? ` during ${each.during}` : ''}: ${each.message}` })));
   }
 
@@ -56,40 +74,47 @@ NB.RunPage = class {
         this.goalButtons[to].focus();
       },
     }, NB.words(goal.name)));
+    this.goalTable = NB.sections.goals(this, (index) => this.setGoal(index));
+    this.answer = NB.el('div', { class: 'answer' });
     // On paper, the table below says the same.
     this.side = NB.el('div', { class: 'panel no-print' });
     this.details = NB.el('div', { class: 'panel' });
     this.table = NB.el('div');
+    this.margins = NB.el('div');
     this.budget = NB.el('div');
     this.people = NB.el('div');
+    this.events = NB.el('div');
+    this.now = NB.el('div', { class: 'now small', role: 'status', 'aria-live': 'off' });
     this.curves = new NB.Curves({
       height: 250, label: 'Clearance of each class over the time of the motion', xTitle: 'time (s)', yTitle: 'clearance (mm)',
       seek: (time) => { this.pause(); this.seek(time); },
     });
+    const hasEvents = goals.some((goal) => goal.configurations.some((each) => each.events));
+    this.budgetSection = NB.section('How far off the needle will be: error budget', true, this.budget);
     app.append(
+      this.goalTable?.element || '',
       NB.el('div', { class: 'bar' }, NB.el('strong', { text: 'Goal' }),
         NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons)),
+      this.answer,
       NB.el('div', { class: 'grid' },
-        NB.el('div', null, this.viewBar(), view.element, this.replayBar(), this.curves.element),
+        NB.el('div', null, this.viewBar(), view.element, this.replayBar(), this.now,
+          NB.el('div', { class: 'figure-head' }, NB.el('h3', { text: 'Clearance over time' }),
+            NB.saveButton('SVG', 'Clearance over time', () => [`${this.fileName('clearance')}.svg`, this.curves.svg(`${this.configuration.label}: clearance over time`), 'image/svg+xml'])),
+          this.curves.element),
         NB.el('div', null, this.side, this.details, this.layerPanel())),
-      NB.section('Configurations', true, this.table),
-      NB.section('Error budget', true, this.budget),
+      NB.section('Configurations compared', true, this.table),
+      this.budgetSection,
+      hasEvents ? NB.section('Contact, emergency stop and way back', true, this.events) : '',
+      NB.section('Clearance kept by the planned motion', false, this.margins),
       NB.section('People and free space', false, this.people));
     this.setGoal(0);
   }
 
   buildWithoutGoals(app) {
-    const arm = this.view.arm('arm');
-    arm.pose(this.page.scene.chain, this.page.start);
-    for (const [name, on] of Object.entries(this.layers)) this.view.show(name, on);
-    for (const group of ['collision', 'corridor']) arm.layer(group, false);
-    this.view.frame(this.framed([]), [-0.75, 0.45, -0.55]);
-    const [title, what] = this.report.excitation
-      ? ['Excitation', 'Proven clearances by motion are in report.json; the logs are in the files named there.']
-      : ['ISO 9283', 'The table of the test and its curves are in report.json and in the files named there.'];
-    app.append(this.view.element, NB.section(title, false, NB.el('p', { text: what }),
-      NB.tree(this.report.excitation || this.report.iso9283)));
+    this.test = new NB.TestPage(this.page, app, this.view, this.layers);
   }
+
+  fileName(...words) { return NB.fileName(this.report.scenario.name, this.goal.name, this.configuration.label, ...words); }
 
   /** Base and shoulders of the arm, and points of the goal. */
   framed(points) {
@@ -109,7 +134,8 @@ NB.RunPage = class {
         const d = this.direction(this.goal.target_m, this.goal.axis);
         return { direction: d, distance: 0.55, middle: entry() };
       }),
-      NB.el('span', { class: 'soft', text: 'drag: turn \u00b7 wheel: zoom \u00b7 right button: move' }));
+      NB.pngButton(this.view, 'The view', () => this.fileName(`${this.time.toFixed(2)}s`)),
+      NB.el('span', { class: 'soft small', text: 'drag: turn \u00b7 wheel or two fingers: zoom \u00b7 right button: move' }));
   }
 
   aim({ direction, distance, middle }) {
@@ -128,11 +154,9 @@ NB.RunPage = class {
       NB.el('div', { role: 'group', 'aria-label': 'Parts of the picture' },
         parts.map(([name, text]) => box(name, text)),
         box('needle', 'needle line'), box('cone', 'cone for the hand'), box('people', 'people and sight'), box('space', 'free space'),
-        box('witness', 'least clearance'), hasBudget ? box('ellipsoids', 'error ellipsoids') : null),
+        box('witness', 'what is nearest'), hasBudget ? box('ellipsoids', 'error ellipsoids') : null),
       NB.el('div', { class: 'bar' },
-        NB.select('Clearance lines', [['least', 'the least'], ['all', 'of every class'], ['chosen', 'the chosen class']], this.witness,
-          (value) => { this.witness = value; this.drawWitness(); }),
-        hasBudget ? NB.select('Ellipsoids', [['1', 'true size'], ['5', '5 \u00d7'], ['10', '10 \u00d7'], ['20', '20 \u00d7']], '10',
+        hasBudget ? NB.select('Error ellipsoids drawn at', [['1', 'true size'], ['5', '5 \u00d7'], ['10', '10 \u00d7'], ['20', '20 \u00d7']], '10',
           (value) => { this.magnify = Number(value); this.drawBudget(); }) : null));
   }
 
@@ -181,8 +205,9 @@ NB.RunPage = class {
     this.drawPeople();
     this.sideTable();
     this.configurationTable();
-    this.budgetTable();
-    this.peopleTable();
+    NB.clear(this.answer, NB.sections.answer(this.goal));
+    NB.clear(this.people, NB.sections.people(this.goal));
+    if (this.goalTable) NB.mark(this.goalTable.rows, index);
     const around = [[-0.25, -0.25, -0.1], [0.25, 0.25, 0.3]].map((offset) => offset.map((value, k) => target[k] + value));
     view.frame(this.framed(around), this.direction(target, axis));
     const first = this.goal.recommended
@@ -198,21 +223,34 @@ NB.RunPage = class {
     this.configurationIndex = index;
     NB.mark(this.sideRows, index);
     NB.mark(this.tableRows, index);
-    this.chosenClass = null;
+    this.pinned = null;
     const { runs } = this.own;
     // Two engines at a time: all pairs of them.
     this.pairs = runs.flatMap((second, at) => runs.slice(0, at).map((first) => [first, second]));
     NB.clear(this.engineSelect, this.pairs.map(([first, second], at) => NB.el('option', { value: at ? `pair ${at}` : 'both',
-      text: `${runs.length > 2 ? `${first.engine} and ${second.engine}` : 'both engines'}, second as ghost` })),
+      text: `${runs.length > 2 ? `${first.engine} and ${second.engine}` : 'both engines'}, second in orange` })),
       runs.map((run, at) => NB.el('option', { value: String(at), text: `${run.engine}${run.stopped ? ' (stopped)' : ''}` })),
       runs.length ? null : NB.el('option', { value: '', text: 'no motion recorded' }));
     const apart_m = this.configuration.engine_difference?.peak_tip_m;
-    this.apart.textContent = apart_m === undefined ? '' : `tips of the engines at most ${NB.length(apart_m)} apart; the ghost is seen only where they differ`;
+    this.apart.textContent = apart_m === undefined ? '' : `The engines\u2019 tips are at most ${NB.length(apart_m)} apart; the second is seen only where they differ.`;
     this.showDetails();
+    this.showSections();
     this.drawRoom();
     this.drawBudget();
     this.showMotion();
-    this.drawWitness();
+    this.drawGhosts();
+  }
+
+  /** What the sections below say of this configuration. */
+  showSections() {
+    const { goal, configuration } = this;
+    const { charts } = this.own;
+    const name = this.report.scenario.name;
+    const budget = NB.sections.budget(goal, configuration, charts, this.extra.charts, name);
+    this.budgetSection.hidden = !budget;
+    NB.clear(this.budget, budget || []);
+    NB.clear(this.margins, NB.sections.margins(configuration));
+    NB.clear(this.events, NB.sections.events(goal, configuration, charts, name) || []);
   }
 
   decode(run) {
@@ -220,6 +258,7 @@ NB.RunPage = class {
       run.decoded = {
         time: NB.array(run.time), joints: run.joints.map(NB.array), curveTime: NB.array(run.curveTime),
         curves: Object.entries(run.curves).map(([name, column]) => [name, NB.array(column).map((value) => value * 1e3)]),
+        nearest: { ...run.nearest, time: NB.array(run.nearest.time), pair: NB.array(run.nearest.pair), points: run.nearest.points.map(NB.array) },
       };
     }
     return run.decoded;
@@ -269,7 +308,9 @@ NB.RunPage = class {
       this.joints = configuration.joints_rad;
     }
     this.curves.seek(this.shown.length ? time : null);
-    this.view.draw();
+    if (this.pinned && this.pinned.time_s !== null && Math.abs(this.pinned.time_s - time) > 1e-9) this.pinned = null;
+    this.drawWitness();
+    if (!this.playing) this.toAddress();
   }
 
   play() {
@@ -289,7 +330,7 @@ NB.RunPage = class {
   }
 
   pause() {
-    this.playing = false;
+    if (this.playing) { this.playing = false; this.toAddress(); }
     if (this.playButton) this.playButton.textContent = '\u25b6 Play';
   }
 
@@ -303,35 +344,91 @@ NB.RunPage = class {
     this.view.draw();
   }
 
+  /** Postures of other configurations, each in its colour and with its name. */
   drawGhosts() {
+    const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255);
+    this.view.empty('ghost labels');
     this.ghostArms.forEach((ghost, index) => {
-      const joints = this.goal.configurations[index]?.joints_rad;
+      const configuration = this.goal.configurations[index];
+      const joints = configuration?.joints_rad;
       const on = this.ghosts.has(index) && Boolean(joints);
-      if (on && !ghost.arm) ghost.arm = this.view.arm(ghost.name, { color: [0.34, 0.71, 0.91], opacity: 0.28 });
+      const color = NB.ghostColors[index];
+      if (on && !ghost.arm) ghost.arm = this.view.arm(ghost.name, { color: rgb(color), opacity: 0.45 });
       if (!ghost.arm) return;
       ghost.arm.show(on);
-      if (on) ghost.arm.pose(this.page.scene.chain, joints);
+      if (!on) return;
+      ghost.arm.pose(this.page.scene.chain, joints);
+      if (!this.view.works) return;
+      // Beside the wrist, where those that share an elbow are apart.
+      const at = NB.forward(this.page.scene.chain, joints)[3].elements.slice(12, 15);
+      this.view.label('ghost labels', configuration.label, at);
+      const { element } = this.view.labels.at(-1);
+      element.style.borderLeft = `6px solid ${color}`;
     });
     this.view.draw();
   }
 
+  /** What is nearest at a time of the motion that is shown, or in the final posture; null where nothing is known. */
+  nearestAt(time) {
+    const run = this.shown[0];
+    if (!run) return this.leastOf(this.configuration);
+    const { nearest, curveTime, curves } = this.decode(run);
+    let after = nearest.time.findIndex((each) => each >= time);
+    if (after < 0) after = nearest.time.length - 1;
+    const before = Math.max(after - 1, 0);
+    const share = after > before ? (time - nearest.time[before]) / (nearest.time[after] - nearest.time[before]) : 0;
+    const at = share < 0.5 ? before : after;
+    const pair = nearest.pair[at];
+    if (pair === undefined || pair === 255) return null;
+    // Between two samples of one pair its points move steadily; of two pairs the nearer sample's is shown.
+    const same = nearest.pair[before] === nearest.pair[after];
+    const point = (axis) => (same ? nearest.points[axis][before] + share * (nearest.points[axis][after] - nearest.points[axis][before]) : nearest.points[axis][at]);
+    const name = nearest.classes[pair];
+    const curve = curves.find(([each]) => each === name);
+    return {
+      name, pair: nearest.names[pair], time_s: time, minimum_m: NB.at(curveTime, curve[1], time) / 1e3,
+      witness_points_m: [[0, 1, 2].map(point), [3, 4, 5].map(point)],
+    };
+  }
+
+  /** The least clearance over the whole motion, of what should not touch. */
+  leastOf(configuration) {
+    const all = Object.entries(configuration.clearance).filter(([name, found]) => found?.witness_points_m && this.page.unwantedClasses.includes(name));
+    const least = all.reduce((best, each) => (!best || each[1].minimum_m < best[1].minimum_m ? each : best), null);
+    return least && { name: least[0], ...least[1] };
+  }
+
+  /** What is nearest at the time that is shown; a row of the table pins the least of its class, at its time. */
   drawWitness() {
     const view = this.view;
     view.empty('witness');
-    const classes = Object.entries(this.configuration.clearance).filter(([, found]) => found && found.witness_points_m);
-    const physical = classes.filter(([name]) => this.page.unwantedClasses.includes(name));
-    const least = physical.reduce((best, each) => (!best || each[1].minimum_m < best[1].minimum_m ? each : best), null);
-    const chosen = classes.filter(([name]) => name === this.chosenClass);
-    const lines = this.witness === 'all' ? classes : this.witness === 'chosen' || chosen.length ? chosen : least ? [least] : [];
-    for (const [name, found] of lines) {
-      const color = new THREE.Color(NB.styleOf(name).color);
+    const found = this.pinned || this.nearestAt(this.time);
+    const pairWords = (each) => [...new Set(each.pair.map(NB.words))].join(' to ');
+    if (found && view.works) {
+      const color = new THREE.Color(NB.styleOf(found.name).color);
       const rgba = [color.r, color.g, color.b].map((c) => (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055)).concat(1);
       const [a, b] = found.witness_points_m;
       view.rod('witness', a, b, 0.002, rgba, true);
       for (const end of [a, b]) view.ball('witness', end, 0.005, rgba, true);
-      view.label('witness', `${NB.words(name)} ${NB.mm(found.minimum_m)} mm${found.time_s === null ? '' : ` at ${found.time_s.toFixed(2)} s`}`, a.map((value, k) => (value + b[k]) / 2));
+      const when = !this.shown.length || found.time_s === null ? '' : ` at ${found.time_s.toFixed(2)} s`;
+      const what = this.pinned ? `least ${NB.words(found.name)}` : pairWords(found);
+      view.label('witness', `${what}: ${NB.mm(found.minimum_m)} mm${when}`, a.map((value, k) => (value + b[k]) / 2));
     }
+    this.sayNearest(this.pinned ? this.nearestAt(this.time) : found, pairWords);
     view.draw();
+  }
+
+  sayNearest(found, pairWords) {
+    const least = this.leastOf(this.configuration);
+    const now = found && NB.el('p', { text: `Nearest ${this.shown.length ? `now, at ${this.time.toFixed(2)} s` : 'in the final posture'}: ${pairWords(found)}, ${NB.mm(found.minimum_m)} mm.` });
+    const all = least && this.shown.length && NB.el('p', null, `Least over the whole motion: ${pairWords(least)}, ${NB.mm(least.minimum_m)} mm${least.time_s === null ? '. ' : ` at ${least.time_s.toFixed(2)} s. `}`,
+      least.time_s === null ? null : NB.el('button', { type: 'button', class: 'no-print save', onclick: () => { this.pause(); this.seek(Math.min(least.time_s, this.end)); } }, 'Go there'));
+    if (this.playing && this.now.firstChild && now) {
+      // The button stays where it is.
+      this.now.firstChild.replaceWith(now);
+      return;
+    }
+    NB.clear(this.now, now || '', all || '');
   }
 
   drawPeople() {
@@ -351,7 +448,7 @@ NB.RunPage = class {
       }
       for (const [stature, eyes] of Object.entries(person.eyes)) {
         view.ball('people', eyes, 0.045, [0.35, 0.42, 0.62, 1]);
-        view.label('people', `${person.name} ${stature} m`, eyes);
+        view.label('people', `${NB.words(person.name)}, ${stature} m`, eyes);
       }
     }
     if (sector && view.works) {
@@ -404,7 +501,7 @@ NB.RunPage = class {
         const bias = new THREE.Vector3(...moments.bias_m).applyMatrix4(turn).multiplyScalar(this.magnify);
         const center = at.map((value, k) => value + bias.getComponent(k));
         view.ellipsoid('ellipsoids', center, columns, color);
-        view.label('ellipsoids', `95 % at ${where}, \u00d7 ${this.magnify}: rms ${NB.mm(moments.rms_m, 2)} mm`, center);
+        view.label('ellipsoids', `${this.magnify === 1 ? '' : `\u00d7 ${this.magnify}: `}95 % at ${where}, longest half axis ${NB.mm(2.7955 * NB.longest(moments.covariance_m2), 1)} mm`, center);
       }
     }
     view.draw();
@@ -412,7 +509,7 @@ NB.RunPage = class {
 
   status(configuration) {
     const recommended = this.goal.recommended?.label === configuration.label;
-    const words = { ok: ['good', '\u2713 ok'], failed: ['bad', '\u2717 failed'], rejected: ['off', '\u2013 rejected'] };
+    const words = { ok: ['good', '\u2713 works'], failed: ['bad', '\u2717 failed'], rejected: ['off', '\u2013 rejected'] };
     const missed = this.report.criteria.some((each) => !each.pass && each.criterion !== 'expected' && each.goal === this.goal.name && each.label === configuration.label);
     const open = configuration.not_judged > 0 && !missed;
     const [style, text] = open ? ['bad', '? incomplete'] : words[configuration.status];
@@ -422,9 +519,7 @@ NB.RunPage = class {
   sideTable() {
     const columns = [
       { title: 'Configuration', cell: (c) => c.label },
-      { title: 'Status', cell: (c) => this.status(c) },
-      ...NB.metricColumns(this.extra.columns.side),
-      { title: 'Ghost', cell: (c) => NB.el('input', {
+      { title: 'Ghost', help: 'show its posture, too', cell: (c) => NB.el('span', { class: 'pick' }, NB.el('input', {
         type: 'checkbox', 'aria-label': `ghost of ${c.label}`, checked: this.ghosts.has(this.goal.configurations.indexOf(c)), disabled: !c.joints_rad,
         onclick: (event) => event.stopPropagation(),
         onchange: (event) => {
@@ -432,7 +527,9 @@ NB.RunPage = class {
           if (event.target.checked) this.ghosts.add(at); else this.ghosts.delete(at);
           this.drawGhosts();
         },
-      }) },
+      }), NB.swatch(NB.ghostColors[this.goal.configurations.indexOf(c)])) },
+      { title: 'Status', cell: (c) => this.status(c) },
+      ...NB.metricColumns(this.extra.columns.side),
     ];
     const table = NB.table('Choose a configuration (\u2605 recommended)', columns, this.goal.configurations, { class: 'choose small full' });
     this.sideRows = [...table.querySelectorAll('tbody tr')];
@@ -449,158 +546,68 @@ NB.RunPage = class {
 
   showDetails() {
     const c = this.configuration;
-    const reasons = c.rejections.map((each) => NB.el('li', { text: `${NB.words(each.rule)}: ${NB.quantity(each.value, each.unit)} (limit ${NB.quantity(each.limit, each.unit)}) ${each.detail}` }));
+    const item = (before, each) => {
+      const [value, limit] = NB.valueAndLimit(each.value, each.limit, each.unit);
+      return NB.el('li', { text: `${before}${each.value === null ? '' : `: ${value}, limit ${limit}`}${each.engine ? ` (${each.engine})` : ''}${each.detail ? `. ${each.detail.charAt(0).toUpperCase()}${each.detail.slice(1)}` : ''}.` });
+    };
+    const reasons = c.rejections.map((each) => item(`Rejected, ${NB.words(each.rule)}`, each));
     const failed = this.report.criteria.filter((each) => !each.pass && each.goal === this.goal.name && each.label === c.label)
-      .map((each) => NB.el('li', { text: `misses ${NB.words(each.criterion)}: ${NB.quantity(each.value, each.unit)} (limit ${NB.quantity(each.limit, each.unit)}) ${each.engine || ''} ${each.detail}` }));
+      .map((each) => item(`Misses ${NB.criterionWords(each.criterion)}`, each));
     const classes = Object.entries(c.clearance).filter(([, found]) => found && found.witness_points_m);
     const columns = [
-      { title: 'Least clearance', cell: ([name]) => [NB.sample(NB.styleOf(name)), ` ${NB.words(name)}`] },
-      { title: '', unit: 'mm', numeric: true, cell: ([, found]) => NB.mm(found.minimum_m) },
-      { title: 'Between', cell: ([, found]) => `${found.pair.join(' \u2013 ')}, ${NB.words(found.phase)}${found.time_s === null ? '' : ` ${found.time_s.toFixed(2)} s`}` },
+      { title: 'Between', cell: ([name]) => [NB.sample(NB.styleOf(name)), ` ${NB.words(name)}`] },
+      { title: 'Least', unit: 'mm', numeric: true, cell: ([, found]) => NB.mm(found.minimum_m) },
+      { title: 'Which and when', cell: ([, found]) => `${[...new Set(found.pair.map(NB.words))].join(' to ')}, ${NB.words(found.phase)}${found.time_s === null ? '' : ` ${found.time_s.toFixed(2)} s`}` },
     ];
-    const table = NB.table('Row: show where and when', columns, classes, { class: 'choose small full' });
+    const caption = this.own.runs.length ? 'Least clearances over the whole motion; a row shows where and when' : 'Clearances of the final posture; a row shows where';
+    const table = NB.table(caption, columns, classes, { class: 'choose small full' });
     const rows = [...table.querySelectorAll('tbody tr')];
     NB.rows(rows, (index) => {
       const [name, found] = classes[index];
-      this.chosenClass = name;
       NB.mark(rows, index);
       this.pause();
-      if (found.time_s !== null && this.shown.length) this.seek(found.time_s);
+      if (found.time_s !== null && this.shown.length) this.seek(Math.min(found.time_s, this.end));
+      this.pinned = { name, ...found, time_s: found.time_s === null ? null : this.time };
       this.drawWitness();
     });
     NB.mark(rows, -1);
     if (rows[0]) rows[0].tabIndex = 0;
     NB.clear(this.details, NB.el('h3', { text: c.label }),
-      NB.el('p', { class: 'small' }, c.joints_rad ? `joints ${c.joints_rad.map((q) => NB.deg(q)).join(', ')}\u00b0 \u00b7 roll ${NB.deg(c.roll_rad)}\u00b0` : 'no posture'),
-      reasons.length || failed.length ? NB.el('ul', { class: 'plain small' }, reasons, failed) : null, table, this.marginDetails(c));
-  }
-
-  /** What the planned motion keeps of the clearance that its postures allow, and the way back. */
-  marginDetails(c) {
-    if (!c.margin) return null;
-    const retreat = (name) => c.retreat_clearance[name]?.certified_lower_bound_m ?? null;
-    const columns = [
-      { title: 'Planned motion, proven', cell: ([name]) => NB.words(name) },
-      { title: 'judged', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.limit_m) },
-      { title: 'attainable', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.attainable_m), help: 'least of the start, the approach and its end, which every motion takes' },
-      { title: 'kept', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.achieved_m) },
-      { title: 'limited by', cell: ([, each]) => each.limited_by },
-      { title: 'way back', unit: 'mm', numeric: true, cell: ([name]) => (retreat(name) === null ? '\u2013' : NB.mm(retreat(name))) },
-    ];
-    const ends = { bound: 'no transfer keeps more that counts', proof: 'no transfer helps: a posture that every motion takes is too near', budget: 'a better transfer may exist' };
-    return NB.table(`Search ended by ${c.margin.search}: ${ends[c.margin.search]}`, columns, Object.entries(c.margin.classes), { class: 'small full' });
+      NB.el('p', { class: 'small' }, c.joints_rad ? `Joints ${c.joints_rad.map((q) => `${NB.deg(q)}\u00b0`).join(', ')}; roll about the needle ${NB.deg(c.roll_rad)}\u00b0` : 'No posture.'),
+      reasons.length || failed.length ? NB.el('ul', { class: 'plain small' }, reasons, failed) : null,
+      classes.length ? table : null);
   }
 
   configurationTable() {
     const columns = [
       { title: 'Configuration', cell: (c) => c.label },
       { title: 'Status', cell: (c) => this.status(c) },
-      { title: 'Rank', numeric: true, cell: (c) => c.ranking ? `${c.ranking.rank}${c.pareto ? ' P' : ''}` : '\u2013', help: 'P: in the Pareto set' },
+      { title: 'Rank', numeric: true, cell: (c) => (c.ranking ? String(c.ranking.rank) : '\u2013') },
+      { title: 'Pareto set', cell: (c) => (c.pareto ? 'yes' : c.dominated_by ? `no: ${c.dominated_by.label} is better` : ''), help: 'in it: no other that works is as good in everything and better in something' },
       { title: 'Score', numeric: true, cell: (c) => NB.fixed(c.ranking?.score, 3) },
       ...NB.metricColumns(this.extra.columns.table),
       { title: 'First reason against', text: true, cell: (c) => (c.rejections[0] ? `${NB.words(c.rejections[0].rule)}: ${c.rejections[0].detail}` : '') },
     ];
-    const table = NB.table(`Goal ${NB.words(this.goal.name)}: clearances are minima over the motion of all engines`, columns, this.goal.configurations, { class: 'choose small' });
+    const table = NB.table(`${NB.words(this.goal.name)}: clearances are the least over the recorded motions of all engines; those that are proven hold between the samples, too`, columns, this.goal.configurations, { class: 'choose small' });
     this.tableRows = [...table.querySelectorAll('tbody tr')];
     NB.rows(this.tableRows, (index) => this.setConfiguration(index));
-    const recommended = this.goal.recommended;
-    NB.clear(this.table,
-      recommended ? NB.el('p', null, NB.el('strong', { text: `Recommended: ${recommended.label}. ` }), recommended.reason) : NB.el('p', { class: 'error', text: 'No configuration works.' }),
-      this.routeSentence(),
-      table);
+    const ranking = this.extra.charts.ranking;
+    NB.clear(this.table, table, ranking ? NB.el('details', null, NB.el('summary', { text: 'What the scores are made of' }),
+      NB.chart(`${NB.words(this.goal.name)}: ranking`, ranking, NB.fileName(this.report.scenario.name, this.goal.name, 'ranking'))) : null);
   }
+};
 
-  // How the planned needle keeps away from bone, vessels and organs; red where it does not.
-  routeSentence() {
-    const route = this.goal.needle_route;
-    if (!route) return '';
-    const part = `${NB.words(route.part)} (${route.tissue})`;
-    const where = route.distance_m < 0 ? `${NB.mm(-route.distance_m, 1)} mm deep through ${part}` : `${NB.mm(route.distance_m, 1)} mm from ${part}`;
-    return NB.el('p', { class: route.kept ? '' : 'error', text: `Needle route${route.kept ? '' : ' refused'}: ${where}, margin ${NB.mm(route.margin_m, 1)} mm.` });
+/** Largest standard deviation of a covariance in any direction, by its powers. */
+NB.longest = function (covariance) {
+  let v = [1, 1, 1];
+  let size = 0;
+  for (let k = 0; k < 200; k++) {
+    const next = covariance.map((row) => row.reduce((sum, each, at) => sum + each * v[at], 0));
+    size = Math.hypot(...next);
+    if (!size) return 0;
+    v = next.map((each) => each / size);
   }
-
-  budgetTable() {
-    const with_ = this.goal.configurations.filter((c) => c.budget || c.budget_failure);
-    const section = this.budget.parentElement;
-    if (section) section.hidden = with_.length === 0;
-    this.budget.hidden = with_.length === 0;
-    if (!with_.length) return;
-    const sources = [...new Set(with_.flatMap((c) => (c.budget?.sources || []).map((each) => each.source)))];
-    const rms = (part) => NB.mm(part?.at_target.analytic.rms_m, 2);
-    const columns = [
-      { title: 'Configuration', cell: (c) => c.label },
-      { title: 'All', unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.total) },
-      { title: 'Within (95 %)', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.budget?.total.at_target.radius_95_m, 2), help: 'distance that 95 % of the draws stay within' },
-      { title: 'At skin', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.budget?.total.at_skin?.analytic.rms_m, 2) },
-      ...sources.map((name) => ({ title: NB.words(name), unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.sources.find((each) => each.source === name)) })),
-      { title: 'Largest', cell: (c) => (c.budget ? NB.words(c.budget.dominant) : c.budget_failure) },
-    ];
-    NB.clear(this.budget, NB.table('Root mean square distance of the tip from the target over all arms and patients, in all and by source alone', columns, with_, { class: 'small' }));
-  }
-
-  peopleTable() {
-    const with_ = this.goal.configurations.filter((c) => c.room);
-    const regions = [...new Set(with_.flatMap((c) => Object.keys(c.room.regions)))];
-    const sight = [...new Set(with_.flatMap((c) => c.room.sight.map((each) => `${each.person} ${each.stature_m.toFixed(2)} m`)))];
-    const columns = [
-      { title: 'Configuration', cell: (c) => c.label },
-      { title: 'Free', unit: '%', numeric: true, cell: (c) => NB.percent(c.room.free_fraction) },
-      ...regions.map((name) => ({ title: `Free ${name}`, unit: '%', numeric: true, cell: (c) => NB.percent(c.room.regions[name]) })),
-      ...sight.map((name) => ({ title: `Sight ${name}`, unit: '%', numeric: true, cell: (c) => NB.percent(c.room.sight.find((each) => `${each.person} ${each.stature_m.toFixed(2)} m` === name)?.fraction) })),
-      { title: 'Hand cone', unit: '\u00b0', numeric: true, cell: (c) => NB.deg(c.room.hand_cone_half_angle_rad), help: 'half-angle of the largest free cone behind the guide' },
-      { title: 'Blocked by', cell: (c) => c.room.hand_cone_blocker || '' },
-      { title: 'Elbow', cell: (c) => `${c.room.elbow_up ? 'up' : 'down'}, ${NB.mm(c.room.elbow_over_entry_m, 0)} mm over entry` },
-    ];
-    NB.clear(this.people, NB.el('p', { class: 'soft', text: 'Switch on "people and sight", "free space" and "cone for the hand" to see them: blue lines of sight are free, orange ones end where they are blocked; orange cubes are taken by the arm.' }),
-      NB.table('Shares of the half ball about the entry point that stay free, and of lines of sight', columns, with_, { class: 'small' }));
-  }
-
-  criteria() {
-    const sorted = [...this.report.criteria].sort((a, b) => Number(a.pass) - Number(b.pass));
-    const columns = [
-      { title: 'Criterion', cell: (c) => NB.words(c.criterion) },
-      { title: 'Goal', cell: (c) => NB.words(c.goal) },
-      { title: 'Configuration', cell: (c) => c.label || '' },
-      { title: 'Engine', cell: (c) => c.engine || '' },
-      { title: 'Value', numeric: true, cell: (c) => NB.quantity(c.value, c.unit) },
-      { title: 'Limit', numeric: true, cell: (c) => NB.quantity(c.limit, c.unit) },
-      { title: 'Met', cell: (c) => NB.el('span', { class: c.pass ? 'good' : 'bad', text: c.pass ? '\u2713 met' : '\u2717 missed' }) },
-      { title: '', cell: (c) => c.detail },
-    ];
-    const open = this.report.not_judged;
-    const unjudged = [
-      ...columns.slice(0, 4),
-      { title: 'Why it was not judged', cell: (c) => c.reason },
-    ];
-    return NB.section(`Criteria (${sorted.length}${open.length ? `, ${open.length} not judged` : ''})`, open.length > 0 || sorted.some((each) => !each.pass),
-      NB.table('What was checked, missed ones first', columns, sorted, { class: 'small' }),
-      open.length ? NB.table('What was to be judged and was not', unjudged, open, { class: 'small' }) : null);
-  }
-
-  requirements() {
-    const rows = this.report.trace || [];
-    const words = { met: '\u2713 met', missed: '\u2717 missed', not_judged: 'not judged' };
-    const columns = [
-      { title: 'Requirement', cell: (r) => r.requirement },
-      { title: 'Criterion', cell: (r) => NB.words(r.criterion) },
-      { title: 'Outcome', cell: (r) => NB.el('span', { class: r.outcome === 'met' ? 'good' : 'bad', text: words[r.outcome] }) },
-      { title: 'Met', numeric: true, cell: (r) => String(r.met) },
-      { title: 'Missed', numeric: true, cell: (r) => String(r.missed) },
-      { title: 'Not judged', numeric: true, cell: (r) => String(r.not_judged) },
-    ];
-    return NB.el('div', null, rows.length
-      ? NB.section(`Requirements (${rows.length})`, true,
-        NB.table('Requirements, the criteria that stand for them, and how often these were met', columns, rows, { class: 'small' }))
-      : null);
-  }
-
-  provenance() {
-    const { provenance, notes, scenario, truth } = this.report;
-    return NB.el('div', null,
-      notes.length ? NB.section('Notes', true, NB.el('ul', { class: 'plain' }, notes.map((note) => NB.el('li', { text: note })))) : null,
-      truth ? NB.section('The arm and patient that were drawn', false, NB.tree(truth)) : null,
-      NB.section('Where the numbers come from', false, NB.provenance(provenance, scenario.file)));
-  }
+  return Math.sqrt(size);
 };
 
 /** Lower triangle of a covariance, `L L^T`; what rounding makes negative counts as zero. */

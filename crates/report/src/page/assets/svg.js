@@ -155,3 +155,11 @@ NB.chart = function (title, svg, name, help) {
     help ? NB.el('p', { class: 'soft small', text: help }) : null,
     NB.scroll(title, image));
 };
+
+/** A button that saves what a view shows, labels included; `name` may be a function. */
+NB.pngButton = (view, title, name) => (view.works ? NB.saveButton('PNG', title, async () => {
+  view.snapshot();
+  const bytes = Uint8Array.from(atob(view.image.src.split(',')[1]), (character) => character.charCodeAt(0));
+  const blob = new Blob([bytes], { type: 'image/png' });
+  return [`${typeof name === 'function' ? name() : name}.png`, blob];
+}) : '');

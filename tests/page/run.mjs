@@ -1,0 +1,134 @@
+// What is special to the page of a run: what is nearest at a time, ghosts, addresses, charts, paper.
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+
+/** Sheets of paper that the page of any shipped scenario takes. */
+export const MOST_SHEETS = 6;
+
+const text = (page, selector) => page.locator(selector).first().textContent();
+
+/** The label and the sentence tell what holds at the slider's time, and the least only at its own. */
+export async function testNearest(page, settle) {
+  const times = await page.evaluate(() => [0, 0.31, 0.77, 1].map((share) => share * NB.current.end));
+  for (const time of times) {
+    await page.evaluate((seconds) => { NB.current.pause(); NB.current.seek(seconds); }, time);
+    await settle(page);
+    const { shown, label, least } = await page.evaluate(() => {
+      const run = NB.current;
+      const { curveTime, curves } = run.decode(run.shown[0]);
+      const unwanted = curves.filter(([name]) => run.page.unwantedClasses.includes(name));
+      return {
+        shown: run.now.textContent, least: Math.min(...unwanted.map(([, y]) => NB.at(curveTime, y, run.time))),
+        label: run.view.labels.filter((each) => each.layer === 'witness').map((each) => each.element.textContent),
+      };
+    });
+    assert.equal(label.length, 1, 'one line shows what is nearest');
+    assert.ok(label[0].endsWith(`at ${time.toFixed(2)} s`), label[0]);
+    const stated = Number(/: ([\d.\u2212-]+) mm/.exec(label[0])[1].replace('\u2212', '-'));
+    // A sample of 40 ms may name another pair than the curve's least between two samples.
+    assert.ok(Math.abs(stated - least) < 0.6, `${label[0]}, but ${least} mm is the least`);
+    assert.ok(shown.includes(`at ${time.toFixed(2)} s`), shown);
+  }
+  // A row of the table: the least of its class, at its time and only there.
+  const row = page.locator('.panel .choose').nth(1).locator('tbody tr').first();
+  await row.click();
+  const pinned = await page.evaluate(() => NB.current.view.labels.find((each) => each.layer === 'witness').element.textContent);
+  assert.match(pinned, /^least /);
+  await page.evaluate(() => NB.current.seek(NB.current.time > 0.5 ? NB.current.time - 0.5 : NB.current.time + 0.5));
+  const moved = await page.evaluate(() => NB.current.view.labels.find((each) => each.layer === 'witness').element.textContent);
+  assert.doesNotMatch(moved, /^least /);
+}
+
+/** Ghosts have their own colours, and the names of their configurations stand at them. */
+export async function testGhosts(page, settle) {
+  await page.getByRole('button', { name: 'All as ghosts' }).click();
+  await settle(page);
+  const { labels, expected, colors } = await page.evaluate(() => ({
+    labels: NB.current.view.labels.filter((each) => each.layer === 'ghost labels').map((each) => each.element.textContent),
+    expected: NB.current.goal.configurations.filter((each) => each.joints_rad).map((each) => each.label),
+    colors: [...new Set(NB.ghostColors)].length,
+  }));
+  assert.deepEqual(labels, expected);
+  assert.equal(colors, 8);
+  await page.getByRole('button', { name: 'No ghosts' }).click();
+}
+
+/** What is chosen stands in the address, and the address brings it back, from disk and after a reload. */
+export async function testAddress(page, settle) {
+  const wanted = await page.evaluate(() => {
+    const run = NB.current;
+    run.setGoal(run.report.goals.length - 1);
+    const index = run.goal.configurations.findLastIndex((_, at) => run.extra.configurations[at].runs.length);
+    run.setConfiguration(index);
+    run.seek(1);
+    return { goal: run.goal.name, configuration: run.configuration.label, time: '1.00' };
+  });
+  await page.waitForTimeout(300);
+  const read = () => page.evaluate(() => Object.fromEntries(new URLSearchParams(location.hash.slice(1))));
+  assert.deepEqual(await read(), wanted);
+  await page.reload();
+  await page.waitForSelector('html[data-ready]');
+  const after = await page.evaluate(() => ({ goal: NB.current.goal.name, configuration: NB.current.configuration.label, time: NB.current.time.toFixed(2) }));
+  assert.deepEqual(after, wanted);
+  // Another address in the open page, and one that asks for what there is not.
+  await page.evaluate(() => { location.hash = `#goal=${NB.current.report.goals[0].name}`; });
+  await settle(page);
+  assert.equal(await page.evaluate(() => NB.current.goalIndex), 0);
+  await page.evaluate(() => { location.hash = '#goal=nowhere&configuration=None&time=abc'; });
+  await settle(page);
+  assert.equal(await page.evaluate(() => NB.current.goalIndex), 0);
+}
+
+/** Figures are saved as SVG for a column of 85 mm, and the view as PNG. */
+export async function testSaving(page) {
+  const save = async (name) => {
+    const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('button', { name, exact: true }).first().click()]);
+    return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
+  };
+  const curves = await save('Clearance over time: save as SVG');
+  assert.match(curves.name, /\.svg$/);
+  const svg = curves.bytes.toString();
+  assert.match(svg, /^<svg [^>]*width="85mm"/);
+  assert.ok(svg.includes('clearance (mm)') && svg.includes('time (s)'), 'axes without units');
+  const view = await save('The view: save as PNG');
+  assert.equal(view.bytes.subarray(1, 4).toString(), 'PNG');
+}
+
+/** Every chart of the program is drawn, and fits its frame. */
+export async function testCharts(page) {
+  await page.evaluate(() => { for (const each of document.querySelectorAll('details')) each.open = true; });
+  const charts = await page.evaluate(() => Promise.all([...document.querySelectorAll('.chart img')].map(async (image) => {
+    await image.decode();
+    return [image.alt, image.naturalWidth];
+  })));
+  for (const [title, width] of charts) assert.ok(title && width > 100, `${title} is not drawn`);
+  return charts.map(([title]) => title);
+}
+
+/** A test by ISO 9283: each pose can be looked at, with where the arm came to rest. */
+export async function testPoses(page, picture) {
+  const pictures = new Set();
+  for (const name of ['P1', 'P2', 'P3', 'P4', 'P5']) {
+    await page.getByRole('button', { name, exact: true }).click();
+    pictures.add(await picture(page));
+    assert.ok((await text(page, '[role=status]')).includes(name));
+  }
+  assert.equal(pictures.size, 5, 'the arm does not go to the poses');
+  const charts = await testCharts(page);
+  assert.ok(charts.length >= 4, `${charts.length} charts`);
+}
+
+/** Sections that a scenario with events has. */
+export async function testEvents(page) {
+  const asked = await page.evaluate(() => NB.current.goal.configurations.some((each) => each.events));
+  if (!asked) return;
+  for (const title of ['Contacts that were asked for', 'Emergency stop', 'Way back']) {
+    const table = page.locator('h3', { hasText: title }).locator('xpath=following-sibling::div[1]//tbody/tr');
+    assert.ok(await table.count() > 0, `${title}: nothing`);
+  }
+  const charts = await testCharts(page);
+  assert.ok(charts.some((title) => title.includes('contact 1')), 'no chart of a contact');
+}
+
+/** Sheets of a PDF file. */
+export const sheets = (pdf) => (pdf.toString('latin1').match(/\/Type\s*\/Page(?!s)/g) || []).length;
