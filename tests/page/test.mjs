@@ -16,9 +16,9 @@ import { testNumbers } from './numbers.mjs';
 import { MOST_SHEETS, sheets, testAddress, testCharts, testEvents, testGhosts, testNearest, testPoses, testSaving } from './run.mjs';
 
 // A study's hundred thousand cases take a moment to unpack.
-const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000 };
+const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000, replay: 2000 };
 const REDRAW_MS = 100;
-const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6 };
+const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6, replay: 3e6 };
 const SIZE = { width: 1280, height: 900 };
 const SOFTWARE_GL = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
 const NO_GL = ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis'];
@@ -50,7 +50,7 @@ async function open(running, file) {
   page.on('request', (request) => { if (!/^(file|data|blob):/.test(request.url())) problems.push(`asked for ${request.url()}`); });
   await page.goto(pathToFileURL(file).href);
   await page.waitForSelector('html[data-ready]', { timeout: 60_000 });
-  const timing = await page.evaluate(() => NB.timing.firstView);
+  const timing = await page.evaluate(() => NB.timing.firstView ?? 0);
   return { page, problems, timing };
 }
 
@@ -205,6 +205,15 @@ async function testAtlas(page, judge, name) {
   await notBlank(judge, page.locator('.view canvas'), 'the 3D view', 200);
   await notBlank(judge, page.locator('.plot canvas').nth(0), 'the strips');
   await notBlank(judge, page.locator('.plot canvas').nth(1), 'the curves');
+  await testNumbers(page);
+  const asked = await page.evaluate(() => ({ goal: NB.current.page.goals.at(-1).name, configuration: NB.current.goal.branches[2].label, roll: '90' }));
+  await page.evaluate((choices) => { location.hash = `#${new URLSearchParams(choices)}`; }, asked);
+  await page.waitForTimeout(300);
+  await page.reload();
+  await page.waitForSelector('html[data-ready]');
+  assert.deepEqual(await page.evaluate(() => ({ goal: NB.current.goal.name, configuration: NB.current.branch.label, roll: String(NB.current.roll) })), asked);
+  const legend = await page.locator('.curves .legend').first().textContent();
+  assert.ok(legend.indexOf('works') < legend.indexOf('Rejected by:'), legend);
   const before = await picture(page);
   const roll = await page.evaluate(() => NB.current.roll);
   await page.locator('.replay input[type=range]').focus();
@@ -265,12 +274,12 @@ async function testStudy(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-map.png` });
 }
 
-const tests = { run: testRun, atlas: testAtlas, study: testStudy };
+const tests = { run: testRun, atlas: testAtlas, study: testStudy, replay: async () => {} };
 
 for (const given of words) {
   const file = resolve(given);
   const html = readFileSync(file, 'utf8');
-  const kind = html.match(/<title>(run|atlas|study): /)[1];
+  const kind = html.match(/<title>(run|atlas|study): /)?.[1] || 'replay';
   const name = `${kind}-${words.indexOf(given)}`;
   const bytes = statSync(file).size;
   assert.ok(bytes <= MOST_BYTES[kind], `${given} has ${bytes} bytes`);

@@ -1,4 +1,4 @@
-//! The page of a replay: tables and the chart, without scripts.
+//! The page of a replay: tables and the chart; it needs no script to be read.
 
 use std::fmt::Write;
 
@@ -15,9 +15,14 @@ use crate::table::replay::{pose_errors, shown, small};
 
 const STYLE: &str = concat!(
     include_str!("assets/page.css"),
-    "\n.chart svg { max-width: 100%; height: auto; }\n\
+    "\n.chart svg { width: 100%; min-width: 640px; height: auto; }\n\
      thead th.number { white-space: normal; min-width: 70px; max-width: 170px; }\n"
 );
+
+const CORE: &str = include_str!("assets/core.js");
+/// Boxes that scroll say so.
+const HINTS: &str = "for (const box of document.querySelectorAll('.scroll')) NB.hint(box);\n\
+                     document.documentElement.dataset.ready = 'true';\n";
 
 /// The page of a recorded run.
 pub fn replay_page(report: &ReplayReport, chart: Option<&Chart>) -> String {
@@ -28,7 +33,7 @@ pub fn replay_page(report: &ReplayReport, chart: Option<&Chart>) -> String {
         title: &format!("{}: recorded run", report.log.source.file),
         style: STYLE,
         body: &out,
-        scripts: &[],
+        scripts: &[CORE, HINTS],
     }
     .html()
 }
@@ -67,7 +72,8 @@ fn body(out: &mut String, report: &ReplayReport, chart: Option<&Chart>) -> std::
         section(out, "Errors and torques over time", true)?;
         writeln!(
             out,
-            "<div class=\"chart\">{}</div></details>",
+            "<div class=\"scrolled chart\"><div class=\"scroll\" tabindex=\"0\" role=\"region\" \
+             aria-label=\"Errors and torques over time\">{}</div></div></details>",
             chart.to_inline_svg()
         )?;
     }
@@ -119,7 +125,12 @@ fn table(
     header: &[&str],
     rows: impl IntoIterator<Item = Vec<String>>,
 ) -> std::fmt::Result {
-    writeln!(out, "<div class=\"scroll\"><table><thead><tr>")?;
+    writeln!(
+        out,
+        "<div class=\"scrolled\"><div class=\"scroll\" tabindex=\"0\" role=\"region\" \
+         aria-label=\"{}\"><table><thead><tr>",
+        escape(header[0])
+    )?;
     for (at, name) in header.iter().enumerate() {
         let class = if at > 0 { " class=\"number\"" } else { "" };
         writeln!(out, "<th scope=\"col\"{class}>{}</th>", escape(*name))?;
@@ -136,7 +147,7 @@ fn table(
         }
         writeln!(out, "</tr>")?;
     }
-    writeln!(out, "</tbody></table></div>")
+    writeln!(out, "</tbody></table></div></div>")
 }
 
 fn criteria(out: &mut String, report: &ReplayReport) -> std::fmt::Result {

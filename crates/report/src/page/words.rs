@@ -25,10 +25,22 @@ const NAMES: [(&str, &str); 29] = [
     ("expected", "outcome as expected"),
     ("allow_contact", "no contact"),
     ("min_working_configurations", "configurations that work"),
-    ("engines.envelope.peak_tip_um", "engines' tips apart on the way"),
-    ("engines.envelope.settled_tip_nm", "engines' tips apart at rest"),
-    ("engines.envelope.joint_torque_nm", "engines' joint torques apart"),
-    ("events.max_retraction_deviation_mm", "way back: guide off the needle's axis"),
+    (
+        "engines.envelope.peak_tip_um",
+        "engines' tips apart on the way",
+    ),
+    (
+        "engines.envelope.settled_tip_nm",
+        "engines' tips apart at rest",
+    ),
+    (
+        "engines.envelope.joint_torque_nm",
+        "engines' joint torques apart",
+    ),
+    (
+        "events.max_retraction_deviation_mm",
+        "way back: guide off the needle's axis",
+    ),
     ("events.stop.max_tip_distance_mm", "stop: way of the tip"),
     ("events.stop.max_stopping_time_s", "stop: time to a stand"),
     ("max_force_difference", "engines' forces apart"),

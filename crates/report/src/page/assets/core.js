@@ -161,8 +161,16 @@ NB.table = function (caption, columns, rows, options = {}) {
 /** A box that scrolls sideways where its contents are wider than it, and says so. */
 NB.scroll = function (label, content) {
   const box = NB.el('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': label }, content);
+  const element = NB.el('div', { class: 'scrolled' }, box);
+  NB.hint(box);
+  return element;
+};
+
+/** Tells below a box whether it scrolls sideways, and how much is hidden. */
+NB.hint = function (box) {
+  const element = box.parentElement;
   const hint = NB.el('p', { class: 'hint no-print', 'aria-hidden': 'true' });
-  const element = NB.el('div', { class: 'scrolled' }, box, hint);
+  element.append(hint);
   const look = () => {
     const rest = box.scrollWidth - box.clientWidth - box.scrollLeft;
     const hides = box.scrollWidth > box.clientWidth + 1;
@@ -178,8 +186,7 @@ NB.scroll = function (label, content) {
   box.addEventListener('scroll', look, { passive: true });
   const observer = new ResizeObserver(look);
   observer.observe(box);
-  observer.observe(content);
-  return element;
+  observer.observe(box.firstElementChild);
 };
 
 /** A fold-out section. */
@@ -265,9 +272,10 @@ NB.provenance = function (provenance, file) {
       NB.el('dt', { text: 'lock file' }), NB.el('dd', null, NB.el('code', { text: provenance.cargo_lock_sha256 })),
       provenance.engines.map((engine) => [NB.el('dt', { text: `${engine.name} ${engine.version}` }),
         NB.el('dd', { text: engine.settings.map(([key, value]) => `${key} = ${value}`).join(', ') })])),
-    NB.table('Files that went in', [
+    NB.el('p', { class: 'print-only', text: `${provenance.inputs.length} files went in; report.json has their names and hashes.` }),
+    NB.el('div', { class: 'no-print' }, NB.table('Files that went in', [
       { title: 'Role', cell: (input) => input.role },
       { title: 'File', cell: (input) => input.file },
       { title: 'SHA-256', cell: (input) => NB.el('code', { text: input.sha256 }) },
-    ], provenance.inputs, { class: 'small' }));
+    ], provenance.inputs, { class: 'small' })));
 };
