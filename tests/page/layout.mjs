@@ -41,7 +41,7 @@ function problemsOfLayout({ tappable, narrow }) {
   while (texts.nextNode()) {
     const node = texts.currentNode;
     const parent = node.parentElement;
-    if (!node.textContent.trim() || !seen(parent) || parent.closest('script, style, option, svg, .labels')) continue;
+    if (!node.textContent.trim() || !seen(parent) || parent.closest('script, style, option, svg, .labels, caption')) continue;
     const block = parent.closest('td, th, li, p, button, label, h1, h2, h3, dd, dt, .panel, .chip, section, main, header, div');
     const range = document.createRange();
     range.selectNodeContents(node);

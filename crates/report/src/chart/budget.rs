@@ -174,7 +174,7 @@ fn tile(chart: &mut Chart, [left, top]: [f64; 2], label: &str, budget: &ErrorBud
 
 /// Closed outline of the 95 % ellipse in two of the axes, mm.
 fn ellipse_points(moments: &Moments, (x, y): (usize, usize)) -> Vec<[f64; 2]> {
-    const POINTS: u32 = 96;
+    const POINTS: u32 = 64;
     let (bias, covariance) = (moments.bias(), moments.covariance());
     let (xx, yy, xy) = (covariance[(x, x)], covariance[(y, y)], covariance[(x, y)]);
     // Cholesky factor of the two rows and columns.
@@ -300,7 +300,7 @@ mod tests {
     fn ellipses_go_round_the_bias_at_the_radius_of_95_per_cent() {
         let moments = point(3e-3).analytic;
         let outline = ellipse_points(&moments, (0, 2));
-        assert_eq!(outline.len(), 97);
+        assert_eq!(outline.len(), 65);
         // Uncorrelated, so upright: 2.4477 standard deviations either way.
         let right = outline
             .iter()

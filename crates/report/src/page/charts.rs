@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::pack::Pack;
 use super::scene::pose;
-use crate::chart::budget::{budget_chart, budget_figure};
+use crate::chart::budget::budget_figure;
 use crate::chart::iso9283::{attained_chart, stabilisation_chart};
 use crate::chart::press::press_chart;
 use crate::chart::ranking::ranking_chart;
@@ -16,7 +16,6 @@ pub(super) fn of_goal(finished: &ScenarioRun, goal: usize) -> Value {
     let report = &finished.report.goals[goal];
     json!({
         "ranking": ranking_chart(report).map(|chart| chart.to_svg()),
-        "budget": budget_chart(report).map(|chart| chart.to_svg()),
     })
 }
 

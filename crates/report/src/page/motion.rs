@@ -13,11 +13,12 @@ const POSTURE_PERIOD_S: f64 = 0.04;
 /// Points of a clearance curve: as many as a plot has pixels.
 const MOST_POINTS: usize = 700;
 
-/// The document's part on one engine's motion.
-pub(super) fn motion(run: &EngineRun, stopped: bool, pack: &mut Pack) -> Value {
+/// The document's part on one engine's motion. What is nearest is told of the `first` one alone: where it
+/// came to its end, engines agree to far less than shows.
+pub(super) fn motion(run: &EngineRun, first: bool, stopped: bool, pack: &mut Pack) -> Value {
     let (time_s, joints) = postures(&run.recording, pack);
     let (curve_time_s, curves) = curves(&run.clearance, pack);
-    let nearest = nearest(&run.clearance, pack);
+    let nearest = (first || stopped).then(|| nearest(&run.clearance, pack));
     json!({
         "engine": run.engine,
         "stopped": stopped,

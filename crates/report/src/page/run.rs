@@ -108,13 +108,14 @@ fn goal(
         .map(|(index, configuration)| {
             let mut runs: Vec<Value> = finished.runs[goal][index]
                 .iter()
-                .map(|run| motion(run, false, pack))
+                .enumerate()
+                .map(|(at, run)| motion(run, at == 0, false, pack))
                 .collect();
             let stopped = finished
                 .stopped
                 .iter()
                 .filter(|each| each.goal == goal && each.configuration == index);
-            runs.extend(stopped.map(|each| motion(&each.run, true, pack)));
+            runs.extend(stopped.map(|each| motion(&each.run, false, true, pack)));
             let flange = configuration.joints_rad.map(|joints_rad| {
                 let q = Joints::from_column_slice(&joints_rad);
                 pose(&resolved.cell.robot.world_from_flange(&q))

@@ -38,7 +38,7 @@ NB.TestPage = class {
             engines.length > 1 ? NB.select('Spread of', engines.map((name, at) => [String(at), name]), '0', (value) => { this.engine = Number(value); this.drawSpread(); }) : null,
             NB.pngButton(view, 'ISO 9283 poses', NB.fileName(this.report.scenario.name, 'poses'))),
           view.element, this.note),
-        NB.el('div', null, NB.el('div', { class: 'panel' }, this.results()))),
+        NB.el('div', null, NB.el('div', { class: 'panel' }, this.results(), this.remarks()))),
       NB.section('Where the arm came to rest', true, test.engines.map(({ engine, attained }) => NB.chart(`${engine}: attained positions about the command`, attained, NB.fileName(this.report.scenario.name, 'attained', engine),
         'Positions in the controller\u2019s base frame, all poses to one scale. AP: distance of the mean from the command; RP: mean distance from the mean and three standard deviations of it.'))),
       NB.section('How it came to rest', true, test.engines.map(({ engine, stabilisation }) => NB.chart(`${engine}: distance from the attained position after the motion`, stabilisation, NB.fileName(this.report.scenario.name, 'stabilisation', engine)))),
@@ -99,6 +99,15 @@ NB.TestPage = class {
     ], rows, { class: 'small full' });
   }
 
+  /** What has to be known to read the numbers, before anybody reads them. */
+  remarks() {
+    const remarks = Object.entries(this.report.iso9283.engines).filter(([, each]) => each.remark);
+    return [...new Set(remarks.map(([, each]) => each.remark))].map((remark) => {
+      const of = remarks.filter(([, each]) => each.remark === remark).map(([engine]) => engine);
+      return NB.el('p', { class: 'bad', text: `${of.join(' and ')}: ${remark}.` });
+    });
+  }
+
   tables() {
     return Object.entries(this.report.iso9283.engines).map(([engine, each]) => {
       const rows = each.poses.map((pose) => ({
@@ -117,7 +126,6 @@ NB.TestPage = class {
           { title: 'Overshoot', numeric: true, cell: ({ settled }) => NB.length(settled?.overshoot_m) },
         ], rows, { class: 'small' }),
         each.drift ? NB.el('p', { text: `Drift at P${each.drift.pose}: accuracy ${NB.length(each.drift.dap_m)}, repeatability ${NB.length(each.drift.drp_m)}.` }) : null,
-        each.remark ? NB.el('p', { class: 'soft', text: `${each.remark.charAt(0).toUpperCase()}${each.remark.slice(1)}.` }) : null,
       ];
     });
   }

@@ -246,7 +246,7 @@ NB.RunPage = class {
     const { goal, configuration } = this;
     const { charts } = this.own;
     const name = this.report.scenario.name;
-    const budget = NB.sections.budget(goal, configuration, charts, this.extra.charts, name);
+    const budget = NB.sections.budget(goal, configuration, charts, name);
     this.budgetSection.hidden = !budget;
     NB.clear(this.budget, budget || []);
     NB.clear(this.margins, NB.sections.margins(configuration));
@@ -258,8 +258,8 @@ NB.RunPage = class {
       run.decoded = {
         time: NB.array(run.time), joints: run.joints.map(NB.array), curveTime: NB.array(run.curveTime),
         curves: Object.entries(run.curves).map(([name, column]) => [name, NB.array(column).map((value) => value * 1e3)]),
-        nearest: { ...run.nearest, time: NB.array(run.nearest.time), pair: NB.array(run.nearest.pair), points: run.nearest.points.map(NB.array) },
       };
+      if (run.nearest) run.decoded.nearest = { ...run.nearest, time: NB.array(run.nearest.time), pair: NB.array(run.nearest.pair), points: run.nearest.points.map(NB.array) };
     }
     return run.decoded;
   }
@@ -372,7 +372,8 @@ NB.RunPage = class {
   nearestAt(time) {
     const run = this.shown[0];
     if (!run) return this.leastOf(this.configuration);
-    const { nearest, curveTime, curves } = this.decode(run);
+    const { curveTime, curves } = this.decode(run);
+    const { nearest } = this.decode(run.nearest ? run : this.own.runs[0]);
     let after = nearest.time.findIndex((each) => each >= time);
     if (after < 0) after = nearest.time.length - 1;
     const before = Math.max(after - 1, 0);

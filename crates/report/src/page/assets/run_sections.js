@@ -86,7 +86,7 @@ NB.sections = {
   },
 
   /** Where the needle goes over all arms and patients, in all and by source. */
-  budget(goal, configuration, charts, ofGoal, name) {
+  budget(goal, configuration, charts, name) {
     const with_ = goal.configurations.filter((c) => c.budget || c.budget_failure);
     if (!with_.length) return null;
     const sources = [...new Set(with_.flatMap((c) => (c.budget?.sources || []).map((each) => each.source)))];
@@ -103,8 +103,6 @@ NB.sections = {
     return [
       charts?.budget ? NB.chart(`${configuration.label}: where the needle goes`, charts.budget, NB.fileName(name, goal.name, configuration.label, 'budget'), help) : null,
       NB.table('Expected distance of the tip from the target, root mean square over all arms and patients: by all sources together, and by each alone', columns, with_, { class: 'small' }),
-      ofGoal?.budget ? NB.el('details', { class: 'no-print' }, NB.el('summary', { text: 'All configurations side by side' }),
-        NB.chart(`${NB.words(goal.name)}: where the needle goes`, ofGoal.budget, NB.fileName(name, goal.name, 'budget'))) : null,
     ];
   },
 
@@ -223,7 +221,7 @@ NB.sections.press = function (with_, configuration, charts, goal, name) {
   const fixed = (digits) => (value) => NB.fixed(value, digits);
   const columns = [
     { title: 'Configuration', cell: ({ c }) => c.label },
-    { title: 'Contact', cell: ({ press, index }) => `${index + 1}: ${press.solids.map(NB.words).join(' against ')}` },
+    { title: 'Contact', text: true, cell: ({ press, index }) => `${index + 1}: ${press.solids.map(NB.words).join(' against ')}` },
     { title: 'Engine', cell: ({ engine, press }) => engine || `not staged: ${press.not_staged}` },
     { title: 'Friction', numeric: true, cell: ({ press }) => NB.significant(press.friction) },
     { title: 'Begins', unit: 's', numeric: true, cell: ({ measured }) => or(measured?.episodes[0]?.start_s, fixed(3)) },
@@ -238,6 +236,7 @@ NB.sections.press = function (with_, configuration, charts, goal, name) {
     { title: 'Engines\u2019 tips differ by', numeric: true, cell: ({ press }) => NB.length(press.tip_difference_settled_m) },
   ];
   const own = with_.find((c) => c === configuration);
+  const table = (caption, of) => NB.table(caption, columns, of, { class: 'small contacts' });
   const shown = (own?.events.press || []).map((press, index) => {
     const svg = charts?.press?.[index];
     const title = `${configuration.label}, contact ${index + 1}: ${press.solids.map(NB.words).join(' against ')}${press.friction ? `, friction ${press.friction}` : ''}`;
@@ -247,7 +246,9 @@ NB.sections.press = function (with_, configuration, charts, goal, name) {
   return [
     NB.el('h3', { text: 'Contacts that were asked for' }),
     NB.el('p', { class: 'bad', text: `Forces are not those on a patient: ${means}.` }),
-    NB.table('After planning the obstacle is moved before the arm, which is then driven into it', columns, rows, { class: 'small' }),
+    NB.el('p', { class: 'soft', text: 'After planning the obstacle is moved before the arm, which is then driven into it.' }),
+    own ? table(`${configuration.label}: contacts by engine`, rows.filter(({ c }) => c === own)) : NB.el('p', { text: `${configuration.label} does not work: nothing was staged.` }),
+    NB.el('details', { class: 'no-print' }, NB.el('summary', { text: 'Contacts of all configurations' }), table('All configurations', rows)),
     own ? NB.el('details', { open: true }, NB.el('summary', { text: `Force and clearance over time, ${configuration.label}` }), NB.el('div', { class: 'two' }, shown)) : null,
   ];
 };
