@@ -207,11 +207,14 @@ fn described(result: &CriterionResult) -> String {
     match (result.value, result.limit) {
         (Some(value), Some(limit)) => {
             let (value, limit) = value_and_limit(value, limit, result.unit);
-            let text = format!(
-                "{}{engine}: {value}, limit {limit} {}",
-                result.criterion, result.detail
-            );
-            text.trim_end().to_owned()
+            let detail = match result.detail.as_str() {
+                "" => String::new(),
+                detail => format!(" ({detail})"),
+            };
+            format!(
+                "{}{engine}: {value}, limit {limit}{detail}",
+                result.criterion
+            )
         }
         _ => format!("{}{engine}: {}", result.criterion, result.detail),
     }

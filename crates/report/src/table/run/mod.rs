@@ -488,8 +488,11 @@ fn missed_in_words(result: &CriterionResult) -> String {
         result.label.clone(),
         result.engine.clone(),
         Some(format!("{}:", result.criterion)),
-        measured,
-        Some(result.detail.clone()),
+        Some(match (&measured, result.detail.as_str()) {
+            (Some(measured), "") => measured.clone(),
+            (Some(measured), detail) => format!("{measured} ({detail})"),
+            (None, detail) => detail.to_owned(),
+        }),
     ];
     let parts: Vec<String> = parts
         .into_iter()
