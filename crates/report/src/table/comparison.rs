@@ -2,7 +2,8 @@
 
 use comfy_table::{Cell, CellAlignment, Color};
 use needlebench_evaluation::compare::{
-    Change, Comparison, ConfigurationComparison, GoalComparison, MetricComparison, Side,
+    Change, Comparison, ComparisonFailure, ConfigurationComparison, GoalComparison,
+    MetricComparison, Side,
 };
 
 use super::verdict::capitals;
@@ -149,7 +150,7 @@ pub fn comparison_screen(comparison: &Comparison) -> String {
     let mut lines = vec![verdict(comparison)];
     let failures = &comparison.failures;
     let listed = failures.iter().take(MOST_LISTED);
-    lines.extend(listed.map(|failure| format!("  FAILED {}", failure_text(failure))));
+    lines.extend(listed.map(|failure| format!("  FAILED {}", failure_line(failure))));
     if failures.len() > MOST_LISTED {
         lines.push(format!("  and {} more", failures.len() - MOST_LISTED));
     }
@@ -160,17 +161,48 @@ pub fn comparison_screen(comparison: &Comparison) -> String {
         lines.push(goals_table(&goals).to_string());
     }
     let metrics = metric_changes(&goals);
-    if metrics.is_empty() {
-        lines.push("no value changed beyond its resolution".to_owned());
-    } else {
+    let (judged, others): (Vec<_>, Vec<_>) = metrics.into_iter().partition(|each| each.is_judged);
+    if !judged.is_empty() {
         lines.push(String::new());
-        lines.push(metrics_table(&metrics).to_string());
-        if metrics.len() > MOST_METRICS {
-            lines.push(format!("and {} more metrics", metrics.len() - MOST_METRICS));
-        }
-        lines.push("each configuration by itself: --wide".to_owned());
+        lines.push(
+            "of configurations that work in both, by metrics that are judged or ranked by"
+                .to_owned(),
+        );
+        lines.push(metrics_table(&judged).to_string());
+    }
+    let more = others.len() + judged.len().saturating_sub(MOST_METRICS);
+    if more > 0 {
+        lines.push(format!(
+            "{more} more metrics changed; each configuration by itself: --wide"
+        ));
+    } else if judged.is_empty() {
+        lines.push("no value changed beyond its resolution".to_owned());
     }
     lines.join("\n")
+}
+
+/// A loss in one screen: what it is, without what may mend it.
+fn failure_line(failure: &ComparisonFailure) -> String {
+    let text = failure_text(failure);
+    match text.split_once("; ") {
+        Some((first, _)) if first.contains('(') && !first.contains(')') => format!("{first})"),
+        Some((first, _)) => first.to_owned(),
+        None => text,
+    }
+}
+
+/// Metrics that changed of configurations that work in both results: others have nothing to compare.
+fn changed_rows(goal: &GoalComparison) -> Vec<(&ConfigurationComparison, &MetricComparison)> {
+    let works = |status: &Option<String>| status.as_deref().is_some_and(|it| it != "rejected");
+    let mut changed = rows(goal, false);
+    changed.retain(|(each, _)| works(&each.status_a) && works(&each.status_b));
+    changed
+}
+
+/// Whether people judge or rank by a metric.
+fn is_judged(found: &MetricComparison) -> bool {
+    let metric = found.key.metric();
+    !found.key.is_of_engine() && (metric.ranking_key.is_some() || metric.criterion.is_some())
 }
 
 /// Whether something of a goal changed that is not a metric, or metrics did.
@@ -204,7 +236,7 @@ fn goals_table(goals: &[&GoalComparison]) -> Table {
         } else {
             format!("{a} to {b}")
         };
-        let changed = rows(goal, false);
+        let changed = changed_rows(goal);
         let count = |way: Change| {
             changed
                 .iter()
@@ -238,6 +270,7 @@ fn goals_table(goals: &[&GoalComparison]) -> Table {
 /// A metric that changed, over all goals and configurations.
 struct MetricChanges<'a> {
     words: String,
+    is_judged: bool,
     better: usize,
     worse: usize,
     /// The largest change for the worse, or where there is none the largest, and of what.
@@ -251,7 +284,7 @@ struct MetricChanges<'a> {
 fn metric_changes<'a>(goals: &[&'a GoalComparison]) -> Vec<MetricChanges<'a>> {
     let mut all: Vec<MetricChanges<'a>> = Vec::new();
     for goal in goals {
-        for (configuration, found) in rows(goal, false) {
+        for (configuration, found) in changed_rows(goal) {
             let words = found.key.words();
             let at = all
                 .iter()
@@ -260,6 +293,7 @@ fn metric_changes<'a>(goals: &[&'a GoalComparison]) -> Vec<MetricChanges<'a>> {
                     let (better, worse) = (0, 0);
                     all.push(MetricChanges {
                         words,
+                        is_judged: is_judged(found),
                         better,
                         worse,
                         largest: None,
@@ -388,7 +422,7 @@ pub fn comparison_text(comparison: &Comparison, all: bool) -> String {
 /// The verdict in a line: what was compared, what was lost, what changed.
 pub(crate) fn verdict(comparison: &Comparison) -> String {
     let count = |way: &[Change]| {
-        let rows = comparison.goals.iter().flat_map(|goal| rows(goal, false));
+        let rows = comparison.goals.iter().flat_map(changed_rows);
         rows.filter(|(_, found)| way.contains(&found.outcome))
             .count()
     };
@@ -404,7 +438,7 @@ pub(crate) fn verdict(comparison: &Comparison) -> String {
         count => format!("{count} losses"),
     };
     let mut text = format!(
-        "{}: {losses}; {goals} {}, {configurations} configurations; of those that work {} values are better, {} worse",
+        "{}: {losses}; {goals} {}, {configurations} configurations; of those that work in both {} values are better, {} worse",
         capitals(comparison.verdict),
         if goals == 1 { "goal" } else { "goals" },
         count(&[Change::Better, Change::New]),
@@ -417,7 +451,7 @@ pub(crate) fn verdict(comparison: &Comparison) -> String {
     text
 }
 
-pub(crate) fn failure_text(failure: &needlebench_evaluation::compare::ComparisonFailure) -> String {
+pub(crate) fn failure_text(failure: &ComparisonFailure) -> String {
     let place: Vec<&str> = [failure.goal.as_deref(), failure.label.as_deref()]
         .into_iter()
         .flatten()
