@@ -138,7 +138,8 @@ struct Difference<'a> {
 impl Difference<'_> {
     fn text(&self) -> String {
         let metric = Metric::of_key(self.mine.metric);
-        let text = |value: f64| metric.map_or(value.to_string(), |metric| metric.quantity.text(value));
+        let text =
+            |value: f64| metric.map_or(value.to_string(), |metric| metric.quantity.text(value));
         // A table beside it has what was attained, which is a little more.
         let proven = metric.is_some_and(|metric| metric.bound == Bound::Certified);
         format!(

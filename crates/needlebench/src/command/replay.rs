@@ -47,10 +47,6 @@ Example: needlebench replay log.csv --arm ur3e --max-tracking 0.5 --engine rapie
 Example: needlebench replay run.mcap --arm ur5e --effort current";
 
 #[derive(Debug, Args)]
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "each is a flag of the command line"
-)]
 pub(crate) struct ReplayArguments {
     /// The recorded run: CSV or MCAP.
     #[arg(value_name = "LOG")]

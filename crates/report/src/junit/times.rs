@@ -23,7 +23,7 @@ pub(super) fn share_time(document: &mut Report, total: Duration) {
     document.set_time(total);
 }
 
-/// The same for one suite of several that took different times.
+/// A time of a report's timings.
 pub(super) fn seconds(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds).unwrap_or_default()
 }
