@@ -16,6 +16,7 @@ use super::scene::{chain, pose, surroundings};
 use super::viewer::Viewer;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::shown::{Shown, shown_metrics};
+use crate::table::verdict::{counts, missed_as_expected};
 use needlebench_bench::ScenarioRun;
 
 const SCRIPT: &str = concat!(
@@ -48,6 +49,10 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
         .map(|goal| self::goal(resolved, finished, &room, goal, &mut pack))
         .collect();
     document["goals"] = json!(goals);
+    document["counts"] = json!(counts(report));
+    let expected = report.criteria.iter().enumerate();
+    let expected = expected.filter(|(_, result)| missed_as_expected(report, result));
+    document["missedAsExpected"] = json!(expected.map(|(index, _)| index).collect::<Vec<_>>());
     document["iso9283"] = json!(charts::of_test(resolved, finished, &mut pack));
     document["words"] = super::words::words(resolved);
     let page = Viewer {

@@ -35,7 +35,7 @@ pub(crate) fn counts(report: &Report) -> String {
 }
 
 /// Whether a criterion is missed by a configuration of which the scenario expects that it fails.
-pub(super) fn missed_as_expected(report: &Report, result: &CriterionResult) -> bool {
+pub(crate) fn missed_as_expected(report: &Report, result: &CriterionResult) -> bool {
     !result.pass
         && result.label.is_some()
         && report.criteria.iter().any(|other| {

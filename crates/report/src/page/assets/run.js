@@ -18,7 +18,7 @@ NB.RunPage = class {
     this.view = new NB.View(page.scene, `Cell of ${this.report.scenario.name}`);
     if (this.report.goals.length) this.build(app);
     else this.buildWithoutGoals(app);
-    app.append(NB.sections.criteria(this.report), NB.sections.requirements(this.report) || '', NB.sections.provenance(this.report));
+    app.append(NB.sections.criteria(this.page), NB.sections.requirements(this.report) || '', NB.sections.provenance(this.report));
     this.fromAddress(NB.address.read());
     NB.address.watch((choices) => this.fromAddress(choices));
   }
@@ -40,15 +40,10 @@ NB.RunPage = class {
   }
 
   head() {
-    const { verdict, criteria, not_judged: open, engine_failures: failures } = this.report;
-    const met = criteria.filter((each) => each.pass).length;
-    const all = criteria.length + open.length;
-    const counts = open.length
-      ? `${criteria.length} of ${all} criteria judged, ${met === criteria.length ? 'all' : `${met} of them`} met; ${open.length} not judged`
-      : `${met} of ${criteria.length} criteria met`;
+    const { verdict, engine_failures: failures } = this.report;
     return NB.el('div', { class: 'bar' },
       NB.verdict(verdict),
-      NB.el('span', { text: counts }),
+      NB.el('span', { text: this.page.counts }),
       NB.copyLink(),
       failures.map((each) => NB.el('span', { class: 'error', text: `${each.engine} failed${each.during ? ` during ${each.during}` : ''}: ${each.message}` })));
   }
@@ -513,7 +508,8 @@ NB.RunPage = class {
     const words = { ok: ['good', '\u2713 works'], failed: ['bad', '\u2717 failed'], rejected: ['off', '\u2013 rejected'] };
     const missed = this.report.criteria.some((each) => !each.pass && each.criterion !== 'expected' && each.goal === this.goal.name && each.label === configuration.label);
     const open = configuration.not_judged > 0 && !missed;
-    const [style, text] = open ? ['bad', '? incomplete'] : words[configuration.status];
+    const isExpected = configuration.status === 'failed' && this.page.missedAsExpected.some((index) => this.report.criteria[index].goal === this.goal.name && this.report.criteria[index].label === configuration.label);
+    const [style, text] = open ? ['bad', '? incomplete'] : isExpected ? ['off', '\u2717 failed, as expected'] : words[configuration.status];
     return [NB.el('span', { class: style, text }), recommended ? NB.el('span', { class: 'good', text: ' \u2605', title: 'recommended' }) : ''];
   }
 
@@ -593,7 +589,7 @@ NB.RunPage = class {
     this.tableRows = [...table.querySelectorAll('tbody tr')];
     NB.rows(this.tableRows, (index) => this.setConfiguration(index));
     const ranking = this.extra.charts.ranking;
-    NB.clear(this.table, table, ranking ? NB.el('details', null, NB.el('summary', { text: 'What the scores are made of' }),
+    NB.clear(this.table, table, ranking ? NB.el('details', { class: 'no-print' }, NB.el('summary', { text: 'What the scores are made of' }),
       NB.chart(`${NB.words(this.goal.name)}: ranking`, ranking, NB.fileName(this.report.scenario.name, this.goal.name, 'ranking'))) : null);
   }
 };

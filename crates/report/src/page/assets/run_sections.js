@@ -130,8 +130,9 @@ NB.sections = {
   },
 
   /** What was checked: what was missed first and in full, what was met by criterion, and all of it folded. */
-  criteria(report) {
+  criteria({ report, counts, missedAsExpected }) {
     const { criteria, not_judged: open } = report;
+    const isExpected = new Set(missedAsExpected.map((index) => criteria[index]));
     const missed = criteria.filter((each) => !each.pass);
     const limits = (c) => NB.valueAndLimit(c.value, c.limit, c.unit);
     const columns = [
@@ -141,11 +142,11 @@ NB.sections = {
       { title: 'Engine', cell: (c) => c.engine || '' },
       { title: 'Value', numeric: true, cell: (c) => limits(c)[0] },
       { title: 'Limit', numeric: true, cell: (c) => limits(c)[1] },
-      { title: 'Outcome', cell: (c) => NB.el('span', { class: c.pass ? 'good' : 'bad', text: c.pass ? '\u2713 met' : '\u2717 missed' }) },
+      { title: 'Outcome', cell: (c) => NB.el('span', { class: c.pass ? 'good' : 'bad', text: c.pass ? '\u2713 met' : isExpected.has(c) ? '\u2717 missed, as expected' : '\u2717 missed' }) },
       { title: 'Remark', text: true, cell: (c) => c.detail },
     ];
     const unjudged = [...columns.slice(0, 4), { title: 'Why it was not judged', text: true, cell: (c) => c.reason }];
-    return NB.section(`What was checked: ${criteria.length - missed.length} of ${criteria.length} criteria met${open.length ? `, ${open.length} not judged` : ''}`, open.length > 0 || missed.length > 0,
+    return NB.section(`What was checked: ${counts}`, open.length > 0 || missed.length > 0,
       missed.length ? NB.table('Missed', columns, missed, { class: 'small' }) : null,
       open.length ? NB.table('What was to be judged and was not', unjudged, open, { class: 'small' }) : null,
       NB.sections.summary(criteria),
