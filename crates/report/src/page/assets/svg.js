@@ -149,6 +149,7 @@ NB.paper = function (title, paint, height, legend = []) {
 NB.chart = function (title, svg, name, help) {
   const [, width, height] = svg.match(/viewBox="0 0 ([\d.]+) ([\d.]+)"/).map(Number);
   const image = NB.el('img', { src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`, alt: title, width: String(Math.round(width)), height: String(Math.round(height)) });
+  image.style.maxWidth = `${Math.round(1.2 * width)}px`;
   image.style.minWidth = `${Math.round(Math.min(width, Math.max(440, 0.6 * width)))}px`;
   return NB.el('figure', { class: 'chart' },
     NB.el('figcaption', null, NB.el('span', { text: title }), NB.saveButton('SVG', title, () => [`${name}.svg`, svg, 'image/svg+xml'])),
