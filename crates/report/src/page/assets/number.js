@@ -3,14 +3,14 @@
 'use strict';
 
 {
-  /** Pages have signs that terminals may lack: minus, micro, degree. */
-  const typeset = (text) => text.replace(/^-/, '\u2212').replace(/ um$/, ' \u00b5m').replace(/ deg$/, '\u00b0').replace(/e-/, 'e\u2212');
+  /** Pages have signs that terminals may lack: minus, micro, degree; and no minus before zero. */
+  const typeset = (text) => text.replace(/^-(?=0(\.0+)?( |$))/, '').replace(/^-/, '\u2212').replace(/ um$/, ' \u00b5m').replace(/ deg$/, '\u00b0').replace(/e-/, 'e\u2212');
   const absent = (value) => value === null || value === undefined || Number.isNaN(value);
   const NONE = '\u2013';
 
   /** So many decimals; halves go to the even digit, as in Rust. */
   const fixed = function (value, digits) {
-    const text = value.toFixed(digits);
+    const text = Object.is(value, -0) ? `-${(0).toFixed(digits)}` : value.toFixed(digits);
     const exact = Math.abs(value) < 1e15 ? value.toFixed(Math.min(100, digits + 60)) : '';
     const point = exact.indexOf('.');
     const rest = point < 0 ? '' : exact.slice(point + 1 + digits);
@@ -42,7 +42,7 @@
     const text = function (each) {
       if (unit === 'm') return limit !== 0 && Math.abs(limit) < 1e-3 ? smallLength(each) : `${fixed(each * 1e3, 2)} mm`;
       if (unit === 'rad') return `${fixed(degrees(each), 4)} deg`;
-      if (unit === '1') return Number.isInteger(value) && Number.isInteger(limit) && Number.isInteger(each) ? String(each) : fixed(each, 4);
+      if (unit === '1') return Number.isInteger(each) && Number.isInteger(limit) ? fixed(each, 0) : fixed(each, 4);
       return `${fixed(each, 3)} ${unit}`;
     };
     const texts = [text(value), text(limit)];
