@@ -14,10 +14,10 @@ import { chromium } from 'playwright-core';
 import { testLayout } from './layout.mjs';
 import { testNumbers } from './numbers.mjs';
 import { MOST_SHEETS, sheets, testAddress, testCharts, testEvents, testGhosts, testNearest, testPoses, testSaving } from './run.mjs';
+import { testStudy } from './study.mjs';
 
 // A study's hundred thousand cases take a moment to unpack.
 const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000, replay: 2000 };
-const REDRAW_MS = 100;
 const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6, replay: 3e6 };
 const SIZE = { width: 1280, height: 900 };
 const SOFTWARE_GL = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
@@ -230,51 +230,7 @@ async function testAtlas(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-strips.png` });
 }
 
-async function testStudy(page, judge, name) {
-  for (const [which, title] of [['scatter', 'the scatter'], ['map', 'the map'], ['ecdf', 'the shares'], ['histogram', 'the histogram'], ['strip', 'the rates']]) {
-    const handle = page.locator('.plot canvas').nth(['strip', 'scatter', 'map', 'ecdf', 'histogram'].indexOf(which));
-    await handle.scrollIntoViewIfNeeded();
-    await settle(page);
-    await notBlank(judge, handle, title, which === 'histogram' ? 5 : 12);
-  }
-  const times = await page.evaluate(() => ['scatter', 'map', 'ecdf', 'histogram', 'strip'].map((which) => {
-    const canvas = NB.current[which];
-    const runs = [];
-    for (let k = 0; k < 7; k++) { canvas.render(); runs.push(canvas.paintedInMs); }
-    return [which, Math.round(runs.sort((a, b) => a - b)[3] * 10) / 10];
-  }));
-  console.log(`  redraws, ms: ${times.map((each) => each.join(' ')).join(', ')}`);
-  for (const [which, ms] of times) assert.ok(ms < REDRAW_MS, `${which} takes ${ms} ms`);
-  // From a point to its case.
-  const scatter = page.locator('.plot canvas').nth(1);
-  await scatter.scrollIntoViewIfNeeded();
-  const box = await scatter.boundingBox();
-  const first = await page.evaluate(() => NB.current.chosen);
-  for (const [x, y] of [[0.3, 0.3], [0.62, 0.4], [0.5, 0.5], [0.7, 0.25]]) await page.mouse.click(box.x + box.width * x, box.y + box.height * y);
-  const chosen = await page.evaluate(() => NB.current.chosen);
-  assert.notEqual(chosen, first, 'a click on a point chooses no case');
-  const number = await page.evaluate(() => NB.current.caseOf(NB.current.chosen));
-  const command = await page.locator('.cases code').first().textContent();
-  assert.ok(command.startsWith('needlebench study ') && command.endsWith(`--case ${number}`), command);
-  assert.equal(await page.locator('.cases .choose tbody tr').count(), 8);
-  // Every choice of every list draws without errors.
-  for (const select of await page.locator('select').all()) {
-    const values = await select.locator('option').evaluateAll((options) => options.map((option) => option.value));
-    for (const value of values) { await select.selectOption(value); await settle(page); }
-    await select.selectOption(values[0]);
-  }
-  const map = page.locator('.plot canvas').nth(2);
-  await map.scrollIntoViewIfNeeded();
-  const cell = await map.boundingBox();
-  await page.mouse.click(cell.x + cell.width / 2, cell.y + cell.height / 2);
-  assert.ok(await page.locator('.points .legend button').count() > 0, 'a cell of the map lists no cases');
-  await page.locator('.points .legend button').first().focus();
-  await page.keyboard.press('ArrowRight');
-  assert.ok(await page.evaluate(() => NB.current.chosen) >= 0);
-  await page.screenshot({ path: `${out}/${name}-map.png` });
-}
-
-const tests = { run: testRun, atlas: testAtlas, study: testStudy, replay: async () => {} };
+const tests = { run: testRun, atlas: testAtlas, study: (page, judge, name) => testStudy(page, judge, name, { notBlank, settle, out }), replay: async () => {} };
 
 for (const given of words) {
   const file = resolve(given);

@@ -187,21 +187,33 @@ pub fn in_percent(share: f64) -> String {
     }
 }
 
-/// A length in mm, or another number, with about three digits; what is below 1e-6 is rounding.
+/// A length in mm, or another number, with two or three digits and no power of ten.
 pub fn three_digits(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {
         "0".to_owned()
-    } else if size < 1e-6 {
-        "< 1e-6".to_owned()
+    } else if size < 1e-4 {
+        "< 0.0001".to_owned()
     } else if size >= 100.0 {
         format!("{value:.0}")
     } else if size >= 10.0 {
         format!("{value:.1}")
-    } else if size >= 0.01 {
+    } else if size >= 0.1 {
         format!("{value:.2}")
+    } else if size >= 0.01 {
+        format!("{value:.3}")
     } else {
-        format!("{value:.1e}")
+        format!("{value:.4}")
+    }
+}
+
+/// A value with its unit, as people read it; lengths below a hundredth of a millimetre in the unit that
+/// suits them.
+pub fn measured(value: f64, unit: &str) -> String {
+    match unit {
+        "mm" if value != 0.0 && value.abs() < 0.01 => small_length(value * 1e-3),
+        "" | "1" => three_digits(value),
+        unit => format!("{} {unit}", three_digits(value)),
     }
 }
 
@@ -317,7 +329,19 @@ mod tests {
 
     #[test]
     fn three_digits_are_enough_at_every_size() {
-        let texts = [0.0, 1e-9, 0.001_23, 0.123, 12.34, 1234.5].map(three_digits);
-        assert_eq!(texts, ["0", "< 1e-6", "1.2e-3", "0.12", "12.3", "1234"]);
+        let texts = [0.0, 1e-9, 1e-5, 0.001_23, 0.0123, 0.123, 12.34, 1234.5].map(three_digits);
+        assert_eq!(
+            texts,
+            [
+                "0", "< 0.0001", "< 0.0001", "0.0012", "0.012", "0.12", "12.3", "1234"
+            ]
+        );
+    }
+
+    #[test]
+    fn lengths_take_the_unit_that_suits_them() {
+        let texts = [0.0, 2.243e-13, 0.0012, 12.34].map(|value| measured(value, "mm"));
+        assert_eq!(texts, ["0 mm", "< 1 pm", "1.20 um", "12.3 mm"]);
+        assert_eq!(measured(0.84, "mm/mrad"), "0.84 mm/mrad");
     }
 }

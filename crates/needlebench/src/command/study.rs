@@ -21,7 +21,7 @@ use crate::arguments::{RobotArguments, leave};
 use crate::clock::elapsed;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
-use crate::output::{complain, shown};
+use crate::output::{complain, print_wide, shown};
 use crate::progress::TerminalProgress;
 use arguments::StudyResultArguments;
 pub(crate) use arguments::{MergeArguments, STUDY_HELP, StudyArguments};
@@ -291,7 +291,16 @@ fn finish(
     if arguments.json {
         print_json(&finished.summary)?;
     } else {
-        print_text(&format!("{}results: {}", finished.text, shown(folder)))?;
+        if arguments.wide {
+            print_wide();
+        }
+        let text = finished.text(arguments.wide);
+        let more = if arguments.wide {
+            ""
+        } else {
+            " (--wide prints all tables)"
+        };
+        print_text(&format!("{text}results: {}{more}", shown(folder)))?;
     }
     if let Some(request) = arguments.table.request() {
         match accuracy_of_study(prepared, &results, &request) {

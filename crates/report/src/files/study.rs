@@ -9,11 +9,11 @@ use needlebench_bench::study::{
     ENGINE_FAILURE, PreparedStudy, Replanned, RobustnessResult, StudyCase, robustness_of,
 };
 use needlebench_cell::requirements::{Requirements, requirement_of};
-use needlebench_evaluation::report::{TraceOutcome, Verdict};
-use needlebench_study::ParquetResults;
+use needlebench_evaluation::report::Verdict;
 use needlebench_study::statistics::{
     CriterionResult, Summary, SummaryOptions, judge_study, summarise,
 };
+use needlebench_study::{ParquetResults, Results as _};
 use serde::Serialize;
 
 use super::accuracy::remove_accuracy;
@@ -23,8 +23,10 @@ use super::folder::Folder;
 use super::replan::replan;
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
-use crate::page::study::StudyPage;
-use crate::table::study::document::{Block, blocks, table};
+use crate::page::study::{CasePictures, StudyPage};
+use crate::table::study::answer::Answer;
+use crate::table::study::criteria::requirements_blocks;
+use crate::table::study::document::{Document, Parts};
 use crate::table::study::postures::{Postures, postures_blocks, postures_headline};
 use crate::table::study::robustness::{robustness_blocks, robustness_method};
 use crate::table::study::text::summary_text;
@@ -53,6 +55,8 @@ pub struct StudySummary {
     /// Postures only, in a sentence; none where all cases have motions.
     #[serde(skip_serializing_if = "Option::is_none")]
     headline: Option<String>,
+    /// The answer, in a sentence with its figure and interval, and what it compares.
+    answer: Answer,
     /// How much the postures alone overstate; none where all cases have motions, or none was to be planned.
     #[serde(skip_serializing_if = "Option::is_none")]
     replanned: Option<Replanned>,
@@ -90,10 +94,23 @@ pub struct StudyOutput<'a> {
 pub struct FinishedStudy {
     /// Its statistics.
     pub summary: StudySummary,
-    /// The summary for a terminal.
-    pub text: String,
+    document: Document,
     /// Whether all criteria are judged and met.
     pub verdict: Verdict,
+}
+
+impl FinishedStudy {
+    /// The summary for a terminal: verdict, answer and the tables that it rests on, or `all` that there is, the
+    /// first screen last.
+    pub fn text(&self, all: bool) -> String {
+        let mut text = String::new();
+        if all {
+            text.push_str(&summary_text(&self.document.more));
+            text.push('\n');
+        }
+        text.push_str(&summary_text(&self.document.first));
+        text
+    }
 }
 
 /// Sums up a study's table and writes what there is to write.
@@ -128,6 +145,12 @@ pub fn write_study(
     )?;
     let postures = Postures::of(prepared);
     let headline = postures_headline(postures, replanned.as_ref());
+    let working = file
+        .criteria
+        .working_configurations
+        .unwrap_or(1)
+        .clamp(1, 8) as usize;
+    let answer = Answer::new(&statistics, results.factors(), working);
     let robustness = file
         .robustness
         .as_ref()
@@ -154,6 +177,7 @@ pub fn write_study(
         mode: prepared.study.mode.name(),
         postures_only: postures.name(),
         headline,
+        answer,
         replanned,
         verdict,
         criteria,
@@ -164,24 +188,15 @@ pub fn write_study(
     let folder = Folder(output.folder);
     let json = serde_json::to_string_pretty(&summary)?;
     folder.write("summary.json", json)?;
-    let more = summary
-        .robustness
-        .as_ref()
-        .map_or_else(Vec::new, |results| robustness_blocks(results));
-    let headline = summary.headline.as_deref();
-    let mut blocks = blocks(&summary.statistics, &summary.criteria, more);
-    let head = postures_blocks(headline, summary.replanned.as_ref());
-    blocks.splice(0..0, head);
-    blocks.extend(requirements_blocks(&file.requirements, &summary.criteria));
-    blocks.extend(last_line(&summary).map(|line| Block::Lines(vec![line])));
+    let document = document(&summary, &file.requirements);
     let title = match postures {
         Postures::All => format!("{} (postures only)", file.name),
         Postures::Some | Postures::None => file.name.clone(),
     };
-    let verdict = last_line(&summary).map(|_| summary.verdict);
-    let markdown = summary_markdown(&title, verdict, &blocks);
+    let verdict = is_judged(&summary).then_some(summary.verdict);
+    let markdown = summary_markdown(&title, verdict, &document);
     folder.write("summary.md", markdown)?;
-    let text = summary_text(&blocks);
+    let headline = summary.headline.as_deref();
     if let Some(path) = output.junit {
         let document = study_junit(&file.name, headline, &summary.criteria, output.elapsed)?;
         write_atomically(path, document.as_bytes()).map_err(|source| FilesError::Write {
@@ -205,8 +220,10 @@ pub fn write_study(
             results,
             summary: &serde_json::to_value(&summary)?,
             manifest: &serde_json::to_value(prepared.manifest(None))?,
-            base: Some(prepared.study.family.base()),
-            scenarios: Some(&scenarios),
+            pictures: Some(CasePictures {
+                base: prepared.study.family.base(),
+                scenario_of: &scenarios,
+            }),
         };
         folder.write(PAGE_FILE, page.html()?)?;
     } else {
@@ -215,47 +232,8 @@ pub fn write_study(
     Ok(FinishedStudy {
         verdict: summary.verdict,
         summary,
-        text,
+        document,
     })
-}
-
-/// The trace matrix: requirements, the criteria that stand for them, and what came of these.
-fn requirements_blocks(requirements: &Requirements, criteria: &[CriterionResult]) -> Vec<Block> {
-    if requirements.is_empty() {
-        return Vec::new();
-    }
-    let mut rows: Vec<Vec<String>> = requirements
-        .iter()
-        .map(|(key, requirement)| {
-            let of_it = criteria.iter().filter(|each| each.criterion == *key);
-            let count = |is: &dyn Fn(&CriterionResult) -> bool| {
-                of_it.clone().filter(|each| is(each)).count() as u64
-            };
-            let met = count(&|each| each.is_judged() && each.pass);
-            let missed = count(&CriterionResult::is_missed);
-            let open = count(&|each| !each.is_judged());
-            let outcome = TraceOutcome::of(met, missed, open).words().to_owned();
-            let counts = [met, missed, open].map(|count| count.to_string());
-            let mut row = vec![requirement.clone(), key.clone(), outcome];
-            row.extend(counts);
-            row
-        })
-        .collect();
-    rows.sort();
-    vec![
-        Block::Heading("requirements".to_owned()),
-        table(
-            [
-                "requirement",
-                "<criterion",
-                "<outcome",
-                "met",
-                "missed",
-                "not judged",
-            ],
-            rows,
-        ),
-    ]
 }
 
 /// What was to be judged and could not be: criteria without values, and motions that engines could not
@@ -284,8 +262,37 @@ fn not_judged(statistics: &Summary, criteria: &[CriterionResult]) -> Vec<String>
     reasons
 }
 
-/// The verdict with its counts; none where there is nothing to judge.
-fn last_line(summary: &StudySummary) -> Option<String> {
+/// Whether there is anything to judge.
+fn is_judged(summary: &StudySummary) -> bool {
+    !summary.criteria.is_empty() || !summary.not_judged.is_empty()
+}
+
+/// The summary for people.
+fn document(summary: &StudySummary, requirements: &Requirements) -> Document {
+    let verdict = verdict_line(summary);
+    let parts = Parts {
+        summary: &summary.statistics,
+        answer: &summary.answer,
+        criteria: &summary.criteria,
+        verdict: &verdict,
+        headline: summary.headline.as_deref(),
+    };
+    let mut document = Document::new(&parts);
+    document
+        .more
+        .extend(postures_blocks(summary.replanned.as_ref()));
+    let radii = summary.robustness.as_ref();
+    document
+        .more
+        .extend(radii.map_or_else(Vec::new, |results| robustness_blocks(results)));
+    document
+        .more
+        .extend(requirements_blocks(requirements, &summary.criteria));
+    document.finish(&parts)
+}
+
+/// The verdict with its counts.
+fn verdict_line(summary: &StudySummary) -> String {
     let total = summary.criteria.len();
     let judged = summary
         .criteria
@@ -293,9 +300,13 @@ fn last_line(summary: &StudySummary) -> Option<String> {
         .filter(|each| each.is_judged())
         .count();
     let met = summary.criteria.iter().filter(|each| each.pass).count();
+    let name = format!("{}, {} cases", summary.name, summary.cases);
     let verdict = capitals(summary.verdict);
+    if !is_judged(summary) {
+        return format!("{name}: nothing is judged, the study has no criteria");
+    }
     if summary.not_judged.is_empty() {
-        return (total > 0).then(|| format!("{verdict}: {met} of {total} criteria met"));
+        return format!("{name}: {verdict}: {met} of {total} criteria met");
     }
     let why = summary.not_judged.join("; ");
     let met = if met == judged {
@@ -303,7 +314,5 @@ fn last_line(summary: &StudySummary) -> Option<String> {
     } else {
         format!("{met} of them met")
     };
-    Some(format!(
-        "{verdict}: {judged} of {total} criteria judged, {met}; not judged: {why}"
-    ))
+    format!("{name}: {verdict}: {judged} of {total} criteria judged, {met}; not judged: {why}")
 }

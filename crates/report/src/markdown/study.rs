@@ -5,7 +5,7 @@ use std::fmt::Write;
 use needlebench_evaluation::report::Verdict;
 
 use super::escape::inline;
-use crate::table::study::document::Block;
+use crate::table::study::document::{Block, Document};
 
 /// Text that breaks no table.
 fn cell_text(text: &str) -> String {
@@ -28,11 +28,12 @@ fn headings(header: &[String]) -> Vec<String> {
     names
 }
 
-/// The summary as Markdown; without a verdict where there is nothing to judge.
-pub fn summary_markdown(title: &str, verdict: Option<Verdict>, blocks: &[Block]) -> String {
+/// The summary as Markdown: what answers the study, then all else folded in; without a verdict where there is
+/// nothing to judge.
+pub fn summary_markdown(title: &str, verdict: Option<Verdict>, document: &Document) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
-    let _ = write_markdown(&mut text, title, verdict, blocks);
+    let _ = write_markdown(&mut text, title, verdict, document);
     text
 }
 
@@ -40,15 +41,26 @@ fn write_markdown(
     out: &mut String,
     title: &str,
     verdict: Option<Verdict>,
-    blocks: &[Block],
+    document: &Document,
 ) -> std::fmt::Result {
     let verdict = verdict.map_or(String::new(), |verdict| match verdict {
         Verdict::Pass => ": pass".to_owned(),
         other => format!(": **{}**", other.name()),
     });
     writeln!(out, "# {}{verdict}\n", inline(title))?;
+    write_blocks(out, &document.first)?;
+    if !document.more.is_empty() {
+        writeln!(out, "<details><summary>All tables</summary>\n")?;
+        write_blocks(out, &document.more)?;
+        writeln!(out, "</details>")?;
+    }
+    Ok(())
+}
+
+fn write_blocks(out: &mut String, blocks: &[Block]) -> std::fmt::Result {
     for part in blocks {
         match part {
+            Block::Answer(sentence) => writeln!(out, "**{}**\n", inline(sentence))?,
             Block::Heading(heading) => writeln!(out, "## {}\n", inline(heading))?,
             Block::Lines(lines) => {
                 for line in lines {

@@ -42,6 +42,7 @@ pub fn atlas_page(
         name: &report.scenario,
         description: &resolved.scenario.description,
         script: SCRIPT,
+        style: "",
     };
     page.html(pack, &document)
 }

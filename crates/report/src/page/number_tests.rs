@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::number::{percent, shown, small_length, value_and_limit};
+use crate::number::{measured, percent, shown, small_length, three_digits, value_and_limit};
 use needlebench_evaluation::metric::Show;
 
 const FILE: &str = "../../tests/page/numbers.json";
@@ -42,6 +42,13 @@ fn cases() -> Value {
     let lengths: Vec<Value> = signed()
         .map(|value| json!([value, small_length(value)]))
         .collect();
+    let numbers: Vec<Value> = signed()
+        .map(|value| json!([value, three_digits(value)]))
+        .collect();
+    let values: Vec<Value> = ["mm", "mm/mrad", "1"]
+        .into_iter()
+        .flat_map(|unit| signed().map(move |value| json!([value, unit, measured(value, unit)])))
+        .collect();
     let shares = [0.0, 1e-5, 4.9e-4, 0.0125, 0.123, 0.999, 0.9996, 1.0];
     let shares: Vec<Value> = shares.map(|share| json!([share, percent(share)])).into();
     let shows = [
@@ -67,7 +74,10 @@ fn cases() -> Value {
             })
         })
         .collect();
-    json!({"small_length": lengths, "percent": shares, "shown": shows, "value_and_limit": limits})
+    json!({
+        "small_length": lengths, "percent": shares, "shown": shows, "value_and_limit": limits,
+        "three_digits": numbers, "measured": values,
+    })
 }
 
 #[test]

@@ -60,6 +60,7 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
         name: &report.scenario.name,
         description: &report.scenario.description,
         script: SCRIPT,
+        style: "",
     };
     page.html(pack, &document)
 }

@@ -1,8 +1,8 @@
 //! The cell as surfaces, and the arm's chain.
 
-use needlebench_cell::fixtures::FixtureKind;
-use needlebench_cell::phantom::Tissue;
-use needlebench_cell::{BodyKind, Frame, PlacedPhantom, ResolvedScenario, Tool};
+use needlebench_cell::fixtures::{Fixture, FixtureKind};
+use needlebench_cell::phantom::{PhantomPart, Tissue};
+use needlebench_cell::{BodyKind, Frame, PlacedPhantom, ResolvedScenario, Robot, Tool};
 use needlebench_geometry::{Shape, Solid, TriangleMesh, Visual};
 use needlebench_kinematics::{Chain, Pose};
 use serde_json::{Value, json};
@@ -117,24 +117,59 @@ impl Surfaces {
     /// A patient, from the phantom's frame.
     fn add_phantom(&mut self, placed: &PlacedPhantom, place: &Pose) {
         for part in placed.phantom.parts.iter().chain(&placed.limbs) {
-            let (group, opacity) = match part.tissue {
-                Tissue::Skin => ("skin", 0.22),
-                Tissue::Organ => ("organ", 0.4),
-                Tissue::Bone => ("bone", 1.0),
-                Tissue::Fissure => ("organ", 0.5),
-                Tissue::Vessel => ("vessel", 1.0),
-                Tissue::Lesion => ("lesion", 1.0),
-                Tissue::Marker => ("marker", 1.0),
-            };
-            let mut color_rgba = part.color_rgba;
-            color_rgba[3] = opacity;
-            self.add_solids(
-                group,
-                WORLD,
-                color_rgba,
-                std::slice::from_ref(&part.solid),
-                place,
-            );
+            self.add_tissue(part, place);
+        }
+    }
+
+    fn add_tissue(&mut self, part: &PhantomPart, place: &Pose) {
+        let (group, opacity) = match part.tissue {
+            Tissue::Skin => ("skin", 0.22),
+            Tissue::Organ => ("organ", 0.4),
+            Tissue::Bone => ("bone", 1.0),
+            Tissue::Fissure => ("organ", 0.5),
+            Tissue::Vessel => ("vessel", 1.0),
+            Tissue::Lesion => ("lesion", 1.0),
+            Tissue::Marker => ("marker", 1.0),
+        };
+        let mut color_rgba = part.color_rgba;
+        color_rgba[3] = opacity;
+        self.add_solids(
+            group,
+            WORLD,
+            color_rgba,
+            std::slice::from_ref(&part.solid),
+            place,
+        );
+    }
+
+    /// Something that stands in the room, from the world.
+    fn add_fixture(&mut self, fixture: &Fixture, place: &Pose) {
+        let group = match fixture.kind {
+            FixtureKind::Table => "table",
+            FixtureKind::Gantry => "gantry",
+            FixtureKind::Mount => "mount",
+            FixtureKind::Obstacle => "obstacle",
+        };
+        for (color_rgba, solids) in fixture.by_color() {
+            let solids: Vec<TriangleMesh> = solids
+                .iter()
+                .map(|solid| {
+                    let mut placed = solid.shape.surface(CHORD_ERROR_M);
+                    for vertex in &mut placed.vertices_m {
+                        *vertex = solid.parent_from_shape * *vertex;
+                    }
+                    placed
+                })
+                .collect();
+            self.add(group, WORLD, color_rgba, &joined(&solids), place);
+        }
+    }
+
+    /// The links that move.
+    fn add_links(&mut self, robot: &Robot) {
+        for (frame, link) in (0..).zip(&robot.links) {
+            let here = Pose::identity();
+            self.add_body("robot", frame, &link.visuals, &link.solids, &here);
         }
     }
 
@@ -183,33 +218,12 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
         &robot.base.solids,
         &robot.world_from_base_link,
     );
-    for (frame, link) in (0..).zip(&robot.links) {
-        let here = Pose::identity();
-        surfaces.add_body("robot", frame, &link.visuals, &link.solids, &here);
-    }
+    surfaces.add_links(robot);
     let tool = &cell.tool;
     let here = Pose::identity();
     surfaces.add_tool(tool);
     for fixture in &resolved.fixtures {
-        let group = match fixture.kind {
-            FixtureKind::Table => "table",
-            FixtureKind::Gantry => "gantry",
-            FixtureKind::Mount => "mount",
-            FixtureKind::Obstacle => "obstacle",
-        };
-        for (color_rgba, solids) in fixture.by_color() {
-            let solids: Vec<TriangleMesh> = solids
-                .iter()
-                .map(|solid| {
-                    let mut placed = solid.shape.surface(CHORD_ERROR_M);
-                    for vertex in &mut placed.vertices_m {
-                        *vertex = solid.parent_from_shape * *vertex;
-                    }
-                    placed
-                })
-                .collect();
-            surfaces.add(group, WORLD, color_rgba, &joined(&solids), &here);
-        }
+        surfaces.add_fixture(fixture, &here);
     }
     if let Some(placed) = &resolved.phantom {
         surfaces.add_phantom(placed, &placed.world_from_phantom);
@@ -237,20 +251,49 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
     })
 }
 
-/// Triangles of a surface of a further tool or phantom: there may be many of them on a page.
-const MOST_TRIANGLES_OF_A_LOOK: usize = 3000;
+/// The arm of a scenario alone: its chain and the links that move.
+pub(super) fn arm(robot: &Robot, pack: &mut Pack) -> Value {
+    let mut surfaces = Surfaces::default();
+    surfaces.add_links(robot);
+    json!({
+        "chain": chain(&robot.world_from_base_link, &robot.chain),
+        "parts": surfaces.finish(pack, MOST_TRIANGLES),
+    })
+}
 
-/// Tool and phantom of another case than the one that a page's surroundings are of. The phantom is in its
-/// own frame.
-pub(super) fn look(resolved: &ResolvedScenario, pack: &mut Pack) -> Value {
-    let tool = &resolved.cell.tool;
+/// Triangles of a surface of which there may be many kinds on a page.
+const MOST_TRIANGLES_OF_A_KIND: usize = 3000;
+
+/// A tool, in the flange's frame.
+pub(super) fn tool(tool: &Tool, pack: &mut Pack) -> Value {
     let mut surfaces = Surfaces::default();
     surfaces.add_tool(tool);
-    if let Some(placed) = &resolved.phantom {
-        surfaces.add_phantom(placed, &Pose::identity());
-    }
     json!({
         "guide": [pose(&tool.flange_from_guide_entry), pose(&tool.flange_from_guide_exit)],
-        "parts": surfaces.finish(pack, MOST_TRIANGLES_OF_A_LOOK),
+        "parts": surfaces.finish(pack, MOST_TRIANGLES_OF_A_KIND),
     })
+}
+
+/// The link of an arm that does not move, in its own frame.
+pub(super) fn base(robot: &Robot, pack: &mut Pack) -> Value {
+    let mut surfaces = Surfaces::default();
+    let (link, here) = (&robot.base, Pose::identity());
+    surfaces.add_body("robot", WORLD, &link.visuals, &link.solids, &here);
+    Value::Array(surfaces.finish(pack, MOST_TRIANGLES))
+}
+
+/// Parts of a patient, in the frame that they are in.
+pub(super) fn tissues(parts: &[PhantomPart], pack: &mut Pack) -> Value {
+    let mut surfaces = Surfaces::default();
+    for part in parts {
+        surfaces.add_tissue(part, &Pose::identity());
+    }
+    Value::Array(surfaces.finish(pack, MOST_TRIANGLES_OF_A_KIND))
+}
+
+/// Something that stands in the room, in the frame that it is in.
+pub(super) fn fixture(fixture: &Fixture, pack: &mut Pack) -> Value {
+    let mut surfaces = Surfaces::default();
+    surfaces.add_fixture(fixture, &Pose::identity());
+    Value::Array(surfaces.finish(pack, MOST_TRIANGLES))
 }

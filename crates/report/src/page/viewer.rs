@@ -24,6 +24,8 @@ pub(super) struct Viewer<'a> {
     pub description: &'a str,
     /// The page's own script.
     pub script: &'static str,
+    /// The page's own style, after that of all pages.
+    pub style: &'static str,
 }
 
 impl Viewer<'_> {
@@ -41,7 +43,7 @@ impl Viewer<'_> {
         );
         Document {
             title: &format!("{}: {} - needlebench", self.kind, self.name),
-            style: STYLE,
+            style: &format!("{STYLE}{}", self.style),
             body: &body,
             scripts: &[THREE, CORE, NUMBER, VIEW, PLOT, SVG, self.script],
         }
@@ -62,6 +64,7 @@ mod tests {
             name: attack,
             description: attack,
             script: "",
+            style: "",
         };
         let html = page.html(Pack::default(), &json!({"name": attack}));
         assert!(!html.contains("<img"));

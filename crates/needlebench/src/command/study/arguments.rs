@@ -80,6 +80,9 @@ pub(crate) struct StudyResultArguments {
     /// Print one JSON document instead of the tables.
     #[arg(long)]
     pub json: bool,
+    /// Print all tables, not only the answer and what it rests on.
+    #[arg(long)]
+    pub wide: bool,
     /// Write JUnit XML of the study's criteria to this file.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,

@@ -58,13 +58,24 @@
     return `${fixed(share * 100, 1)} %`;
   };
 
+  const threeDigits = function (value) {
+    const size = Math.abs(value);
+    if (size === 0) return '0';
+    if (size < 1e-4) return '< 0.0001';
+    return fixed(value, size >= 100 ? 0 : size >= 10 ? 1 : size >= 0.1 ? 2 : size >= 0.01 ? 3 : 4);
+  };
+  const measured = function (value, unit) {
+    if (unit === 'mm' && value !== 0 && Math.abs(value) < 0.01) return smallLength(value * 1e-3);
+    return unit === '' || unit === '1' ? threeDigits(value) : `${threeDigits(value)} ${unit}`;
+  };
+
   const shown = {
     millimetres: (value) => fixed(value * 1e3, 1), length: smallLength, number: (value) => fixed(value, 2),
     percent: (value) => fixed(100 * value, 0), degrees: (value) => fixed(degrees(value), 1),
   };
 
   /** Texts as number.rs writes them; for the test. */
-  NB.plain = { smallLength, valueAndLimit, percent, shown };
+  NB.plain = { smallLength, valueAndLimit, percent, shown, threeDigits, measured };
 
   NB.minus = (text) => text.replace('-', '\u2212');
   NB.fixed = (value, digits) => (absent(value) ? NONE : typeset(fixed(Number(fixed(value, digits)) || 0, digits)));
@@ -73,6 +84,10 @@
   NB.percent = (share) => NB.fixed(absent(share) ? NaN : share * 100, 0);
   /** A share that is nearly none or nearly all and reads so. */
   NB.share = (share) => (absent(share) ? NONE : percent(share));
+  /** A number of any size with two or three digits and no power of ten. */
+  NB.threeDigits = (value) => (absent(value) ? NONE : typeset(threeDigits(value)));
+  /** A value of a study with its unit, which may be mm. */
+  NB.measured = (value, unit) => (absent(value) ? NONE : typeset(measured(value, unit)));
   /** A length in the unit that suits it. */
   NB.length = (metres) => (absent(metres) ? NONE : metres === 0 ? '0' : typeset(smallLength(metres)));
   NB.formats = Object.fromEntries(Object.entries(shown).map(([name, text]) => [name, (value) => (absent(value) ? NONE : typeset(text(value)))]));

@@ -84,8 +84,8 @@ NB.Axes = class {
     }
     context.textAlign = 'center';
     context.textBaseline = 'top';
-    const xTicks = this.x.labels ? this.x.labels.map((_, index) => index) : NB.ticks(this.x.low, this.x.high, width / 80);
-    const space = this.x.labels ? width / this.x.labels.length - 6 : 80;
+    const xTicks = this.x.labels ? this.x.labels.map((_, index) => index) : NB.ticks(this.x.low, this.x.high, width / 60);
+    const space = this.x.labels ? width / this.x.labels.length - 6 : 60;
     for (const tick of xTicks) {
       const at = Math.round(this.px(tick)) + 0.5;
       context.beginPath(); context.moveTo(at, top); context.lineTo(at, top + height); context.stroke();

@@ -5,9 +5,15 @@ NB.StudyPage = class extends NB.StudyPlots {
   constructor(page, app) {
     super();
     this.page = page;
+    this.summary = page.summary || {};
     this.count = page.kept;
-    this.factors = page.factors.map((factor) => ({ ...factor, values: NB.array(factor.column) }));
-    this.metrics = page.metrics.map((metric) => ({ ...metric, values: NB.array(metric.column) }));
+    // Goals have names for files.
+    const levels = (factor) => (factor.name === 'goal' && factor.levels ? factor.levels.map((level) => ({ ...level, label: NB.words(level.label) })) : factor.levels);
+    this.factors = page.factors.map((factor) => ({ ...factor, levels: levels(factor), values: NB.array(factor.column) }));
+    const metrics = page.metrics.map((metric) => ({ ...metric, values: NB.array(metric.column) }));
+    // What rounding leaves of an exact arm is no number to be shown.
+    this.exact = metrics.filter((metric) => NB.isRounding(metric));
+    this.metrics = metrics.filter((metric) => !NB.isRounding(metric));
     this.outcomes = NB.array(page.outcomes);
     this.outcomeOf = page.outcomeNames.map(([outcome]) => outcome);
     this.numbers = page.numbers ? NB.array(page.numbers) : null;
@@ -15,10 +21,8 @@ NB.StudyPage = class extends NB.StudyPlots {
     const posed = NB.array(page.postures.cases);
     this.posed = new Map([...posed].map((index, at) => [index, at]));
     this.poses = NB.array(page.postures.joints);
-    this.places = page.places ? NB.array(page.places) : null;
-    this.lookOf = page.lookOf ? NB.array(page.lookOf) : null;
-    this.looks = page.looks || [];
     this.derive();
+    app.classList.add('study');
     app.append(this.head());
     if (!this.count) {
       app.append(NB.el('p', { text: 'The study has no cases.' }));
@@ -55,7 +59,7 @@ NB.StudyPage = class extends NB.StudyPlots {
   caseOf(index) { return this.numbers ? this.numbers[index] : index; }
 
   indexOf(number) {
-    if (!this.numbers) return number < this.count ? number : -1;
+    if (!this.numbers) return number >= 0 && number < this.count ? number : -1;
     let [low, high] = [0, this.count - 1];
     while (low <= high) {
       const middle = (low + high) >> 1;
@@ -65,99 +69,167 @@ NB.StudyPage = class extends NB.StudyPlots {
     return -1;
   }
 
+  /** Verdict, cases, and what has to be known of every figure below. */
   head() {
     const { cases, kept } = this.page;
-    const group = (value) => value.toLocaleString('en').replaceAll(',', '\u202f');
-    const { criteria = [], verdict, not_judged: open = [] } = this.page.summary || {};
+    const { criteria = [], verdict, not_judged: open = [], postures_only: postures } = this.summary;
+    const varied = this.factors.filter((factor) => !factor.levels || factor.levels.length > 1).map((factor) => (factor.levels ? `${factor.words} (${factor.levels.length})` : factor.words));
     return NB.el('div', { class: 'bar' },
-      criteria.length || open.length ? NB.verdict(verdict) : null,
+      criteria.length || open.length ? NB.verdict(verdict) : NB.el('span', { class: 'chip off', text: 'no criteria: nothing is judged' }),
       open.length ? NB.el('span', { class: 'error', text: `not judged: ${open.join('; ')}` }) : null,
-      NB.el('span', { text: `${group(cases)} cases of 8 configurations` }),
-      this.page.summary?.headline ? NB.el('strong', { class: 'headline', text: this.page.summary.headline.charAt(0).toUpperCase() + this.page.summary.headline.slice(1) }) : null,
-      this.choiceText() ? NB.el('strong', { class: 'headline', text: this.choiceText() }) : null,
-      kept < cases ? NB.el('strong', { text: `The plots show ${group(kept)} of them: one of each block of successive cases, drawn by a fixed rule, and those that the statistics name. All tables of statistics are of all cases.` }) : null);
+      this.posturesChip(),
+      NB.el('span', { text: `${NB.grouped(cases)} cases, each with 8 configurations; varied: ${varied.join(', ')}` }),
+      kept < cases ? NB.el('strong', { text: `The plots show ${NB.grouped(kept)} of them: one of each block of successive cases, drawn by a fixed rule, and those that the statistics name. All tables of statistics are of all cases.` }) : null,
+      postures && postures !== 'none' && this.summary.headline ? NB.el('p', { class: 'headline', text: `${this.summary.headline.charAt(0).toUpperCase()}${this.summary.headline.slice(1)}.` }) : null);
   }
 
-  /** Of which choice the statistics are, in a sentence; empty where nothing is chosen. */
-  choiceText() {
-    const best = this.page.summary?.of_choice;
-    if (this.page.summary?.not_ranked) return `Not judged: ${this.page.summary.not_ranked}`;
-    if (!best) return '';
-    const rate = this.page.summary.overall?.at_least?.[0];
-    const heldOut = best.held_out === null || best.held_out === undefined ? ''
-      : `; picked on one half of the points, a choice works in ${NB.fixed(100 * best.held_out, 1)} % of the other half`;
-    const share = rate?.rate === null || rate?.rate === undefined ? '' : ` At least one configuration is ok in ${NB.fixed(100 * rate.rate, 1)} %${rate.interval ? ` (${NB.fixed(100 * rate.interval.low, 1)} to ${NB.fixed(100 * rate.interval.high, 1)}, which holds for all choices at once)` : ''} of its valid layouts${heldOut}.`;
-    return `Rates and criteria are of the best of ${best.of} choices, ${best.label}, by ${best.by}.${share}`;
+  /** That nothing is known of motions, to stand beside figures. */
+  posturesChip() {
+    const text = { all: 'postures only: no motion is planned', some: 'some cases are postures only' }[this.summary.postures_only];
+    return text ? NB.el('span', { class: 'chip bad', text, title: this.summary.headline || null }) : null;
   }
 
   build(app) {
-    const continuous = this.factors.findIndex((factor) => !factor.levels);
-    const varying = this.factors.map((factor, index) => [factor, index]).filter(([factor]) => !factor.levels || factor.levels.length > 1).map(([, index]) => index);
-    this.state = {
-      x: continuous >= 0 ? continuous : varying[0] ?? 0,
-      y: varying.find((index) => index > (continuous >= 0 ? continuous : varying[0])) ?? varying[1] ?? 0,
-      color: 'outcome', configuration: -1, metric: this.metrics[0]?.name, filters: new Map(),
-    };
     this.axesOf = this.factors.map((factor, index) => this.axis(factor, index));
+    this.state = this.startState();
     this.filter();
-    const options = this.factors.map((factor, index) => [String(index), NB.words(factor.name)]);
-    const configurations = [['-1', 'best of each case'], ...this.page.configurations.map((label, index) => [String(index), label])];
-    const redraw = (set) => (value) => { set(value); this.redraw(); };
-    const metricOptions = this.metrics.map((metric) => [metric.name, this.titleOf(metric)]);
-    const colors = [['outcome', 'outcome'], ['best', 'best configuration'], ['working', 'number that work'], ...metricOptions];
-    const controls = NB.el('div', { class: 'bar no-print', role: 'group', 'aria-label': 'What the plots show' },
-      NB.select('across', options, String(this.state.x), redraw((value) => { this.state.x = Number(value); })),
-      NB.select('up', options, String(this.state.y), redraw((value) => { this.state.y = Number(value); })),
-      NB.select('colour', colors, 'outcome', redraw((value) => { this.state.color = value; })),
-      NB.select('of', configurations, '-1', redraw((value) => { this.state.configuration = Number(value); })),
-      this.factors.map((factor, index) => (factor.levels && factor.levels.length > 1
-        ? NB.select(NB.words(factor.name), [['', 'all'], ...factor.levels.map((level, at) => [String(at), level.label])], '', (value) => {
-          if (value === '') this.state.filters.delete(index); else this.state.filters.set(index, Number(value));
-          this.filter();
-          this.redraw();
-        }) : null)));
     this.tip = NB.el('div', { class: 'tip', hidden: true });
-    this.scatter = new NB.Canvas(430, 'Scatter of the cases over two factors', (...all) => this.paintScatter(...all));
-    this.map = new NB.Canvas(430, 'Map of the success rate over two factors', (...all) => this.paintMap(...all));
-    this.ecdf = new NB.Canvas(300, 'Share of cases below a value, configuration by configuration', (...all) => this.paintEcdf(...all));
-    this.histogram = new NB.Canvas(300, 'Histogram of a metric', (...all) => this.paintHistogram(...all));
-    this.strip = new NB.Canvas(230, 'Success rates with their intervals', (...all) => this.paintStrip(...all));
-    this.scatterLegend = NB.el('div', { class: 'legend' });
-    this.mapLegend = NB.el('div', { class: 'legend' });
-    this.ecdfLegend = NB.el('div', { class: 'legend' });
-    this.shown = NB.el('p', { class: 'soft', role: 'status' });
-    this.listen(this.scatter, (x, y) => this.nearestPoint(x, y));
-    this.listen(this.ecdf, (x, y) => this.nearestOnCurve(x, y));
-    this.listen(this.map, (x, y) => this.cellAt(x, y));
+    this.statistics = new NB.Statistics(this);
+    const map = this.figureOfMap();
+    this.makeFigures();
     this.casePanel = NB.el('div', { class: 'panel' });
-    this.cellPanel = NB.el('div');
-    this.makeView();
-    const figure = (title, help, ...parts) => NB.el('section', { class: 'panel points' }, NB.el('h3', { text: title }), NB.el('p', { class: 'soft small', text: help }), ...parts);
-    const metricSelect = NB.select('metric', metricOptions, this.state.metric, redraw((value) => { this.state.metric = value; this.sorted = null; }));
+    this.scene = this.page.scene ? new NB.CaseScene(this.page) : null;
+    this.view = this.scene?.view;
     app.append(
-      figure('How often each configuration works', this.page.summary?.overall
-        ? `Share of valid cases in which it is ok, with ${Math.round(100 * (this.page.summary.confidence || 0.95))} % interval; ${this.page.summary.of_choice ? `of the best choice, ${this.page.summary.of_choice.label}` : 'of all cases'}.`
-        : 'Share of the valid cases on this page in which it is ok.', this.strip.element),
-      controls, this.shown,
-      NB.el('div', { class: 'grid cases' },
-        NB.el('div', null,
-          figure('Cases', 'Each point is a case: click it to see it at the right, or go through the numbers there with the arrow keys.', this.scatter.element, this.scatterLegend),
-          figure('Success rate', 'Share of valid cases in each cell that are ok. Click a cell for its cases.', this.map.element, this.mapLegend, this.cellPanel)),
-        NB.el('div', null, this.casePanel, this.view ? NB.el('div', { class: 'panel' }, this.view.element, this.viewNote) : null)),
-      NB.el('div', { class: 'bar no-print' }, metricSelect),
-      NB.el('div', { class: 'grid wide' },
-        figure('Share of cases below', 'Click a curve for the case at that value.', this.ecdf.element, this.ecdfLegend),
-        figure('Histogram', 'Rows of the configuration chosen above; ok and failed ones.', this.histogram.element)),
-      this.tip, ...new NB.Statistics(this).sections());
+      ...this.statistics.first(),
+      NB.el('h2', { class: 'part', text: 'Look into the cases' }), this.controls(), this.shown,
+      NB.el('div', { class: 'explore' },
+        NB.el('div', null, this.scatter.element, map.element, this.cellPanel),
+        NB.el('div', null, this.scene ? this.scene.element : null, this.casePanel)),
+      NB.el('h2', { class: 'part', text: 'How the numbers spread' }),
+      NB.el('div', { class: 'bar no-print' }, this.metricSelect),
+      NB.el('div', { class: 'pair' }, this.ecdf.element, this.histogram.element),
+      NB.el('h2', { class: 'part', text: 'All tables' }),
+      this.tip, ...this.statistics.sections());
     this.redraw();
+    const asked = this.indexOf(Number(this.asked.case ?? NaN));
     const noted = this.firstNoted();
-    this.choose(Number.isNaN(noted) ? 0 : noted);
+    this.choose(asked >= 0 ? asked : Number.isNaN(noted) ? this.indices[0] ?? 0 : noted, this.state.configuration >= 0 ? this.state.configuration : null);
+    this.started = true;
+    NB.address.watch((choices) => this.follow(choices));
+  }
+
+  /** What the plots show at first: of the best choice, over numbers; or what the address asks for. */
+  startState() {
+    this.asked = NB.address.read();
+    const varying = this.factors.map((factor, index) => index).filter((index) => !this.factors[index].levels || this.factors[index].levels.length > 1);
+    const isNumber = (index) => !this.factors[index].levels || this.factors[index].levels.every((level) => level.number !== null);
+    const chosen = varying.filter((index) => this.factors[index].role === 'choice' && isNumber(index));
+    const numbers = chosen.length > 1 ? chosen : varying.filter((index) => !this.factors[index].levels);
+    const order = [...new Set([...numbers, ...varying])];
+    const state = { x: order[0] ?? 0, y: order[1] ?? order[0] ?? 0, color: 'outcome', configuration: -1, metric: (this.metrics.find((metric) => metric.measure === 'clearance') || this.metrics[0])?.name, filters: new Map() };
+    const best = this.summary.choices?.choices?.[0];
+    (best ? this.summary.choices.axes : []).forEach((axis, at) => {
+      const factor = this.factors[axis.factor];
+      if (factor.levels && !axis.coarse && axis.factor !== state.x && axis.factor !== state.y) state.filters.set(axis.factor, best.bins[at]);
+    });
+    return this.withAddress(state);
+  }
+
+  /** A state with what the address says of it. */
+  withAddress(state) {
+    const named = (name) => this.factors.findIndex((factor) => factor.name === name);
+    const of = this.page.configurations.indexOf(this.asked.of);
+    if (of >= 0) state.configuration = of;
+    if (this.asked.of === 'best') state.configuration = -1;
+    for (const axis of ['x', 'y']) { const at = named(this.asked[axis]); if (at >= 0) state[axis] = at; }
+    const color = this.asked.colour;
+    if (['outcome', 'best', 'working'].includes(color) || this.metric(color)) state.color = color;
+    if (this.metric(this.asked.metric)) state.metric = this.asked.metric;
+    this.factors.forEach((factor, index) => {
+      const asked = this.asked[`with.${factor.name}`];
+      const level = factor.levels ? factor.levels.findIndex((each) => each.label === asked) : -1;
+      if (level >= 0) state.filters.set(index, level);
+      else if (asked === 'all') state.filters.delete(index);
+    });
+    return state;
+  }
+
+  /** Writes what is shown into the address. */
+  remember() {
+    const { x, y, color, configuration, metric, filters } = this.state;
+    const words = { case: this.caseOf(this.chosen), x: this.factors[x].name, y: this.factors[y].name, colour: color, of: configuration < 0 ? 'best' : this.page.configurations[configuration], metric };
+    this.factors.forEach((factor, index) => {
+      if (factor.levels && factor.levels.length > 1) words[`with.${factor.name}`] = filters.has(index) ? factor.levels[filters.get(index)].label : 'all';
+    });
+    NB.address.write(words);
+  }
+
+  /** Shows what an address that was typed or gone back to asks for. */
+  follow(choices) {
+    this.asked = choices;
+    this.state = this.withAddress(this.state);
+    for (const [control, value] of this.kept) control.querySelector('select').value = value();
+    this.filter();
+    this.redraw();
+    const index = this.indexOf(Number(this.asked.case ?? NaN));
+    if (index >= 0) this.choose(index);
+  }
+
+  controls() {
+    const options = this.factors.map((factor, index) => [String(index), factor.words]).filter(([index]) => !this.factors[index].levels || this.factors[index].levels.length > 1);
+    const configurations = [['-1', 'best of each layout'], ...this.page.configurations.map((label, index) => [String(index), label])];
+    const colors = [['outcome', 'what became of it'], ['best', 'best configuration'], ['working', 'how many work'], ...this.metricOptions()];
+    this.kept = [];
+    const select = (label, choices, value, set) => {
+      const control = NB.select(label, choices, value(), (chosen) => { set(chosen); this.filter(); this.redraw(); this.remember(); });
+      this.kept.push([control, value]);
+      return control;
+    };
+    const { state } = this;
+    const filters = this.factors.map((factor, index) => (factor.levels && factor.levels.length > 1
+      ? select(`${factor.words}:`, [['', 'all'], ...factor.levels.map((level, at) => [String(at), level.label])], () => String(this.state.filters.get(index) ?? ''),
+        (value) => { if (value === '') state.filters.delete(index); else state.filters.set(index, Number(value)); }) : null));
+    this.metricSelect = this.metrics.length ? select('number', this.metricOptions(), () => this.state.metric, (value) => { state.metric = value; }) : null;
+    return NB.el('div', { class: 'bar no-print', role: 'group', 'aria-label': 'What the plots show' },
+      select('across', options, () => String(this.state.x), (value) => { state.x = Number(value); }),
+      select('up', options, () => String(this.state.y), (value) => { state.y = Number(value); }),
+      select('colour', colors, () => this.state.color, (value) => { state.color = value; }),
+      select('of', configurations, () => String(this.state.configuration), (value) => { state.configuration = Number(value); }),
+      filters);
+  }
+
+  metricOptions() { return this.metrics.map((metric) => [metric.name, this.titleOf(metric)]); }
+
+  figureOfMap() {
+    this.map = new NB.Figure({
+      name: `${this.page.name}-map`, title: 'Where it works', help: 'Share of the layouts in each cell that work. Click a cell for its cases.',
+      label: 'Map of the share of layouts that work over two factors', height: 400,
+      paint: (...all) => this.paintMap(...all), legend: () => this.mapItems || [],
+    });
+    return this.map;
+  }
+
+  makeFigures() {
+    const figure = (which, title, help, label, height, paint) => {
+      this[which] = new NB.Figure({ name: `${this.page.name}-${which}`, title, help, label, height, paint, legend: () => this[`${which}Items`] || [] });
+    };
+    figure('scatter', 'Cases', 'Each mark is a place, of one case or of several: click it for its cases, or go through the numbers beside it with the arrow keys.', 'Scatter of the cases over two factors', 400, (...all) => this.paintScatter(...all));
+    figure('ecdf', 'Share of layouts below', 'Of the layouts in which the configuration is not rejected. Click a curve for the case at that value.', 'Share of layouts below a value, configuration by configuration', 300, (...all) => this.paintEcdf(...all));
+    figure('histogram', 'Histogram', 'Of the configuration chosen above, where it is not rejected; of the best, where any works.', 'Histogram of a number', 300, (...all) => this.paintHistogram(...all));
+    this.shown = NB.el('p', { class: 'soft', role: 'status' });
+    this.showCount();
+    this.cellPanel = NB.el('div');
+    this.listen(this.scatter.canvas, (x, y) => this.nearestPlace(x, y));
+    this.listen(this.ecdf.canvas, (x, y) => this.nearestOnCurve(x, y));
+    this.listen(this.map.canvas, (x, y) => this.cellAt(x, y));
   }
 
   /** The first case that the statistics name and that is here. */
   firstNoted() {
-    const found = JSON.stringify(this.page.summary?.evidence?.configurations || []).match(/"case":(\d+)/);
-    const index = found ? this.indexOf(Number(found[1])) : -1;
+    const best = this.summary.evidence?.configurations?.find((each) => each.of === 'best');
+    const worst = best?.worst.find(({ metric }) => !this.statistics.isExact(metric));
+    const index = worst?.cases.length ? this.indexOf(worst.cases[0].case) : -1;
     return index >= 0 ? index : NaN;
   }
 
@@ -168,7 +240,7 @@ NB.StudyPage = class extends NB.StudyPlots {
 
   /** Range, title and bins of a factor. */
   axis(factor, salt) {
-    const title = `${NB.words(factor.name)}${factor.unit ? ` (${factor.unit})` : ''}`;
+    const title = `${factor.words}${factor.unit ? ` (${factor.unit})` : ''}`;
     if (factor.levels) {
       const labels = factor.levels.map((level) => level.label);
       return { low: -0.5, high: labels.length - 0.5, title, labels, bins: labels.length, salt };
@@ -181,11 +253,6 @@ NB.StudyPage = class extends NB.StudyPlots {
     if (!(low < high)) { low -= 0.5; high += 0.5; }
     const bins = Math.min(Math.max(Math.floor(Math.sqrt(this.count / 40)), 4), 16);
     return { low, high, title, labels: null, bins, salt };
-  }
-
-  place(axis, factor, index) {
-    const value = factor.values[index];
-    return axis.labels ? value + 0.7 * (NB.jitter(index, axis.salt) - 0.5) : value;
   }
 
   bin(axis, factor, index) {
@@ -202,12 +269,17 @@ NB.StudyPage = class extends NB.StudyPlots {
     }
     this.indices = Uint32Array.from(indices);
     this.sorted = null;
-    if (this.shown) this.shown.textContent = `${this.indices.length.toLocaleString('en')} cases are shown.`;
+    this.placed = null;
+    if (this.shown) this.showCount();
   }
 
-  redraw() {
-    for (const canvas of [this.scatter, this.map, this.ecdf, this.histogram, this.strip]) canvas.draw();
+  showCount() {
+    const only = [...this.state.filters].map(([factor, level]) => `${this.factors[factor].words} ${this.factors[factor].levels[level].label}`);
+    const postures = this.summary.postures_only === 'all' ? ' Postures only: whether a motion gets there is not known.' : '';
+    this.shown.textContent = `${NB.grouped(this.indices.length)} of ${NB.grouped(this.count)} cases are shown${only.length ? `, with ${only.join(', ')}` : ''}.${postures}`;
   }
+
+  redraw() { for (const figure of [this.scatter, this.map, this.ecdf, this.histogram]) figure.draw(); }
 
   /** Row of the chosen configuration in a case; -1 where none works. */
   row(index) {
@@ -232,26 +304,32 @@ NB.StudyPage = class extends NB.StudyPlots {
       this.tip.hidden = !found;
       if (!found) return;
       this.tip.textContent = found.text;
-      this.tip.style.left = `${Math.min(event.pageX + 14, window.innerWidth - 280)}px`;
+      this.tip.style.left = `${Math.max(Math.min(event.pageX + 14, document.documentElement.clientWidth - this.tip.offsetWidth - 4), 0)}px`;
       this.tip.style.top = `${event.pageY + 12}px`;
     });
     canvas.canvas.addEventListener('pointerleave', () => { this.tip.hidden = true; });
     canvas.canvas.addEventListener('click', (event) => at(event)?.choose());
   }
 
-  nearestPoint(x, y) {
+  nearestPlace(x, y) {
     const axes = this.scatterAxes;
     if (!axes) return null;
-    const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
-    const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
-    let [best, least] = [-1, 100];
-    for (const index of this.indices) {
-      const dx = axes.px(this.place(xAxis, xFactor, index)) - x;
-      if (dx > 10 || dx < -10) continue;
-      const dy = axes.py(this.place(yAxis, yFactor, index)) - y;
-      if (dx * dx + dy * dy < least) { least = dx * dx + dy * dy; best = index; }
+    const places = this.places();
+    let [best, least] = [-1, 144];
+    for (let place = 0; place < places.first.length; place++) {
+      const dx = axes.px(places.x[place]) - x;
+      if (dx > 12 || dx < -12) continue;
+      const dy = axes.py(places.y[place]) - y;
+      if (dx * dx + dy * dy < least) { least = dx * dx + dy * dy; best = place; }
     }
-    return best < 0 ? null : { text: `case ${this.caseOf(best)}: ${this.outcome(best)}, ${this.working[best]} of 8 work`, choose: () => this.choose(best) };
+    if (best < 0) return null;
+    const first = places.first[best];
+    if (places.counts[best] === 1) {
+      return { text: `case ${this.caseOf(first)}: ${this.outcome(first)}, ${this.working[first]} of 8 configurations work`, choose: () => this.choose(first) };
+    }
+    const here = [...this.indices].filter((_, at) => places.of[at] === best);
+    const working = here.filter((index) => this.outcome(index) === 'ok').length;
+    return { text: `${here.length} cases at this place: ${working} work`, choose: () => this.list(here, 'at this place') };
   }
 
   nearestOnCurve(px, py) {
@@ -268,7 +346,7 @@ NB.StudyPage = class extends NB.StudyPlots {
     });
     if (best < 0) return null;
     return {
-      text: `${this.page.configurations[best]}: ${NB.fixed(100 * share, 1)} % below ${NB.fixed(value, 2)}`,
+      text: `${this.page.configurations[best]}: ${NB.fixed(100 * share, 1)} % below ${NB.threeDigits(value)} ${metric.unit === '1' ? '' : metric.unit}`,
       choose: () => {
         let [found, nearest] = [-1, Infinity];
         for (const index of this.indices) {
@@ -288,25 +366,29 @@ NB.StudyPage = class extends NB.StudyPlots {
     if (cx < 0 || cy < 0 || cx >= nx || cy >= ny) return null;
     const cell = cy * nx + cx;
     return {
-      text: of[cell] ? `${ok[cell]} of ${of[cell]} valid cases are ok (${Math.round(100 * ok[cell] / of[cell])} %)` : 'no valid cases',
+      text: of[cell] ? `${ok[cell]} of ${of[cell]} layouts work (${Math.round(100 * ok[cell] / of[cell])} %)` : 'no layouts',
       choose: () => this.listCell(cx, cy),
     };
   }
 
-  /** The first cases of a cell of the map, those that are not ok first. */
   listCell(cx, cy) {
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
-    const inside = [...this.indices].filter((index) => this.bin(xAxis, xFactor, index) === cx && this.bin(yAxis, yFactor, index) === cy);
+    this.list([...this.indices].filter((index) => this.bin(xAxis, xFactor, index) === cx && this.bin(yAxis, yFactor, index) === cy), 'in this cell');
+  }
+
+  /** The first cases of a place or a cell, those that do not work first. */
+  list(inside, where) {
     inside.sort((a, b) => Number(this.outcome(a) === 'ok') - Number(this.outcome(b) === 'ok') || a - b);
-    NB.clear(this.cellPanel, NB.el('p', { class: 'small', text: `${inside.length} cases in this cell; the first 40, those that are not ok before others:` }),
+    NB.clear(this.cellPanel, NB.el('p', { class: 'small', text: `${inside.length} cases ${where}; the first 40, those that do not work before others:` }),
       this.caseButtons(inside.slice(0, 40).map((index) => this.caseOf(index))));
+    if (inside.length) this.choose(inside[0]);
   }
 
   caseButtons(numbers) {
     const buttons = numbers.map((number) => {
       const index = this.indexOf(number);
-      return NB.el('button', { type: 'button', class: 'key', disabled: index < 0, title: index < 0 ? 'not on this page' : null, onclick: () => this.choose(index) }, String(number));
+      return NB.el('button', { type: 'button', class: 'key', disabled: index < 0, title: index < 0 ? 'not on this page' : null, 'aria-label': `Case ${number}`, onclick: () => this.choose(index) }, String(number));
     });
     buttons.forEach((button, at) => button.addEventListener('keydown', (event) => {
       const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
@@ -327,7 +409,7 @@ NB.StudyPage = class extends NB.StudyPlots {
     const columns = [
       { title: 'Configuration', cell: (c) => this.page.configurations[c] },
       { title: 'Outcome', cell: (c) => this.outcomeText(index, c) },
-      ...this.metrics.map((metric) => ({ title: this.titleOf(metric), numeric: true, help: metric.description, cell: (c) => NB.fixed(metric.values[c * this.count + index], Math.min(Math.max(0, Math.floor(-Math.log10(metric.column.step))), 3)) })),
+      ...this.metrics.map((metric) => ({ title: this.titleOf(metric), numeric: true, help: metric.description, cell: (c) => NB.threeDigits(metric.values[c * this.count + index]) })),
     ];
     const table = NB.table('Row: show its posture', columns, [0, 1, 2, 3, 4, 5, 6, 7], { class: 'choose small full' });
     const rows = [...table.querySelectorAll('tbody tr')];
@@ -343,22 +425,25 @@ NB.StudyPage = class extends NB.StudyPlots {
         if (to >= 0) this.choose(to); else copied.textContent = 'that case is not on this page; the command reruns any';
       },
     });
-    NB.clear(this.casePanel, NB.el('h3', null, 'Case ', input),
+    const elsewhere = this.indices.indexOf(index) < 0 ? NB.el('p', { class: 'soft small', text: 'The filters above leave this case out of the plots.' }) : null;
+    NB.clear(this.casePanel, NB.el('h3', null, 'Case ', input), elsewhere,
       NB.el('dl', null, this.factors.flatMap((factor) => {
         const value = factor.values[index];
         const text = factor.levels ? factor.levels[value].label : `${NB.fixed(value, 2)} ${factor.unit}`;
-        return [NB.el('dt', { text: NB.words(factor.name) }), NB.el('dd', { text })];
+        return [NB.el('dt', { text: factor.words }), NB.el('dd', { text })];
       })), table,
       NB.el('p', { class: 'small' }, 'To the last digit, and with all columns: ', NB.el('code', { text: command }), ' ',
         NB.el('button', { type: 'button', class: 'no-print', onclick: () => this.copy(command, copied) }, 'Copy'), ' ', copied));
     this.pose(index, row);
+    if (this.started) this.remember();
   }
 
   outcomeText(index, c) {
-    const [outcome, detail] = this.page.outcomeNames[this.outcomes[c * this.count + index]];
+    const [outcome, , words] = this.page.outcomeNames[this.outcomes[c * this.count + index]];
     const style = { ok: 'good', failed: 'bad', rejected: 'off', invalid: 'off' }[outcome];
     const sign = { ok: '\u2713', failed: '\u2717', rejected: '\u2013', invalid: '\u2205' }[outcome];
-    return [NB.el('span', { class: style, text: `${sign} ${outcome}` }), detail ? NB.el('div', { class: 'soft', text: NB.words(detail) }) : ''];
+    const name = { ok: 'works', failed: 'misses a criterion', rejected: 'rejected', invalid: 'cannot exist' }[outcome];
+    return [NB.el('span', { class: style, text: `${sign} ${name}` }), words ? NB.el('div', { class: 'soft', text: words }) : ''];
   }
 
   async copy(text, status) {
@@ -370,78 +455,25 @@ NB.StudyPage = class extends NB.StudyPlots {
     }
   }
 
-  makeView() {
-    const { scene } = this.page;
-    this.viewNote = NB.el('p', { class: 'soft small', role: 'status' });
-    if (!scene) return;
-    // Tools and phantoms of other cases stand in groups of their own: `skin@1`.
-    const others = this.looks.flatMap((look, at) => look.parts.map((part) => ({ ...part, group: `${part.group}@${at + 1}` })));
-    this.view = new NB.View({ ...scene, parts: [...scene.parts, ...others] }, 'Posture of the chosen configuration');
-    this.view.element.style.height = '330px';
-    this.arm = this.view.arm('arm');
-    for (const layer of ['collision', 'corridor']) this.arm.layer(layer, false);
-    this.view.show('gantry', false);
-    const goals = Object.values(this.page.goals || {});
-    const targets = goals.map((goal) => goal.target);
-    this.view.frame([...NB.aboutBase(scene.chain.base, 0.5), ...targets.flatMap((t) => [t.map((v) => v - 0.25), t.map((v) => v + 0.25)])], goals.length ? NB.direction(scene.chain.base, goals[0].target, goals[0].axis) : [-0.75, 0.45, -0.55]);
-  }
-
-  /** The posture of a row, where it is on the page; places of robot and phantom as far as they are known. */
+  /** The posture of a row, where it is on the page. */
   pose(index, c) {
-    if (!this.view) return;
+    if (!this.scene) return;
     const at = this.posed.get(index);
     const joints = at === undefined ? null : Array.from(this.poses.subarray((8 * at + c) * 6, (8 * at + c) * 6 + 6), (value) => value * Math.PI / 180);
-    const has = Boolean(joints) && joints.every((value) => !Number.isNaN(value));
-    const chain = { ...this.page.scene.chain };
-    let known = false;
-    if (at !== undefined && this.places) {
-      const numbers = Array.from(this.places.subarray(14 * at, 14 * at + 14));
-      known = !Number.isNaN(numbers[0]);
-      if (known) chain.base = numbers.slice(0, 7);
-    }
-    // Without places the picture is of the base scenario, which says so below.
-    const look = this.lookOf && at !== undefined ? this.lookOf[at] : this.lookOf ? 255 : 0;
-    const drawn = look <= this.looks.length;
-    this.look(look, known ? Array.from(this.places.subarray(14 * at + 7, 14 * at + 14)) : null);
-    this.arm.show(has);
-    this.view.empty('needle');
-    if (has && this.view.works) this.arm.pose(chain, joints);
-    if (has && drawn && this.view.works) {
-      const poses = NB.forward(chain, joints);
-      const exit = (look ? this.looks[look - 1] : this.page.scene).guide[1];
-      const guide = poses[6].clone().multiply(NB.matrix(exit));
-      const point = (z) => new THREE.Vector3(0, 0, z).applyMatrix4(guide).toArray();
-      this.view.rod('needle', point(-0.12), point(0.08), 0.0012, [0, 0.45, 0.32, 1]);
-    }
-    this.viewNote.textContent = [
-      has ? `${this.page.configurations[c]} in case ${this.caseOf(index)}.`
-        : at === undefined ? 'The posture of this case is not on the page (it holds some thousand): rerun it by the command.' : 'This configuration has no posture.',
-      known && drawn ? 'Robot, patient and tool are those of this case, and stand where they do in it; table, gantry, mount and obstacles are those of the base scenario.'
-        : known ? 'The robot stands where it does in this case; its tool and its patient are not on the page, and are not drawn: rerun it with --run to see them.'
-        : this.lookOf ? 'Tool and patient of this case are not on the page, and are not drawn; table, gantry, mount and obstacles are those of the base scenario.'
-        : 'The surroundings are those of the base scenario: what this case changes of them is not drawn.'].join(' ');
-    this.view.draw();
+    this.scene.show(at, joints, `${this.page.configurations[c]} in case ${this.caseOf(index)}`);
   }
+};
 
-  /** Shows the tool and the patient of a look alone, the patient at a place; of one that is not on the page, none. */
-  look(look, phantom) {
-    if (!this.view.works) return;
-    const name = (group, at) => (at ? `${group}@${at}` : group);
-    for (let at = 0; at <= this.looks.length; at++) {
-      this.arm.layer(name('tool', at), at === look);
-      for (const tissue of ['skin', 'bone', 'organ', 'vessel', 'lesion', 'marker']) {
-        const group = this.view.group(name(tissue, at));
-        group.visible = at === look;
-        if (at !== look || !phantom || Number.isNaN(phantom[0])) continue;
-        const move = NB.matrix(phantom);
-        // The base scenario's lies where it does there, the others in their own frame.
-        if (!at) { if (!this.page.phantom) continue; move.multiply(NB.matrix(this.page.phantom).invert()); }
-        group.matrixAutoUpdate = false;
-        group.matrix.copy(move);
-        group.matrixWorldNeedsUpdate = true;
-      }
-    }
+/** Lengths in mm that are nothing but rounding. */
+NB.isRounding = function ({ unit, values }) {
+  if (unit !== 'mm') return false;
+  let any = false;
+  for (const value of values) {
+    if (Number.isNaN(value)) continue;
+    if (Math.abs(value) >= NB.ROUNDING_MM) return false;
+    any = true;
   }
+  return any;
 };
 
 NB.start((page, app) => { NB.current = new NB.StudyPage(page, app); });

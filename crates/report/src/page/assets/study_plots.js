@@ -15,6 +15,9 @@ NB.viridis = function (share) {
   return stops[low].map((value, k) => Math.round(value + (stops[low + 1][k] - value) * (at - low)));
 };
 
+/** A count with thin spaces between thousands. */
+NB.grouped = (value) => value.toLocaleString('en').replaceAll(',', '\u202f');
+
 /** Fixed scatter of points that share a level, so that they can be told apart: 0 to 1. */
 NB.jitter = (index, salt) => {
   let x = Math.imul(index + 1, 0x9e3779b1) ^ Math.imul(salt + 1, 0x85ebca6b);
@@ -22,104 +25,237 @@ NB.jitter = (index, salt) => {
   return ((x ^ x >>> 13) >>> 0) / 4294967296;
 };
 
-/** What a study's page draws: colours, scatter, map, shares, histogram, rates. */
+NB.rgb = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;
+
+/** Places that are drawn with a mark each; more are drawn as pixels. */
+NB.MOST_MARKS = 4000;
+
+/** Cases of a cell below which no share is written. */
+NB.FEW_CASES = 20;
+
+/** What a study's page draws: colours, scatter, map, shares, histogram. */
 NB.StudyPlots = class {
-  /** Class and colour of each shown case, and the legend. */
+  /** Kinds of cases with their colours, `of` the kind of a case, or a `scale` and the `value` of a case. */
   coloring() {
     const { color } = this.state;
+    const [blue, red, orange, grey] = [[0, 114, 178], [213, 94, 0], [230, 159, 0], [150, 150, 150]];
     if (color === 'outcome') {
       const kinds = this.state.configuration < 0
-        ? [['ok', [0, 114, 178], 'square'], ['none works', [213, 94, 0], 'cross'], ['invalid', [150, 150, 150], 'dot']]
-        : [['ok', [0, 114, 178], 'square'], ['failed', [230, 159, 0], 'triangle'], ['rejected', [213, 94, 0], 'cross'], ['invalid', [150, 150, 150], 'dot']];
+        ? [['ok', blue, 'square', 'works'], ['none works', red, 'cross', 'none works'], ['invalid', grey, 'dot', 'cannot exist']]
+        : [['ok', blue, 'square', 'works'], ['failed', orange, 'triangle', 'misses a criterion'], ['rejected', red, 'cross', 'rejected'], ['invalid', grey, 'dot', 'cannot exist']];
       const at = new Map(kinds.map(([name], index) => [name, index]));
       return { kinds, of: (index) => at.get(this.outcome(index)) ?? kinds.length - 1 };
     }
-    const rgb = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
     if (color === 'best') {
-      const kinds = [...this.page.configurations.map((label, c) => [label, rgb(NB.configurationStyles[c].color), c % 2 ? 'triangle' : 'square']), ['none works', [190, 190, 190], 'dot']];
+      const hex = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
+      const kinds = [...this.page.configurations.map((label, c) => [label, hex(NB.configurationStyles[c].color), c % 2 ? 'triangle' : 'square', label]), ['none works', [190, 190, 190], 'dot', 'none works']];
       return { kinds, of: (index) => (this.best[index] < 0 ? 8 : this.best[index]) };
     }
     if (color === 'working') {
-      const kinds = Array.from({ length: 9 }, (_, k) => [String(k), NB.viridis(k / 8), 'square']);
-      return { kinds, of: (index) => this.working[index], scale: ['0', '8', 'configurations that work'] };
+      return { low: 0, high: 8, scale: { low: '0', high: '8', text: 'configurations that work' }, value: (index) => (this.invalid[index] ? NaN : this.working[index]) };
     }
     const metric = this.metric(color);
-    const { values } = metric;
+    const value = (index) => { const row = this.row(index); return row < 0 ? NaN : metric.values[row]; };
     const shown = [];
-    for (const index of this.indices) { const row = this.row(index); if (row >= 0 && !Number.isNaN(values[row])) shown.push(values[row]); }
+    for (const index of this.indices) { const each = value(index); if (!Number.isNaN(each)) shown.push(each); }
     shown.sort((a, b) => a - b);
     const [low, high] = [shown[Math.floor(0.01 * shown.length)] ?? 0, shown[Math.floor(0.99 * (shown.length - 1))] ?? 1];
-    const steps = 24;
-    const kinds = [...Array.from({ length: steps }, (_, k) => [String(k), NB.viridis(k / (steps - 1)), 'square']), ['none', [200, 200, 200], 'dot']];
-    return {
-      kinds, scale: [`\u2264 ${NB.fixed(low, 1)}`, `\u2265 ${NB.fixed(high, 1)}`, this.titleOf(metric)],
-      of: (index) => {
-        const row = this.row(index);
-        const value = row < 0 ? NaN : values[row];
-        return Number.isNaN(value) ? steps : Math.min(Math.max(Math.floor((value - low) / (high - low || 1) * steps), 0), steps - 1);
-      },
+    return { low, high, value, scale: { low: `\u2264 ${NB.threeDigits(low)}`, high: `\u2265 ${NB.threeDigits(high)}`, text: this.titleOf(metric) } };
+  }
+
+  /** The places of the shown cases over two factors: cases of the same place are drawn as one mark. */
+  places() {
+    if (this.placed) return this.placed;
+    const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
+    const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
+    const code = ({ column, levels }, value) => (levels ? value : Math.round((value - column.low) / (column.step || 1)));
+    const known = new Map();
+    const first = [];
+    const of = new Uint32Array(this.indices.length);
+    this.indices.forEach((index, at) => {
+      const key = code(xFactor, xFactor.values[index]) * 65537 + code(yFactor, yFactor.values[index]);
+      let place = known.get(key);
+      if (place === undefined) { place = first.length; known.set(key, place); first.push(index); }
+      of[at] = place;
+    });
+    const counts = new Uint32Array(first.length);
+    for (const place of of) counts[place]++;
+    // Level by level there is one place each: no scatter is wanted, the mark says how many cases it is of.
+    const grid = Boolean(xAxis.labels && yAxis.labels);
+    const where = (axis, factor, index) => {
+      const value = factor.values[index];
+      return axis.labels && !grid ? value + 0.6 * (NB.jitter(index, axis.salt) - 0.5) : value;
     };
+    let most = 0;
+    for (const count of counts) most = Math.max(most, count);
+    this.placed = { of, first, counts, most, x: first.map((index) => where(xAxis, xFactor, index)), y: first.map((index) => where(yAxis, yFactor, index)), grid };
+    return this.placed;
+  }
+
+  /** Radius of the mark of a place: its area grows with the number of its cases. */
+  radius(count, most, width) {
+    if (most === 1) return 3.2;
+    const largest = this.places().grid ? Math.min(26, width / 16) : this.places().first.length > 600 ? 4.5 : Math.min(8, width / 60);
+    return Math.max(largest * Math.sqrt(count / most), 2.5);
   }
 
   paintScatter(context, width, height) {
-    const left = this.axesOf[this.state.y].labels ? 150 : 74;
-    const box = { left, top: 10, width: width - left - 14, height: height - 52 };
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
-    const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
+    const left = yAxis.labels ? Math.min(150, 0.3 * width) : 62;
+    const box = { left, top: 10, width: width - left - 14, height: height - 52 };
     const axes = new NB.Axes(box, this.padded(xAxis), this.padded(yAxis));
-    this.scatterAxes = axes;
+    if (!context.isPaper) this.scatterAxes = axes;
     axes.draw(context);
-    const { kinds, of, scale } = this.coloring();
-    const counts = new Uint32Array(kinds.length);
+    const coloring = this.coloring();
+    const places = this.places();
+    const marks = coloring.kinds ? this.shares(places, coloring) : this.medians(places, coloring);
+    if (places.first.length > NB.MOST_MARKS) this.pixels(context, box, axes, places, marks);
+    else this.marks(context, axes, places, marks, coloring, width);
+    if (this.chosen !== undefined && !context.isPaper) this.ring(context, axes, places);
+    this.scatterItems = this.legendOf(coloring, places, marks);
+  }
+
+  /** How many cases of each kind every place has. */
+  shares(places, { kinds, of }) {
+    const counts = new Uint32Array(kinds.length * places.first.length);
+    const totals = new Uint32Array(kinds.length);
+    this.indices.forEach((index, at) => {
+      const kind = of(index);
+      counts[places.of[at] * kinds.length + kind]++;
+      totals[kind]++;
+    });
+    const color = (place) => {
+      let most = 0;
+      for (let kind = 1; kind < kinds.length; kind++) if (counts[place * kinds.length + kind] > counts[place * kinds.length + most]) most = kind;
+      return kinds[most][1];
+    };
+    return { counts, totals, color };
+  }
+
+  /** The median of the cases of every place. */
+  medians(places, { low, high, value }) {
+    const lists = places.first.map(() => []);
+    this.indices.forEach((index, at) => {
+      const each = value(index);
+      if (!Number.isNaN(each)) lists[places.of[at]].push(each);
+    });
+    const middle = lists.map((list) => (list.length ? list.sort((a, b) => a - b)[list.length >> 1] : NaN));
+    return { middle, color: (place) => (Number.isNaN(middle[place]) ? [200, 200, 200] : NB.viridis((middle[place] - low) / (high - low || 1))) };
+  }
+
+  /** A mark at each place: a shape of a single case, a pie of the shares of several. */
+  marks(context, axes, places, marks, { kinds }, width) {
+    places.first.forEach((_, place) => {
+      const [x, y, count] = [axes.px(places.x[place]), axes.py(places.y[place]), places.counts[place]];
+      const radius = this.radius(count, places.most, width);
+      if (kinds && places.most === 1) {
+        const kind = kinds.findIndex((_each, at) => marks.counts[place * kinds.length + at]);
+        this.shape(context, kinds[kind], x, y, radius);
+        return;
+      }
+      const parts = kinds ? kinds.map((kind, at) => [kind[1], marks.counts[place * kinds.length + at]]) : [[marks.color(place), count]];
+      this.pie(context, x, y, radius, parts);
+      if (places.grid && radius > 12) {
+        context.fillStyle = '#111';
+        context.textAlign = 'left';
+        context.textBaseline = 'middle';
+        const text = kinds ? `${Math.round(100 * marks.counts[place * kinds.length] / count)} %` : NB.threeDigits(marks.middle[place]);
+        context.fillText(text, x + radius + 4, y);
+      }
+    });
+  }
+
+  pie(context, x, y, radius, parts) {
+    const all = parts.reduce((sum, [, count]) => sum + count, 0);
+    let from = -Math.PI / 2;
+    for (const [color, count] of parts) {
+      if (!count) continue;
+      const to = from + 2 * Math.PI * count / all;
+      context.fillStyle = NB.rgb(color);
+      context.beginPath();
+      if (count < all) context.moveTo(x, y);
+      context.arc(x, y, radius, from, to);
+      if (count < all) context.closePath();
+      context.fill();
+      from = to;
+    }
+    context.strokeStyle = '#fff';
+    context.lineWidth = 0.8;
+    context.beginPath(); context.arc(x, y, radius, 0, 2 * Math.PI); context.stroke();
+  }
+
+  /** A hundred thousand shapes would take too long: pixels are written one by one. */
+  pixels(context, box, axes, places, marks) {
+    const size = 2;
+    if (context.isPaper) {
+      places.first.forEach((_, place) => {
+        context.fillStyle = NB.rgb(marks.color(place));
+        context.fillRect(axes.px(places.x[place]), axes.py(places.y[place]), 1, 1);
+      });
+      return;
+    }
     const ratio = context.getTransform().a;
-    const many = this.indices.length > 4000;
-    const size = Math.max(1, Math.round((many ? 1.6 : 3) * ratio));
-    if (many) {
-      // Pixels are written one by one: a hundred thousand shapes would take too long.
-      const [w, h] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
-      const image = context.getImageData(Math.round(box.left * ratio), Math.round(box.top * ratio), w, h);
-      const pixels = new Uint32Array(image.data.buffer);
-      const colors = kinds.map(([, [r, g, b]]) => (255 << 24 | b << 16 | g << 8 | r) >>> 0);
-      for (const index of this.indices) {
-        const kind = of(index);
-        counts[kind]++;
-        const x = Math.round((axes.px(this.place(xAxis, xFactor, index)) - box.left) * ratio);
-        const y = Math.round((axes.py(this.place(yAxis, yFactor, index)) - box.top) * ratio);
-        for (let dy = 0; dy < size; dy++) {
-          for (let dx = 0; dx < size; dx++) {
-            if (x + dx >= 0 && x + dx < w && y + dy >= 0 && y + dy < h) pixels[(y + dy) * w + x + dx] = colors[kind];
-          }
+    const [w, h] = [Math.round(box.width * ratio), Math.round(box.height * ratio)];
+    const image = context.getImageData(Math.round(box.left * ratio), Math.round(box.top * ratio), w, h);
+    const pixels = new Uint32Array(image.data.buffer);
+    const wide = Math.max(1, Math.round(0.8 * size * ratio));
+    for (let place = 0; place < places.first.length; place++) {
+      const [r, g, b] = marks.color(place);
+      const color = (255 << 24 | b << 16 | g << 8 | r) >>> 0;
+      const x = Math.round((axes.px(places.x[place]) - box.left) * ratio);
+      const y = Math.round((axes.py(places.y[place]) - box.top) * ratio);
+      for (let dy = 0; dy < wide; dy++) {
+        for (let dx = 0; dx < wide; dx++) {
+          if (x + dx >= 0 && x + dx < w && y + dy >= 0 && y + dy < h) pixels[(y + dy) * w + x + dx] = color;
         }
       }
-      context.putImageData(image, Math.round(box.left * ratio), Math.round(box.top * ratio));
+    }
+    context.putImageData(image, Math.round(box.left * ratio), Math.round(box.top * ratio));
+  }
+
+  /** A ring about the place of the chosen case. */
+  ring(context, axes, places) {
+    const at = this.indices.indexOf(this.chosen);
+    if (at < 0) return;
+    const place = places.of[at];
+    const radius = this.radius(places.counts[place], places.most, 700) + 4;
+    for (const [color, wide] of [['#fff', 5], ['#000', 2.2]]) {
+      context.strokeStyle = color; context.lineWidth = wide;
+      context.beginPath(); context.arc(axes.px(places.x[place]), axes.py(places.y[place]), radius, 0, 7); context.stroke();
+    }
+  }
+
+  legendOf(coloring, places, marks) {
+    const items = [];
+    const group = (value) => NB.grouped(value);
+    if (coloring.kinds) {
+      coloring.kinds.forEach((kind, at) => {
+        if (!marks.totals[at] && coloring.kinds.length > 5) return;
+        const draw = places.most === 1 && places.first.length <= NB.MOST_MARKS
+          ? (context, x, y) => this.shape(context, kind, x, y, 4.5)
+          : (context, x, y) => { context.fillStyle = NB.rgb(kind[1]); context.beginPath(); context.arc(x, y, 5, 0, 2 * Math.PI); context.fill(); };
+        items.push({ text: `${kind[3]}: ${group(marks.totals[at])} ${marks.totals[at] === 1 ? 'case' : 'cases'}`, draw });
+      });
     } else {
-      for (const index of this.indices) {
-        const kind = of(index);
-        counts[kind]++;
-        this.shape(context, kinds[kind], axes.px(this.place(xAxis, xFactor, index)), axes.py(this.place(yAxis, yFactor, index)), 3.2);
-      }
+      items.push({ ...coloring.scale, color: (share) => NB.rgb(NB.viridis(share)) });
+      items.push({ text: 'none works, or none has it', draw: (context, x, y) => this.pie(context, x, y, 5, [[[200, 200, 200], 1]]) });
     }
-    if (this.chosen !== undefined) {
-      const [x, y] = [axes.px(this.place(xAxis, xFactor, this.chosen)), axes.py(this.place(yAxis, yFactor, this.chosen))];
-      for (const [color, wide] of [['#fff', 5], ['#000', 2.2]]) {
-        context.strokeStyle = color; context.lineWidth = wide;
-        context.beginPath(); context.arc(x, y, 8, 0, 7); context.stroke();
-      }
+    if (places.most > 1) {
+      let fewest = Infinity;
+      for (const count of places.counts) fewest = Math.min(fewest, count);
+      const cases = fewest === places.most ? `${group(places.most)} cases` : `${group(fewest)} to ${group(places.most)} cases`;
+      items.push({ text: `${group(places.first.length)} places of ${cases} each; ${places.first.length > NB.MOST_MARKS ? 'the colour is of the most' : coloring.kinds ? 'sectors are shares of its cases' : 'the colour is of their median'}`, draw() {} });
     }
-    if (scale) this.scaleLegend(this.scatterLegend, kinds, scale);
-    else {
-      NB.clear(this.scatterLegend, kinds.map((kind, index) => (counts[index] || kinds.length < 5
-        ? NB.el('span', { class: 'key' }, this.symbol(kind), `${kind[0]}: ${counts[index].toLocaleString('en')}`) : null)));
-    }
+    return items;
   }
 
   padded(axis) {
-    const pad = axis.labels ? 0 : 0.02 * (axis.high - axis.low);
+    const pad = axis.labels ? 0 : 0.03 * (axis.high - axis.low);
     return { ...axis, low: axis.low - pad, high: axis.high + pad };
   }
 
-  shape(context, [, [r, g, b], shape], x, y, size) {
-    context.fillStyle = `rgb(${r}, ${g}, ${b})`;
+  shape(context, [, color, shape], x, y, size) {
+    context.fillStyle = NB.rgb(color);
     context.strokeStyle = context.fillStyle;
     context.lineWidth = 1.8;
     if (shape === 'cross') {
@@ -134,28 +270,10 @@ NB.StudyPlots = class {
     } else context.fillRect(x - size * 0.8, y - size * 0.8, size * 1.6, size * 1.6);
   }
 
-  symbol(kind) {
-    const canvas = NB.el('canvas', { width: '14', height: '14', 'aria-hidden': 'true' });
-    this.shape(canvas.getContext('2d'), kind, 7, 7, 4.5);
-    return canvas;
-  }
-
-  scaleLegend(element, kinds, [low, high, title]) {
-    const canvas = NB.el('canvas', { width: '160', height: '12', 'aria-hidden': 'true' });
-    const context = canvas.getContext('2d');
-    for (let x = 0; x < 160; x++) {
-      const [r, g, b] = NB.viridis(x / 159);
-      context.fillStyle = `rgb(${r}, ${g}, ${b})`;
-      context.fillRect(x, 0, 1, 12);
-    }
-    const none = kinds.find((kind) => kind[0] === 'none');
-    NB.clear(element, NB.el('span', { class: 'key' }, `${title}: ${low}`, canvas, high), none ? NB.el('span', { class: 'key' }, this.symbol(none), 'none') : null);
-  }
-
   paintMap(context, width, height) {
-    const left = this.axesOf[this.state.y].labels ? 150 : 74;
-    const box = { left, top: 10, width: width - left - 14, height: height - 52 };
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
+    const left = yAxis.labels ? Math.min(150, 0.3 * width) : 62;
+    const box = { left, top: 10, width: width - left - 14, height: height - 52 };
     const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
     const axes = new NB.Axes(box, xAxis, yAxis);
     const [nx, ny] = [xAxis.bins, yAxis.bins];
@@ -167,12 +285,11 @@ NB.StudyPlots = class {
       of[cell]++;
       if (outcome === 'ok') ok[cell]++;
     }
-    this.mapCells = { axes, nx, ny, ok, of };
+    if (!context.isPaper) this.mapCells = { axes, nx, ny, ok, of };
     axes.draw(context);
     const [w, h] = [box.width / nx, box.height / ny];
     context.textAlign = 'center';
     context.textBaseline = 'middle';
-    context.font = '11px system-ui, sans-serif';
     for (let cell = 0; cell < nx * ny; cell++) {
       const [x, y] = [box.left + (cell % nx) * w, box.top + box.height - (Math.floor(cell / nx) + 1) * h];
       if (!of[cell]) { context.fillStyle = '#f2f2f2'; context.fillRect(x, y, w, h); continue; }
@@ -180,15 +297,18 @@ NB.StudyPlots = class {
       const [r, g, b] = NB.viridis(rate);
       context.fillStyle = `rgb(${r}, ${g}, ${b})`;
       context.fillRect(x, y, Math.ceil(w), Math.ceil(h));
-      if (w > 27 && h > 14) {
+      if (w > 24 && h > 14) {
         context.fillStyle = 0.3 * r + 0.59 * g + 0.11 * b > 130 ? '#000' : '#fff';
-        // Cells of few cases say so.
-        context.fillText(`${Math.round(100 * rate)}${of[cell] < 20 ? '?' : ''}`, x + w / 2, y + h / 2);
+        // Of few cases a share would say too much.
+        const text = of[cell] < NB.FEW_CASES ? `${ok[cell]}/${of[cell]}` : String(Math.round(100 * rate));
+        if (context.measureText(text).width < w - 2) context.fillText(text, x + w / 2, y + h / 2);
       }
     }
-    const title = this.state.configuration < 0 ? 'cases in which any configuration is ok, %' : `${this.page.configurations[this.state.configuration]} ok, %`;
-    this.scaleLegend(this.mapLegend, [], ['0', '100', title]);
-    this.mapLegend.append(NB.el('span', { class: 'soft small', text: '? fewer than 20 cases' }));
+    const text = this.state.configuration < 0 ? 'layouts in which any configuration works (%)' : `layouts in which ${this.page.configurations[this.state.configuration]} works (%)`;
+    this.mapItems = [{ low: '0', high: '100', text, color: (share) => NB.rgb(NB.viridis(share)) }];
+    let fewest = Infinity;
+    for (const count of of) if (count) fewest = Math.min(fewest, count);
+    if (fewest < NB.FEW_CASES) this.mapItems.push({ text: `how many of how many, where a cell has fewer than ${NB.FEW_CASES} cases: no more than a hint`, draw() {} });
   }
 
   /** Sorted values of every configuration, once for each metric and filter. */
@@ -223,8 +343,8 @@ NB.StudyPlots = class {
     if (!metric) return;
     const [low, high] = this.valueRange();
     const box = { left: 62, top: 10, width: width - 76, height: height - 52 };
-    const axes = new NB.Axes(box, { low, high, title: this.titleOf(metric) }, { low: 0, high: 100, title: 'share of rows below (%)' });
-    this.ecdfAxes = axes;
+    const axes = new NB.Axes(box, { low, high, title: this.titleOf(metric) }, { low: 0, high: 100, title: 'layouts below (%)' });
+    if (!context.isPaper) this.ecdfAxes = axes;
     axes.draw(context);
     context.save();
     context.beginPath(); context.rect(box.left, box.top, box.width, box.height); context.clip();
@@ -244,7 +364,18 @@ NB.StudyPlots = class {
       context.stroke();
     });
     context.restore();
-    NB.clear(this.ecdfLegend, this.page.configurations.map((label, c) => NB.el('span', { class: 'key' }, NB.sample(NB.configurationStyles[c]), `${label} (${this.sort()[c].length.toLocaleString('en')})`)));
+    context.setLineDash([]);
+    this.ecdfItems = this.page.configurations.map((label, c) => ({
+      text: `${label} (${NB.grouped(this.sort()[c].length)} layouts)`,
+      draw: (at, x, y) => {
+        const { color, dash } = NB.configurationStyles[c];
+        at.strokeStyle = color;
+        at.lineWidth = 2.5;
+        at.setLineDash(dash.map((each) => each / 2));
+        at.beginPath(); at.moveTo(x - 8, y); at.lineTo(x + 8, y); at.stroke();
+        at.setLineDash([]);
+      },
+    })).filter((_, c) => this.sort()[c].length);
   }
 
   paintHistogram(context, width, height) {
@@ -262,50 +393,13 @@ NB.StudyPlots = class {
     else for (const index of this.indices) { const row = this.row(index); if (row >= 0 && !Number.isNaN(metric.values[row])) add(metric.values[row]); }
     const most = Math.max(...counts, 1);
     const box = { left: 62, top: 10, width: width - 76, height: height - 52 };
-    const whose = c < 0 ? 'best of each case' : this.page.configurations[c];
-    const axes = new NB.Axes(box, { low, high, title: `${this.titleOf(metric)}, ${whose}` }, { low: 0, high: 1.05 * most, title: 'rows' });
+    const whose = c < 0 ? 'best of each layout' : this.page.configurations[c];
+    const axes = new NB.Axes(box, { low, high, title: `${this.titleOf(metric)}, ${whose}` }, { low: 0, high: 1.05 * most, title: 'cases' });
     axes.draw(context);
     context.fillStyle = c < 0 ? '#5a626d' : NB.configurationStyles[c].color;
     counts.forEach((count, bin) => {
       const [x, next] = [axes.px(low + (high - low) * bin / bins), axes.px(low + (high - low) * (bin + 1) / bins)];
       context.fillRect(x + 0.5, axes.py(count), next - x - 1, axes.py(0) - axes.py(count));
-    });
-  }
-
-  paintStrip(context, width, height) {
-    const given = this.page.summary?.overall?.configurations;
-    const rates = this.page.configurations.map((label, c) => {
-      const found = Array.isArray(given) ? given.find((each) => each.label === label)?.success : null;
-      if (found && found.rate !== null) return { label, rate: found.rate, interval: found.interval };
-      let [ok, of] = [0, 0];
-      for (let index = 0; index < this.count; index++) {
-        if (this.invalid[index]) continue;
-        of++;
-        if (this.outcomeOf[this.outcomes[c * this.count + index]] === 'ok') ok++;
-      }
-      return { label, rate: of ? ok / of : NaN, interval: null };
-    });
-    const box = { left: 150, top: 8, width: width - 240, height: height - 50 };
-    const axes = new NB.Axes(box, { low: 0, high: 100, title: 'success rate (%)' }, { low: -0.5, high: 7.5, title: '', labels: rates.map((each) => each.label).reverse() });
-    axes.draw(context);
-    rates.forEach(({ rate, interval }, c) => {
-      const y = axes.py(7 - c);
-      const h = box.height / 8 * 0.56;
-      context.fillStyle = '#56b4e9';
-      context.fillRect(box.left, y - h / 2, axes.px(100 * rate) - box.left, h);
-      if (interval) {
-        context.strokeStyle = '#000';
-        context.lineWidth = 1.4;
-        const [a, b] = [axes.px(100 * interval.low), axes.px(100 * interval.high)];
-        context.beginPath();
-        context.moveTo(a, y); context.lineTo(b, y);
-        for (const x of [a, b]) { context.moveTo(x, y - 4); context.lineTo(x, y + 4); }
-        context.stroke();
-      }
-      context.fillStyle = '#111';
-      context.textAlign = 'left';
-      context.textBaseline = 'middle';
-      context.fillText(`${NB.fixed(100 * rate, 1)} %`, Math.min(axes.px(100 * (interval ? interval.high : rate)), box.left + box.width) + 8, y);
     });
   }
 };

@@ -11,16 +11,22 @@ use needlebench_study::{FactorKind, Results, ResultsError};
 use serde_json::{Value, json};
 
 use super::pack::Pack;
-use super::scene::{pose, surroundings};
+use super::scene;
 use super::viewer::Viewer;
 use columns::{Columns, LABELLED};
 use looks::Looks;
 
+use crate::table::study::reasons::reason_in_words;
+
 const SCRIPT: &str = concat!(
+    include_str!("../assets/study_figure.js"),
     include_str!("../assets/statistics.js"),
     include_str!("../assets/study_plots.js"),
+    include_str!("../assets/study_case.js"),
     include_str!("../assets/study.js")
 );
+
+const STYLE: &str = include_str!("../assets/study.css");
 
 /// What a study's page is made of.
 pub struct StudyPage<'a> {
@@ -36,11 +42,16 @@ pub struct StudyPage<'a> {
     pub summary: &'a Value,
     /// Where the numbers come from, as in `study.json`.
     pub manifest: &'a Value,
-    /// The base scenario, for the picture.
-    pub base: Option<&'a ResolvedScenario>,
-    /// The scenario of a case, none of one that cannot exist; without it the picture shows the base
-    /// scenario, and says so.
-    pub scenarios: Option<&'a dyn Fn(u64) -> Option<ResolvedScenario>>,
+    /// What cases look like; without it nothing is drawn in three dimensions.
+    pub pictures: Option<CasePictures<'a>>,
+}
+
+/// What cases look like.
+pub struct CasePictures<'a> {
+    /// The base scenario, whose arm is drawn.
+    pub base: &'a ResolvedScenario,
+    /// The scenario of a case, none of one that cannot exist.
+    pub scenario_of: &'a dyn Fn(u64) -> Option<ResolvedScenario>,
 }
 
 impl StudyPage<'_> {
@@ -75,6 +86,7 @@ impl StudyPage<'_> {
                 };
                 json!({
                     "name": factor.name,
+                    "words": factor.name.replace('_', " "),
                     "unit": factor.unit,
                     "role": factor.role,
                     "levels": levels,
@@ -102,8 +114,14 @@ impl StudyPage<'_> {
             "cases": pack.indices(&columns.posed),
             "joints": pack.coarse_column(&columns.joints_deg, u16::MAX - 1),
         });
-        let scene = self.base.map(|base| surroundings(base, &mut pack));
-        let [places, codes, looks] = self.case_places(&columns, &mut pack);
+        let pictures = self.pictures.as_ref();
+        let scene = pictures.map(|each| scene::arm(&each.base.cell.robot, &mut pack));
+        let looks = pictures.map(|each| each.looks(&columns, &mut pack));
+        let outcomes = columns
+            .outcome_names
+            .iter()
+            .map(|[outcome, detail]| json!([outcome, detail, reason_in_words(detail)]));
+        let outcomes: Vec<Value> = outcomes.collect();
         let labels = Configuration::ALL.map(Configuration::label);
         let document = json!({
             "kind": "study",
@@ -116,68 +134,34 @@ impl StudyPage<'_> {
             "metrics": metrics,
             "numbers": (columns.cases.len() as u64 != self.results.cases()).then(|| pack.numbers(&columns.cases)),
             "outcomes": pack.u8s(&columns.outcomes),
-            "outcomeNames": columns.outcome_names,
+            "outcomeNames": outcomes,
             "postures": postures,
-            "places": places,
-            "lookOf": codes,
             "looks": looks,
             "summary": self.summary,
             "manifest": self.manifest,
             "scene": scene,
-            "goals": self.base.map(goals),
-            "phantom": self.base.and_then(|base| base.phantom.as_ref()).map(|placed| pose(&placed.world_from_phantom)),
         });
         let page = Viewer {
             kind: "study",
             name: self.name,
             description: self.description,
             script: SCRIPT,
+            style: STYLE,
         };
         Ok(page.html(pack, &document))
     }
-
-    /// Robot and phantom of the cases that have postures, seven numbers each; what they look like.
-    fn case_places(&self, columns: &Columns, pack: &mut Pack) -> [Value; 3] {
-        let Some(scenarios) = self.scenarios else {
-            return [Value::Null, Value::Null, Value::Array(Vec::new())];
-        };
-        let mut looks = Looks::new(self.base, pack);
-        let mut numbers = Vec::with_capacity(14 * columns.posed.len());
-        for &index in &columns.posed {
-            let found = scenarios(columns.cases[index as usize]);
-            looks.push(found.as_ref(), pack);
-            let robot = found
-                .as_ref()
-                .map(|each| each.cell.robot.world_from_base_link);
-            let placed = found.as_ref().and_then(|each| each.phantom.as_ref());
-            let phantom = placed.map(|placed| placed.world_from_phantom);
-            for pose in [robot, phantom] {
-                match pose {
-                    Some(pose) => {
-                        let (t, q) = (pose.translation.vector, pose.rotation);
-                        numbers.extend([t.x, t.y, t.z, q.i, q.j, q.k, q.w]);
-                    }
-                    None => numbers.extend([f64::NAN; 7]),
-                }
-            }
-        }
-        let [codes, looks] = looks.finish(pack);
-        [pack.f32s(numbers), codes, looks]
-    }
 }
 
-/// Goals of the base scenario, by name.
-fn goals(base: &ResolvedScenario) -> Value {
-    let goals = base.goals.iter().map(|goal| {
-        let (target, axis) = (goal.target_m, goal.axis.into_inner());
-        let place = json!({
-            "target": [target.x, target.y, target.z],
-            "axis": [axis.x, axis.y, axis.z],
-            "exit": pose(&goal.world_from_guide_exit),
-        });
-        (goal.name.clone(), place)
-    });
-    Value::Object(goals.collect())
+impl CasePictures<'_> {
+    /// What the cases that have postures look like.
+    fn looks(&self, columns: &Columns, pack: &mut Pack) -> Value {
+        let mut looks = Looks::new(self.base, pack);
+        for &index in &columns.posed {
+            let found = (self.scenario_of)(columns.cases[index as usize]);
+            looks.push(found.as_ref(), pack);
+        }
+        looks.finish(pack)
+    }
 }
 
 /// Numbers of the cases that the statistics name as evidence: they are on the page in any case.

@@ -9,7 +9,7 @@ use needlebench_study::{
 };
 use serde_json::{Value, json};
 
-use super::StudyPage;
+use super::{CasePictures, StudyPage};
 use crate::page::pack::unpack::{Unpacked, of_page};
 
 /// Largest page of a study.
@@ -178,8 +178,7 @@ fn page(results: &Synthetic, summary: &Value) -> String {
         results,
         summary,
         manifest: &json!({"seed": 1}),
-        base: None,
-        scenarios: None,
+        pictures: None,
     };
     page.html().unwrap()
 }
@@ -299,30 +298,87 @@ fn a_case_looks_like_itself() {
         results: &results,
         summary: &json!({}),
         manifest: &json!({}),
-        base: Some(family.base()),
-        scenarios: Some(&scenarios),
+        pictures: Some(CasePictures {
+            base: family.base(),
+            scenario_of: &scenarios,
+        }),
     };
     let back = of_page(&page.html().unwrap());
-    let codes = back.column(&back.document["lookOf"]);
-    assert_eq!(codes, [0.0, 0.0, 1.0, 1.0, 2.0, 255.0]);
-    let looks = back.document["looks"].as_array().unwrap();
-    assert_eq!(looks.len(), 2);
-    let base = &back.document["scene"];
-    // Another guide, the same patient; the same guide, another patient.
-    assert_ne!(looks[0]["guide"], base["guide"]);
-    assert_eq!(looks[1]["guide"], base["guide"]);
-    for look in looks {
-        let groups: Vec<&str> = look["parts"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|part| part["group"].as_str().unwrap())
-            .collect();
-        for group in ["tool", "skin", "bone", "lesion"] {
-            assert!(groups.contains(&group), "{groups:?}");
-        }
-        assert!(!groups.contains(&"robot"));
+    let looks = &back.document["looks"];
+    // The tool of each case, none of a layout that cannot exist; base, patient and what else stands there.
+    assert_eq!(
+        back.column(&looks["toolOf"]),
+        [0.0, 0.0, 1.0, 1.0, 0.0, 255.0]
+    );
+    let tools = looks["tools"].as_array().unwrap();
+    assert_eq!(tools.len(), 2);
+    assert_ne!(tools[0]["guide"], tools[1]["guide"]);
+    let slots = usize::try_from(looks["slots"].as_u64().unwrap()).unwrap();
+    let limbs = family.base().phantom.as_ref().unwrap().limbs.len();
+    assert_eq!(slots, 2 + limbs + family.base().fixtures.len());
+    let codes = back.column(&looks["things"]);
+    let of = |case: usize| &codes[slots * case..slots * (case + 1)];
+    assert_eq!(of(0), of(2));
+    assert_ne!(of(0)[1], of(4)[1]);
+    assert_eq!(of(0)[2 + limbs..], of(4)[2 + limbs..]);
+    assert!(of(5).iter().all(|code| *code == 254.0));
+    let groups = |kind: f64| -> Vec<String> {
+        let parts = looks["kinds"][code(kind)].as_array().unwrap().iter();
+        parts
+            .map(|part| part["group"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    assert_eq!(groups(of(0)[0]), ["robot"]);
+    for tissue in ["skin", "bone", "lesion"] {
+        assert!(groups(of(4)[1]).iter().any(|group| group == tissue));
     }
+}
+
+#[test]
+fn an_obstacle_stands_where_its_case_has_it_or_not_at_all() {
+    use needlebench_cell::{Change, KeyPath, Overrides, ScenarioFamily, Setting};
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let scenario = root.join("scenarios/hanging.toml");
+    let family = ScenarioFamily::load(&scenario, &Overrides::default()).unwrap();
+    let goal = family.goals().next().unwrap().to_owned();
+    let vary = |key: &str, value: Setting| {
+        let change = Change::Set(value);
+        family.vary(&goal, &[(KeyPath::parse(key).unwrap(), change)])
+    };
+    let results = Synthetic::new(3);
+    let scenarios = |case: u64| match case {
+        0 => family.vary(&goal, &[]).ok(),
+        1 => vary("obstacles[0].position_mm[0]", Setting::from(350.0)).ok(),
+        _ => vary("obstacles[0].present", Setting::from(false)).ok(),
+    };
+    let page = StudyPage {
+        name: "obstacles",
+        description: "",
+        file: "obstacles.toml",
+        results: &results,
+        summary: &json!({}),
+        manifest: &json!({}),
+        pictures: Some(CasePictures {
+            base: family.base(),
+            scenario_of: &scenarios,
+        }),
+    };
+    let back = of_page(&page.html().unwrap());
+    let looks = &back.document["looks"];
+    let slots = usize::try_from(looks["slots"].as_u64().unwrap()).unwrap();
+    let (codes, places) = (back.column(&looks["things"]), back.column(&looks["places"]));
+    let obstacle = |case: usize| {
+        let here = slots * case..slots * (case + 1);
+        here.filter(|&at| codes[at] < 254.0)
+            .filter(|&at| looks["kinds"][code(codes[at])][0]["group"] == "obstacle")
+            .map(|at| (codes[at], places[7 * at]))
+            .collect::<Vec<_>>()
+    };
+    // The same pole elsewhere, and none; the other obstacle stays.
+    assert_eq!(obstacle(0)[0].0, obstacle(1)[0].0);
+    assert_ne!(obstacle(0)[0].1, obstacle(1)[0].1);
+    assert_eq!(obstacle(0)[1], obstacle(1)[1]);
+    assert_eq!(obstacle(2), obstacle(0)[1..]);
 }
 
 /// A summary with the keys that the page draws, from the table itself.
@@ -347,13 +403,75 @@ fn summary(results: &Synthetic) -> Value {
             })
         })
         .collect();
+    let choices = choices(results);
     json!({
         "schema_version": 1,
         "confidence": 0.95,
+        "verdict": "fail",
+        "postures_only": "all",
+        "headline": "postures only: whether a motion gets there is not known",
+        "answer": {
+            "sentence": "best tool of 3: perpendicular; with it at least one configuration works in 93.0 % of 33334 \
+                layouts (95 % interval 92.7 to 93.3 %, which holds for all 3 at once)",
+            "remarks": ["the next, inline, works in 3.0 points fewer (95 % interval 2.0 to 4.0)"],
+            "compared": [],
+        },
+        "criteria": [
+            {"criterion": "min_layouts_working", "of": null, "choice": "perpendicular", "pass": false, "value": 0.93,
+                "interval": {"low": 0.927, "high": 0.933}, "limit": 0.95, "unit": "1", "confidence": false,
+                "detail": "layouts in which at least one configuration is ok", "cases": [12, 18], "requirement": "SRS-1 <b>"},
+            {"criterion": "max_tip_error_mm", "of": "best", "choice": "perpendicular", "pass": true, "value": 2.243e-13,
+                "interval": {"low": 2.1e-13, "high": 2.4e-13}, "limit": 2.7, "unit": "mm", "confidence": false,
+                "detail": "95 % quantile of the tip error", "cases": [77], "requirement": null},
+        ],
+        "not_judged": [],
+        "choices": choices,
         "overall": {"goal": null, "cases": results.cases, "invalid": 0, "configurations": configurations},
         "evidence": {"invalid": [12, 18], "configurations": [
             {"of": "best", "worst": [{"metric": "clearance_static_mm", "cases": [{"case": 77, "value": 6.01}, {"case": 78, "value": 6.02}]}]}]},
         "notes": ["A table made up for tests <b>"],
+    })
+}
+
+/// The tools, ranked as a study's summary has them.
+fn choices(results: &Synthetic) -> Value {
+    let mut counts = [[0_u64; 2]; 3];
+    results
+        .visit(&mut |values, result| {
+            let FactorValue::Level(tool) = values[1] else {
+                unreachable!("a tool is a level")
+            };
+            let works = result.rows.iter().any(|row| row.outcome == Outcome::Ok);
+            counts[tool][0] += u64::from(works);
+            counts[tool][1] += u64::from(result.rows[0].outcome != Outcome::Invalid);
+        })
+        .unwrap();
+    let labels = ["perpendicular", "inline", "offset </script>"];
+    let choices: Vec<Value> = labels
+        .iter()
+        .zip(counts)
+        .enumerate()
+        .map(|(bin, (label, [ok, of]))| {
+            let rate = ok as f64 / of as f64;
+            let works = json!({"successes": ok, "of": of, "rate": rate, "effective_size": of, "remark": null,
+                "interval": {"low": rate - 0.01, "high": rate + 0.01}});
+            let against = (bin > 0).then(|| {
+                json!({"difference": 0.03, "interval": {"low": 0.02, "high": 0.04}, "distinguishable": bin == 2})
+            });
+            json!({"bins": [bin], "label": label, "cases": of, "invalid": 0, "works": works, "works_k": works,
+                "best_clearance_mm": {"p": 0.05, "value": 6.1, "interval": {"low": 6.0, "high": 6.2}, "remark": null},
+                "tip_error_mm": null, "against_first": against, "failing": [2, 8]})
+        })
+        .collect();
+    json!({
+        "axes": [{"factor": 1, "name": "tool", "unit": "", "role": "choice", "coarse": false,
+            "bins": labels.map(|label| json!({"label": label, "low": null, "high": null}))}],
+        "working_configurations": 2,
+        "ranked_by": "the share of its cases that work",
+        "held_out": null,
+        "paired": true,
+        "validity_differs": false,
+        "choices": choices,
     })
 }
 
@@ -362,10 +480,19 @@ fn summary(results: &Synthetic) -> Value {
 fn a_page_of_a_hundred_thousand_cases_for_the_browser() {
     let path = std::env::var_os("PAGE_OUT").expect("PAGE_OUT names the file to write");
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let scenario = root.join("scenarios/supine_suite.toml");
-    let base = needlebench_cell::load_scenario(&scenario, &needlebench_cell::Overrides::default())
-        .unwrap();
     let results = Synthetic::new(100_000);
+    let family = needlebench_cell::ScenarioFamily::load(
+        &root.join("scenarios/studies/chest.toml"),
+        &needlebench_cell::Overrides::default(),
+    )
+    .unwrap();
+    let goal = family.goals().next().unwrap().to_owned();
+    let tools = ["perpendicular", "inline", "offset"].map(|tool| {
+        let key = needlebench_cell::KeyPath::parse("tool.urdf").unwrap();
+        let change = needlebench_cell::Change::Set(needlebench_cell::Setting::from(tool));
+        family.vary(&goal, &[(key, change)]).unwrap()
+    });
+    let scenario_of = |case: u64| Some(tools[usize::try_from(case / 2 % 3).unwrap()].clone());
     let page = StudyPage {
         name: "synthetic </script><img src=x>",
         description: "A table made up for tests </script><script>window.attacked = true</script>",
@@ -373,8 +500,10 @@ fn a_page_of_a_hundred_thousand_cases_for_the_browser() {
         results: &results,
         summary: &summary(&results),
         manifest: &json!({"seed": 1}),
-        base: Some(&base),
-        scenarios: None,
+        pictures: Some(CasePictures {
+            base: family.base(),
+            scenario_of: &scenario_of,
+        }),
     };
     std::fs::write(path, page.html().unwrap()).unwrap();
 }

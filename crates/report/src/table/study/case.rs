@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use comfy_table::{Cell, CellAlignment};
 use needlebench_bench::study::{StudyCase, StudyColumns};
 use needlebench_evaluation::metric::Show;
 use needlebench_kinematics::ik::Configuration;
@@ -11,7 +10,10 @@ use needlebench_study::{CaseResult, Design, FactorKind, FactorValue, Row};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::table::plain_table;
+use super::document::Block;
+use super::reasons::reason_in_words;
+use super::text::summary_text;
+use crate::number::three_digits;
 
 /// A case as a JSON value: its factors, and its rows with every metric that they have.
 #[derive(Debug, Serialize)]
@@ -95,17 +97,21 @@ fn label(row: &Row) -> String {
 }
 
 /// A column of the table of a case: its heading, and the columns of rows of which the last that a row
-/// has is shown, with so many digits.
+/// has is shown, and how.
 struct Column {
     heading: &'static str,
-    shown: Vec<(usize, usize)>,
+    shown: Vec<(usize, Show)>,
 }
 
 impl Column {
     fn text(&self, row: &Row) -> String {
         let mut shown = self.shown.iter().rev();
-        let found = shown.find_map(|(index, digits)| Some((row.get(*index)?, digits)));
-        found.map_or_else(String::new, |(value, digits)| format!("{value:.digits$}"))
+        let found = shown.find_map(|(index, show)| Some((f64::from(row.get(*index)?), show)));
+        found.map_or_else(String::new, |(value, show)| match show {
+            Show::SmallLength => three_digits(value),
+            Show::Millimetres | Show::Degrees => format!("{value:.1}"),
+            Show::Seconds | Show::Percent | Show::Number => format!("{value:.2}"),
+        })
     }
 }
 
@@ -117,16 +123,11 @@ fn columns_of_table(columns: &StudyColumns) -> Vec<Column> {
         let Some((place, heading)) = metric.heading.case.filter(|_| !key.is_of_engine()) else {
             continue;
         };
-        let digits = match metric.show {
-            Show::SmallLength => 4,
-            Show::Millimetres | Show::Degrees => 1,
-            Show::Seconds | Show::Percent | Show::Number => 2,
-        };
         let column = places.entry(place).or_insert_with(|| Column {
             heading,
             shown: Vec::new(),
         });
-        column.shown.push((index, digits));
+        column.shown.push((index, metric.show));
     }
     places.into_values().collect()
 }
@@ -144,22 +145,22 @@ pub fn case_text(
         let _ = writeln!(text, "  {name:<16} {value}");
     }
     let columns = columns_of_table(columns);
-    let header: Vec<&str> = ["configuration", "outcome"]
+    let header = ["configuration", "<outcome"]
         .into_iter()
         .chain(columns.iter().map(|column| column.heading))
-        .chain(["why"])
+        .chain(["<why not"])
+        .map(str::to_owned)
         .collect();
-    let mut table = plain_table(&header);
-    for row in &result.rows {
-        let mut cells = vec![Cell::new(label(row)), Cell::new(row.outcome.name())];
-        cells.extend(
-            columns
-                .iter()
-                .map(|column| Cell::new(column.text(row)).set_alignment(CellAlignment::Right)),
-        );
-        cells.push(Cell::new(&row.detail));
-        table.add_row(cells);
-    }
-    let _ = write!(text, "{table}");
+    let rows = result.rows.iter().map(|row| {
+        let mut cells = vec![label(row), row.outcome.name().to_owned()];
+        cells.extend(columns.iter().map(|column| column.text(row)));
+        cells.push(reason_in_words(&row.detail));
+        cells
+    });
+    let table = Block::Table {
+        header,
+        rows: rows.collect(),
+    };
+    text.push_str(&summary_text(&[table]));
     text
 }

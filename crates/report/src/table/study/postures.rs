@@ -53,10 +53,9 @@ pub(crate) fn postures_headline(postures: Postures, found: Option<&Replanned>) -
         ));
     };
     Some(format!(
-        "{what}: whether a motion gets there is not known. Of {} cases, drawn from {} and planned too, {} % work \
-         by their posture and {} % with a motion: {}",
+        "{what}: whether a motion gets there is not known. Of {} cases planned too, {} % work by their posture, \
+         {} % with a motion: {}",
         found.cases,
-        found.of,
         share(any.by_postures, any),
         share(any.planned, any),
         points(any)
@@ -73,23 +72,17 @@ fn points(gap: &Gap) -> String {
         return "-".to_owned();
     };
     format!(
-        "{} points less ({} to {}, 95 %)",
+        "{} points less (95 % interval {} to {})",
         in_percent(difference),
         in_percent(interval.low),
         in_percent(interval.high)
     )
 }
 
-/// The headline, and the gap of each configuration.
-pub(crate) fn postures_blocks(headline: Option<&str>, found: Option<&Replanned>) -> Vec<Block> {
-    let Some(headline) = headline else {
-        return Vec::new();
-    };
-    let mut text = headline.to_owned();
-    text.replace_range(..8, "POSTURES");
-    let mut blocks = vec![Block::Lines(vec![text])];
+/// The gap of each configuration.
+pub(crate) fn postures_blocks(found: Option<&Replanned>) -> Vec<Block> {
     let Some(found) = found else {
-        return blocks;
+        return Vec::new();
     };
     let rows = found.gaps.iter().map(|gap| {
         vec![
@@ -107,11 +100,11 @@ pub(crate) fn postures_blocks(headline: Option<&str>, found: Option<&Replanned>)
             gap.gained.to_string(),
         ]
     });
-    blocks.push(Block::Heading(format!(
-        "what postures alone overstate, by {} of {} cases",
+    let heading = Block::Heading(format!(
+        "what postures alone overstate: {} cases, drawn from {}, planned too",
         found.cases, found.of
-    )));
-    blocks.push(table(
+    ));
+    let table = table(
         [
             "configuration",
             "ok by\nposture (%)",
@@ -121,10 +114,10 @@ pub(crate) fn postures_blocks(headline: Option<&str>, found: Option<&Replanned>)
             "motion\nonly",
         ],
         rows.collect(),
-    ));
-    blocks.push(Block::Lines(vec![
+    );
+    let line = Block::Lines(vec![
         "motion only: cases that work with their motion and not by the posture that would be tried first"
             .to_owned(),
-    ]));
-    blocks
+    ]);
+    vec![heading, table, line]
 }

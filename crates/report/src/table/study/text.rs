@@ -15,6 +15,9 @@ pub fn summary_text(blocks: &[Block]) -> String {
                 text.push('\n');
                 text.push_str(heading);
             }
+            Block::Answer(sentence) => {
+                text.push_str(&layout::wrapped(&format!("ANSWER: {sentence}")));
+            }
             Block::Lines(lines) => {
                 text.push_str(&layout::wrapped(&lines.join("\n")));
             }
