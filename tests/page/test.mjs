@@ -7,10 +7,10 @@
 // installed Chromium (or the one that CHROMIUM names), else the one that comes with the packages, which
 // CHROMIUM=packaged asks for.
 import assert from 'node:assert/strict';
-import { existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
+import { mkdirSync, readFileSync, statSync } from 'node:fs';
 import { resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
-import { chromium } from 'playwright-core';
+import { NO_GL, SOFTWARE_GL, launch } from './browser.mjs';
 import { testLayout } from './layout.mjs';
 import { testNumbers } from './numbers.mjs';
 import { MOST_SHEETS, sheets, testAddress, testCharts, testEvents, testGhosts, testNearest, testPoses, testSaving } from './run.mjs';
@@ -20,26 +20,11 @@ import { testStudy } from './study.mjs';
 const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000, replay: 2000 };
 const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6, replay: 3e6 };
 const SIZE = { width: 1280, height: 900 };
-const SOFTWARE_GL = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
-const NO_GL = ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis'];
 
 const words = process.argv.slice(2);
 const at = words.indexOf('--out');
 const out = resolve(at >= 0 ? words.splice(at, 2)[1] : 'screenshots');
 mkdirSync(out, { recursive: true });
-
-async function executable() {
-  const installed = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'];
-  const found = process.env.CHROMIUM === 'packaged' ? null : installed.find((path) => path && existsSync(path));
-  if (found) return { path: found, args: [] };
-  // Makes the package unpack the libraries that a bare machine lacks, too (NSS, expat).
-  process.env.AWS_LAMBDA_JS_RUNTIME ??= 'nodejs22.x';
-  const { default: packaged } = await import('@sparticuz/chromium');
-  return { path: await packaged.executablePath(), args: ['--no-zygote'] };
-}
-
-const browser = await executable();
-const launch = (args) => chromium.launch({ executablePath: browser.path, args: ['--no-sandbox', ...browser.args, ...args] });
 
 /** A page that fails on every error and every request that leaves the file. */
 async function open(running, file) {

@@ -14,7 +14,7 @@ use needlebench_kinematics::Pose;
 use serde::{Deserialize, Serialize};
 
 use crate::scenario::{GantrySection, TableSection};
-pub(crate) use mount::mount;
+pub use mount::mount;
 
 /// Which fixture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

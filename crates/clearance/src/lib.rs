@@ -50,7 +50,7 @@ pub use certificate::{
     certify_sampled,
 };
 pub use known_gaps::KnownGaps;
-pub use model::{ClassMinima, ClearanceModel, PairClearance};
+pub use model::{ClassMinima, ClearanceModel, ClearanceParts, PairClearance};
 pub use pairs::{
     PairConcern, PairExamination, PairSettings, PairState, RangeBound, SrdfAnswer, SrdfVerdict,
     check_srdf, examine_pairs,

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use needlebench_cell::{Cell, ClearanceClass, Frame, part_in_words};
+use needlebench_cell::{BodyPair, Cell, ClearanceClass, CollisionBody, Frame, part_in_words};
 use needlebench_geometry::{PRUNING_MARGIN_M, Placement, Separation, separation_within};
 use needlebench_kinematics::{Chain, JOINT_COUNT, Joints, Pose};
 
@@ -77,6 +77,31 @@ struct SolidPair {
     b: usize,
 }
 
+/// What clearances of a cell are computed from.
+#[derive(Debug, Clone, Copy)]
+pub struct ClearanceParts<'c> {
+    /// Joints from `base_link` to the flange.
+    pub chain: &'c Chain,
+    /// Pose of `base_link` in the world.
+    pub world_from_base_link: &'c Pose,
+    /// All bodies.
+    pub bodies: &'c [CollisionBody],
+    /// Pairs of them, the moving body first if there is one.
+    pub pairs: &'c [BodyPair],
+}
+
+impl<'c> ClearanceParts<'c> {
+    /// Those of a cell.
+    pub fn of(cell: &'c Cell) -> Self {
+        Self {
+            chain: &cell.robot.chain,
+            world_from_base_link: &cell.robot.world_from_base_link,
+            bodies: &cell.bodies,
+            pairs: &cell.pairs,
+        }
+    }
+}
+
 /// Clearance queries of one cell, prepared once.
 ///
 /// Distances are as accurate as [`separation`](needlebench_geometry::separation).
@@ -93,14 +118,24 @@ pub struct ClearanceModel {
 impl ClearanceModel {
     /// Prepares the geometry of a cell.
     pub fn new(cell: &Cell) -> Self {
-        Self::made_of(cell, &[])
+        Self::of_parts(&ClearanceParts::of(cell))
+    }
+
+    /// Prepares the geometry of what is known of a cell.
+    pub fn of_parts(parts: &ClearanceParts<'_>) -> Self {
+        Self::made_of(parts, &[])
     }
 
     /// The model of another cell: what [`ClearanceModel::new`] gives for it, bit for bit, but the
     /// bodies and shapes that this model has too are not prepared again. Cheap where little differs,
     /// as between the layouts of a study.
     pub fn for_cell(&self, cell: &Cell) -> Self {
-        Self::made_of(cell, &self.bodies)
+        self.for_parts(&ClearanceParts::of(cell))
+    }
+
+    /// [`ClearanceModel::for_cell`] of what is known of a cell.
+    pub fn for_parts(&self, parts: &ClearanceParts<'_>) -> Self {
+        Self::made_of(parts, &self.bodies)
     }
 
     /// Number of bodies that the model of a cell would share with this one.
@@ -124,9 +159,9 @@ impl ClearanceModel {
             })
     }
 
-    fn made_of(cell: &Cell, known: &[Arc<PlacedBody>]) -> Self {
+    fn made_of(parts: &ClearanceParts<'_>, known: &[Arc<PlacedBody>]) -> Self {
         let mut moving = 0;
-        let bodies = cell.bodies.iter().enumerate().map(|(index, body)| {
+        let bodies = parts.bodies.iter().enumerate().map(|(index, body)| {
             let placed = placed_body(body, moving, known.get(index));
             if placed.frame != Frame::World {
                 moving += placed.solids.len();
@@ -139,10 +174,10 @@ impl ClearanceModel {
             solids.all(|solid| solid.shape.is_convex())
         };
         let mut has_class = [false; CLASS_COUNT];
-        for pair in &cell.pairs {
+        for pair in parts.pairs {
             has_class[pair.class as usize] = true;
         }
-        let pairs = cell
+        let pairs = parts
             .pairs
             .iter()
             .map(|pair| PlacedPair {
@@ -153,8 +188,8 @@ impl ClearanceModel {
             })
             .collect();
         Self {
-            chain: cell.robot.chain,
-            world_from_base_link: cell.robot.world_from_base_link,
+            chain: *parts.chain,
+            world_from_base_link: *parts.world_from_base_link,
             bodies,
             pairs,
             has_class,

@@ -1,11 +1,13 @@
-//! Bytes of what is kept of meshes: little-endian numbers, counts as 64 bits.
+//! Bytes of shapes and meshes, which give the same bits back: little-endian numbers, counts as 64 bits.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use needlebench_kinematics::Pose;
 
 use crate::triangle_mesh::TriangleMesh;
 
 /// What is appended to bytes.
-pub(crate) trait Encode {
+pub trait Encode {
+    /// Appends it.
     fn encode(&self, bytes: &mut Vec<u8>);
 }
 
@@ -47,8 +49,17 @@ impl Encode for TriangleMesh {
     }
 }
 
-/// Takes from the front of bytes; `None` where they end too early.
-pub(crate) struct Reader<'a>(pub &'a [u8]);
+impl Encode for Pose {
+    fn encode(&self, bytes: &mut Vec<u8>) {
+        self.translation.vector.encode(bytes);
+        for number in self.rotation.coords.iter() {
+            number.encode(bytes);
+        }
+    }
+}
+
+/// Takes from the front of bytes; `None` where they end too early, or are none of these.
+pub struct Reader<'a>(pub &'a [u8]);
 
 impl Reader<'_> {
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
@@ -57,19 +68,28 @@ impl Reader<'_> {
         Some(*taken)
     }
 
+    /// One byte.
+    pub fn byte(&mut self) -> Option<u8> {
+        self.take().map(|[byte]| byte)
+    }
+
+    /// A number.
     pub fn number(&mut self) -> Option<f64> {
         self.take().map(f64::from_le_bytes)
     }
 
+    /// An index of 32 bits.
     pub fn index(&mut self) -> Option<u32> {
         self.take().map(u32::from_le_bytes)
     }
 
+    /// A count.
     pub fn count(&mut self) -> Option<usize> {
         self.take()
             .and_then(|bytes| usize::try_from(u64::from_le_bytes(bytes)).ok())
     }
 
+    /// Three numbers.
     pub fn vector(&mut self) -> Option<Vector3<f64>> {
         Some(Vector3::new(self.number()?, self.number()?, self.number()?))
     }
@@ -91,6 +111,20 @@ impl Reader<'_> {
         Some(list)
     }
 
+    /// A pose, with the bits of its unit quaternion.
+    pub fn pose(&mut self) -> Option<Pose> {
+        let translation = Translation3::from(self.vector()?);
+        let [i, j, k, w] = [
+            self.number()?,
+            self.number()?,
+            self.number()?,
+            self.number()?,
+        ];
+        let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
+        Some(Pose::from_parts(translation, rotation))
+    }
+
+    /// A mesh.
     pub fn mesh(&mut self) -> Option<TriangleMesh> {
         let (vertices, triangles) = (self.count()?, self.count()?);
         Some(TriangleMesh {

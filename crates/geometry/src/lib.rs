@@ -99,7 +99,7 @@
 mod bounds;
 mod convex;
 mod distance;
-mod encoding;
+pub mod encoding;
 mod inside;
 mod measure;
 pub mod mesh;
@@ -111,6 +111,7 @@ pub mod sample_solids;
 mod segment;
 mod separation;
 mod shape;
+mod shape_encoding;
 mod surface;
 mod tessellate;
 mod topology;

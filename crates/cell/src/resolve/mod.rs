@@ -64,6 +64,7 @@ use phantom::place_phantom;
 pub use robot::load_robot;
 pub use servo::ServoSettings;
 use servo::{note_assumed_drives, servo_settings};
+pub use standing::{FOOT_M, RIGID_M};
 use standing::{
     KnownDepths, Standing, check_distance, check_floor, check_start, note_crowds,
     note_idle_criteria,
@@ -416,7 +417,8 @@ fn static_body(
     }
 }
 
-fn pose_of(position_mm: [f64; 3], rpy_deg: [f64; 3]) -> Pose {
+/// The pose that a scenario gives as a position in millimetres and roll, pitch and yaw in degrees.
+pub fn pose_of(position_mm: [f64; 3], rpy_deg: [f64; 3]) -> Pose {
     let [roll, pitch, yaw] = rpy_deg.map(f64::to_radians);
     Pose::from_parts(
         Translation3::from(Vector3::from(position_mm) * 1e-3),

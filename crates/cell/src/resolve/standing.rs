@@ -24,10 +24,10 @@ use depths::Beside;
 pub(super) use depths::{KnownDepths, patient_box};
 
 /// Overlap of rigid things that is rounding of a drawing, m.
-const RIGID_M: f64 = 1e-3;
+pub const RIGID_M: f64 = 1e-3;
 /// How far a base's shapes may reach into what it stands on, m: the shipped arms' enclose their foot and
 /// reach 7.2 mm below it.
-const FOOT_M: f64 = 10e-3;
+pub const FOOT_M: f64 = 10e-3;
 /// Depth to which a patient may lie in a cushion or a table top, m (assumed).
 const SOFT_M: f64 = 10e-3;
 /// Height of a cushion that is worth a note, and that nobody has, m (assumed).

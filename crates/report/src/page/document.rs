@@ -24,7 +24,8 @@ impl Document<'_> {
         let may_run = if self.scripts.is_empty() {
             ""
         } else {
-            "script-src 'unsafe-inline'; "
+            // Nor can it make code of texts; WebAssembly, which a page may bring along, is none.
+            "script-src 'unsafe-inline' 'wasm-unsafe-eval'; "
         };
         let mut out = format!(
             "<!DOCTYPE html>\n\

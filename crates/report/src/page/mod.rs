@@ -11,6 +11,7 @@
 mod atlas;
 mod charts;
 pub mod document;
+mod explore;
 #[cfg(test)]
 mod further_engine_tests;
 mod mesh;

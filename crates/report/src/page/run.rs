@@ -9,6 +9,7 @@ use needlebench_kinematics::Joints;
 use serde_json::{Value, json};
 
 use super::charts;
+use super::explore::explore;
 use super::motion::motion;
 use super::pack::Pack;
 use super::room;
@@ -19,9 +20,11 @@ use crate::table::shown::{Shown, shown_metrics};
 use crate::table::verdict::{counts, missed_as_expected};
 use needlebench_bench::ScenarioRun;
 
+/// The script of the page, after those of what it has in it.
 const SCRIPT: &str = concat!(
     include_str!("assets/run_sections.js"),
     include_str!("assets/iso9283.js"),
+    include_str!("assets/explore.js"),
     include_str!("assets/run.js")
 );
 
@@ -44,6 +47,7 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
     let unwanted = ClearanceClass::ALL.into_iter();
     let unwanted = unwanted.filter(|class| class.is_unwanted());
     document["unwantedClasses"] = json!(unwanted.map(ClearanceClass::name).collect::<Vec<_>>());
+    document["explore"] = explore(resolved, &mut pack);
     let room = RoomModel::new(resolved);
     let goals: Vec<Value> = (0..resolved.goals.len())
         .map(|goal| self::goal(resolved, finished, &room, goal, &mut pack))

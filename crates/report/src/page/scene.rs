@@ -7,6 +7,7 @@ use needlebench_geometry::{Shape, Solid, TriangleMesh, Visual};
 use needlebench_kinematics::{Chain, Pose};
 use serde_json::{Value, json};
 
+use super::explore::goes_with_base;
 use super::mesh::{MOST_TRIANGLES, append, joined, surface, thinned};
 use super::pack::Pack;
 
@@ -21,7 +22,9 @@ const CORRIDOR: [f32; 4] = [0.34, 0.71, 0.91, 0.35];
 /// Colour of tools without surfaces for pictures.
 const TOOL: [f32; 4] = [0.35, 0.37, 0.40, 1.0];
 
-/// What a surface moves with: nothing, one of the six links, or the flange.
+/// What a surface moves with: the robot's base where somebody moves that, nothing, one of the six links, or
+/// the flange.
+const BASE: i64 = -2;
 const WORLD: i64 = -1;
 const FLANGE: i64 = 6;
 
@@ -143,7 +146,7 @@ impl Surfaces {
     }
 
     /// Something that stands in the room, from the world.
-    fn add_fixture(&mut self, fixture: &Fixture, place: &Pose) {
+    fn add_fixture(&mut self, fixture: &Fixture, frame: i64, place: &Pose) {
         let group = match fixture.kind {
             FixtureKind::Table => "table",
             FixtureKind::Gantry => "gantry",
@@ -161,7 +164,7 @@ impl Surfaces {
                     placed
                 })
                 .collect();
-            self.add(group, WORLD, color_rgba, &joined(&solids), place);
+            self.add(group, frame, color_rgba, &joined(&solids), place);
         }
     }
 
@@ -213,7 +216,7 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
     let mut surfaces = Surfaces::default();
     surfaces.add_body(
         "robot",
-        WORLD,
+        BASE,
         &robot.base.visuals,
         &robot.base.solids,
         &robot.world_from_base_link,
@@ -223,7 +226,14 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
     let here = Pose::identity();
     surfaces.add_tool(tool);
     for fixture in &resolved.fixtures {
-        surfaces.add_fixture(fixture, &here);
+        let ties = fixture.solids.iter();
+        let mut ties = ties.map(|solid| goes_with_base(resolved, &solid.name));
+        let frame = if fixture.kind == FixtureKind::Mount || ties.any(|tied| tied) {
+            BASE
+        } else {
+            WORLD
+        };
+        surfaces.add_fixture(fixture, frame, &here);
     }
     if let Some(placed) = &resolved.phantom {
         surfaces.add_phantom(placed, &placed.world_from_phantom);
@@ -237,7 +247,7 @@ pub(super) fn surroundings(resolved: &ResolvedScenario, pack: &mut Pack) -> Valu
             _ => continue,
         };
         let frame = match body.frame {
-            Frame::World => WORLD,
+            Frame::World => BASE,
             Frame::Link(link) => i64::try_from(link).expect("six links"),
         };
         surfaces.add_solids(group, frame, color_rgba, &body.solids, &here);
@@ -294,6 +304,6 @@ pub(super) fn tissues(parts: &[PhantomPart], pack: &mut Pack) -> Value {
 /// Something that stands in the room, in the frame that it is in.
 pub(super) fn fixture(fixture: &Fixture, pack: &mut Pack) -> Value {
     let mut surfaces = Surfaces::default();
-    surfaces.add_fixture(fixture, &Pose::identity());
+    surfaces.add_fixture(fixture, WORLD, &Pose::identity());
     Value::Array(surfaces.finish(pack, MOST_TRIANGLES))
 }

@@ -6,7 +6,10 @@ use serde_json::Value;
 use super::document::Document;
 use super::pack::Pack;
 
-const STYLE: &str = include_str!("assets/page.css");
+const STYLE: &str = concat!(
+    include_str!("assets/page.css"),
+    include_str!("assets/explore.css")
+);
 const THREE: &str = include_str!("assets/three.bundle.js");
 const CORE: &str = include_str!("assets/core.js");
 const NUMBER: &str = include_str!("assets/number.js");

@@ -71,6 +71,7 @@ NB.RunPage = class {
     }, NB.words(goal.name)));
     this.goalTable = NB.sections.goals(this, (index) => this.setGoal(index));
     this.answer = NB.el('div', { class: 'answer' });
+    this.explore = new NB.Explore(this);
     // On paper, the table below says the same.
     this.side = NB.el('div', { class: 'panel no-print' });
     this.details = NB.el('div', { class: 'panel' });
@@ -92,7 +93,7 @@ NB.RunPage = class {
         NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons)),
       this.answer,
       NB.el('div', { class: 'grid' },
-        NB.el('div', null, this.viewBar(), view.element, this.replayBar(), this.now,
+        NB.el('div', null, this.viewBar(), view.element, this.replayBar(), this.now, this.explore.element,
           NB.el('div', { class: 'figure-head' }, NB.el('h3', { text: 'Clearance over time' }),
             NB.saveButton('SVG', 'Clearance over time', () => [`${this.fileName('clearance')}.svg`, this.curves.svg(`${this.configuration.label}: clearance over time`), 'image/svg+xml'])),
           this.curves.element),
@@ -281,6 +282,7 @@ NB.RunPage = class {
 
   /** Poses the arms at a time of the motion, or in the final posture where there is none. */
   seek(time) {
+    this.explore.leave();
     this.time = time;
     this.slider.value = String(time);
     const { configuration } = this;
@@ -336,6 +338,7 @@ NB.RunPage = class {
       } else this.view.show(name, on);
     }
     this.view.group('robot').visible = this.layers.robot;
+    this.explore.applyLayers();
     this.view.draw();
   }
 

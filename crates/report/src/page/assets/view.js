@@ -9,6 +9,9 @@ NB.matrix = function ([x, y, z, qx, qy, qz, qw]) {
     new THREE.Vector3(x, y, z), new THREE.Quaternion(qx, qy, qz, qw), new THREE.Vector3(1, 1, 1));
 };
 
+/** Frame of parts that stand in the room and go where the robot's base goes, when somebody moves that. */
+NB.BASE = -2;
+
 /** Corners of a box about a base and `reach` m out of it, which may hang or be tilted. */
 NB.aboutBase = function (base, reach) {
   const place = NB.matrix(base);
@@ -92,6 +95,8 @@ NB.View = class {
     this.scene = scene;
     this.groups = new Map();
     this.labels = [];
+    // Surfaces that go where the base goes, with their layers.
+    this.tied = [];
     this.image = NB.el('img', { class: 'print-only view-image', alt: label });
     this.overlay = NB.el('div', { class: 'labels', 'aria-hidden': 'true' });
     this.element = NB.el('div', { class: 'view' }, this.image);
@@ -123,7 +128,9 @@ NB.View = class {
     this.geometries = scene.parts.map((part) => NB.geometry(part.surface));
     scene.parts.forEach((part, index) => {
       if (part.frame >= 0 || part.group === 'collision') return;
-      this.group(part.group).add(this.mesh(index, part.color));
+      const mesh = this.mesh(index, part.color);
+      this.group(part.group).add(mesh);
+      if (part.frame === NB.BASE) this.tied.push({ mesh, group: part.group });
     });
     canvas.addEventListener('keydown', (event) => this.key(event));
     new ResizeObserver(() => this.resize()).observe(this.element);
@@ -171,12 +178,19 @@ NB.View = class {
     return mesh;
   }
 
-  /** A copy of the arm with its tool: `{ pose(chain, joints), layers, root }`; `look` sets colour and opacity. */
+  /**
+   * A copy of the arm with its tool: `pose` it, `stand` its base elsewhere, `tint` its links, `show` it or a `layer` of
+   * it; `look` sets colour and opacity.
+   */
   arm(name, look = null) {
-    if (!this.works) return { pose() {}, show() {}, layer() {} };
+    if (!this.works) return { pose() {}, stand() {}, tint() {}, show() {}, layer() {} };
     const root = this.group(name);
     const links = Array.from({ length: 7 }, () => new THREE.Group());
+    const foot = new THREE.Group();
+    foot.matrixAutoUpdate = false;
+    root.add(foot);
     const layers = new Map();
+    const painted = [];
     links.forEach((link) => { link.matrixAutoUpdate = false; root.add(link); });
     this.scene.parts.forEach((part, index) => {
       if (look && part.group !== 'robot' && part.group !== 'tool') return;
@@ -189,7 +203,8 @@ NB.View = class {
         mesh.material.polygonOffsetFactor = 2;
         mesh.material.polygonOffsetUnits = 8;
       }
-      if (part.frame < 0) root.add(mesh); else links[part.frame].add(mesh);
+      if (part.frame < 0) foot.add(mesh); else links[part.frame].add(mesh);
+      if (part.group === 'robot' || part.group === 'tool') painted.push({ mesh, frame: part.frame, own: mesh.material.color.clone() });
       if (!layers.has(part.group)) layers.set(part.group, []);
       layers.get(part.group).push(mesh);
     });
@@ -198,6 +213,15 @@ NB.View = class {
       pose: (chain, joints) => {
         NB.forward(chain, joints).forEach((pose, index) => links[index].matrix.copy(pose));
         root.updateMatrixWorld(true);
+      },
+      stand: (pose) => { foot.matrix.copy(pose); },
+      // A colour (sRGB) by frame, or null for the part's own.
+      tint: (colorOf) => {
+        for (const { mesh, frame, own } of painted) {
+          mesh.material.color.copy(own);
+          const color = colorOf(frame);
+          if (color) mesh.material.color.lerp(new THREE.Color().setRGB(...color, 'srgb'), 0.7);
+        }
       },
       show: (visible) => { root.visible = visible; },
       layer: (group, visible) => { for (const mesh of layers.get(group) || []) mesh.visible = visible; },
@@ -218,7 +242,6 @@ NB.View = class {
     });
   }
 
-  /** A straight line as a thin rod. */
   /** What is marked is seen through all that stands before it. */
   marked(material) {
     material.depthTest = false;
@@ -226,6 +249,7 @@ NB.View = class {
     return material;
   }
 
+  /** A straight line as a thin rod. */
   rod(name, from, to, radius, color, isMark = false) {
     if (!this.works) return;
     const [a, b] = [new THREE.Vector3(...from), new THREE.Vector3(...to)];

@@ -1,0 +1,177 @@
+//! Which of the eight configurations bring the guide to a goal, and with what clearance.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use needlebench_cell::{ClearanceClass, Roll};
+use needlebench_clearance::PairClearance;
+use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
+use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
+
+use crate::live::Live;
+use crate::scene::CLASS_COUNT;
+
+/// What becomes of a configuration, the worse the earlier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Outcome {
+    /// It does not reach the goal.
+    Unreachable,
+    /// It is the same posture as another configuration.
+    Merged,
+    /// A joint has no place in its range.
+    JointLimit,
+    /// It is too near to a singularity.
+    Singular,
+    /// Something is nearer than the scenario's floor.
+    TooNear,
+    /// No rule is broken, but a criterion about clearances is missed.
+    Misses,
+    /// Nothing is wrong with the posture.
+    Works,
+}
+
+/// A configuration at the best roll of those that were looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// What becomes of it.
+    pub outcome: Outcome,
+    /// Angle of the guide about the needle, rad.
+    pub roll_rad: f64,
+    /// Joint positions within their ranges, rad, where it reaches the goal.
+    pub joints: Option<Joints>,
+    /// What decides between rolls of the same outcome: distance beyond the limits, or how far a goal that is
+    /// not reached is missed (negative), m.
+    pub surplus_m: f64,
+    /// The pair that is nearest to its limit, where clearances were computed.
+    pub nearest: Option<PairClearance>,
+}
+
+impl Reach {
+    fn without_posture(outcome: Outcome, roll_rad: f64, surplus_m: f64) -> Self {
+        Self {
+            outcome,
+            roll_rad,
+            joints: None,
+            surplus_m,
+            nearest: None,
+        }
+    }
+
+    fn is_better_than(&self, other: &Self) -> bool {
+        (self.outcome, self.surplus_m) > (other.outcome, other.surplus_m)
+    }
+}
+
+impl Live {
+    /// All eight configurations at a goal, in the order of [`Configuration::ALL`]: each at the best of
+    /// `rolls` rolls all round, or at the goal's one if it has one. Empty for an arm that is not of UR's
+    /// build.
+    ///
+    /// # Panics
+    /// If there is no such goal.
+    pub fn reach(&self, goal: usize, rolls: u32) -> Vec<Reach> {
+        let Some(kinematics) = &self.kinematics else {
+            return Vec::new();
+        };
+        let rolls = match self.scene.goals[goal].roll {
+            Roll::Fixed(roll_rad) => vec![roll_rad],
+            Roll::Free => (0..rolls)
+                .map(|k| TAU * f64::from(k) / f64::from(rolls))
+                .collect(),
+        };
+        let mut best: Vec<Option<Reach>> = vec![None; Configuration::ALL.len()];
+        for roll_rad in rolls {
+            let pose = self.base_link_from_flange(goal, roll_rad);
+            let found = kinematics.branches(&pose, Some(&self.scene.start));
+            for (best, configuration) in best.iter_mut().zip(Configuration::ALL) {
+                let reach = self.look(kinematics, configuration, roll_rad, &found);
+                if best.is_none_or(|best| reach.is_better_than(&best)) {
+                    *best = Some(reach);
+                }
+            }
+        }
+        best.into_iter().flatten().collect()
+    }
+
+    fn base_link_from_flange(&self, goal: usize, roll_rad: f64) -> Pose {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll_rad);
+        self.world_from_base_link.inverse()
+            * (self.scene.goals[goal].world_from_guide_exit * turn)
+            * self.scene.flange_from_guide_exit.inverse()
+    }
+
+    fn look(
+        &self,
+        kinematics: &Kinematics,
+        configuration: Configuration,
+        roll_rad: f64,
+        found: &Solutions,
+    ) -> Reach {
+        let without = |outcome, surplus_m| Reach::without_posture(outcome, roll_rad, surplus_m);
+        let mut solutions = found.solutions.iter();
+        let solution = solutions.find(|solution| solution.configuration == configuration);
+        let Some(solution) = solution.filter(|it| it.kind != SolutionKind::Nearest) else {
+            let mut unreachable = found.unreachable.iter();
+            return match unreachable.find(|(each, _)| *each == configuration) {
+                Some((_, why)) => without(Outcome::Unreachable, -why.missing_m()),
+                None => without(Outcome::Merged, 0.0),
+            };
+        };
+        let Some(joints) = self.within_limits(solution) else {
+            return without(Outcome::JointLimit, 0.0);
+        };
+        self.judged(kinematics, joints, roll_rad)
+    }
+
+    /// With the whole turns that bring every joint into its range, as few as can be.
+    fn within_limits(&self, solution: &Solution) -> Option<Joints> {
+        let mut joints = solution.joints;
+        for joint in 0..JOINT_COUNT {
+            let limit = self.scene.joint_limits.0[joint];
+            let turns = limit.turns(joints[joint])?;
+            let fewest = turns.min_by_key(|turns| turns.abs())?;
+            joints[joint] = limit.admit(joints[joint] + TAU * f64::from(fewest))?;
+        }
+        Some(joints)
+    }
+
+    fn judged(&self, kinematics: &Kinematics, joints: Joints, roll_rad: f64) -> Reach {
+        let limits = &self.scene.limits;
+        let minima = self.model.minimum_per_class(&joints);
+        // The least distance beyond the limits of the classes, and the pair that has it.
+        let beyond = |limits_m: &[f64; CLASS_COUNT]| {
+            let mut least = (f64::INFINITY, None);
+            for pair in minima.iter() {
+                let surplus_m = pair.separation.distance_m - limits_m[pair.class as usize];
+                if surplus_m < least.0 {
+                    least = (surplus_m, Some(*pair));
+                }
+            }
+            least
+        };
+        let (over_floor_m, below_floor) = beyond(&limits.floor_m);
+        let (over_judged_m, nearest) = beyond(&limits.judged_m);
+        let sines = [joints[4], joints[2]].map(|q| q.sin().abs());
+        let is_singular = sines.iter().any(|sine| *sine < limits.singularity_sine)
+            || kinematics.geometry.wrist_forward_m(&joints).abs() < limits.shoulder_m;
+        let (outcome, surplus_m, nearest) = if is_singular {
+            (Outcome::Singular, over_judged_m, nearest)
+        } else if over_floor_m < 0.0 {
+            (Outcome::TooNear, over_floor_m, below_floor)
+        } else if over_judged_m < 0.0 {
+            (Outcome::Misses, over_judged_m, nearest)
+        } else {
+            (Outcome::Works, over_judged_m, nearest)
+        };
+        Reach {
+            outcome,
+            roll_rad,
+            joints: Some(joints),
+            surplus_m,
+            nearest,
+        }
+    }
+}
+
+/// The classes' order is the one that limits are given in.
+const _: () = assert!(ClearanceClass::NeedleRoute as usize == CLASS_COUNT - 1);

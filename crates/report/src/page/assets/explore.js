@@ -1,0 +1,556 @@
+// Trying postures: the arm at any joint positions and its base at any place, with the clearances there.
+// The numbers are the program's own: its code, compiled to WebAssembly, comes with the page.
+'use strict';
+
+/** The program's clearances and configurations. Lengths in m, angles in rad unless they say otherwise. */
+NB.Live = class {
+  /** Rejects where the browser runs no WebAssembly. */
+  static async start(data) {
+    if (typeof WebAssembly === 'undefined') throw new Error('this browser has no WebAssembly, or it is switched off');
+    const { instance } = await WebAssembly.instantiate(NB.array(data.code).slice(), {});
+    const live = new NB.Live();
+    live.code = instance.exports;
+    live.data = data;
+    const scene = NB.array(data.scene);
+    live.bytes(live.code.input(scene.length), scene.length).set(scene);
+    if (!live.code.load()) throw new Error('the scene in this page cannot be read');
+    return live;
+  }
+
+  bytes(at, count) { return new Uint8Array(this.code.memory.buffer, at, count); }
+
+  put(numbers) { this.bytes(this.code.input(8 * numbers.length), 8 * numbers.length).set(new Uint8Array(Float64Array.from(numbers).buffer)); }
+
+  /** Rows of so many numbers, of an answer with `count` numbers. */
+  rows(count, width) {
+    const all = new Float64Array(this.code.memory.buffer, this.code.results(), count).slice();
+    return Array.from({ length: count / width }, (_, row) => all.subarray(row * width, (row + 1) * width));
+  }
+
+  /** Clearance of every pair at joint positions, in the document's order. */
+  pairs(joints) {
+    this.put(joints);
+    return this.rows(this.code.pairs(), 9).map((row, index) => {
+      const [a, b, kind] = this.data.pairs[index];
+      return { index, class: kind, bodies: [a, b], distance: row[0], points: [[...row.subarray(1, 4)], [...row.subarray(4, 7)]], solids: [this.solid(a, row[7]), this.solid(b, row[8])] };
+    });
+  }
+
+  solid(body, index) { return this.data.bodies[body].solids[index]; }
+
+  lowest(joints) {
+    this.put(joints);
+    return this.code.lowest();
+  }
+
+  /** Moves the base: mm, and roll, pitch, yaw in degrees. Says why its mount cannot carry it there, or null. */
+  placeBase(position, rpy) {
+    this.put([...position, ...rpy]);
+    const length = this.code.place_base();
+    return length ? new TextDecoder().decode(this.bytes(this.code.message(), length)) : null;
+  }
+
+  resetBase() { this.code.reset_base(); }
+
+  /** What base and mount stand in. */
+  overlaps() {
+    return this.rows(this.code.overlaps(), 3).map(([body, other, depth]) => ({ body: this.data.bodies[body].name, other: this.data.bodies[other].name, depth }));
+  }
+
+  /** All eight configurations at a goal, each at the best of so many rolls. */
+  reach(goal, rolls) {
+    return this.rows(this.code.reach(goal, rolls), 11).map((row, index) => ({
+      label: this.data.configurations[index], outcome: NB.Live.OUTCOMES[row[0]], roll: row[1], surplus: row[2],
+      joints: Number.isNaN(row[3]) ? null : [...row.subarray(3, 9)], pair: Number.isNaN(row[9]) ? null : row[9], distance: row[10],
+    }));
+  }
+
+  mountSurface() { return this.rows(this.code.mount_surface(), 9).flatMap((row) => [...row]); }
+};
+NB.Live.OUTCOMES = ['unreachable', 'merged', 'joint_limit', 'singular', 'too_near', 'misses', 'works'];
+
+/** How near is near, by what is asked: colours that people with any colour vision tell apart. */
+NB.NEARNESS = [
+  { key: 'overlap', words: 'overlapping', color: [0.835, 0.369, 0], radius: 0.004 },
+  { key: 'missed', words: 'nearer than the limit', color: [0.902, 0.624, 0], radius: 0.003 },
+  { key: 'near', words: 'within 50 mm of the limit', color: [0.337, 0.706, 0.914], radius: 0.002 },
+  { key: 'far', words: 'farther', color: [0.46, 0.46, 0.46], radius: 0.0012 },
+];
+NB.nearness = function (distance, limit) {
+  const asked = limit ?? 0;
+  if (distance < Math.min(0, asked)) return NB.NEARNESS[0];
+  if (distance < asked) return NB.NEARNESS[1];
+  return NB.NEARNESS[distance < asked + 0.05 ? 2 : 3];
+};
+
+NB.JOINTS = ['Shoulder pan', 'Shoulder lift', 'Elbow', 'Wrist 1', 'Wrist 2', 'Wrist 3'];
+
+/** The panel, and the arm that it moves. `run` is the page: its view, its arms and what they show. */
+NB.Explore = class {
+  constructor(run) {
+    this.run = run;
+    this.data = run.page.explore;
+    this.view = run.view;
+    this.active = false;
+    this.open = NB.el('button', { type: 'button', onclick: () => this.enter() }, 'Try a posture');
+    this.status = NB.el('span', { class: 'soft', role: 'status', text: 'Move the joints and the base by hand, with the clearances there.' });
+    this.body = NB.el('div', { hidden: true });
+    this.element = NB.el('section', { class: 'panel explore no-print', 'aria-label': 'Try a posture' },
+      NB.el('div', { class: 'bar' }, this.open, this.status), this.body);
+    this.sign = NB.el('p', { class: 'tried-sign', hidden: true, text: 'Tried posture: not a result of the run' });
+    this.view.element.append(this.sign);
+    // What is printed are results.
+    window.addEventListener('beforeprint', () => this.leave(), { capture: true });
+    this.grabBase();
+  }
+
+  async enter() {
+    if (this.active) return;
+    this.run.pause?.();
+    try {
+      this.live ||= await NB.Live.start(this.data);
+    } catch (error) {
+      this.open.disabled = true;
+      this.status.textContent = `Clearances cannot be computed here: ${error.message}. On the command line: ${this.command(this.startJoints())}`;
+      return;
+    }
+    if (!this.built) this.build();
+    this.active = true;
+    this.open.hidden = true;
+    this.body.hidden = false;
+    this.status.textContent = '';
+    this.from ||= this.view.arm('tried-from', { color: [0.34, 0.71, 0.91], opacity: 0.22 });
+    this.arm ||= this.view.arm('tried');
+    this.resetAll();
+    this.sign.hidden = false;
+    this.view.element.classList.add('trying');
+    this.applyLayers();
+    this.sliders[0].focus();
+  }
+
+  /** Back to what the run has shown. */
+  leave() {
+    if (!this.active) return;
+    this.active = false;
+    this.live.resetBase();
+    this.base = this.homeBase();
+    this.placeTied();
+    this.open.hidden = false;
+    this.body.hidden = true;
+    this.sign.hidden = true;
+    this.status.textContent = 'Move the joints and the base by hand, with the clearances there.';
+    this.view.element.classList.remove('trying');
+    for (const name of ['tried', 'tried-from', 'tried-lines', 'tried-handle']) this.view.group(name).visible = false;
+    this.view.empty('tried-lines');
+    this.run.applyLayers?.();
+    this.run.arm?.show(true);
+  }
+
+  back() {
+    this.leave();
+    this.run.showAgain?.();
+    this.open.focus();
+  }
+
+  startJoints() { return [...(this.run.joints || this.run.page.start)]; }
+
+  homeBase() { return { position: [...this.data.base.position], rpy: [...this.data.base.rpy] }; }
+
+  get baseMoved() {
+    const home = this.data.base;
+    return this.base.position.some((value, k) => value !== home.position[k]) || this.base.rpy.some((value, k) => value !== home.rpy[k]);
+  }
+
+  build() {
+    this.built = true;
+    const degrees = (rad) => rad * 180 / Math.PI;
+    const field = (label, attributes, change) => NB.el('input', { type: 'number', 'aria-label': label, ...attributes,
+      onchange: (event) => { if (Number.isFinite(event.target.valueAsNumber)) change(event.target.valueAsNumber); else this.write(); } });
+    this.sliders = [];
+    this.numbers = [];
+    const joints = NB.JOINTS.map((name, joint) => {
+      const [low, high] = this.data.joints[joint].map(degrees);
+      const set = (value) => this.setJoint(joint, Math.min(Math.max(value, low), high) * Math.PI / 180);
+      const ends = { min: low.toFixed(1), max: high.toFixed(1) };
+      this.sliders[joint] = NB.el('input', { type: 'range', ...ends, step: '0.5', 'aria-label': `${name}, degrees`, oninput: (event) => set(event.target.valueAsNumber) });
+      this.numbers[joint] = field(`${name}, degrees, ${ends.min} to ${ends.max}`, { ...ends, step: 'any' }, set);
+      return NB.el('div', { class: 'joint' }, NB.el('span', { text: name }), this.sliders[joint], this.numbers[joint], NB.el('span', { class: 'unit', text: '\u00b0' }));
+    });
+    this.baseFields = [
+      ...['x', 'y', 'height'].map((name, k) => [name, 'mm', () => this.base.position[k], (value) => { this.base.position[k] = value; }]),
+      ...['roll', 'pitch', 'yaw'].map((name, k) => [name, '\u00b0', () => this.base.rpy[k], (value) => { this.base.rpy[k] = value; }]),
+    ].map(([name, unit, get, set]) => {
+      const input = field(`Base, ${name}, ${unit === 'mm' ? 'millimetres' : 'degrees'}`, { step: unit === 'mm' ? '10' : '5' }, (value) => this.moveBase(() => set(value)));
+      return { name, unit, get, input };
+    });
+    this.problems = NB.el('div', { role: 'alert' });
+    this.classes = NB.el('div');
+    this.reached = NB.el('div');
+    this.text = NB.el('pre', { class: 'small', tabindex: '0', 'aria-label': 'The same on the command line' });
+    this.copied = NB.el('span', { class: 'soft', role: 'status' });
+    const button = (text, click, extra = {}) => NB.el('button', { type: 'button', onclick: click, ...extra }, text);
+    this.body.append(
+      NB.el('p', { class: 'tried-note', text: 'What is shown is this posture alone, not a result of the run: nothing is simulated, and no motion to it is planned or proven. The blue ghost is the run\u2019s posture.' }),
+      NB.el('div', { class: 'bar' },
+        button('Back to the run', () => this.back()), button('Reset joints', () => this.resetJoints()), button('Reset base', () => this.resetBase())),
+      NB.el('div', { class: 'explore-grid' },
+        NB.el('fieldset', null, NB.el('legend', { text: 'Joints' }), joints),
+        NB.el('fieldset', null, NB.el('legend', { text: 'Base: drag the ring at its foot, or' }),
+          NB.el('div', { class: 'base-fields' }, this.baseFields.map(({ name, unit, input }) => NB.el('label', null, NB.el('span', { text: name }), input, NB.el('span', { class: 'unit', text: unit })))))),
+      this.problems, this.classes,
+      NB.el('p', { class: 'legend small' }, 'Lines and parts: ', NB.NEARNESS.map(({ words, color }) => NB.el('span', { class: 'nearness' },
+        NB.el('span', { class: 'swatch', style: `background: rgb(${color.map((c) => Math.round(255 * c)).join(' ')})` }), words))),
+      this.reached,
+      NB.el('h3', { text: 'The same on the command line' }),
+      this.text,
+      NB.el('div', { class: 'bar' },
+        button('Copy joints', () => this.copy(this.jointList())), button('Copy command', () => this.copy(this.command(this.joints))),
+        button('Copy base as TOML', () => this.copy(this.toml())), this.copied));
+  }
+
+  resetAll() {
+    this.base = this.homeBase();
+    this.live.resetBase();
+    this.joints = this.startJoints();
+    this.fromJoints = [...this.joints];
+    this.placeTied();
+    this.write();
+    this.evaluate();
+    this.lookForConfigurations();
+  }
+
+  resetJoints() {
+    this.joints = this.startJoints();
+    this.write();
+    this.evaluate();
+  }
+
+  resetBase() { this.moveBase(() => { this.base = this.homeBase(); }); }
+
+  setJoint(joint, value) {
+    this.joints[joint] = value;
+    this.write(joint);
+    this.evaluate();
+  }
+
+  /** Moves the base; where its mount cannot carry it, all stays and the reason is said. */
+  moveBase(change) {
+    const before = { position: [...this.base.position], rpy: [...this.base.rpy] };
+    change();
+    let refused = null;
+    if (this.baseMoved) refused = this.live.placeBase(this.base.position, this.base.rpy);
+    else this.live.resetBase();
+    if (refused) this.base = before;
+    this.refused = refused;
+    this.placeTied();
+    this.write();
+    this.evaluate();
+    this.lookForConfigurations();
+  }
+
+  /** Writes the state into the controls; a joint's own control is being moved. */
+  write(moved = null) {
+    this.joints.forEach((q, joint) => {
+      const degrees = q * 180 / Math.PI;
+      if (joint !== moved || document.activeElement !== this.sliders[joint]) this.sliders[joint].value = degrees;
+      this.numbers[joint].value = degrees.toFixed(2);
+    });
+    for (const { get, input } of this.baseFields) input.value = Number(get().toFixed(3));
+  }
+
+  get goalIndex() { return this.run.goalIndex ?? null; }
+
+  pose() {
+    const [x, y, z] = this.base.position.map((mm) => mm * 1e-3);
+    const [roll, pitch, yaw] = this.base.rpy.map((deg) => deg * Math.PI / 180);
+    const turn = new THREE.Matrix4().makeRotationZ(yaw).multiply(new THREE.Matrix4().makeRotationY(pitch)).multiply(new THREE.Matrix4().makeRotationX(roll));
+    return this.baseMoved ? turn.setPosition(x, y, z) : NB.matrix(this.run.page.scene.chain.base);
+  }
+
+  chain() {
+    const pose = this.pose();
+    const [at, turn] = [new THREE.Vector3().setFromMatrixPosition(pose), new THREE.Quaternion().setFromRotationMatrix(pose)];
+    return { ...this.run.page.scene.chain, base: [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w] };
+  }
+
+  /** Base, mount and what is bolted to them go along. */
+  placeTied() {
+    const { view } = this;
+    if (!view.works) return;
+    const delta = this.pose().clone().multiply(NB.matrix(this.run.page.scene.chain.base).invert());
+    const moved = this.baseMoved;
+    this.arm.stand(delta);
+    view.empty('tried-mount');
+    for (const { mesh, group } of view.tied) {
+      mesh.visible = !(moved && group === 'mount');
+      mesh.matrixAutoUpdate = false;
+      mesh.matrix.copy(moved ? delta : new THREE.Matrix4());
+      mesh.updateMatrixWorld(true);
+    }
+    if (moved) {
+      const corners = this.live.mountSurface();
+      if (corners.length) {
+        const geometry = new THREE.BufferGeometry();
+        geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(corners), 3));
+        geometry.computeVertexNormals();
+        const color = view.scene.parts.find((part) => part.group === 'mount')?.color || [0.35, 0.37, 0.4, 1];
+        view.group('tried-mount').add(new THREE.Mesh(geometry, view.material([...color.slice(0, 3), 0.75])));
+      }
+    }
+    view.group('tried-mount').visible = this.active && this.run.layers?.mount !== false;
+    this.drawHandle();
+  }
+
+  /** Computes this posture and shows it. */
+  evaluate() {
+    const started = performance.now();
+    const pairs = this.live.pairs(this.joints);
+    this.computedInMs = performance.now() - started;
+    this.pairs = pairs;
+    const least = new Map();
+    for (const pair of pairs) if (!least.has(pair.class) || pair.distance < least.get(pair.class).distance) least.set(pair.class, pair);
+    this.least = [...least.values()].sort((a, b) => a.class - b.class);
+    this.showClasses();
+    this.showProblems();
+    this.text.textContent = [this.baseMoved ? this.toml() : null, this.command(this.joints)].filter(Boolean).join('\n\n');
+    this.draw();
+    this.evaluatedInMs = performance.now() - started;
+  }
+
+  showProblems() {
+    const low = this.live.lowest(this.joints);
+    const lines = [
+      this.refused ? `The base cannot go there: ${this.refused}.` : null,
+      ...this.live.overlaps().map(({ body, other, depth }) => `The ${NB.words(body)} stands ${NB.mm(depth)} mm in the ${NB.words(other)}.`),
+      low < -0.001 ? `The arm reaches ${NB.mm(-low)} mm under the floor.` : null,
+    ].filter(Boolean);
+    const text = lines.join(' ');
+    // Said once, and not at every step of a drag.
+    if (this.problems.textContent !== text) NB.clear(this.problems, lines.map((line) => NB.el('p', { class: 'error', text: line })));
+  }
+
+  limit(pair) { return this.data.classes[pair.class].judged; }
+
+  showClasses() {
+    const name = (pair) => this.data.classes[pair.class].name;
+    const columns = [
+      { title: 'Clearance of this posture', cell: (pair) => NB.words(name(pair)) },
+      { title: 'Distance', unit: 'mm', numeric: true, cell: (pair) => NB.mm(pair.distance), help: 'signed: negative where they overlap' },
+      { title: 'Limit', unit: 'mm', numeric: true, cell: (pair) => NB.mm(this.limit(pair)), help: 'the scenario\u2019s criterion, or what planning wants at least' },
+      { title: '', cell: (pair) => this.judgement(pair.distance, this.limit(pair)) },
+      { title: 'Between', cell: (pair) => pair.solids.map(NB.words).join(' and ') },
+    ];
+    NB.clear(this.classes, NB.table('Signed distances of this posture by class; not proven along any motion', columns, this.least, { class: 'small full' }));
+  }
+
+  judgement(distance, limit) {
+    if (limit === null) return NB.el('span', { class: 'soft', text: 'no limit' });
+    return distance >= limit ? NB.el('span', { class: 'good', text: '\u2713 kept' }) : NB.el('span', { class: 'bad', text: distance < 0 ? '\u2717 overlap' : '\u2717 too near' });
+  }
+
+  draw() {
+    const { view } = this;
+    if (!view.works) return;
+    this.arm.pose(this.chain(), this.joints);
+    this.from.pose(this.run.page.scene.chain, this.fromJoints);
+    this.tint();
+    view.empty('tried-lines');
+    const labelled = new Set(this.least.map((pair) => pair.index));
+    for (const pair of this.pairs) {
+      const nearness = NB.nearness(pair.distance, this.limit(pair));
+      const unwanted = this.data.classes[pair.class].unwanted;
+      if (!labelled.has(pair.index) && (!unwanted || nearness.key === 'far')) continue;
+      view.rod('tried-lines', ...pair.points, nearness.radius, [...nearness.color, 1], true);
+      if (nearness.key === 'far') continue;
+      for (const point of pair.points) view.ball('tried-lines', point, 2 * nearness.radius, [...nearness.color, 1], true);
+      if (!labelled.has(pair.index)) continue;
+      const middle = pair.points[0].map((value, k) => (value + pair.points[1][k]) / 2);
+      view.label('tried-lines', `${pair.solids.map(NB.words).join(' and ')}: ${NB.mm(pair.distance)} mm`, middle);
+    }
+    view.group('tried-lines').visible = true;
+    view.draw();
+  }
+
+  /** Colours the links by what is nearest to them. */
+  tint() {
+    const worst = new Map();
+    for (const pair of this.pairs) {
+      if (!this.data.classes[pair.class].unwanted) continue;
+      const rank = NB.NEARNESS.indexOf(NB.nearness(pair.distance, this.limit(pair)));
+      for (const body of pair.bodies) {
+        const { link, kind } = this.data.bodies[body];
+        if (link === null) continue;
+        const frame = kind === 'link' ? link : 6;
+        worst.set(frame, Math.min(rank, worst.get(frame) ?? 3));
+      }
+    }
+    this.arm.tint((frame) => {
+      const rank = worst.get(frame) ?? 3;
+      return rank < 2 ? NB.NEARNESS[rank].color : null;
+    });
+  }
+
+  /** Which configurations reach the goal from here: at once at few rolls, and again at many when all rests. */
+  lookForConfigurations() {
+    if (this.goalIndex === null) return;
+    this.showReach(this.data.goals[this.goalIndex].free ? 6 : 1, false);
+    clearTimeout(this.later);
+    this.later = setTimeout(() => { if (this.active) this.showReach(NB.Explore.ROLLS, true); }, 200);
+  }
+
+  showReach(rolls, isLast) {
+    const { free, fromBase } = this.data.goals[this.goalIndex];
+    const started = performance.now();
+    this.found = this.live.reach(this.goalIndex, rolls);
+    this.reachedInMs = performance.now() - started;
+    if (!this.found.length) return;
+    const words = {
+      works: ['good', '\u2713 limits kept'], misses: ['bad', '\u2717 limit missed'], too_near: ['bad', '\u2717 too near'], singular: ['bad', '\u2717 near a singularity'],
+      joint_limit: ['off', '\u2013 beyond a joint limit'], merged: ['off', '\u2013 same as another'], unreachable: ['off', '\u2013 out of reach'],
+    };
+    const between = ({ pair, distance }) => {
+      if (pair === null) return '';
+      const [a, b] = this.data.pairs[pair].map((body) => NB.words(this.data.bodies[body].name));
+      return `${a} and ${b}, ${NB.mm(distance)} mm`;
+    };
+    const columns = [
+      { title: 'From this base', cell: (each) => each.label },
+      { title: 'Final posture', cell: (each) => NB.el('span', { class: words[each.outcome][0], text: words[each.outcome][1] }) },
+      { title: 'Nearest to its limit', cell: between },
+      { title: 'Roll', unit: '\u00b0', numeric: true, cell: (each) => (each.joints ? NB.deg(each.roll, 0) : '\u2013') },
+      { title: '', cell: (each) => NB.el('button', { type: 'button', disabled: !each.joints, 'aria-label': `Take the posture of ${each.label}`,
+        onclick: () => this.take(each) }, 'Take') },
+    ];
+    const count = this.found.filter((each) => each.outcome === 'works').length;
+    const at = free ? `the best of ${rolls} rolls about the needle` : 'the roll that the goal fixes';
+    const table = NB.table(`Goal ${NB.words(this.run.goal.name)}: ${count} of ${this.found.length} postures keep all limits, at ${at}`, columns, this.found, { class: 'small full' });
+    const note = fromBase ? NB.el('p', { class: 'small', text: 'Here the goal stays where it is in the room. The scenario gives it from the robot\u2019s base (flange_pose), so there it goes along with the base: give its target and entry in the room before you move the base.' }) : null;
+    // A button that has the focus keeps it.
+    const focused = [...this.reached.querySelectorAll('button')].indexOf(document.activeElement);
+    NB.clear(this.reached, NB.el('h3', { text: 'What if the robot stood here?' }), table, note);
+    if (focused >= 0) this.reached.querySelectorAll('button')[focused]?.focus();
+    this.reached.dataset.rolls = isLast ? 'all' : 'few';
+  }
+
+  take({ joints }) {
+    this.joints = [...joints];
+    this.write();
+    this.evaluate();
+  }
+
+  jointList() { return this.joints.map((q) => String(q)).join(','); }
+
+  command(joints) { return `needlebench clearance ${this.run.report.scenario.file} --joints ${joints.join(',')}`; }
+
+  toml() {
+    const list = (values) => `[${values.map((value) => Number(value.toFixed(6))).join(', ')}]`;
+    return `[robot]\nbase_position_mm = ${list(this.base.position)}\nbase_rpy_deg = ${list(this.base.rpy)}`;
+  }
+
+  async copy(text) {
+    try {
+      await navigator.clipboard.writeText(text);
+      this.copied.textContent = 'copied';
+    } catch {
+      // Not allowed here: the text itself, to be copied by hand.
+      const range = document.createRange();
+      this.text.textContent = text;
+      range.selectNodeContents(this.text);
+      getSelection().removeAllRanges();
+      getSelection().addRange(range);
+      this.copied.textContent = 'selected: copy it with Ctrl+C';
+    }
+    clearTimeout(this.copiedUntil);
+    this.copiedUntil = setTimeout(() => { this.copied.textContent = ''; }, 4000);
+  }
+
+  /** The run's layers, less what is a result of the run. */
+  applyLayers() {
+    if (!this.active) return;
+    const { view, run } = this;
+    for (const name of ['arm', 'other', 'witness', 'ellipsoids', 'cone', 'people', 'space', 'sight', 'taken']) view.group(name).visible = false;
+    for (const name of ['tried', 'tried-from', 'tried-lines', 'tried-handle']) view.group(name).visible = true;
+    view.group('tried-mount').visible = run.layers?.mount !== false;
+    for (const name of ['robot', 'tool', 'collision', 'corridor']) this.arm.layer(name, run.layers ? run.layers[name] : name === 'robot' || name === 'tool');
+    view.draw();
+  }
+
+  // The ring at the base's foot.
+  drawHandle() {
+    const { view } = this;
+    view.empty('tried-handle');
+    const [x, y, z] = new THREE.Vector3().setFromMatrixPosition(this.pose()).toArray();
+    const [around, inner, outer] = [64, NB.Explore.RING - 0.02, NB.Explore.RING];
+    const positions = [];
+    for (let step = 0; step < around; step++) {
+      const [a, b] = [step, step + 1].map((k) => 2 * Math.PI * k / around);
+      const at = (radius, angle) => [x + radius * Math.cos(angle), y + radius * Math.sin(angle), z];
+      positions.push(...at(inner, a), ...at(outer, a), ...at(outer, b), ...at(inner, a), ...at(outer, b), ...at(inner, b));
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(positions), 3));
+    const material = view.marked(new THREE.MeshBasicMaterial({ color: 0x0072b2, opacity: 0.8, transparent: true, side: THREE.DoubleSide }));
+    const ring = new THREE.Mesh(geometry, material);
+    ring.renderOrder = 31;
+    view.add('tried-handle', ring);
+    view.group('tried-handle').visible = this.active;
+  }
+
+  /** Where a pointer is on the level of the base, m; null where the view is along it. */
+  under(event) {
+    const { view } = this;
+    const box = view.renderer.domElement.getBoundingClientRect();
+    const far = new THREE.Vector3((event.clientX - box.left) / box.width * 2 - 1, 1 - (event.clientY - box.top) / box.height * 2, 0.5).unproject(view.camera);
+    const eye = view.camera.position;
+    const way = far.sub(eye).normalize();
+    if (Math.abs(way.z) < 0.03) return null;
+    const along = (this.base.position[2] * 1e-3 - eye.z) / way.z;
+    return along > 0 ? [eye.x + along * way.x, eye.y + along * way.y] : null;
+  }
+
+  isOnRing(event) {
+    const at = this.active && this.under(event);
+    return Boolean(at) && Math.hypot(at[0] - this.base.position[0] * 1e-3, at[1] - this.base.position[1] * 1e-3) <= NB.Explore.RING + 0.01;
+  }
+
+  grabBase() {
+    if (!this.view.works) return;
+    const canvas = this.view.renderer.domElement;
+    const listen = (type, handle) => this.view.element.addEventListener(type, handle, { capture: true });
+    let held = null;
+    listen('pointerdown', (event) => {
+      if (event.target !== canvas || event.button !== 0 || !this.isOnRing(event)) return;
+      const [x, y] = this.under(event);
+      held = [x * 1e3 - this.base.position[0], y * 1e3 - this.base.position[1]];
+      canvas.setPointerCapture(event.pointerId);
+      canvas.focus();
+      // The view is not turned.
+      event.stopImmediatePropagation();
+    });
+    listen('pointermove', (event) => {
+      if (!this.active) return;
+      canvas.style.cursor = held ? 'grabbing' : this.isOnRing(event) ? 'grab' : '';
+      if (!held) return;
+      event.stopImmediatePropagation();
+      const at = this.under(event);
+      if (!at || this.asked) return;
+      // Once before the next frame, however often the pointer moves.
+      this.asked = requestAnimationFrame(() => {
+        this.asked = 0;
+        if (this.active) this.moveBase(() => at.forEach((value, k) => { this.base.position[k] = Math.round(value * 1e3 - held0[k]); }));
+      });
+      const held0 = held;
+    });
+    for (const type of ['pointerup', 'pointercancel']) {
+      listen(type, (event) => {
+        if (!held) return;
+        held = null;
+        canvas.style.cursor = '';
+        event.stopImmediatePropagation();
+      });
+    }
+  }
+};
+/** Rolls that are looked at when all rests, and radius of the ring (m). */
+NB.Explore.ROLLS = 36;
+NB.Explore.RING = 0.17;

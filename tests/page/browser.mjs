@@ -1,0 +1,21 @@
+// The Chromium that pages are opened in.
+import { existsSync } from 'node:fs';
+import { chromium } from 'playwright-core';
+
+export const SOFTWARE_GL = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+export const NO_GL = ['--disable-gpu', '--disable-software-rasterizer', '--disable-3d-apis'];
+
+async function executable() {
+  const installed = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'];
+  const found = process.env.CHROMIUM === 'packaged' ? null : installed.find((path) => path && existsSync(path));
+  if (found) return { path: found, args: [] };
+  // Makes the package unpack the libraries that a bare machine lacks, too (NSS, expat).
+  process.env.AWS_LAMBDA_JS_RUNTIME ??= 'nodejs22.x';
+  const { default: packaged } = await import('@sparticuz/chromium');
+  return { path: await packaged.executablePath(), args: ['--no-zygote'] };
+}
+
+const browser = await executable();
+
+/** A running Chromium with further arguments. */
+export const launch = (args) => chromium.launch({ executablePath: browser.path, args: ['--no-sandbox', ...browser.args, ...args] });
