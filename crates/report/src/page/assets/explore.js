@@ -94,9 +94,10 @@ NB.Explore = class {
     this.active = false;
     this.open = NB.el('button', { type: 'button', onclick: () => this.enter() }, 'Try a posture');
     this.status = NB.el('span', { class: 'soft', role: 'status', text: 'Move the joints and the base by hand, with the clearances there.' });
+    this.bar = NB.el('div', { class: 'bar' }, this.open, this.status);
     this.body = NB.el('div', { hidden: true });
     this.element = NB.el('section', { class: 'panel explore no-print', 'aria-label': 'Try a posture' },
-      NB.el('div', { class: 'bar' }, this.open, this.status), this.body);
+      this.bar, this.body);
     this.sign = NB.el('p', { class: 'tried-sign', hidden: true, text: 'Tried posture: not a result of the run' });
     this.view.element.append(this.sign);
     // What is printed are results.
@@ -106,7 +107,7 @@ NB.Explore = class {
 
   async enter() {
     if (this.active) return;
-    this.run.pause?.();
+    this.run.pause();
     try {
       this.live ||= await NB.Live.start(this.data);
     } catch (error) {
@@ -116,9 +117,9 @@ NB.Explore = class {
     }
     if (!this.built) this.build();
     this.active = true;
-    this.open.hidden = true;
+    this.bar.hidden = true;
     this.body.hidden = false;
-    this.status.textContent = '';
+    this.were = NB.Explore.RESULTS.map((name) => [name, this.view.group(name).visible]);
     this.from ||= this.view.arm('tried-from', { color: [0.34, 0.71, 0.91], opacity: 0.22 });
     this.arm ||= this.view.arm('tried');
     this.resetAll();
@@ -135,20 +136,18 @@ NB.Explore = class {
     this.live.resetBase();
     this.base = this.homeBase();
     this.placeTied();
-    this.open.hidden = false;
+    this.bar.hidden = false;
     this.body.hidden = true;
     this.sign.hidden = true;
-    this.status.textContent = 'Move the joints and the base by hand, with the clearances there.';
     this.view.element.classList.remove('trying');
     for (const name of ['tried', 'tried-from', 'tried-lines', 'tried-handle']) this.view.group(name).visible = false;
     this.view.empty('tried-lines');
-    this.run.applyLayers?.();
-    this.run.arm?.show(true);
+    for (const [name, visible] of this.were) this.view.group(name).visible = visible;
+    this.run.applyLayers();
   }
 
   back() {
     this.leave();
-    this.run.showAgain?.();
     this.open.focus();
   }
 
@@ -258,7 +257,7 @@ NB.Explore = class {
     for (const { get, input } of this.baseFields) input.value = Number(get().toFixed(3));
   }
 
-  get goalIndex() { return this.run.goalIndex ?? null; }
+  get goalIndex() { return this.run.goalIndex; }
 
   pose() {
     const [x, y, z] = this.base.position.map((mm) => mm * 1e-3);
@@ -297,7 +296,7 @@ NB.Explore = class {
         view.group('tried-mount').add(new THREE.Mesh(geometry, view.material([...color.slice(0, 3), 0.75])));
       }
     }
-    view.group('tried-mount').visible = this.active && this.run.layers?.mount !== false;
+    view.group('tried-mount').visible = this.active && this.run.layers.mount;
     this.drawHandle();
   }
 
@@ -392,7 +391,6 @@ NB.Explore = class {
 
   /** Which configurations reach the goal from here: at once at few rolls, and again at many when all rests. */
   lookForConfigurations() {
-    if (this.goalIndex === null) return;
     this.showReach(this.data.goals[this.goalIndex].free ? 6 : 1, false);
     clearTimeout(this.later);
     this.later = setTimeout(() => { if (this.active) this.showReach(NB.Explore.ROLLS, true); }, 200);
@@ -468,10 +466,10 @@ NB.Explore = class {
   applyLayers() {
     if (!this.active) return;
     const { view, run } = this;
-    for (const name of ['arm', 'other', 'witness', 'ellipsoids', 'cone', 'people', 'space', 'sight', 'taken']) view.group(name).visible = false;
+    for (const name of NB.Explore.RESULTS) view.group(name).visible = false;
     for (const name of ['tried', 'tried-from', 'tried-lines', 'tried-handle']) view.group(name).visible = true;
-    view.group('tried-mount').visible = run.layers?.mount !== false;
-    for (const name of ['robot', 'tool', 'collision', 'corridor']) this.arm.layer(name, run.layers ? run.layers[name] : name === 'robot' || name === 'tool');
+    view.group('tried-mount').visible = run.layers.mount;
+    for (const name of ['robot', 'tool', 'collision', 'corridor']) this.arm.layer(name, run.layers[name]);
     view.draw();
   }
 
@@ -551,6 +549,8 @@ NB.Explore = class {
     }
   }
 };
+/** Layers that show what the run has found. */
+NB.Explore.RESULTS = ['arm', 'other', 'witness', 'ellipsoids', 'cone', 'sight', 'taken'];
 /** Rolls that are looked at when all rests, and radius of the ring (m). */
 NB.Explore.ROLLS = 36;
 NB.Explore.RING = 0.17;

@@ -327,6 +327,7 @@ NB.RunPage = class {
   }
 
   pause() {
+    this.explore.leave();
     if (this.playing) { this.playing = false; this.toAddress(); }
     if (this.playButton) this.playButton.textContent = '\u25b6 Play';
   }
