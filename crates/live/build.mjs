@@ -9,7 +9,7 @@
 // page's numbers against the program's, says whether they are right.
 import { execFileSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
-import { readFileSync, readdirSync, statSync, writeFileSync } from 'node:fs';
+import { existsSync, readFileSync, readdirSync, statSync, writeFileSync } from 'node:fs';
 import { homedir } from 'node:os';
 import { dirname, join, relative, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -48,6 +48,9 @@ function sources() {
 }
 
 function compile() {
+  const targets = run('rustc', ['--print', 'target-libdir', '--target', TARGET]).trim();
+  // A toolchain without the target's own libraries.
+  if (!existsSync(targets)) run('rustup', ['target', 'add', TARGET], { stdio: 'inherit' });
   const cargo = process.env.CARGO_HOME || join(homedir(), '.cargo');
   const remap = [[root, '.'], [cargo, 'cargo']].map(([from, to]) => `--remap-path-prefix=${from}=${to}`);
   const folder = process.env.CARGO_TARGET_DIR ? join(process.env.CARGO_TARGET_DIR, 'page') : join(root, 'target/page');

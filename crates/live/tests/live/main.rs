@@ -121,7 +121,7 @@ fn a_base_that_was_moved_is_a_scenario_with_that_base() {
                 assert!(off_m.abs() < ROUNDING_M, "{each:?}: {off_m}");
             }
         }
-        assert_eq!(live.overlaps(), []);
+        assert!(live.overlaps().is_empty());
     }
 }
 
@@ -150,7 +150,7 @@ fn a_base_in_something_and_a_mount_that_does_not_reach_are_told() {
     );
     assert_eq!(live.pairs(&resolved.start), before);
     live.reset_base();
-    assert_eq!(live.overlaps(), []);
+    assert!(live.overlaps().is_empty());
     let model = ClearanceModel::new(&resolved.cell);
     assert_eq!(
         live.pairs(&resolved.start),

@@ -47,7 +47,9 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
     let unwanted = ClearanceClass::ALL.into_iter();
     let unwanted = unwanted.filter(|class| class.is_unwanted());
     document["unwantedClasses"] = json!(unwanted.map(ClearanceClass::name).collect::<Vec<_>>());
-    document["explore"] = explore(resolved, &mut pack);
+    if !resolved.goals.is_empty() {
+        document["explore"] = explore(resolved, &mut pack);
+    }
     let room = RoomModel::new(resolved);
     let goals: Vec<Value> = (0..resolved.goals.len())
         .map(|goal| self::goal(resolved, finished, &room, goal, &mut pack))
