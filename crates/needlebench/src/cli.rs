@@ -106,12 +106,15 @@ enum Command {
     /// Reproduce the paper: Table 3, every equation, both methods, and Figure 6.
     #[command(after_help = "Example: needlebench paper --out out/paper")]
     Paper(PaperArguments),
-    /// JSON schema of scenario, study or arm files, for editors.
+    /// JSON schema of scenario, study or arm files, for editors; the table of metrics.
     #[command(after_help = "Example: needlebench schema scenario > scenario.schema.json")]
     Schema {
-        /// Which file format.
+        /// What to describe.
         #[arg(value_enum)]
         format: SchemaFormat,
+        /// Print it as Markdown, for people.
+        #[arg(long)]
+        markdown: bool,
     },
     /// What this machine has and lacks for running both engines.
     #[command(after_help = "Example: needlebench doctor")]
@@ -164,7 +167,7 @@ fn run() -> ExitCode {
         Command::Servo(arguments) => command::servo(&arguments),
         Command::Report(arguments) => command::report(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),
-        Command::Schema { format } => command::schema(format),
+        Command::Schema { format, markdown } => command::schema(format, markdown),
         Command::Doctor { json } => command::doctor(json),
         Command::Completions { shell } => command::completions(shell, &mut command_line()),
     };

@@ -22,6 +22,9 @@ pub use files::write_atomically;
 pub use junit::{
     JudgedLimit, comparison_junit, junit, limits_junit, study_comparison_junit, study_junit,
 };
-pub use markdown::{comparison_markdown, markdown, study_comparison_markdown};
+pub use markdown::{
+    MetricDescription, comparison_markdown, markdown, metric_descriptions, metrics_markdown,
+    schema_markdown, study_comparison_markdown,
+};
 pub use table::{Table, plain_table, report_screen, report_text};
 pub use urscript::excitation_script;

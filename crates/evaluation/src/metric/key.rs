@@ -139,6 +139,15 @@ impl MetricKey {
 
     /// What exactly it is, with its unit in studies.
     pub fn description(&self) -> String {
+        let unit = match self.metric.unit.symbol {
+            "1" => String::new(),
+            symbol => format!(", {symbol}"),
+        };
+        format!("{}{unit}", self.definition())
+    }
+
+    /// What exactly it is.
+    pub fn definition(&self) -> String {
         let metric = self.metric;
         let basis = match &self.of {
             _ if metric.static_key == Some(metric.key) => {
@@ -155,11 +164,7 @@ impl MetricKey {
             }
             Of::Engine(engine) => format!("simulated in {engine}"),
         };
-        let unit = match metric.unit.symbol {
-            "1" => String::new(),
-            symbol => format!(", {symbol}"),
-        };
-        format!("{}; {basis}{unit}", metric.definition)
+        format!("{}; {basis}", metric.definition)
     }
 
     /// What a study's statistics do with it.

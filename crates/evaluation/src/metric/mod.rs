@@ -1,6 +1,6 @@
 //! The metrics: every number by which configurations are judged, ranked and compared, declared once.
 //!
-//! A metric is an entry of the [table](groups): what it is called, what exactly it is, and how it is read
+//! A metric is an entry of the [table](GROUPS): what it is called, what exactly it is, and how it is read
 //! from a configuration's part of the report. All else is made from the table: rows and columns of
 //! studies, criteria, rankings and Pareto sets, thresholds of comparisons, headings of tables and
 //! pages. One name is one thing: a proven bound and a nearest approach, one draw of the imperfections
@@ -24,13 +24,13 @@ pub use key::{MetricKey, measured};
 pub use legacy::{FORMER_COLUMNS, FormerColumn, FormerRow, former_report};
 pub use quantity::{Quantity, Unit};
 pub use resolution::{Resolved, resolve};
-pub use table::groups;
+pub use table::{GROUPS, Group};
 
 /// Every metric, in the order of reports.
 ///
 /// Where several metrics of a family would do, the later counts: it says more.
 pub fn metrics() -> impl DoubleEndedIterator<Item = &'static Metric> {
-    groups().iter().flat_map(|group| group.iter())
+    GROUPS.iter().flat_map(|group| group.metrics.iter())
 }
 
 #[cfg(test)]

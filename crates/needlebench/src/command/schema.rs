@@ -3,12 +3,14 @@
 use anyhow::Result;
 use clap::ValueEnum;
 use needlebench_engine::{ENGINES, Engine, choose_engines, engine_names};
+use needlebench_report::{metric_descriptions, metrics_markdown, schema_markdown};
 use serde_json::{Value, json};
 
 use super::print_json;
 use crate::exit::ExitStatus;
+use crate::output::print_text;
 
-/// Formats that have a schema.
+/// What can be described.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SchemaFormat {
     /// Scenario files.
@@ -17,17 +19,42 @@ pub(crate) enum SchemaFormat {
     Study,
     /// An arm's data, `arm.toml`.
     Arm,
+    /// The metrics: no file, but the names and definitions of the numbers in reports and studies.
+    Metrics,
 }
 
-/// Prints the schema of a file format.
-pub(crate) fn schema(format: SchemaFormat) -> Result<ExitStatus> {
+impl SchemaFormat {
+    fn title(self) -> &'static str {
+        match self {
+            Self::Scenario => "Keys of a scenario",
+            Self::Study => "Keys of a study",
+            Self::Arm => "Keys of an arm's data",
+            Self::Metrics => "Metrics",
+        }
+    }
+}
+
+/// Prints the schema of a file format, or the table of metrics.
+pub(crate) fn schema(format: SchemaFormat, markdown: bool) -> Result<ExitStatus> {
     let mut schema = match format {
         SchemaFormat::Scenario => needlebench_cell::scenario::scenario_schema(),
         SchemaFormat::Study => needlebench_cell::study::study_schema(),
         SchemaFormat::Arm => needlebench_cell::arm::data::arm_schema(),
+        SchemaFormat::Metrics if markdown => {
+            print_text(&metrics_markdown())?;
+            return Ok(ExitStatus::Success);
+        }
+        SchemaFormat::Metrics => {
+            print_json(&json!({ "schema_version": 1, "metrics": metric_descriptions() }))?;
+            return Ok(ExitStatus::Success);
+        }
     };
     name_engines(&mut schema, ENGINES);
-    print_json(&schema)?;
+    if markdown {
+        print_text(&schema_markdown(format.title(), &schema))?;
+    } else {
+        print_json(&schema)?;
+    }
     Ok(ExitStatus::Success)
 }
 

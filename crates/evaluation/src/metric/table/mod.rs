@@ -28,28 +28,42 @@ const UNSIMULATED: &[StudyMode] = &[Static, Planned];
 const MOVING: &[StudyMode] = &[Planned, Dynamic];
 const ALL: &[StudyMode] = &[Static, Planned, Dynamic];
 
-/// The metrics, group by group, in the order of reports.
-pub fn groups() -> &'static [&'static [Metric]] {
-    &[
-        posture::POSTURE,
-        needle::PREDICTED,
-        needle::SIMULATED,
-        effort::EFFORT,
-        effort::ENGINES_COMPARED,
-        needle::BUDGET,
-        people::PEOPLE,
-        clearance::CLEARANCE,
-        clearance::LEAST_CLEARANCE,
-        clearance::ARM_TO_SKIN,
-        clearance::TO_TABLE,
-        clearance::TO_GANTRY,
-        clearance::TO_MOUNT,
-        clearance::TO_OBSTACLES,
-        clearance::SELF_CLEARANCE,
-        clearance::TOOL_TO_SKIN,
-        clearance::GUIDE_TO_SKIN,
-        clearance::NEEDLE_CORRIDOR,
-        clearance::NEEDLE_ROUTE,
-        clearance::MARGIN,
-    ]
+/// Metrics that stand together, under a heading.
+#[derive(Debug, Clone, Copy)]
+pub struct Group {
+    /// What they are of, as a heading.
+    pub title: &'static str,
+    /// The metrics, in the order of reports.
+    pub metrics: &'static [Metric],
 }
+
+const fn group(title: &'static str, metrics: &'static [Metric]) -> Group {
+    Group { title, metrics }
+}
+
+/// The metrics, group by group, in the order of reports.
+pub const GROUPS: &[Group] = &[
+    group("The posture", posture::POSTURE),
+    group("The needle, without engines", needle::PREDICTED),
+    group("The needle, simulated", needle::SIMULATED),
+    group("Motion and effort", effort::EFFORT),
+    group("Engines compared", effort::ENGINES_COMPARED),
+    group("The needle, over all arms and patients", needle::BUDGET),
+    group("People", people::PEOPLE),
+    group(
+        "Clearance of arm and tool from their surroundings",
+        clearance::CLEARANCE,
+    ),
+    group("Least clearance of all", clearance::LEAST_CLEARANCE),
+    group("Arm to skin", clearance::ARM_TO_SKIN),
+    group("To the table", clearance::TO_TABLE),
+    group("To the gantry", clearance::TO_GANTRY),
+    group("To the mount", clearance::TO_MOUNT),
+    group("To obstacles", clearance::TO_OBSTACLES),
+    group("The arm from itself", clearance::SELF_CLEARANCE),
+    group("Tool to skin", clearance::TOOL_TO_SKIN),
+    group("Guide to skin", clearance::GUIDE_TO_SKIN),
+    group("Behind the guide", clearance::NEEDLE_CORRIDOR),
+    group("The needle's route", clearance::NEEDLE_ROUTE),
+    group("What a motion may keep", clearance::MARGIN),
+];
