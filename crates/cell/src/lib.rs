@@ -70,8 +70,8 @@ pub use model::{
 pub use printable::{printable, printable_json, printable_line};
 pub use resolve::{
     Expectation, Expected, FOOT_M, Goal, GravitySettings, Overrides, PlacedPhantom, RIGID_M,
-    ResolvedScenario, Roll, ServoSettings, excitation, imperfections, iso9283, load_robot, load_scenario, people,
-    pose_of, resolve_scenario,
+    ResolvedScenario, Roll, ServoSettings, excitation, imperfections, iso9283, load_robot,
+    load_scenario, people, pose_of, resolve_scenario,
 };
 pub use robot::{
     Calibration, DisabledPair, LinkEnclosure, MOVING_LINK_LABELS, MissingInertia, OriginDeviation,

@@ -126,7 +126,9 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
         "{STUDY}[criteria]\nmin_layouts_working = 0.0\n[requirements]\nmin_layouts_working = \"SRS-1\"\n"
     ));
     let arguments = ["study", "study.toml", "--quiet", "--no-page"];
-    let answer = bench.run_with(&[("COLUMNS", Some("80"))], &arguments).exits_with(0);
+    let answer = bench
+        .run_with(&[("COLUMNS", Some("80"))], &arguments)
+        .exits_with(0);
     let lines: Vec<&str> = answer.stdout.lines().collect();
     assert_eq!(lines[0], "moved, 96 cases: PASS: 1 of 1 criteria met");
     assert!(
