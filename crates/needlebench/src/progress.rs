@@ -8,6 +8,9 @@ use needlebench_bench::progress::Progress;
 
 use crate::output::complain;
 
+/// Environment variable that switches it off, for whole jobs.
+const SWITCH: &str = "NEEDLEBENCH_PROGRESS";
+
 /// Progress on standard error.
 #[derive(Debug)]
 pub(crate) enum TerminalProgress {
@@ -20,9 +23,10 @@ pub(crate) enum TerminalProgress {
 }
 
 impl TerminalProgress {
-    /// `quiet` hides it everywhere.
+    /// `quiet` hides it everywhere, as `NEEDLEBENCH_PROGRESS=off` does.
     pub(crate) fn new(quiet: bool) -> Self {
-        if quiet {
+        let off = std::env::var_os(SWITCH).is_some_and(|value| value == "off");
+        if quiet || off {
             return Self::Hidden;
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
