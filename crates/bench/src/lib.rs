@@ -32,7 +32,9 @@ mod scenario_run;
 pub mod servo;
 mod setup;
 mod simulate;
+mod starter;
 pub mod study;
+pub mod suggest;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use control::Control;
@@ -47,3 +49,4 @@ pub use scenario_run::{
 };
 pub use setup::SetupError;
 pub use simulate::EngineRun;
+pub use starter::{Starter, StarterOptions, Template, starter, starter_study};

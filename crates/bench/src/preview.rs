@@ -73,6 +73,14 @@ pub struct ConfigurationPreview {
     pub joints_rad: Option<[f64; 6]>,
 }
 
+impl ConfigurationPreview {
+    /// The first rule or criterion that it breaks; empty if it works.
+    pub fn reason(&self) -> &str {
+        let rule = self.rejections.first().map(|rejection| rejection.rule);
+        rule.or(self.missed).unwrap_or_default()
+    }
+}
+
 /// The place of a target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TargetPreview {
@@ -121,7 +129,8 @@ impl Preview {
     }
 }
 
-fn goal_preview(planner: &Planner<'_>, resolved: &ResolvedScenario, goal: &Goal) -> GoalPreview {
+/// What is known of a goal in the cell of a scenario.
+pub(crate) fn goal_preview(planner: &Planner<'_>, resolved: &ResolvedScenario, goal: &Goal) -> GoalPreview {
     // What a refused route says of all alike is said once.
     let members = planner.postures(goal).map(|mut member| {
         member

@@ -19,7 +19,7 @@
 //! | [`requirements`], [`judgement`] | what criteria stand for; what people state about results |
 //! | [`phantom`], [`fixtures`] | chests and furniture as solids |
 //! | `resolve` with [`imperfections`], [`people`], [`iso9283`], [`excitation`] | from sections to a [`Cell`] with goals in the world |
-//! | `excitation_text` | the text of a scenario, given a run that excites every joint |
+//! | `excitation_text`, `scenario_edit` | the text of a scenario, given a run that excites every joint, or changed key by key |
 //! | [`family`], [`study`], `thresholds` | many scenarios from one, and what is asked of them |
 //! | `log_columns` | which column of a recorded log is what |
 
@@ -43,6 +43,7 @@ pub mod requirements;
 mod resolve;
 mod robot;
 pub mod scenario;
+mod scenario_edit;
 mod schema;
 pub mod study;
 mod thresholds;
@@ -69,15 +70,17 @@ pub use model::{
 };
 pub use printable::{printable, printable_json, printable_line};
 pub use resolve::{
-    Expectation, Expected, FOOT_M, Goal, GravitySettings, Overrides, PlacedPhantom, RIGID_M,
-    ResolvedScenario, Roll, ServoSettings, excitation, imperfections, iso9283, load_robot,
-    load_scenario, people, pose_of, resolve_scenario,
+    ChosenEntry, EntryChooser, Expectation, Expected, FOOT_M, Goal, GoalPlacer, GravitySettings,
+    OpenScenario, Overrides, PlacedPhantom, RIGID_M, ResolvedScenario, Roll, ServoSettings,
+    direction, excitation, imperfections, iso9283, load_open_scenario, load_robot, load_scenario,
+    people, pose_of, resolve_open_scenario, resolve_scenario,
 };
 pub use robot::{
     Calibration, DisabledPair, LinkEnclosure, MOVING_LINK_LABELS, MissingInertia, OriginDeviation,
     Srdf, enclosures,
 };
 pub use scenario::{REJECTION_RULES, envelope, ranking};
+pub use scenario_edit::ScenarioEdit;
 pub use study::criteria as study_criteria;
 pub use thresholds::ThresholdsFile;
 pub use words::{pair_in_words, part_in_words, rule_in_words};

@@ -1,5 +1,7 @@
 //! TOML files into structs, with messages that name file, line, key and value.
 
+mod slips;
+
 use std::ops::Range;
 
 use serde::de::DeserializeOwned;
@@ -36,12 +38,14 @@ impl<'a> TomlText<'a> {
             let Some(span) = error.span() else {
                 return Finding::new(file, message);
             };
+            let hint = slips::hint_about(text, span.clone());
             if message == "duplicate key"
                 && let Some(key) = text.get(span.clone())
             {
                 message = format!("duplicate key `{key}`");
             }
-            Finding::new(file, message).at(text, span)
+            let finding = Finding::new(file, message).at(text, span);
+            Finding { hint, ..finding }
         })?;
         let values = table(Path::Top, places.get_ref()).map_err(|beyond| {
             Finding::new(file, beyond.message)
@@ -55,6 +59,11 @@ impl<'a> TomlText<'a> {
             places,
             values,
         })
+    }
+
+    /// Values that may be meant in another unit than their keys say, in words.
+    pub(crate) fn doubts(&self) -> Vec<String> {
+        slips::doubtful_units(&self.values)
     }
 
     /// The whole file as a struct.

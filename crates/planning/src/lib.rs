@@ -29,5 +29,5 @@ pub use press::{PressError, PressPlan, stage_press};
 pub use rejection::{Rejection, Rule};
 pub use route::{
     RouteClearance, RouteJudgement, crossed_fissures, judge_route, judge_route_beside,
-    needle_route, route_rejection,
+    judged_tissues, needle_route, route_rejection,
 };

@@ -146,23 +146,31 @@ pub fn judge_route_beside<'a>(
     placed: &'a PlacedPhantom,
     goal: &Goal,
 ) -> Option<RouteJudgement<'a>> {
+    judged_tissues(resolved, placed, goal).min_by(|a, b| {
+        let surplus = |each: &RouteJudgement<'_>| each.distance_m - each.margin_m;
+        surplus(a).total_cmp(&surplus(b))
+    })
+}
+
+/// How the planned needle of a goal keeps each margin: bone, vessel and organ, as far as there are any that it
+/// has to keep away from.
+pub fn judged_tissues<'a>(
+    resolved: &ResolvedScenario,
+    placed: &'a PlacedPhantom,
+    goal: &Goal,
+) -> impl Iterator<Item = RouteJudgement<'a>> {
     let section = &resolved.scenario.planning.needle_route;
-    [Tissue::Bone, Tissue::Vessel, Tissue::Organ]
-        .into_iter()
-        .filter_map(|tissue| {
-            let margin_m = margin_m(section, tissue)?;
-            let wanted = |part: &RouteObstacle| part.tissue == tissue && !is_off(section, part);
-            let nearest = nearest_of(&resolved.cell, placed, goal, wanted)?;
-            Some(RouteJudgement {
-                distance_m: nearest.separation.distance_m - ROUNDING_M,
-                nearest,
-                margin_m,
-            })
+    let tissues = [Tissue::Bone, Tissue::Vessel, Tissue::Organ].into_iter();
+    tissues.filter_map(move |tissue| {
+        let margin_m = margin_m(section, tissue)?;
+        let wanted = |part: &RouteObstacle| part.tissue == tissue && !is_off(section, part);
+        let nearest = nearest_of(&resolved.cell, placed, goal, wanted)?;
+        Some(RouteJudgement {
+            distance_m: nearest.separation.distance_m - ROUNDING_M,
+            nearest,
+            margin_m,
         })
-        .min_by(|a, b| {
-            let surplus = |each: &RouteJudgement<'_>| each.distance_m - each.margin_m;
-            surplus(a).total_cmp(&surplus(b))
-        })
+    })
 }
 
 /// Why no configuration is to go to a goal; `None` if the needle's route keeps its margins.

@@ -446,6 +446,11 @@ pub struct CellData {
     /// Start posture, shoulder pan to wrist 3, deg.
     #[schemars(inner(range(min = -720.0, max = 720.0)))]
     pub start_joints_deg: [f64; 6],
+    /// Where it stands at the right of a patient on a table: from mid-chest towards the head, from the table's
+    /// edge outwards, and over the table's upper face, mm.
+    #[serde(default)]
+    #[schemars(inner(range(min = -3000.0, max = 3000.0)))]
+    pub beside_patient_mm: Option<[f64; 3]>,
     /// A citation, or `assumed: ` and why.
     pub source: String,
 }

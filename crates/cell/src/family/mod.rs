@@ -37,13 +37,25 @@ impl ScenarioFamily {
     /// As [`load_scenario`].
     pub fn load(path: &Path, overrides: &Overrides) -> Result<Self, Vec<Finding>> {
         let base = load_scenario(path, overrides)?;
+        Self::of(base, path.parent().unwrap_or(Path::new("")), overrides)
+    }
+
+    /// Of a scenario that was resolved with these overrides; `folder` is the one that its paths are relative to.
+    ///
+    /// # Errors
+    /// Where its values cannot be changed: a bug, but one to be told of.
+    pub fn of(
+        base: ResolvedScenario,
+        folder: &Path,
+        overrides: &Overrides,
+    ) -> Result<Self, Vec<Finding>> {
         let arm = base.cell.robot.arm.as_ref();
         let editable = Editable::new(base.scenario.clone(), arm)
             .map_err(|error| vec![Finding::new(&base.source.file, error)])?;
         Ok(Self {
             base,
             editable,
-            folder: path.parent().unwrap_or(Path::new("")).to_owned(),
+            folder: folder.to_owned(),
             overrides: overrides.clone(),
             library: ModelLibrary::default(),
         })
@@ -97,6 +109,7 @@ impl ScenarioFamily {
             &self.folder,
             &self.overrides,
             &self.library,
+            true,
         )
     }
 

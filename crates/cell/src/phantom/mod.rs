@@ -251,6 +251,11 @@ impl Phantom {
         self.skin_surface.clip_line(origin, direction)
     }
 
+    /// Outward normal of the skin at a point of it (phantom frame).
+    pub fn skin_normal(&self, point: &Point3<f64>) -> UnitVector3<f64> {
+        self.skin_surface.normal(point)
+    }
+
     /// Whether a point (phantom frame) is inside the skin or on it.
     pub fn skin_contains(&self, point: &Point3<f64>) -> bool {
         self.skin_signed_depth(point) >= 0.0

@@ -1,6 +1,6 @@
 //! The skin as what lines pierce and points are under.
 
-use nalgebra::{Point3, UnitVector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_geometry::mesh::SurfaceIndex;
 
 use super::half_spaces::HalfSpaces;
@@ -37,6 +37,24 @@ impl SkinSurface {
             Self::Convex(faces) => faces.depth_m(point) >= 0.0,
             Self::Mesh(surface) => surface.contains(point),
         }
+    }
+
+    /// See `Phantom::skin_normal`.
+    pub(super) fn normal(&self, point: &Point3<f64>) -> UnitVector3<f64> {
+        /// How far from the surface it is asked for its direction, m: more than rounding, less than any face.
+        const STEP_M: f64 = 1e-5;
+        let face = match self {
+            Self::Convex(faces) => faces.nearest_normal(point),
+            Self::Mesh(_) => None,
+        };
+        face.unwrap_or_else(|| {
+            let slope = Vector3::from_fn(|axis, _| {
+                let mut step = Vector3::zeros();
+                step[axis] = STEP_M;
+                self.depth_m(&(point - step)) - self.depth_m(&(point + step))
+            });
+            UnitVector3::try_new(slope, f64::MIN_POSITIVE).unwrap_or_else(Vector3::z_axis)
+        })
     }
 
     /// See `Phantom::skin_signed_depth`.

@@ -1,7 +1,9 @@
 //! From a scenario file to a resolved cell with goals.
 
 mod arm_values;
+mod assumed;
 mod cache;
+mod entry;
 pub mod excitation;
 mod expected;
 mod fixtures;
@@ -39,15 +41,17 @@ use crate::files::source_of;
 use crate::fixtures::Fixture;
 use crate::input::read_text;
 use crate::model::{BodyKind, Cell, CollisionBody, Frame, NeedleCorridor, placed};
-use crate::scenario::{self, Scenario};
+use crate::scenario::{self, GoalSection, Scenario};
 use crate::toml_text::TomlText;
 use crate::{Finding, Robot};
 use arm_values::check_brakes;
+use assumed::assume;
+pub use entry::{ChosenEntry, EntryChooser, GoalPlacer, OpenScenario};
 use excitation::{ExcitationProtocol, check_sweeps, resolve_excitation};
 pub use expected::Expected;
 use expected::RealThings;
 use goals::{BodyBoxes, Surroundings, resolve_goal};
-pub use goals::{Expectation, Goal, Roll};
+pub use goals::{Expectation, Goal, Roll, direction};
 pub use gravity::GravitySettings;
 use gravity::gravity_settings;
 use imperfections::Imperfections;
@@ -119,22 +123,40 @@ pub struct ResolvedScenario {
 /// # Errors
 /// Every [`Finding`] of the first stage that has any: text, values, models, goals.
 pub fn load_scenario(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
-    read_scenario(path, overrides)
-        .map_err(|findings| or_wrong_kind(path, FileKind::Scenario, findings))
+    let wrong_kind = |findings| or_wrong_kind(path, FileKind::Scenario, findings);
+    let (file, text) = text_of(path).map_err(wrong_kind)?;
+    resolve_scenario(&file, &text, folder_of(path), overrides).map_err(wrong_kind)
 }
 
-fn read_scenario(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
+/// Reads a scenario file, and resolves and validates all of it but its goals.
+///
+/// # Errors
+/// As [`load_scenario`].
+pub fn load_open_scenario(
+    path: &Path,
+    overrides: &Overrides,
+) -> Result<OpenScenario, Vec<Finding>> {
+    let wrong_kind = |findings| or_wrong_kind(path, FileKind::Scenario, findings);
+    let (file, text) = text_of(path).map_err(wrong_kind)?;
+    resolve_open_scenario(&file, &text, folder_of(path), overrides).map_err(wrong_kind)
+}
+
+fn text_of(path: &Path) -> Result<(String, String), Vec<Finding>> {
     let file = path.display().to_string();
-    let text = read_text(path).map_err(|error| {
-        let hint = error.hint("scenarios are TOML files, such as scenarios/table3.toml");
-        vec![Finding::new(&file, format!("cannot read the scenario: {error}")).hint(hint)]
-    })?;
-    resolve_scenario(
-        &file,
-        &text,
-        path.parent().unwrap_or(Path::new("")),
-        overrides,
-    )
+    match read_text(path) {
+        Ok(text) => Ok((file, text)),
+        Err(error) => {
+            let hint = error.hint(
+                "scenarios are TOML files, such as scenarios/table3.toml; `needlebench init` writes one",
+            );
+            let message = format!("cannot read the scenario: {error}");
+            Err(vec![Finding::new(&file, message).hint(hint)])
+        }
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new(""))
 }
 
 /// Resolves a scenario's text; `base` is the folder that its paths are relative to.
@@ -148,20 +170,156 @@ pub fn resolve_scenario(
     overrides: &Overrides,
 ) -> Result<ResolvedScenario, Vec<Finding>> {
     let toml = TomlText::parse(file, text).map_err(|finding| vec![finding])?;
-    let scenario: Scenario = toml.read(&scenario::FILE)?;
-    let source = source_of(file.to_owned(), text.as_bytes());
-    resolve(
-        &toml,
-        scenario,
-        source,
-        base,
-        overrides,
-        &ModelLibrary::default(),
-    )
+    Draft::read(&toml, base, overrides)?.resolve()
+}
+
+/// Resolves a scenario's text but for its goals.
+///
+/// # Errors
+/// As [`load_scenario`].
+pub fn resolve_open_scenario(
+    file: &str,
+    text: &str,
+    base: &Path,
+    overrides: &Overrides,
+) -> Result<OpenScenario, Vec<Finding>> {
+    let toml = TomlText::parse(file, text).map_err(|finding| vec![finding])?;
+    let draft = Draft::read(&toml, base, overrides)?;
+    let goals = draft.scenario.goals.clone();
+    let resolved = draft.without_goals().map_err(|found| draft.remarked(found))?;
+    Ok(OpenScenario {
+        resolved: draft.noted(resolved),
+        goals,
+    })
+}
+
+/// A scenario as it was read, with what it leaves out assumed.
+struct Draft<'a> {
+    toml: &'a TomlText<'a>,
+    scenario: Scenario,
+    base: &'a Path,
+    overrides: &'a Overrides,
+    library: ModelLibrary,
+    /// What was assumed, and what looks like a slip.
+    remarks: Vec<String>,
+}
+
+impl<'a> Draft<'a> {
+    fn read(
+        toml: &'a TomlText<'a>,
+        base: &'a Path,
+        overrides: &'a Overrides,
+    ) -> Result<Self, Vec<Finding>> {
+        let mut scenario: Scenario = toml.read(&scenario::FILE)?;
+        let library = ModelLibrary::default();
+        let mut remarks = toml.doubts();
+        assume(toml, &mut scenario, base, overrides, &library, &mut remarks);
+        Ok(Self {
+            toml,
+            scenario,
+            base,
+            overrides,
+            library,
+            remarks,
+        })
+    }
+
+    fn resolve(mut self) -> Result<ResolvedScenario, Vec<Finding>> {
+        let resolved = self
+            .assume_entries()
+            .and_then(|()| self.resolved(self.scenario.clone(), true));
+        match resolved {
+            Ok(resolved) => Ok(self.noted(resolved)),
+            Err(found) => Err(self.remarked(found)),
+        }
+    }
+
+    fn without_goals(&self) -> Result<ResolvedScenario, Vec<Finding>> {
+        let scenario = Scenario {
+            goals: Vec::new(),
+            ..self.scenario.clone()
+        };
+        self.resolved(scenario, false)
+    }
+
+    fn resolved(
+        &self,
+        scenario: Scenario,
+        with_goals: bool,
+    ) -> Result<ResolvedScenario, Vec<Finding>> {
+        let source = source_of(self.toml.file.to_owned(), self.toml.text.as_bytes());
+        let Self {
+            toml,
+            base,
+            overrides,
+            library,
+            ..
+        } = self;
+        resolve(toml, scenario, source, base, overrides, library, with_goals)
+    }
+
+    /// Entries of goals that have a target and none, where somebody can choose them.
+    fn assume_entries(&mut self) -> Result<(), Vec<Finding>> {
+        let Some(EntryChooser(choose)) = self.overrides.choose_entry else {
+            return Ok(());
+        };
+        let is_open = |goal: &GoalSection| {
+            let has_target = goal.target_mm.is_some() || goal.lesion.is_some();
+            has_target && goal.entry_key_given().is_none() && goal.flange_pose.is_none()
+        };
+        if !self.scenario.goals.iter().any(is_open) {
+            return Ok(());
+        }
+        let cell = self.without_goals()?;
+        let mut findings = Vec::new();
+        for (index, goal) in self.scenario.goals.iter_mut().enumerate() {
+            if !is_open(goal) {
+                continue;
+            }
+            match choose(&cell, goal) {
+                Ok(entry) => {
+                    goal.entry_direction_deg = Some(entry.direction_deg);
+                    self.remarks.push(format!(
+                        "assumed, since goal `{}` has no entry: {}",
+                        goal.name, entry.in_words
+                    ));
+                }
+                Err([message, hint]) => {
+                    let key = format!("goals[{index}].{}", goal.target_key());
+                    findings.push(self.toml.finding(&key, message).hint(hint));
+                }
+            }
+        }
+        if findings.is_empty() {
+            Ok(())
+        } else {
+            Err(findings)
+        }
+    }
+
+    /// With the remarks before all other notes.
+    fn noted(&self, mut resolved: ResolvedScenario) -> ResolvedScenario {
+        resolved.notes.splice(0..0, self.remarks.iter().cloned());
+        resolved
+    }
+
+    /// What is wrong may be so by what was assumed, or by a slip that it does not name.
+    fn remarked(&self, mut findings: Vec<Finding>) -> Vec<Finding> {
+        if let Some(first) = findings.first_mut()
+            && !self.remarks.is_empty()
+        {
+            let remarks = self.remarks.join("\nnote: ");
+            first.hint = Some(match &first.hint {
+                Some(hint) => format!("{hint}\nnote: {remarks}"),
+                None => format!("note: {remarks}"),
+            });
+        }
+        findings
+    }
 }
 
 /// Resolves a scenario whose values are in their ranges; `toml` says where they stand, and `library`
-/// keeps what is read.
+/// keeps what is read. One that needs goals is refused `with_goals` if it has none.
 pub(crate) fn resolve(
     toml: &TomlText<'_>,
     scenario: Scenario,
@@ -169,9 +327,10 @@ pub(crate) fn resolve(
     base: &Path,
     overrides: &Overrides,
     library: &ModelLibrary,
+    with_goals: bool,
 ) -> Result<ResolvedScenario, Vec<Finding>> {
     let one = |finding: Finding| vec![finding];
-    let mut findings = scenario::check_together(toml, &scenario);
+    let mut findings = scenario::check_together(toml, &scenario, with_goals);
     let engines = scenario.engines.run.as_deref();
     findings.extend(check_engine_names(
         toml,

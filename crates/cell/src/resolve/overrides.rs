@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::entry::EntryChooser;
 use crate::arm::{Arm, DEFAULT_ARM, robot_location};
 use crate::files::Location;
 use crate::robot::MissingInertia;
@@ -26,6 +27,8 @@ pub struct Overrides {
     /// Names of the engines that there are: a file that names another one is refused. Without any
     /// names none is.
     pub engines: Vec<&'static str>,
+    /// Who chooses the entry of a goal that has a target alone; without anybody such a goal is refused.
+    pub choose_entry: Option<EntryChooser>,
 }
 
 impl Overrides {

@@ -47,7 +47,8 @@ pub struct FlangePose {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GoalSection {
-    /// Name in reports: letters, digits, `-` and `_`.
+    /// Name in reports: letters, digits, `-` and `_`. Left out: that of its lesion, or `goal_` and its number.
+    #[serde(default)]
     #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME), extend("x-hint" = "names become file names"))]
     pub name: String,
     /// Entry point on the skin, phantom frame (left, posterior, superior), mm. A point within
@@ -58,7 +59,8 @@ pub struct GoalSection {
     /// Where the needle enters, as seen from the target, instead of `entry_mm`: azimuth and elevation
     /// in the phantom frame, deg. Azimuth 0 is towards the front of the body, 90 towards the patient's
     /// left, -90 towards the right; elevation 90 is towards the head. The entry is where the line from
-    /// the target in that direction leaves the skin, so one goal suits phantoms of all sizes.
+    /// the target in that direction leaves the skin, so one goal suits phantoms of all sizes. Without
+    /// `entry_mm` and without this the best entry that `needlebench suggest` finds is assumed, and said.
     #[serde(default)]
     #[schemars(schema_with = "directions")]
     pub entry_direction_deg: Option<[f64; 2]>,
@@ -105,10 +107,37 @@ pub struct GoalSection {
 impl GoalSection {
     /// The key that decides the entry.
     pub(crate) fn entry_key(&self) -> &'static str {
-        if self.entry_direction_deg.is_some() {
-            "entry_direction_deg"
-        } else {
-            "entry_mm"
+        self.entry_key_given().unwrap_or("entry_mm")
+    }
+
+    /// The key that decides the entry, if one does.
+    pub(crate) fn entry_key_given(&self) -> Option<&'static str> {
+        match (self.entry_mm, self.entry_direction_deg) {
+            (_, Some(_)) => Some("entry_direction_deg"),
+            (Some(_), None) => Some("entry_mm"),
+            (None, None) => None,
+        }
+    }
+
+    /// A goal for a target, with everything else left to its defaults.
+    pub fn at(target: Target) -> Self {
+        let (target_mm, lesion) = match target {
+            Target::Point(mm) => (Some(mm), None),
+            Target::Lesion(name) => (None, Some(name)),
+        };
+        Self {
+            name: lesion.clone().unwrap_or_else(|| "target".to_owned()),
+            entry_mm: None,
+            entry_direction_deg: None,
+            target_mm,
+            lesion,
+            target_offset_mm: None,
+            flange_pose: None,
+            insertion_length_mm: None,
+            standoff_mm: default_standoff_mm(),
+            approach_mm: default_approach_mm(),
+            roll_deg: None,
+            expected: BTreeMap::new(),
         }
     }
 
@@ -120,6 +149,15 @@ impl GoalSection {
             (None, None) => "target_mm",
         }
     }
+}
+
+/// What a needle is to reach.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Target {
+    /// A point of the phantom frame, mm.
+    Point([f64; 3]),
+    /// A lesion of the phantom, by name.
+    Lesion(String),
 }
 
 fn default_standoff_mm() -> f64 {
@@ -190,7 +228,10 @@ pub(super) fn check(
                     None => "the key `goals` is missing",
                 },
             )
-            .hint("add a [[goals]], or an [iso9283] for a test of the robot itself"),
+            .hint(
+                "add where the needle is to go, such as\n\n    [[goals]]\n    lesion = \"pleural_based\"\n\nor an \
+                 [iso9283] for a test of the robot itself",
+            ),
         );
     }
     findings

@@ -49,7 +49,7 @@ pub use events::{EventsSection, PressClass, PressSection, StopSection};
 pub use excitation::{ExcitationSection, PayloadSection, SweepSection};
 pub use fixtures::{GantrySection, MountKind, MountSection, TableSection};
 pub(crate) use goals::EVERY_CONFIGURATION;
-pub use goals::{FlangePose, GoalSection, REJECTION_RULES};
+pub use goals::{FlangePose, GoalSection, REJECTION_RULES, Target};
 pub(crate) use imperfections::POPULATION;
 pub use imperfections::{
     ArmClass, BreathState, BreathingBlock, CalibrationBlock, ControlBlock, ElasticityBlock,
@@ -60,6 +60,7 @@ pub use imperfections::{
 pub use iso9283::{
     Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES, STANDARD_EDGES_MM,
 };
+pub use models::shipped_tools;
 pub use motion::{MotionSection, StartSection};
 pub use obstacles::{
     AttachedTo, BoxShape, ObstacleClass, ObstacleSection, ObstacleShape, RoundShape, SphereShape,
@@ -85,7 +86,8 @@ pub(crate) static FILE: LazyLock<FileSchema> = LazyLock::new(FileSchema::of::<Sc
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// Name in reports and of the results folder: letters, digits, `-` and `_`.
+    /// Name in reports and of the results folder: letters, digits, `-` and `_`. Left out: that of the file.
+    #[serde(default)]
     #[schemars(regex(pattern = NAME), length(max = LONGEST_NAME), extend("x-hint" = "names become file names"))]
     pub name: String,
     /// What the scenario is for, in a sentence or two.
@@ -208,7 +210,11 @@ pub fn parse_scenario(file: &str, text: &str) -> Result<Scenario, Vec<Finding>> 
 }
 
 /// What several keys say together.
-pub(crate) fn check_together(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
+pub(crate) fn check_together(
+    toml: &TomlText<'_>,
+    scenario: &Scenario,
+    with_goals: bool,
+) -> Vec<Finding> {
     let engines = &scenario.engines;
     let mut findings = recording::check(toml, &scenario.recording, engines);
     findings.extend(obstacles::check(toml, &scenario.obstacles));
@@ -216,7 +222,7 @@ pub(crate) fn check_together(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Fi
     findings.extend(goals::check(
         toml,
         &scenario.goals,
-        scenario.iso9283.is_none() && scenario.excitation.is_none(),
+        with_goals && scenario.iso9283.is_none() && scenario.excitation.is_none(),
     ));
     findings.extend(ranking::check(toml, &scenario.ranking));
     findings.extend(events::check(toml, scenario));

@@ -44,3 +44,8 @@ pub(super) fn shipped_lesions() -> BTreeSet<String> {
         .filter_map(|lesion| lesion.get("name")?.as_str().map(str::to_owned))
         .collect()
 }
+
+/// Names of the shipped needle guides.
+pub fn shipped_tools() -> Vec<String> {
+    Location::builtin_names("needle_guide", "urdf")
+}

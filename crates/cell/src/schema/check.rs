@@ -109,7 +109,22 @@ impl Node {
                 "" => "give a plain number, in the unit in its name".to_owned(),
                 unit => format!("give a plain number, in {unit}"),
             }),
-            _ => None,
+            Self::Whole(_) => Some("give a plain whole number, without a unit and quotes".to_owned()),
+            Self::Truth => Some("write true or false, without quotes".to_owned()),
+            Self::List(List { items, .. }) => Some(match (&items[0], value) {
+                (Self::Table(_), Value::Table(_)) => format!(
+                    "there may be several: write [[{at}]] in double brackets, once for each"
+                ),
+                (Self::Table(_), _) => format!("write a [[{at}]] section for each"),
+                (Self::Text(_), Value::String(_)) => format!("write it in brackets: [{value}]"),
+                _ => format!("such as `{} = {}`", at.name(), self.example(at.name())),
+            }),
+            Self::Table(table) => Some(table.as_example(at)),
+            Self::Text(_) => match value {
+                Value::Array(_) | Value::Table(_) => None,
+                _ => Some(format!("write it in quotes: \"{value}\"")),
+            },
+            Self::Anything => None,
         };
         Misfit {
             key: at.to_string(),
@@ -178,7 +193,7 @@ impl Limited for i64 {
 }
 
 impl<N: Limited> Limits<N> {
-    fn holds(&self, number: N) -> bool {
+    pub(super) fn holds(&self, number: N) -> bool {
         let is_enough = if self.above_least {
             number > self.least
         } else {
@@ -301,6 +316,27 @@ impl Text {
 }
 
 impl List {
+    /// How to mend a list of another length.
+    fn hint_about(&self, at: Path<'_>, values: &[Value]) -> Option<String> {
+        let is_whole = |value: &Value| value.is_integer();
+        let are_halves = values.len() == 2 * self.most && values.iter().all(is_whole);
+        if are_halves {
+            let pairs = values.chunks(2).map(|pair| format!("{}.{}", pair[0], pair[1]));
+            let numbers: Vec<String> = pairs.collect();
+            return Some(format!(
+                "decimals have a point, commas stand between numbers: [{}]",
+                numbers.join(", ")
+            ));
+        }
+        let example = || {
+            let node = Node::List(self.clone());
+            format!("such as `{} = {}`", at.name(), node.example(at.name()))
+        };
+        self.hint
+            .clone()
+            .or_else(|| (self.least == self.most).then(example))
+    }
+
     /// What an item is.
     pub fn item(&self, index: usize) -> &Node {
         &self.items[index.min(self.items.len() - 1)]
@@ -321,7 +357,7 @@ impl List {
                     "{} has length {count}, expected {wanted}",
                     shown(&Value::Array(values.to_vec()))
                 ),
-                hint: self.hint.clone(),
+                hint: self.hint_about(at, values),
             });
             return;
         }
@@ -333,6 +369,24 @@ impl List {
 }
 
 impl Table {
+    /// How to write such a table.
+    fn as_example(&self, at: Path<'_>) -> String {
+        let required = self.keys.iter().filter(|(_, entry)| entry.is_required);
+        let keys: Vec<String> = required
+            .map(|(key, entry)| format!("\n    {key} = {}", entry.node.example(key)))
+            .collect();
+        if keys.is_empty() {
+            return "it is a section with keys of its own".to_owned();
+        }
+        // Of one in a list the section is the list's.
+        let section: String = at.to_string().split('[').next().unwrap_or_default().to_owned();
+        let section = match at.to_string().rsplit_once("].") {
+            Some((_, name)) => format!("{section}.{name}"),
+            None => section,
+        };
+        format!("it is a section:\n\n    [{section}]{}", keys.concat())
+    }
+
     pub fn check(&self, at: Path<'_>, values: &toml::Table, found: &mut Vec<Misfit>) {
         let mut meant: Vec<&str> = Vec::new();
         for (key, value) in values {
@@ -368,7 +422,7 @@ impl Table {
                     key: Path::Key(&at, key).to_string(),
                     kind: MisfitKind::Missing,
                     message: format!("the key `{key}` is missing"),
-                    hint: None,
+                    hint: Some(format!("add `{key} = {}`", entry.node.example(key))),
                 });
             }
         }

@@ -76,7 +76,24 @@ impl FileSchema {
         if let Node::Table(table) = &self.node {
             table.check(Path::Top, values, &mut found);
         }
+        for misfit in &mut found {
+            if misfit.kind == MisfitKind::Unknown
+                && let Some(hint) = self.place_of_key(&misfit.key)
+            {
+                misfit.hint = Some(hint);
+            }
+        }
         found
+    }
+
+    /// Where a key belongs that stands where it is not known.
+    fn place_of_key(&self, path: &str) -> Option<String> {
+        /// More are no help.
+        const MOST: usize = 3;
+        let (_, key) = path.rsplit_once('.').unwrap_or(("", path));
+        let sections = self.node.sections_with(key);
+        let is_clear = (1..=MOST).contains(&sections.len());
+        is_clear.then(|| format!("`{key}` is a key of {}", sections.join(", ")))
     }
 
     /// The whole file.

@@ -157,6 +157,75 @@ impl Node {
     }
 }
 
+impl Node {
+    /// A value that such a key may have, to be put in its place and changed.
+    pub(super) fn example(&self, key: &str) -> String {
+        match self {
+            Self::Anything => "...".to_owned(),
+            Self::Truth => "true".to_owned(),
+            Self::Number(limits) => {
+                let number = if limits.holds(0.0) { 0.0 } else { limits.least };
+                super::written(number)
+            }
+            Self::Whole(limits) => {
+                let number = if limits.holds(1) { 1 } else { limits.least };
+                number.to_string()
+            }
+            Self::Text(text) => match (text.one_of.first(), key) {
+                (Some(first), _) => format!("\"{first}\""),
+                (None, "file") => "\"part.stl\"".to_owned(),
+                (None, key) => format!("\"my_{key}\""),
+            },
+            Self::List(list) => {
+                let items = (0..list.least).map(|index| list.item(index).example(key));
+                let items: Vec<String> = items.collect();
+                format!("[{}]", items.join(", "))
+            }
+            Self::Table(table) => {
+                let required = table.keys.iter().filter(|(_, entry)| entry.is_required);
+                let keys: Vec<String> = required
+                    .map(|(key, entry)| format!("{key} = {}", entry.node.example(key)))
+                    .collect();
+                format!("{{ {} }}", keys.join(", "))
+            }
+        }
+    }
+
+    /// Sections that have a key of this name, as they are written: `[tool]`, `[[goals]]`, `[planning.needle_route]`.
+    pub(super) fn sections_with(&self, key: &str) -> Vec<String> {
+        let mut found = Vec::new();
+        self.add_sections_with(key, "", false, &mut found);
+        found
+    }
+
+    fn add_sections_with(&self, key: &str, here: &str, is_listed: bool, found: &mut Vec<String>) {
+        match self {
+            Self::List(list) => {
+                for item in &list.items {
+                    item.add_sections_with(key, here, true, found);
+                }
+            }
+            Self::Table(table) => {
+                if !here.is_empty() && table.keys.contains_key(key) {
+                    found.push(if is_listed {
+                        format!("[[{here}]]")
+                    } else {
+                        format!("[{here}]")
+                    });
+                }
+                for (name, entry) in &table.keys {
+                    let inner = match here {
+                        "" => name.clone(),
+                        here => format!("{here}.{name}"),
+                    };
+                    entry.node.add_sections_with(key, &inner, false, found);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
 impl<N: Copy> Limits<N> {
     fn of(here: &Value, under: Under<'_>, read: impl Fn(&Value) -> Option<N>, most: N) -> Self
     where

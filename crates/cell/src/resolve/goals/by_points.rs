@@ -48,33 +48,21 @@ pub(super) fn from_entry_and_target(
                 &key("entry_mm"),
                 "a goal by entry and target needs a [phantom]",
             )
-            .hint("add a [phantom] section, or give `flange_pose`"));
+            .hint(
+                "add the patient:\n\n    [phantom]\n    model = \"male-p50-supine\"\n\nor give `flange_pose`",
+            ));
     };
     let phantom = &placed.phantom;
-    if section.entry_mm.is_none() && section.entry_direction_deg.is_none() {
+    let (target, lesion) = target_inside(text, key, section, phantom)?;
+    if section.entry_key_given().is_none() {
         return Err(text
             .finding(
                 &key("entry_mm"),
-                format!("goal `{}` has no `entry_mm`", section.name),
+                format!("goal `{}` has no entry", section.name),
             )
             .hint(
-                "a goal needs `entry_mm` or `entry_direction_deg`, and `target_mm` or `lesion`; or a \
-                 `flange_pose`",
-            ));
-    }
-    let (target_key, target, lesion) = target_of(text, key, section, phantom)?;
-    let depth_m = phantom.skin_signed_depth(&target);
-    if depth_m <= 0.0 {
-        return Err(text
-            .finding(
-                &key(target_key),
-                format!(
-                    "the target lies {:.1} mm outside the phantom",
-                    -depth_m * 1e3
-                ),
-            )
-            .hint(
-                "points are in the phantom frame: left, posterior, superior, from mid-chest, in mm",
+                "add `entry_mm = [left, posterior, superior]`, a point on the skin, or `entry_direction_deg = \
+                 [azimuth, elevation]` as seen from the target; `needlebench suggest` proposes some",
             ));
     }
     let (entry, axis) = entry_of(text, key, section, phantom, &target)?;
@@ -172,6 +160,24 @@ fn point(mm: [f64; 3]) -> Point3<f64> {
     Point3::from(Vector3::from(mm) * 1e-3)
 }
 
+/// The target, inside the phantom and in its frame, and the lesion that it is.
+pub(crate) fn target_inside(
+    text: &TomlText<'_>,
+    key: &dyn Fn(&str) -> String,
+    section: &GoalSection,
+    phantom: &Phantom,
+) -> Result<(Point3<f64>, Option<String>), Finding> {
+    let (target_key, target, lesion) = target_of(text, key, section, phantom)?;
+    let depth_m = phantom.skin_signed_depth(&target);
+    if depth_m > 0.0 {
+        return Ok((target, lesion));
+    }
+    let message = format!("the target lies {:.1} mm outside the phantom", -depth_m * 1e3);
+    Err(text.finding(&key(target_key), message).hint(
+        "points are in the phantom frame: left, posterior, superior, from mid-chest, in mm",
+    ))
+}
+
 /// The key that decides the target, the target in the phantom frame, and the lesion that it is.
 fn target_of(
     text: &TomlText<'_>,
@@ -208,13 +214,18 @@ fn target_of(
             ("lesion", lesion.center_m, Some(name.clone()))
         }
         (None, None) => {
-            return Err(text.finding(
-                &key("target_mm"),
-                format!(
-                    "goal `{}` has neither `target_mm` nor `lesion`",
-                    section.name
-                ),
-            ));
+            let lesion = phantom.lesions.first().map_or("NAME", |lesion| &lesion.name);
+            return Err(text
+                .finding(
+                    &key("target_mm"),
+                    format!(
+                        "goal `{}` has neither `target_mm` nor `lesion`",
+                        section.name
+                    ),
+                )
+                .hint(format!(
+                    "add `lesion = \"{lesion}\"`, or `target_mm = [left, posterior, superior]` in mm from mid-chest"
+                )));
         }
     };
     Ok(match section.target_offset_mm {
@@ -263,7 +274,7 @@ fn entry_of(
 
 /// From a target outwards, phantom frame (left, posterior, superior): azimuth about the superior axis
 /// from anterior towards the patient's left, elevation towards superior.
-fn direction(azimuth_rad: f64, elevation_rad: f64) -> UnitVector3<f64> {
+pub fn direction(azimuth_rad: f64, elevation_rad: f64) -> UnitVector3<f64> {
     let (azimuth_sine, azimuth_cosine) = azimuth_rad.sin_cos();
     let (elevation_sine, elevation_cosine) = elevation_rad.sin_cos();
     UnitVector3::new_normalize(Vector3::new(

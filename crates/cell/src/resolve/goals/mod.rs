@@ -17,7 +17,9 @@ use crate::toml_text::TomlText;
 use crate::{CollisionBody, Finding, Robot, Tool};
 use by_flange::from_flange_pose;
 pub(crate) use by_points::GoalInPhantom;
+pub use by_points::direction;
 use by_points::from_entry_and_target;
+pub(crate) use by_points::target_inside;
 use checks::{check_place, check_target};
 
 /// Angle of the guide about the needle.

@@ -1,0 +1,637 @@
+//! Where a needle may enter for a target.
+//!
+//! # How they are found
+//!
+//! 1. Directions from the target, 3 deg apart all round, are placed as a scenario with such a goal is: the needle has to
+//!    be long enough, nothing may stand where guide and needle are, it may be oblique to the skin by 60 deg at most, and
+//!    keep its margins to bone, vessels and organs.
+//! 2. Those that are left are ordered by score. From the best on, each is moved by up to 2 deg to where its score is
+//!    best, and is looked at with the robot: as many configurations as the scenario wants have to work, by the code of
+//!    `check`. Entries nearer than 15 mm to a better one are left out, those near one where the robot fails too.
+//! 3. What works is ordered by its score with the robot's term.
+
+use std::f64::consts::FRAC_PI_3;
+
+use nalgebra::Point3;
+use needlebench_cell::scenario::GoalSection;
+use needlebench_cell::{
+    ChosenEntry, Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction,
+};
+use needlebench_clearance::ClearanceModel;
+use needlebench_planning::{Planner, crossed_fissures, judged_tissues};
+use serde::Serialize;
+
+use super::grid::{around, directions};
+use super::{Refused, SuggestError, counted};
+use crate::control::Control;
+use crate::parallel::in_parallel;
+use crate::preview::{ConfigurationPreview, goal_preview};
+use crate::progress::Silent;
+
+/// Distance between proposed entries on the skin, m: entries nearer than that are the same to a hand.
+const APART_M: f64 = 0.015;
+/// Distance from an entry where the robot fails within which it is not asked again, m.
+const FAILED_APART_M: f64 = 0.008;
+/// Entries that are looked at together, whatever the number of threads.
+const BATCH: usize = 8;
+/// Entries that the robot is asked for at most: where so many fail, the robot stands elsewhere.
+const MOST_ASKED: usize = 64;
+/// Largest angle between needle and the skin's normal, rad: beyond it a needle slips along the skin (assumed).
+const STEEPEST_RAD: f64 = FRAC_PI_3;
+
+/// A term of the score: a straight line between a value that is worth nothing and one that is worth all.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct TermScale {
+    name: &'static str,
+    worst: f64,
+    best: f64,
+    weight: f64,
+}
+
+/// The terms of an entry's score, in SI: short, well clear of what it must not meet, square to the skin, across no
+/// fissure, and within the robot's reach in many configurations. Values and weights are assumed.
+const SCALES: [TermScale; 5] = [
+    TermScale { name: "depth_m", worst: 0.140, best: 0.040, weight: 1.0 },
+    TermScale { name: "margin_to_spare_m", worst: 0.0, best: 0.005, weight: 1.0 },
+    TermScale { name: "angle_to_skin_normal_rad", worst: STEEPEST_RAD, best: 0.0, weight: 1.0 },
+    TermScale { name: "fissures_crossed", worst: 1.0, best: 0.0, weight: 0.5 },
+    TermScale { name: "working_configurations", worst: 0.0, best: 8.0, weight: 1.0 },
+];
+
+/// What the score is made of, for people.
+pub const ENTRY_TERMS: &str = "score: mean of depth (1 at 40 mm, 0 at 140), margin to spare beyond what is kept from bone, \
+     vessels and organs (1 at 5 mm), angle to the skin's normal (1 at 0 deg, 0 at 60), fissures crossed (half weight) \
+     and configurations that work";
+
+/// A term of one entry's score.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EntryTerm {
+    /// What it is, with its unit.
+    pub term: &'static str,
+    /// Its value, SI.
+    pub value: f64,
+    /// From 0 to 1.
+    pub utility: f64,
+    /// Its weight.
+    pub weight: f64,
+}
+
+/// Why a direction is no entry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum EntryRule {
+    /// The needle does not reach from the guide to the target.
+    NeedleTooShort,
+    /// Guide or entry would be in something, or the goal is refused otherwise.
+    Blocked,
+    /// Too oblique to the skin.
+    Oblique,
+    /// Through bone or too near to it.
+    Bone,
+    /// Through a vessel or too near to it.
+    Vessel,
+    /// Through an organ or too near to it.
+    Organ,
+    /// Too few configurations of the robot work there.
+    Robot,
+}
+
+impl EntryRule {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::NeedleTooShort,
+        Self::Blocked,
+        Self::Oblique,
+        Self::Bone,
+        Self::Vessel,
+        Self::Organ,
+        Self::Robot,
+    ];
+
+    /// As JSON has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NeedleTooShort => "needle_too_short",
+            Self::Blocked => "blocked",
+            Self::Oblique => "oblique",
+            Self::Bone => "bone",
+            Self::Vessel => "vessel",
+            Self::Organ => "organ",
+            Self::Robot => "robot",
+        }
+    }
+
+    /// For people.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::NeedleTooShort => "needle too short",
+            Self::Blocked => "guide in the table or other things",
+            Self::Oblique => "more than 60 deg from the skin's normal",
+            Self::Bone => "bone in the way",
+            Self::Vessel => "vessel in the way",
+            Self::Organ => "another organ in the way",
+            Self::Robot => "robot fails",
+        }
+    }
+
+    /// Of its name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|rule| rule.name() == name)
+    }
+}
+
+/// A direction that was tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EntrySample {
+    /// Azimuth and elevation from the target, deg.
+    pub direction_deg: [f64; 2],
+    /// The first rule that refuses it; none if it is allowed.
+    pub refused: Option<EntryRule>,
+}
+
+/// How far the needle keeps from a tissue.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TissueMargin {
+    /// Bone, vessel or organ.
+    pub tissue: String,
+    /// What of it is nearest by its margin.
+    pub part: String,
+    /// Distance of the needle's surface, m.
+    pub distance_m: f64,
+    /// The least that it has to be, m.
+    pub margin_m: f64,
+}
+
+/// A proposed entry.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Entry {
+    /// Lines for the goal in a scenario.
+    pub toml: String,
+    /// Azimuth and elevation from the target, deg: `entry_direction_deg`.
+    pub direction_deg: [f64; 2],
+    /// Where the needle enters the skin, phantom frame, m.
+    pub entry_in_phantom_m: [f64; 3],
+    /// From the skin to the target, m.
+    pub depth_m: f64,
+    /// Angle between the needle and the skin's normal, rad.
+    pub angle_to_skin_normal_rad: f64,
+    /// What the needle keeps from bone, vessels and organs.
+    pub margins: Vec<TissueMargin>,
+    /// Fissures of the lungs that it crosses.
+    pub fissures_crossed: Vec<String>,
+    /// Configurations that work there, by their final postures.
+    pub working: usize,
+    /// All eight: which work, and why others do not.
+    pub configurations: Vec<ConfigurationPreview>,
+    /// Configurations that also have a motion that meets the criteria, if motions were planned.
+    pub working_planned: Option<usize>,
+    /// From 0 to 1.
+    pub score: f64,
+    /// What it is made of.
+    pub terms: Vec<EntryTerm>,
+}
+
+/// What was found for a target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EntrySearch {
+    /// Name of the goal.
+    pub goal: String,
+    /// Lesion that is aimed at.
+    pub lesion: Option<String>,
+    /// The target, phantom frame, m.
+    pub target_in_phantom_m: [f64; 3],
+    /// What the judgement of robots rests on.
+    pub basis: &'static str,
+    /// Directions that were tried.
+    pub tried: usize,
+    /// Of these, with a needle's route that is allowed.
+    pub allowed: usize,
+    /// Rules that refused the others, the most frequent first.
+    pub refused: Vec<Refused>,
+    /// Allowed entries that the robot was asked for.
+    pub asked: usize,
+    /// Of these, where too few configurations work; by the rule that rejects most of them.
+    pub robot_refused: Vec<Refused>,
+    /// Configurations that have to work.
+    pub wanted: usize,
+    /// The proposals, the best first.
+    pub entries: Vec<Entry>,
+    /// The direction with the best route, whether the robot reaches it or not.
+    #[serde(skip)]
+    pub best_route_deg: Option<[f64; 2]>,
+    /// All that was tried.
+    #[serde(skip)]
+    pub samples: Vec<EntrySample>,
+}
+
+/// An allowed entry, before the robot is asked.
+#[derive(Debug, Clone)]
+struct Allowed {
+    direction_deg: [f64; 2],
+    goal: Goal,
+    entry: Point3<f64>,
+    angle_rad: f64,
+    margins: Vec<TissueMargin>,
+    fissures: Vec<String>,
+    score: f64,
+}
+
+/// Judges directions by their needles.
+struct Judge<'a> {
+    resolved: &'a ResolvedScenario,
+    placed: &'a PlacedPhantom,
+    placer: GoalPlacer<'a>,
+    section: GoalSection,
+    /// Phantom frame.
+    target: Point3<f64>,
+    /// What the scenario's criteria want of the route beside its margins, m.
+    criterion_m: f64,
+}
+
+impl Judge<'_> {
+    fn section_at(&self, direction_deg: [f64; 2]) -> GoalSection {
+        GoalSection {
+            entry_mm: None,
+            entry_direction_deg: Some(direction_deg),
+            ..self.section.clone()
+        }
+    }
+
+    fn judge(&self, direction_deg: [f64; 2]) -> Result<Allowed, EntryRule> {
+        let (resolved, placed) = (self.resolved, self.placed);
+        let tool = &resolved.cell.tool;
+        let [azimuth, elevation] = direction_deg.map(f64::to_radians);
+        let outwards = direction(azimuth, elevation);
+        let skin = placed.phantom.skin_intersection(&self.target, &outwards);
+        let (_, depth_m) = skin.ok_or(EntryRule::Blocked)?;
+        let needed_m = tool.guide_length_m() + self.section.standoff_mm * 1e-3 + depth_m;
+        if tool.needle.length_m < needed_m {
+            return Err(EntryRule::NeedleTooShort);
+        }
+        let goal = self.placer.place(&self.section_at(direction_deg));
+        let goal = goal.map_err(|_| EntryRule::Blocked)?;
+        let to_phantom = placed.world_from_phantom.inverse();
+        let entry = to_phantom * goal.entry_m.ok_or(EntryRule::Blocked)?;
+        let inwards = to_phantom.rotation * goal.axis.into_inner();
+        let normal = placed.phantom.skin_normal(&entry);
+        let angle_rad = (-normal.dot(&inwards)).clamp(-1.0, 1.0).acos();
+        if angle_rad > STEEPEST_RAD {
+            return Err(EntryRule::Oblique);
+        }
+        let margins: Vec<TissueMargin> = judged_tissues(resolved, placed, &goal)
+            .map(|judged| TissueMargin {
+                tissue: judged.nearest.part.tissue.to_string(),
+                part: judged.nearest.part.name.clone(),
+                distance_m: judged.distance_m,
+                margin_m: judged.margin_m.max(self.criterion_m),
+            })
+            .collect();
+        let broken = margins.iter().filter(|each| each.distance_m < each.margin_m);
+        let worst = broken.min_by(|a, b| {
+            (a.distance_m - a.margin_m).total_cmp(&(b.distance_m - b.margin_m))
+        });
+        if let Some(worst) = worst {
+            return Err(EntryRule::of_name(&worst.tissue).unwrap_or(EntryRule::Organ));
+        }
+        let mut allowed = Allowed {
+            direction_deg,
+            fissures: crossed_fissures(resolved, &goal),
+            goal,
+            entry,
+            angle_rad,
+            margins,
+            score: 0.0,
+        };
+        allowed.score = score(&terms(&allowed, self.depth_m(&allowed), None));
+        Ok(allowed)
+    }
+
+    fn depth_m(&self, allowed: &Allowed) -> f64 {
+        (self.target - allowed.entry).norm()
+    }
+
+    /// The best direction within a step of the grid.
+    fn refined(&self, allowed: &Allowed) -> Allowed {
+        around(allowed.direction_deg)
+            .filter_map(|direction_deg| self.judge(direction_deg).ok())
+            .fold(allowed.clone(), |best, each| {
+                if each.score > best.score { each } else { best }
+            })
+    }
+}
+
+fn terms(allowed: &Allowed, depth_m: f64, working: Option<usize>) -> Vec<EntryTerm> {
+    let spare_m = allowed
+        .margins
+        .iter()
+        .map(|each| each.distance_m - each.margin_m)
+        .fold(f64::INFINITY, f64::min);
+    // Where there is nothing to keep away from there is all the room that counts.
+    let spare_m = if spare_m.is_finite() { spare_m } else { SCALES[1].best };
+    let values = [
+        Some(depth_m),
+        Some(spare_m),
+        Some(allowed.angle_rad),
+        Some(if allowed.fissures.is_empty() { 0.0 } else { 1.0 }),
+        working.map(|count| count as f64),
+    ];
+    let known = SCALES.iter().zip(values);
+    known
+        .filter_map(|(scale, value)| {
+            let value = value?;
+            Some(EntryTerm {
+                term: scale.name,
+                value,
+                utility: ((value - scale.worst) / (scale.best - scale.worst)).clamp(0.0, 1.0),
+                weight: scale.weight,
+            })
+        })
+        .collect()
+}
+
+fn score(terms: &[EntryTerm]) -> f64 {
+    let weight: f64 = terms.iter().map(|term| term.weight).sum();
+    let sum: f64 = terms.iter().map(|term| term.weight * term.utility).sum();
+    sum / weight
+}
+
+/// Proposes up to `count` entries for a goal's target in a scenario's cell; an entry that it has does not count, nor
+/// what it expects. The same for any number of threads.
+///
+/// # Errors
+/// If there is no patient, the target is none, or it was interrupted.
+pub fn suggest_entries(
+    resolved: &ResolvedScenario,
+    section: &GoalSection,
+    count: usize,
+    control: &Control<'_>,
+) -> Result<EntrySearch, SuggestError> {
+    let criteria = &resolved.scenario.criteria;
+    let mut section = section.clone();
+    section.expected.clear();
+    let placer = GoalPlacer::new(resolved);
+    let target = placer.target(&section)?;
+    let placed = resolved.phantom.as_ref().expect("a target is in a patient");
+    let judge = Judge {
+        resolved,
+        placed,
+        placer,
+        section,
+        target,
+        criterion_m: criteria.min_clearance_mm.needle_route.unwrap_or(0.0) * 1e-3,
+    };
+    let tried = directions();
+    control.progress.message("routes");
+    let judged = in_parallel(control.threads, &tried, |direction_deg| {
+        if control.is_cancelled() {
+            Err(EntryRule::Blocked)
+        } else {
+            judge.judge(*direction_deg)
+        }
+    });
+    if control.is_cancelled() {
+        return Err(SuggestError::Interrupted);
+    }
+    let mut samples: Vec<EntrySample> = tried
+        .iter()
+        .zip(&judged)
+        .map(|(direction_deg, judged)| EntrySample {
+            direction_deg: *direction_deg,
+            refused: judged.as_ref().err().copied(),
+        })
+        .collect();
+    let mut allowed: Vec<Allowed> = judged.into_iter().flatten().collect();
+    allowed.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let wanted = (criteria.min_working_configurations as usize).max(1);
+    let asked = ask_robot(&judge, &allowed, count, wanted, control)?;
+    for (direction_deg, rule) in asked.failed() {
+        let sample = samples
+            .iter_mut()
+            .find(|sample| sample.direction_deg == direction_deg);
+        if let Some(sample) = sample {
+            sample.refused = Some(rule);
+        }
+    }
+    let refused = counted(
+        samples
+            .iter()
+            .filter_map(|sample| sample.refused)
+            .filter(|rule| *rule != EntryRule::Robot)
+            .map(EntryRule::name),
+    );
+    Ok(EntrySearch {
+        goal: judge.section.name.clone(),
+        lesion: judge.section.lesion.clone(),
+        target_in_phantom_m: target.coords.into(),
+        basis: crate::preview::BASIS,
+        tried: tried.len(),
+        allowed: allowed.len(),
+        refused,
+        asked: asked.answers.len(),
+        robot_refused: counted(asked.answers.iter().filter_map(|answer| answer.broken.as_deref())),
+        wanted,
+        best_route_deg: asked.answers.first().map(|answer| answer.allowed.direction_deg),
+        entries: asked.entries(&judge, count),
+        samples,
+    })
+}
+
+/// What the robot makes of an allowed entry.
+struct Answer {
+    /// On the grid, before it was moved.
+    grid_deg: [f64; 2],
+    allowed: Allowed,
+    configurations: Vec<ConfigurationPreview>,
+    working: usize,
+    /// The rule that rejects most configurations, if too few work.
+    broken: Option<String>,
+}
+
+struct Asked {
+    answers: Vec<Answer>,
+}
+
+impl Asked {
+    fn failed(&self) -> impl Iterator<Item = ([f64; 2], EntryRule)> {
+        let failed = self.answers.iter().filter(|answer| answer.broken.is_some());
+        failed.map(|answer| (answer.grid_deg, EntryRule::Robot))
+    }
+
+    fn entries(self, judge: &Judge<'_>, count: usize) -> Vec<Entry> {
+        let works = self.answers.into_iter().filter(|answer| answer.broken.is_none());
+        let mut entries: Vec<Entry> = works
+            .map(|answer| {
+                let Answer {
+                    allowed,
+                    configurations,
+                    working,
+                    ..
+                } = answer;
+                let depth_m = judge.depth_m(&allowed);
+                let terms = terms(&allowed, depth_m, Some(working));
+                let [azimuth, elevation] = allowed.direction_deg;
+                let mm = allowed.entry.coords * 1e3;
+                Entry {
+                    toml: format!(
+                        "entry_direction_deg = [{azimuth}, {elevation}] # enters at [{:.1}, {:.1}, {:.1}] mm, {:.0} mm deep",
+                        mm.x,
+                        mm.y,
+                        mm.z,
+                        depth_m * 1e3
+                    ),
+                    direction_deg: allowed.direction_deg,
+                    entry_in_phantom_m: allowed.entry.coords.into(),
+                    depth_m,
+                    angle_to_skin_normal_rad: allowed.angle_rad,
+                    margins: allowed.margins,
+                    fissures_crossed: allowed.fissures,
+                    working,
+                    configurations,
+                    working_planned: None,
+                    score: score(&terms),
+                    terms,
+                }
+            })
+            .collect();
+        // The sort is stable: equals stay in the order of their routes.
+        entries.sort_by(|a, b| b.score.total_cmp(&a.score));
+        entries.truncate(count);
+        entries
+    }
+}
+
+/// Asks the robot for the best entries, until as many as wanted work or it has failed often.
+fn ask_robot(
+    judge: &Judge<'_>,
+    allowed: &[Allowed],
+    count: usize,
+    wanted: usize,
+    control: &Control<'_>,
+) -> Result<Asked, SuggestError> {
+    let resolved = judge.resolved;
+    let model = ClearanceModel::new(&resolved.cell);
+    let planner = Planner::new(resolved, &model)
+        .map_err(|error| SuggestError::refused(error.to_string(), "only UR arms can be asked"))?;
+    control.progress.message("configurations");
+    let mut answers: Vec<Answer> = Vec::new();
+    let mut next = 0;
+    let is_free = |entry: &Point3<f64>, answers: &[Answer]| {
+        answers.iter().all(|answer| {
+            let apart_m = if answer.broken.is_none() { APART_M } else { FAILED_APART_M };
+            (entry - answer.allowed.entry).norm() >= apart_m
+        })
+    };
+    while answers.iter().filter(|answer| answer.broken.is_none()).count() < count
+        && answers.len() < MOST_ASKED
+    {
+        let mut batch: Vec<([f64; 2], Allowed)> = Vec::new();
+        while batch.len() < BATCH && next < allowed.len() {
+            let candidate = &allowed[next];
+            next += 1;
+            let apart = |entry: &Point3<f64>| {
+                is_free(entry, &answers)
+                    && batch.iter().all(|(_, each)| (entry - each.entry).norm() >= APART_M)
+            };
+            if !apart(&candidate.entry) {
+                continue;
+            }
+            let refined = judge.refined(candidate);
+            let chosen = if apart(&refined.entry) { refined } else { candidate.clone() };
+            batch.push((candidate.direction_deg, chosen));
+        }
+        if batch.is_empty() {
+            break;
+        }
+        control.progress.expect(batch.len() as u64);
+        let previews = in_parallel(control.threads, &batch, |(_, allowed)| {
+            let found = (!control.is_cancelled()).then(|| goal_preview(&planner, resolved, &allowed.goal));
+            control.progress.step();
+            found
+        });
+        for ((grid_deg, allowed), preview) in batch.into_iter().zip(previews) {
+            let preview = preview.ok_or(SuggestError::Interrupted)?;
+            let broken = (preview.working < wanted).then(|| {
+                let rules = preview.configurations.iter().filter(|each| !each.works);
+                let first = counted(rules.map(ConfigurationPreview::reason));
+                first.first().map_or_else(String::new, |first| first.rule.clone())
+            });
+            answers.push(Answer {
+                grid_deg,
+                allowed,
+                working: preview.working,
+                configurations: preview.configurations,
+                broken,
+            });
+        }
+    }
+    Ok(Asked { answers })
+}
+
+/// Chooses the first proposal: for scenarios that leave an entry open.
+///
+/// # Errors
+/// A message and a hint, where there is none.
+pub fn choose_entry(
+    resolved: &ResolvedScenario,
+    section: &GoalSection,
+) -> Result<ChosenEntry, [String; 2]> {
+    let control = Control {
+        threads: std::thread::available_parallelism().map_or(1, usize::from),
+        cancel: &std::sync::atomic::AtomicBool::new(false),
+        progress: &Silent,
+    };
+    let found = suggest_entries(resolved, section, 1, &control).map_err(|error| match error {
+        SuggestError::Interrupted => [error.to_string(), String::new()],
+        SuggestError::Refused { message, hint } => [message, hint],
+    })?;
+    let Some(entry) = found.entries.first() else {
+        return Err([
+            format!(
+                "goal `{}` has no entry, and none can be assumed: {}",
+                found.goal,
+                found.why_none()
+            ),
+            "`needlebench suggest` shows all that was tried; or give `entry_mm` or `entry_direction_deg`".to_owned(),
+        ]);
+    };
+    let nearest = entry.margins.iter().min_by(|a, b| {
+        (a.distance_m - a.margin_m).total_cmp(&(b.distance_m - b.margin_m))
+    });
+    let nearest = nearest.map_or(String::new(), |each| {
+        format!(", {:.1} mm from {} ({})", each.distance_m * 1e3, each.part, each.tissue)
+    });
+    let [azimuth, elevation] = entry.direction_deg;
+    Ok(ChosenEntry {
+        direction_deg: entry.direction_deg,
+        in_words: format!(
+            "`entry_direction_deg = [{azimuth}, {elevation}]`, {:.0} mm deep{nearest}; the first of those that \
+             `needlebench suggest` proposes",
+            entry.depth_m * 1e3
+        ),
+    })
+}
+
+impl EntrySearch {
+    /// Why nothing is proposed.
+    pub fn why_none(&self) -> String {
+        if self.allowed == 0 {
+            let most = self.refused.first();
+            let rule = most.and_then(|most| EntryRule::of_name(&most.rule));
+            return format!(
+                "of {} directions none has an allowed needle's route; most often: {} ({})",
+                self.tried,
+                rule.map_or("", EntryRule::in_words),
+                most.map_or(0, |most| most.count),
+            );
+        }
+        let most = self.robot_refused.first();
+        format!(
+            "{} of {} needle's routes are allowed, but at the {} best and apart of them fewer than {} of 8 \
+             configurations work; most often: {}",
+            self.allowed,
+            self.tried,
+            self.asked,
+            self.wanted,
+            most.map_or("", |most| most.rule.as_str()),
+        )
+    }
+}

@@ -1,0 +1,77 @@
+//! Proposals for a scenario: where a needle may enter for a target, and where the robot may stand for its goals.
+//!
+//! Both are found on a stated grid, judged by the code that `check` and static cases of studies have, and ranked by
+//! stated terms: nothing here has rules of its own about routes or clearances. Postures only are judged, unless motions
+//! are asked for.
+
+mod entries;
+mod grid;
+mod places;
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+pub use entries::{
+    ENTRY_TERMS, Entry, EntryRule, EntrySample, EntrySearch, EntryTerm, TissueMargin, choose_entry,
+    suggest_entries,
+};
+pub use places::{Place, PlaceGoal, PlaceSample, PlaceSearch, plan_place, suggest_places};
+
+/// Why nothing could be proposed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SuggestError {
+    /// The user stopped it.
+    #[error("interrupted")]
+    Interrupted,
+    /// Something about the scenario, and how to mend it.
+    #[error("{message}")]
+    Refused {
+        /// What is wrong.
+        message: String,
+        /// How to mend it.
+        hint: String,
+    },
+}
+
+impl From<needlebench_cell::Finding> for SuggestError {
+    fn from(finding: needlebench_cell::Finding) -> Self {
+        Self::refused(finding.message, finding.hint.unwrap_or_default())
+    }
+}
+
+impl SuggestError {
+    fn refused(message: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self::Refused {
+            message: message.into(),
+            hint: hint.into(),
+        }
+    }
+}
+
+/// How many of what was tried a rule refused.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Refused {
+    /// The rule.
+    pub rule: String,
+    /// How many it refused.
+    pub count: usize,
+}
+
+/// Counts of rules, the most frequent first.
+fn counted<'a>(rules: impl Iterator<Item = &'a str>) -> Vec<Refused> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for rule in rules {
+        *counts.entry(rule).or_default() += 1;
+    }
+    let mut counts: Vec<Refused> = counts
+        .into_iter()
+        .map(|(rule, count)| Refused {
+            rule: rule.to_owned(),
+            count,
+        })
+        .collect();
+    // The sort is stable: equals stay in the order of their names.
+    counts.sort_by_key(|refused| std::cmp::Reverse(refused.count));
+    counts
+}

@@ -1,0 +1,100 @@
+//! Entries that a scenario leaves open, and goals that are tried in its cell.
+
+use nalgebra::Point3;
+
+use super::goals::{BodyBoxes, Goal, Surroundings, resolve_goal, target_inside};
+use super::{Finding, ResolvedScenario};
+use crate::model::{BodyKind, CollisionBody, Frame};
+use crate::scenario::GoalSection;
+use crate::toml_text::TomlText;
+
+/// Where a needle is to enter, and by what that was chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChosenEntry {
+    /// For `entry_direction_deg`.
+    pub direction_deg: [f64; 2],
+    /// What it is, for people.
+    pub in_words: String,
+}
+
+/// Chooses an entry for a goal that has none, in a cell without its goals; a message and a hint where there is
+/// none to choose.
+type Choose = fn(&ResolvedScenario, &GoalSection) -> Result<ChosenEntry, [String; 2]>;
+
+/// Who chooses entries that scenarios leave open: what it takes to judge them is above this crate.
+#[derive(Debug, Clone, Copy)]
+pub struct EntryChooser(pub Choose);
+
+/// Says nothing of what is resolved.
+impl PartialEq for EntryChooser {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+/// The cell of a scenario, whose goals are still to be placed in it.
+#[derive(Debug, Clone)]
+pub struct OpenScenario {
+    /// Everything but the goals.
+    pub resolved: ResolvedScenario,
+    /// The goals of the file, sound or not; one without an entry has none.
+    pub goals: Vec<GoalSection>,
+}
+
+/// Places goals in the cell of a scenario, one after the other.
+#[derive(Debug)]
+pub struct GoalPlacer<'a> {
+    resolved: &'a ResolvedScenario,
+    fixtures: Vec<CollisionBody>,
+    boxes: Vec<BodyBoxes>,
+}
+
+impl<'a> GoalPlacer<'a> {
+    /// For the cell of a scenario; its own goals do not count.
+    pub fn new(resolved: &'a ResolvedScenario) -> Self {
+        let stands = |body: &&CollisionBody| {
+            body.frame == Frame::World && !matches!(body.kind, BodyKind::Base | BodyKind::Phantom)
+        };
+        let fixtures: Vec<CollisionBody> = resolved.cell.bodies.iter().filter(stands).cloned().collect();
+        Self {
+            resolved,
+            boxes: fixtures.iter().map(BodyBoxes::new).collect(),
+            fixtures,
+        }
+    }
+
+    /// A goal's target, phantom frame, m.
+    ///
+    /// # Errors
+    /// What a scenario with this goal is refused for, whatever its entry.
+    pub fn target(&self, section: &GoalSection) -> Result<Point3<f64>, Finding> {
+        let toml = TomlText::without_text(&self.resolved.source.file);
+        let key = |name: &str| format!("goals[0].{name}");
+        let Some(placed) = &self.resolved.phantom else {
+            return Err(toml.finding("phantom", "there is no patient").hint("add a [phantom] section"));
+        };
+        if section.flange_pose.is_some() {
+            let message = format!("goal `{}` is a pose of the flange, which decides its entry", section.name);
+            return Err(toml
+                .finding(&key("flange_pose"), message)
+                .hint("give it a `lesion` or `target_mm` instead"));
+        }
+        target_inside(&toml, &key, section, &placed.phantom).map(|(target, _)| target)
+    }
+
+    /// The goal in the world.
+    ///
+    /// # Errors
+    /// What a scenario with this goal is refused for, with keys of the first goal and without lines.
+    pub fn place(&self, section: &GoalSection) -> Result<Goal, Finding> {
+        let toml = TomlText::without_text(&self.resolved.source.file);
+        let surroundings = Surroundings {
+            robot: &self.resolved.cell.robot,
+            tool: &self.resolved.cell.tool,
+            phantom: self.resolved.phantom.as_ref(),
+            fixtures: &self.fixtures,
+            boxes: &self.boxes,
+        };
+        resolve_goal(&toml, 0, section, &surroundings, &mut Vec::new())
+    }
+}
