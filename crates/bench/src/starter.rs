@@ -228,20 +228,14 @@ fn text(
         Template::Lateral => (750, "position_mm = [0, 0, 20] # mid-chest in the world; the third: a cushion on the table\n"),
     };
     let goal = entry.map_or(String::new(), |entry| {
-        let margins: Vec<String> = entry
-            .margins
-            .iter()
-            .map(|each| format!("{:.1} mm from {} ({})", each.distance_m * 1e3, each.part, each.tissue))
+        let margins = entry.margins.iter();
+        let margins: String = margins
+            .map(|each| format!("\n# {:.1} mm from {} ({})", each.distance_m * 1e3, each.part, each.tissue))
             .collect();
         let [azimuth, elevation] = entry.direction_deg;
-        let clear = if margins.is_empty() {
-            String::new()
-        } else {
-            format!("\n# It keeps {}.", margins.join(", "))
-        };
         format!(
             "# Where the needle enters, as seen from the target: azimuth (0 front, 90 patient's left, -90 right) and\n\
-             # elevation (90 towards the head), deg. Here {:.0} mm deep.{clear}\n\
+             # elevation (90 towards the head), deg. Here the needle goes {:.0} mm deep and passes{margins}\n\
              # `needlebench suggest {name}.toml` proposes others; a point is `entry_mm = [left, posterior, superior]`.\n\
              entry_direction_deg = [{azimuth}, {elevation}]\n",
             entry.depth_m * 1e3
@@ -256,8 +250,8 @@ fn text(
 # change `needlebench check {name}.toml` says in a moment what can work. Every key that is left out has a default;
 # scenario.schema.json describes all of them, and editors that know the line at the top show it.
 #
-# Lengths are in mm, angles in deg, as keys say. World: x towards the patient's head, {right}, z up,
-# floor at 0. Points of the patient: from mid-chest, x to the patient's left, y to the back, z to the head.
+# Lengths are in mm, angles in deg, as keys say. World: x towards the patient's head, {right}, z up
+# from the floor. Points of the patient: from mid-chest, x to the patient's left, y to the back, z to the head.
 name = "{name}"
 description = "A first scenario: {about_small}."
 seed = 1 # of everything random: the same seed gives the same results

@@ -8,9 +8,9 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 use crate::clock::elapsed;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, FkArguments,
-    ISO9283_HELP, IkArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments,
+    ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments,
     REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments, ReportArguments, RunArguments,
-    STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
+    STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments, SuggestArguments,
 };
 use crate::exit::ExitStatus;
 use crate::output::{complain, keep_to_width};
@@ -30,6 +30,14 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Write a first scenario: small, commented, and one that passes.
+    #[command(after_help = "Example: needlebench init my_cell.toml --arm ur5e --lesion left_upper_lobe")]
+    Init(InitArguments),
+    /// Propose entries for a lesion, and places for the robot's base, as TOML to paste.
+    #[command(
+        after_help = "Example: needlebench suggest scenarios/supine_suite.toml --lesion left_upper_lobe --out out"
+    )]
+    Suggest(Box<SuggestArguments>),
     /// Plan, simulate and measure every configuration of every goal.
     #[command(after_help = "Example: needlebench run scenarios/table3.toml")]
     Run(RunArguments),
@@ -151,6 +159,8 @@ fn run() -> ExitCode {
     let cli = Cli::parse();
     keep_to_width();
     let result = match cli.command {
+        Command::Init(arguments) => command::init(&arguments),
+        Command::Suggest(arguments) => command::suggest(&arguments),
         Command::Run(arguments) => command::run(&arguments),
         Command::Check(arguments) => command::check(&arguments),
         Command::Ik(arguments) => command::ik(&arguments),

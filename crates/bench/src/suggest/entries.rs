@@ -3,8 +3,8 @@
 //! # How they are found
 //!
 //! 1. Directions from the target, 3 deg apart all round, are placed as a scenario with such a goal is: the needle has to
-//!    be long enough, nothing may stand where guide and needle are, it may be oblique to the skin by 60 deg at most, and
-//!    keep its margins to bone, vessels and organs.
+//!    be long enough, nothing may stand where guide and needle are, it may not enter at the neck or the waist, where the
+//!    chest ends, nor be oblique to the skin by more than 60 deg, and has to keep its margins to bone, vessels and organs.
 //! 2. Those that are left are ordered by score. From the best on, each is moved by up to 2 deg to where its score is
 //!    best, and is looked at with the robot: as many configurations as the scenario wants have to work, by the code of
 //!    `check`. Entries nearer than 15 mm to a better one are left out, those near one where the robot fails too.
@@ -19,6 +19,7 @@ use needlebench_cell::{
 };
 use needlebench_clearance::ClearanceModel;
 use needlebench_planning::{Planner, crossed_fissures, judged_tissues};
+use needlebench_study::Outcome;
 use serde::Serialize;
 
 use super::grid::{around, directions};
@@ -27,6 +28,7 @@ use crate::control::Control;
 use crate::parallel::in_parallel;
 use crate::preview::{ConfigurationPreview, goal_preview};
 use crate::progress::Silent;
+use crate::study::planned_rows;
 
 /// Distance between proposed entries on the skin, m: entries nearer than that are the same to a hand.
 const APART_M: f64 = 0.015;
@@ -36,6 +38,9 @@ const FAILED_APART_M: f64 = 0.008;
 const BATCH: usize = 8;
 /// Entries that the robot is asked for at most: where so many fail, the robot stands elsewhere.
 const MOST_ASKED: usize = 64;
+/// Part of the skin's normal along the body beyond which the skin is that of an end of the chest: neck, shoulders or
+/// waist begin there, which the phantom does not have (assumed: 45 deg).
+const END_Z: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Largest angle between needle and the skin's normal, rad: beyond it a needle slips along the skin (assumed).
 const STEEPEST_RAD: f64 = FRAC_PI_3;
 
@@ -59,9 +64,11 @@ const SCALES: [TermScale; 5] = [
 ];
 
 /// What the score is made of, for people.
-pub const ENTRY_TERMS: &str = "score: mean of depth (1 at 40 mm, 0 at 140), margin to spare beyond what is kept from bone, \
-     vessels and organs (1 at 5 mm), angle to the skin's normal (1 at 0 deg, 0 at 60), fissures crossed (half weight) \
-     and configurations that work";
+pub const ENTRY_TERMS: &str = "\
+score: mean of depth (1 at 40 mm, 0 at 140), margin to spare beyond what is
+  kept from bone, vessels and organs (1 at 5 mm), angle to the skin's normal
+  (1 at 0 deg, 0 at 60), fissures crossed (half weight), and configurations
+  that work";
 
 /// A term of one entry's score.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -83,6 +90,8 @@ pub enum EntryRule {
     NeedleTooShort,
     /// Guide or entry would be in something, or the goal is refused otherwise.
     Blocked,
+    /// At the neck or the waist, where the chest ends and is no skin.
+    End,
     /// Too oblique to the skin.
     Oblique,
     /// Through bone or too near to it.
@@ -97,9 +106,10 @@ pub enum EntryRule {
 
 impl EntryRule {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::NeedleTooShort,
         Self::Blocked,
+        Self::End,
         Self::Oblique,
         Self::Bone,
         Self::Vessel,
@@ -112,6 +122,7 @@ impl EntryRule {
         match self {
             Self::NeedleTooShort => "needle_too_short",
             Self::Blocked => "blocked",
+            Self::End => "end_of_chest",
             Self::Oblique => "oblique",
             Self::Bone => "bone",
             Self::Vessel => "vessel",
@@ -125,6 +136,7 @@ impl EntryRule {
         match self {
             Self::NeedleTooShort => "needle too short",
             Self::Blocked => "guide in the table or other things",
+            Self::End => "at the neck or waist, where the chest ends",
             Self::Oblique => "more than 60 deg from the skin's normal",
             Self::Bone => "bone in the way",
             Self::Vessel => "vessel in the way",
@@ -201,6 +213,8 @@ pub struct EntrySearch {
     pub target_in_phantom_m: [f64; 3],
     /// What the judgement of robots rests on.
     pub basis: &'static str,
+    /// Position of the robot's base that was asked, m.
+    pub base_position_m: [f64; 3],
     /// Directions that were tried.
     pub tried: usize,
     /// Of these, with a needle's route that is allowed.
@@ -273,7 +287,10 @@ impl Judge<'_> {
         let entry = to_phantom * goal.entry_m.ok_or(EntryRule::Blocked)?;
         let inwards = to_phantom.rotation * goal.axis.into_inner();
         let normal = placed.phantom.skin_normal(&entry);
-        let angle_rad = (-normal.dot(&inwards)).clamp(-1.0, 1.0).acos();
+        if normal.z.abs() > END_Z {
+            return Err(EntryRule::End);
+        }
+        let angle_rad = normal.angle(&-inwards);
         if angle_rad > STEEPEST_RAD {
             return Err(EntryRule::Oblique);
         }
@@ -423,6 +440,7 @@ pub fn suggest_entries(
         lesion: judge.section.lesion.clone(),
         target_in_phantom_m: target.coords.into(),
         basis: crate::preview::BASIS,
+        base_position_m: resolved.cell.robot.world_from_base_link.translation.vector.into(),
         tried: tried.len(),
         allowed: allowed.len(),
         refused,
@@ -564,6 +582,31 @@ fn ask_robot(
         }
     }
     Ok(Asked { answers })
+}
+
+/// Plans the motions to an entry of a goal, and says for how many configurations there is one.
+///
+/// # Errors
+/// If the goal cannot be planned at all.
+pub fn plan_entry(
+    resolved: &ResolvedScenario,
+    section: &GoalSection,
+    entry: &mut Entry,
+) -> Result<(), SuggestError> {
+    let section = GoalSection {
+        entry_mm: None,
+        entry_direction_deg: Some(entry.direction_deg),
+        ..section.clone()
+    };
+    let goal = GoalPlacer::new(resolved).place(&section)?;
+    let mut with_goal = resolved.clone();
+    with_goal.goals = vec![goal];
+    with_goal.scenario.goals = vec![section];
+    let rows = planned_rows(&with_goal)
+        .map_err(|message| SuggestError::refused(message, String::new()))?;
+    let works = rows.iter().filter(|row| row.outcome == Outcome::Ok);
+    entry.working_planned = Some(works.count());
+    Ok(())
 }
 
 /// Chooses the first proposal: for scenarios that leave an entry open.

@@ -14,9 +14,9 @@ use serde::Serialize;
 
 pub use entries::{
     ENTRY_TERMS, Entry, EntryRule, EntrySample, EntrySearch, EntryTerm, TissueMargin, choose_entry,
-    suggest_entries,
+    plan_entry, suggest_entries,
 };
-pub use places::{Place, PlaceGoal, PlaceSample, PlaceSearch, plan_place, suggest_places};
+pub use places::{Place, PlaceGoal, PlaceSample, PlaceSearch, at_place, plan_place, suggest_places};
 
 /// Why nothing could be proposed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -41,7 +41,7 @@ impl From<needlebench_cell::Finding> for SuggestError {
 }
 
 impl SuggestError {
-    fn refused(message: impl Into<String>, hint: impl Into<String>) -> Self {
+    pub(crate) fn refused(message: impl Into<String>, hint: impl Into<String>) -> Self {
         Self::Refused {
             message: message.into(),
             hint: hint.into(),

@@ -3,7 +3,7 @@
 //! Places on a grid about the patient, in whole centimetres, are judged as static cases of a study are: a place that
 //! cannot be is refused by what it breaks, one where a goal has fewer working configurations than the scenario wants by
 //! the rule that rejects most of them. The others are ordered by their worst goal: first by how many configurations work
-//! there, then by the clearance of its best configuration from all but the arm itself. Proposals are 100 mm apart.
+//! there, then by the clearance of its best configuration's arm from its surroundings. Proposals are 100 mm apart.
 
 use std::sync::atomic::Ordering;
 
@@ -36,7 +36,7 @@ pub struct PlaceGoal {
     pub working: usize,
     /// That of them with the largest clearance.
     pub best: String,
-    /// Its least clearance from all but the arm itself, m; none if there is nothing to be near to.
+    /// Least clearance of its arm from patient, table, gantry, mount and obstacles, m; none if there is none of them.
     pub clearance_m: Option<f64>,
     /// Configurations that also have a motion that meets the criteria, if motions were planned.
     pub working_planned: Option<usize>,
@@ -231,7 +231,13 @@ impl Search<'_> {
                 let broken = rows.iter().filter(|row| !works(row));
                 let rules = counted(broken.map(|row| row.detail.as_ref()));
                 let rule = rules.first().map_or("", |first| first.rule.as_str());
-                return Judged::Fails(working, format!("{goal}: {rule}"));
+                return Judged::Fails(
+                    working,
+                    match self.goals {
+                        [_] => rule.to_owned(),
+                        _ => format!("{goal}: {rule}"),
+                    },
+                );
             }
             let best = rows.iter().filter(works).max_by(|a, b| {
                 let clear = |row: &CaseRow| clearance_m(row).unwrap_or(f64::INFINITY);
@@ -241,7 +247,7 @@ impl Search<'_> {
             served.push(PlaceGoal {
                 goal: goal.clone(),
                 working,
-                best: best.map_or_else(String::new, |row| row.measured.label.clone()),
+                best: best.map_or_else(String::new, |row| row.measured.label.to_owned()),
                 clearance_m: best.and_then(clearance_m),
                 working_planned: None,
             });
@@ -282,23 +288,38 @@ impl Search<'_> {
     }
 }
 
+/// The scenario with a goal alone and the base at a place.
+///
+/// # Errors
+/// If there cannot be such a layout.
+pub fn at_place(
+    family: &ScenarioFamily,
+    goal: &str,
+    place: &Place,
+) -> Result<ResolvedScenario, SuggestError> {
+    let at = BasePlace {
+        position_mm: place.position_mm,
+        rpy_deg: place.rpy_deg,
+    };
+    let resolved = family.vary(goal, &changes(&at));
+    resolved.map_err(|findings| SuggestError::refused(in_words(&findings), String::new()))
+}
+
 /// Plans the motions of a place's goals, and says for how many configurations there is one.
 ///
 /// # Errors
 /// If a goal cannot be planned at all.
 pub fn plan_place(family: &ScenarioFamily, place: &mut Place) -> Result<(), SuggestError> {
-    let at = BasePlace {
-        position_mm: place.position_mm,
-        rpy_deg: place.rpy_deg,
-    };
-    for goal in &mut place.goals {
-        let resolved = family.vary(&goal.goal, &changes(&at));
-        let resolved = resolved
-            .map_err(|findings| SuggestError::refused(in_words(&findings), String::new()))?;
+    let mut counts = Vec::with_capacity(place.goals.len());
+    for goal in &place.goals {
+        let resolved = at_place(family, &goal.goal, place)?;
         let rows = planned_rows(&resolved)
             .map_err(|message| SuggestError::refused(message, String::new()))?;
         let works = rows.iter().filter(|row| row.outcome == Outcome::Ok);
-        goal.working_planned = Some(works.count());
+        counts.push(works.count());
+    }
+    for (goal, count) in place.goals.iter_mut().zip(counts) {
+        goal.working_planned = Some(count);
     }
     Ok(())
 }
@@ -325,10 +346,11 @@ fn in_words(findings: &[Finding]) -> String {
     }
 }
 
-/// Least clearance from all that is not the arm itself, m.
+/// Least clearance of the arm from its surroundings, m.
 fn clearance_m(row: &CaseRow) -> Option<f64> {
-    /// Classes of what the arm and its tool keep from, or between the needle and the patient.
-    const LEFT_OUT: [ClearanceClass; 4] = [
+    /// The arm against itself, and what the goal decides wherever the robot stands.
+    const LEFT_OUT: [ClearanceClass; 5] = [
+        ClearanceClass::ToolPhantom,
         ClearanceClass::SelfCollision,
         ClearanceClass::GuideStandoff,
         ClearanceClass::NeedleCorridor,
@@ -342,9 +364,10 @@ fn clearance_m(row: &CaseRow) -> Option<f64> {
 fn present_place(base: &ResolvedScenario) -> BasePlace {
     let pose = &base.cell.robot.world_from_base_link;
     let (roll, pitch, yaw) = pose.rotation.euler_angles();
+    let angles = [roll, pitch, yaw].map(|angle| tenth(angle.to_degrees()));
     BasePlace {
         position_mm: (pose.translation.vector * 1e3).map(tenth).into(),
-        rpy_deg: [roll, pitch, yaw].map(|angle| tenth(angle.to_degrees())),
+        rpy_deg: base.scenario.robot.base_rpy_deg.unwrap_or(angles),
     }
 }
 

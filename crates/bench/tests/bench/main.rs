@@ -4,3 +4,4 @@ mod further_engine;
 #[path = "../../../engine/tests/engine/common/replay.rs"]
 mod replay;
 mod study_cases;
+mod suggest;

@@ -5,6 +5,7 @@ mod check;
 mod clearance;
 mod compare;
 mod doctor;
+mod init;
 mod iso9283;
 mod kinematics;
 mod pairs;
@@ -16,12 +17,13 @@ mod run;
 mod schema;
 mod servo;
 mod study;
+mod suggest;
 
 use std::path::Path;
 
 use anyhow::Result;
 use needlebench_cell::{
-    Finding, Overrides, PackagePaths, ResolvedScenario, load_scenario, printable_json,
+    EntryChooser, Finding, Overrides, PackagePaths, ResolvedScenario, load_scenario, printable_json,
 };
 use needlebench_engine::{ENGINES, engine_names};
 use serde::Serialize;
@@ -31,6 +33,7 @@ pub(crate) use check::{CheckArguments, check};
 pub(crate) use clearance::{ClearanceArguments, clearance};
 pub(crate) use compare::{CompareArguments, compare, compare_help};
 pub(crate) use doctor::doctor;
+pub(crate) use init::{InitArguments, init};
 pub(crate) use iso9283::{ISO9283_HELP, Iso9283Arguments, iso9283};
 pub(crate) use kinematics::{FkArguments, IkArguments, fk, ik};
 pub(crate) use pairs::{PairsArguments, pairs};
@@ -42,8 +45,10 @@ pub(crate) use run::{RunArguments, run};
 pub(crate) use schema::{SchemaFormat, schema};
 pub(crate) use servo::{ServoArguments, servo};
 pub(crate) use study::{MergeArguments, STUDY_HELP, StudyArguments, merge, study};
+pub(crate) use suggest::{SuggestArguments, suggest};
 
 use needlebench_bench::Runnable;
+use needlebench_bench::suggest::choose_entry;
 
 use crate::arguments::{RobotArguments, UrdfArguments};
 use crate::exit::ExitStatus;
@@ -87,6 +92,7 @@ fn urdf_overrides(arguments: &UrdfArguments) -> Result<Overrides, Finding> {
         calibration: arguments.calibration.clone(),
         engines: engine_names(ENGINES),
         missing_inertia: arguments.missing_inertia.clone(),
+        choose_entry: Some(EntryChooser(choose_entry)),
     })
 }
 

@@ -90,7 +90,7 @@ pub(crate) struct RecordPlanArguments {
 
 /// Three finite numbers between commas.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Three([f64; 3]);
+pub(crate) struct Three(pub [f64; 3]);
 
 impl std::str::FromStr for Three {
     type Err = String;

@@ -34,28 +34,30 @@ impl SchemaFormat {
     }
 }
 
-/// Prints the schema of a file format, or the table of metrics.
+/// Prints what is asked for, as JSON or as Markdown.
 pub(crate) fn schema(format: SchemaFormat, markdown: bool) -> Result<ExitStatus> {
+    if !markdown {
+        print_json(&document(format))?;
+    } else if format == SchemaFormat::Metrics {
+        print_text(metrics_markdown().trim_end())?;
+    } else {
+        print_text(schema_markdown(format.title(), &document(format)).trim_end())?;
+    }
+    Ok(ExitStatus::Success)
+}
+
+/// The schema of a format; of metrics their descriptions.
+pub(super) fn document(format: SchemaFormat) -> Value {
     let mut schema = match format {
         SchemaFormat::Scenario => needlebench_cell::scenario::scenario_schema(),
         SchemaFormat::Study => needlebench_cell::study::study_schema(),
         SchemaFormat::Arm => needlebench_cell::arm::data::arm_schema(),
-        SchemaFormat::Metrics if markdown => {
-            print_text(&metrics_markdown())?;
-            return Ok(ExitStatus::Success);
-        }
         SchemaFormat::Metrics => {
-            print_json(&json!({ "schema_version": 1, "metrics": metric_descriptions() }))?;
-            return Ok(ExitStatus::Success);
+            return json!({ "schema_version": 1, "metrics": metric_descriptions() });
         }
     };
     name_engines(&mut schema, ENGINES);
-    if markdown {
-        print_text(&schema_markdown(format.title(), &schema))?;
-    } else {
-        print_json(&schema)?;
-    }
-    Ok(ExitStatus::Success)
+    schema
 }
 
 /// Adds the engines' names where a file may name some, and those that run where it names none.

@@ -232,8 +232,8 @@ fn goal_that_contradicts_itself_is_refused() {
         .key("goals[0].target_mm")
         .says("neither `target_mm` nor `lesion`");
     refused_goal("target_mm = [0, -60, 0]\n")
-        .key("goals[0].entry_mm")
-        .says("no `entry_mm`");
+        .key("goals[0].target_mm")
+        .says("none can be assumed");
     refused_goal_with(
         "[0, -60, 0]\n",
         "[0, -60, 0]\nlesion = \"left_perihilar\"\n",

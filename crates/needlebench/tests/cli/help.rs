@@ -2,7 +2,9 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 16] = [
+const COMMANDS: [&str; 18] = [
+    "init",
+    "suggest",
     "run",
     "check",
     "ik",

@@ -17,8 +17,10 @@ mod determinism;
 #[cfg(target_os = "linux")]
 mod environment;
 mod events;
+mod first_slips;
 mod help;
 mod imperfect;
+mod init;
 #[cfg(target_os = "linux")]
 mod interrupt;
 mod iso9283;
@@ -38,4 +40,5 @@ mod run;
 mod schema;
 mod screen;
 mod study;
+mod suggest;
 mod support;

@@ -30,6 +30,7 @@ pub mod press;
 pub mod ranking;
 pub mod replay;
 pub mod servo;
+pub mod suggest;
 
 pub use axis::{Axis, Scale};
 pub use drawing::{Anchor, Chart, Mark, Size, Text};

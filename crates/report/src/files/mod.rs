@@ -16,6 +16,7 @@ mod replay;
 mod run;
 mod servo;
 mod study;
+mod suggest;
 
 pub use accuracy::write_accuracy;
 pub use atlas::write_atlas;
@@ -27,4 +28,5 @@ pub use iso9283::{write_measured, write_test};
 pub use replay::{CALIBRATION_FILE, write_replay};
 pub use run::{RunFiles, write_run};
 pub use servo::write_servo;
+pub use suggest::write_suggestions;
 pub use study::{FinishedStudy, StudyOutput, StudySummary, write_study};

@@ -17,6 +17,7 @@ pub mod servo;
 pub(crate) mod shown;
 pub mod study;
 pub mod study_comparison;
+pub mod suggest;
 pub(crate) mod verdict;
 
 pub use plain::{Table, plain_table};

@@ -1,0 +1,99 @@
+//! Proposed entries against all others on a grid of another kind, judged by what `check` says of each.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::{Point3, Vector3};
+use needlebench_bench::progress::Silent;
+use needlebench_bench::suggest::suggest_entries;
+use needlebench_bench::{Control, Preview};
+use needlebench_cell::{
+    Change, KeyPath, Overrides, ResolvedScenario, ScenarioEdit, ScenarioFamily, resolve_scenario,
+};
+use needlebench_planning::judge_route;
+
+/// How much better an entry may be that is not proposed, of a score from 0 to 1: what is lost between directions that
+/// are 3 deg apart, and by asking the robot for the best routes alone. Twice what was seen.
+const MISSED: f64 = 0.05;
+/// Steps of the other grid, deg.
+const STEP_DEG: u16 = 4;
+
+/// The score as its documentation has it, from what `check` says of a goal.
+fn score(resolved: &ResolvedScenario, preview: &Preview) -> f64 {
+    let (goal, said) = (&resolved.goals[0], &preview.goals[0]);
+    let placed = resolved.phantom.as_ref().unwrap();
+    let to_phantom = placed.world_from_phantom.inverse();
+    let entry = to_phantom * goal.entry_m.unwrap();
+    let depth_mm = goal.entry_to_target_m().unwrap() * 1e3;
+    let route = said.needle_route.as_ref().unwrap();
+    let spare_mm = (route.distance_m - route.margin_m) * 1e3;
+    // Normal of the skin from how depth changes about a point inside, not from its faces.
+    let inside = entry + (to_phantom.rotation * goal.axis.into_inner()) * 1e-4;
+    let depth = |at: Point3<f64>| placed.phantom.skin_signed_depth(&at);
+    let slope = Vector3::from_fn(|axis, _| {
+        let mut step = Vector3::zeros();
+        step[axis] = 1e-6;
+        depth(inside + step) - depth(inside - step)
+    });
+    let needle = to_phantom.rotation * goal.axis.into_inner();
+    let angle_deg = slope.angle(&needle).to_degrees();
+    let between = |worst: f64, best: f64, value: f64| ((value - worst) / (best - worst)).clamp(0.0, 1.0);
+    let fissures = if said.fissures_crossed.is_empty() { 0.5 } else { 0.0 };
+    (between(140.0, 40.0, depth_mm)
+        + between(0.0, 5.0, spare_mm)
+        + between(60.0, 0.0, angle_deg)
+        + fissures
+        + said.working as f64 / 8.0)
+        / 4.5
+}
+
+#[test]
+fn no_entry_of_another_grid_is_much_better_than_the_first_proposal() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/supine_suite.toml");
+    let family = ScenarioFamily::load(&path, &Overrides::default()).unwrap();
+    let control = Control {
+        threads: 2,
+        cancel: &AtomicBool::new(false),
+        progress: &Silent,
+    };
+    let name = "right_upper_anterior";
+    let section = &family.base().scenario.goals[0];
+    assert_eq!(section.name, name);
+    let found = suggest_entries(family.base(), section, 3, &control).unwrap();
+    // Of a file in which the goal enters by its direction.
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut edit = ScenarioEdit::new("s.toml", &text).unwrap();
+    edit.remove("goals[0]", "entry_mm").unwrap();
+    edit.set("goals[0]", "entry_direction_deg", "[-32, -9]").unwrap();
+    let base = resolve_scenario("s.toml", edit.text(), Path::new(""), &Overrides::default()).unwrap();
+    let by_direction = ScenarioFamily::of(base, Path::new(""), &Overrides::default()).unwrap();
+    let at = |direction: [f64; 2]| {
+        let key = KeyPath::parse("goal.entry_direction_deg").unwrap();
+        by_direction.vary(name, &[(key, Change::Set(direction.into()))])
+    };
+    let first = &found.entries[0];
+    let resolved = at(first.direction_deg).unwrap();
+    let (preview, findings) = Preview::of(&resolved).unwrap();
+    assert_eq!(findings, []);
+    // Face by face and by slope the normal is the same; distances are those of `check`.
+    assert!((score(&resolved, &preview) - first.score).abs() < 1e-6);
+    let (mut allowed, mut best) = (0, f64::NEG_INFINITY);
+    for azimuth in (1..360).step_by(STEP_DEG.into()) {
+        for elevation in (1..150).step_by(STEP_DEG.into()) {
+            let direction = [f64::from(azimuth) - 180.0, f64::from(elevation) - 75.0];
+            let Ok(resolved) = at(direction) else { continue };
+            let kept = judge_route(&resolved, &resolved.goals[0]).is_some_and(|judged| judged.is_kept());
+            if !kept {
+                continue;
+            }
+            let (preview, findings) = Preview::of(&resolved).unwrap();
+            if findings.is_empty() {
+                allowed += 1;
+                best = f64::max(best, score(&resolved, &preview));
+            }
+        }
+    }
+    println!("{allowed} allowed, best {best:.3} against {:.3}", first.score);
+    assert!(allowed > 20, "{allowed}");
+    assert!(best <= first.score + MISSED, "{best} against {}", first.score);
+}

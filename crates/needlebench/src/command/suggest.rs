@@ -1,0 +1,412 @@
+//! `needlebench suggest`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use needlebench_bench::suggest::{
+    EntrySearch, PlaceSearch, SuggestError, at_place, plan_entry, plan_place, suggest_entries,
+    suggest_places,
+};
+use needlebench_bench::{Control, Preview, Runnable};
+use needlebench_cell::scenario::{GoalSection, Target};
+use needlebench_cell::{
+    Finding, GoalPlacer, OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, ScenarioFamily,
+    load_open_scenario, nearest_name, read_text, resolve_scenario,
+};
+use needlebench_report::files::{Folder, write_suggestions};
+use needlebench_report::table::suggest::{entries_text, places_text};
+use needlebench_report::write_atomically;
+use serde::Serialize;
+
+use super::record_plan::Three;
+use super::run::prepare_folder;
+use super::{overrides, print_json, print_text};
+use crate::arguments::RobotArguments;
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::output::{complain, shown};
+use crate::progress::TerminalProgress;
+
+#[derive(Debug, Args)]
+pub(crate) struct SuggestArguments {
+    /// Scenario with the patient, the robot and the room; its goals need no entries.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// One goal of the scenario; all of them if left out.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["lesion", "target"])]
+    pub goal: Option<String>,
+    /// A lesion of the phantom, instead of the scenario's goals.
+    #[arg(long, value_name = "NAME", conflicts_with = "target")]
+    pub lesion: Option<String>,
+    /// A point of the patient, instead of the scenario's goals: left, posterior, superior from mid-chest, mm.
+    #[arg(long, value_name = "X,Y,Z", allow_negative_numbers = true)]
+    pub target: Option<Three>,
+    /// Entries to propose for each target; 0 for none.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(0..=50))]
+    pub entries: u8,
+    /// Places of the robot's base to propose, for the first entries that are proposed, or with --entries 0 for
+    /// those of the scenario; 0 for none.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(0..=50))]
+    pub places: u8,
+    /// Plan motions of what is proposed, and say for how many configurations there is one.
+    #[arg(long)]
+    pub planned: bool,
+    /// Write the scenario with the first entries to a file, and with the first place where its own does not serve or
+    /// --entries is 0.
+    #[arg(long, value_name = "FILE")]
+    pub write: Option<PathBuf>,
+    /// With --write: replace a file that is there.
+    #[arg(long, requires = "write")]
+    pub force: bool,
+    /// Folder for maps of skin and room, as PNG and SVG; the scenario gets a folder of its name in it. None are
+    /// drawn if left out.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON document instead of the tables.
+    #[arg(long)]
+    pub json: bool,
+    /// Threads; the number of cores if left out. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: Option<u16>,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+#[derive(Serialize)]
+struct SuggestAnswer<'a> {
+    schema_version: u32,
+    scenario: &'a str,
+    ok: bool,
+    entries: &'a [EntrySearch],
+    places: Option<&'a PlaceSearch>,
+    notes: &'a [String],
+    written: Option<String>,
+}
+
+/// What was found, and in what.
+struct Found {
+    resolved: ResolvedScenario,
+    entries: Vec<EntrySearch>,
+    places: Option<PlaceSearch>,
+}
+
+impl Found {
+    /// Something was found of all that was asked for.
+    fn is_complete(&self) -> bool {
+        self.entries.iter().all(|found| !found.entries.is_empty())
+            && self.places.as_ref().is_none_or(|found| !found.places.is_empty())
+    }
+}
+
+/// Why there is no answer.
+enum Stop {
+    Refused(Vec<Finding>),
+    Interrupted,
+}
+
+impl From<Vec<Finding>> for Stop {
+    fn from(findings: Vec<Finding>) -> Self {
+        Self::Refused(findings)
+    }
+}
+
+impl From<Finding> for Stop {
+    fn from(finding: Finding) -> Self {
+        Self::Refused(vec![finding])
+    }
+}
+
+/// Proposes entries and places for a scenario.
+pub(crate) fn suggest(arguments: &SuggestArguments) -> Result<ExitStatus> {
+    let cancel = Arc::new(AtomicBool::new(false));
+    let requested = Arc::clone(&cancel);
+    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
+        .context("cannot watch for interrupts")?;
+    let progress = TerminalProgress::new(false);
+    let control = Control {
+        threads: arguments.jobs.map_or_else(
+            || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            usize::from,
+        ),
+        cancel: &cancel,
+        progress: &progress,
+    };
+    let answer = overrides(&arguments.robot)
+        .map_err(Stop::from)
+        .and_then(|overrides| {
+            let found = find(arguments, &overrides, &control)?;
+            let written = written(arguments, &found, &overrides)?;
+            Ok((found, written))
+        });
+    progress.finish();
+    let (found, written) = match answer {
+        Ok(answer) => answer,
+        Err(Stop::Interrupted) => {
+            complain("interrupted");
+            return Ok(ExitStatus::Interrupted);
+        }
+        Err(Stop::Refused(findings)) => {
+            print_findings(&findings);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let name = &found.resolved.scenario.name;
+    if let Some(out) = &arguments.out {
+        let folder = out.join(name);
+        if let Err(finding) = prepare_folder(&folder) {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+        let places = found.places.as_ref();
+        write_suggestions(&found.resolved, &found.entries, places, Folder(&folder))?;
+    }
+    if arguments.json {
+        print_json(&SuggestAnswer {
+            schema_version: 1,
+            scenario: name,
+            ok: found.is_complete(),
+            entries: &found.entries,
+            places: found.places.as_ref(),
+            notes: &found.resolved.notes,
+            written: written.as_deref().map(shown),
+        })?;
+    } else {
+        print_text(&in_words(arguments, &found, written.as_deref()))?;
+    }
+    Ok(if found.is_complete() {
+        ExitStatus::Success
+    } else {
+        ExitStatus::CriterionFailed
+    })
+}
+
+fn in_words(arguments: &SuggestArguments, found: &Found, written: Option<&Path>) -> String {
+    let mut parts: Vec<String> = found.entries.iter().map(entries_text).collect();
+    parts.extend(found.places.as_ref().map(places_text));
+    let notes = found.resolved.notes.iter();
+    let assumed = notes.filter(|note| note.starts_with("assumed, since"));
+    let mut last: Vec<String> = assumed.map(|note| format!("note: {note}")).collect();
+    if let Some(out) = &arguments.out {
+        let folder = out.join(&found.resolved.scenario.name);
+        last.push(format!("maps: {}", shown(&folder)));
+    }
+    if let Some(path) = written {
+        last.push(format!("written: {0}; next: needlebench run {0}", shown(path)));
+    }
+    if !last.is_empty() {
+        parts.push(last.join("\n"));
+    }
+    parts.join("\n\n")
+}
+
+fn find(
+    arguments: &SuggestArguments,
+    overrides: &Overrides,
+    control: &Control<'_>,
+) -> Result<Found, Stop> {
+    let OpenScenario {
+        mut resolved,
+        goals,
+    } = load_open_scenario(&arguments.scenario, overrides)?;
+    let file = resolved.source.file.clone();
+    let stop = |error: SuggestError| match error {
+        SuggestError::Interrupted => Stop::Interrupted,
+        SuggestError::Refused { message, hint } => Finding::new(&file, message).hint(hint).into(),
+    };
+    let mut sections = sections(arguments, &file, goals)?;
+    let (mut entries, mut best) = (Vec::new(), Vec::new());
+    for section in &sections {
+        let has_entry = section.entry_mm.is_some() || section.entry_direction_deg.is_some();
+        // Places need an entry too.
+        let is_needed = arguments.entries > 0 || !has_entry && section.flange_pose.is_none();
+        if !is_needed {
+            best.push(None);
+            continue;
+        }
+        let count = usize::from(arguments.entries.max(1));
+        let mut found = suggest_entries(&resolved, section, count, control).map_err(stop)?;
+        let first = found.entries.first().map(|entry| entry.direction_deg);
+        best.push(first.or(found.best_route_deg));
+        if arguments.planned {
+            for entry in &mut found.entries {
+                plan_entry(&resolved, section, entry).map_err(stop)?;
+            }
+        }
+        if arguments.entries > 0 {
+            entries.push(found);
+        }
+    }
+    let mut places = None;
+    if arguments.places > 0 {
+        for (section, best) in sections.iter_mut().zip(best) {
+            // Of what is proposed, and where nothing is of the best route.
+            if best.is_some() {
+                section.entry_mm = None;
+                section.entry_direction_deg = best;
+            }
+        }
+        let placer = GoalPlacer::new(&resolved);
+        let placed = sections.iter().map(|section| placer.place(section));
+        let placed: Result<Vec<_>, Finding> = placed.collect();
+        let (goals, names) = match placed {
+            Ok(goals) => {
+                let names: Vec<String> = goals.iter().map(|goal| goal.name.clone()).collect();
+                (goals, names)
+            }
+            // Without any entry there is nothing to stand beside.
+            Err(_) if entries.iter().any(|found| found.allowed == 0) => {
+                return Ok(Found { resolved, entries, places });
+            }
+            Err(finding) => return Err(finding.into()),
+        };
+        resolved.goals = goals;
+        resolved.scenario.goals = sections;
+        let folder = arguments.scenario.parent().unwrap_or(Path::new(""));
+        let family = ScenarioFamily::of(resolved.clone(), folder, overrides)?;
+        let count = usize::from(arguments.places);
+        let mut found = suggest_places(&family, &names, count, control).map_err(stop)?;
+        if arguments.planned {
+            for place in &mut found.places {
+                plan_place(&family, place).map_err(stop)?;
+            }
+        }
+        // Where the robot stands badly its entries are those from the first place.
+        if let Some(first) = found.places.first() {
+            for each in entries.iter_mut().filter(|each| each.entries.is_empty()) {
+                let moved = at_place(&family, &each.goal, first).map_err(stop)?;
+                let section = &moved.scenario.goals[0];
+                let count = usize::from(arguments.entries);
+                *each = suggest_entries(&moved, section, count, control).map_err(stop)?;
+            }
+        }
+        places = Some(found);
+    }
+    Ok(Found {
+        resolved,
+        entries,
+        places,
+    })
+}
+
+/// What is to be reached.
+fn sections(
+    arguments: &SuggestArguments,
+    file: &str,
+    goals: Vec<GoalSection>,
+) -> Result<Vec<GoalSection>, Finding> {
+    let target = match (&arguments.lesion, arguments.target) {
+        (Some(name), _) => Some(Target::Lesion(name.clone())),
+        (None, Some(Three(point))) => Some(Target::Point(point)),
+        (None, None) => None,
+    };
+    if let Some(target) = target {
+        // With the stand-off of the scenario's first goal, if it has one.
+        let like = goals.first();
+        let mut section = GoalSection::at(target);
+        if let Some(like) = like.filter(|goal| goal.flange_pose.is_none()) {
+            section.standoff_mm = like.standoff_mm;
+            section.approach_mm = like.approach_mm;
+        }
+        return Ok(vec![section]);
+    }
+    if goals.is_empty() {
+        return Err(Finding::new(file, "it has no goal to propose anything for")
+            .key("goals")
+            .hint("name a target with --lesion NAME or --target X,Y,Z"));
+    }
+    let Some(name) = &arguments.goal else {
+        return Ok(goals);
+    };
+    let names: Vec<String> = goals.iter().map(|goal| goal.name.clone()).collect();
+    let found: Vec<GoalSection> = goals.into_iter().filter(|goal| goal.name == *name).collect();
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let near = nearest_name(name, names.iter().map(String::as_str));
+    let finding = Finding::new(file, format!("it has no goal `{name}`")).key("--goal");
+    Err(finding.hint(match near {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("goals: {}", names.join(", ")),
+    }))
+}
+
+/// Writes the scenario with the first proposals, if that is wanted and they pass what `check` asks.
+fn written(
+    arguments: &SuggestArguments,
+    found: &Found,
+    overrides: &Overrides,
+) -> Result<Option<PathBuf>, Stop> {
+    let Some(path) = &arguments.write else {
+        return Ok(None);
+    };
+    let to = path.display().to_string();
+    if !found.is_complete() {
+        return Ok(None);
+    }
+    if path.exists() && !arguments.force {
+        return Err(Finding::new(&to, "there is such a file already")
+            .key("--write")
+            .hint("choose another name, or replace it with --force")
+            .into());
+    }
+    let file = &found.resolved.source.file;
+    let text = read_text(&arguments.scenario)
+        .map_err(|error| Finding::new(file, error.to_string()))?;
+    let mut edit = ScenarioEdit::new(file, &text)?;
+    let own = load_open_scenario(&arguments.scenario, overrides)?.goals;
+    let mut next = own.len();
+    for search in &found.entries {
+        let entry = &search.entries[0];
+        let index = own.iter().position(|goal| goal.name == search.goal);
+        let section = format!("goals[{}]", index.unwrap_or(next));
+        if index.is_none() {
+            next += 1;
+            let [x, y, z] = search.target_in_phantom_m.map(|m| (m * 1e4).round() / 10.0);
+            match &search.lesion {
+                Some(lesion) => edit.set(&section, "lesion", &format!("\"{lesion}\""))?,
+                None => edit.set(&section, "target_mm", &format!("[{x}, {y}, {z}]"))?,
+            }
+        }
+        let [azimuth, elevation] = entry.direction_deg;
+        edit.remove(&section, "entry_mm")?;
+        edit.set(&section, "entry_direction_deg", &format!("[{azimuth}, {elevation}]"))?;
+    }
+    // A place that serves is kept, unless only places were asked for.
+    let place = found.places.as_ref().filter(|found| found.present.is_none() || arguments.entries == 0);
+    if let Some(place) = place.and_then(|found| found.places.first()) {
+        for line in place.toml.lines() {
+            if let Some((key, value)) = line.split_once(" = ") {
+                edit.set("robot", key, value)?;
+            }
+        }
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let resolved = resolve_scenario(&to, edit.text(), folder, overrides).map_err(unplaced)?;
+    let runnable = Runnable::checked(resolved)?;
+    let (_, findings) = Preview::of(runnable.scenario())
+        .map_err(|error| Finding::new(&to, error.to_string()))?;
+    if let Some(first) = findings.into_iter().next() {
+        let message = format!("what is proposed does not pass with the rest of the scenario: {}", first.message);
+        let hint = "other goals may need another place: propose for all of them, without --goal, --lesion and --target";
+        return Err(Finding { message, ..first }.hint(hint).into());
+    }
+    write_atomically(path, edit.text().as_bytes()).map_err(|error| {
+        Finding::new(&to, format!("cannot be written: {error}")).key("--write")
+    })?;
+    Ok(Some(path.clone()))
+}
+
+/// Without lines: they are those of a file that is not there.
+fn unplaced(findings: Vec<Finding>) -> Vec<Finding> {
+    let findings = findings.into_iter();
+    findings
+        .map(|finding| Finding {
+            line: None,
+            span: None,
+            ..finding
+        })
+        .collect()
+}

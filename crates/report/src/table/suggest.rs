@@ -1,0 +1,167 @@
+//! Proposals as tables, with what to paste.
+
+use std::fmt::Write;
+
+use needlebench_bench::preview::ConfigurationPreview;
+use needlebench_bench::suggest::{
+    ENTRY_TERMS, Entry, EntryRule, EntrySearch, PlaceSearch, Refused,
+};
+
+use super::plain_table;
+
+/// Entries for a target.
+pub fn entries_text(found: &EntrySearch) -> String {
+    let base = found.base_position_m.map(|m| format!("{:.0}", m * 1e3));
+    let mut text = format!(
+        "entries for {}, the base at [{}] mm ({})\n",
+        found.goal,
+        base.join(", "),
+        found.basis
+    );
+    let [x, y, z] = found.target_in_phantom_m.map(|m| m * 1e3);
+    let _ = writeln!(
+        text,
+        "target [{x:.1}, {y:.1}, {z:.1}] mm; {} of {} directions have an allowed route{}",
+        found.allowed,
+        found.tried,
+        counts(&found.refused, |rule| {
+            EntryRule::of_name(rule).map_or("", EntryRule::in_words)
+        }),
+    );
+    if found.entries.is_empty() {
+        let _ = write!(text, "none: {}", found.why_none());
+        return text;
+    }
+    let mut header = vec!["", "direction\n(deg)", "depth\n(mm)", "to normal\n(deg)"];
+    let tissues: Vec<&str> = found.entries[0]
+        .margins
+        .iter()
+        .map(|each| each.tissue.as_str())
+        .collect();
+    let headings: Vec<String> = tissues.iter().map(|tissue| format!("{tissue}\n(mm)")).collect();
+    header.extend(headings.iter().map(String::as_str));
+    header.extend(["works", "score"]);
+    let is_planned = found.entries.iter().any(|each| each.working_planned.is_some());
+    if is_planned {
+        header.insert(header.len() - 1, "with a\nmotion");
+    }
+    let mut table = plain_table(&header);
+    for (index, entry) in found.entries.iter().enumerate() {
+        table.add_row(entry_row(index, entry, &tissues, is_planned));
+    }
+    let _ = writeln!(text, "{table}\n{ENTRY_TERMS}");
+    for (index, entry) in found.entries.iter().enumerate() {
+        let nearest = entry.margins.iter().map(|each| each.part.as_str());
+        let nearest: Vec<&str> = nearest.collect();
+        let _ = write!(text, "\n# {}: nearest {}", index + 1, nearest.join(", "));
+        if !entry.fissures_crossed.is_empty() {
+            let _ = write!(text, "; crosses {}", entry.fissures_crossed.join(", "));
+        }
+        let fails = entry.configurations.iter().filter(|each| !each.works);
+        let fails: Vec<String> = fails.map(why_not).collect();
+        if !fails.is_empty() {
+            let _ = write!(text, "\n# fails: {}", fails.join(", "));
+        }
+        let _ = writeln!(text, "\n{}", entry.toml);
+    }
+    text.trim_end().to_owned()
+}
+
+fn entry_row(index: usize, entry: &Entry, tissues: &[&str], is_planned: bool) -> Vec<String> {
+    let [azimuth, elevation] = entry.direction_deg;
+    let mut row = vec![
+        (index + 1).to_string(),
+        format!("{azimuth}, {elevation}"),
+        format!("{:.0}", entry.depth_m * 1e3),
+        format!("{:.0}", entry.angle_to_skin_normal_rad.to_degrees()),
+    ];
+    for tissue in tissues {
+        let margin = entry.margins.iter().find(|each| each.tissue == *tissue);
+        row.push(margin.map_or_else(|| "-".to_owned(), |each| format!("{:.1}", each.distance_m * 1e3)));
+    }
+    row.push(format!("{} of 8", entry.working));
+    if is_planned {
+        let planned = entry.working_planned;
+        row.push(planned.map_or_else(|| "-".to_owned(), |count| format!("{count} of 8")));
+    }
+    row.push(format!("{:.2}", entry.score));
+    row
+}
+
+fn why_not(each: &ConfigurationPreview) -> String {
+    format!("{} {}", each.label, each.reason())
+}
+
+/// Places of the robot's base.
+pub fn places_text(found: &PlaceSearch) -> String {
+    let mut text = format!(
+        "places of the base for {} ({})\n{} of {} places serve {}{}\n",
+        found.goals.join(", "),
+        found.basis,
+        found.allowed,
+        found.tried,
+        if found.goals.len() == 1 { "it" } else { "all of them" },
+        counts(&found.refused, |rule| rule),
+    );
+    if found.places.is_empty() {
+        let _ = write!(text, "none: {}", found.why_none());
+        return text;
+    }
+    let is_planned = found
+        .places
+        .iter()
+        .flat_map(|place| &place.goals)
+        .any(|goal| goal.working_planned.is_some());
+    let mut header = vec!["", "position (mm)", "yaw\n(deg)", "goal", "works"];
+    if is_planned {
+        header.push("with a\nmotion");
+    }
+    header.extend(["arm clear\n(mm)", "best"]);
+    let mut table = plain_table(&header);
+    let present = found.present.iter().map(|place| ("now".to_owned(), place));
+    let proposed = found.places.iter().enumerate();
+    let proposed = proposed.map(|(index, place)| ((index + 1).to_string(), place));
+    for (name, place) in proposed.chain(present) {
+        for (row, goal) in place.goals.iter().enumerate() {
+            let [x, y, z] = place.position_mm;
+            let first = |text: String| if row == 0 { text } else { String::new() };
+            let mut cells = vec![
+                first(name.clone()),
+                first(format!("{x:.0}, {y:.0}, {z:.0}")),
+                first(format!("{:.0}", place.rpy_deg[2])),
+                goal.goal.clone(),
+                format!("{} of 8", goal.working),
+            ];
+            if is_planned {
+                let planned = goal.working_planned;
+                cells.push(planned.map_or_else(|| "-".to_owned(), |count| format!("{count} of 8")));
+            }
+            let clear = goal.clearance_m;
+            cells.push(clear.map_or_else(|| "-".to_owned(), |m| format!("{:.0}", m * 1e3)));
+            cells.push(goal.best.clone());
+            table.add_row(cells);
+        }
+    }
+    let _ = writeln!(
+        text,
+        "{table}\nordered by the goal with fewest configurations, then by how clear the arm of its\nbest one is of patient, table, gantry, mount and obstacles"
+    );
+    for (index, place) in found.places.iter().enumerate() {
+        let _ = writeln!(text, "\n# {}\n[robot]\n{}", index + 1, place.toml);
+    }
+    text.trim_end().to_owned()
+}
+
+fn counts<'a>(refused: &'a [Refused], words: impl Fn(&'a str) -> &'a str) -> String {
+    /// Lines of them; the others are counted together.
+    const MOST: usize = 6;
+    let mut text = String::new();
+    for each in refused.iter().take(MOST) {
+        let _ = write!(text, "\n  {:5} refused: {}", each.count, words(&each.rule));
+    }
+    let others: usize = refused.iter().skip(MOST).map(|each| each.count).sum();
+    if others > 0 {
+        let _ = write!(text, "\n  {others:5} refused: others");
+    }
+    text
+}
