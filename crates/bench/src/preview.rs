@@ -130,7 +130,11 @@ impl Preview {
 }
 
 /// What is known of a goal in the cell of a scenario.
-pub(crate) fn goal_preview(planner: &Planner<'_>, resolved: &ResolvedScenario, goal: &Goal) -> GoalPreview {
+pub(crate) fn goal_preview(
+    planner: &Planner<'_>,
+    resolved: &ResolvedScenario,
+    goal: &Goal,
+) -> GoalPreview {
     // What a refused route says of all alike is said once.
     let members = planner.postures(goal).map(|mut member| {
         member

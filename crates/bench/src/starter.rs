@@ -5,7 +5,9 @@
 
 use std::path::Path;
 
-use needlebench_cell::{Finding, Overrides, ResolvedScenario, ScenarioFamily, resolve_open_scenario, resolve_scenario};
+use needlebench_cell::{
+    Finding, Overrides, ResolvedScenario, ScenarioFamily, resolve_open_scenario, resolve_scenario,
+};
 
 use crate::Runnable;
 use crate::control::Control;
@@ -135,7 +137,8 @@ pub fn starter(
 }
 
 /// What to do where nothing works.
-const OTHERS: &str = "choose another --lesion, --from or --arm; `needlebench init --list` shows what there is";
+const OTHERS: &str =
+    "choose another --lesion, --from or --arm; `needlebench init --list` shows what there is";
 
 /// The first entry in a draft's cell, or why there is none and the direction with the best route.
 type FoundEntry = Result<Entry, (String, Option<[f64; 2]>)>;
@@ -146,10 +149,11 @@ fn entry_at(
     overrides: &Overrides,
     control: &Control<'_>,
 ) -> Result<(ResolvedScenario, FoundEntry), SuggestError> {
-    let open = resolve_open_scenario(file, draft, Path::new(""), overrides).map_err(|findings| {
-        let first = findings.into_iter().next();
-        first.map_or(SuggestError::Interrupted, SuggestError::from)
-    })?;
+    let open =
+        resolve_open_scenario(file, draft, Path::new(""), overrides).map_err(|findings| {
+            let first = findings.into_iter().next();
+            first.map_or(SuggestError::Interrupted, SuggestError::from)
+        })?;
     let found = suggest_entries(&open.resolved, &open.goals[0], 1, control)?;
     let why = found.why_none();
     let best = found.best_route_deg;
@@ -225,7 +229,10 @@ fn text(
     };
     let (top_mm, cushion) = match template {
         Template::Table | Template::Hanging => (780, ""),
-        Template::Lateral => (750, "position_mm = [0, 0, 20] # mid-chest in the world; the third: a cushion on the table\n"),
+        Template::Lateral => (
+            750,
+            "position_mm = [0, 0, 20] # mid-chest in the world; the third: a cushion on the table\n",
+        ),
     };
     let goal = entry.map_or(String::new(), |entry| {
         let margins = entry.margins.iter();
@@ -303,9 +310,9 @@ min_working_configurations = 1 # of eight
 
 fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
-    letters
-        .next()
-        .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 /// A small study of a scenario with goals: how much the patient's place may be off.

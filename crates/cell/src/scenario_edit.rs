@@ -48,15 +48,25 @@ impl ScenarioEdit {
                     .hint(format!("write it as [{section}], with a line for each key")));
             }
             let end = header.end + rest.find('\n').unwrap_or(rest.len());
-            let before = if self.text[..end].ends_with('\n') { "" } else { "\n" };
-            self.text.insert_str(end, &format!("{before}{key} = {value}"));
+            let before = if self.text[..end].ends_with('\n') {
+                ""
+            } else {
+                "\n"
+            };
+            self.text
+                .insert_str(end, &format!("{before}{key} = {value}"));
         } else {
             let header = match section.split_once('[') {
                 Some((list, _)) => format!("[[{list}]]"),
                 None => format!("[{section}]"),
             };
-            let ending = if self.text.is_empty() || self.text.ends_with('\n') { "" } else { "\n" };
-            self.text.push_str(&format!("{ending}\n{header}\n{key} = {value}\n"));
+            let ending = if self.text.is_empty() || self.text.ends_with('\n') {
+                ""
+            } else {
+                "\n"
+            };
+            self.text
+                .push_str(&format!("{ending}\n{header}\n{key} = {value}\n"));
         }
         self.checked(section)
     }
@@ -104,7 +114,8 @@ mod tests {
         edit.set("robot", "base_rpy_deg", "[0, 0, 270]").unwrap();
         edit.set("robot", "base_position_mm", "[1, 2, 3]").unwrap();
         edit.remove("goals[0]", "entry_mm").unwrap();
-        edit.set("goals[0]", "entry_direction_deg", "[4, 5]").unwrap();
+        edit.set("goals[0]", "entry_direction_deg", "[4, 5]")
+            .unwrap();
         edit.set("mount", "kind", "\"column\"").unwrap();
         edit.set("goals[1]", "lesion", "\"y\"").unwrap();
         let wanted = "name = \"a\" # mine\n[robot] # the arm\nbase_position_mm = [1, 2, 3]\nbase_rpy_deg = [0, 0, 270] \

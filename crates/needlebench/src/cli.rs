@@ -8,9 +8,10 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 use crate::clock::elapsed;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, FkArguments,
-    ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments,
-    REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments, ReportArguments, RunArguments,
-    STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments, SuggestArguments,
+    ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, MergeArguments, PairsArguments,
+    PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
+    ReportArguments, RunArguments, STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
+    SuggestArguments,
 };
 use crate::exit::ExitStatus;
 use crate::output::{complain, keep_to_width};
@@ -31,7 +32,9 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Write a first scenario: small, commented, and one that passes.
-    #[command(after_help = "Example: needlebench init my_cell.toml --arm ur5e --lesion left_upper_lobe")]
+    #[command(
+        after_help = "Example: needlebench init my_cell.toml --arm ur5e --lesion left_upper_lobe"
+    )]
     Init(InitArguments),
     /// Propose entries for a lesion, and places for the robot's base, as TOML to paste.
     #[command(

@@ -3,8 +3,9 @@
 //! # How they are found
 //!
 //! 1. Directions from the target, 3 deg apart all round, are placed as a scenario with such a goal is: the needle has to
-//!    be long enough, nothing may stand where guide and needle are, it may not enter at the neck or the waist, where the
-//!    chest ends, nor be oblique to the skin by more than 60 deg, and has to keep its margins to bone, vessels and organs.
+//!    be long enough, nothing may stand where guide and needle are, it may not enter at the ends of the chest, where the
+//!    phantom lacks clavicles and vessels, nor be oblique to the skin by more than 60 deg, and has to keep its margins to
+//!    bone, vessels and organs.
 //! 2. Those that are left are ordered by score. From the best on, each is moved by up to 2 deg to where its score is
 //!    best, and is looked at with the robot: as many configurations as the scenario wants have to work, by the code of
 //!    `check`. Entries nearer than 15 mm to a better one are left out, those near one where the robot fails too.
@@ -14,9 +15,7 @@ use std::f64::consts::FRAC_PI_3;
 
 use nalgebra::Point3;
 use needlebench_cell::scenario::GoalSection;
-use needlebench_cell::{
-    ChosenEntry, Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction,
-};
+use needlebench_cell::{ChosenEntry, Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
 use needlebench_clearance::ClearanceModel;
 use needlebench_planning::{Planner, crossed_fissures, judged_tissues};
 use needlebench_study::Outcome;
@@ -41,6 +40,9 @@ const MOST_ASKED: usize = 64;
 /// Part of the skin's normal along the body beyond which the skin is that of an end of the chest: neck, shoulders or
 /// waist begin there, which the phantom does not have (assumed: 45 deg).
 const END_Z: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Highest entry of a shipped chest, as a share of its half length: the second rib space is at 0.42 in front (README of
+/// the phantoms), and above it clavicles and subclavian vessels, which they do not have, would be in the way (assumed).
+const HIGHEST: f64 = 0.5;
 /// Largest angle between needle and the skin's normal, rad: beyond it a needle slips along the skin (assumed).
 const STEEPEST_RAD: f64 = FRAC_PI_3;
 
@@ -56,11 +58,36 @@ struct TermScale {
 /// The terms of an entry's score, in SI: short, well clear of what it must not meet, square to the skin, across no
 /// fissure, and within the robot's reach in many configurations. Values and weights are assumed.
 const SCALES: [TermScale; 5] = [
-    TermScale { name: "depth_m", worst: 0.140, best: 0.040, weight: 1.0 },
-    TermScale { name: "margin_to_spare_m", worst: 0.0, best: 0.005, weight: 1.0 },
-    TermScale { name: "angle_to_skin_normal_rad", worst: STEEPEST_RAD, best: 0.0, weight: 1.0 },
-    TermScale { name: "fissures_crossed", worst: 1.0, best: 0.0, weight: 0.5 },
-    TermScale { name: "working_configurations", worst: 0.0, best: 8.0, weight: 1.0 },
+    TermScale {
+        name: "depth_m",
+        worst: 0.140,
+        best: 0.040,
+        weight: 1.0,
+    },
+    TermScale {
+        name: "margin_to_spare_m",
+        worst: 0.0,
+        best: 0.005,
+        weight: 1.0,
+    },
+    TermScale {
+        name: "angle_to_skin_normal_rad",
+        worst: STEEPEST_RAD,
+        best: 0.0,
+        weight: 1.0,
+    },
+    TermScale {
+        name: "fissures_crossed",
+        worst: 1.0,
+        best: 0.0,
+        weight: 0.5,
+    },
+    TermScale {
+        name: "working_configurations",
+        worst: 0.0,
+        best: 8.0,
+        weight: 1.0,
+    },
 ];
 
 /// What the score is made of, for people.
@@ -90,7 +117,7 @@ pub enum EntryRule {
     NeedleTooShort,
     /// Guide or entry would be in something, or the goal is refused otherwise.
     Blocked,
-    /// At the neck or the waist, where the chest ends and is no skin.
+    /// Near the neck, a shoulder or the waist, where the phantom lacks what a needle could meet.
     End,
     /// Too oblique to the skin.
     Oblique,
@@ -136,7 +163,7 @@ impl EntryRule {
         match self {
             Self::NeedleTooShort => "needle too short",
             Self::Blocked => "guide in the table or other things",
-            Self::End => "at the neck or waist, where the chest ends",
+            Self::End => "at neck, shoulder or waist, of which the phantom lacks parts",
             Self::Oblique => "more than 60 deg from the skin's normal",
             Self::Bone => "bone in the way",
             Self::Vessel => "vessel in the way",
@@ -287,7 +314,9 @@ impl Judge<'_> {
         let entry = to_phantom * goal.entry_m.ok_or(EntryRule::Blocked)?;
         let inwards = to_phantom.rotation * goal.axis.into_inner();
         let normal = placed.phantom.skin_normal(&entry);
-        if normal.z.abs() > END_Z {
+        let size = placed.phantom.parameters.as_ref();
+        let highest_m = size.map_or(f64::INFINITY, |size| HIGHEST * 0.5e-3 * size.length_mm);
+        if normal.z.abs() > END_Z || entry.z > highest_m {
             return Err(EntryRule::End);
         }
         let angle_rad = normal.angle(&-inwards);
@@ -302,10 +331,11 @@ impl Judge<'_> {
                 margin_m: judged.margin_m.max(self.criterion_m),
             })
             .collect();
-        let broken = margins.iter().filter(|each| each.distance_m < each.margin_m);
-        let worst = broken.min_by(|a, b| {
-            (a.distance_m - a.margin_m).total_cmp(&(b.distance_m - b.margin_m))
-        });
+        let broken = margins
+            .iter()
+            .filter(|each| each.distance_m < each.margin_m);
+        let worst = broken
+            .min_by(|a, b| (a.distance_m - a.margin_m).total_cmp(&(b.distance_m - b.margin_m)));
         if let Some(worst) = worst {
             return Err(EntryRule::of_name(&worst.tissue).unwrap_or(EntryRule::Organ));
         }
@@ -343,12 +373,20 @@ fn terms(allowed: &Allowed, depth_m: f64, working: Option<usize>) -> Vec<EntryTe
         .map(|each| each.distance_m - each.margin_m)
         .fold(f64::INFINITY, f64::min);
     // Where there is nothing to keep away from there is all the room that counts.
-    let spare_m = if spare_m.is_finite() { spare_m } else { SCALES[1].best };
+    let spare_m = if spare_m.is_finite() {
+        spare_m
+    } else {
+        SCALES[1].best
+    };
     let values = [
         Some(depth_m),
         Some(spare_m),
         Some(allowed.angle_rad),
-        Some(if allowed.fissures.is_empty() { 0.0 } else { 1.0 }),
+        Some(if allowed.fissures.is_empty() {
+            0.0
+        } else {
+            1.0
+        }),
         working.map(|count| count as f64),
     ];
     let known = SCALES.iter().zip(values);
@@ -440,14 +478,28 @@ pub fn suggest_entries(
         lesion: judge.section.lesion.clone(),
         target_in_phantom_m: target.coords.into(),
         basis: crate::preview::BASIS,
-        base_position_m: resolved.cell.robot.world_from_base_link.translation.vector.into(),
+        base_position_m: resolved
+            .cell
+            .robot
+            .world_from_base_link
+            .translation
+            .vector
+            .into(),
         tried: tried.len(),
         allowed: allowed.len(),
         refused,
         asked: asked.answers.len(),
-        robot_refused: counted(asked.answers.iter().filter_map(|answer| answer.broken.as_deref())),
+        robot_refused: counted(
+            asked
+                .answers
+                .iter()
+                .filter_map(|answer| answer.broken.as_deref()),
+        ),
         wanted,
-        best_route_deg: asked.answers.first().map(|answer| answer.allowed.direction_deg),
+        best_route_deg: asked
+            .answers
+            .first()
+            .map(|answer| answer.allowed.direction_deg),
         entries: asked.entries(&judge, count),
         samples,
     })
@@ -475,7 +527,10 @@ impl Asked {
     }
 
     fn entries(self, judge: &Judge<'_>, count: usize) -> Vec<Entry> {
-        let works = self.answers.into_iter().filter(|answer| answer.broken.is_none());
+        let works = self
+            .answers
+            .into_iter()
+            .filter(|answer| answer.broken.is_none());
         let mut entries: Vec<Entry> = works
             .map(|answer| {
                 let Answer {
@@ -534,11 +589,19 @@ fn ask_robot(
     let mut next = 0;
     let is_free = |entry: &Point3<f64>, answers: &[Answer]| {
         answers.iter().all(|answer| {
-            let apart_m = if answer.broken.is_none() { APART_M } else { FAILED_APART_M };
+            let apart_m = if answer.broken.is_none() {
+                APART_M
+            } else {
+                FAILED_APART_M
+            };
             (entry - answer.allowed.entry).norm() >= apart_m
         })
     };
-    while answers.iter().filter(|answer| answer.broken.is_none()).count() < count
+    while answers
+        .iter()
+        .filter(|answer| answer.broken.is_none())
+        .count()
+        < count
         && answers.len() < MOST_ASKED
     {
         let mut batch: Vec<([f64; 2], Allowed)> = Vec::new();
@@ -547,13 +610,19 @@ fn ask_robot(
             next += 1;
             let apart = |entry: &Point3<f64>| {
                 is_free(entry, &answers)
-                    && batch.iter().all(|(_, each)| (entry - each.entry).norm() >= APART_M)
+                    && batch
+                        .iter()
+                        .all(|(_, each)| (entry - each.entry).norm() >= APART_M)
             };
             if !apart(&candidate.entry) {
                 continue;
             }
             let refined = judge.refined(candidate);
-            let chosen = if apart(&refined.entry) { refined } else { candidate.clone() };
+            let chosen = if apart(&refined.entry) {
+                refined
+            } else {
+                candidate.clone()
+            };
             batch.push((candidate.direction_deg, chosen));
         }
         if batch.is_empty() {
@@ -561,7 +630,8 @@ fn ask_robot(
         }
         control.progress.expect(batch.len() as u64);
         let previews = in_parallel(control.threads, &batch, |(_, allowed)| {
-            let found = (!control.is_cancelled()).then(|| goal_preview(&planner, resolved, &allowed.goal));
+            let found =
+                (!control.is_cancelled()).then(|| goal_preview(&planner, resolved, &allowed.goal));
             control.progress.step();
             found
         });
@@ -570,7 +640,9 @@ fn ask_robot(
             let broken = (preview.working < wanted).then(|| {
                 let rules = preview.configurations.iter().filter(|each| !each.works);
                 let first = counted(rules.map(ConfigurationPreview::reason));
-                first.first().map_or_else(String::new, |first| first.rule.clone())
+                first
+                    .first()
+                    .map_or_else(String::new, |first| first.rule.clone())
             });
             answers.push(Answer {
                 grid_deg,
@@ -636,11 +708,17 @@ pub fn choose_entry(
             "`needlebench suggest` shows all that was tried; or give `entry_mm` or `entry_direction_deg`".to_owned(),
         ]);
     };
-    let nearest = entry.margins.iter().min_by(|a, b| {
-        (a.distance_m - a.margin_m).total_cmp(&(b.distance_m - b.margin_m))
-    });
+    let nearest = entry
+        .margins
+        .iter()
+        .min_by(|a, b| (a.distance_m - a.margin_m).total_cmp(&(b.distance_m - b.margin_m)));
     let nearest = nearest.map_or(String::new(), |each| {
-        format!(", {:.1} mm from {} ({})", each.distance_m * 1e3, each.part, each.tissue)
+        format!(
+            ", {:.1} mm from {} ({})",
+            each.distance_m * 1e3,
+            each.part,
+            each.tissue
+        )
     });
     let [azimuth, elevation] = entry.direction_deg;
     Ok(ChosenEntry {

@@ -14,7 +14,9 @@ pub(super) fn directions() -> Vec<[f64; 2]> {
     let mut row = 1.0;
     while row < rows {
         let elevation = STEP_DEG * row - 90.0;
-        let count = (360.0 * elevation.to_radians().cos() / STEP_DEG).round().max(1.0);
+        let count = (360.0 * elevation.to_radians().cos() / STEP_DEG)
+            .round()
+            .max(1.0);
         let mut place = 0.0;
         while place < count {
             let azimuth = (360.0 * place / count).round();
@@ -30,16 +32,23 @@ pub(super) fn directions() -> Vec<[f64; 2]> {
 pub(super) fn around([azimuth, elevation]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
     let offsets = [-2.0, -1.0, 0.0, 1.0, 2.0];
     offsets.into_iter().flat_map(move |up| {
-        offsets
-            .into_iter()
-            .map(move |across| [in_half_turn(azimuth + across), (elevation + up).clamp(-89.0, 89.0)])
+        offsets.into_iter().map(move |across| {
+            [
+                in_half_turn(azimuth + across),
+                (elevation + up).clamp(-89.0, 89.0),
+            ]
+        })
     })
 }
 
 /// In (-180, 180].
 fn in_half_turn(degrees: f64) -> f64 {
     let turned = degrees.rem_euclid(360.0);
-    if turned > 180.0 { turned - 360.0 } else { turned }
+    if turned > 180.0 {
+        turned - 360.0
+    } else {
+        turned
+    }
 }
 
 /// A place of the base.
@@ -163,12 +172,23 @@ mod tests {
     fn directions_are_whole_degrees_evenly_over_the_sphere() {
         let found = directions();
         assert!(found.iter().flatten().all(|deg| deg.fract() == 0.0));
-        assert!(found.iter().all(|[azimuth, _]| (-180.0..=180.0).contains(azimuth)));
+        assert!(
+            found
+                .iter()
+                .all(|[azimuth, _]| (-180.0..=180.0).contains(azimuth))
+        );
         #[expect(clippy::cast_possible_truncation, reason = "whole degrees")]
-        let different: BTreeSet<[i32; 2]> = found.iter().map(|each| each.map(|deg| deg as i32)).collect();
+        let different: BTreeSet<[i32; 2]> = found
+            .iter()
+            .map(|each| each.map(|deg| deg as i32))
+            .collect();
         assert_eq!(different.len(), found.len());
         // 4 pi over the square of a step.
         let wanted = 4.0 * std::f64::consts::PI / STEP_DEG.to_radians().powi(2);
-        assert!((found.len() as f64 / wanted - 1.0).abs() < 0.02, "{}", found.len());
+        assert!(
+            (found.len() as f64 / wanted - 1.0).abs() < 0.02,
+            "{}",
+            found.len()
+        );
     }
 }

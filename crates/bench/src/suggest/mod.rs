@@ -16,7 +16,9 @@ pub use entries::{
     ENTRY_TERMS, Entry, EntryRule, EntrySample, EntrySearch, EntryTerm, TissueMargin, choose_entry,
     plan_entry, suggest_entries,
 };
-pub use places::{Place, PlaceGoal, PlaceSample, PlaceSearch, at_place, plan_place, suggest_places};
+pub use places::{
+    Place, PlaceGoal, PlaceSample, PlaceSearch, at_place, plan_place, suggest_places,
+};
 
 /// Why nothing could be proposed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -148,23 +148,29 @@ pub fn suggest_places(
     });
     let judged: Option<Vec<Judged>> = judged.into_iter().flatten().collect();
     let judged = judged.ok_or(SuggestError::Interrupted)?;
-    let samples = tried.iter().zip(&judged).map(|(place, judged)| PlaceSample {
-        position_mm: place.position_mm,
-        working: match judged {
-            Judged::Serves(goals) => goals.iter().map(|goal| goal.working).min(),
-            Judged::Fails(working, _) => Some(*working),
-            Judged::Invalid(_) => None,
-        },
-    });
+    let samples = tried
+        .iter()
+        .zip(&judged)
+        .map(|(place, judged)| PlaceSample {
+            position_mm: place.position_mm,
+            working: match judged {
+                Judged::Serves(goals) => goals.iter().map(|goal| goal.working).min(),
+                Judged::Fails(working, _) => Some(*working),
+                Judged::Invalid(_) => None,
+            },
+        });
     let samples: Vec<PlaceSample> = samples.collect();
     let refused = counted(judged.iter().filter_map(|judged| match judged {
         Judged::Serves(_) => None,
         Judged::Fails(_, rule) | Judged::Invalid(rule) => Some(rule.as_str()),
     }));
-    let served = tried.iter().zip(judged).filter_map(|(place, judged)| match judged {
-        Judged::Serves(goals) => Some(proposal(place, goals)),
-        _ => None,
-    });
+    let served = tried
+        .iter()
+        .zip(judged)
+        .filter_map(|(place, judged)| match judged {
+            Judged::Serves(goals) => Some(proposal(place, goals)),
+            _ => None,
+        });
     let mut served: Vec<Place> = served.collect();
     let allowed = served.len();
     served.sort_by(better_first);
@@ -191,10 +197,17 @@ fn check_goals(base: &ResolvedScenario, goals: &[String]) -> Result<(), SuggestE
         if !goals.contains(&goal.name) {
             continue;
         }
-        let section = base.scenario.goals.iter().find(|each| each.name == goal.name);
+        let section = base
+            .scenario
+            .goals
+            .iter()
+            .find(|each| each.name == goal.name);
         if section.is_some_and(|section| section.flange_pose.is_some()) {
             return Err(SuggestError::refused(
-                format!("goal `{}` is a pose of the flange, which moves with the base", goal.name),
+                format!(
+                    "goal `{}` is a pose of the flange, which moves with the base",
+                    goal.name
+                ),
                 "give it an entry and a target",
             ));
         }
@@ -242,7 +255,9 @@ impl Search<'_> {
             let best = rows.iter().filter(works).max_by(|a, b| {
                 let clear = |row: &CaseRow| clearance_m(row).unwrap_or(f64::INFINITY);
                 // The first of equals.
-                clear(a).total_cmp(&clear(b)).then(std::cmp::Ordering::Greater)
+                clear(a)
+                    .total_cmp(&clear(b))
+                    .then(std::cmp::Ordering::Greater)
             });
             served.push(PlaceGoal {
                 goal: goal.clone(),
@@ -263,7 +278,10 @@ impl Search<'_> {
                 break;
             }
             let is_near = |other: &Place| {
-                let (a, b) = (Vector3::from(place.position_mm), Vector3::from(other.position_mm));
+                let (a, b) = (
+                    Vector3::from(place.position_mm),
+                    Vector3::from(other.position_mm),
+                );
                 (a - b).norm() < APART_MM
             };
             if !chosen.iter().any(is_near) && self.passes(&place) {
@@ -358,7 +376,9 @@ fn clearance_m(row: &CaseRow) -> Option<f64> {
     ];
     let found = row.measured.posture_clearance_m.iter();
     let outer = found.filter(|(class, _)| LEFT_OUT.iter().all(|left| left.name() != **class));
-    outer.map(|(_, clearance_m)| *clearance_m).min_by(f64::total_cmp)
+    outer
+        .map(|(_, clearance_m)| *clearance_m)
+        .min_by(f64::total_cmp)
 }
 
 fn present_place(base: &ResolvedScenario) -> BasePlace {
@@ -392,7 +412,10 @@ fn proposal(place: &BasePlace, goals: Vec<PlaceGoal>) -> Place {
         position_mm,
         rpy_deg,
         working: goals.iter().map(|goal| goal.working).min().unwrap_or(0),
-        clearance_m: goals.iter().filter_map(|goal| goal.clearance_m).min_by(f64::total_cmp),
+        clearance_m: goals
+            .iter()
+            .filter_map(|goal| goal.clearance_m)
+            .min_by(f64::total_cmp),
         goals,
     }
 }
@@ -405,7 +428,9 @@ fn listed(numbers: [f64; 3]) -> String {
 
 fn better_first(a: &Place, b: &Place) -> std::cmp::Ordering {
     let clear = |place: &Place| place.clearance_m.unwrap_or(f64::INFINITY);
-    b.working.cmp(&a.working).then(clear(b).total_cmp(&clear(a)))
+    b.working
+        .cmp(&a.working)
+        .then(clear(b).total_cmp(&clear(a)))
 }
 
 impl PlaceSearch {
@@ -415,7 +440,11 @@ impl PlaceSearch {
         format!(
             "of {} places about the patient none serves {}; most often: {} ({})",
             self.tried,
-            if self.goals.len() == 1 { "the goal" } else { "all goals" },
+            if self.goals.len() == 1 {
+                "the goal"
+            } else {
+                "all goals"
+            },
             most.map_or("", |most| most.rule.as_str()),
             most.map_or(0, |most| most.count),
         )

@@ -37,8 +37,13 @@ fn score(resolved: &ResolvedScenario, preview: &Preview) -> f64 {
     });
     let needle = to_phantom.rotation * goal.axis.into_inner();
     let angle_deg = slope.angle(&needle).to_degrees();
-    let between = |worst: f64, best: f64, value: f64| ((value - worst) / (best - worst)).clamp(0.0, 1.0);
-    let fissures = if said.fissures_crossed.is_empty() { 0.5 } else { 0.0 };
+    let between =
+        |worst: f64, best: f64, value: f64| ((value - worst) / (best - worst)).clamp(0.0, 1.0);
+    let fissures = if said.fissures_crossed.is_empty() {
+        0.5
+    } else {
+        0.0
+    };
     (between(140.0, 40.0, depth_mm)
         + between(0.0, 5.0, spare_mm)
         + between(60.0, 0.0, angle_deg)
@@ -64,8 +69,10 @@ fn no_entry_of_another_grid_is_much_better_than_the_first_proposal() {
     let text = std::fs::read_to_string(&path).unwrap();
     let mut edit = ScenarioEdit::new("s.toml", &text).unwrap();
     edit.remove("goals[0]", "entry_mm").unwrap();
-    edit.set("goals[0]", "entry_direction_deg", "[-32, -9]").unwrap();
-    let base = resolve_scenario("s.toml", edit.text(), Path::new(""), &Overrides::default()).unwrap();
+    edit.set("goals[0]", "entry_direction_deg", "[-32, -9]")
+        .unwrap();
+    let base =
+        resolve_scenario("s.toml", edit.text(), Path::new(""), &Overrides::default()).unwrap();
     let by_direction = ScenarioFamily::of(base, Path::new(""), &Overrides::default()).unwrap();
     let at = |direction: [f64; 2]| {
         let key = KeyPath::parse("goal.entry_direction_deg").unwrap();
@@ -81,8 +88,11 @@ fn no_entry_of_another_grid_is_much_better_than_the_first_proposal() {
     for azimuth in (1..360).step_by(STEP_DEG.into()) {
         for elevation in (1..150).step_by(STEP_DEG.into()) {
             let direction = [f64::from(azimuth) - 180.0, f64::from(elevation) - 75.0];
-            let Ok(resolved) = at(direction) else { continue };
-            let kept = judge_route(&resolved, &resolved.goals[0]).is_some_and(|judged| judged.is_kept());
+            let Ok(resolved) = at(direction) else {
+                continue;
+            };
+            let kept =
+                judge_route(&resolved, &resolved.goals[0]).is_some_and(|judged| judged.is_kept());
             if !kept {
                 continue;
             }
@@ -93,7 +103,14 @@ fn no_entry_of_another_grid_is_much_better_than_the_first_proposal() {
             }
         }
     }
-    println!("{allowed} allowed, best {best:.3} against {:.3}", first.score);
+    println!(
+        "{allowed} allowed, best {best:.3} against {:.3}",
+        first.score
+    );
     assert!(allowed > 20, "{allowed}");
-    assert!(best <= first.score + MISSED, "{best} against {}", first.score);
+    assert!(
+        best <= first.score + MISSED,
+        "{best} against {}",
+        first.score
+    );
 }

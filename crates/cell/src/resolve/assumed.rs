@@ -7,7 +7,9 @@ use std::path::Path;
 
 use super::library::ModelLibrary;
 use super::overrides::Overrides;
-use crate::scenario::{GoalSection, MountKind, MountSection, PhantomSection, Scenario, TableSection};
+use crate::scenario::{
+    GoalSection, MountKind, MountSection, PhantomSection, Scenario, TableSection,
+};
 use crate::toml_text::TomlText;
 
 /// Middle of the table from mid-chest, along the patient, mm: head and legs lie on it, as in shipped scenarios.
@@ -79,7 +81,8 @@ fn name_goals(goals: &mut [GoalSection]) {
         }
         let numbered = format!("goal_{}", index + 1);
         let lesion = goals[index].lesion.clone().unwrap_or_default();
-        let is_free = |name: &String| !name.is_empty() && goals.iter().all(|goal| goal.name != *name);
+        let is_free =
+            |name: &String| !name.is_empty() && goals.iter().all(|goal| goal.name != *name);
         goals[index].name = Some(lesion).filter(is_free).unwrap_or(numbered);
     }
 }

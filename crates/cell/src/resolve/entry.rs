@@ -55,7 +55,13 @@ impl<'a> GoalPlacer<'a> {
         let stands = |body: &&CollisionBody| {
             body.frame == Frame::World && !matches!(body.kind, BodyKind::Base | BodyKind::Phantom)
         };
-        let fixtures: Vec<CollisionBody> = resolved.cell.bodies.iter().filter(stands).cloned().collect();
+        let fixtures: Vec<CollisionBody> = resolved
+            .cell
+            .bodies
+            .iter()
+            .filter(stands)
+            .cloned()
+            .collect();
         Self {
             resolved,
             boxes: fixtures.iter().map(BodyBoxes::new).collect(),
@@ -71,10 +77,15 @@ impl<'a> GoalPlacer<'a> {
         let toml = TomlText::without_text(&self.resolved.source.file);
         let key = |name: &str| format!("goals[0].{name}");
         let Some(placed) = &self.resolved.phantom else {
-            return Err(toml.finding("phantom", "there is no patient").hint("add a [phantom] section"));
+            return Err(toml
+                .finding("phantom", "there is no patient")
+                .hint("add a [phantom] section"));
         };
         if section.flange_pose.is_some() {
-            let message = format!("goal `{}` is a pose of the flange, which decides its entry", section.name);
+            let message = format!(
+                "goal `{}` is a pose of the flange, which decides its entry",
+                section.name
+            );
             return Err(toml
                 .finding(&key("flange_pose"), message)
                 .hint("give it a `lesion` or `target_mm` instead"));

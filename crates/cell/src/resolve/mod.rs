@@ -186,7 +186,9 @@ pub fn resolve_open_scenario(
     let toml = TomlText::parse(file, text).map_err(|finding| vec![finding])?;
     let draft = Draft::read(&toml, base, overrides)?;
     let goals = draft.scenario.goals.clone();
-    let resolved = draft.without_goals().map_err(|found| draft.remarked(found))?;
+    let resolved = draft
+        .without_goals()
+        .map_err(|found| draft.remarked(found))?;
     Ok(OpenScenario {
         resolved: draft.noted(resolved),
         goals,

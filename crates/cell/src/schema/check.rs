@@ -109,7 +109,9 @@ impl Node {
                 "" => "give a plain number, in the unit in its name".to_owned(),
                 unit => format!("give a plain number, in {unit}"),
             }),
-            Self::Whole(_) => Some("give a plain whole number, without a unit and quotes".to_owned()),
+            Self::Whole(_) => {
+                Some("give a plain whole number, without a unit and quotes".to_owned())
+            }
             Self::Truth => Some("write true or false, without quotes".to_owned()),
             Self::List(List { items, .. }) => Some(match (&items[0], value) {
                 (Self::Table(_), Value::Table(_)) => format!(
@@ -321,7 +323,9 @@ impl List {
         let is_whole = |value: &Value| value.is_integer();
         let are_halves = values.len() == 2 * self.most && values.iter().all(is_whole);
         if are_halves {
-            let pairs = values.chunks(2).map(|pair| format!("{}.{}", pair[0], pair[1]));
+            let pairs = values
+                .chunks(2)
+                .map(|pair| format!("{}.{}", pair[0], pair[1]));
             let numbers: Vec<String> = pairs.collect();
             return Some(format!(
                 "decimals have a point, commas stand between numbers: [{}]",
@@ -379,7 +383,12 @@ impl Table {
             return "it is a section with keys of its own".to_owned();
         }
         // Of one in a list the section is the list's.
-        let section: String = at.to_string().split('[').next().unwrap_or_default().to_owned();
+        let section: String = at
+            .to_string()
+            .split('[')
+            .next()
+            .unwrap_or_default()
+            .to_owned();
         let section = match at.to_string().rsplit_once("].") {
             Some((_, name)) => format!("{section}.{name}"),
             None => section,

@@ -31,23 +31,40 @@ pub(super) fn hint_about(text: &str, span: Range<usize>) -> Option<String> {
         && is_number(whole)
         && is_number(decimals)
     {
-        return Some(format!("decimals have a point: `{key} = {whole}.{decimals}`"));
+        return Some(format!(
+            "decimals have a point: `{key} = {whole}.{decimals}`"
+        ));
     }
-    if let Some(inside) = value.strip_prefix('(').and_then(|rest| rest.strip_suffix(')')) {
-        return Some(format!("lists stand in square brackets: `{key} = [{inside}]`"));
+    if let Some(inside) = value
+        .strip_prefix('(')
+        .and_then(|rest| rest.strip_suffix(')'))
+    {
+        return Some(format!(
+            "lists stand in square brackets: `{key} = [{inside}]`"
+        ));
     }
-    if let Some(inside) = value.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
-        let words: Vec<&str> = inside.split([' ', ',', ';']).filter(|word| !word.is_empty()).collect();
+    if let Some(inside) = value
+        .strip_prefix('[')
+        .and_then(|rest| rest.strip_suffix(']'))
+    {
+        let words: Vec<&str> = inside
+            .split([' ', ',', ';'])
+            .filter(|word| !word.is_empty())
+            .collect();
         let are_numbers = words.iter().all(|word| is_number(word));
         return are_numbers.then(|| {
-            format!("put commas between the numbers: `{key} = [{}]`", words.join(", "))
+            format!(
+                "put commas between the numbers: `{key} = [{}]`",
+                words.join(", ")
+            )
         });
     }
     let quotes = |quote: char| value.matches(quote).count();
     if quotes('"') % 2 == 1 || quotes('\'') % 2 == 1 {
         return Some("the text has to end with the quote that it begins with".to_owned());
     }
-    let digits = value.trim_end_matches(|c: char| c.is_alphabetic() || c.is_whitespace() || c == '%');
+    let digits =
+        value.trim_end_matches(|c: char| c.is_alphabetic() || c.is_whitespace() || c == '%');
     if is_number(digits) && digits.len() < value.len() {
         return Some(format!(
             "write the number alone, `{key} = {digits}`: the key's name says the unit"
@@ -109,9 +126,16 @@ fn numbers(value: &Value) -> Option<Vec<f64>> {
 
 /// Keys of points and sizes of things that fill more than a few millimetres.
 fn is_place(key: &str) -> bool {
-    ["position_mm", "entry_mm", "target_mm", "center_mm", "isocentre_mm", "size_mm"]
-        .iter()
-        .any(|end| key.ends_with(end))
+    [
+        "position_mm",
+        "entry_mm",
+        "target_mm",
+        "center_mm",
+        "isocentre_mm",
+        "size_mm",
+    ]
+    .iter()
+    .any(|end| key.ends_with(end))
 }
 
 /// A multiple of 45 degrees, written in radians to two digits or more.
@@ -125,10 +149,17 @@ fn doubt_degrees(path: &str, value: &Value) -> Option<String> {
         number.fract() != 0.0 && is_multiple && (number - eighths * FRAC_PI_4).abs() < ROUNDING
     };
     let is_slip = numbers.iter().any(|number| is_radians(*number))
-        && numbers.iter().all(|number| *number == 0.0 || is_radians(*number));
+        && numbers
+            .iter()
+            .all(|number| *number == 0.0 || is_radians(*number));
     is_slip.then(|| {
-        let degrees = numbers.iter().map(|number| (number.to_degrees() / 45.0).round() * 45.0);
-        format!("`{path}` is in degrees: did you give radians? They are {} deg", listed(degrees))
+        let degrees = numbers
+            .iter()
+            .map(|number| (number.to_degrees() / 45.0).round() * 45.0);
+        format!(
+            "`{path}` is in degrees: did you give radians? They are {} deg",
+            listed(degrees)
+        )
     })
 }
 
@@ -142,7 +173,10 @@ fn doubt_millimetres(path: &str, value: &Value) -> Option<String> {
         && numbers.iter().any(|number| number.fract() != 0.0);
     is_slip.then(|| {
         let millimetres = numbers.iter().map(|number| (number * 1e4).round() / 10.0);
-        format!("`{path}` is in millimetres: did you give metres? They are {} mm", listed(millimetres))
+        format!(
+            "`{path}` is in millimetres: did you give metres? They are {} mm",
+            listed(millimetres)
+        )
     })
 }
 
@@ -192,10 +226,19 @@ mod tests {
 
     #[test]
     fn radians_and_metres_are_doubted_and_degrees_and_millimetres_are_not() {
-        let found = doubts("[robot]\nbase_rpy_deg = [0, 0, 4.712]\nbase_position_mm = [-0.28, 0.35, 1.05]");
+        let found =
+            doubts("[robot]\nbase_rpy_deg = [0, 0, 4.712]\nbase_position_mm = [-0.28, 0.35, 1.05]");
         assert_eq!(found.len(), 2, "{found:?}");
-        assert!(found.iter().any(|each| each.contains("[-280, 350, 1050] mm")), "{found:?}");
-        assert!(found.iter().any(|each| each.contains("[0, 0, 270] deg")), "{found:?}");
+        assert!(
+            found
+                .iter()
+                .any(|each| each.contains("[-280, 350, 1050] mm")),
+            "{found:?}"
+        );
+        assert!(
+            found.iter().any(|each| each.contains("[0, 0, 270] deg")),
+            "{found:?}"
+        );
         assert!(doubts("[[goals]]\nroll_deg = 1.57")[0].starts_with("`goals[0].roll_deg`"));
         let sound = "[robot]\nbase_rpy_deg = [0, 0, 270]\nbase_position_mm = [0, 0, 800.5]\n[[goals]]\n\
                      entry_direction_deg = [3.2, -1.57]\ntarget_offset_mm = [0.5, 0, 0]\nroll_deg = 2";

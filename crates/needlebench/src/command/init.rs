@@ -164,7 +164,9 @@ fn choices(arguments: &InitArguments) -> Result<Choices, Finding> {
         .lesions;
     Ok(Choices {
         schema_version: 1,
-        templates: Template::ALL.map(|each| [each.name(), each.in_words()]).to_vec(),
+        templates: Template::ALL
+            .map(|each| [each.name(), each.in_words()])
+            .to_vec(),
         arms: Arm::shipped_names().collect(),
         tools: shipped_tools(),
         phantoms: SIZE_PRESETS.to_vec(),
@@ -190,18 +192,29 @@ fn unknown(argument: &str, given: &str, known: &[&str]) -> Finding {
 }
 
 /// The file, and what is wanted in it.
-fn options(arguments: &InitArguments, choices: &Choices) -> Result<(PathBuf, StarterOptions), Finding> {
+fn options(
+    arguments: &InitArguments,
+    choices: &Choices,
+) -> Result<(PathBuf, StarterOptions), Finding> {
     let template = Template::from(arguments.from);
-    let lesion = arguments.lesion.clone().unwrap_or_else(|| template.lesion().to_owned());
+    let lesion = arguments
+        .lesion
+        .clone()
+        .unwrap_or_else(|| template.lesion().to_owned());
     let arms = &choices.arms;
     if !arms.contains(&arguments.arm.as_str()) {
         return Err(unknown("--arm", &arguments.arm, arms));
     }
-    let lesions: Vec<&str> = choices.lesions.iter().map(|each| each.name.as_str()).collect();
+    let lesions: Vec<&str> = choices
+        .lesions
+        .iter()
+        .map(|each| each.name.as_str())
+        .collect();
     if !lesions.contains(&lesion.as_str()) {
         return Err(unknown("--lesion", &lesion, &lesions));
     }
-    let is_folder = arguments.path.is_dir() || arguments.path.as_os_str().to_string_lossy().ends_with('/');
+    let is_folder =
+        arguments.path.is_dir() || arguments.path.as_os_str().to_string_lossy().ends_with('/');
     let path = if is_folder {
         arguments.path.join("first.toml")
     } else {
@@ -209,14 +222,20 @@ fn options(arguments: &InitArguments, choices: &Choices) -> Result<(PathBuf, Sta
     };
     let file = path.display().to_string();
     let is_toml = path.extension().is_some_and(|ending| ending == "toml");
-    let name = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    let name = path
+        .file_stem()
+        .and_then(|stem| stem.to_str())
+        .unwrap_or_default();
     let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if !is_toml || name.is_empty() || !name.chars().all(is_name) {
         return Err(Finding::new(&file, "this is no name of a scenario's file").hint(
             "letters, digits, `-` and `_`, and the ending `.toml`: results go to a folder of that name",
         ));
     }
-    let written = [Some(path.clone()), arguments.study.then(|| study_path(&path, name))];
+    let written = [
+        Some(path.clone()),
+        arguments.study.then(|| study_path(&path, name)),
+    ];
     for path in written.into_iter().flatten() {
         if path.exists() && !arguments.force {
             let file = path.display().to_string();
@@ -257,15 +276,29 @@ fn write_files(
     let schema = |format: SchemaFormat| -> Result<String> {
         Ok(serde_json::to_string_pretty(&document(format))? + "\n")
     };
-    write(&path.with_file_name("scenario.schema.json"), &schema(SchemaFormat::Scenario)?)?;
+    write(
+        &path.with_file_name("scenario.schema.json"),
+        &schema(SchemaFormat::Scenario)?,
+    )?;
     if arguments.study {
-        write(&study_path(path, &options.name), &starter_study(&options.name))?;
-        write(&path.with_file_name("study.schema.json"), &schema(SchemaFormat::Study)?)?;
+        write(
+            &study_path(path, &options.name),
+            &starter_study(&options.name),
+        )?;
+        write(
+            &path.with_file_name("study.schema.json"),
+            &schema(SchemaFormat::Study)?,
+        )?;
     }
     Ok(())
 }
 
-fn said(arguments: &InitArguments, path: &Path, options: &StarterOptions, starter: &Starter) -> String {
+fn said(
+    arguments: &InitArguments,
+    path: &Path,
+    options: &StarterOptions,
+    starter: &Starter,
+) -> String {
     let entry = &starter.entry;
     let mut text = format!(
         "{}: {} for {}, {}\n  needle {:.0} mm deep, {} of 8 configurations can work (postures only, motions not planned)\n",
@@ -283,19 +316,38 @@ fn said(arguments: &InitArguments, path: &Path, options: &StarterOptions, starte
             "  the robot stands at [{x}, {y}, {z}] mm: from the usual place it does not serve this lesion"
         );
     }
-    let _ = writeln!(text, "  beside it: scenario.schema.json, which editors read");
+    let _ = writeln!(
+        text,
+        "  beside it: scenario.schema.json, which editors read"
+    );
     text += "next:\n";
     let path = shown(path);
     let mut next = vec![
-        (format!("needlebench run {path}"), "all of it, with a page to look at"),
-        (format!("needlebench check {path}"), "after each change: what can work"),
-        (format!("needlebench suggest {path}"), "other entries, other places"),
+        (
+            format!("needlebench run {path}"),
+            "all of it, with a page to look at",
+        ),
+        (
+            format!("needlebench check {path}"),
+            "after each change: what can work",
+        ),
+        (
+            format!("needlebench suggest {path}"),
+            "other entries, other places",
+        ),
     ];
     if arguments.study {
         let study = study_path(Path::new(&path), &options.name);
-        next.push((format!("needlebench study {}", shown(&study)), "how much the patient may be off"));
+        next.push((
+            format!("needlebench study {}", shown(&study)),
+            "how much the patient may be off",
+        ));
     }
-    let width = next.iter().map(|(command, _)| command.len()).max().unwrap_or(0);
+    let width = next
+        .iter()
+        .map(|(command, _)| command.len())
+        .max()
+        .unwrap_or(0);
     for (command, why) in next {
         let _ = writeln!(text, "  {command:width$}  {why}");
     }

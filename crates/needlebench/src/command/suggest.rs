@@ -97,7 +97,10 @@ impl Found {
     /// Something was found of all that was asked for.
     fn is_complete(&self) -> bool {
         self.entries.iter().all(|found| !found.entries.is_empty())
-            && self.places.as_ref().is_none_or(|found| !found.places.is_empty())
+            && self
+                .places
+                .as_ref()
+                .is_none_or(|found| !found.places.is_empty())
     }
 }
 
@@ -194,7 +197,10 @@ fn in_words(arguments: &SuggestArguments, found: &Found, written: Option<&Path>)
         last.push(format!("maps: {}", shown(&folder)));
     }
     if let Some(path) = written {
-        last.push(format!("written: {0}; next: needlebench run {0}", shown(path)));
+        last.push(format!(
+            "written: {0}; next: needlebench run {0}",
+            shown(path)
+        ));
     }
     if !last.is_empty() {
         parts.push(last.join("\n"));
@@ -258,7 +264,11 @@ fn find(
             }
             // Without any entry there is nothing to stand beside.
             Err(_) if entries.iter().any(|found| found.allowed == 0) => {
-                return Ok(Found { resolved, entries, places });
+                return Ok(Found {
+                    resolved,
+                    entries,
+                    places,
+                });
             }
             Err(finding) => return Err(finding.into()),
         };
@@ -321,7 +331,10 @@ fn sections(
         return Ok(goals);
     };
     let names: Vec<String> = goals.iter().map(|goal| goal.name.clone()).collect();
-    let found: Vec<GoalSection> = goals.into_iter().filter(|goal| goal.name == *name).collect();
+    let found: Vec<GoalSection> = goals
+        .into_iter()
+        .filter(|goal| goal.name == *name)
+        .collect();
     if !found.is_empty() {
         return Ok(found);
     }
@@ -353,8 +366,8 @@ fn written(
             .into());
     }
     let file = &found.resolved.source.file;
-    let text = read_text(&arguments.scenario)
-        .map_err(|error| Finding::new(file, error.to_string()))?;
+    let text =
+        read_text(&arguments.scenario).map_err(|error| Finding::new(file, error.to_string()))?;
     let mut edit = ScenarioEdit::new(file, &text)?;
     let own = load_open_scenario(&arguments.scenario, overrides)?.goals;
     let mut next = own.len();
@@ -372,10 +385,17 @@ fn written(
         }
         let [azimuth, elevation] = entry.direction_deg;
         edit.remove(&section, "entry_mm")?;
-        edit.set(&section, "entry_direction_deg", &format!("[{azimuth}, {elevation}]"))?;
+        edit.set(
+            &section,
+            "entry_direction_deg",
+            &format!("[{azimuth}, {elevation}]"),
+        )?;
     }
     // A place that serves is kept, unless only places were asked for.
-    let place = found.places.as_ref().filter(|found| found.present.is_none() || arguments.entries == 0);
+    let place = found
+        .places
+        .as_ref()
+        .filter(|found| found.present.is_none() || arguments.entries == 0);
     if let Some(place) = place.and_then(|found| found.places.first()) {
         for line in place.toml.lines() {
             if let Some((key, value)) = line.split_once(" = ") {
@@ -386,16 +406,18 @@ fn written(
     let folder = path.parent().unwrap_or(Path::new(""));
     let resolved = resolve_scenario(&to, edit.text(), folder, overrides).map_err(unplaced)?;
     let runnable = Runnable::checked(resolved)?;
-    let (_, findings) = Preview::of(runnable.scenario())
-        .map_err(|error| Finding::new(&to, error.to_string()))?;
+    let (_, findings) =
+        Preview::of(runnable.scenario()).map_err(|error| Finding::new(&to, error.to_string()))?;
     if let Some(first) = findings.into_iter().next() {
-        let message = format!("what is proposed does not pass with the rest of the scenario: {}", first.message);
+        let message = format!(
+            "what is proposed does not pass with the rest of the scenario: {}",
+            first.message
+        );
         let hint = "other goals may need another place: propose for all of them, without --goal, --lesion and --target";
         return Err(Finding { message, ..first }.hint(hint).into());
     }
-    write_atomically(path, edit.text().as_bytes()).map_err(|error| {
-        Finding::new(&to, format!("cannot be written: {error}")).key("--write")
-    })?;
+    write_atomically(path, edit.text().as_bytes())
+        .map_err(|error| Finding::new(&to, format!("cannot be written: {error}")).key("--write"))?;
     Ok(Some(path.clone()))
 }
 

@@ -29,15 +29,28 @@ fn every_template_with_every_arm_passes_check() {
 #[ignore = "long: every template, arm, phantom and lesion"]
 fn every_variant_passes_check_or_is_refused() {
     let bench = Bench::new();
-    let choices = bench.run(&["init", "--list", "--json"]).exits_with(0).json();
+    let choices = bench
+        .run(&["init", "--list", "--json"])
+        .exits_with(0)
+        .json();
     let (mut written, mut refused) = (0, 0);
     for template in TEMPLATES {
         for arm in ARMS {
             for phantom in choices["phantoms"].as_array().unwrap() {
                 for lesion in choices["lesions"].as_array().unwrap() {
-                    let [phantom, lesion] = [phantom, &lesion["name"]].map(|each| each.as_str().unwrap());
+                    let [phantom, lesion] =
+                        [phantom, &lesion["name"]].map(|each| each.as_str().unwrap());
                     let arguments = [
-                        "init", "v.toml", "--force", "--from", template, "--arm", arm, "--phantom", phantom, "--lesion",
+                        "init",
+                        "v.toml",
+                        "--force",
+                        "--from",
+                        template,
+                        "--arm",
+                        arm,
+                        "--phantom",
+                        phantom,
+                        "--lesion",
                         lesion,
                     ];
                     let answer = bench.run(&arguments);
@@ -76,7 +89,14 @@ fn other_templates_run_too() {
         bench
             .run(&["init", &file, "--from", template, "--arm", arm])
             .exits_with(0);
-        let run = ["run", &file, "--engine", "rapier", "--no-pictures", "--no-page"];
+        let run = [
+            "run",
+            &file,
+            "--engine",
+            "rapier",
+            "--no-pictures",
+            "--no-page",
+        ];
         bench.run(&run).exits_with(0);
     }
 }
@@ -86,15 +106,24 @@ fn the_text_says_its_schema_first_and_explains_every_value() {
     let bench = Bench::new();
     bench.run(&["init", "mine.toml"]).exits_with(0);
     let text = String::from_utf8(bench.read("mine.toml")).unwrap();
-    assert!(text.starts_with("#:schema ./scenario.schema.json\n"), "{text}");
+    assert!(
+        text.starts_with("#:schema ./scenario.schema.json\n"),
+        "{text}"
+    );
     assert_eq!(bench.read_json("scenario.schema.json")["title"], "Scenario");
-    assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    assert!(
+        text.lines().all(|line| line.chars().count() <= 120),
+        "{text}"
+    );
     let mut explained = false;
     for line in text.lines() {
         let is_value = line.contains(" = ") && !line.starts_with('#');
         // A comment beside a value, or above it.
         let is_named = line.starts_with("name") || line.starts_with("description");
-        assert!(!is_value || line.contains('#') || explained || is_named, "{line}");
+        assert!(
+            !is_value || line.contains('#') || explained || is_named,
+            "{line}"
+        );
         explained = line.starts_with('#') || explained && is_value;
     }
 }
@@ -103,7 +132,10 @@ fn the_text_says_its_schema_first_and_explains_every_value() {
 fn files_are_not_replaced_unless_forced() {
     let bench = Bench::new();
     bench.write("first.toml", "mine");
-    bench.run(&["init"]).exits_with(2).complains(["first.toml", "--force"]);
+    bench
+        .run(&["init"])
+        .exits_with(2)
+        .complains(["first.toml", "--force"]);
     assert_eq!(bench.read("first.toml"), b"mine");
     bench.run(&["init", "--force"]).exits_with(0);
     bench.run(&["init", "new_folder/"]).exits_with(0);
@@ -114,7 +146,10 @@ fn files_are_not_replaced_unless_forced() {
 fn a_small_study_comes_with_it_and_runs() {
     let bench = Bench::new();
     let said = bench.run(&["init", "--study"]).exits_with(0).stdout;
-    assert!(said.contains("needlebench study first_study.toml"), "{said}");
+    assert!(
+        said.contains("needlebench study first_study.toml"),
+        "{said}"
+    );
     bench.run(&["study", "first_study.toml"]).exits_with(0);
 }
 
@@ -122,7 +157,13 @@ fn a_small_study_comes_with_it_and_runs() {
 fn what_there_is_is_listed_and_what_is_not_is_refused_with_the_nearest() {
     let bench = Bench::new();
     let list = bench.run(&["init", "--list"]).exits_with(0).stdout;
-    for word in ["ur5e", "perpendicular", "male-p50-supine", "pleural_based", "hanging"] {
+    for word in [
+        "ur5e",
+        "perpendicular",
+        "male-p50-supine",
+        "pleural_based",
+        "hanging",
+    ] {
         assert!(list.contains(word), "{word}: {list}");
     }
     for (arguments, near) in [
@@ -134,5 +175,8 @@ fn what_there_is_is_listed_and_what_is_not_is_refused_with_the_nearest() {
         let answer = bench.run(&[&["init"], &arguments[..]].concat());
         answer.exits_with(2).complains([&hint]);
     }
-    bench.run(&["init", "my first.toml"]).exits_with(2).complains(["letters"]);
+    bench
+        .run(&["init", "my first.toml"])
+        .exits_with(2)
+        .complains(["letters"]);
 }

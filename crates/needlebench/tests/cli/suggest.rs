@@ -7,7 +7,8 @@ use serde_json::Value;
 use crate::support::{Bench, numbers, workspace};
 
 /// A patient, a table, a robot beside it, and a lesion: all else is left out.
-const SHORT: &str = "[phantom]\nmodel = \"male-p50-supine\"\n[[goals]]\nlesion = \"right_upper_lobe\"\n";
+const SHORT: &str =
+    "[phantom]\nmodel = \"male-p50-supine\"\n[[goals]]\nlesion = \"right_upper_lobe\"\n";
 
 fn suite() -> String {
     fs::read_to_string(workspace().join("scenarios/supine_suite.toml")).unwrap()
@@ -20,7 +21,15 @@ fn entries(answer: &Value) -> &Vec<Value> {
 #[test]
 fn proposed_entries_lie_on_the_skin_and_pass_check() {
     let bench = Bench::with_scenario(&suite());
-    let arguments = ["suggest", "s.toml", "--goal", "right_upper_anterior", "--places", "0", "--json"];
+    let arguments = [
+        "suggest",
+        "s.toml",
+        "--goal",
+        "right_upper_anterior",
+        "--places",
+        "0",
+        "--json",
+    ];
     let answer = bench.run(&arguments).exits_with(0).json();
     assert_eq!(entries(&answer).len(), 3);
     for entry in entries(&answer) {
@@ -28,33 +37,59 @@ fn proposed_entries_lie_on_the_skin_and_pass_check() {
         let point = numbers(&entry["entry_in_phantom_m"]);
         // By the direction, and by the point where it says that this leaves the skin.
         let by_direction = format!("entry_direction_deg = {direction:?}");
-        let by_point = format!("entry_mm = {:?}", point.iter().map(|m| m * 1e3).collect::<Vec<_>>());
+        let by_point = format!(
+            "entry_mm = {:?}",
+            point.iter().map(|m| m * 1e3).collect::<Vec<_>>()
+        );
         for line in [by_direction, by_point] {
             let text = suite().replace("entry_mm = [-108.9, -76.4, 85.8]", &line);
             bench.write("with.toml", text);
-            let check = bench.run(&["check", "with.toml", "--json"]).exits_with(0).json();
+            let check = bench
+                .run(&["check", "with.toml", "--json"])
+                .exits_with(0)
+                .json();
             let goal = &check["scenarios"][0]["goals"][0];
             assert_eq!(goal["name"], "right_upper_anterior");
             assert_eq!(goal["working"], entry["working"]);
             assert_eq!(goal["needle_route"]["kept"], true);
-            let moved = check["notes"].as_array().unwrap().iter().filter_map(Value::as_str);
-            let moved = moved.filter(|note| note.contains("right_upper_anterior") && note.contains("moved"));
+            let moved = check["notes"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .filter_map(Value::as_str);
+            let moved = moved
+                .filter(|note| note.contains("right_upper_anterior") && note.contains("moved"));
             assert_eq!(moved.count(), 0, "the entry is not on the skin");
         }
         let depth = entry["depth_m"].as_f64().unwrap();
         let target = numbers(&answer["entries"][0]["target_in_phantom_m"]);
-        let apart: f64 = point.iter().zip(&target).map(|(a, b)| (a - b).powi(2)).sum();
+        let apart: f64 = point
+            .iter()
+            .zip(&target)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum();
         assert!((apart.sqrt() - depth).abs() < 1e-12);
     }
     // The best is first.
-    let scores: Vec<f64> = entries(&answer).iter().map(|each| each["score"].as_f64().unwrap()).collect();
+    let scores: Vec<f64> = entries(&answer)
+        .iter()
+        .map(|each| each["score"].as_f64().unwrap())
+        .collect();
     assert!(scores.is_sorted_by(|a, b| a >= b), "{scores:?}");
 }
 
 #[test]
 fn proposed_places_pass_check_for_all_goals() {
     let bench = Bench::with_scenario(&suite());
-    let arguments = ["suggest", "s.toml", "--entries", "0", "--places", "2", "--json"];
+    let arguments = [
+        "suggest",
+        "s.toml",
+        "--entries",
+        "0",
+        "--places",
+        "2",
+        "--json",
+    ];
     let answer = bench.run(&arguments).exits_with(0).json();
     let places = answer["places"]["places"].as_array().unwrap();
     assert_eq!(places.len(), 2);
@@ -63,11 +98,20 @@ fn proposed_places_pass_check_for_all_goals() {
         let old = "base_position_mm = [-280, 350, 1050]\nbase_rpy_deg = [0, 0, 270]";
         assert!(suite().contains(old));
         bench.write("with.toml", suite().replace(old, lines));
-        let check = bench.run(&["check", "with.toml", "--json"]).exits_with(0).json();
+        let check = bench
+            .run(&["check", "with.toml", "--json"])
+            .exits_with(0)
+            .json();
         let goals = check["scenarios"][0]["goals"].as_array().unwrap();
-        let working: Vec<u64> = goals.iter().map(|goal| goal["working"].as_u64().unwrap()).collect();
+        let working: Vec<u64> = goals
+            .iter()
+            .map(|goal| goal["working"].as_u64().unwrap())
+            .collect();
         let proposed = place["goals"].as_array().unwrap();
-        let proposed: Vec<u64> = proposed.iter().map(|goal| goal["working"].as_u64().unwrap()).collect();
+        let proposed: Vec<u64> = proposed
+            .iter()
+            .map(|goal| goal["working"].as_u64().unwrap())
+            .collect();
         assert_eq!(working, proposed);
         assert_eq!(place["working"].as_u64(), working.iter().min().copied());
     }
@@ -77,7 +121,9 @@ fn proposed_places_pass_check_for_all_goals() {
 fn answers_do_not_depend_on_threads() {
     let bench = Bench::with_scenario(SHORT);
     let ask = |jobs: &str| {
-        let arguments = ["suggest", "s.toml", "--places", "1", "--json", "--jobs", jobs];
+        let arguments = [
+            "suggest", "s.toml", "--places", "1", "--json", "--jobs", jobs,
+        ];
         bench.run(&arguments).exits_with(0).stdout
     };
     assert_eq!(ask("1"), ask("3"));
@@ -87,25 +133,60 @@ fn answers_do_not_depend_on_threads() {
 fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
     let bench = Bench::with_scenario(&suite());
     let arguments = [
-        "suggest", "s.toml", "--lesion", "left_perihilar", "--places", "1", "--write", "new.toml", "--out", "maps",
+        "suggest",
+        "s.toml",
+        "--lesion",
+        "left_perihilar",
+        "--places",
+        "1",
+        "--write",
+        "new.toml",
+        "--out",
+        "maps",
     ];
     let said = bench.run(&arguments).exits_with(0).stdout;
     assert!(said.contains("next: needlebench run new.toml"), "{said}");
     let text = String::from_utf8(bench.read("new.toml")).unwrap();
-    assert!(text.contains("# Driven out of the bore") && text.contains("lesion = \"left_perihilar\""), "{text}");
-    for name in ["left_perihilar.entries.png", "left_perihilar.entries.svg", "places.png", "places.svg"] {
-        assert!(bench.path("maps/supine_suite").join(name).is_file(), "{name}");
+    assert!(
+        text.contains("# Driven out of the bore") && text.contains("lesion = \"left_perihilar\""),
+        "{text}"
+    );
+    for name in [
+        "left_perihilar.entries.png",
+        "left_perihilar.entries.svg",
+        "places.png",
+        "places.svg",
+    ] {
+        assert!(
+            bench.path("maps/supine_suite").join(name).is_file(),
+            "{name}"
+        );
     }
-    bench.run(&arguments).exits_with(2).complains(["new.toml", "--force"]);
+    bench
+        .run(&arguments)
+        .exits_with(2)
+        .complains(["new.toml", "--force"]);
 }
 
 #[test]
 fn where_there_is_no_entry_it_says_which_rule_refuses_most() {
     let short = suite().replace("needle_length_mm = 200", "needle_length_mm = 70");
     let bench = Bench::with_scenario(&short);
-    let arguments = ["suggest", "s.toml", "--lesion", "left_lower_lobe", "--entries", "1", "--places", "0"];
+    let arguments = [
+        "suggest",
+        "s.toml",
+        "--lesion",
+        "left_lower_lobe",
+        "--entries",
+        "1",
+        "--places",
+        "0",
+    ];
     let said = bench.run(&arguments).exits_with(1).stdout;
-    assert!(said.contains("none: of") && said.contains("most often: needle too short"), "{said}");
+    assert!(
+        said.contains("none: of") && said.contains("most often: needle too short"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -115,9 +196,18 @@ fn targets_that_are_none_are_refused() {
         let answer = bench.run(&[&["suggest", "s.toml"], arguments].concat());
         answer.exits_with(2).complains(parts);
     };
-    refused(&["--lesion", "plural_based"], ["no lesion `plural_based`", "pleural_based"]);
-    refused(&["--target", "400,0,0"], ["outside the phantom", "phantom frame"]);
-    refused(&["--goal", "right_uper_lobe"], ["no goal `right_uper_lobe`", "right_upper_lobe"]);
+    refused(
+        &["--lesion", "plural_based"],
+        ["no lesion `plural_based`", "pleural_based"],
+    );
+    refused(
+        &["--target", "400,0,0"],
+        ["outside the phantom", "phantom frame"],
+    );
+    refused(
+        &["--goal", "right_uper_lobe"],
+        ["no goal `right_uper_lobe`", "right_upper_lobe"],
+    );
     refused(&["--target", "1,2"], ["three numbers", ""]);
 }
 
@@ -126,21 +216,33 @@ fn targets_that_are_none_are_refused() {
 #[ignore = "long: every shipped phantom and lesion"]
 fn proposals_for_every_phantom_and_lesion_pass_check() {
     let bench = Bench::new();
-    let choices = bench.run(&["init", "--list", "--json"]).exits_with(0).json();
+    let choices = bench
+        .run(&["init", "--list", "--json"])
+        .exits_with(0)
+        .json();
     let (mut proposed, mut none) = (0, 0);
     for phantom in choices["phantoms"].as_array().unwrap() {
         for lesion in choices["lesions"].as_array().unwrap() {
             let [phantom, lesion] = [phantom, &lesion["name"]].map(|each| each.as_str().unwrap());
             let text = format!("[phantom]\nmodel = \"{phantom}\"\n");
             bench.write("s.toml", &text);
-            let arguments = ["suggest", "s.toml", "--lesion", lesion, "--places", "0", "--json"];
+            let arguments = [
+                "suggest", "s.toml", "--lesion", lesion, "--places", "0", "--json",
+            ];
             let answer = bench.run(&arguments);
             let found = answer.json();
-            assert_eq!(answer.status, Some(i32::from(entries(&found).is_empty())), "{phantom} {lesion}");
+            assert_eq!(
+                answer.status,
+                Some(i32::from(entries(&found).is_empty())),
+                "{phantom} {lesion}"
+            );
             none += usize::from(entries(&found).is_empty());
             for entry in entries(&found) {
                 let entry = entry["toml"].as_str().unwrap();
-                bench.write("with.toml", format!("{text}[[goals]]\nlesion = \"{lesion}\"\n{entry}\n"));
+                bench.write(
+                    "with.toml",
+                    format!("{text}[[goals]]\nlesion = \"{lesion}\"\n{entry}\n"),
+                );
                 bench.run(&["check", "with.toml"]).exits_with(0);
                 proposed += 1;
             }

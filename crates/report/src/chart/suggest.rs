@@ -130,7 +130,10 @@ pub fn places_chart(resolved: &ResolvedScenario, found: &PlaceSearch) -> Chart {
     panel.draw(&mut chart);
     outline(&mut chart, &panel, resolved);
     for [x, y] in spots(found) {
-        let here = found.samples.iter().filter(|each| each.position_mm[..2] == [x, y]);
+        let here = found
+            .samples
+            .iter()
+            .filter(|each| each.position_mm[..2] == [x, y]);
         let most = here.filter_map(|each| each.working).max();
         let [cx, cy] = panel.at([x, y]);
         let corner = [cx - 0.5 * EDGE_PX, cy - 0.5 * EDGE_PX];
@@ -148,7 +151,9 @@ pub fn places_chart(resolved: &ResolvedScenario, found: &PlaceSearch) -> Chart {
         let [x, y, _] = place.position_mm;
         let [cx, cy] = panel.at([x, y]);
         // Proposals above each other would hide each other.
-        let above = found.places[..index].iter().filter(|each| each.position_mm[..2] == [x, y]);
+        let above = found.places[..index]
+            .iter()
+            .filter(|each| each.position_mm[..2] == [x, y]);
         let aside = 2.0 * MARK_PX * above.count() as f64;
         numbered(&mut chart, [cx + aside, cy], index + 1);
     }
@@ -162,10 +167,19 @@ pub fn places_chart(resolved: &ResolvedScenario, found: &PlaceSearch) -> Chart {
     );
     let names: Vec<String> = (0..=8).map(|count: usize| count.to_string()).collect();
     let counts = names.iter().enumerate();
-    let counts = counts.map(|(count, name)| (Sample::Area(Paint::Fixed(count_colour(count))), name.as_str()));
+    let counts = counts.map(|(count, name)| {
+        (
+            Sample::Area(Paint::Fixed(count_colour(count))),
+            name.as_str(),
+        )
+    });
     chart.write(Anchor::Start, [90.0, 704.0], "of 8 work:");
     legend(&mut chart, [180.0, 704.0], 780.0, counts);
-    chart.write(Anchor::Start, [90.0, 734.0], "a stroke: the base cannot stand there");
+    chart.write(
+        Anchor::Start,
+        [90.0, 734.0],
+        "a stroke: the base cannot stand there",
+    );
     chart
 }
 

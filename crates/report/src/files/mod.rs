@@ -28,5 +28,5 @@ pub use iso9283::{write_measured, write_test};
 pub use replay::{CALIBRATION_FILE, write_replay};
 pub use run::{RunFiles, write_run};
 pub use servo::write_servo;
-pub use suggest::write_suggestions;
 pub use study::{FinishedStudy, StudyOutput, StudySummary, write_study};
+pub use suggest::write_suggestions;

@@ -38,10 +38,16 @@ pub fn entries_text(found: &EntrySearch) -> String {
         .iter()
         .map(|each| each.tissue.as_str())
         .collect();
-    let headings: Vec<String> = tissues.iter().map(|tissue| format!("{tissue}\n(mm)")).collect();
+    let headings: Vec<String> = tissues
+        .iter()
+        .map(|tissue| format!("{tissue}\n(mm)"))
+        .collect();
     header.extend(headings.iter().map(String::as_str));
     header.extend(["works", "score"]);
-    let is_planned = found.entries.iter().any(|each| each.working_planned.is_some());
+    let is_planned = found
+        .entries
+        .iter()
+        .any(|each| each.working_planned.is_some());
     if is_planned {
         header.insert(header.len() - 1, "with a\nmotion");
     }
@@ -77,7 +83,10 @@ fn entry_row(index: usize, entry: &Entry, tissues: &[&str], is_planned: bool) ->
     ];
     for tissue in tissues {
         let margin = entry.margins.iter().find(|each| each.tissue == *tissue);
-        row.push(margin.map_or_else(|| "-".to_owned(), |each| format!("{:.1}", each.distance_m * 1e3)));
+        row.push(margin.map_or_else(
+            || "-".to_owned(),
+            |each| format!("{:.1}", each.distance_m * 1e3),
+        ));
     }
     row.push(format!("{} of 8", entry.working));
     if is_planned {
@@ -100,7 +109,11 @@ pub fn places_text(found: &PlaceSearch) -> String {
         found.basis,
         found.allowed,
         found.tried,
-        if found.goals.len() == 1 { "it" } else { "all of them" },
+        if found.goals.len() == 1 {
+            "it"
+        } else {
+            "all of them"
+        },
         counts(&found.refused, |rule| rule),
     );
     if found.places.is_empty() {

@@ -172,10 +172,13 @@ pub(crate) fn target_inside(
     if depth_m > 0.0 {
         return Ok((target, lesion));
     }
-    let message = format!("the target lies {:.1} mm outside the phantom", -depth_m * 1e3);
-    Err(text.finding(&key(target_key), message).hint(
-        "points are in the phantom frame: left, posterior, superior, from mid-chest, in mm",
-    ))
+    let message = format!(
+        "the target lies {:.1} mm outside the phantom",
+        -depth_m * 1e3
+    );
+    Err(text
+        .finding(&key(target_key), message)
+        .hint("points are in the phantom frame: left, posterior, superior, from mid-chest, in mm"))
 }
 
 /// The key that decides the target, the target in the phantom frame, and the lesion that it is.
@@ -214,7 +217,10 @@ fn target_of(
             ("lesion", lesion.center_m, Some(name.clone()))
         }
         (None, None) => {
-            let lesion = phantom.lesions.first().map_or("NAME", |lesion| &lesion.name);
+            let lesion = phantom
+                .lesions
+                .first()
+                .map_or("NAME", |lesion| &lesion.name);
             return Err(text
                 .finding(
                     &key("target_mm"),
