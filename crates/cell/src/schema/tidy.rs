@@ -47,6 +47,11 @@ fn remove_null(object: &mut Map<String, Value>) {
     if object.get("default").is_some_and(Value::is_null) {
         object.remove("default");
     }
+    // A name that may be left out is not empty where it is given.
+    if object.get("default").is_some_and(|default| default == "") && object.contains_key("pattern")
+    {
+        object.remove("default");
+    }
     if let Some(default) = object.get_mut("default") {
         leave_out_nulls(default);
     }
