@@ -124,7 +124,7 @@ fn the_text_says_its_schema_first_and_explains_every_value() {
             !is_value || line.contains('#') || explained || is_named,
             "{line}"
         );
-        explained = line.starts_with('#') || explained && is_value;
+        explained = line.starts_with('#') || explained && !line.is_empty();
     }
 }
 
