@@ -24,7 +24,10 @@ use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
 #[derive(Debug, Args)]
-#[expect(clippy::struct_excessive_bools, reason = "switches of the command line")]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "switches of the command line"
+)]
 pub(crate) struct InitArguments {
     /// File to write, or a folder for a file of the name `first.toml`.
     #[arg(value_name = "FILE|DIR", default_value = "first.toml")]
