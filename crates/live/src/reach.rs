@@ -11,6 +11,9 @@ use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
 use crate::live::Live;
 use crate::scene::CLASS_COUNT;
 
+/// Halvings of the step between rolls: 0.01 deg from 10 deg.
+const HALVINGS: u32 = 10;
+
 /// What becomes of a configuration, the worse the earlier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
@@ -63,9 +66,9 @@ impl Reach {
 }
 
 impl Live {
-    /// All eight configurations at a goal, in the order of [`Configuration::ALL`]: each at the best of
-    /// `rolls` rolls all round, or at the goal's one if it has one. Empty for an arm that is not of UR's
-    /// build.
+    /// All eight configurations at a goal, in the order of [`Configuration::ALL`]: each at the best roll that
+    /// is found, from the best of `rolls` rolls all round, or at the goal's one if it has one. Empty for an
+    /// arm that is not of UR's build.
     ///
     /// # Panics
     /// If there is no such goal.
@@ -73,11 +76,10 @@ impl Live {
         let Some(kinematics) = &self.kinematics else {
             return Vec::new();
         };
-        let rolls = match self.scene.goals[goal].roll {
-            Roll::Fixed(roll_rad) => vec![roll_rad],
-            Roll::Free => (0..rolls)
-                .map(|k| TAU * f64::from(k) / f64::from(rolls))
-                .collect(),
+        let step_rad = TAU / f64::from(rolls);
+        let (rolls, is_free) = match self.scene.goals[goal].roll {
+            Roll::Fixed(roll_rad) => (vec![roll_rad], false),
+            Roll::Free => ((0..rolls).map(|k| step_rad * f64::from(k)).collect(), true),
         };
         let mut best: Vec<Option<Reach>> = vec![None; Configuration::ALL.len()];
         for roll_rad in rolls {
@@ -90,7 +92,40 @@ impl Live {
                 }
             }
         }
-        best.into_iter().flatten().collect()
+        let best = best.into_iter().flatten().zip(Configuration::ALL);
+        best.map(|(reach, configuration)| {
+            if is_free && reach.joints.is_some() && reach.outcome != Outcome::Works {
+                self.climbed(goal, kinematics, configuration, reach, step_rad)
+            } else {
+                reach
+            }
+        })
+        .collect()
+    }
+
+    /// The best that is found beside a roll, between it and its neighbours: a range of rolls that works may lie
+    /// between two of the grid.
+    fn climbed(
+        &self,
+        goal: usize,
+        kinematics: &Kinematics,
+        configuration: Configuration,
+        mut best: Reach,
+        mut step_rad: f64,
+    ) -> Reach {
+        for _ in 0..HALVINGS {
+            step_rad *= 0.5;
+            for roll_rad in [best.roll_rad - step_rad, best.roll_rad + step_rad] {
+                let roll_rad = roll_rad.rem_euclid(TAU);
+                let pose = self.base_link_from_flange(goal, roll_rad);
+                let found = kinematics.branches(&pose, Some(&self.scene.start));
+                let reach = self.look(kinematics, configuration, roll_rad, &found);
+                if reach.is_better_than(&best) {
+                    best = reach;
+                }
+            }
+        }
+        best
     }
 
     fn base_link_from_flange(&self, goal: usize, roll_rad: f64) -> Pose {

@@ -209,6 +209,8 @@ NB.Explore = class {
 
   resetAll() {
     this.base = this.homeBase();
+    this.refused = null;
+    this.startHits = null;
     this.live.resetBase();
     this.joints = this.startJoints();
     this.fromJoints = [...this.joints];
@@ -241,10 +243,17 @@ NB.Explore = class {
     else this.live.resetBase();
     if (refused) this.base = before;
     this.refused = refused;
+    this.startHits = this.baseMoved ? this.worstHit(this.run.page.start) : null;
     this.placeTied();
     this.write();
     this.evaluate();
     this.lookForConfigurations();
+  }
+
+  /** The deepest overlap at joint positions, of bodies that are not meant to touch; null for none. */
+  worstHit(joints) {
+    const hits = this.live.pairs(joints).filter((pair) => pair.distance < 0 && this.data.classes[pair.class].unwanted);
+    return hits.reduce((worst, pair) => (worst && worst.distance <= pair.distance ? worst : pair), null);
   }
 
   /** Writes the state into the controls; a joint's own control is being moved. */
@@ -289,11 +298,22 @@ NB.Explore = class {
     if (moved) {
       const corners = this.live.mountSurface();
       if (corners.length) {
-        const geometry = new THREE.BufferGeometry();
-        geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(corners), 3));
-        geometry.computeVertexNormals();
-        const color = view.scene.parts.find((part) => part.group === 'mount')?.color || [0.35, 0.37, 0.4, 1];
-        view.group('tried-mount').add(new THREE.Mesh(geometry, view.material([...color.slice(0, 3), 0.75])));
+        const color = view.scene.parts.find((part) => part.group === 'mount').color.slice(0, 3);
+        // Walls and ceilings, which would hide the cell, are faint: they have the large triangles.
+        const parts = [[], []];
+        for (let at = 0; at < corners.length; at += 9) {
+          const [a, b, c] = [0, 3, 6].map((k) => new THREE.Vector3(...corners.slice(at + k, at + k + 3)));
+          const area = b.sub(a).cross(c.sub(a)).length() / 2;
+          parts[area > 0.12 ? 1 : 0].push(...corners.slice(at, at + 9));
+        }
+        parts.forEach((part, isFaint) => {
+          const geometry = new THREE.BufferGeometry();
+          geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(part), 3));
+          geometry.computeVertexNormals();
+          const mesh = new THREE.Mesh(geometry, view.material([...color, isFaint ? 0.12 : 1]));
+          mesh.renderOrder = isFaint ? 10 : 0;
+          view.group('tried-mount').add(mesh);
+        });
       }
     }
     view.group('tried-mount').visible = this.active && this.run.layers.mount;
@@ -321,6 +341,7 @@ NB.Explore = class {
     const lines = [
       this.refused ? `The base cannot go there: ${this.refused}.` : null,
       ...this.live.overlaps().map(({ body, other, depth }) => `The ${NB.words(body)} stands ${NB.mm(depth)} mm in the ${NB.words(other)}.`),
+      this.startHits ? `From here, the posture that the scenario starts in collides: ${this.startHits.solids.map(NB.words).join(' and ')} overlap by ${NB.mm(-this.startHits.distance)} mm. Give another one under [start].` : null,
       low < -0.001 ? `The arm reaches ${NB.mm(-low)} mm under the floor.` : null,
     ].filter(Boolean);
     const text = lines.join(' ');
@@ -420,7 +441,7 @@ NB.Explore = class {
         onclick: () => this.take(each) }, 'Take') },
     ];
     const count = this.found.filter((each) => each.outcome === 'works').length;
-    const at = free ? `the best of ${rolls} rolls about the needle` : 'the roll that the goal fixes';
+    const at = free ? 'the best roll found about the needle' : 'the roll that the goal fixes';
     const table = NB.table(`Goal ${NB.words(this.run.goal.name)}: ${count} of ${this.found.length} postures keep all limits, at ${at}`, columns, this.found, { class: 'small full' });
     const note = fromBase ? NB.el('p', { class: 'small', text: 'Here the goal stays where it is in the room. The scenario gives it from the robot\u2019s base (flange_pose), so there it goes along with the base: give its target and entry in the room before you move the base.' }) : null;
     // A button that has the focus keeps it.
