@@ -410,9 +410,12 @@ NB.Explore = class {
     });
   }
 
-  /** Which configurations reach the goal from here: at once at few rolls, and again at many when all rests. */
+  /** Which configurations reach the goal from here: at once from few rolls, where that is quick, and again from many when all rests. */
   lookForConfigurations() {
-    this.showReach(this.data.goals[this.goalIndex].free ? 6 : 1, false);
+    if (!(this.coarseInMs > NB.Explore.COARSE_MS)) {
+      this.showReach(6, false);
+      this.coarseInMs = this.reachedInMs;
+    }
     clearTimeout(this.later);
     this.later = setTimeout(() => { if (this.active) this.showReach(NB.Explore.ROLLS, true); }, 200);
   }
@@ -572,6 +575,7 @@ NB.Explore = class {
 };
 /** Layers that show what the run has found. */
 NB.Explore.RESULTS = ['arm', 'other', 'witness', 'ellipsoids', 'cone', 'sight', 'taken'];
-/** Rolls that are looked at when all rests, and radius of the ring (m). */
+/** Rolls that are looked at when all rests, what a look at fewer may take while the base moves, and radius of the ring (m). */
 NB.Explore.ROLLS = 36;
+NB.Explore.COARSE_MS = 10;
 NB.Explore.RING = 0.17;
