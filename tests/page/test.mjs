@@ -239,7 +239,10 @@ for (const given of words) {
   await page.screenshot({ path: `${out}/${name}-whole.png`, fullPage: true });
   assert.equal(await page.evaluate(() => window.attacked), undefined, 'a name became a script');
   assert.equal(await page.locator('img[src="x"]').count(), 0, 'a name became an element');
-  await testLayout(page, { judge, notBlank, settle, shot: (width) => `${out}/${name}-${width}.png` });
+  const layout = await open(running, file);
+  await testLayout(layout.page, { judge, notBlank, settle, shot: (width) => `${out}/${name}-${width}.png` });
+  assert.deepEqual(layout.problems, []);
+  await layout.page.close();
   console.log(`  the keyboard reaches ${await walk(page)} controls`);
   await tests[kind](page, judge, name);
   // On paper: the picture in place of the view, no controls.
