@@ -18,15 +18,18 @@ const MISSED: f64 = 0.05;
 /// Steps of the other grid, deg.
 const STEP_DEG: u16 = 4;
 
-/// The score as its documentation has it, from what `check` says of a goal.
-fn score(resolved: &ResolvedScenario, preview: &Preview) -> f64 {
+/// The score as its documentation has it, from what `check` says of a goal; none at the ends of the chest and for a
+/// needle that is too oblique, which are not proposed.
+fn score(resolved: &ResolvedScenario, preview: &Preview) -> Option<f64> {
     let (goal, said) = (&resolved.goals[0], &preview.goals[0]);
     let placed = resolved.phantom.as_ref().unwrap();
     let to_phantom = placed.world_from_phantom.inverse();
     let entry = to_phantom * goal.entry_m.unwrap();
     let depth_mm = goal.entry_to_target_m().unwrap() * 1e3;
     let route = said.needle_route.as_ref().unwrap();
-    let spare_mm = (route.distance_m - route.margin_m) * 1e3;
+    let criterion_mm = resolved.scenario.criteria.min_clearance_mm.needle_route;
+    let kept_mm = (route.margin_m * 1e3).max(criterion_mm.unwrap_or(0.0));
+    let spare_mm = route.distance_m * 1e3 - kept_mm;
     // Normal of the skin from how depth changes about a point inside, not from its faces.
     let inside = entry + (to_phantom.rotation * goal.axis.into_inner()) * 1e-4;
     let depth = |at: Point3<f64>| placed.phantom.skin_signed_depth(&at);
@@ -37,6 +40,11 @@ fn score(resolved: &ResolvedScenario, preview: &Preview) -> f64 {
     });
     let needle = to_phantom.rotation * goal.axis.into_inner();
     let angle_deg = slope.angle(&needle).to_degrees();
+    let half_mm = 0.5 * placed.phantom.parameters.as_ref().unwrap().length_mm;
+    let is_at_end = slope.normalize().z.abs() > 0.5_f64.sqrt() || entry.z * 1e3 > 0.5 * half_mm;
+    if is_at_end || angle_deg > 60.0 {
+        return None;
+    }
     let between =
         |worst: f64, best: f64, value: f64| ((value - worst) / (best - worst)).clamp(0.0, 1.0);
     let fissures = if said.fissures_crossed.is_empty() {
@@ -44,12 +52,12 @@ fn score(resolved: &ResolvedScenario, preview: &Preview) -> f64 {
     } else {
         0.0
     };
-    (between(140.0, 40.0, depth_mm)
+    let sum = between(140.0, 40.0, depth_mm)
         + between(0.0, 5.0, spare_mm)
         + between(60.0, 0.0, angle_deg)
         + fissures
-        + said.working as f64 / 8.0)
-        / 4.5
+        + said.working as f64 / 8.0;
+    Some(sum / 4.5)
 }
 
 #[test]
@@ -83,7 +91,7 @@ fn no_entry_of_another_grid_is_much_better_than_the_first_proposal() {
     let (preview, findings) = Preview::of(&resolved).unwrap();
     assert_eq!(findings, []);
     // Face by face and by slope the normal is the same; distances are those of `check`.
-    assert!((score(&resolved, &preview) - first.score).abs() < 1e-6);
+    assert!((score(&resolved, &preview).unwrap() - first.score).abs() < 1e-6);
     let (mut allowed, mut best) = (0, f64::NEG_INFINITY);
     for azimuth in (1..360).step_by(STEP_DEG.into()) {
         for elevation in (1..150).step_by(STEP_DEG.into()) {
@@ -97,9 +105,10 @@ fn no_entry_of_another_grid_is_much_better_than_the_first_proposal() {
                 continue;
             }
             let (preview, findings) = Preview::of(&resolved).unwrap();
-            if findings.is_empty() {
+            let scored = score(&resolved, &preview).filter(|_| findings.is_empty());
+            if let Some(scored) = scored {
                 allowed += 1;
-                best = f64::max(best, score(&resolved, &preview));
+                best = f64::max(best, scored);
             }
         }
     }

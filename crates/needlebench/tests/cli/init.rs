@@ -172,7 +172,7 @@ fn what_there_is_is_listed_and_what_is_not_is_refused_with_the_nearest() {
         (["--lesion", "plural_based"], "pleural_based"),
     ] {
         let hint = format!("did you mean `{near}`?");
-        let answer = bench.run(&[&["init"], &arguments[..]].concat());
+        let answer = bench.run(&[&["init"][..], &arguments[..]].concat());
         answer.exits_with(2).complains([&hint]);
     }
     bench

@@ -193,7 +193,7 @@ fn where_there_is_no_entry_it_says_which_rule_refuses_most() {
 fn targets_that_are_none_are_refused() {
     let bench = Bench::with_scenario(SHORT);
     let refused = |arguments: &[&str], parts: [&str; 2]| {
-        let answer = bench.run(&[&["suggest", "s.toml"], arguments].concat());
+        let answer = bench.run(&[&["suggest", "s.toml"][..], arguments].concat());
         answer.exits_with(2).complains(parts);
     };
     refused(
