@@ -236,9 +236,11 @@ fn text(
     };
     let goal = entry.map_or(String::new(), |entry| {
         let margins = entry.margins.iter();
-        let margins: String = margins
-            .map(|each| format!("\n# {:.1} mm from {} ({})", each.distance_m * 1e3, each.part, each.tissue))
-            .collect();
+        let margins = margins.map(|each| {
+            let (distance_mm, part) = (each.distance_m * 1e3, &each.part);
+            format!("\n# {distance_mm:.1} mm from {part} ({})", each.tissue)
+        });
+        let margins = margins.collect::<Vec<_>>().concat();
         let [azimuth, elevation] = entry.direction_deg;
         format!(
             "# Where the needle enters, as seen from the target: azimuth (0 front, 90 patient's left, -90 right) and\n\

@@ -2,6 +2,7 @@
 
 use crate::Finding;
 use crate::toml_text::TomlText;
+use std::fmt::Write as _;
 
 /// The text of a scenario, to be changed key by key.
 #[derive(Debug, Clone)]
@@ -65,8 +66,7 @@ impl ScenarioEdit {
             } else {
                 "\n"
             };
-            self.text
-                .push_str(&format!("{ending}\n{header}\n{key} = {value}\n"));
+            let _ = writeln!(self.text, "{ending}\n{header}\n{key} = {value}");
         }
         self.checked(section)
     }

@@ -102,11 +102,11 @@ const MOVES: [(&str, &str, [f64; 3], [f64; 3]); 4] = [
 ];
 
 fn moved(to: &(&str, &str, [f64; 3], [f64; 3])) -> (Live, ResolvedScenario) {
-    let (name, line, position_mm, rpy_deg) = to;
+    let (name, base, position_mm, rpy_deg) = to;
     let mut live = live(&scenario(name, None));
     live.place_base(&pose_of(*position_mm, *rpy_deg)).unwrap();
     let there = format!("base_position_mm = {position_mm:?}\nbase_rpy_deg = {rpy_deg:?}");
-    (live, scenario(name, Some((line, &there))))
+    (live, scenario(name, Some((base, &there))))
 }
 
 #[test]

@@ -151,7 +151,7 @@ struct Judged<'a> {
 struct Limit {
     criterion: &'static str,
     value_m: Option<f64>,
-    limit_m: f64,
+    limited_to_m: f64,
     pass: bool,
 }
 
@@ -160,7 +160,7 @@ impl Limit {
         JudgedLimit {
             criterion: self.criterion.to_owned(),
             value: self.value_m.map(|metres| format!("{:.4} mm", metres * 1e3)),
-            limit: format!("{} mm", self.limit_m * 1e3),
+            limit: format!("{} mm", self.limited_to_m * 1e3),
             pass: self.pass,
         }
     }
@@ -216,7 +216,7 @@ pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus> {
                 text,
                 "{word} {}: {value}, limit {} mm",
                 limit.criterion,
-                limit.limit_m * 1e3
+                limit.limited_to_m * 1e3
             );
         }
         if !judged.limits.is_empty() {
@@ -287,12 +287,12 @@ fn limits(arguments: &Iso9283Arguments, report: &MeasuredReport) -> Vec<Limit> {
     ]
     .into_iter()
     .filter_map(|(criterion, limit_mm, value_m)| {
-        let limit_m = limit_mm? * 1e-3;
+        let limited_to_m = limit_mm? * 1e-3;
         Some(Limit {
             criterion,
             value_m,
-            limit_m,
-            pass: value_m.is_some_and(|value| value <= limit_m),
+            limited_to_m,
+            pass: value_m.is_some_and(|value| value <= limited_to_m),
         })
     })
     .collect()

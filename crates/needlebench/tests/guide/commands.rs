@@ -18,7 +18,7 @@ const ENVIRONMENT: [(&str, &str); 4] = [
     ("NO_COLOR", "1"),
     ("NEEDLEBENCH_PROGRESS", "off"),
 ];
-const LONGEST: Duration = Duration::from_secs(600);
+const LONGEST: Duration = Duration::from_mins(10);
 
 #[test]
 fn commands_print_what_the_guide_says() {

@@ -254,7 +254,7 @@ impl<'a> Reference<'a> {
     fn default(&self, schema: &'a Value) -> Option<String> {
         let (inner, _) = self.resolve(schema);
         let default = schema.get("default").or_else(|| inner.get("default"))?;
-        let said = !default.is_object() && !default.is_null() && *default != Value::from("");
+        let said = !default.is_object() && !default.is_null() && default.as_str() != Some("");
         let empty = default.as_array().is_some_and(Vec::is_empty);
         (said && !empty).then(|| toml(default))
     }

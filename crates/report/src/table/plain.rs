@@ -93,7 +93,7 @@ fn columns(table: &comfy_table::Table) -> Vec<Shape> {
                     .any(|line| line.len() > WORDS && line.contains(' '))
             });
             let least = if is_words {
-                let words = cells().flat_map(|text| longest(&text, char::is_whitespace));
+                let words = cells().filter_map(|text| longest(&text, char::is_whitespace));
                 let lines = longest(&heading, |letter| letter == '\n');
                 words
                     .chain(lines)

@@ -1,5 +1,7 @@
 //! The answer of a study: one sentence with its figure and interval.
 
+use std::fmt::Write as _;
+
 use needlebench_study::statistics::{
     BinMean, ChoiceRanking, ChosenChoice, Interval, Rate, Summary,
 };
@@ -281,7 +283,8 @@ fn of_circumstances(
             .success
             .interval
             .map_or(String::new(), |each| format!(" ({})", percents(each)));
-        works += &format!(
+        let _ = write!(
+            works,
             "; most often {}, in {} %{interval}",
             most.label,
             most.success.rate.map_or(String::new(), in_percent)
