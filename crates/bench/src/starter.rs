@@ -6,7 +6,8 @@
 use std::path::Path;
 
 use needlebench_cell::{
-    Finding, Overrides, ResolvedScenario, ScenarioFamily, resolve_open_scenario, resolve_scenario,
+    Finding, Overrides, ResolvedScenario, ScenarioFamily, part_in_words, resolve_open_scenario,
+    resolve_scenario,
 };
 
 use crate::Runnable;
@@ -237,7 +238,7 @@ fn text(
     let goal = entry.map_or(String::new(), |entry| {
         let margins = entry.margins.iter();
         let margins = margins.map(|each| {
-            let (distance_mm, part) = (each.distance_m * 1e3, &each.part);
+            let (distance_mm, part) = (each.distance_m * 1e3, part_in_words(&each.part));
             format!("\n# {distance_mm:.1} mm from {part} ({})", each.tissue)
         });
         let margins = margins.collect::<Vec<_>>().concat();

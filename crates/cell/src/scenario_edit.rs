@@ -1,8 +1,11 @@
 //! Keys set in the text of a scenario, which stays as it was otherwise: comments, order and spaces.
 
-use crate::Finding;
-use crate::toml_text::TomlText;
 use std::fmt::Write as _;
+use std::path::Path;
+
+use crate::Finding;
+use crate::resolve::name_from_file;
+use crate::toml_text::TomlText;
 
 /// The text of a scenario, to be changed key by key.
 #[derive(Debug, Clone)]
@@ -27,6 +30,19 @@ impl ScenarioEdit {
     /// The text as it is now.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Names the scenario after the file that it goes to, if its text names it.
+    ///
+    /// # Errors
+    /// A name that is written in an unusual form.
+    pub fn name_after(&mut self, file: &Path) -> Result<(), Finding> {
+        let toml = TomlText::parse(&self.file, &self.text)?;
+        if let Some(span) = toml.span_of("name") {
+            let name = format!("\"{}\"", name_from_file(file));
+            self.text.replace_range(span, &name);
+        }
+        self.checked("name")
     }
 
     /// Sets a key of a section, such as `robot` and `base_rpy_deg`, or `goals[0]` and `lesion`, to a value as TOML

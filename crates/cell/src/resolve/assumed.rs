@@ -54,23 +54,27 @@ pub(super) fn assume(
     }
 }
 
-/// The file's name, as far as it can be one.
+/// The file's name, if the scenario has none.
 fn name_scenario(file: &str, scenario: &mut Scenario) {
-    if !scenario.name.is_empty() {
-        return;
+    if scenario.name.is_empty() {
+        scenario.name = name_from_file(Path::new(file));
     }
-    let stem = Path::new(file).file_stem().and_then(|stem| stem.to_str());
+}
+
+/// A scenario's name from that of its file, as far as it can be one.
+pub(crate) fn name_from_file(file: &Path) -> String {
+    let stem = file.file_stem().and_then(|stem| stem.to_str());
     let is_of_names = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     let name = stem.unwrap_or_default().chars();
     let name: String = name
         .map(|c| if is_of_names(c) { c } else { '_' })
         .take(crate::schema::LONGEST_NAME)
         .collect();
-    scenario.name = if name.is_empty() {
+    if name.is_empty() {
         "scenario".to_owned()
     } else {
         name
-    };
+    }
 }
 
 /// Their lesions' names, or their numbers.

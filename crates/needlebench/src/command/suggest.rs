@@ -403,6 +403,7 @@ fn written(
             }
         }
     }
+    edit.name_after(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let resolved = resolve_scenario(&to, edit.text(), folder, overrides).map_err(unplaced)?;
     let runnable = Runnable::checked(resolved)?;

@@ -147,6 +147,8 @@ fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
     let said = bench.run(&arguments).exits_with(0).stdout;
     assert!(said.contains("next: needlebench run new.toml"), "{said}");
     let text = String::from_utf8(bench.read("new.toml")).unwrap();
+    assert!(text.contains("name = \"new\""), "{text}");
+    assert!(said.contains(" rib") && !said.contains("rib_"), "{said}");
     assert!(
         text.contains("# Driven out of the bore") && text.contains("lesion = \"left_perihilar\""),
         "{text}"

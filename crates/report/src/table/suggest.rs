@@ -7,7 +7,10 @@ use needlebench_bench::suggest::{
     ENTRY_TERMS, Entry, EntryRule, EntrySearch, PlaceSearch, Refused,
 };
 
+use needlebench_cell::part_in_words;
+
 use super::plain_table;
+use super::study::reasons::reason_in_words;
 
 /// Entries for a target.
 pub fn entries_text(found: &EntrySearch) -> String {
@@ -25,7 +28,7 @@ pub fn entries_text(found: &EntrySearch) -> String {
         found.allowed,
         found.tried,
         counts(&found.refused, |rule| {
-            EntryRule::of_name(rule).map_or("", EntryRule::in_words)
+            EntryRule::of_name(rule).map_or(String::new(), |rule| rule.in_words().to_owned())
         }),
     );
     if found.entries.is_empty() {
@@ -57,11 +60,16 @@ pub fn entries_text(found: &EntrySearch) -> String {
     }
     let _ = writeln!(text, "{table}\n{ENTRY_TERMS}");
     for (index, entry) in found.entries.iter().enumerate() {
-        let nearest = entry.margins.iter().map(|each| each.part.as_str());
-        let nearest: Vec<&str> = nearest.collect();
+        let nearest = entry.margins.iter().map(|each| part_in_words(&each.part));
+        let nearest: Vec<_> = nearest.collect();
         let _ = write!(text, "\n# {}: nearest {}", index + 1, nearest.join(", "));
         if !entry.fissures_crossed.is_empty() {
-            let _ = write!(text, "; crosses {}", entry.fissures_crossed.join(", "));
+            let crossed = entry
+                .fissures_crossed
+                .iter()
+                .map(|each| part_in_words(each));
+            let crossed: Vec<_> = crossed.collect();
+            let _ = write!(text, "; crosses {}", crossed.join(", "));
         }
         let fails = entry.configurations.iter().filter(|each| !each.works);
         let fails: Vec<String> = fails.map(why_not).collect();
@@ -98,7 +106,7 @@ fn entry_row(index: usize, entry: &Entry, tissues: &[&str], is_planned: bool) ->
 }
 
 fn why_not(each: &ConfigurationPreview) -> String {
-    format!("{} {}", each.label, each.reason())
+    format!("{} ({})", each.label, reason_in_words(each.reason()))
 }
 
 /// Places of the robot's base.
@@ -114,7 +122,7 @@ pub fn places_text(found: &PlaceSearch) -> String {
         } else {
             "all of them"
         },
-        counts(&found.refused, |rule| rule),
+        counts(&found.refused, reason_in_words),
     );
     if found.places.is_empty() {
         let _ = write!(text, "none: {}", found.why_none());
@@ -165,7 +173,7 @@ pub fn places_text(found: &PlaceSearch) -> String {
     text.trim_end().to_owned()
 }
 
-fn counts<'a>(refused: &'a [Refused], words: impl Fn(&'a str) -> &'a str) -> String {
+fn counts(refused: &[Refused], words: impl Fn(&str) -> String) -> String {
     /// Lines of them; the others are counted together.
     const MOST: usize = 6;
     let mut text = String::new();
