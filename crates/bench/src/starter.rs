@@ -260,8 +260,8 @@ fn text(
 # change `needlebench check {name}.toml` says in a moment what can work. Every key that is left out has a default;
 # scenario.schema.json describes all of them, and editors that know the line at the top show it.
 #
-# Lengths are in mm, angles in deg, as keys say. World: x towards the patient's head, {right}, z up
-# from the floor. Points of the patient: from mid-chest, x to the patient's left, y to the back, z to the head.
+# Lengths are in mm, angles in deg, as keys say. World: x towards the patient's head, {right},
+# z up from the floor. Points of the patient: from mid-chest, x to the patient's left, y to the back, z to the head.
 name = "{name}"
 description = "A first scenario: {about_small}."
 seed = 1 # of everything random: the same seed gives the same results

@@ -372,7 +372,7 @@ fn needle_that_would_leave_the_skin_on_its_way_is_refused() {
         sound.write(name, stl(triangles));
     }
     let notes = check(&sound).exits_with(0).json()["notes"].to_string();
-    assert!(notes.contains("moved -1.00 mm"), "{notes}");
+    assert!(notes.contains("moved -1.000 mm"), "{notes}");
 }
 
 #[test]

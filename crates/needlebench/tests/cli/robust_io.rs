@@ -94,7 +94,7 @@ fn a_folder_is_no_file() {
     std::fs::create_dir(bench.path("folder.toml")).unwrap();
     // A folder may be one of results.
     let refused = bench.run(&["check", "folder.toml"]).exits_with(2);
-    refused.complains(["it is a folder, not a regular file"]);
+    refused.complains(["this is a folder, not a scenario"]);
 }
 
 #[cfg(unix)]

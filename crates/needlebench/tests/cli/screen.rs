@@ -132,6 +132,7 @@ fn files_of_another_kind_are_named_with_the_command_that_takes_them() {
     bench.write("study.toml", study);
     bench.write("log.csv", "timestamp,actual_q_0\n0,1\n");
     bench.write("limits.toml", "[max_loss]\nclearance = \"1mm\"\n");
+    std::fs::create_dir(bench.path("results")).unwrap();
     bench.write("results/report.json", "{}");
     for (arguments, is, instead) in [
         (

@@ -114,7 +114,7 @@ fn a_study_of_postures_says_so_everywhere_and_what_they_overstate() {
         assert!(junit.contains(words), "{junit}");
     }
     let page = String::from_utf8(bench.read("out/moved/report.html")).unwrap();
-    assert!(page.contains("summary?.headline"));
+    assert!(page.contains("summary.headline"));
 }
 
 /// Lines of a terminal's window: what a study says fits one.
@@ -177,7 +177,7 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
 fn named_levels_are_held_against_each_other_where_nothing_is_to_be_chosen() {
     let study = STUDY.replace("role = \"choice\"\n", "").replace(
         "key = \"tool.mount_rotation_deg\"\nvalues = [90, 180]",
-        "[[factors.levels]]\nname = \"plain\"\n[[factors.levels]]\nname = \"far away\"\nset = { \"phantom.position_mm\" = [2500, 0, 0] }",
+        "[[factors.levels]]\nname = \"plain\"\n[[factors.levels]]\nname = \"far away\"\nset = { \"robot.base_position_mm\" = [2500, 0, 800] }",
     );
     let bench = bench(&study.replace(
         "key = \"phantom.position_mm[0]\"\nrange = [-20, 20]\nrelative = true",

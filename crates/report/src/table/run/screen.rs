@@ -55,7 +55,13 @@ fn write_screen(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
     if let Some(excitation) = &report.excitation {
         out.push_str(&crate::table::excitation::report_text(excitation));
     }
-    let notes = report.notes.len();
+    // What was chosen for the user, and what is not as a standard has it, is not for another screen.
+    let (told, others): (Vec<&String>, Vec<&String>) =
+        report.notes.iter().partition(|note| is_told(report, note));
+    for note in told {
+        writeln!(out, "note: {note}")?;
+    }
+    let notes = others.len();
     if notes > 0 {
         let (notes_are, they) = if notes == 1 {
             ("note is", "it")
@@ -68,6 +74,11 @@ fn write_screen(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
         )?;
     }
     Ok(())
+}
+
+/// Whether a note is said on the first screen.
+fn is_told(report: &Report, note: &str) -> bool {
+    report.iso9283.is_some() || note.starts_with("assumed, since")
 }
 
 /// Criteria that were missed, and engines that failed.
