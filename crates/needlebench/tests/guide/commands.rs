@@ -81,7 +81,9 @@ fn the_program_understands_command_lines_that_are_not_run() {
         {
             let text = block
                 .text
-                .replace("cargo run --release -- ", "needlebench ");
+                .replace("cargo run --release -- ", "needlebench ")
+                // A line that goes on in the next.
+                .replace("\\\n", " ");
             for words in others(&text) {
                 if let Err(error) = needlebench::command_line().try_get_matches_from(&words) {
                     panic!("{}: {words:?}: {error}", file.display());
