@@ -177,7 +177,7 @@ fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
 fn named_levels_are_held_against_each_other_where_nothing_is_to_be_chosen() {
     let study = STUDY.replace("role = \"choice\"\n", "").replace(
         "key = \"tool.mount_rotation_deg\"\nvalues = [90, 180]",
-        "[[factors.levels]]\nname = \"plain\"\n[[factors.levels]]\nname = \"far away\"\nset = { \"robot.base_position_mm\" = [2500, 0, 800] }",
+        "[[factors.levels]]\nname = \"plain\"\n[[factors.levels]]\nname = \"far away\"\nset = { \"robot.base_position_mm[0]\" = 2500 }",
     );
     let bench = bench(&study.replace(
         "key = \"phantom.position_mm[0]\"\nrange = [-20, 20]\nrelative = true",

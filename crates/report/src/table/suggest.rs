@@ -7,10 +7,9 @@ use needlebench_bench::suggest::{
     ENTRY_TERMS, Entry, EntryRule, EntrySearch, PlaceSearch, Refused,
 };
 
-use needlebench_cell::part_in_words;
+use needlebench_cell::{part_in_words, reason_in_words};
 
 use super::plain_table;
-use super::study::reasons::reason_in_words;
 
 /// Entries for a target.
 pub fn entries_text(found: &EntrySearch) -> String {
@@ -137,7 +136,7 @@ pub fn places_text(found: &PlaceSearch) -> String {
     if is_planned {
         header.push("with a\nmotion");
     }
-    header.extend(["arm clear\n(mm)", "best"]);
+    header.extend(["arm clear\n(mm)", "of the clearest"]);
     let mut table = plain_table(&header);
     let present = found.present.iter().map(|place| ("now".to_owned(), place));
     let proposed = found.places.iter().enumerate();
@@ -165,7 +164,7 @@ pub fn places_text(found: &PlaceSearch) -> String {
     }
     let _ = writeln!(
         text,
-        "{table}\nordered by the goal with fewest configurations, then by how clear the arm of its\nbest one is of patient, table, gantry, mount and obstacles"
+        "{table}\nordered by the goal with fewest configurations, then by how clear the arm is in its\nclearest one of patient, table, gantry, mount and obstacles; run ranks by all that it measures"
     );
     for (index, place) in found.places.iter().enumerate() {
         let _ = writeln!(text, "\n# {}\n[robot]\n{}", index + 1, place.toml);

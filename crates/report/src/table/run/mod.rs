@@ -264,7 +264,7 @@ fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::
         writeln!(
             out,
             "published needle robots: across the needle before it goes in {} to {} mm, here {before}; at the target \
-             {} to {} mm, here {after}, allowed {} mm",
+             {} to {} mm, here {after}; radiologists allow {} mm (no criterion here judges it, `max_tip_rms_mm` does)",
             mm(CLINICAL_LATERAL_M[0]),
             mm(CLINICAL_LATERAL_M[1]),
             mm(CLINICAL_M[0]),

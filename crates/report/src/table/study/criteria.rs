@@ -5,7 +5,7 @@ use needlebench_evaluation::report::TraceOutcome;
 use needlebench_study::statistics::{BEST, CriterionResult};
 
 use super::answer::spaced;
-use super::document::{Block, case_list, table};
+use super::block::{Block, case_list, table};
 use crate::number::{in_percent, measured};
 
 /// Whether the limit of a criterion is the least that is allowed; the other limits are the most.
