@@ -77,7 +77,7 @@ pub fn pair_in_words(pair: &[String; 2]) -> String {
 }
 
 /// Rules that reject configurations, and what a configuration that one rejects suffers from.
-const RULES: [(&str, &str); 11] = [
+const RULES: [(&str, &str); 12] = [
     ("needle_route", "needle route blocked"),
     ("unreachable", "out of reach"),
     ("merged", "same as another"),
@@ -89,6 +89,7 @@ const RULES: [(&str, &str); 11] = [
     ("nearest_only", "not exact"),
     ("no_motion", "no motion"),
     ("max_tip_position_error_mm", "tip error over its limit"),
+    ("max_tip_rms_mm", "expected tip error over its limit"),
 ];
 
 /// What people call a rule that rejects configurations: one of [`crate::REJECTION_RULES`].

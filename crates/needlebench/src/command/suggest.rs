@@ -196,6 +196,12 @@ fn in_words(arguments: &SuggestArguments, found: &Found, written: Option<&Path>)
         let folder = out.join(&found.resolved.scenario.name);
         last.push(format!("maps: {}", shown(&folder)));
     }
+    if let (Some(path), None) = (&arguments.write, written) {
+        last.push(format!(
+            "not written: {}, since not all that is asked for was found",
+            shown(path)
+        ));
+    }
     if let Some(path) = written {
         last.push(format!(
             "written: {0}; next: needlebench run {0}",
@@ -392,6 +398,11 @@ fn written(
             match &search.lesion {
                 Some(lesion) => edit.set(&section, "lesion", &format!("\"{lesion}\""))?,
                 None => edit.set(&section, "target_mm", &format!("[{x}, {y}, {z}]"))?,
+            }
+            // It was judged with these.
+            if let Some(like) = own.first().filter(|goal| goal.flange_pose.is_none()) {
+                edit.set(&section, "standoff_mm", &format!("{}", like.standoff_mm))?;
+                edit.set(&section, "approach_mm", &format!("{}", like.approach_mm))?;
             }
         }
         let [azimuth, elevation] = entry.direction_deg;

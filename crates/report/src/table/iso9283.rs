@@ -8,7 +8,7 @@ use needlebench_evaluation::iso9283::{
 };
 
 use super::plain_table;
-use crate::number::{small_length, small_length_or_zero};
+use crate::number::small_length_or_zero;
 
 /// What a run prints of its test.
 pub fn report_text(report: &Iso9283Report) -> String {
@@ -95,23 +95,69 @@ pub fn measured_text(report: &MeasuredReport) -> String {
     text
 }
 
+/// The unit that all lengths of a table have, so that a column can be read down.
+struct LengthUnit {
+    name: &'static str,
+    per_metre: f64,
+    decimals: usize,
+}
+
+impl LengthUnit {
+    /// Micrometres where nothing is a tenth of a millimetre, else millimetres, as the standard has them.
+    fn of(statistics: &ProtocolStatistics, stabilisation: &[StabilisationReport]) -> Self {
+        let poses = statistics.poses.iter();
+        let lengths = poses.flat_map(|each| [each.ap_m, each.rp_m]);
+        let overshoots = stabilisation.iter().filter_map(|each| each.overshoot_m);
+        if lengths.chain(overshoots).fold(0.0, f64::max) < 1e-4 {
+            Self {
+                name: "um",
+                per_metre: 1e6,
+                decimals: 2,
+            }
+        } else {
+            Self {
+                name: "mm",
+                per_metre: 1e3,
+                decimals: 4,
+            }
+        }
+    }
+
+    fn text(&self, metres: f64) -> String {
+        let text = format!("{:.*}", self.decimals, metres * self.per_metre);
+        // No minus before what rounds to zero.
+        let is_zero = text
+            .bytes()
+            .all(|letter| matches!(letter, b'-' | b'.' | b'0'));
+        if is_zero { text.replace('-', "") } else { text }
+    }
+}
+
 /// AP, RP, vAP, stabilisation and drift as tables and lines.
 fn statistics_text(
     statistics: &ProtocolStatistics,
     stabilisation: &[StabilisationReport],
     drift: Option<&Drift>,
 ) -> String {
+    let unit = LengthUnit::of(statistics, stabilisation);
+    let headed = |name: &str| format!("{name}\n({})", unit.name);
+    let (ap, mean, rp, overshoot) = (
+        headed("AP"),
+        format!("mean minus command\nx, y, z ({})", unit.name),
+        headed("RP"),
+        headed("overshoot"),
+    );
     let mut table = plain_table(&[
         "pose",
         "n",
-        "AP",
-        "mean minus command\n(x, y, z)",
-        "RP",
-        "AP a, b, c (mdeg)",
-        "RP a, b, c (mdeg)",
+        &ap,
+        &mean,
+        &rp,
+        "AP a, b, c\n(mdeg)",
+        "RP a, b, c\n(mdeg)",
         "stabilisation\n(s)",
         "after motion\n(s)",
-        "overshoot",
+        &overshoot,
     ]);
     for each in &statistics.poses {
         let settled = stabilisation.iter().find(|found| found.pose == each.pose);
@@ -128,9 +174,9 @@ fn statistics_text(
         table.add_row([
             format!("P{}", each.pose),
             each.count.to_string(),
-            small_length_or_zero(each.ap_m),
-            each.ap_xyz_m.map(small_length).join(", "),
-            small_length_or_zero(each.rp_m),
+            unit.text(each.ap_m),
+            each.ap_xyz_m.map(|metres| unit.text(metres)).join(", "),
+            unit.text(each.rp_m),
             angles(each.angles.map(|angles| angles.ap_rad)),
             angles(each.angles.map(|angles| angles.rp_rad)),
             seconds(settled.and_then(|each| each.time_s)),
@@ -141,7 +187,7 @@ fn statistics_text(
                     if metres == 0.0 {
                         "none".to_owned()
                     } else {
-                        small_length_or_zero(metres)
+                        unit.text(metres)
                     }
                 }),
         ]);

@@ -26,8 +26,8 @@ pub fn entries_text(found: &EntrySearch) -> String {
         "target [{x:.1}, {y:.1}, {z:.1}] mm; {} of {} directions have an allowed route{}",
         found.allowed,
         found.tried,
-        counts(&found.refused, |rule| {
-            EntryRule::of_name(rule).map_or(String::new(), |rule| rule.in_words().to_owned())
+        counts(&found.refused, |each| {
+            EntryRule::of_name(&each.rule).map_or(String::new(), |rule| rule.in_words().to_owned())
         }),
     );
     if found.entries.is_empty() {
@@ -121,7 +121,7 @@ pub fn places_text(found: &PlaceSearch) -> String {
         } else {
             "all of them"
         },
-        counts(&found.refused, reason_in_words),
+        counts(&found.refused, Refused::in_words),
     );
     if found.places.is_empty() {
         let _ = write!(text, "none: {}", found.why_none());
@@ -136,7 +136,7 @@ pub fn places_text(found: &PlaceSearch) -> String {
     if is_planned {
         header.push("with a\nmotion");
     }
-    header.extend(["arm clear\n(mm)", "of the clearest"]);
+    header.extend(["arm clear\n(mm)", "clearest"]);
     let mut table = plain_table(&header);
     let present = found.present.iter().map(|place| ("now".to_owned(), place));
     let proposed = found.places.iter().enumerate();
@@ -172,12 +172,12 @@ pub fn places_text(found: &PlaceSearch) -> String {
     text.trim_end().to_owned()
 }
 
-fn counts(refused: &[Refused], words: impl Fn(&str) -> String) -> String {
+fn counts(refused: &[Refused], words: impl Fn(&Refused) -> String) -> String {
     /// Lines of them; the others are counted together.
     const MOST: usize = 6;
     let mut text = String::new();
     for each in refused.iter().take(MOST) {
-        let _ = write!(text, "\n  {:5} refused: {}", each.count, words(&each.rule));
+        let _ = write!(text, "\n  {:5} refused: {}", each.count, words(each));
     }
     let others: usize = refused.iter().skip(MOST).map(|each| each.count).sum();
     if others > 0 {

@@ -492,7 +492,7 @@ NB.RunPage = class {
     if (total && view.works) {
       const turn = new THREE.Matrix4().makeRotationFromQuaternion(new THREE.Quaternion(...this.extra.guideExit.slice(3)));
       const entry = this.goal.entry_m;
-      for (const [where, at, color] of [['target', this.goal.target_m, [0.84, 0.37, 0, 0.55]], ['skin', entry, [0, 0.45, 0.7, 0.55]]]) {
+      for (const [where, at, color] of [['target', this.goal.target_m, [0, 0.45, 0.7, 0.55]], ['skin', entry, [0.84, 0.37, 0, 0.55]]]) {
         const moments = total[`at_${where}`]?.analytic;
         if (!at || !moments) continue;
         const spread = NB.cholesky(moments.covariance_m2);

@@ -17,6 +17,7 @@ use super::{
 use crate::layout;
 use crate::number::millimetres;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
+use crate::table::events::events_in_words;
 use crate::table::plain::{Table, plain_table};
 use crate::table::ranking::words;
 use crate::table::shown::shown_metrics;
@@ -133,6 +134,9 @@ fn write_goal(
         }
     }
     write_rejected(out, goal)?;
+    if let Some(words) = events_in_words(goal) {
+        writeln!(out, "{words}")?;
+    }
     write_expected(out, report, goal)?;
     if let Some(route) = &goal.needle_route {
         writeln!(out, "{}", route_in_words(route))?;
@@ -387,6 +391,7 @@ fn write_goals(
         for words in words
             .into_iter()
             .chain(fissures_in_words(&goal.fissures_crossed))
+            .chain(events_in_words(goal))
         {
             writeln!(out, "{}: {words}", goal.name)?;
         }

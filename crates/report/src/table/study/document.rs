@@ -50,6 +50,7 @@ impl Document {
             .map(capital)
             .into_iter()
             .chain(parts.answer.remarks.iter().cloned())
+            .chain(that_cannot_exist(summary))
             .collect();
         if !beside.is_empty() {
             first.push(Block::Lines(beside));
@@ -82,6 +83,21 @@ impl Document {
         criteria_in_full(parts.criteria, &mut self.more);
         self
     }
+}
+
+/// How many cases no rate is of, and mostly why.
+fn that_cannot_exist(summary: &Summary) -> Option<String> {
+    let overall = &summary.overall;
+    let mostly = overall.invalid_details.first();
+    let mostly = mostly.map_or(String::new(), |detail| {
+        format!(", mostly because of {}", detail.detail)
+    });
+    (overall.invalid > 0).then(|| {
+        format!(
+            "{} of {} cases are layouts that cannot exist and in no rate{mostly}",
+            overall.invalid, overall.cases
+        )
+    })
 }
 
 /// `postures only: ...` with its warning in capitals.
