@@ -107,8 +107,11 @@ fn against(
         )];
     };
     let mut clauses = vec![
-        format!("score {:.3}, best of {count} that work", mine.score),
-        format!("{} has {:.3}", second.label, theirs.score),
+        format!(
+            "score {:.1} of 100, best of {count} that work",
+            100.0 * mine.score
+        ),
+        format!("{} has {:.1}", second.label, 100.0 * theirs.score),
     ];
     let (ahead, behind) = differences(mine, theirs);
     if (mine.score - theirs.score).abs() <= SAME_SCORE {
@@ -155,12 +158,12 @@ impl Difference<'_> {
         // A table beside it has what was attained, which is a little more.
         let proven = metric.is_some_and(|metric| metric.bound == Bound::Certified);
         format!(
-            "{} ({}{} against {}: {:+.3})",
+            "{} ({}{} against {}: {:+.1})",
             words(self.mine.metric),
             if proven { "proven " } else { "" },
             text(self.mine.value),
             text(self.theirs.value),
-            self.lead
+            100.0 * self.lead
         )
     }
 }

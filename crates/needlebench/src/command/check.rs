@@ -170,7 +170,9 @@ fn in_words(
             write!(text, "\n    {reason} ({criterion}): {}", labels.join(", "))?;
         }
         if let Some(route) = &goal.needle_route {
-            write!(text, "\n    {}", route_in_words(route))?;
+            let wanted_mm = resolved.scenario.criteria.min_clearance_mm.needle_route;
+            let wanted_m = wanted_mm.map(|mm| mm * 1e-3);
+            write!(text, "\n    {}", route_in_words(route, wanted_m))?;
         }
         if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
             write!(text, "\n    {words}")?;

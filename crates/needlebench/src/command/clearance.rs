@@ -81,6 +81,7 @@ pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus> {
     let cell = &resolved.cell;
     let model = ClearanceModel::new(cell);
     let q = Joints::from_column_slice(&arguments.joints.0);
+    arguments.joints.doubt_degrees();
     let classes: BTreeMap<&'static str, ClassAnswer> = model
         .minimum_per_class(&q)
         .iter()

@@ -101,14 +101,7 @@ fn answer(atlas: &GoalAtlas) -> String {
 
 /// All rolls of some ranges together.
 fn width_rad(ranges: &[RollRange]) -> f64 {
-    let width = |range: &RollRange| {
-        if range.is_whole_circle {
-            std::f64::consts::TAU
-        } else {
-            range.to_rad - range.from_rad
-        }
-    };
-    ranges.iter().map(width).sum()
+    ranges.iter().map(RollRange::width_rad).sum()
 }
 
 /// What a roll is best at.

@@ -45,7 +45,7 @@ pub fn entries_text(found: &EntrySearch) -> String {
         .map(|tissue| format!("{tissue}\n(mm)"))
         .collect();
     header.extend(headings.iter().map(String::as_str));
-    header.extend(["works", "score"]);
+    header.extend(["works", "score\nof 100"]);
     let is_planned = found
         .entries
         .iter()
@@ -100,7 +100,7 @@ fn entry_row(index: usize, entry: &Entry, tissues: &[&str], is_planned: bool) ->
         let planned = entry.working_planned;
         row.push(planned.map_or_else(|| "-".to_owned(), |count| format!("{count} of 8")));
     }
-    row.push(format!("{:.2}", entry.score));
+    row.push(format!("{:.0}", 100.0 * entry.score));
     row
 }
 

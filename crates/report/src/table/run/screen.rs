@@ -12,7 +12,7 @@ use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, St
 
 use super::{
     fissures_in_words, goal_heading, missed_in_words, rejected_in_words, route_in_words,
-    write_expected,
+    route_wanted_m, write_expected,
 };
 use crate::layout;
 use crate::number::millimetres;
@@ -139,7 +139,11 @@ fn write_goal(
     }
     write_expected(out, report, goal)?;
     if let Some(route) = &goal.needle_route {
-        writeln!(out, "{}", route_in_words(route))?;
+        writeln!(
+            out,
+            "{}",
+            route_in_words(route, route_wanted_m(report, goal))
+        )?;
     }
     if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
         writeln!(out, "{words}")?;
@@ -387,7 +391,7 @@ fn write_goals(
             .needle_route
             .as_ref()
             .filter(|_| !kept)
-            .map(route_in_words);
+            .map(|route| route_in_words(route, route_wanted_m(report, goal)));
         for words in words
             .into_iter()
             .chain(fissures_in_words(&goal.fissures_crossed))
