@@ -8,7 +8,7 @@ use needlebench_evaluation::iso9283::{
 };
 
 use super::plain_table;
-use crate::number::small_length_or_zero;
+use crate::number::{LengthUnit, small_length_or_zero, unit_of_length};
 
 /// What a run prints of its test.
 pub fn report_text(report: &Iso9283Report) -> String {
@@ -96,41 +96,14 @@ pub fn measured_text(report: &MeasuredReport) -> String {
 }
 
 /// The unit that all lengths of a table have, so that a column can be read down.
-struct LengthUnit {
-    name: &'static str,
-    per_metre: f64,
-    decimals: usize,
-}
-
-impl LengthUnit {
-    /// Micrometres where nothing is a tenth of a millimetre, else millimetres, as the standard has them.
-    fn of(statistics: &ProtocolStatistics, stabilisation: &[StabilisationReport]) -> Self {
-        let poses = statistics.poses.iter();
-        let lengths = poses.flat_map(|each| [each.ap_m, each.rp_m]);
-        let overshoots = stabilisation.iter().filter_map(|each| each.overshoot_m);
-        if lengths.chain(overshoots).fold(0.0, f64::max) < 1e-4 {
-            Self {
-                name: "um",
-                per_metre: 1e6,
-                decimals: 2,
-            }
-        } else {
-            Self {
-                name: "mm",
-                per_metre: 1e3,
-                decimals: 4,
-            }
-        }
-    }
-
-    fn text(&self, metres: f64) -> String {
-        let text = format!("{:.*}", self.decimals, metres * self.per_metre);
-        // No minus before what rounds to zero.
-        let is_zero = text
-            .bytes()
-            .all(|letter| matches!(letter, b'-' | b'.' | b'0'));
-        if is_zero { text.replace('-', "") } else { text }
-    }
+fn shared_unit(
+    statistics: &ProtocolStatistics,
+    stabilisation: &[StabilisationReport],
+) -> LengthUnit {
+    let poses = statistics.poses.iter();
+    let lengths = poses.flat_map(|each| [each.ap_m, each.rp_m]);
+    let overshoots = stabilisation.iter().filter_map(|each| each.overshoot_m);
+    unit_of_length(lengths.chain(overshoots).fold(0.0, f64::max))
 }
 
 /// AP, RP, vAP, stabilisation and drift as tables and lines.
@@ -139,8 +112,10 @@ fn statistics_text(
     stabilisation: &[StabilisationReport],
     drift: Option<&Drift>,
 ) -> String {
-    let unit = LengthUnit::of(statistics, stabilisation);
+    let unit = shared_unit(statistics, stabilisation);
     let headed = |name: &str| format!("{name}\n({})", unit.name);
+    // No minus before what rounds to zero.
+    let text = |metres: f64| format!("{:.2}", metres * unit.per_metre).replace("-0.00", "0.00");
     let (ap, mean, rp, overshoot) = (
         headed("AP"),
         format!("mean minus command\nx, y, z ({})", unit.name),
@@ -174,9 +149,9 @@ fn statistics_text(
         table.add_row([
             format!("P{}", each.pose),
             each.count.to_string(),
-            unit.text(each.ap_m),
-            each.ap_xyz_m.map(|metres| unit.text(metres)).join(", "),
-            unit.text(each.rp_m),
+            text(each.ap_m),
+            each.ap_xyz_m.map(text).join(", "),
+            text(each.rp_m),
             angles(each.angles.map(|angles| angles.ap_rad)),
             angles(each.angles.map(|angles| angles.rp_rad)),
             seconds(settled.and_then(|each| each.time_s)),
@@ -187,7 +162,7 @@ fn statistics_text(
                     if metres == 0.0 {
                         "none".to_owned()
                     } else {
-                        unit.text(metres)
+                        text(metres)
                     }
                 }),
         ]);

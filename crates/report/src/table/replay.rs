@@ -7,7 +7,7 @@ use needlebench_kinematics::JOINT_LABELS;
 use needlebench_recorded::{CalibrationFit, Estimate, LogKind, PoseError};
 
 use super::plain_table;
-use crate::number::{rounded, value_and_limit};
+use crate::number::{rounded, small_length, value_and_limit};
 
 /// The whole report, for a terminal of 80 columns.
 pub fn text(report: &ReplayReport) -> String {
@@ -330,13 +330,19 @@ fn comparison(out: &mut String, report: &ReplayReport) {
 
 /// What the log and its replay say, before any table.
 fn answer(out: &mut String, report: &ReplayReport) {
-    let mm = |m: f64| small(m * 1e3);
+    let length = |m: f64| {
+        if m < 1e-6 {
+            small_length(m)
+        } else {
+            format!("{} mm", rounded(m * 1e3, 4))
+        }
+    };
     if let Some(fit) = report.calibration.as_ref().filter(|fit| fit.is_worth) {
         let _ = writeln!(
             out,
-            "calibration: poses that it has not seen are off by {} mm rms, by nominal lengths {} mm",
-            mm(fit.held_out.rms_m),
-            mm(fit.nominal_held_out.rms_m)
+            "calibration: poses that it has not seen are off by {} rms, by nominal lengths {}",
+            length(fit.held_out.rms_m),
+            length(fit.nominal_held_out.rms_m)
         );
     }
     if let Some(real) = &report.real {
@@ -346,18 +352,18 @@ fn answer(out: &mut String, report: &ReplayReport) {
         });
         let _ = writeln!(
             out,
-            "the arm follows its set-points within {} mm rms at the tip, {} at most{lag}",
-            mm(real.tip_rms_m),
-            mm(real.tip_largest_m)
+            "the arm follows its set-points within {} rms at the tip, {} at most{lag}",
+            length(real.tip_rms_m),
+            length(real.tip_largest_m)
         );
     }
     for (name, engine) in &report.engines {
         if let Some(real) = &engine.against_real {
             let _ = writeln!(
                 out,
-                "{name} follows the arm's own tip within {} mm rms, {} at most",
-                mm(real.tip_rms_m),
-                mm(real.tip_largest_m)
+                "{name} follows the arm's own tip within {} rms, {} at most",
+                length(real.tip_rms_m),
+                length(real.tip_largest_m)
             );
         }
     }
