@@ -1,11 +1,9 @@
 //! Why a configuration is recommended, in words.
 
-use std::fmt::Write;
-
 use crate::metric::{Bound, Metric};
 use crate::ranking_report::{GoalRanking, RankingReport, SAME_SCORE, Term};
 use crate::report::ConfigurationReport;
-use needlebench_cell::{ClearanceClass, pair_in_words, part_in_words};
+use needlebench_cell::{pair_in_words, part_in_words};
 
 /// Terms that are named for the first choice and, of the runner-up's leads, against it.
 const NAMED: (usize, usize) = (3, 2);
@@ -18,9 +16,9 @@ pub(crate) fn reason(
     second: Option<&ConfigurationReport>,
     ranking: &GoalRanking,
 ) -> String {
-    let nearest = first.clearance.least().map(|found| {
+    let nearest = first.clearance.least_from_surroundings().map(|found| {
         format!(
-            "least clearance {:.1} mm ({} to {} in the {})",
+            "clearance {:.1} mm ({} to {} in the {})",
             found.minimum_m * 1e3,
             part_in_words(&found.pair[0]),
             part_in_words(&found.pair[1]),
@@ -46,23 +44,14 @@ pub(crate) fn one_sentence(
         |second| beside(first, second, ranking),
     );
     // As the column of that name.
-    let clearance = first.clearance.least_from_surroundings();
-    let itself = first
-        .clearance
-        .classes
-        .get(ClearanceClass::SelfCollision.name());
-    let clearance = clearance.map(|found| ("clearance", found));
-    let itself = itself.map(|found| ("of the arm from itself", found));
-    let mut sentence = why;
-    for (what, found) in clearance.into_iter().chain(itself) {
-        let _ = write!(
-            sentence,
-            "; {what} {:.1} mm ({})",
+    match first.clearance.least_from_surroundings() {
+        Some(found) => format!(
+            "{why}; clearance {:.1} mm ({})",
             found.minimum_m * 1e3,
             pair_in_words(&found.pair)
-        );
+        ),
+        None => why,
     }
-    sentence
 }
 
 /// Score and place of the first choice, and what puts it before the second.
