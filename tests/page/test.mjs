@@ -29,6 +29,8 @@ mkdirSync(out, { recursive: true });
 /** A page that fails on every error and every request that leaves the file. */
 async function open(running, file) {
   const page = await running.newPage({ viewport: SIZE });
+  // Pictures are drawn in software, on machines that may have other things to do.
+  page.setDefaultTimeout(120_000);
   const problems = [];
   page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`); });
   page.on('pageerror', (error) => problems.push(error.message));
