@@ -251,16 +251,17 @@ for (const given of words) {
   assert.ok(bytes <= MOST_BYTES[kind], `${given} has ${bytes} bytes`);
   const running = await launch(SOFTWARE_GL);
   const judge = await running.newPage();
-  // The best of three: other programs run, too.
+  // The best of three, each by the pace of the browser before and after it: other programs run, too.
   let best = Infinity;
-  let pace = Infinity;
+  let slowest = WORK_MS;
   for (let k = 0; k < 3; k++) {
-    pace = Math.min(pace, await judge.evaluate(work));
+    const before = await judge.evaluate(work);
     const opened = await open(running, file);
-    best = Math.min(best, opened.timing);
     await opened.page.close();
+    const pace = Math.max(WORK_MS, before, await judge.evaluate(work));
+    if (opened.timing / pace < best / slowest) [best, slowest] = [opened.timing, pace];
   }
-  console.log(`${kind} ${given}: ${(bytes / 1e6).toFixed(2)} MB, first view after ${Math.round(best)} ms, work in ${Math.round(pace)} ms`);
+  console.log(`${kind} ${given}: ${(bytes / 1e6).toFixed(2)} MB, first view after ${Math.round(best)} ms, work in ${Math.round(slowest)} ms`);
   const { page, problems } = await open(running, file);
   await page.screenshot({ path: `${out}/${name}-first.png` });
   await page.screenshot({ path: `${out}/${name}-whole.png`, fullPage: true });
@@ -286,7 +287,7 @@ for (const given of words) {
   }
   assert.deepEqual(problems, []);
   await running.close();
-  const limit = FIRST_VIEW_MS[kind] * Math.max(1, pace / WORK_MS);
+  const limit = FIRST_VIEW_MS[kind] * (slowest / WORK_MS);
   assert.ok(best <= limit, `first view after ${best} ms, limit ${limit} ms`);
 
   const plain = await launch(NO_GL);
