@@ -207,14 +207,9 @@ const WORTH_A_NAME: f64 = 0.02;
 fn share_of(budget: &ErrorBudget, source: Source) -> f64 {
     let square = |each: &SourceBudget| each.at_target.analytic.rms_m.powi(2);
     let sum: f64 = budget.sources.iter().map(square).sum();
-    let mut of_it = budget
-        .sources
-        .iter()
-        .filter(|each| each.source == Some(source));
-    of_it
-        .next()
-        .filter(|_| sum > 0.0)
-        .map_or(0.0, |each| square(each) / sum)
+    let mut sources = budget.sources.iter();
+    let mine = sources.find(|each| each.source == Some(source) && sum > 0.0);
+    mine.map_or(0.0, |each| square(each) / sum)
 }
 
 /// Sources that have a colour of their own, the largest over all budgets first; what is left is one grey rest.
