@@ -1,6 +1,6 @@
 //! What is wrong with a volume, and what is worth knowing of one.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Why there is no answer: what is wrong, where, and how to mend it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -58,7 +58,7 @@ impl ImagingError {
 }
 
 /// Something that a user has to know of a volume that is used all the same.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Remark {
     /// File, series, slice or header element it is about, where it is not the whole input.
     pub place: Option<String>,

@@ -8,6 +8,8 @@
 
 mod error;
 mod grid;
+pub mod registration;
+mod serial;
 mod volume;
 
 pub use error::{ImagingError, Remark};

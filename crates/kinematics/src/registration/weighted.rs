@@ -111,7 +111,10 @@ pub fn register_weighted(
     let mut pose = start;
     for _ in 0..MOST_ROUNDS {
         let normal = frame.normal_equations(&pose, from, to)?;
-        let step = normal.covariance()? * normal.gradient;
+        let root = normal.information.cholesky();
+        let step = root
+            .ok_or(RegistrationError::Undetermined)?
+            .solve(&normal.gradient);
         pose = frame.moved(&pose, &step);
         if step.amax() < SETTLED {
             return frame.fit(&pose, from, to);
