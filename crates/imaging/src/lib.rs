@@ -8,6 +8,7 @@
 
 mod error;
 mod grid;
+pub mod markers;
 pub mod registration;
 mod serial;
 mod volume;
