@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use nalgebra::Point3;
 
 use super::bits::{Bits, Groups, Run, disc};
-use super::{DensePart, MarkerModel, Rejected};
+use super::{DENSE_SHARE, DensePart, MarkerModel, Rejected};
 use crate::{ImagingError, Volume};
 
 /// Air is below: halfway between it and water.
@@ -19,9 +19,6 @@ const SMOOTHER_M: f64 = 4e-3;
 
 /// Depth under the surface in which flat dense markers are looked for.
 const SHELL_M: f64 = 6e-3;
-
-/// Share of the expected density above which something is dense, where a slice holds little of it.
-const DENSE_SHARE: f64 = 0.25;
 
 /// Least and most mass, over what is expected; with the least, a marker halved by thick slices is still found.
 const MASS_SHARES: [f64; 2] = [0.1, 6.0];

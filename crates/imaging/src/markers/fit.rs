@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Point3, Rotation3, SMatrix, Vector3};
 use super::model::{AIR, Appearance, Posed, UNKNOWNS, Unknowns, unknown};
 use super::noise::{Noise, REACH, SLICES};
 use super::sphere::BlurredSphere;
-use super::{DetectedMarker, MarkerModel, Options};
+use super::{DENSE_SHARE, DensePart, DetectedMarker, MarkerModel, Options};
 use crate::{Remark, Volume};
 
 type Information = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
@@ -38,12 +38,15 @@ const RADIUS_MM: f64 = 0.05;
 /// Of the blur's assumed standard deviation.
 const BLUR_SHARE: f64 = 0.25;
 
+/// Curvature of skin along any direction beforehand, 1/mm: between that of a barrel of 130 mm and none.
+const BODY_PER_MM: f64 = 0.004;
+
 /// Standard deviation of the dense part's HU beforehand, thousands, and least of the centre's, mm: none.
 const DENSE: f64 = 20.0;
 const CENTER_MM: f64 = 20.0;
 
 /// Error along each axis that shapes, which are never quite the model's, leave in every fit, mm.
-const SHAPE_MM: f64 = 0.006;
+const SHAPE_MM: f64 = 0.002;
 
 /// Residuals this much above the noise, in variance, and this share of the contrast are said to be.
 const ODD_CHI_SQUARE: f64 = 4.0;
@@ -150,20 +153,19 @@ pub fn localise(
         thickness_mm: scan.thickness_mm,
     };
     let reach_mm = model.reach_m() * 1e3;
-    let outward = outward(scan, seed, reach_mm)?;
+    let outward = outward(scan, seed, model)?;
     let sd = noise.map_or(20.0, |noise| noise.sd_hu).max(LEAST_NOISE_HU) / 1e3;
     let per_value = noise.map_or(4.0, Noise::voxels_per_value);
     let weight = 1.0 / (sd * sd * per_value);
-    let mut start = before(&of, &outward);
+    let start = before(&of);
+    let task = Task::new(&of, scan, seed, &outward, &start, weight);
     let mut best: Option<(f64, Unknowns)> = None;
     let span = 0.5 * reach_mm.min(4.0);
     for step in [0.0, -1.0, 1.0] {
-        let mut task = Task::new(&of, scan, seed, &outward, &start, weight);
         let mut values = start;
         let offset = outward * (step * span);
         values.fixed_rows_mut::<3>(0).copy_from(&offset);
         let cost = task.settle(&mut values, MOST_ROUNDS);
-        task.outward = outward;
         if best.as_ref().is_none_or(|(least, _)| cost < *least) {
             best = Some((cost, values));
         }
@@ -183,15 +185,18 @@ pub fn localise(
     let outward = Posed::new(&of, &outward, &values).normal();
     values[unknown::TILT] = 0.0;
     values[unknown::TILT + 1] = 0.0;
-    start.fixed_rows_mut::<3>(0).fill(0.0);
     let task = Task::new(&of, scan, &seed, &outward, &start, weight);
     task.settle(&mut values, MOST_ROUNDS);
     task.verdict(scan, &seed, &values, options, noise)
 }
 
 /// From soft tissue around a candidate to the candidate: the way out.
-fn outward(scan: &Scan<'_>, seed: &Point3<f64>, reach_mm: f64) -> Result<Vector3<f64>, String> {
-    let radius = reach_mm + 8.0;
+fn outward(
+    scan: &Scan<'_>,
+    seed: &Point3<f64>,
+    model: &MarkerModel,
+) -> Result<Vector3<f64>, String> {
+    let radius = model.reach_m() * 1e3 + 8.0;
     let mut sum = Vector3::zeros();
     for_each_voxel(
         scan,
@@ -204,10 +209,45 @@ fn outward(scan: &Scan<'_>, seed: &Point3<f64>, reach_mm: f64) -> Result<Vector3
         },
     );
     let length = sum.norm();
-    if length > 0.0 {
-        Ok(-sum / length)
+    if length <= 0.0 {
+        return Err("there is no skin beside it".to_owned());
+    }
+    let outward = -sum / length;
+    Ok(match model.dense {
+        DensePart::Sphere { .. } => outward,
+        DensePart::Ring { .. } => axis(scan, seed, model, &outward),
+    })
+}
+
+/// Across the plane that a ring's voxels lie in: a ring that leans too much from the start is not found by the fit.
+fn axis(
+    scan: &Scan<'_>,
+    seed: &Point3<f64>,
+    model: &MarkerModel,
+    outward: &Vector3<f64>,
+) -> Vector3<f64> {
+    let reach_mm = model.reach_m() * 1e3 + 1.0;
+    let mut dense = Vec::new();
+    for_each_voxel(scan, seed, [reach_mm, reach_mm], |_, at, hu| {
+        if f64::from(hu) > DENSE_SHARE * model.hu {
+            dense.push((at, f64::from(hu)));
+        }
+    });
+    let mass: f64 = dense.iter().map(|(_, hu)| hu).sum();
+    let middle = dense.iter().map(|(at, hu)| at * *hu).sum::<Vector3<f64>>() / mass.max(1.0);
+    let scatter: Matrix3<f64> = dense
+        .iter()
+        .map(|(at, hu)| (at - middle) * (at - middle).transpose() * *hu)
+        .sum();
+    let eigen = scatter.symmetric_eigen();
+    let axis = eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imin())
+        .into_owned();
+    if dense.len() < 8 {
+        *outward
     } else {
-        Err("there is no skin beside it".to_owned())
+        axis * axis.dot(outward).signum()
     }
 }
 
@@ -248,18 +288,13 @@ fn for_each_voxel(
 }
 
 /// What is known beforehand.
-fn before(of: &Appearance<'_>, outward: &Vector3<f64>) -> Unknowns {
+fn before(of: &Appearance<'_>) -> Unknowns {
     let mut values = Unknowns::zeros();
     values[unknown::HEIGHT] = of.marker.height_m * 1e3;
     values[unknown::TISSUE] = 0.03;
     values[unknown::DENSE] = of.marker.hu / 1e3;
-    // A body is a cylinder, roughly, of 130 mm along the slices' normal; the first direction is across `outward`.
-    let flat = outward.z.abs() > 0.8;
-    values[unknown::CURVATURE] = 0.004;
-    values[unknown::CURVATURE + 2] = 0.004;
-    if flat {
-        values[unknown::CURVATURE] = 0.003;
-    }
+    values[unknown::CURVATURE] = BODY_PER_MM;
+    values[unknown::CURVATURE + 2] = BODY_PER_MM;
     for (index, layer) in of.marker.layers.iter().enumerate() {
         values[unknown::LAYER + index] = layer.hu / 1e3;
     }
@@ -478,8 +513,10 @@ impl Task<'_> {
         let mut remarks = Vec::new();
         let (center, covariance) =
             self.along_slices(scan, values, center, covariance, &mut remarks);
-        let share = misfit > ODD_MISFIT && chi_square > ODD_CHI_SQUARE;
-        if share {
+        if let Some(chi_square) = chi_square
+            && misfit > ODD_MISFIT
+            && chi_square > ODD_CHI_SQUARE
+        {
             remarks.push(Remark::new(format!(
                 "the residuals are {:.1} times the noise: streaks of metal, something that touches it, or another shape \
                  than the model's",
@@ -497,7 +534,7 @@ impl Task<'_> {
             center_m: seed + turn * center * 1e-3,
             covariance_m2: turn * covariance * turn.transpose() * 1e-6,
             normal: turn * normal,
-            diameter_m: 2.0 * (self.of.marker.ball_radius_m() + values[unknown::RADIUS] * 1e-3),
+            diameter_m: self.of.marker.diameter_m(values[unknown::RADIUS] * 1e-3),
             hu,
             tissue_hu,
             chi_square,
@@ -512,10 +549,10 @@ impl Task<'_> {
 
     /// Mean square of the residuals over the noise's variance, and covariance of the centre, mm^2, under noise as it is
     /// in place, with its correlation.
-    fn covariance(&self, values: &Unknowns, noise: Option<&Noise>) -> (f64, Matrix3<f64>) {
+    fn covariance(&self, values: &Unknowns, noise: Option<&Noise>) -> (Option<f64>, Matrix3<f64>) {
         let at = self.linearised(values);
         let Some(inverse) = at.information.try_inverse() else {
-            return (f64::INFINITY, Matrix3::identity() * CENTER_MM * CENTER_MM);
+            return (None, Matrix3::identity() * CENTER_MM * CENTER_MM);
         };
         let per_value = noise.map_or(4.0, Noise::voxels_per_value);
         let count = self.samples.len() as f64;
@@ -523,7 +560,7 @@ impl Task<'_> {
         let prior: f64 = (0..UNKNOWNS).map(|k| inverse[(k, k)] * self.known[k]).sum();
         let taken = (UNKNOWNS as f64 - prior) * per_value;
         let variance = at.squares / (count - taken).max(0.2 * count);
-        let chi_square = noise.map_or(1.0, |noise| variance * 1e6 / (noise.sd_hu * noise.sd_hu));
+        let chi_square = noise.map(|noise| variance * 1e6 / (noise.sd_hu * noise.sd_hu));
 
         let rows = inverse.fixed_rows::<3>(0).into_owned();
         let influence = self.influence(values, &rows);

@@ -67,6 +67,12 @@ pub struct MarkerModel {
     pub layers: Vec<HolderLayer>,
 }
 
+/// Share of a ring's density above which a voxel is dense, where a slice holds little of it.
+const DENSE_SHARE: f64 = 0.25;
+
+/// Radius of balls in a row that spread as far across it as a wire of radius 1: sqrt(5/4).
+const BALL_FOR_WIRE: f64 = 1.118_033_988_749_895;
+
 /// Balls that a ring is made of in the fit, per wire diameter of its length: half overlapping.
 const BALLS_PER_WIRE: f64 = 2.0;
 
@@ -157,7 +163,16 @@ impl MarkerModel {
     fn ball_radius_m(&self) -> f64 {
         match self.dense {
             DensePart::Sphere { diameter_m } => 0.5 * diameter_m,
-            DensePart::Ring { wire_m, .. } => 0.5 * wire_m,
+            DensePart::Ring { wire_m, .. } => 0.5 * wire_m * BALL_FOR_WIRE,
+        }
+    }
+
+    /// Diameter of ball or wire where the balls' radius is so much larger than the model's.
+    fn diameter_m(&self, wider_m: f64) -> f64 {
+        let radius_m = self.ball_radius_m() + wider_m;
+        match self.dense {
+            DensePart::Sphere { .. } => 2.0 * radius_m,
+            DensePart::Ring { .. } => 2.0 * radius_m / BALL_FOR_WIRE,
         }
     }
 
@@ -189,6 +204,13 @@ impl MarkerModel {
     /// Share of a ball's mass that it stands for.
     fn ball_weight(&self) -> f64 {
         self.volume_m3() / (self.ball_count() as f64 * ball_m3(self.ball_radius_m()))
+    }
+
+    /// The layer that the dense part is in.
+    fn layer_around(&self) -> Option<usize> {
+        let radius_m = self.ball_radius_m() - 1e-6;
+        let around = |layer: &HolderLayer| layer.bottom_m <= -radius_m && layer.top_m >= radius_m;
+        self.layers.iter().position(around)
     }
 
     /// Volume of the dense part.
@@ -254,8 +276,9 @@ pub struct DetectedMarker {
     pub hu: f64,
     /// Tissue under it, HU.
     pub tissue_hu: f64,
-    /// Mean square of the fit's residuals over the variance of the noise: 1 if the model explains everything.
-    pub chi_square: f64,
+    /// Mean square of the fit's residuals over the variance of the scan's noise: 1 if the model explains everything.
+    /// Nothing where the scan shows no homogeneous tissue to measure its noise in.
+    pub chi_square: Option<f64>,
     /// Residual, rms over the contrast of the marker.
     pub misfit: f64,
     /// What is worth knowing of it.

@@ -19,6 +19,9 @@ const SOFT_HU: std::ops::RangeInclusive<i16> = -250..=350;
 /// Patches are taken on a lattice of at most so many along each direction.
 const LATTICE: [usize; 3] = [24, 24, 16];
 
+/// Most patches whose correlation is taken: hundreds of thousands of voxels.
+const MOST: usize = 160;
+
 /// Fewest patches that say something.
 const FEWEST: usize = 6;
 
@@ -57,12 +60,6 @@ impl Noise {
     }
 }
 
-/// What a patch says: its variance, and its products by lag.
-struct Patch {
-    variance: f64,
-    products: Vec<[[f64; WIDTH]; WIDTH]>,
-}
-
 /// Noise as homogeneous patches of soft tissue show it; nothing where there are none, or no noise.
 ///
 /// Planes are taken out of the patches, so that slow changes of tissue do not count. Patches with structure have a
@@ -70,47 +67,44 @@ struct Patch {
 /// that choice and the planes leave out.
 pub fn measure_noise(volume: &Volume) -> Option<Noise> {
     let size = volume.grid.size();
-    let mut patches = Vec::new();
     if size[0] < PATCH || size[1] < PATCH {
         return None;
     }
     let places = |axis: usize, reach: usize| -> Vec<usize> {
         let room = size[axis] - reach;
-        let count = LATTICE[axis].min(room / reach.max(1) + 1);
+        let count = LATTICE[axis].min(room / 4 + 1);
         (0..count)
             .map(|n| room * (2 * n + 1) / (2 * count))
             .collect()
     };
+    let mut patches = Vec::new();
     for &k in &places(2, 1) {
         for &j in &places(1, PATCH) {
             for &i in &places(0, PATCH) {
-                patches.extend(patch(volume, [i, j, k]));
+                patches
+                    .extend(flat(volume, [i, j, k]).map(|values| (variance(&values), [i, j, k])));
             }
         }
     }
     if patches.len() < FEWEST {
         return None;
     }
-    patches.sort_by(|a, b| a.variance.total_cmp(&b.variance));
-    let half = &patches[..patches.len().div_ceil(2)];
+    patches.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let median = patches[patches.len() / 2].0;
+    let half = patches.len().div_ceil(2);
     let mut sums = vec![[[0.0; WIDTH]; WIDTH]; SLICES + 1];
-    for patch in half {
-        for (sum, own) in sums.iter_mut().zip(&patch.products) {
-            for (sum, own) in sum.iter_mut().flatten().zip(own.iter().flatten()) {
-                *sum += own;
-            }
-        }
+    for (_, place) in patches[..half].iter().step_by(half.div_ceil(MOST)) {
+        add_products(volume, *place, &mut sums);
     }
     let whole = sums[0][REACH][REACH];
-    let variance = patches[patches.len() / 2].variance;
-    if whole <= 0.0 || variance <= 0.0 {
+    if whole <= 0.0 || median <= 0.0 {
         return None;
     }
     for value in sums.iter_mut().flatten().flatten() {
         *value /= whole;
     }
     let mut noise = Noise {
-        sd_hu: variance.sqrt(),
+        sd_hu: median.sqrt(),
         correlation: sums,
     };
     // A plane takes three values of those that a patch is worth.
@@ -121,34 +115,33 @@ pub fn measure_noise(volume: &Volume) -> Option<Noise> {
     Some(noise)
 }
 
-fn patch(volume: &Volume, [i, j, k]: [usize; 3]) -> Option<Patch> {
+fn variance(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
+}
+
+/// Adds a patch's mean products by lag.
+fn add_products(volume: &Volume, [i, j, k]: [usize; 3], sums: &mut [[[f64; WIDTH]; WIDTH]]) {
     let planes: Vec<Vec<f64>> = (k..(k + SLICES + 1).min(volume.grid.size()[2]))
         .map_while(|k| flat(volume, [i, j, k]))
         .collect();
-    let first = planes.first()?;
-    let variance = first.iter().map(|v| v * v).sum::<f64>() / (PATCH * PATCH) as f64;
+    let Some(first) = planes.first() else { return };
     let reach = REACH as isize;
-    let mut products = vec![[[0.0; WIDTH]; WIDTH]; SLICES + 1];
-    for (plane, products) in planes.iter().zip(&mut products) {
+    let side = PATCH as isize;
+    for (plane, sums) in planes.iter().zip(sums) {
         for dj in -reach..=reach {
             for di in -reach..=reach {
-                let (mut sum, mut count) = (0.0, 0.0);
-                for y in 0..PATCH as isize {
-                    for x in 0..PATCH as isize {
-                        let (u, v) = (x + di, y + dj);
-                        let inside = 0..PATCH as isize;
-                        if inside.contains(&u) && inside.contains(&v) {
-                            let at = |x: isize, y: isize| (y as usize) * PATCH + x as usize;
-                            sum += first[at(x, y)] * plane[at(u, v)];
-                            count += 1.0;
-                        }
+                let mut sum = 0.0;
+                for y in 0.max(-dj)..side.min(side - dj) {
+                    for x in 0.max(-di)..side.min(side - di) {
+                        let at = |x: isize, y: isize| (y * side + x) as usize;
+                        sum += first[at(x, y)] * plane[at(x + di, y + dj)];
                     }
                 }
-                products[(dj + reach) as usize][(di + reach) as usize] = sum / count;
+                let count = (side - di.abs()) * (side - dj.abs());
+                sums[(dj + reach) as usize][(di + reach) as usize] += sum / count as f64;
             }
         }
     }
-    Some(Patch { variance, products })
 }
 
 /// Soft tissue less its plane; nothing if something else is there.

@@ -74,7 +74,7 @@ pub struct Scanner {
     pub noise_blur: f64,
     /// Directions of rows and columns of pixels, and of the slices' centres.
     pub axes: Matrix3<f64>,
-    /// Dark and bright stripes, HU.
+    /// Dark and bright stripes around the middle, HU.
     pub streaks: f64,
     pub clip: f64,
 }
@@ -110,7 +110,13 @@ impl Scanner {
             let noise = self.noise_image(random);
             for (index, value) in image.into_iter().enumerate() {
                 let (i, j) = (index % self.size[0], index / self.size[0]);
-                let streak = self.streaks * (0.9 * i as f64 + 0.37 * j as f64).sin();
+                let off = [i as f64 - middle.x, j as f64 - middle.y];
+                let near = off[0].hypot(off[1]) * self.pixel < 9.0;
+                let streak = if near {
+                    self.streaks * (0.9 * off[0] + 0.37 * off[1]).sin()
+                } else {
+                    0.0
+                };
                 let value = value + noise[index] + streak;
                 hu.push(value.round().clamp(-1024.0, self.clip) as i16);
             }
