@@ -55,6 +55,9 @@ const ODD_MISFIT: f64 = 0.03;
 /// Standard deviation along the slices above which a place is said not to be a point, mm.
 const OPEN_MM: f64 = 0.25;
 
+/// Thicknesses that slices can have, mm.
+const POSSIBLE_MM: std::ops::RangeInclusive<f64> = 0.05..=20.0;
+
 /// A sphere this much larger than a slice's thickness shows in more than one slice, wherever it is, mm.
 const RECOVERED_MM: f64 = 0.5;
 
@@ -83,19 +86,19 @@ impl<'a> Scan<'a> {
         let ct_from_slice =
             Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[row, across, normal]));
         let increment_mm = normal.dot(&steps.column(2)) * 1e3;
-        let thickness = volume
-            .slice_thickness_m
-            .filter(|t| *t > 0.0 && t.is_finite());
-        if thickness.is_none() {
+        let stated_mm = volume.slice_thickness_m.map(|t| t * 1e3);
+        let possible_mm = stated_mm.filter(|t| POSSIBLE_MM.contains(t));
+        let thickness_mm = possible_mm.unwrap_or_else(|| {
             remarks.push(Remark::new(format!(
-                "the thickness of slices is not stated; {increment_mm:.2} mm, their distance, is taken for it"
+                "no possible thickness of slices is stated; {increment_mm:.2} mm, their distance, is taken for it"
             )));
-        }
+            increment_mm.clamp(*POSSIBLE_MM.start(), *POSSIBLE_MM.end())
+        });
         Self {
             volume,
             ct_from_slice,
             index_from_mm: (steps * 1e3).try_inverse().unwrap_or_else(Matrix3::zeros),
-            thickness_mm: thickness.map_or(increment_mm, |t| t * 1e3),
+            thickness_mm,
             increment_mm,
             blur_mm: blur_sigma_m * 1e3,
         }

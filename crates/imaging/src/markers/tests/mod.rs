@@ -105,7 +105,11 @@ fn a_ball_on_skin_is_found_and_localised() {
 }
 
 /// What people do without a fit: mean place of the voxels around, mm, each with a weight by its HU.
-fn centroid(volume: &Volume, around_mm: &Vector3<f64>, weight: impl Fn(f64) -> f64) -> Vector3<f64> {
+fn centroid(
+    volume: &Volume,
+    around_mm: &Vector3<f64>,
+    weight: impl Fn(f64) -> f64,
+) -> Vector3<f64> {
     let [nx, ny, nz] = volume.grid.size();
     let (mut sum, mut moment) = (0.0, Vector3::zeros());
     for k in 0..nz {
@@ -163,14 +167,22 @@ fn table() {
         const TRIALS: u64 = 48;
         let scanner = Scanner::new(thickness, increment, noise);
         let [binary, air, skin] = centroids(TRIALS, &scanner, [diameter, hu]);
-        println!("centroids: binary {binary:.3}, weighted over air {air:.3}, over skin {skin:.3} mm");
+        println!(
+            "centroids: binary {binary:.3}, weighted over air {air:.3}, over skin {skin:.3} mm"
+        );
         trials(TRIALS, &scanner, &bare(diameter), [diameter, hu], |_, _| ());
         let softer = Scanner {
             blur: 0.55 * 1.25,
             ..scanner
         };
         print!("  blur +25 %, radius +0.05: ");
-        trials(TRIALS, &softer, &bare(diameter), [diameter + 0.1, hu], |_, _| ());
+        trials(
+            TRIALS,
+            &softer,
+            &bare(diameter),
+            [diameter + 0.1, hu],
+            |_, _| (),
+        );
     }
 }
 
@@ -179,9 +191,19 @@ fn table() {
 fn covariances_are_those_of_the_errors() {
     for (thickness, increment, noise) in [(1.0, 1.0, 50.0), (2.5, 2.5, 40.0)] {
         let scanner = Scanner::new(thickness, increment, noise);
-        let tally = trials(300, &scanner, &MarkerModel::bare_sphere(6e-3), [6.0, 1200.0], |_, _| ());
+        let tally = trials(
+            300,
+            &scanner,
+            &MarkerModel::bare_sphere(6e-3),
+            [6.0, 1200.0],
+            |_, _| (),
+        );
         // Of so many chi-squares with three degrees of freedom the mean is known to 4.7 %.
-        assert!((tally.chi_square() - 1.0).abs() < 0.1 + 0.047, "{}", tally.chi_square());
+        assert!(
+            (tally.chi_square() - 1.0).abs() < 0.1 + 0.047,
+            "{}",
+            tally.chi_square()
+        );
     }
 }
 
