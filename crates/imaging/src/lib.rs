@@ -8,8 +8,13 @@
 
 mod error;
 mod grid;
+mod histogram;
+mod orientation;
+pub mod read;
 mod volume;
 
 pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};
+pub use histogram::HuHistogram;
+pub use orientation::{NoOrientation, Orientation};
 pub use volume::{AIR_HU, LabelMap, Volume};
