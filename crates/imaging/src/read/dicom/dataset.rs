@@ -219,10 +219,12 @@ impl<R: Read + Seek> Elements<R> {
         let mut found = self.empty();
         while self.end - self.at >= 8 {
             let start = self.at;
-            let head = self.head()?;
-            if head.tag >> 16 != 2 {
+            let tag = self.tag()?;
+            // What follows may be written in another way.
+            if tag >> 16 != 2 {
                 return Ok((found, start));
             }
+            let head = self.head_of(tag)?;
             self.value(&head, self.end, &mut found, 0)?;
         }
         Ok((found, self.at))
@@ -237,6 +239,9 @@ impl<R: Read + Seek> Elements<R> {
                 return Err(damaged("an item ends that did not begin", self.at));
             }
             self.value(&head, self.end, &mut found, 0)?;
+        }
+        if self.pixels.is_none() && self.at < self.end {
+            return Err(damaged("the file is cut off", self.at));
         }
         Ok((found, self.pixels))
     }
@@ -289,8 +294,17 @@ impl<R: Read + Seek> Elements<R> {
         Ok(())
     }
 
+    fn tag(&mut self) -> Result<Tag, ImagingError> {
+        Ok(u32::from(self.short()?) << 16 | u32::from(self.short()?))
+    }
+
     fn head(&mut self) -> Result<Head, ImagingError> {
-        let tag = u32::from(self.short()?) << 16 | u32::from(self.short()?);
+        let tag = self.tag()?;
+        self.head_of(tag)
+    }
+
+    /// What follows a tag.
+    fn head_of(&mut self, tag: Tag) -> Result<Head, ImagingError> {
         if tag >> 16 == 0xFFFE || !self.encoding.is_explicit {
             let length = self.long()?.into();
             return Ok(Head {

@@ -27,6 +27,8 @@ pub(super) struct OpenedFile {
     pub(super) data: DataSet,
     pub(super) pixels: Option<Pixels>,
     pub(super) syntax: TransferSyntax,
+    /// What kind of object it says that it is, before all else.
+    pub(super) sop_class: Option<String>,
     /// What had to be assumed to read it.
     pub(super) assumed: Option<&'static str>,
 }
@@ -91,6 +93,7 @@ impl OpenedFile {
         let (meta, start) =
             Elements::new(&mut input, at as u64, end, Encoding::EXPLICIT)?.meta()?;
         let head = peek(&mut input, start)?;
+        let sop_class = meta.text(tag::META_SOP_CLASS);
         let mut assumed = None;
         let syntax = match meta.text(tag::TRANSFER_SYNTAX) {
             Some(uid) => TransferSyntax::of(&uid),
@@ -110,6 +113,7 @@ impl OpenedFile {
                 data,
                 pixels,
                 syntax,
+                sop_class,
                 assumed,
             }));
         }
@@ -124,6 +128,7 @@ impl OpenedFile {
             data,
             pixels,
             syntax,
+            sop_class,
             assumed,
         }))
     }

@@ -12,6 +12,13 @@ use super::tag::{self, Tag};
 use crate::ImagingError;
 use crate::read::scalar::{Kind, Rescale, Stored};
 
+/// Kinds of objects that are images of CT: of one slice, of many, and made of many.
+const CT_IMAGES: [&str; 3] = [
+    "1.2.840.10008.5.1.4.1.1.2",
+    "1.2.840.10008.5.1.4.1.1.2.1",
+    "1.2.840.10008.5.1.4.1.1.2.2",
+];
+
 /// Frames that a file may have.
 const FRAMES: i64 = 1 << 16;
 
@@ -135,9 +142,18 @@ pub(super) fn slices(
         mut data,
         pixels,
         syntax,
+        sop_class,
         assumed,
     } = opened;
     let (Some(rows), Some(columns)) = (short(&data, tag::ROWS), short(&data, tag::COLUMNS)) else {
+        let sop_class = data.text(tag::SOP_CLASS).or(sop_class).unwrap_or_default();
+        if CT_IMAGES.contains(&sop_class.as_str()) {
+            return Err(ImagingError::refused(
+                "the file is cut off: it is a CT image without pixels",
+            )
+            .at(name)
+            .hint("copy or export it again"));
+        }
         return Ok(Vec::new());
     };
     let mut shared = data.take_items(tag::SHARED_GROUPS).into_iter().next();

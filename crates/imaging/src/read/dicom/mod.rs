@@ -56,13 +56,10 @@ pub(super) fn read(
         others,
     } = find(path, options, cancel)?;
     if slices.is_empty() {
-        return Err(match broken.is_empty() {
-            false => broken.swap_remove(0),
-            true if others > 0 => {
-                ImagingError::refused(format!("none of its {others} files is a DICOM image"))
-                    .hint("name a folder of DICOM files, or a .nii or .nii.gz file")
-            }
-            true => ImagingError::refused("the folder is empty"),
+        return Err(if broken.is_empty() {
+            without_images(path, others)
+        } else {
+            broken.swap_remove(0)
         });
     }
     let (series, mut remarks) = series::choose(series::all(slices), options.series.as_deref())?;
@@ -106,6 +103,16 @@ pub(super) fn read(
         remarks,
         description,
     })
+}
+
+fn without_images(path: &Path, files: usize) -> ImagingError {
+    let what = match (path.is_dir(), files) {
+        (false, _) => "it is DICOM, but no image".to_owned(),
+        (true, 0) => "the folder is empty".to_owned(),
+        (true, files) => format!("none of its {files} files is a DICOM image"),
+    };
+    ImagingError::refused(what)
+        .hint("name a folder with the DICOM files of a scan, or a .nii or .nii.gz file")
 }
 
 fn place_of(problem: &ImagingError) -> String {

@@ -225,6 +225,13 @@ pub(super) fn choose(
             list(&all)
         )));
     }
+    if chosen.key().is_scout {
+        return Err(
+            ImagingError::refused("it is a scout (LOCALIZER), and no volume")
+                .at(format!("series {}", chosen.label))
+                .hint("name the folder or file of the scan"),
+        );
+    }
     match &chosen.key().modality {
         Some(modality) if modality != "CT" => Err(ImagingError::refused(format!(
             "the modality is {modality}, and not CT"

@@ -168,25 +168,28 @@ fn shown(slice: &Slice) -> String {
     }
 }
 
+/// Distance that stands for one that nobody said: of a single slice, where it matters to nothing within the slice.
+const ASSUMED_MM: f64 = 1.0;
+
 fn single(slices: Vec<Slice>, plane: &Plane, normal: &Vector3<f64>) -> Result<Stack, ImagingError> {
     let slice = &slices[0];
-    let Some(thickness_mm) = slice.thickness_mm else {
-        return Err(
-            ImagingError::refused("there is one slice, and how thick it is is not said")
-                .at(shown(slice))
-                .hint("name the folder with all slices of the series"),
-        );
-    };
     let size = [
         usize::from(slice.file.columns),
         usize::from(slice.file.rows),
         1,
     ];
+    let message = match slice.thickness_mm {
+        Some(mm) => format!(
+            "there is one slice; its thickness, {mm} mm, stands for the distance between slices"
+        ),
+        None => format!(
+            "there is one slice, and how thick it is is not said: {ASSUMED_MM} mm stand for the distance between slices"
+        ),
+    };
+    let step_mm = slice.thickness_mm.unwrap_or(ASSUMED_MM);
     Ok(Stack {
-        grid: grid(plane, normal * thickness_mm, size)?,
-        remarks: vec![Remark::new(format!(
-            "there is one slice; {thickness_mm} mm, its thickness, stand for the distance between slices"
-        ))],
+        grid: grid(plane, normal * step_mm, size)?,
+        remarks: vec![Remark::new(message)],
         slices,
         sources: vec![Source::just(0)],
     })
