@@ -11,10 +11,12 @@ mod grid;
 mod histogram;
 mod orientation;
 pub mod read;
+mod resample;
 mod volume;
 
 pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};
 pub use histogram::HuHistogram;
 pub use orientation::{NoOrientation, Orientation};
+pub use resample::{Resampled, resample};
 pub use volume::{AIR_HU, LabelMap, Volume};

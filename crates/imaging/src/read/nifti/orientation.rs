@@ -58,6 +58,8 @@ pub(super) struct Placement {
     qform_code: i64,
     sform_code: i64,
     quaternion_bcd: [f64; 3],
+    /// Of the quaternion's square, as its numbers are written.
+    rounding: f64,
     offset: [f64; 3],
     sform: Matrix3x4<f64>,
     unit: i64,
@@ -83,6 +85,11 @@ impl Placement {
             qform_code: (places.code)(fields, places.qform_code),
             sform_code: (places.code)(fields, places.qform_code + places.code_bytes),
             quaternion_bcd: [0, 1, 2].map(|index| real(places.quatern, index)),
+            rounding: if is_first {
+                3.0 * f64::from(f32::EPSILON)
+            } else {
+                3.0 * f64::EPSILON
+            },
             offset: [3, 4, 5].map(|index| real(places.quatern, index)),
             sform: Matrix3x4::from_fn(|row, column| real(places.srow, 4 * row + column)),
             unit: unit & 7,
@@ -97,7 +104,12 @@ impl Placement {
         if rest < -1e-5 || !rest.is_finite() {
             return None;
         }
-        let a = rest.max(0.0).sqrt();
+        // Of a half turn the rest is rounding, and its root a turn of a hundredth of a degree.
+        let a = if rest < self.rounding {
+            0.0
+        } else {
+            rest.sqrt()
+        };
         let norm = (a * a + b * b + c * c + d * d).sqrt();
         let [a, b, c, d] = [a, b, c, d].map(|each| each / norm);
         let turn = Matrix3::new(

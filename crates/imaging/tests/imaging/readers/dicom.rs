@@ -258,7 +258,7 @@ fn size_is_held_against_file_and_limit_before_memory_is_taken() {
     let large = Slice::at(0.0)
         .with(0x0028_0030, *b"DS", "0.05\\0.05")
         .with(0x0028_0010, *b"US", u16::MAX.to_le_bytes())
-        .with(0x0028_0011, *b"US", 32000_u16.to_le_bytes());
+        .with(0x0028_0011, *b"US", u16::MAX.to_le_bytes());
     assert!(refusal(read_as("a.dcm", &large.bytes())).contains("--max-memory"));
     let smaller = large.with(0x0028_0010, *b"US", 32000_u16.to_le_bytes());
     assert!(refusal(read_as("a.dcm", &smaller.bytes())).contains("cut off"));
