@@ -11,10 +11,11 @@ use crate::{ImagingError, Remark, VoxelGrid};
 /// Slices this close are at the same place.
 const SAME_PLACE_MM: f64 = 1e-3;
 
-/// Deviation of positions from even steps that is rounding: unremarked, and the most of it (positions are
-/// written with one decimal by some).
+/// Deviation of positions from even steps that is rounding: unremarked; and the most of it, where positions are
+/// written with one decimal, and both ends of the line with them. Never more than a tenth of a step.
 const UNREMARKED_MM: f64 = 0.01;
-const ROUNDED_MM: f64 = 0.06;
+const ROUNDED_MM: f64 = 0.101;
+const ROUNDED_SHARE: f64 = 0.1;
 
 /// Deviation from a line along which slices may be stacked.
 const ASIDE_MM: f64 = 0.1;
@@ -257,7 +258,7 @@ fn steps(
     if apart_mm <= UNREMARKED_MM {
         return Ok(Steps { step_mm, sources });
     }
-    if apart_mm <= ROUNDED_MM {
+    if apart_mm <= ROUNDED_MM.min(ROUNDED_SHARE * step_mm) {
         remarks.push(Remark::new(format!(
             "positions of slices are up to {apart_mm:.3} mm beside even steps of {step_mm:.4} mm, as rounding leaves \
              them: even steps count"
