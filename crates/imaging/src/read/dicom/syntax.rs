@@ -127,12 +127,27 @@ impl TransferSyntax {
             ImagingError::refused(format!("the {} pixels are damaged: {what}", self.name()))
                 .hint("copy or export it again; or decompress it with gdcmconv --raw IN OUT (GDCM)")
         };
-        if let Some((columns, rows)) = self.stated_size(frame.bytes)
-            && (columns, rows) != (frame.columns.into(), frame.rows.into())
-        {
+        let expected = usize::from(frame.rows)
+            * usize::from(frame.columns)
+            * usize::from(frame.bits_allocated / 8);
+        if self.uid == RLE {
+            return run_lengths(frame.bytes, expected, usize::from(frame.bits_allocated / 8))
+                .ok_or_else(|| wrong("they do not fill the image"));
+        }
+        // Decoders take memory for what a stream says of itself: it has to be what the file says of it.
+        let stated = self
+            .stated(frame.bytes)
+            .ok_or_else(|| wrong("they do not begin as they should"))?;
+        if (stated.columns, stated.rows) != (frame.columns.into(), frame.rows.into()) {
             return Err(wrong(&format!(
-                "they are {columns} x {rows}, the file says {} x {}",
-                frame.columns, frame.rows
+                "they are {} x {}, the file says {} x {}",
+                stated.columns, stated.rows, frame.columns, frame.rows
+            )));
+        }
+        if stated.components != 1 || stated.tiles > MOST_TILES {
+            return Err(wrong(&format!(
+                "they have {} components in {} tiles",
+                stated.components, stated.tiles
             )));
         }
         let Some(Codec::EncapsulatedPixelData(Some(decoder), _)) = TransferSyntaxRegistry
@@ -155,9 +170,6 @@ impl TransferSyntax {
             Ok(Err(error)) => return Err(wrong(&with_sources(&error))),
             Err(_) => return Err(wrong("the decoder gave up")),
         }
-        let expected = usize::from(frame.rows)
-            * usize::from(frame.columns)
-            * usize::from(frame.bits_allocated / 8);
         if decoded.len() != expected {
             return Err(wrong(&format!(
                 "{} bytes instead of {expected}",
@@ -167,14 +179,72 @@ impl TransferSyntax {
         Ok(decoded)
     }
 
-    /// Columns and rows that a stream says it has: what a decoder would take memory for.
-    fn stated_size(&self, bytes: &[u8]) -> Option<(u32, u32)> {
+    /// What a stream says of itself.
+    fn stated(&self, bytes: &[u8]) -> Option<Stated> {
         if JPEG_2000.contains(&self.uid.as_str()) {
-            return codestream_size(bytes);
+            codestream_stated(bytes)
+        } else {
+            jpeg_stated(bytes)
         }
-        JPEG.contains(&self.uid.as_str())
-            .then(|| jpeg_size(bytes))?
     }
+}
+
+/// What a compressed stream says of its image.
+struct Stated {
+    columns: u32,
+    rows: u32,
+    components: u16,
+    tiles: u64,
+}
+
+/// Tiles of one slice: more are no CT's.
+const MOST_TILES: u64 = 4096;
+
+/// Of run lengths (PS3.5, annex G): one segment for each byte of a number, the highest first, into little-endian
+/// numbers. None where they are damaged.
+fn run_lengths(bytes: &[u8], expected: usize, bytes_each: usize) -> Option<Vec<u8>> {
+    let number = |at: usize| -> Option<usize> {
+        let four = bytes.get(4 * at..4 * at + 4)?;
+        usize::try_from(u32::from_le_bytes(four.try_into().ok()?)).ok()
+    };
+    if number(0)? != bytes_each {
+        return None;
+    }
+    let mut decoded = vec![0; expected];
+    for segment in 0..bytes_each {
+        let start = number(segment + 1)?;
+        let end = if segment + 1 < bytes_each {
+            number(segment + 2)?
+        } else {
+            bytes.len()
+        };
+        let mut codes = bytes.get(start..end)?.iter().copied();
+        let mut out = decoded
+            .iter_mut()
+            .skip(bytes_each - 1 - segment)
+            .step_by(bytes_each);
+        let mut left = expected / bytes_each;
+        while left > 0 {
+            let code = codes.next()?;
+            let (count, repeated) = match code {
+                0..=127 => (usize::from(code) + 1, None),
+                128 => continue,
+                _ => (257 - usize::from(code), Some(codes.next()?)),
+            };
+            // What goes beyond the last pixel is padding of the run.
+            for _ in 0..count.min(left) {
+                let value = match repeated {
+                    Some(value) => value,
+                    None => codes.next()?,
+                };
+                if let Some(out) = out.next() {
+                    *out = value;
+                }
+            }
+            left -= count.min(left);
+        }
+    }
+    Some(decoded)
 }
 
 /// An error with what caused it.
@@ -189,7 +259,7 @@ fn with_sources(error: &dyn std::error::Error) -> String {
 }
 
 /// Of JPEG 2000: the SIZ marker behind the start of the codestream, which may stand in a file's boxes.
-fn codestream_size(bytes: &[u8]) -> Option<(u32, u32)> {
+fn codestream_stated(bytes: &[u8]) -> Option<Stated> {
     let at = bytes
         .windows(4)
         .position(|four| four == [0xFF, 0x4F, 0xFF, 0x51])?;
@@ -197,13 +267,25 @@ fn codestream_size(bytes: &[u8]) -> Option<(u32, u32)> {
         let four = bytes.get(at + offset..at + offset + 4)?;
         Some(u32::from_be_bytes(four.try_into().ok()?))
     };
-    // Marker, length and capabilities come before them: 8 bytes behind the start.
+    // Markers, length and capabilities come before them. Ends and begins of the image, then size and begin of tiles.
     let (right, bottom, left, top) = (number(8)?, number(12)?, number(16)?, number(20)?);
-    Some((right.checked_sub(left)?, bottom.checked_sub(top)?))
+    let (tile_width, tile_height) = (number(24)?, number(28)?);
+    let [high, low] = *bytes.get(at + 40..at + 42)? else {
+        return None;
+    };
+    if tile_width == 0 || tile_height == 0 {
+        return None;
+    }
+    Some(Stated {
+        columns: right.checked_sub(left)?,
+        rows: bottom.checked_sub(top)?,
+        components: u16::from_be_bytes([high, low]),
+        tiles: u64::from(right.div_ceil(tile_width)) * u64::from(bottom.div_ceil(tile_height)),
+    })
 }
 
 /// Of JPEG: the frame header (SOF0 to SOF15 but the tables' markers).
-fn jpeg_size(bytes: &[u8]) -> Option<(u32, u32)> {
+fn jpeg_stated(bytes: &[u8]) -> Option<Stated> {
     let mut at = 2;
     loop {
         let [0xFF, marker, high, low] = *bytes.get(at..at + 4)? else {
@@ -211,13 +293,15 @@ fn jpeg_size(bytes: &[u8]) -> Option<(u32, u32)> {
         };
         let is_frame = (0xC0..=0xCF).contains(&marker) && ![0xC4, 0xC8, 0xCC].contains(&marker);
         if is_frame {
-            let [a, b, c, d] = *bytes.get(at + 5..at + 9)? else {
+            let [a, b, c, d, components] = *bytes.get(at + 5..at + 10)? else {
                 return None;
             };
-            return Some((
-                u16::from_be_bytes([c, d]).into(),
-                u16::from_be_bytes([a, b]).into(),
-            ));
+            return Some(Stated {
+                columns: u16::from_be_bytes([c, d]).into(),
+                rows: u16::from_be_bytes([a, b]).into(),
+                components: components.into(),
+                tiles: 1,
+            });
         }
         at += 2 + usize::from(u16::from_be_bytes([high, low]));
     }
