@@ -30,14 +30,26 @@ fn main() {
         }
     }
     for (at, path) in paths.iter().enumerate() {
-        let start = Instant::now();
         let out = folder.join(format!("{at}.hu"));
-        println!("{}", answer(path, &out, &options, threads, start));
+        println!("{}", answer(path, &out, &options, threads));
     }
 }
 
-fn answer(path: &Path, out: &Path, options: &ReadOptions, threads: usize, start: Instant) -> Value {
-    let read = match read_volume(path, options, threads, &AtomicBool::new(false)) {
+/// Time that this thread has had of a core, where the system tells it.
+fn thread_cpu_s() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds = text
+        .split(' ')
+        .next()
+        .and_then(|word| word.parse::<f64>().ok());
+    nanoseconds.unwrap_or(f64::NAN) * 1e-9
+}
+
+fn answer(path: &Path, out: &Path, options: &ReadOptions, threads: usize) -> Value {
+    let (start, cpu_s) = (Instant::now(), thread_cpu_s());
+    let outcome = read_volume(path, options, threads, &AtomicBool::new(false));
+    let (seconds, cpu_s) = (start.elapsed().as_secs_f64(), thread_cpu_s() - cpu_s);
+    let read = match outcome {
         Ok(read) => read,
         Err(ImagingError::Interrupted) => return json!({"refused": "interrupted"}),
         Err(ImagingError::Refused {
@@ -46,7 +58,6 @@ fn answer(path: &Path, out: &Path, options: &ReadOptions, threads: usize, start:
             hint,
         }) => return json!({"refused": message, "place": place, "hint": hint}),
     };
-    let seconds = start.elapsed().as_secs_f64();
     let grid = &read.volume.grid;
     let steps: Vec<f64> = grid.steps_m().iter().copied().collect();
     let bytes: Vec<u8> = read
@@ -72,6 +83,7 @@ fn answer(path: &Path, out: &Path, options: &ReadOptions, threads: usize, start:
         "description": read.description,
         "slice_thickness_m": read.volume.slice_thickness_m,
         "read_s": seconds,
+        "read_cpu_s": cpu_s,
         "voxels": out,
     })
 }
