@@ -50,7 +50,8 @@ def times(reader: Reader, folder: Path) -> None:
     body = ((i - 256) / 220) ** 2 + ((j - 256) / 160) ** 2 < 1
     hu = np.empty(size, np.int16)
     for k in range(size[2]):
-        hu[..., k] = np.where(body, 40, -1000) + rng.normal(0, 20, size[:2])
+        noisy = np.where(body, 40, -1000) + rng.normal(0, 20, size[:2])
+        hu[..., k] = np.maximum(noisy, -1024)
     packed = folder / "scan.nii.gz"
     image = nib.Nifti1Image(hu, np.diag([-0.7, -0.7, 1.0, 1.0]))
     image.header.set_xyzt_units("mm")
