@@ -51,10 +51,9 @@ fn begin(first: &[u8]) -> Option<usize> {
     let head = first.get(..8)?;
     let has_vr = head[4..6].iter().all(u8::is_ascii_uppercase);
     let begins = match head[..2] {
-        // The group of the transfer syntax, or of what describes the image.
-        [2, 0] => has_vr,
+        // The group of what describes the image, or of the transfer syntax.
         [8, 0] => has_vr || head[6..8] == [0, 0] && head[4] < 128,
-        [0, 8] => has_vr,
+        [2, 0] | [0, 8] => has_vr,
         _ => false,
     };
     begins.then_some(0)
@@ -95,14 +94,13 @@ impl OpenedFile {
         let head = peek(&mut input, start)?;
         let sop_class = meta.text(tag::META_SOP_CLASS);
         let mut assumed = None;
-        let syntax = match meta.text(tag::TRANSFER_SYNTAX) {
-            Some(uid) => TransferSyntax::of(&uid),
-            None => {
-                assumed = Some(
-                    "the file does not say how it is written (no transfer syntax): read as its first bytes suggest",
-                );
-                TransferSyntax::plain(guessed(&head))
-            }
+        let syntax = if let Some(uid) = meta.text(tag::TRANSFER_SYNTAX) {
+            TransferSyntax::of(&uid)
+        } else {
+            assumed = Some(
+                "the file does not say how it is written (no transfer syntax): read as its first bytes suggest",
+            );
+            TransferSyntax::plain(guessed(&head))
         };
         if syntax.is_deflated() {
             let bytes = inflated(&mut input, start, most_bytes)?;
@@ -153,6 +151,7 @@ pub(super) fn pixel_bytes(
     )?)))
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "errors are mapped by it")]
 fn unreadable(error: std::io::Error) -> ImagingError {
     ImagingError::refused(format!("cannot be read: {error}"))
 }

@@ -143,6 +143,7 @@ fn read_frame(
             .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))
     };
     buffer.clear();
+    #[expect(clippy::single_match_else, reason = "two ways of the same weight")]
     match &image.pixels {
         Some(Pixels::Plain { offset, .. }) => {
             let bytes = frame_bytes(image, &stored);
@@ -205,7 +206,10 @@ pub(super) fn bits(
 
 /// One converter at a time: slices of a series mostly have the same.
 #[derive(Default)]
-struct Conversion(Option<((Stored, [u64; 2], Option<[u64; 2]>), Converter)>);
+struct Conversion(Option<(ConversionKey, Converter)>);
+
+/// How numbers are stored; slope and intercept, and the range of padding, by their bits.
+type ConversionKey = (Stored, [u64; 2], Option<[u64; 2]>);
 
 impl Conversion {
     fn of(&mut self, slice: &Slice, stored: Stored) -> Result<&Converter, ImagingError> {

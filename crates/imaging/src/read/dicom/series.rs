@@ -165,7 +165,7 @@ impl Series {
         }
         match &key.modality {
             Some(modality) if modality != "CT" => {
-                words.push(format!("modality {modality}, not CT"))
+                words.push(format!("modality {modality}, not CT"));
             }
             _ => {}
         }

@@ -152,7 +152,7 @@ impl TransferSyntax {
         }
         let Some(Codec::EncapsulatedPixelData(Some(decoder), _)) = TransferSyntaxRegistry
             .get(&self.uid)
-            .map(|syntax| syntax.codec())
+            .map(dicom_encoding::TransferSyntax::codec)
         else {
             return Err(wrong("there is no decoder"));
         };

@@ -35,6 +35,10 @@ enum Source {
 }
 
 /// Header and voxels of what a path names: one file, or a pair.
+#[expect(
+    clippy::case_sensitive_file_extension_comparisons,
+    reason = "of a name in small letters"
+)]
 pub(super) fn pair(path: &Path) -> (PathBuf, PathBuf) {
     let text = path.to_string_lossy();
     let lower = text.to_ascii_lowercase();
