@@ -116,7 +116,7 @@ const OWNERS: [(&str, &str); 17] = [
     ("crc32fast", "study"),
     ("mcap", "recorded"),
     ("flate2", "imaging"),
-    ("dicom-object", "imaging"),
+    ("dicom-transfer-syntax-registry", "imaging"),
     ("png", "render"),
     ("quick-junit", "report"),
     ("indicatif", "needlebench"),

@@ -128,6 +128,32 @@ impl VoxelGrid {
         Point3::from(self.index_from_ct * (point_m - self.first_m))
     }
 
+    /// Centres of the eight voxels at the corners, in `ct`.
+    pub fn corners_m(&self) -> [Point3<f64>; 8] {
+        std::array::from_fn(|corner| {
+            let at = |axis: usize| {
+                let last = (self.size[axis] - 1) as f64;
+                if corner >> axis & 1 == 1 { last } else { 0.0 }
+            };
+            self.ct_from_index(&Point3::new(at(0), at(1), at(2)))
+        })
+    }
+
+    /// The largest distance in m between corresponding corners of two grids.
+    pub fn farthest_corners_m(&self, other: &Self) -> f64 {
+        let pairs = self.corners_m().into_iter().zip(other.corners_m());
+        pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    }
+
+    /// Angle in rad between the step from slice to slice and the normal of the slices: a tilted gantry's. 0 for
+    /// slices that lie straight above one another.
+    pub fn tilt_rad(&self) -> f64 {
+        let [i, j, k] = [0, 1, 2].map(|axis| self.ct_from_index.column(axis).into_owned());
+        let normal = i.cross(&j);
+        let along = normal.dot(&k).abs();
+        normal.cross(&k).norm().atan2(along)
+    }
+
     /// Offset of a voxel in the data: columns run fastest, slices slowest.
     pub fn offset(&self, [i, j, k]: [usize; 3]) -> usize {
         (k * self.size[1] + j) * self.size[0] + i

@@ -11,8 +11,15 @@ mod grid;
 pub mod markers;
 pub mod registration;
 mod serial;
+mod histogram;
+mod orientation;
+pub mod read;
+mod resample;
 mod volume;
 
 pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};
+pub use histogram::HuHistogram;
+pub use orientation::{NoOrientation, Orientation};
+pub use resample::{Resampled, resample};
 pub use volume::{AIR_HU, LabelMap, Volume};
