@@ -6,10 +6,24 @@
 //!
 //! Names and birth dates of patients are never read into any value of this crate.
 
+mod components;
+mod distance;
 mod error;
 mod grid;
+mod mask;
+mod morphology;
+mod segment;
+mod spacing;
 mod volume;
 
+pub use components::{Component, Components, Connectivity};
+pub use distance::{DistanceField, DistanceOptions};
 pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};
+pub use mask::{IndexBox, Mask};
+pub use morphology::{bridged, closed, dilated, eroded, opened};
+pub use segment::{
+    BONE_LEVEL_HU, Body, Bone, LUNG_LEVEL_HU, Label, LabelFacts, Lesion, LesionSeed, Lung, Lungs,
+    SKIN_LEVEL_HU, Segmentation, Side, grow_lesion, label_map, segment,
+};
 pub use volume::{AIR_HU, LabelMap, Volume};
