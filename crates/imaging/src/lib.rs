@@ -14,6 +14,7 @@ mod mask;
 mod morphology;
 mod segment;
 mod spacing;
+mod surface;
 mod volume;
 
 pub use components::{Component, Components, Connectivity};
@@ -25,5 +26,8 @@ pub use morphology::{bridged, closed, dilated, eroded, opened};
 pub use segment::{
     BONE_LEVEL_HU, Body, Bone, LUNG_LEVEL_HU, Label, LabelFacts, Lesion, LesionSeed, Lung, Lungs,
     SKIN_LEVEL_HU, Segmentation, Side, grow_lesion, label_map, segment,
+};
+pub use surface::{
+    Field, Level, LocalLevel, SurfaceError, Values, simplify, surface_error, surface_net,
 };
 pub use volume::{AIR_HU, LabelMap, Volume};
