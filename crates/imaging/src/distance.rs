@@ -11,7 +11,7 @@ use nalgebra::Point3;
 use crate::ImagingError;
 use crate::grid::VoxelGrid;
 use crate::mask::{IndexBox, Mask};
-use crate::spacing::orthogonal;
+use crate::spacing::{orthogonal, whole};
 
 /// Distances from voxels to the nearest voxel of a set, centre to centre, within a box of the grid.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ impl DistanceField {
         options: &DistanceOptions<'_>,
     ) -> Result<Self, ImagingError> {
         let spacing_m = orthogonal(grid)?;
-        let reach = [0, 1, 2].map(|axis| voxels_within(options.cap_m, spacing_m[axis]));
+        let reach = [0, 1, 2].map(|axis| whole(options.cap_m / spacing_m[axis]));
         // What is outside the box counts as far as the cap reaches.
         let wide = within.widened(reach, grid.size());
         let part = set.cropped(&wide);
@@ -143,7 +143,7 @@ impl DistanceField {
             if !(0.0..=(last - first) as f64).contains(&beyond) {
                 return None;
             }
-            let step = voxels_within(beyond, 1.0).min((last - first).saturating_sub(1));
+            let step = whole(beyond).min((last - first).saturating_sub(1));
             low[axis] = first + step;
             part[axis] = beyond - step as f64;
         }
@@ -170,16 +170,6 @@ impl DistanceField {
     }
 }
 
-/// Whole steps within a length.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a count of voxels; what is beyond any grid saturates"
-)]
-fn voxels_within(length: f64, step: f64) -> usize {
-    (length / step).floor().max(0.0) as usize
-}
-
 /// Distances in steps to the voxels of a mask.
 fn distances(
     mask: &Mask,
@@ -187,7 +177,7 @@ fn distances(
     options: &DistanceOptions<'_>,
 ) -> Result<Vec<i16>, ImagingError> {
     let [nx, ny, nz] = mask.size();
-    let far = voxels_within(options.cap_m, spacing_m[2]).min(i16::MAX as usize - 1) + 1;
+    let far = whole(options.cap_m / spacing_m[2]).min(i16::MAX as usize - 1) + 1;
     let far = i16::try_from(far).unwrap_or(i16::MAX);
     let mut steps = counts_along_k(mask, far);
     let slices_each = nz.div_ceil(options.threads.max(1));
@@ -384,7 +374,7 @@ impl Envelope {
         let mut from = 0;
         for (number, &(at, _, _)) in self.parabolas.iter().enumerate() {
             let to = match self.parabolas.get(number + 1) {
-                Some(&(_, _, next)) => voxels_within(next, 1.0)
+                Some(&(_, _, next)) => whole(next)
                     .saturating_add(usize::from(next >= 0.0))
                     .min(length),
                 None => length,

@@ -12,8 +12,10 @@ mod error;
 mod grid;
 mod mask;
 mod morphology;
+mod reconstruct;
 mod segment;
 mod spacing;
+mod structures;
 mod surface;
 mod volume;
 
@@ -23,11 +25,15 @@ pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};
 pub use mask::{IndexBox, Mask};
 pub use morphology::{bridged, closed, dilated, eroded, opened};
+pub use reconstruct::{
+    LesionSize, MeasuredLesion, Progress, ReconstructOptions, Reconstruction, SURFACE_ERROR_M,
+    Surface, SurfaceSizes, reconstruct,
+};
 pub use segment::{
-    BONE_LEVEL_HU, Body, Bone, LUNG_LEVEL_HU, Label, LabelFacts, Lesion, LesionSeed, Lung, Lungs,
-    SKIN_LEVEL_HU, Segmentation, Side, grow_lesion, label_map, segment,
+    BONE_LEVEL_HU, Body, Bone, FIRST_LESION, LUNG_LEVEL_HU, Label, LabelFacts, Lesion, LesionSeed,
+    Levels, Lung, Lungs, SKIN_LEVEL_HU, Segmentation, Side, grow_lesion, label_facts, label_map,
+    segment,
 };
-pub use surface::{
-    Field, Level, LocalLevel, SurfaceError, Values, simplify, surface_error, surface_net,
-};
+pub use structures::{Structure, SurfaceTissue, structure_of};
+pub use surface::{Field, Level, SurfaceError, Values, simplify, surface_error, surface_net};
 pub use volume::{AIR_HU, LabelMap, Volume};

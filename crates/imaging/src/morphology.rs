@@ -5,6 +5,7 @@
 //! words of 64, so that a voxel costs less than a bit's work per row of the ball.
 
 use crate::mask::Mask;
+use crate::spacing::whole;
 
 /// Rows of a ball: how far along j and k, and its half width along i.
 fn ball_rows(radius_m: f64, spacing_m: [f64; 3]) -> Vec<(usize, [isize; 2])> {
@@ -22,15 +23,6 @@ fn ball_rows(radius_m: f64, spacing_m: [f64; 3]) -> Vec<(usize, [isize; 2])> {
     }
     rows.sort_unstable();
     rows
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a count of voxels, which is never negative"
-)]
-fn whole(steps: f64) -> usize {
-    steps.floor() as usize
 }
 
 /// Sets every bit within `by` of one that is set; `scratch` is as long as `row`.

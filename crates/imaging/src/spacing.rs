@@ -25,3 +25,13 @@ pub(crate) fn orthogonal(grid: &VoxelGrid) -> Result<[f64; 3], ImagingError> {
     }
     Ok(grid.spacing_m())
 }
+
+/// Whole steps in a length; what is more than there are voxels saturates.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a count, which is never negative"
+)]
+pub(crate) fn whole(steps: f64) -> usize {
+    steps.floor().max(0.0) as usize
+}

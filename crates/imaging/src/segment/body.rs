@@ -46,9 +46,8 @@ pub struct Body {
 }
 
 pub(super) fn find(scan: &Scan<'_>, remarks: &mut Vec<Remark>) -> Result<Body, ImagingError> {
-    let tissue = Mask::of(scan.size(), &scan.volume.hu, |hu| {
-        f64::from(hu) > SKIN_LEVEL_HU
-    });
+    let level = scan.levels.skin_hu;
+    let tissue = Mask::of(scan.size(), &scan.volume.hu, |hu| f64::from(hu) > level);
     scan.check()?;
     let solid = without_bed(scan, &tissue, remarks)?;
     scan.check()?;
@@ -199,7 +198,10 @@ fn filled(scan: &Scan<'_>, solid: &Mask, remarks: &mut Vec<Remark>) -> Mask {
             at_side && !lung_like
         })
         .collect();
-    around.mask_of(|part| is_outside[part]).complement()
+    let body = around.mask_of(|part| is_outside[part]).complement();
+    let parts = Components::of(&body, Connectivity::Faces);
+    let largest = parts.largest();
+    parts.mask_of(|part| Some(part) == largest)
 }
 
 /// Area of the faces between two masks that do not overlap, other than along k, m^2.

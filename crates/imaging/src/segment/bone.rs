@@ -4,10 +4,11 @@ use crate::components::{Component, Components, Connectivity};
 use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::closed;
+use crate::spacing::whole;
 
+use super::Scan;
 use super::body::Body;
 use super::lungs::Lungs;
-use super::{Scan, whole};
 
 /// Denser than soft tissue and blood without contrast medium.
 pub const BONE_LEVEL_HU: f64 = 190.5;
@@ -51,9 +52,8 @@ pub(super) fn find(
     remarks: &mut Vec<Remark>,
 ) -> Result<Bone, ImagingError> {
     let bounds = body.bounds;
-    let dense = Mask::of(scan.size(), &scan.volume.hu, |hu| {
-        f64::from(hu) > BONE_LEVEL_HU
-    });
+    let level = scan.levels.bone_hu;
+    let dense = Mask::of(scan.size(), &scan.volume.hu, |hu| f64::from(hu) > level);
     let mut dense = dense.cropped(&bounds);
     dense.intersect(&body.mask.cropped(&bounds));
     scan.check()?;

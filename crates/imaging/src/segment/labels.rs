@@ -118,11 +118,12 @@ pub fn label_map(
         paint(&mut map, &lesion.bounds, &lesion.mask, number);
         map.names.push((number, lesion.name.clone()));
     }
-    let facts = facts(&map);
+    let facts = label_facts(&map);
     (map, facts)
 }
 
-fn paint(map: &mut LabelMap, within: &IndexBox, mask: &Mask, label: u16) {
+/// Gives the voxels of a mask of a box a label.
+pub fn paint(map: &mut LabelMap, within: &IndexBox, mask: &Mask, label: u16) {
     let [_, ny, nz] = mask.size();
     for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
         let row = map
@@ -135,7 +136,7 @@ fn paint(map: &mut LabelMap, within: &IndexBox, mask: &Mask, label: u16) {
 }
 
 /// Voxels and volume of every label that a map names.
-pub fn facts(map: &LabelMap) -> Vec<LabelFacts> {
+pub fn label_facts(map: &LabelMap) -> Vec<LabelFacts> {
     let mut counts = vec![0_usize; 1 << 16];
     // Neighbours mostly have the same label: a run is counted at once.
     for run in map.labels.chunk_by(|a, b| a == b) {

@@ -9,7 +9,7 @@ use crate::distance::{DistanceField, DistanceOptions};
 use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
 use crate::morphology::{closed, dilated, opened};
-use crate::spacing::orthogonal;
+use crate::spacing::{orthogonal, whole};
 use crate::volume::Volume;
 
 use super::{Scan, Segmentation};
@@ -87,6 +87,7 @@ pub fn grow_lesion(
     let scan = Scan {
         volume,
         spacing_m: orthogonal(&volume.grid)?,
+        levels: super::Levels::default(),
         cancel,
     };
     let grower = Grower::new(&scan, found, seed).map_err(|error| error.at(place(seed)))?;
@@ -127,7 +128,7 @@ impl<'a> Grower<'a> {
             return Err(ImagingError::refused("the point is outside the volume")
                 .hint("points are in millimetres, in the patient's LPS frame"));
         }
-        let voxel = [0, 1, 2].map(|axis| super::whole(index[axis].round()).min(size[axis] - 1));
+        let voxel = [0, 1, 2].map(|axis| whole(index[axis].round()).min(size[axis] - 1));
         if !found.body.mask.get(voxel) {
             return Err(ImagingError::refused("the point is outside the body")
                 .hint("points are in millimetres, in the patient's LPS frame"));

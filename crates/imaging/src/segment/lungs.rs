@@ -81,9 +81,8 @@ pub(super) fn find(
     remarks: &mut Vec<Remark>,
 ) -> Result<Lungs, ImagingError> {
     let bounds = body.bounds;
-    let mut airy = Mask::of(scan.size(), &scan.volume.hu, |hu| {
-        f64::from(hu) < LUNG_LEVEL_HU
-    });
+    let level = scan.levels.lung_hu;
+    let mut airy = Mask::of(scan.size(), &scan.volume.hu, |hu| f64::from(hu) < level);
     airy.intersect(&body.mask);
     let airy = airy.cropped(&bounds);
     scan.check()?;
@@ -412,7 +411,19 @@ fn with_enclosed(scan: &Scan<'_>, air: &Mask) -> Mask {
     all.intersect(&j);
     all.intersect(&k);
     enclosed.unite(&all);
+    enclosed.unite(&part);
+    enclosed.unite(&holes(&enclosed));
     let mut filled = air.clone();
     filled.unite_within(&bounds, &enclosed);
     filled
+}
+
+/// What a mask encloses.
+fn holes(mask: &Mask) -> Mask {
+    let size = mask.size();
+    let around = Components::of(&mask.complement(), Connectivity::Faces);
+    around.mask_of(|part| {
+        let bounds = &around.parts()[part].bounds;
+        (0..3).all(|axis| bounds.first[axis] > 0 && bounds.last[axis] < size[axis] - 1)
+    })
 }

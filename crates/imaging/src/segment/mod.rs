@@ -10,12 +10,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{ImagingError, Remark};
 use crate::mask::{IndexBox, Mask};
-use crate::spacing::orthogonal;
+use crate::spacing::{orthogonal, whole};
 use crate::volume::Volume;
 
 pub use body::{Body, SKIN_LEVEL_HU};
 pub use bone::{BONE_LEVEL_HU, Bone};
-pub use labels::{Label, LabelFacts, label_map};
+pub use labels::{FIRST_LESION, Label, LabelFacts, label_facts, label_map, paint};
 pub use lesion::{Lesion, LesionSeed, grow_lesion};
 pub use lungs::{LUNG_LEVEL_HU, Lung, Lungs, Side};
 
@@ -32,11 +32,65 @@ pub struct Segmentation {
     pub remarks: Vec<Remark>,
 }
 
+/// Where surfaces run, HU: at half-integers, so that no voxel is on them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Levels {
+    /// Between air and skin.
+    pub skin_hu: f64,
+    /// Between lung and soft tissue.
+    pub lung_hu: f64,
+    /// Above it is bone, or blood with contrast medium. The surface of bone runs at its own middle.
+    pub bone_hu: f64,
+}
+
+impl Default for Levels {
+    fn default() -> Self {
+        Self {
+            skin_hu: SKIN_LEVEL_HU,
+            lung_hu: LUNG_LEVEL_HU,
+            bone_hu: BONE_LEVEL_HU,
+        }
+    }
+}
+
+impl Levels {
+    /// The same at the nearest half-integers.
+    ///
+    /// # Errors
+    /// If they are not in the order of lung, soft tissue and bone, or beyond what 16 bits hold.
+    fn checked(&self) -> Result<Self, ImagingError> {
+        let Self {
+            skin_hu,
+            lung_hu,
+            bone_hu,
+        } = *self;
+        let sound = [skin_hu, lung_hu, bone_hu]
+            .iter()
+            .all(|level| (-990.0..3000.0).contains(level));
+        if !sound || skin_hu >= bone_hu || lung_hu >= bone_hu {
+            return Err(ImagingError::refused(format!(
+                "levels of {skin_hu} HU (skin), {lung_hu} HU (lung) and {bone_hu} HU (bone)"
+            ))
+            .hint("skin and lung below bone, all between -990 and 3000 HU"));
+        }
+        let half = |level: f64| level.floor() + 0.5;
+        Ok(Self {
+            skin_hu: half(skin_hu),
+            lung_hu: half(lung_hu),
+            bone_hu: half(bone_hu),
+        })
+    }
+}
+
 /// Finds body, lungs, airways, vessels and bone.
 ///
 /// # Errors
 /// If the grid is sheared, nothing is denser than air, or it was told to stop.
-pub fn segment(volume: &Volume, cancel: &AtomicBool) -> Result<Segmentation, ImagingError> {
+pub fn segment(
+    volume: &Volume,
+    levels: &Levels,
+    cancel: &AtomicBool,
+) -> Result<Segmentation, ImagingError> {
     if volume.hu.len() != volume.grid.len() {
         return Err(ImagingError::refused(format!(
             "the grid has {} voxels, the data {}",
@@ -47,6 +101,7 @@ pub fn segment(volume: &Volume, cancel: &AtomicBool) -> Result<Segmentation, Ima
     let scan = Scan {
         volume,
         spacing_m: orthogonal(&volume.grid)?,
+        levels: levels.checked()?,
         cancel,
     };
     let mut remarks = Vec::new();
@@ -61,19 +116,11 @@ pub fn segment(volume: &Volume, cancel: &AtomicBool) -> Result<Segmentation, Ima
     })
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a count of voxels; what is more than there are saturates"
-)]
-fn whole(count: f64) -> usize {
-    count.floor().max(0.0) as usize
-}
-
 /// A volume that is looked at.
 struct Scan<'a> {
     volume: &'a Volume,
     spacing_m: [f64; 3],
+    levels: Levels,
     cancel: &'a AtomicBool,
 }
 

@@ -58,6 +58,13 @@ pub struct LocalLevel {
 }
 
 impl LocalLevel {
+    /// Median of the blocks, HU.
+    pub fn median(&self) -> Option<f64> {
+        let mut levels = self.levels_hu.clone();
+        levels.sort_by(f32::total_cmp);
+        levels.get(levels.len() / 2).map(|&level| f64::from(level))
+    }
+
     /// Level at a voxel of the grid, HU.
     pub fn at(&self, voxel: [usize; 3]) -> f32 {
         let mut low = [0; 3];

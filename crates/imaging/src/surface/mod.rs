@@ -3,11 +3,13 @@
 mod accuracy;
 mod cases;
 mod field;
+mod local_level;
 mod nets;
 mod simplify;
 
 pub use accuracy::{SurfaceError, surface_error};
-pub use field::{Field, Level, LocalLevel, Values};
+pub use field::{Field, Level, Values};
+pub use local_level::{local_level, refine};
 pub use nets::surface_net;
 pub use simplify::simplify;
 

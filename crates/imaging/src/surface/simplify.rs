@@ -8,6 +8,8 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_geometry::TriangleMesh;
 
+use crate::spacing::whole;
+
 /// Weight of staying where an edge is, relative to the planes' : decides where they do not.
 const KEEP: f64 = 1e-3;
 
@@ -214,7 +216,7 @@ impl Collapse {
         self.pass += 1;
         let mut candidates = self.candidates();
         // An edge takes two triangles with it; some will be refused.
-        let wanted = self.alive - target.max(whole(self.alive, 1.0 - PASS));
+        let wanted = self.alive - target.max(whole(self.alive as f64 * (1.0 - PASS)));
         let taken = (wanted * 3 / 4).clamp(1, candidates.len().max(1));
         if taken < candidates.len() {
             candidates.select_nth_unstable_by(taken, order);
@@ -413,15 +415,6 @@ impl Collapse {
 
 fn order(a: &Candidate, b: &Candidate) -> std::cmp::Ordering {
     a.cost.total_cmp(&b.cost).then(a.edge.cmp(&b.edge))
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a share of a count"
-)]
-fn whole(count: usize, share: f64) -> usize {
-    (count as f64 * share) as usize
 }
 
 fn number(index: usize) -> u32 {

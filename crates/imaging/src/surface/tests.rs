@@ -131,9 +131,9 @@ fn ball(size: [usize; 3], grid: &VoxelGrid, middle: &Point3<f64>, radius_m: f64)
     hu
 }
 
-/// Of values rounded to whole Hounsfield units of a linear field of 300 HU per mm, and of a ball of 14 mm between
-/// voxels of 1 mm: 1 / 600 mm and 1 / (8 x 14) mm.
-const BALL_M: f64 = 12e-6;
+/// Of values rounded to whole Hounsfield units of a linear field of 300 HU per mm, and of a ball of 14 mm between voxels
+/// of 0.7 x 0.8 x 1 mm: 1 / 600 mm and (0.7^2 + 0.8^2 + 1^2) / (8 x 14) mm.
+const BALL_M: f64 = 21e-6;
 
 #[test]
 fn vertices_lie_on_the_analytic_surface_at_every_stride() {
