@@ -46,9 +46,13 @@ impl DistanceField {
         options: &DistanceOptions<'_>,
     ) -> Result<Self, ImagingError> {
         let spacing_m = orthogonal(grid)?;
-        let reach = [0, 1, 2].map(|axis| whole(options.cap_m / spacing_m[axis]));
         // What is outside the box counts as far as the cap reaches.
-        let wide = within.widened(reach, grid.size());
+        let reach = [0, 1, 2].map(|axis| whole(options.cap_m / spacing_m[axis]));
+        let around = within.widened(reach, grid.size());
+        let wide = match set.bounds() {
+            Some(bounds) => within.joined(&bounds).common(&around),
+            None => within,
+        };
         let part = set.cropped(&wide);
         let steps = distances(&part, spacing_m, options)?;
         let field = Self {

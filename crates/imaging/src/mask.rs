@@ -42,6 +42,24 @@ impl IndexBox {
         }
     }
 
+    /// The least box around this one and another one.
+    #[must_use]
+    pub fn joined(&self, other: &Self) -> Self {
+        Self {
+            first: [0, 1, 2].map(|axis| self.first[axis].min(other.first[axis])),
+            last: [0, 1, 2].map(|axis| self.last[axis].max(other.last[axis])),
+        }
+    }
+
+    /// What this one has in common with one that it meets.
+    #[must_use]
+    pub fn common(&self, other: &Self) -> Self {
+        Self {
+            first: [0, 1, 2].map(|axis| self.first[axis].max(other.first[axis])),
+            last: [0, 1, 2].map(|axis| self.last[axis].min(other.last[axis])),
+        }
+    }
+
     /// Whether a voxel is inside.
     pub fn contains(&self, voxel: [usize; 3]) -> bool {
         (0..3).all(|axis| (self.first[axis]..=self.last[axis]).contains(&voxel[axis]))

@@ -60,15 +60,21 @@ impl Default for SurfaceSizes {
     }
 }
 
-/// How far a vertex may leave the planes of the surface that it stands for, root mean square: a third of what 99 % of
-/// the surface keep to.
-const MEAN_ERROR_M: f64 = 0.08e-3;
+/// How far a vertex may leave the planes of the surface that it stands for, root mean square: 99 % of the surface keep
+/// to twice that.
+const MEAN_ERROR_M: f64 = 0.12e-3;
 
 /// Distance from the voxels' surface that 99 % of it keep to.
 pub const SURFACE_ERROR_M: f64 = 0.25e-3;
 
-/// Cells of skin and lungs: several voxels where these are finer.
-const LARGE_CELL_M: f64 = 1.5e-3;
+/// Cells of skin and lungs: several voxels where these are finer. Vertices lie on the voxels' surface all the same.
+const LARGE_CELL_M: f64 = 2.2e-3;
+
+/// Cells of bone, which has plates of 2 mm.
+const BONE_CELL_M: f64 = 1.45e-3;
+
+/// Cells of what is small: voxels.
+const SMALL_CELL_M: f64 = 0.0;
 
 /// Typical of air, lung, soft tissue and bone, HU: stand in where the mask knows better than the voxel.
 const AIR: f32 = -1000.0;
@@ -416,7 +422,7 @@ fn jobs<'a>(
         &lungs.airways,
         airways,
         sizes.other,
-        0.0,
+        SMALL_CELL_M,
     );
     let bone = &found.bone;
     add(
@@ -426,7 +432,7 @@ fn jobs<'a>(
         &bone.bone,
         Runs::BoneMiddle,
         sizes.bone,
-        0.0,
+        BONE_CELL_M,
     );
     let contrast = Runs::At {
         level_hu: levels.bone_hu,
@@ -439,7 +445,7 @@ fn jobs<'a>(
         &bone.contrast,
         contrast,
         sizes.other,
-        0.0,
+        SMALL_CELL_M,
     );
     for each in given {
         let target = match each.structure.tissue {
@@ -456,7 +462,7 @@ fn jobs<'a>(
             mask: &each.mask,
             runs: Runs::Mask,
             target,
-            cell_m: 0.0,
+            cell_m: SMALL_CELL_M,
             lesion: None,
         });
     }
@@ -476,7 +482,7 @@ fn jobs<'a>(
                 },
             },
             target: sizes.other,
-            cell_m: 0.0,
+            cell_m: SMALL_CELL_M,
             lesion: Some(number),
         });
     }
@@ -596,7 +602,7 @@ fn make(volume: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Ma
             .at(job.name.clone())
     })?;
     let index = SurfaceIndex::new(coarse);
-    let Some(error) = surface_error(&fine, &index) else {
+    let Some(error) = surface_error(&field, grid, &index) else {
         return Ok(None);
     };
     let size = job.lesion.map(|_| size_of(&fine, grid));

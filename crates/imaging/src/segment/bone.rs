@@ -182,7 +182,8 @@ fn solid(scan: &Scan<'_>, shell: &Mask) -> Result<Mask, ImagingError> {
     let size = tight.size();
     let marrow = holes.mask_of(|part| {
         let hole = &holes.parts()[part];
-        let inside = (0..3)
+        // A bone that the first or the last slice cuts is open there.
+        let inside = (0..2)
             .all(|axis| hole.bounds.first[axis] > 0 && hole.bounds.last[axis] < size[axis] - 1);
         inside && hole.voxels <= most
     });

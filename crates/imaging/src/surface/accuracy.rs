@@ -1,15 +1,19 @@
 //! How far a surface is from another one that is finer.
 
 use nalgebra::Point3;
-use needlebench_geometry::TriangleMesh;
 use needlebench_geometry::mesh::SurfaceIndex;
 use serde::Serialize;
+
+use crate::grid::VoxelGrid;
+
+use super::field::Field;
 
 /// Points at which a surface is compared.
 const SAMPLES: usize = 20_000;
 
-/// Distances of a simplified surface from the surface of the voxels: from evenly chosen vertices of the fine one to
-/// the coarse one, m. The fine one's vertices lie on the trilinear surface of the voxels.
+/// Distances of a surface from that of the voxels: from evenly chosen places at which the trilinear surface crosses the
+/// lines between voxels, of all three directions, to the nearest point of the surface, m. What the surface leaves out
+/// counts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SurfaceError {
     /// Root of the mean square.
@@ -22,15 +26,25 @@ pub struct SurfaceError {
     pub points: usize,
 }
 
-/// Measures a simplified surface against the one that it was made of. None without triangles.
-pub fn surface_error(fine: &TriangleMesh, coarse: &SurfaceIndex) -> Option<SurfaceError> {
-    let every = fine.vertices_m.len().div_ceil(SAMPLES).max(1);
-    let points = fine.vertices_m.iter().step_by(every);
-    of_distances(
-        points
-            .map(|point: &Point3<f64>| coarse.distance_m(point))
-            .collect(),
-    )
+/// Measures a surface against the field that it was made of. None if the field has no surface.
+pub fn surface_error(
+    field: &Field<'_>,
+    grid: &VoxelGrid,
+    surface: &SurfaceIndex,
+) -> Option<SurfaceError> {
+    let mut count = 0_usize;
+    field.for_each_crossed_line(|_, _| count += 1);
+    let every = count.div_ceil(SAMPLES).max(1);
+    let mut distances_m = Vec::with_capacity(count / every + 1);
+    let mut number = 0;
+    field.for_each_crossed_line(|at, axis| {
+        if number % every == 0 {
+            let place = grid.ct_from_index(&Point3::from(field.crossing(at, axis)));
+            distances_m.push(surface.distance_m(&place));
+        }
+        number += 1;
+    });
+    of_distances(distances_m)
 }
 
 /// Of distances from a surface.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::mask::{IndexBox, Mask};
+use crate::mask::{IndexBox, Mask, set_bits};
 
 /// A structure on a grid: which voxels are inside, and values that say where between two voxels its surface runs.
 #[derive(Debug, Clone, Copy)]
@@ -193,6 +193,57 @@ impl Field<'_> {
             sum += weight * i16::from(self.is_inside(voxel));
         }
         f32::from(sum) / 64.0
+    }
+
+    /// Where the surface crosses the line from a voxel to the next one along an axis, which are on its two sides; as an
+    /// index of the grid.
+    pub fn crossing(&self, at: [isize; 3], axis: usize) -> Vector3<f64> {
+        let mut next = at;
+        next[axis] += 1;
+        let [a, b] = [self.at_voxel(at), self.at_voxel(next)].map(f64::from);
+        let mut place = Vector3::from(at.map(|index| index as f64));
+        place[axis] += (a / (a - b)).clamp(0.0, 1.0);
+        place
+    }
+
+    /// Visits the voxels that the surface parts from the next one along an axis, with the axis; also those that the
+    /// volume's end or that of the box cuts.
+    pub fn for_each_crossed_line(&self, mut visit: impl FnMut([isize; 3], usize)) {
+        let [_, ny, nz] = self.inside.size();
+        let first = self.bounds.first.map(usize::cast_signed);
+        let empty = vec![0; self.inside.words_per_row()];
+        let row = |j: Option<usize>, k: Option<usize>| match j.zip(k) {
+            Some((j, k)) if j < ny && k < nz => self.inside.row(j, k),
+            _ => &empty[..],
+        };
+        let mut changed = empty.clone();
+        for k in 0..=nz {
+            for j in 0..=ny {
+                let here = row(Some(j), Some(k));
+                for (axis, before) in [
+                    (1, row(j.checked_sub(1), Some(k))),
+                    (2, row(Some(j), k.checked_sub(1))),
+                ] {
+                    for ((to, a), b) in changed.iter_mut().zip(here).zip(before) {
+                        *to = a ^ b;
+                    }
+                    for i in set_bits(&changed) {
+                        let mut at = [i, j, k].map(usize::cast_signed);
+                        at[axis] -= 1;
+                        visit([0, 1, 2].map(|axis| at[axis] + first[axis]), axis);
+                    }
+                }
+                if j < ny && k < nz {
+                    for i in self.inside.runs(j, k).flatten() {
+                        let at = [i, j, k].map(usize::cast_signed);
+                        visit(
+                            [at[0] - 1 + first[0], at[1] + first[1], at[2] + first[2]],
+                            0,
+                        );
+                    }
+                }
+            }
+        }
     }
 
     /// Value and gradient per voxel at a place between voxels of the grid, trilinear.

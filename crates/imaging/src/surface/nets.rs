@@ -170,12 +170,7 @@ impl<'a> Net<'a> {
                 break;
             }
         }
-        let mut next = at;
-        next[axis] += 1;
-        let [a, b] = [self.field.at_voxel(at), self.field.at_voxel(next)].map(f64::from);
-        let mut place = Vector3::from(at.map(|index| index as f64));
-        place[axis] += (a / (a - b)).clamp(0.0, 1.0);
-        place
+        self.field.crossing(at, axis)
     }
 
     /// Onto the trilinear surface, if it is in the cell.

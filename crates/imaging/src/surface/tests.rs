@@ -61,9 +61,9 @@ fn random_field(size: [usize; 3], seed: u64, density: u32) -> Vec<i16> {
         .collect()
 }
 
-fn net_of(size: [usize; 3], hu: &[i16], grid: &VoxelGrid, stride: [usize; 3]) -> TriangleMesh {
+fn with_field<T>(size: [usize; 3], hu: &[i16], then: impl FnOnce(&Field<'_>) -> T) -> T {
     let inside = Mask::of(size, hu, |value| value >= 0);
-    let field = Field {
+    then(&Field {
         bounds: IndexBox::whole(size),
         inside: &inside,
         values: Values::Hounsfield {
@@ -72,8 +72,22 @@ fn net_of(size: [usize; 3], hu: &[i16], grid: &VoxelGrid, stride: [usize; 3]) ->
             level: Level::Everywhere(-0.5),
             typical: [100.0, -100.0],
         },
-    };
-    surface_net(&field, grid, stride)
+    })
+}
+
+fn error_of(
+    size: [usize; 3],
+    hu: &[i16],
+    grid: &VoxelGrid,
+    mesh: TriangleMesh,
+) -> Option<SurfaceError> {
+    with_field(size, hu, |field| {
+        surface_error(field, grid, &SurfaceIndex::new(mesh))
+    })
+}
+
+fn net_of(size: [usize; 3], hu: &[i16], grid: &VoxelGrid, stride: [usize; 3]) -> TriangleMesh {
+    with_field(size, hu, |field| surface_net(field, grid, stride))
 }
 
 #[test]
@@ -178,7 +192,7 @@ fn simplified_surface_is_a_manifold_near_the_fine_one() {
             "{}",
             coarse.triangles.len()
         );
-        let error = surface_error(&fine, &SurfaceIndex::new(coarse)).unwrap();
+        let error = error_of(size, &hu, &grid, coarse).unwrap();
         // Chords of a ball: the square of an edge over 8 radii, edges of sqrt(4 pi r^2 / n * 2.3).
         let edge_m = (4.0 * std::f64::consts::PI * 14e-3 * 14e-3 / target as f64 * 2.3).sqrt();
         assert!(
