@@ -29,7 +29,7 @@ const LEAST_BONE_MM3: f64 = 50.0;
 const CLOSING_M: f64 = 1.2e-3;
 
 /// Marrow that a shell encloses.
-const MOST_MARROW_L: f64 = 0.05;
+const MOST_MARROW_L: f64 = 0.3;
 
 /// A part that is not surely bone or contrast medium and is worth a remark.
 const UNSURE_L: f64 = 1e-3;

@@ -24,8 +24,8 @@ const BESIDE_M: f64 = 4e-3;
 const CORE_M: f64 = 1.5e-3;
 
 /// The wall of the lung is carried on across a lesion by a ball of this radius: a lesion of 20 mm that touches the
-/// wall loses a cap of 3 mm at most.
-const WALL_RADIUS_M: f64 = 15e-3;
+/// wall loses a cap of 2 mm at most.
+const WALL_RADIUS_M: f64 = 25e-3;
 
 /// A vessel is thinner than this share of the lesion, and is cut off where it leaves the lesion.
 const VESSEL_SHARE: f64 = 0.6;
@@ -110,7 +110,7 @@ struct Grower<'a> {
     bounds: IndexBox,
     body: Mask,
     /// Lungs with what they enclose.
-    lung: Mask,
+    lungs: Vec<Mask>,
     lung_hu: Option<i16>,
     median_hu: i16,
 }
@@ -139,16 +139,17 @@ impl<'a> Grower<'a> {
             last: voxel,
         }
         .widened(reach, size);
-        let mut lungs = Mask::empty(size);
-        for lung in &found.lungs.lungs {
-            lungs.unite_within(&found.lungs.bounds, &lung.mask);
-        }
+        let lungs = found.lungs.lungs.iter().map(|lung| {
+            let mut whole = Mask::empty(size);
+            whole.unite_within(&found.lungs.bounds, &lung.mask);
+            whole.cropped(&bounds)
+        });
         let mut grower = Self {
             scan,
             seed,
             at: [0, 1, 2].map(|axis| voxel[axis] - bounds.first[axis]),
             body: found.body.mask.cropped(&bounds),
-            lung: lungs.cropped(&bounds),
+            lungs: lungs.filter(|lung| !lung.is_empty()).collect(),
             lung_hu: found.lungs.air_hu,
             bounds,
             median_hu: 0,
@@ -203,26 +204,16 @@ impl<'a> Grower<'a> {
 
     fn grow(mut self, remarks: &mut Vec<Remark>) -> Result<Lesion, ImagingError> {
         self.scan.check()?;
-        let lung_share = self.lung.count() as f64 / self.body.count() as f64;
-        let in_lung = lung_share > LUNG_SHARE;
+        let hull = self.lung_hull();
+        let in_lung = hull.is_some();
         let level_hu = self.level(in_lung)?;
         let mut region = self
             .scan
             .within(&self.body, &self.bounds, |hu| f64::from(hu) > level_hu);
         let unbounded = region.clone();
         let mut cut_at_wall = false;
-        if in_lung {
-            let hull = closed(&self.lung, WALL_RADIUS_M, self.scan.spacing_m);
-            if hull.get(self.at) {
-                region.intersect(&hull);
-            } else {
-                remarks.push(
-                    Remark::new(
-                        "it is beside the lung, not in it: it is not bounded by the lung's wall",
-                    )
-                    .at(place(self.seed)),
-                );
-            }
+        if let Some(hull) = hull {
+            region.intersect(&hull);
         }
         let around = component_at(&region, self.at);
         let (top, radius_m) = self.deepest(&around)?;
@@ -260,6 +251,19 @@ impl<'a> Grower<'a> {
             cut_at_vessels,
             leaked,
         })
+    }
+
+    /// The lung that the seed is in, with its wall carried on across what grows into it; none if it is in none.
+    fn lung_hull(&self) -> Option<Mask> {
+        let voxels: usize = self.lungs.iter().map(Mask::count).sum();
+        if (voxels as f64) < LUNG_SHARE * self.body.count() as f64 {
+            return None;
+        }
+        // One by one: together they would enclose what is between them.
+        self.lungs
+            .iter()
+            .map(|lung| closed(lung, WALL_RADIUS_M, self.scan.spacing_m))
+            .find(|hull| hull.get(self.at))
     }
 
     /// Middle between the lesion and what is around it.

@@ -31,12 +31,21 @@ pub fn surface_net(field: &Field<'_>, grid: &VoxelGrid, stride: [usize; 3]) -> T
     net.mesh
 }
 
+/// Voxels of a row at which the lattice has points: the first and the last one are among them, so that the flat ends
+/// of what a volume cuts keep their edges.
+fn sampled(size: usize, stride: usize) -> Vec<usize> {
+    let mut places: Vec<usize> = (0..size).step_by(stride).collect();
+    if places.last() != Some(&(size - 1)) {
+        places.push(size - 1);
+    }
+    places
+}
+
 struct Net<'a> {
     field: &'a Field<'a>,
     grid: &'a VoxelGrid,
-    stride: [isize; 3],
-    /// Voxel of the lattice's first point: outside the structure.
-    first: [isize; 3],
+    /// Voxels of the lattice's points along each axis; the first and the last one are outside the structure's box.
+    places: [Vec<isize>; 3],
     /// Lattice points that are inside.
     lattice: Mask,
     /// Corners inside and first vertex of each cell of the last two layers.
@@ -51,25 +60,30 @@ struct Net<'a> {
 impl<'a> Net<'a> {
     fn new(field: &'a Field<'a>, grid: &'a VoxelGrid, stride: [usize; 3]) -> Self {
         let size = field.inside.size();
-        // A point more on either side, which are outside.
-        let points = [0, 1, 2].map(|axis| size[axis].div_ceil(stride[axis]) + 2);
-        let first: [isize; 3] = std::array::from_fn(|axis| {
-            field.bounds.first[axis].cast_signed() - stride[axis].cast_signed()
-        });
+        let within = [0, 1, 2].map(|axis| sampled(size[axis], stride[axis]));
+        let points = [0, 1, 2].map(|axis| within[axis].len() + 2);
         let mut lattice = Mask::empty(points);
-        for (k, from_k) in (0..size[2]).step_by(stride[2]).enumerate() {
-            for (j, from_j) in (0..size[1]).step_by(stride[1]).enumerate() {
-                for [from, to] in field.inside.runs(from_j, from_k) {
-                    let run = [from, to].map(|i| i.div_ceil(stride[0]) + 1);
+        for (k, &from_k) in within[2].iter().enumerate() {
+            for (j, &from_j) in within[1].iter().enumerate() {
+                for run in field.inside.runs(from_j, from_k) {
+                    let run = run.map(|end| within[0].partition_point(|&i| i < end) + 1);
                     lattice.insert_run(run, j + 1, k + 1);
                 }
             }
         }
+        let places = std::array::from_fn(|axis| {
+            let first = field.bounds.first[axis].cast_signed();
+            let middle = within[axis].iter().map(|&at| first + at.cast_signed());
+            let beyond = first + size[axis].cast_signed();
+            std::iter::once(first - 1)
+                .chain(middle)
+                .chain([beyond])
+                .collect()
+        });
         Self {
             field,
             grid,
-            stride: stride.map(usize::cast_signed),
-            first,
+            places,
             layers: [0, 1].map(|_| vec![(0, 0); points[0] * points[1]]),
             lattice,
             on_faces: BTreeMap::new(),
@@ -152,7 +166,7 @@ impl<'a> Net<'a> {
 
     /// Voxel of a lattice point.
     fn voxel(&self, point: [usize; 3]) -> [isize; 3] {
-        std::array::from_fn(|axis| self.first[axis] + point[axis].cast_signed() * self.stride[axis])
+        [0, 1, 2].map(|axis| self.places[axis][point[axis]])
     }
 
     /// Where the surface crosses an edge of a cell, as an index of the grid.
@@ -163,7 +177,8 @@ impl<'a> Net<'a> {
         let mut at = from;
         let inside = self.field.is_inside(at);
         // The first voxel that is on the other side: there is one, the end of the edge.
-        for _ in 1..self.stride[axis] {
+        let step = self.places[axis][cell[axis] + 1] - from[axis];
+        for _ in 1..step {
             at[axis] += 1;
             if self.field.is_inside(at) != inside {
                 at[axis] -= 1;
@@ -176,7 +191,7 @@ impl<'a> Net<'a> {
     /// Onto the trilinear surface, if it is in the cell.
     fn onto_surface(&self, start: Vector3<f64>, cell: [usize; 3]) -> Vector3<f64> {
         let low = Vector3::from(self.voxel(cell).map(|index| index as f64));
-        let high = low + Vector3::from(self.stride.map(|stride| stride as f64));
+        let high = Vector3::from(self.voxel(cell.map(|at| at + 1)).map(|index| index as f64));
         let squares = Vector3::from(self.grid.spacing_m()).map(|step| step * step);
         let mut place = start;
         let mut best = (f64::INFINITY, start);

@@ -181,7 +181,8 @@ fn simplified_surface_is_a_manifold_near_the_fine_one() {
     let size = [50, 46, 38];
     let grid = grid(size);
     let middle = grid.ct_from_index(&Point3::new(24.3, 22.1, 18.4));
-    let fine = net_of(size, &ball(size, &grid, &middle, 14e-3), &grid, [1; 3]);
+    let hu = ball(size, &grid, &middle, 14e-3);
+    let fine = net_of(size, &hu, &grid, [1; 3]);
     for target in [2000, 400] {
         let coarse = simplify(&fine, target, 0.2e-3);
         assert_manifold(&coarse);
