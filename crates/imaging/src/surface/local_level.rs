@@ -16,6 +16,9 @@ const AROUND_M: [f64; 2] = [1.6e-3, 4e-3];
 /// Of the values inside: what the edge's blur leaves alone. Half of a rib's voxels are at its edge.
 const INSIDE_QUANTILE: f64 = 0.8;
 
+/// Voxels from its surface within which a voxel's own value says whether it is inside: its neighbours, edges included.
+const LAYER: f64 = 1.5;
+
 /// Smaller pieces and holes are noise.
 const SPECK_M3: f64 = 50e-9;
 
@@ -77,9 +80,9 @@ pub fn refine(
     levels: &LocalLevel,
 ) -> Mask {
     let spacing_m = grid.spacing_m();
-    let layer_m = 1.5 * spacing_m[0].max(spacing_m[1]);
-    let mut refined = eroded(inside, layer_m, spacing_m);
-    let mut band = dilated(inside, layer_m, spacing_m);
+    // In voxels: in thick slices what is deep within its slice may be at the surface of the next one.
+    let mut refined = eroded(inside, LAYER, [1.0; 3]);
+    let mut band = dilated(inside, LAYER, [1.0; 3]);
     band.subtract(&refined);
     for [i, j, k] in band.voxels() {
         let [x, y, z] = bounds.first;
