@@ -511,6 +511,9 @@ struct Made {
     size: Option<LesionSize>,
 }
 
+/// Where a thread leaves what became of a surface: none while it is not made.
+type Slot = Mutex<Option<Result<Option<Made>, ImagingError>>>;
+
 /// All surfaces, on so many threads; the largest first.
 fn make_all(
     volume: &Volume,
@@ -520,8 +523,7 @@ fn make_all(
     progress: Progress<'_>,
 ) -> Result<Vec<Option<Made>>, ImagingError> {
     let next = AtomicUsize::new(0);
-    let done: Vec<Mutex<Option<Result<Option<Made>, ImagingError>>>> =
-        jobs.iter().map(|_| Mutex::new(None)).collect();
+    let done: Vec<Slot> = jobs.iter().map(|_| Mutex::new(None)).collect();
     let work = || {
         while let Some((job, slot)) = {
             let at = next.fetch_add(1, Ordering::Relaxed);

@@ -50,6 +50,10 @@ pub struct LesionSeed {
 
 /// A lesion.
 #[derive(Debug, Clone)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "facts that do not depend on each other"
+)]
 pub struct Lesion {
     /// What it is called.
     pub name: String,
@@ -268,15 +272,14 @@ impl<'a> Grower<'a> {
 
     /// Middle between the lesion and what is around it.
     fn level(&self, in_lung: bool) -> Result<f64, ImagingError> {
-        let around_hu = match self.lung_hu.filter(|_| in_lung) {
-            Some(lung_hu) => lung_hu,
-            None => {
-                let mut shell = self.ball(0.6 * REACH_M);
-                shell.subtract(&self.ball(0.4 * REACH_M));
-                self.scan
-                    .median(&shell, &self.bounds)
-                    .unwrap_or(self.median_hu)
-            }
+        let around_hu = if let Some(lung_hu) = self.lung_hu.filter(|_| in_lung) {
+            lung_hu
+        } else {
+            let mut shell = self.ball(0.6 * REACH_M);
+            shell.subtract(&self.ball(0.4 * REACH_M));
+            self.scan
+                .median(&shell, &self.bounds)
+                .unwrap_or(self.median_hu)
         };
         let contrast = f64::from(self.median_hu) - f64::from(around_hu);
         if contrast < LEAST_CONTRAST_HU {

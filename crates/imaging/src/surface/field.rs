@@ -152,7 +152,7 @@ impl Field<'_> {
                 level,
                 typical,
             } => {
-                let voxel = at.map(|index| index.unsigned_abs());
+                let voxel = at.map(isize::unsigned_abs);
                 let level = match level {
                     Level::Everywhere(level) => level,
                     Level::Local(levels) => levels.at(voxel),

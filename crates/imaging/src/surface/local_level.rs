@@ -56,7 +56,7 @@ pub fn local_level(
         quantile(&mut all[0], INSIDE_QUANTILE)?,
         quantile(&mut all[1], 0.5)?,
     ];
-    let [inside, around] = values.map(|blocks| blocks.into_iter());
+    let [inside, around] = values.map(IntoIterator::into_iter);
     let levels = inside.zip(around).map(|(mut inside, mut around)| {
         let inside = quantile(&mut inside, INSIDE_QUANTILE).unwrap_or(whole[0]);
         let around = quantile(&mut around, 0.5).unwrap_or(whole[1]);
