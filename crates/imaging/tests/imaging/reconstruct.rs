@@ -18,10 +18,13 @@ const SIZE: [usize; 3] = [144, 104, 64];
 /// Samples along each edge of a voxel.
 const SAMPLES: usize = 3;
 
-/// A solid in mm from the volume's middle, and its density.
-struct Solid(Box<dyn Fn(&Vector3<f64>) -> bool>, f64);
+/// Whether a place, in mm from the volume's middle, is inside.
+type Inside = Box<dyn Fn(&Vector3<f64>) -> bool>;
 
-fn ellipsoid(at: [f64; 3], axes: [f64; 3]) -> Box<dyn Fn(&Vector3<f64>) -> bool> {
+/// A solid in mm from the volume's middle, and its density.
+struct Solid(Inside, f64);
+
+fn ellipsoid(at: [f64; 3], axes: [f64; 3]) -> Inside {
     let (at, axes) = (Vector3::from(at), Vector3::from(axes));
     Box::new(move |p| (p - at).component_div(&axes).norm() <= 1.0)
 }
