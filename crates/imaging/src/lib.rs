@@ -6,6 +6,8 @@
 //!
 //! Names and birth dates of patients are never read into any value of this crate.
 
+mod components;
+mod distance;
 mod error;
 mod grid;
 pub mod markers;
@@ -15,11 +17,33 @@ mod histogram;
 mod orientation;
 pub mod read;
 mod resample;
+mod mask;
+mod morphology;
+mod reconstruct;
+mod segment;
+mod spacing;
+mod structures;
+mod surface;
 mod volume;
 
+pub use components::{Component, Components, Connectivity};
+pub use distance::{DistanceField, DistanceOptions};
 pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};
 pub use histogram::HuHistogram;
 pub use orientation::{NoOrientation, Orientation};
 pub use resample::{Resampled, resample};
+pub use mask::{IndexBox, Mask};
+pub use morphology::{bridged, closed, dilated, eroded, opened};
+pub use reconstruct::{
+    LesionSize, MeasuredLesion, Progress, ReconstructOptions, Reconstruction, SURFACE_ERROR_M,
+    Surface, SurfaceSizes, reconstruct,
+};
+pub use segment::{
+    BONE_LEVEL_HU, Body, Bone, FIRST_LESION, LUNG_LEVEL_HU, Label, LabelFacts, Lesion, LesionSeed,
+    Levels, Lung, Lungs, SKIN_LEVEL_HU, Segmentation, Side, grow_lesion, label_facts, label_map,
+    segment,
+};
+pub use structures::{Structure, SurfaceTissue, structure_of};
+pub use surface::{Field, Level, SurfaceError, Values, simplify, surface_error, surface_net};
 pub use volume::{AIR_HU, LabelMap, Volume};

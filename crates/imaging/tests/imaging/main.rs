@@ -1,3 +1,4 @@
 //! CT volumes, from outside the crate.
 
 mod readers;
+mod reconstruct;

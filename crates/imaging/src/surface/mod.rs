@@ -1,0 +1,17 @@
+//! Closed surfaces of structures, and how far they are from the voxels.
+
+mod accuracy;
+mod cases;
+mod field;
+mod local_level;
+mod nets;
+mod simplify;
+
+pub use accuracy::{SurfaceError, surface_error};
+pub use field::{Field, Level, Values};
+pub use local_level::{local_level, refine};
+pub use nets::surface_net;
+pub use simplify::simplify;
+
+#[cfg(test)]
+mod tests;
