@@ -8,7 +8,9 @@
 
 mod error;
 mod grid;
+pub mod synth;
 mod volume;
+pub mod write;
 
 pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};

@@ -1,0 +1,3 @@
+//! CT volumes, from outside the crate.
+
+mod synth;
