@@ -13,6 +13,12 @@
 //! The slices may lie anyhow in `ct`, turned or sheared (a tilted gantry); thickness counts along their normal.
 //! The same seed gives the same bytes, whatever the number of threads.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "images are made in f32; counts of cells and layers are rounded from lengths that were checked"
+)]
+
 mod blur;
 mod in_slices;
 mod noise;
@@ -166,7 +172,8 @@ impl<'g> SliceFrame<'g> {
         let along_rows = steps.column(1) / height_m;
         let cosine = along_columns.dot(&along_rows);
         if cosine.abs() > SQUARE {
-            let between = 90.0 - cosine.clamp(-1.0, 1.0).asin().to_degrees();
+            let sine = along_columns.cross(&along_rows).norm();
+            let between = sine.atan2(cosine).to_degrees();
             return Err(ImagingError::refused(format!(
                 "columns and rows of the slices are {between:.3} degrees apart, not 90"
             )));

@@ -1,5 +1,10 @@
 //! NIfTI-1: one file, little endian, with both forms of its place in the world.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "the format's numbers are f32"
+)]
+
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -12,7 +17,7 @@ use super::file::{go_on, write_whole};
 use crate::{ImagingError, LabelMap, Volume, VoxelGrid};
 
 /// Bytes of the header, and of it with the four that say that no extension follows.
-const HEADER: usize = 348;
+const HEADER: i32 = 348;
 const DATA_AT: usize = 352;
 /// Codes of the format: types of data, millimetres, coordinates of the scanner.
 const INT16: i16 = 4;
@@ -33,7 +38,7 @@ pub fn write_nifti(path: &Path, volume: &Volume, cancel: &AtomicBool) -> Result<
         &header,
         &volume.hu,
         slice_of(&volume.grid),
-        |value| value.to_le_bytes(),
+        i16::to_le_bytes,
         cancel,
     )
 }
@@ -50,7 +55,7 @@ pub fn write_label_nifti(
         &header,
         &map.labels,
         slice_of(&map.grid),
-        |label| label.to_le_bytes(),
+        u16::to_le_bytes,
         cancel,
     )
 }
@@ -99,7 +104,7 @@ fn header(
 ) -> Result<Vec<u8>, ImagingError> {
     let mut header = vec![0; DATA_AT];
     let mut put = |at: usize, bytes: &[u8]| header[at..at + bytes.len()].copy_from_slice(bytes);
-    put(0, &(HEADER as i32).to_le_bytes());
+    put(0, &HEADER.to_le_bytes());
     put(40, &3i16.to_le_bytes());
     for (axis, size) in grid.size().into_iter().enumerate() {
         let size = i16::try_from(size).map_err(|_| {

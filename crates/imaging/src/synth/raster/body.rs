@@ -202,7 +202,7 @@ impl Body {
                     match cutting {
                         None => cutting = Some(plane.normal),
                         Some(normal) => {
-                            filled.is_rough |= normal.dot(&plane.normal) < SMOOTH_COSINE
+                            filled.is_rough |= normal.dot(&plane.normal) < SMOOTH_COSINE;
                         }
                     }
                 }
