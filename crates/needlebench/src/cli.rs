@@ -7,9 +7,9 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 
 use crate::clock::elapsed;
 use crate::command::{
-    self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, FkArguments,
-    ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, MergeArguments, PairsArguments,
-    PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
+    self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, CtArguments,
+    FkArguments, ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, MergeArguments,
+    PairsArguments, PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
     ReportArguments, RunArguments, STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
     SuggestArguments,
 };
@@ -67,6 +67,8 @@ enum Command {
         after_help = "Example: needlebench atlas scenarios/supine_suite.toml --goal right_upper_anterior"
     )]
     Atlas(AtlasArguments),
+    /// CT volumes: synthetic ones of phantoms.
+    Ct(CtArguments),
     /// Two results side by side: what changed, and whether more was lost than is allowed.
     #[command(
         after_help = "Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm",
@@ -170,6 +172,7 @@ fn run() -> ExitCode {
         Command::Fk(arguments) => command::fk(&arguments),
         Command::Clearance(arguments) => command::clearance(&arguments),
         Command::Atlas(arguments) => command::atlas(&arguments),
+        Command::Ct(arguments) => command::ct(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
         Command::Study(arguments) => command::study(&arguments),
         Command::Merge(arguments) => command::merge(&arguments),

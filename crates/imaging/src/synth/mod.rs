@@ -26,6 +26,7 @@ mod raster;
 mod scanner;
 mod scene;
 mod slab;
+mod streaks;
 
 use std::sync::atomic::AtomicBool;
 
@@ -39,6 +40,7 @@ use raster::{Cell, Contents, Raster, Stack};
 pub use scanner::{Kernel, Noise, Overshoot, ScanPreset, Scanner, SliceProfile, Streaks};
 pub use scene::{Scene, ScenePart};
 use slab::{Cells, Layers, SlabPainter};
+use streaks::add_streaks;
 
 /// Scans a scene.
 ///
@@ -209,6 +211,7 @@ impl<'g> SliceFrame<'g> {
 struct Camera<'s> {
     scanner: &'s Scanner,
     size: [usize; 2],
+    pixel_m: f64,
     layers: Layers,
     blur: [Blur; 2],
     cells: Cells,
@@ -233,6 +236,7 @@ impl<'s> Camera<'s> {
         Self {
             scanner,
             size,
+            pixel_m,
             layers: Layers::new(scanner.slice_profile, scanner.slice_thickness_m),
             blur,
             cells,
@@ -279,6 +283,10 @@ impl<'c> SliceScan<'c> {
         self.painter.paint(first_cell, &mut self.cells);
         self.in_plane.apply(&self.cells, &mut self.image);
         self.overshoot();
+        if let Some(streaks) = &self.camera.scanner.streaks {
+            let columns = self.camera.size[0];
+            add_streaks(&mut self.image, columns, self.camera.pixel_m, streaks);
+        }
         self.add_noise(index);
         self.store(slice);
     }

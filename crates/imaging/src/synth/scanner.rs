@@ -198,6 +198,18 @@ impl Scanner {
             at_least_0("overshoot", overshoot.share, "of the edge")?;
             positive("width of the overshoot", 1e3 * overshoot.sigma_m, "mm")?;
         }
+        if let Some(streaks) = &self.streaks {
+            positive(
+                "density from which on there are streaks",
+                streaks.above_hu,
+                "HU",
+            )?;
+            at_least_0(
+                "what streaks are made of",
+                streaks.share,
+                "of the attenuation",
+            )?;
+        }
         if let Some(noise) = &self.noise {
             at_least_0("noise", noise.sd_hu, "HU")?;
             at_least_0("noise at the rim", noise.rim_share, "of that in the middle")?;

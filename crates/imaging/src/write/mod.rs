@@ -2,7 +2,9 @@
 //!
 //! Files are either whole or not there.
 
+mod dicom;
 mod file;
 mod nifti;
 
+pub use dicom::{DicomSeries, write_dicom};
 pub use nifti::{write_label_nifti, write_nifti};

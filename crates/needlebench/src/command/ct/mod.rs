@@ -1,0 +1,33 @@
+//! `needlebench ct`: CT volumes.
+
+mod synth;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+use crate::exit::ExitStatus;
+
+use synth::{SYNTH_HELP, SynthArguments, synth};
+
+#[derive(Debug, Args)]
+pub(crate) struct CtArguments {
+    #[command(subcommand)]
+    command: CtCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum CtCommand {
+    /// Synthetic CT of a phantom, with the truth beside it.
+    #[command(
+        after_help = "Example: needlebench ct synth scenarios/supine_suite.toml --out out/ct --preset biopsy --markers ct-sphere",
+        after_long_help = SYNTH_HELP
+    )]
+    Synth(Box<SynthArguments>),
+}
+
+/// Runs what is asked for of a CT.
+pub(crate) fn ct(arguments: &CtArguments) -> Result<ExitStatus> {
+    match &arguments.command {
+        CtCommand::Synth(arguments) => synth(arguments),
+    }
+}
