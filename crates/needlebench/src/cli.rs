@@ -68,6 +68,7 @@ enum Command {
     )]
     Atlas(AtlasArguments),
     /// CT volumes: synthetic ones of phantoms.
+    #[command(after_help = "Example: needlebench ct synth male-p50-supine --out out/ct")]
     Ct(CtArguments),
     /// Two results side by side: what changed, and whether more was lost than is allowed.
     #[command(

@@ -13,6 +13,7 @@ mod clearance;
 mod compare;
 mod compare_studies;
 mod credibility;
+mod ct_synth;
 mod determinism;
 #[cfg(target_os = "linux")]
 mod environment;
