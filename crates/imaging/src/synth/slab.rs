@@ -10,6 +10,9 @@ const LAYER_M: f64 = 0.5e-3;
 /// Where the bell is cut off, in thicknesses: 2.9 standard deviations.
 const BELL_REACH: f64 = 1.25;
 
+/// Cells of a block that one surface crosses and that are asked one by one (measured).
+const ASKED_CELLS: usize = 16;
+
 /// Layers of a slice, and how much each counts.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Layers {
@@ -67,6 +70,12 @@ struct Block {
     high: [usize; 3],
 }
 
+impl Block {
+    fn count(&self) -> usize {
+        (0..3).map(|axis| self.high[axis] - self.low[axis]).product()
+    }
+}
+
 /// Makes the slices of a scene one at a time.
 #[derive(Debug)]
 pub(super) struct SlabPainter<'r> {
@@ -111,12 +120,13 @@ impl<'r> SlabPainter<'r> {
             self.fill(block, material.hu, image);
             return;
         }
-        let Some(axis) = self.longest_axis(block) else {
-            let cell = self.cell(block);
-            let hu = self.raster.mean_hu(contents, &cell, &mut self.stack);
-            self.fill(block, hu, image);
+        // Of one surface, asking each cell is quicker than halving further.
+        let count = block.count();
+        if count == 1 || (count <= ASKED_CELLS && contents.is_single()) {
+            self.paint_cells(block, contents, image);
             return;
-        };
+        }
+        let axis = self.longest_axis(block);
         let middle = usize::midpoint(block.low[axis], block.high[axis]);
         let (mut lower, mut upper) = (*block, *block);
         lower.high[axis] = middle;
@@ -125,6 +135,22 @@ impl<'r> SlabPainter<'r> {
             let cell = self.cell(&half);
             let inner = self.raster.within(contents, &cell, &mut self.stack);
             self.paint_block(&half, &inner, image);
+        }
+    }
+
+    fn paint_cells(&mut self, block: &Block, contents: &Contents, image: &mut [f32]) {
+        for layer in block.low[2]..block.high[2] {
+            for row in block.low[1]..block.high[1] {
+                for column in block.low[0]..block.high[0] {
+                    let one = Block {
+                        low: [column, row, layer],
+                        high: [column + 1, row + 1, layer + 1],
+                    };
+                    let cell = self.cell(&one);
+                    let hu = self.raster.mean_hu(contents, &cell, &mut self.stack);
+                    self.fill(&one, hu, image);
+                }
+            }
         }
     }
 
@@ -146,13 +172,14 @@ impl<'r> SlabPainter<'r> {
         }
     }
 
-    /// Along which a block is halved; none of one cell and layer.
-    fn longest_axis(&self, block: &Block) -> Option<usize> {
-        let count = |axis: usize| block.high[axis] - block.low[axis];
-        let length_m = |axis: usize| count(axis) as f64 * self.edge_m(axis);
-        (0..3)
-            .filter(|&axis| count(axis) > 1)
-            .max_by(|&a, &b| length_m(a).total_cmp(&length_m(b)))
+    /// Along which a block of more than one cell is halved.
+    fn longest_axis(&self, block: &Block) -> usize {
+        let length_m = |axis: usize| match block.high[axis] - block.low[axis] {
+            1 => 0.0,
+            count => count as f64 * self.edge_m(axis),
+        };
+        let longer = |a: usize, b: usize| if length_m(b) > length_m(a) { b } else { a };
+        longer(longer(0, 1), 2)
     }
 
     fn fill(&self, block: &Block, hu: f64, image: &mut [f32]) {

@@ -77,6 +77,11 @@ impl Contents {
         (self.first == self.last).then_some(self.beneath)
     }
 
+    /// Whether one part alone may cut the box.
+    pub fn is_single(&self) -> bool {
+        self.last - self.first == 1
+    }
+
     /// Label of what is beneath all that may cut the box.
     pub fn beneath_label(&self) -> u16 {
         self.beneath.label
