@@ -277,7 +277,7 @@ struct Elements(Vec<u8>);
 
 impl Elements {
     fn put(&mut self, tag: u32, vr: [u8; 2], value: &[u8]) {
-        let [group, element] = [tag >> 16, tag & 0xFFFF].map(|half| half.to_le_bytes());
+        let [group, element] = [tag >> 16, tag & 0xFFFF].map(u32::to_le_bytes);
         self.0.extend([group[0], group[1], element[0], element[1]]);
         self.0.extend(vr);
         let is_odd = value.len() % 2 == 1;
