@@ -72,7 +72,9 @@ struct Block {
 
 impl Block {
     fn count(&self) -> usize {
-        (0..3).map(|axis| self.high[axis] - self.low[axis]).product()
+        (0..3)
+            .map(|axis| self.high[axis] - self.low[axis])
+            .product()
     }
 }
 

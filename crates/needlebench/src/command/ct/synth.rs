@@ -40,6 +40,10 @@ Writes into DIR:
 Frame ct is the patient's LPS. The same file, options and seed give the same bytes.";
 
 #[derive(Debug, Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a switch of the command line"
+)]
 pub(crate) struct SynthArguments {
     /// Scenario with a phantom, file of a phantom's sizes, or a shipped size such as male-p50-supine.
     #[arg(value_name = "SCENARIO|PHANTOM")]
