@@ -47,6 +47,7 @@ const LAYERS: [(&str, &[&str]); 17] = [
             "planning",
             "clearance",
             "cell",
+            "geometry",
             "kinematics",
         ],
     ),

@@ -24,6 +24,17 @@ pub enum Measured {
     Supine,
 }
 
+/// What the markers on the skin are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MarkerKind {
+    /// A plastic disc, for cameras and touching: CT does not tell it from skin.
+    #[default]
+    Disc,
+    /// The same disc on a carrier of foam that holds a dense sphere against the skin, for CT as well.
+    CtSphere,
+}
+
 /// Size and contents of a chest phantom.
 ///
 /// Positions are in the `phantom` frame: anatomical LPS (x to the patient's left, y posterior, z
@@ -85,6 +96,13 @@ pub struct PhantomParameters {
     #[serde(default = "default_marker_thickness_mm")]
     #[schemars(range(min = 0.2, max = 5.0))]
     pub marker_thickness_mm: f64,
+    /// `disc`, or `ct_sphere` for markers that CT sees too.
+    #[serde(default)]
+    pub marker_kind: MarkerKind,
+    /// Diameter of the sphere of `ct_sphere` markers, mm; their discs lie so much higher above the skin.
+    #[serde(default = "default_marker_sphere_mm")]
+    #[schemars(range(min = 3.0, max = 15.0))]
+    pub marker_sphere_mm: f64,
     /// Head and arms, for scenarios that have them.
     #[serde(default)]
     pub limbs: LimbSizes,
@@ -210,6 +228,10 @@ fn default_marker_diameter_mm() -> f64 {
 }
 fn default_marker_thickness_mm() -> f64 {
     1.0
+}
+
+fn default_marker_sphere_mm() -> f64 {
+    8.0
 }
 
 macro_rules! preset {

@@ -4,6 +4,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
 use super::models::reference_schema;
+use crate::phantom::MarkerKind;
 use crate::schema::{LONGEST_NAME, NAME};
 
 /// Value of `model` for a phantom of the user's parts alone.
@@ -54,6 +55,8 @@ pub struct PhantomSection {
     /// Length of the phantom, mm; the model's own if left out.
     #[schemars(range(min = ChestSize::LENGTH_MM[0], max = ChestSize::LENGTH_MM[1]))]
     pub length_mm: Option<f64>,
+    /// What the markers on the skin are: `disc`, or `ct_sphere` for markers that CT sees too; the model's own if left out.
+    pub markers: Option<MarkerKind>,
     /// How it lies.
     pub posture: Posture,
     /// Direction from feet to head in the world's horizontal plane: 0 is world x, 90 world y, deg.
@@ -84,6 +87,7 @@ impl Default for PhantomSection {
             breadth_mm: None,
             depth_mm: None,
             length_mm: None,
+            markers: None,
             posture: Posture::Supine,
             head_yaw_deg: 0.0,
             body_roll_deg: 0.0,

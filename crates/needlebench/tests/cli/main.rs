@@ -14,6 +14,7 @@ mod compare;
 mod compare_studies;
 mod credibility;
 mod ct_info;
+mod ct_synth;
 mod determinism;
 #[cfg(target_os = "linux")]
 mod environment;

@@ -1,6 +1,7 @@
 //! `needlebench ct`: CT volumes.
 
 mod info;
+mod synth;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
@@ -8,6 +9,7 @@ use clap::{Args, Subcommand};
 use crate::exit::ExitStatus;
 
 use info::{InfoArguments, info};
+use synth::{SYNTH_HELP, SynthArguments, synth};
 
 #[derive(Debug, Args)]
 pub(crate) struct CtArguments {
@@ -20,11 +22,18 @@ enum CtCommand {
     /// What a volume is: geometry, Hounsfield units, and what is wrong with it.
     #[command(after_help = "Example: needlebench ct info scan.nii.gz")]
     Info(InfoArguments),
+    /// Synthetic CT of a phantom, with the truth beside it.
+    #[command(
+        after_help = "Example: needlebench ct synth scenarios/supine_suite.toml --out out/ct --preset biopsy --markers ct-sphere",
+        after_long_help = SYNTH_HELP
+    )]
+    Synth(Box<SynthArguments>),
 }
 
 /// Runs what is asked for of a CT.
 pub(crate) fn ct(arguments: &CtArguments) -> Result<ExitStatus> {
     match &arguments.command {
         CtCommand::Info(arguments) => info(arguments),
+        CtCommand::Synth(arguments) => synth(arguments),
     }
 }

@@ -1,0 +1,10 @@
+//! Volumes and label maps into files that other programs read.
+//!
+//! Files are either whole or not there.
+
+mod dicom;
+mod file;
+mod nifti;
+
+pub use dicom::{DicomSeries, write_dicom};
+pub use nifti::{write_label_nifti, write_nifti};
