@@ -1,5 +1,7 @@
 //! Markers of a whole scan: 512 x 512 x 300 voxels, eight balls on a body that is an elliptic cylinder.
 
+#![expect(missing_docs, reason = "what criterion's macro makes")]
+
 use std::hint::black_box;
 use std::sync::atomic::AtomicBool;
 
@@ -67,6 +69,7 @@ fn scan() -> Volume {
                         }
                     }
                 }
+                #[expect(clippy::cast_possible_truncation, reason = "within the range of HU")]
                 hu.push((value + random.uniform(-35.0, 35.0)) as i16);
             }
         }
@@ -99,7 +102,7 @@ fn markers(criterion: &mut Criterion) {
     let detected: Vec<_> = found
         .markers
         .iter()
-        .map(|marker| marker.localised())
+        .map(needlebench_imaging::markers::DetectedMarker::localised)
         .collect();
     let reference: Vec<_> = centers_mm()
         .iter()

@@ -1,5 +1,7 @@
 //! A synthetic chest scan, stage by stage: 512 x 512 x 300 voxels of 0.7 x 0.7 x 1.0 mm, about 300 parts, one thread.
 
+#![expect(missing_docs, reason = "what criterion's macro makes")]
+
 use std::hint::black_box;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;

@@ -33,14 +33,14 @@ pub use distance::{DistanceField, DistanceOptions};
 pub use error::{ImagingError, Remark};
 pub use grid::{NotAGrid, VoxelGrid};
 pub use histogram::HuHistogram;
-pub use orientation::{NoOrientation, Orientation};
-pub use resample::{Resampled, resample};
 pub use mask::{IndexBox, Mask};
 pub use morphology::{bridged, closed, dilated, eroded, opened};
+pub use orientation::{NoOrientation, Orientation};
 pub use reconstruct::{
     LesionSize, MeasuredLesion, Progress, ReconstructOptions, Reconstruction, SURFACE_ERROR_M,
     Surface, SurfaceSizes, reconstruct,
 };
+pub use resample::{Resampled, resample};
 pub use segment::{
     BONE_LEVEL_HU, Body, Bone, FIRST_LESION, LUNG_LEVEL_HU, Label, LabelFacts, Lesion, LesionSeed,
     Levels, Lung, Lungs, SKIN_LEVEL_HU, Segmentation, Side, grow_lesion, label_facts, label_map,

@@ -280,6 +280,11 @@ mod tests {
                         .grid
                         .ct_from_index(&Point3::new(i as f64, j as f64, k as f64));
                     let index = grid.index_from_ct(&place);
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "an index within the volume"
+                    )]
                     let at = [0, 1, 2].map(|axis| index[axis].round() as usize);
                     assert_eq!(
                         resampled.volume.hu[grid.offset(at)],
@@ -303,7 +308,9 @@ mod tests {
                         .grid
                         .ct_from_index(&Point3::new(i as f64, j as f64, k as f64));
                     let offset = volume.grid.offset([i, j, k]);
-                    volume.hu[offset] = hu(&place).round() as i16;
+                    #[expect(clippy::cast_possible_truncation, reason = "some hundred HU")]
+                    let value = hu(&place).round() as i16;
+                    volume.hu[offset] = value;
                 }
             }
         }

@@ -86,7 +86,8 @@ pub mod pose {
         let plain = Plain::deserialize(from)?;
         let [w, i, j, k] = plain.rotation_quat_wxyz;
         let q = Quaternion::new(w, i, j, k);
-        if !((q.norm() - 1.0).abs() < 1e-6) {
+        let off = (q.norm() - 1.0).abs();
+        if off.is_nan() || off >= 1e-6 {
             return Err(D::Error::custom(format!(
                 "rotation_quat_wxyz has length {}, not 1",
                 q.norm()

@@ -489,8 +489,8 @@ impl Task<'_> {
         if center.norm() > reach_mm {
             return Err(format!("the fit goes {:.1} mm away", center.norm()));
         }
-        let largest = options.largest_misfit + 2.0 * self.noise_share(values, noise);
-        if !(misfit <= largest) {
+        let largest = options.largest_misfit + 2.0 * Self::noise_share(values, noise);
+        if misfit.is_nan() || misfit > largest {
             return Err(format!(
                 "a marker explains it to {:.0} % of its contrast, {:.0} % at best",
                 misfit * 100.0,
@@ -546,7 +546,7 @@ impl Task<'_> {
         })
     }
 
-    fn noise_share(&self, values: &Unknowns, noise: Option<&Noise>) -> f64 {
+    fn noise_share(values: &Unknowns, noise: Option<&Noise>) -> f64 {
         noise.map_or(0.0, |noise| noise.sd_hu / 1e3) / Self::contrast(values).max(0.1)
     }
 

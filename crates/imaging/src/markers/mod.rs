@@ -5,12 +5,38 @@
 //! curved skin under the scan's blur are fitted to the voxels themselves. The fit's covariance holds for noise that is
 //! correlated between voxels; where a slice is too thick to tell where in it a sphere lies, it is wide, and says so.
 
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "indices of voxels within a volume, and counts of some"
+)]
 mod bits;
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "indices of voxels within a volume, and counts of some"
+)]
 mod detect;
 mod edge;
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_possible_wrap,
+    reason = "indices of voxels within a volume, and counts of some"
+)]
 mod fit;
 mod model;
+#[expect(
+    clippy::cast_sign_loss,
+    clippy::cast_possible_wrap,
+    reason = "indices of voxels within a volume, and counts of some"
+)]
 mod noise;
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "indices of voxels within a volume, and counts of some"
+)]
 mod sphere;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -146,7 +172,8 @@ impl MarkerModel {
             )));
         }
         let bad = |layer: &HolderLayer| {
-            !(layer.bottom_m < layer.top_m && layer.radius_m > 0.0)
+            layer.bottom_m >= layer.top_m
+                || layer.radius_m <= 0.0
                 || ![layer.bottom_m, layer.top_m, layer.radius_m, layer.hu]
                     .iter()
                     .all(|v| v.is_finite())
@@ -180,7 +207,14 @@ impl MarkerModel {
         match self.dense {
             DensePart::Sphere { .. } => 1,
             DensePart::Ring { diameter_m, wire_m } => {
-                (std::f64::consts::PI * diameter_m / wire_m * BALLS_PER_WIRE).ceil() as usize
+                let count = (std::f64::consts::PI * diameter_m / wire_m * BALLS_PER_WIRE).ceil();
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "some dozens: the ring is checked"
+                )]
+                let count = count as usize;
+                count
             }
         }
     }
@@ -368,7 +402,10 @@ pub fn find_markers(
 }
 
 fn check_options(options: &Options) -> Result<(), ImagingError> {
-    if !(0.1e-3..=3e-3).contains(&options.blur_sigma_m) || !(options.largest_misfit > 0.0) {
+    if !(0.1e-3..=3e-3).contains(&options.blur_sigma_m)
+        || options.largest_misfit.is_nan()
+        || options.largest_misfit <= 0.0
+    {
         return Err(ImagingError::refused(format!(
             "a blur of {:.3} mm or a largest misfit of {}: the blur is 0.1 to 3 mm, the misfit above 0",
             options.blur_sigma_m * 1e3,

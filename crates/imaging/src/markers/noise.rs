@@ -195,6 +195,7 @@ mod tests {
         let mut hu = Vec::new();
         for _ in 0..size[1] * size[2] {
             let row: Vec<f64> = (0..=size[0]).map(|_| 30.0 * random.next_normal()).collect();
+            #[expect(clippy::cast_possible_truncation, reason = "some hundred HU")]
             hu.extend(
                 (0..size[0]).map(|x| (0.5 * (row[x] + row[x + 1]) + 0.5 * x as f64).round() as i16),
             );

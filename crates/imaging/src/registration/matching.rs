@@ -287,7 +287,7 @@ fn missing_remark(
     reference: &[ReferenceMarker],
 ) -> Remark {
     let (from, to) = best.points(detected, known);
-    let nearest = register_weighted(&from, &to).ok().and_then(|fit| {
+    let nearest = register_weighted(&from, &to).ok().map(|fit| {
         let wanted = fit.to_from_from.inverse_transform_point(&known[index].at_m);
         let nearest_mm = unknown
             .iter()
@@ -298,7 +298,7 @@ fn missing_remark(
             "expected at ({:.1}, {:.1}, {:.1}) mm",
             place.x, place.y, place.z
         );
-        Some(match nearest_mm {
+        match nearest_mm {
             Some((mm, other)) if mm < 20.0 => {
                 format!(
                     "{at}; detected {} is {mm:.1} mm from there: it may have moved",
@@ -306,7 +306,7 @@ fn missing_remark(
                 )
             }
             _ => at,
-        })
+        }
     });
     Remark::new(format!(
         "not detected{}",

@@ -1,5 +1,11 @@
 //! Markers in scans that count points: found, how far off they are, and whether they know it.
 
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::type_complexity,
+    reason = "small volumes, and shapes as they are written down"
+)]
 mod renderer;
 
 use std::sync::atomic::AtomicBool;

@@ -522,12 +522,12 @@ mod tests {
     }
 
     /// An element with a short length.
-    fn element(tag: Tag, vr: &[u8; 2], value: &[u8]) -> Vec<u8> {
+    fn element(tag: Tag, vr: [u8; 2], value: &[u8]) -> Vec<u8> {
         let mut bytes = Vec::new();
         bytes.extend(u16::try_from(tag >> 16).unwrap().to_le_bytes());
         bytes.extend(u16::try_from(tag & 0xFFFF).unwrap().to_le_bytes());
         bytes.extend(vr);
-        if vr == b"UN" {
+        if vr == *b"UN" {
             bytes.extend([0, 0]);
             bytes.extend(u32::try_from(value.len()).unwrap().to_le_bytes());
         } else {
@@ -539,16 +539,16 @@ mod tests {
 
     #[test]
     fn a_number_of_unknown_vr_is_its_text() {
-        let bytes = element(tag::SLOPE, b"UN", b"1 ");
+        let bytes = element(tag::SLOPE, *b"UN", b"1 ");
         let (found, _) = read(&bytes, Encoding::EXPLICIT).unwrap();
         assert_eq!(found.real(tag::SLOPE), Ok(Some(1.0)));
     }
 
     #[test]
     fn names_and_birth_dates_are_skipped_unread() {
-        let mut bytes = element(0x0010_0010, b"PN", b"DOE^JANE");
-        bytes.extend(element(0x0010_0030, b"DA", b"19700101"));
-        bytes.extend(element(tag::MODALITY, b"CS", b"CT"));
+        let mut bytes = element(0x0010_0010, *b"PN", b"DOE^JANE");
+        bytes.extend(element(0x0010_0030, *b"DA", b"19700101"));
+        bytes.extend(element(tag::MODALITY, *b"CS", b"CT"));
         let (found, _) = read(&bytes, Encoding::EXPLICIT).unwrap();
         assert_eq!(found.text(tag::MODALITY).as_deref(), Some("CT"));
         assert!(!format!("{found:?}").contains("68, 79, 69"));
@@ -557,7 +557,7 @@ mod tests {
 
     #[test]
     fn what_is_no_number_names_its_element() {
-        let bytes = element(tag::PIXEL_SPACING, b"DS", b"0,7\\0,7 ");
+        let bytes = element(tag::PIXEL_SPACING, *b"DS", b"0,7\\0,7 ");
         let (found, _) = read(&bytes, Encoding::EXPLICIT).unwrap();
         let problem = found.array::<2>(tag::PIXEL_SPACING).unwrap_err();
         assert!(
@@ -568,7 +568,7 @@ mod tests {
 
     #[test]
     fn a_length_beyond_the_end_is_refused_before_it_is_read() {
-        let mut bytes = element(tag::MODALITY, b"UN", b"CT");
+        let mut bytes = element(tag::MODALITY, *b"UN", b"CT");
         bytes[8..12].copy_from_slice(&0x7FFF_FFFF_u32.to_le_bytes());
         assert!(read(&bytes, Encoding::EXPLICIT).is_err());
     }
