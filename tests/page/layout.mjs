@@ -98,6 +98,22 @@ const edgeColors = (judge, png) => judge.evaluate(async (data) => {
   return [0, image.width - 3].map((x) => new Set(new Uint32Array(context.getImageData(x, 0, 3, image.height).data.buffer)).size);
 }, png.toString('base64'));
 
+/** Widths at which columns come and go, and some between. */
+const STILL_AT = [390, 400, 470, 600, 610, 700, 860, 1000];
+
+/** Heights of the page over a dozen frames, after it had time to settle. */
+async function heights(page) {
+  await page.waitForTimeout(250);
+  return page.evaluate(async () => {
+    const seen = [];
+    for (let frame = 0; frame < 12; frame++) {
+      await new Promise((next) => { requestAnimationFrame(next); });
+      seen.push(document.documentElement.scrollHeight);
+    }
+    return [...new Set(seen)];
+  });
+}
+
 /** Asserts that a page is whole at every width, folded and unfolded; `look(width)` is called at each. */
 export async function testLayout(page, { judge, notBlank, settle, shot }) {
   const before = page.viewportSize();
@@ -129,7 +145,13 @@ export async function testLayout(page, { judge, notBlank, settle, shot }) {
       }
     }
   }
+  for (const width of STILL_AT) {
+    await page.setViewportSize({ width, height: 900 });
+    await settle(page);
+    const found = await heights(page);
+    if (found.length > 1) wrong.push(`${width} px: the page does not come to rest, its height is ${found.join(', ')} px`);
+  }
   await page.setViewportSize(before);
   await settle(page);
-  assert.deepEqual(wrong, [], 'the page is cut, covered or too small');
+  assert.deepEqual(wrong, [], 'the page is cut, covered, too small or restless');
 }

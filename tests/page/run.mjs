@@ -16,9 +16,9 @@ export async function testNearest(page, settle) {
     const { shown, label, least } = await page.evaluate(() => {
       const run = NB.current;
       const { curveTime, curves } = run.decode(run.shown[0]);
-      const unwanted = curves.filter(([name]) => run.page.unwantedClasses.includes(name));
+      const around = curves.filter(([name]) => run.page.classesAround.includes(name));
       return {
-        shown: run.now.textContent, least: Math.min(...unwanted.map(([, y]) => NB.at(curveTime, y, run.time))),
+        shown: run.now.textContent, least: Math.min(...around.map(([, y]) => NB.at(curveTime, y, run.time))),
         label: run.view.labels.filter((each) => each.layer === 'witness').map((each) => each.element.textContent),
       };
     });

@@ -5,7 +5,9 @@
 //! clearances. Motions and engines can only take configurations away, so a goal for which too few are left
 //! here fails in every run.
 
-use needlebench_cell::{ClearanceClass, Finding, Goal, ResolvedScenario, part_in_words};
+use needlebench_cell::{
+    ClearanceClass, Finding, Goal, ResolvedScenario, part_in_words, reason_in_words,
+};
 use needlebench_clearance::ClearanceModel;
 use needlebench_evaluation::report::{ConfigurationReport, RejectionReport, RouteReport};
 use needlebench_evaluation::{first_missed_by_posture, route_is_expected};
@@ -240,6 +242,7 @@ fn reach_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
         for each in goal.configurations.iter().filter(|each| !each.works) {
             let rule = first(each).map(|rejection| rejection.rule.to_owned());
             let reason = rule.or(each.missed.map(str::to_owned)).unwrap_or_default();
+            let reason = reason_in_words(&reason);
             if !reasons.contains(&reason) {
                 reasons.push(reason);
             }
@@ -254,10 +257,11 @@ fn reach_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
     Some(
         Finding::new(&resolved.source.file, message)
             .key(goal_key(resolved, index))
-            .hint(
-                "move the base, the patient or the entry; `min_working_configurations` under [criteria] is \
-                 how many have to work",
-            ),
+            .hint(format!(
+                "move the base, the patient or the entry: `needlebench suggest {}` proposes places and entries; \
+                 `min_working_configurations` under [criteria] is how many have to work",
+                resolved.source.file
+            )),
     )
 }
 
@@ -288,9 +292,10 @@ fn route_finding(resolved: &ResolvedScenario, index: usize, goal: &GoalPreview) 
     Some(
         Finding::new(&resolved.source.file, message)
             .key(goal_key(resolved, index))
-            .hint(
-                "choose another entry, or another direction to the target; `off` under \
-                 [planning.needle_route] names what the needle may pass",
-            ),
+            .hint(format!(
+                "choose another entry: `needlebench suggest {}` proposes some; `off` under [planning.needle_route] \
+                 names what the needle may pass",
+                resolved.source.file
+            )),
     )
 }

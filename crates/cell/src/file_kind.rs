@@ -95,7 +95,10 @@ impl FileKind {
         let table: toml::Table = text.parse().ok()?;
         let has = |key: &str| table.contains_key(key);
         let is_study = has("factors") || table.get("scenario").is_some_and(toml::Value::is_str);
-        if is_study && !has("goals") && !has("robot") {
+        // A study names goals of its scenario; a scenario's are tables.
+        let goals = table.get("goals").and_then(toml::Value::as_array);
+        let has_own_goals = goals.is_some_and(|goals| goals.iter().any(toml::Value::is_table));
+        if is_study && !has_own_goals && !has("robot") {
             Some(Self::Study)
         } else if has("max_loss") {
             Some(Self::Thresholds)

@@ -83,4 +83,4 @@ pub use scenario::{REJECTION_RULES, envelope, ranking};
 pub use scenario_edit::ScenarioEdit;
 pub use study::criteria as study_criteria;
 pub use thresholds::ThresholdsFile;
-pub use words::{pair_in_words, part_in_words, rule_in_words};
+pub use words::{pair_in_words, part_in_words, reason_in_words, rule_in_words};

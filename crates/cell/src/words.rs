@@ -6,6 +6,8 @@
 
 use std::borrow::Cow;
 
+use crate::ClearanceClass;
+
 /// Parts that are there once.
 const SINGLE: [(&str, &str); 27] = [
     ("base", "base"),
@@ -75,8 +77,8 @@ pub fn pair_in_words(pair: &[String; 2]) -> String {
 }
 
 /// Rules that reject configurations, and what a configuration that one rejects suffers from.
-const RULES: [(&str, &str); 10] = [
-    ("needle_route", "needle route"),
+const RULES: [(&str, &str); 12] = [
+    ("needle_route", "needle route blocked"),
     ("unreachable", "out of reach"),
     ("merged", "same as another"),
     ("joint_limit", "joint limit"),
@@ -86,12 +88,54 @@ const RULES: [(&str, &str); 10] = [
     ("approach", "no approach"),
     ("nearest_only", "not exact"),
     ("no_motion", "no motion"),
+    ("max_tip_position_error_mm", "tip error over its limit"),
+    ("max_tip_rms_mm", "expected tip error over its limit"),
 ];
 
 /// What people call a rule that rejects configurations: one of [`crate::REJECTION_RULES`].
 pub fn rule_in_words(rule: &str) -> &str {
     let known = RULES.iter().find(|(name, _)| *name == rule);
     known.map_or(rule, |(_, words)| words)
+}
+
+/// What meets what.
+fn class_in_words(class: ClearanceClass) -> [&'static str; 2] {
+    match class {
+        ClearanceClass::RobotPhantom => ["arm", "patient"],
+        ClearanceClass::RobotTable => ["arm", "table"],
+        ClearanceClass::RobotGantry => ["arm", "gantry"],
+        ClearanceClass::RobotMount => ["arm", "mount"],
+        ClearanceClass::RobotObstacle => ["arm", "obstacle"],
+        ClearanceClass::SelfCollision => ["arm", "itself"],
+        ClearanceClass::ToolPhantom => ["tool", "patient"],
+        ClearanceClass::GuideStandoff => ["guide", "skin"],
+        ClearanceClass::NeedleCorridor => ["something", "the space behind the guide"],
+        ClearanceClass::NeedleRoute => ["needle", "what it must not meet"],
+    }
+}
+
+/// Why a configuration does not work, as rows of studies name it, in words: `collision robot_mount` is `arm hits
+/// mount`.
+pub fn reason_in_words(detail: &str) -> String {
+    if RULES.iter().any(|(name, _)| *name == detail) {
+        return rule_in_words(detail).to_owned();
+    }
+    let of_class = |prefix: &str, words: &str| {
+        let class = ClearanceClass::named(detail.strip_prefix(prefix)?)?;
+        let [this, other] = class_in_words(class);
+        Some(format!("{this} {words} {other}"))
+    };
+    of_class("collision ", "hits")
+        .or_else(|| of_class("no_motion ", "cannot get past"))
+        .or_else(|| of_class("min_clearance_mm.", "too near"))
+        // A key of the scenario stays one, for layouts that cannot exist.
+        .unwrap_or_else(|| {
+            if detail.contains('.') {
+                detail.to_owned()
+            } else {
+                detail.replace('_', " ")
+            }
+        })
 }
 
 /// `left lung` for `lung_left`.
@@ -169,6 +213,21 @@ mod tests {
         for rule in crate::scenario::REJECTION_RULES {
             assert!(!rule_in_words(rule).contains('_'), "{rule}");
             assert!(RULES.iter().any(|(name, _)| *name == rule), "{rule}");
+        }
+    }
+
+    #[test]
+    fn details_are_said_in_words_and_what_is_not_known_stays() {
+        for (detail, words) in [
+            ("collision robot_mount", "arm hits mount"),
+            ("collision self", "arm hits itself"),
+            ("no_motion robot_table", "arm cannot get past table"),
+            ("min_clearance_mm.robot_phantom", "arm too near patient"),
+            ("unreachable", "out of reach"),
+            ("phantom.position_mm", "phantom.position_mm"),
+            ("max_peak_torque_ratio", "max peak torque ratio"),
+        ] {
+            assert_eq!(reason_in_words(detail), words);
         }
     }
 

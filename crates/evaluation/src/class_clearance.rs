@@ -68,6 +68,17 @@ impl ClearanceReport {
             .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
     }
 
+    /// The least clearance of arm and tool from what stands around them, the arm's own left out.
+    pub fn least_from_surroundings(&self) -> Option<&ClassClearance> {
+        let classes = self.classes.iter();
+        classes
+            .filter(|(class, _)| {
+                ClearanceClass::named(class).is_some_and(ClearanceClass::is_surroundings)
+            })
+            .map(|(_, found)| found)
+            .min_by(|a, b| a.minimum_m.total_cmp(&b.minimum_m))
+    }
+
     fn physical(&self) -> impl Iterator<Item = &ClassClearance> {
         self.classes
             .iter()

@@ -22,7 +22,7 @@ pub struct ClearanceSeries {
     pub time_s: Vec<f64>,
     /// Clearance per class at those times, m.
     pub distance_m: BTreeMap<ClearanceClass, Vec<f64>>,
-    /// What is nearest of all that should not touch at those times; none where nothing is near.
+    /// What is nearest of arm and tool to what stands around them at those times; none where nothing is near.
     pub nearest: Vec<Option<Nearest>>,
     /// Names of the solids that `nearest` refers to.
     pub nearest_pairs: Vec<[String; 2]>,
@@ -42,9 +42,9 @@ pub struct Nearest {
 impl ClearanceSeries {
     /// Adds what is nearest in a posture of a cell.
     fn add_nearest(&mut self, cell: &Cell, minima: &ClassMinima) {
-        let unwanted = minima.iter().filter(|pair| pair.class.is_unwanted());
+        let around = minima.iter().filter(|pair| pair.class.is_surroundings());
         let least =
-            unwanted.min_by(|a, b| a.separation.distance_m.total_cmp(&b.separation.distance_m));
+            around.min_by(|a, b| a.separation.distance_m.total_cmp(&b.separation.distance_m));
         let found = least.map(|pair| {
             let (a, b) = pair.solid_names(cell);
             let known = self

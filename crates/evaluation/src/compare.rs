@@ -246,7 +246,7 @@ pub fn compare(
         .collect();
     let mut failures = Vec::new();
     if !options.allow_status_change {
-        failures.extend(status_failures(&goals));
+        failures.extend(status_failures(&goals, b));
     }
     if !options.allow_lost {
         failures.extend(lost(&goals));
@@ -502,7 +502,7 @@ fn compare_metric(key: &MetricKey, a: Option<f64>, b: Option<f64>) -> Option<Met
 }
 
 /// Configurations that do worse.
-fn status_failures(goals: &[GoalComparison]) -> Vec<ComparisonFailure> {
+fn status_failures(goals: &[GoalComparison], b: &StoredReport) -> Vec<ComparisonFailure> {
     let mut failures = Vec::new();
     for goal in goals {
         for each in goal
@@ -512,7 +512,11 @@ fn status_failures(goals: &[GoalComparison]) -> Vec<ComparisonFailure> {
         {
             let before = each.status_a.as_deref().unwrap_or("missing");
             let now = each.status_b.as_deref().unwrap_or("missing");
-            let why = each.rejection_b.as_ref();
+            let missed = || {
+                let missed = missed(b, goal.b.as_deref()?, &each.label);
+                (!missed.is_empty()).then(|| format!("missed: {}", missed.join(", ")))
+            };
+            let why = each.rejection_b.clone().or_else(missed);
             let why = why.map_or(String::new(), |why| format!(" ({why})"));
             failures.push(ComparisonFailure {
                 goal: Some(goal.name().to_owned()),
@@ -523,6 +527,20 @@ fn status_failures(goals: &[GoalComparison]) -> Vec<ComparisonFailure> {
         }
     }
     failures
+}
+
+/// Criteria that a configuration of a report misses.
+fn missed<'a>(report: &'a StoredReport, goal: &str, label: &str) -> Vec<&'a str> {
+    let criteria = report.value("/criteria").and_then(Value::as_array);
+    let of_it = criteria.into_iter().flatten().filter(|each| {
+        text(each, "/goal") == Some(goal)
+            && text(each, "/label") == Some(label)
+            && each.get("pass") == Some(&Value::Bool(false))
+    });
+    let mut names: Vec<&str> = of_it.filter_map(|each| text(each, "/criterion")).collect();
+    // One of each engine.
+    names.dedup();
+    names
 }
 
 /// Metrics that a failure names; the rest are counted.

@@ -16,9 +16,9 @@ pub(crate) fn reason(
     second: Option<&ConfigurationReport>,
     ranking: &GoalRanking,
 ) -> String {
-    let nearest = first.clearance.least().map(|found| {
+    let nearest = first.clearance.least_from_surroundings().map(|found| {
         format!(
-            "least clearance {:.1} mm ({} to {} in the {})",
+            "clearance {:.1} mm ({} to {} in the {})",
             found.minimum_m * 1e3,
             part_in_words(&found.pair[0]),
             part_in_words(&found.pair[1]),
@@ -43,9 +43,10 @@ pub(crate) fn one_sentence(
         || "the only one that works".to_owned(),
         |second| beside(first, second, ranking),
     );
-    match first.clearance.least() {
+    // As the column of that name.
+    match first.clearance.least_from_surroundings() {
         Some(found) => format!(
-            "{why}; least clearance {:.1} mm ({})",
+            "{why}; clearance {:.1} mm ({})",
             found.minimum_m * 1e3,
             pair_in_words(&found.pair)
         ),
@@ -95,8 +96,11 @@ fn against(
         )];
     };
     let mut clauses = vec![
-        format!("score {:.3}, best of {count} that work", mine.score),
-        format!("{} has {:.3}", second.label, theirs.score),
+        format!(
+            "score {:.1} of 100, best of {count} that work",
+            100.0 * mine.score
+        ),
+        format!("{} has {:.1}", second.label, 100.0 * theirs.score),
     ];
     let (ahead, behind) = differences(mine, theirs);
     if (mine.score - theirs.score).abs() <= SAME_SCORE {
@@ -143,12 +147,12 @@ impl Difference<'_> {
         // A table beside it has what was attained, which is a little more.
         let proven = metric.is_some_and(|metric| metric.bound == Bound::Certified);
         format!(
-            "{} ({}{} against {}: {:+.3})",
+            "{} ({}{} against {}: {:+.1})",
             words(self.mine.metric),
             if proven { "proven " } else { "" },
             text(self.mine.value),
             text(self.theirs.value),
-            self.lead
+            100.0 * self.lead
         )
     }
 }

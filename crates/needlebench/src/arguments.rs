@@ -4,6 +4,7 @@ mod engine;
 mod pictures;
 mod table;
 
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -11,6 +12,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nalgebra::Matrix3x4;
 use needlebench_cell::MissingInertia;
 use needlebench_kinematics::UrModel;
+
+use crate::output::complain;
 
 pub(crate) use engine::{EngineArgument, EngineParser};
 pub(crate) use pictures::PicturesArguments;
@@ -87,6 +90,19 @@ impl std::str::FromStr for Six {
             numbers.map(|(value, _)| value),
             numbers.map(|(_, half_unit)| half_unit),
         ))
+    }
+}
+
+impl Six {
+    /// Doubts joint positions of more than two turns, which no arm has: they are likely degrees.
+    pub(crate) fn doubt_degrees(&self) {
+        if let Some(most) = self.0.iter().find(|q| q.abs() > 2.0 * TAU) {
+            complain(&format!(
+                "note: joint positions are in rad, and {most} rad are {:.1} turns; {most} deg would be {:.4} rad",
+                most / TAU,
+                most.to_radians()
+            ));
+        }
     }
 }
 

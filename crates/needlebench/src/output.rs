@@ -12,12 +12,16 @@ use needlebench_report::layout;
 
 /// Tells tables and sentences how wide they may be: `COLUMNS`, else the terminal's width, else that of a log.
 pub(crate) fn keep_to_width() {
-    let asked = std::env::var("COLUMNS").ok();
-    let asked = asked.and_then(|text| text.trim().parse().ok());
     let terminal = || terminal_size::terminal_size_of(std::io::stdout());
     let of_terminal = || terminal().map(|(terminal_size::Width(width), _)| usize::from(width));
-    let width = asked.filter(|width| *width > 0).or_else(of_terminal);
+    let width = columns().or_else(of_terminal);
     layout::set_width(Some(width.unwrap_or(layout::DEFAULT_WIDTH)));
+}
+
+/// The width that `COLUMNS` asks for.
+fn columns() -> Option<usize> {
+    let asked = std::env::var("COLUMNS").ok()?;
+    asked.trim().parse().ok().filter(|width| *width > 0)
 }
 
 /// Breaks nothing from now on: tables are as wide as they are.
@@ -25,9 +29,10 @@ pub(crate) fn print_wide() {
     layout::set_width(None);
 }
 
-/// Writes text for people and a line end to standard output; on a terminal lines are broken at spaces.
+/// Writes text for people and a line end to standard output; on a terminal, and where `COLUMNS` says how wide it
+/// may be, lines are broken at spaces.
 pub(crate) fn print_text(text: &str) -> Result<()> {
-    if std::io::stdout().is_terminal() {
+    if std::io::stdout().is_terminal() || columns().is_some() {
         print_as_it_is(&layout::wrapped(text))
     } else {
         print_as_it_is(text)

@@ -59,7 +59,8 @@ pub fn visible(line: &str) -> usize {
 }
 
 /// A text whose lines are broken at spaces where they are longer than the width; what goes on in a further
-/// line is indented by two more than the line began.
+/// line is indented by two more than the line began. TOML stays fit to be pasted: a comment goes on as a
+/// comment, and a value stays in its line.
 pub fn wrapped(text: &str) -> String {
     wrapped_to(text, width())
 }
@@ -67,7 +68,7 @@ pub fn wrapped(text: &str) -> String {
 /// The same for a given width.
 pub fn wrapped_to(text: &str, width: usize) -> String {
     let lines = text.split('\n').map(|line| {
-        if visible(line) <= width {
+        if visible(line) <= width || is_assignment(line) {
             line.to_owned()
         } else {
             broken(line, width)
@@ -76,9 +77,23 @@ pub fn wrapped_to(text: &str, width: usize) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
+/// Whether a line sets a key in TOML.
+fn is_assignment(line: &str) -> bool {
+    line.split_once(" = ").is_some_and(|(key, _)| {
+        let is_of_key = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+        !key.is_empty() && key.chars().all(is_of_key)
+    })
+}
+
 /// A long line in lines that fit, as far as its words do.
 fn broken(line: &str, width: usize) -> String {
-    let indent = line.len() - line.trim_start().len() + 2;
+    let before = line.len() - line.trim_start().len();
+    let start = if line.starts_with("# ") {
+        "#   ".to_owned()
+    } else {
+        " ".repeat(before + 2)
+    };
+    let indent = start.len();
     let mut text = String::new();
     let mut taken = 0;
     for word in line.split_inclusive(' ') {
@@ -86,7 +101,7 @@ fn broken(line: &str, width: usize) -> String {
         if taken > indent && taken + length > width {
             text.truncate(text.trim_end().len());
             text.push('\n');
-            text.push_str(&" ".repeat(indent));
+            text.push_str(&start);
             taken = indent;
         }
         text.push_str(word);
@@ -133,6 +148,21 @@ mod tests {
             wrapped_to(&format!("results: {path}"), 60),
             format!("results:\n  {path}")
         );
+    }
+
+    #[test]
+    fn toml_can_be_pasted_whatever_the_width() {
+        let value = format!("names = [{}]", "\"word\", ".repeat(20));
+        assert_eq!(wrapped_to(&value, 40), value);
+        let comment = format!("# {}", "word ".repeat(20).trim_end());
+        let text = wrapped_to(&comment, 40);
+        assert!(text.lines().count() > 2);
+        assert!(
+            text.lines()
+                .all(|line| line.starts_with("# ") && line.len() <= 40),
+            "{text}"
+        );
+        assert!(!is_assignment("allowed clearance = 0.1mm"));
     }
 
     #[test]

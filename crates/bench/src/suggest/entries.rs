@@ -92,8 +92,8 @@ const SCALES: [TermScale; 5] = [
 
 /// What the score is made of, for people.
 pub const ENTRY_TERMS: &str = "\
-score: mean of depth (1 at 40 mm, 0 at 140), margin to spare beyond what is
-  kept from bone, vessels and organs (1 at 5 mm), angle to the skin's normal
+score: 100 times the mean of depth (1 at 40 mm, 0 at 140), margin to spare beyond
+  what is kept from bone, vessels and organs (1 at 5 mm), angle to the skin's normal
   (1 at 0 deg, 0 at 60), fissures crossed (half weight), and configurations
   that work";
 

@@ -10,6 +10,7 @@ mod places;
 
 use std::collections::BTreeMap;
 
+use needlebench_cell::reason_in_words;
 use serde::Serialize;
 
 pub use entries::{
@@ -58,6 +59,16 @@ pub struct Refused {
     pub rule: String,
     /// How many it refused.
     pub count: usize,
+}
+
+impl Refused {
+    /// The rule in words, behind its goal where it has one.
+    pub fn in_words(&self) -> String {
+        match self.rule.split_once(": ") {
+            Some((goal, rule)) => format!("{goal}: {}", reason_in_words(rule)),
+            None => reason_in_words(&self.rule),
+        }
+    }
 }
 
 /// Counts of rules, the most frequent first.

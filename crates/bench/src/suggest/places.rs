@@ -445,7 +445,7 @@ impl PlaceSearch {
             } else {
                 "all goals"
             },
-            most.map_or("", |most| most.rule.as_str()),
+            most.map_or(String::new(), Refused::in_words),
             most.map_or(0, |most| most.count),
         )
     }

@@ -13,8 +13,8 @@ use needlebench_cell::{
 use needlebench_planning::judge_route;
 
 /// How much better an entry may be that is not proposed, of a score from 0 to 1: what is lost between directions that
-/// are 3 deg apart, and by asking the robot for the best routes alone. Twice what was seen.
-const MISSED: f64 = 0.05;
+/// are 3 deg apart, and by asking the robot for the best routes alone. Seen: none is better, the best is 0.008 worse.
+const MISSED: f64 = 0.01;
 /// Steps of the other grid, deg.
 const STEP_DEG: u16 = 4;
 
@@ -116,7 +116,8 @@ fn no_entry_of_another_grid_is_much_better_than_the_first_proposal() {
         "{allowed} allowed, best {best:.3} against {:.3}",
         first.score
     );
-    assert!(allowed > 20, "{allowed}");
+    // 14: the lesion lies among ribs.
+    assert!(allowed > 10, "{allowed}");
     assert!(
         best <= first.score + MISSED,
         "{best} against {}",

@@ -100,12 +100,12 @@ fn values_that_cannot_be_are_refused_at_their_line() {
 #[test]
 fn a_value_without_a_source_is_refused() {
     let finding = refused(
-        "source = \"assumed: derived from the UR3e, whose were identified from a recorded run; README step 8\"",
+        "source = \"assumed: derived from the UR3e, whose were identified from a recorded run; models/ur3/README.md step 8\"",
         "source = \"assumed: \"",
     );
     says(&finding, "rotors.source", &["says nothing", "a citation"]);
     let finding = refused(
-        "source = \"assumed: derived from the UR3e, whose were identified from a recorded run; README step 8\"\n",
+        "source = \"assumed: derived from the UR3e, whose were identified from a recorded run; models/ur3/README.md step 8\"\n",
         "\n",
     );
     says(&finding, "rotors.source", &["is missing"]);

@@ -6,7 +6,7 @@ use toml::Value;
 
 use super::SWITCHED_OFF;
 use super::node::{Limits, List, Node, Table, Text};
-use super::unit::{in_words, quantity, unit_of};
+use super::unit::{in_words, quantity, unit_of, written};
 use crate::nearest_name;
 
 /// One thing that does not fit.
@@ -175,16 +175,6 @@ impl Limited for f64 {
     }
 }
 
-/// A number with all its digits and no more zeros than one can count: 1e308, 0.5, 1e-9.
-pub(crate) fn written(number: f64) -> String {
-    let is_short = number == 0.0 || (1e-4..1e7).contains(&number.abs());
-    if is_short || !number.is_finite() {
-        number.to_string()
-    } else {
-        format!("{number:e}")
-    }
-}
-
 impl Limited for i64 {
     fn is_finite(self) -> bool {
         true
@@ -321,7 +311,9 @@ impl List {
     /// How to mend a list of another length.
     fn hint_about(&self, at: Path<'_>, values: &[Value]) -> Option<String> {
         let is_whole = |value: &Value| value.is_integer();
-        let are_halves = values.len() == 2 * self.most && values.iter().all(is_whole);
+        // Lists without an end have the largest number as their most.
+        let is_double = values.len().is_multiple_of(2) && values.len() / 2 == self.most;
+        let are_halves = is_double && values.iter().all(is_whole);
         if are_halves {
             let pairs = values
                 .chunks(2)

@@ -18,9 +18,9 @@ use schemars::JsonSchema;
 use serde_json::Value;
 
 use check::unknown_key_hint;
-pub(crate) use check::{Misfit, MisfitKind, Path, written};
+pub(crate) use check::{Misfit, MisfitKind, Path};
 pub(crate) use node::Node;
-pub(crate) use unit::unit_of;
+pub(crate) use unit::{unit_of, written};
 
 /// Unit of a number, where its key does not end with it.
 pub(crate) const UNIT: &str = "x-unit";

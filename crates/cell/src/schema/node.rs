@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::unit::written_after;
+use super::unit::{written, written_after};
 use super::{HINT, OFF, UNIT};
 
 /// What a value may be.
@@ -165,7 +165,7 @@ impl Node {
             Self::Truth => "true".to_owned(),
             Self::Number(limits) => {
                 let number = if limits.holds(0.0) { 0.0 } else { limits.least };
-                super::written(number)
+                written(number)
             }
             Self::Whole(limits) => {
                 let number = if limits.holds(1) { 1 } else { limits.least };

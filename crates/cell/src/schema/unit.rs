@@ -39,6 +39,16 @@ pub(crate) fn unit_of(key: &str) -> &'static str {
     found.map_or("", |(_, unit, _)| unit)
 }
 
+/// A number with all its digits and no more zeros than one can count: 1e308, 0.5, 1e-9.
+pub(crate) fn written(number: f64) -> String {
+    let is_short = number == 0.0 || (1e-4..1e7).contains(&number.abs());
+    if is_short || !number.is_finite() {
+        number.to_string()
+    } else {
+        format!("{number:e}")
+    }
+}
+
 /// Unit or things counted, as messages write it after a number.
 pub(super) fn written_after(key: &str) -> &'static str {
     let counts = COUNTS.iter().find(|(end, _)| key.ends_with(end));

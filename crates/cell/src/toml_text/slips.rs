@@ -20,6 +20,12 @@ pub(super) fn hint_about(text: &str, span: Range<usize>) -> Option<String> {
         return Some(format!("write `{} = {}`", key.trim(), value.trim()));
     };
     let (key, value) = (key.trim(), value.trim());
+    // By itself it is TOML: what is wrong is that it was there before.
+    if line.parse::<Table>().is_ok() {
+        return Some(format!(
+            "`{key}` stands twice in its section: keep one of the lines"
+        ));
+    }
     let is_number = |word: &str| word.parse::<f64>().is_ok();
     if value.is_empty() {
         return Some(format!("write a value after `{key} =`"));
@@ -214,6 +220,7 @@ mod tests {
             ("lesion = \u{201c}a\u{201d}", "plain quotes"),
             ("lesion = \"a", "end with the quote"),
             ("length_mm =", "a value after `length_mm =`"),
+            ("a = 2", "`a` stands twice"),
         ] {
             let found = hint(line);
             assert!(found.contains(wanted), "{line}: {found}");

@@ -121,5 +121,5 @@ fn contradictions_and_wild_angles_are_refused_with_a_hint() {
     assert_eq!(finding.key.as_deref(), Some("goals[0].target_offset_mm"));
     assert!(finding.message.contains("outside the phantom"));
     let finding = refuse(lesion);
-    assert!(finding.hint.unwrap().contains("`entry_direction_deg`"));
+    assert!(finding.hint.unwrap().contains("`entry_direction_deg = ["));
 }

@@ -413,7 +413,7 @@ fn more_clearance_is_chosen_and_dominates() {
     assert_eq!(goal.ranking.as_ref().unwrap().pareto_set, ["Right-Up-Fold"]);
     let reason = &goal.recommended.as_ref().unwrap().reason;
     assert!(
-        reason.contains("ahead in clearance (30.0 mm against 20.0 mm"),
+        reason.contains("ahead in clearance (proven 30.0 mm against 20.0 mm"),
         "{reason}"
     );
     // Nothing speaks for the other one.
@@ -480,7 +480,10 @@ fn reason_prints_what_was_measured_and_not_what_counts() {
     for term in &goal.configurations[0].ranking.as_ref().unwrap().terms {
         assert!(term.utility <= 1.0);
     }
-    assert!(reason.contains("(30.0 mm against 20.0 mm"), "{reason}");
+    assert!(
+        reason.contains("(proven 30.0 mm against 20.0 mm"),
+        "{reason}"
+    );
 }
 
 #[test]

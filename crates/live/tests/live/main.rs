@@ -8,8 +8,9 @@ use needlebench_kinematics::Joints;
 use needlebench_kinematics::random::SplitMix64;
 use needlebench_live::{Limits, Live, Scene};
 
-/// Rounding of some metres: the base's solids are moved, and in the program made at their place.
-const ROUNDING_M: f64 = 1e-11;
+/// Rounding of some metres, through the angles of a turned base: its solids are moved, and in the program made at
+/// their place. Seen: 2.5e-11.
+const ROUNDING_M: f64 = 1e-10;
 
 fn scenarios() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios")
@@ -73,13 +74,14 @@ fn clearances_are_the_programs_bit_for_bit() {
     }
 }
 
-/// A scenario, its line of the base, other places and turns, and the line of the base's turn there.
+/// A scenario, its lines of the base, another place and turn. Goals are points of the patient: a flange pose would
+/// move with the base.
 const MOVES: [(&str, &str, [f64; 3], [f64; 3]); 4] = [
     (
-        "table3.toml",
-        "base_position_mm = [0, 0, 800]\nbase_rpy_deg = [0, 0, 180]",
-        [-120.0, 35.0, 870.0],
-        [0.0, 0.0, 150.0],
+        "supine_suite.toml",
+        "base_position_mm = [-280, 350, 1050]\nbase_rpy_deg = [0, 0, 270]",
+        [-320.0, 385.0, 1120.0],
+        [0.0, 0.0, 240.0],
     ),
     (
         "hanging.toml",
@@ -166,5 +168,7 @@ fn an_arm_under_the_floor_is_seen() {
     assert!(live.lowest_m(&hanging_down) > 0.0);
     live.place_base(&pose_of([0.0, 0.0, 100.0], [0.0, 0.0, 180.0]))
         .unwrap();
-    assert!(live.lowest_m(&hanging_down) < -0.3);
+    let lowest_m = live.lowest_m(&hanging_down);
+    // Shoulder 152 mm over the base, links of 244 and 213 mm, and the wrists with the tool beyond.
+    assert!((-0.5..-0.2).contains(&lowest_m), "{lowest_m}");
 }

@@ -11,7 +11,7 @@ use needlebench_planning::Aim;
 
 use super::run::prepare_folder;
 use super::{load, overrides, print_json, print_text};
-use crate::output::shown;
+use crate::output::{print_wide, shown};
 
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
@@ -37,6 +37,9 @@ pub(crate) struct AtlasArguments {
     /// Folder for results; the scenario gets a folder of its name in it.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
+    /// Print all columns, as wide as they are, and what works nowhere among the rows.
+    #[arg(long, conflicts_with = "json")]
+    pub wide: bool,
     /// Print the atlas as one JSON document instead of the table.
     #[arg(long)]
     pub json: bool,
@@ -70,6 +73,9 @@ pub(crate) enum AimArgument {
 
 /// Computes and writes the atlas of one or all goals.
 pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
+    if arguments.wide {
+        print_wide();
+    }
     let refuse = |finding: Finding| {
         print_findings(&[finding]);
         Ok(ExitStatus::BadInput)
@@ -126,7 +132,7 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
     } else {
         let tables: Vec<String> = atlases
             .iter()
-            .map(|(goal, atlas)| text(&resolved.cell, goal, atlas))
+            .map(|(goal, atlas)| text(&resolved.cell, goal, atlas, arguments.wide))
             .collect();
         print_text(&format!(
             "{}\n\n{}\nresults: {}",

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use needlebench_bench::Preview;
 use needlebench_bench::preview::BASIS;
-use needlebench_cell::{Finding, ResolvedScenario, part_in_words};
+use needlebench_cell::{Finding, ResolvedScenario, part_in_words, reason_in_words};
 use needlebench_report::table::{fissures_in_words, rejected_in_words, route_in_words};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -159,17 +159,20 @@ fn in_words(
         let by_criteria = rejected.filter(|each| each.rejections.is_empty());
         let mut missed: Vec<(&str, Vec<&str>)> = Vec::new();
         for each in by_criteria {
-            let criterion = each.missed.unwrap_or("a criterion");
+            let criterion = each.missed.unwrap_or("a criterion is missed");
             match missed.iter_mut().find(|(known, _)| *known == criterion) {
                 Some((_, labels)) => labels.push(each.label),
                 None => missed.push((criterion, vec![each.label])),
             }
         }
         for (criterion, labels) in missed {
-            write!(text, "\n    {criterion} is missed: {}", labels.join(", "))?;
+            let reason = reason_in_words(criterion);
+            write!(text, "\n    {reason} ({criterion}): {}", labels.join(", "))?;
         }
         if let Some(route) = &goal.needle_route {
-            write!(text, "\n    {}", route_in_words(route))?;
+            let wanted_mm = resolved.scenario.criteria.min_clearance_mm.needle_route;
+            let wanted_m = wanted_mm.map(|mm| mm * 1e-3);
+            write!(text, "\n    {}", route_in_words(route, wanted_m))?;
         }
         if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
             write!(text, "\n    {words}")?;

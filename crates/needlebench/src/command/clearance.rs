@@ -81,6 +81,7 @@ pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus> {
     let cell = &resolved.cell;
     let model = ClearanceModel::new(cell);
     let q = Joints::from_column_slice(&arguments.joints.0);
+    arguments.joints.doubt_degrees();
     let classes: BTreeMap<&'static str, ClassAnswer> = model
         .minimum_per_class(&q)
         .iter()
@@ -116,7 +117,10 @@ pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus> {
         return Ok(ExitStatus::Success);
     }
     let mut table = needlebench_report::plain_table(&["class", "clearance (mm)", "between", "and"]);
-    for (class, answer) in &classes {
+    // The least first.
+    let mut sorted: Vec<_> = classes.iter().collect();
+    sorted.sort_by(|(_, a), (_, b)| a.minimum_m.total_cmp(&b.minimum_m));
+    for (class, answer) in sorted {
         table.add_row([
             (*class).to_owned(),
             format!("{:.3}", answer.minimum_m * 1e3),

@@ -325,6 +325,7 @@ pub(crate) fn fk(arguments: &FkArguments) -> Result<ExitStatus> {
             return Ok(ExitStatus::BadInput);
         }
     };
+    arguments.joints.doubt_degrees();
     let answer = FkAnswer::new(&arm, &Joints::from_column_slice(&arguments.joints.0));
     if arguments.json {
         print_json(&answer)?;

@@ -187,14 +187,13 @@ fn answer(cell: &Cell, pair: &PairExamination) -> PairAnswer {
 
 fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> String {
     let mut table = plain_table(&[
-        "body",
-        "and",
+        "bodies",
         "class",
         "state",
         "joints",
-        "in collision",
-        "least seen (mm)",
-        "proven least (mm)",
+        "in\ncollision",
+        "least seen\n(mm)",
+        "proven least\n(mm)",
     ]);
     for pair in examined {
         // What stands still in the world is no statement about the arm.
@@ -203,8 +202,7 @@ fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> 
         }
         let [a, b] = names(cell, pair);
         table.add_row([
-            a,
-            b,
+            format!("{a}, {b}"),
             pair.class.map_or("-", ClearanceClass::name).to_owned(),
             pair.state.name().to_owned(),
             pair.joints.len().to_string(),
@@ -216,10 +214,10 @@ fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> 
         ]);
     }
     let count = |state| examined.iter().filter(|pair| pair.state == state).count();
-    let mut text = table.to_string();
+    let mut text = String::new();
     let _ = write!(
         text,
-        "\n{} pairs measured, of which {} proven never to touch and {} always in collision; {} left \
+        "{} pairs measured, of which {} proven never to touch and {} always in collision; {} left \
          out as adjacent, {} as fixed to each other ({} random postures, seed {})",
         examined
             .iter()
@@ -250,6 +248,7 @@ fn table(cell: &Cell, examined: &[PairExamination], settings: &PairSettings) -> 
             ),
         };
     }
+    let _ = write!(text, "\n\n{table}");
     text
 }
 

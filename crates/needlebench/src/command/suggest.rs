@@ -196,6 +196,12 @@ fn in_words(arguments: &SuggestArguments, found: &Found, written: Option<&Path>)
         let folder = out.join(&found.resolved.scenario.name);
         last.push(format!("maps: {}", shown(&folder)));
     }
+    if let (Some(path), None) = (&arguments.write, written) {
+        last.push(format!(
+            "not written: {}, since not all that is asked for was found",
+            shown(path)
+        ));
+    }
     if let Some(path) = written {
         last.push(format!(
             "written: {0}; next: needlebench run {0}",
@@ -222,12 +228,17 @@ fn find(
         SuggestError::Interrupted => Stop::Interrupted,
         SuggestError::Refused { message, hint } => Finding::new(&file, message).hint(hint).into(),
     };
-    let mut sections = sections(arguments, &file, goals)?;
+    let mut sections = sections(arguments, &file, goals.clone())?;
+    // What is written has to serve the other goals of the scenario too.
+    let rest: Vec<GoalSection> = goals
+        .into_iter()
+        .filter(|goal| arguments.write.is_some() && has_entry(goal))
+        .filter(|goal| sections.iter().all(|each| each.name != goal.name))
+        .collect();
     let (mut entries, mut best) = (Vec::new(), Vec::new());
     for section in &sections {
-        let has_entry = section.entry_mm.is_some() || section.entry_direction_deg.is_some();
         // Places need an entry too.
-        let is_needed = arguments.entries > 0 || !has_entry && section.flange_pose.is_none();
+        let is_needed = arguments.entries > 0 || !has_entry(section);
         if !is_needed {
             best.push(None);
             continue;
@@ -254,6 +265,7 @@ fn find(
                 section.entry_direction_deg = best;
             }
         }
+        sections.extend(rest);
         let placer = GoalPlacer::new(&resolved);
         let placed = sections.iter().map(|section| placer.place(section));
         let placed: Result<Vec<_>, Finding> = placed.collect();
@@ -299,6 +311,11 @@ fn find(
         entries,
         places,
     })
+}
+
+/// Whether it says from where the guide's pose follows.
+fn has_entry(goal: &GoalSection) -> bool {
+    goal.entry_mm.is_some() || goal.entry_direction_deg.is_some() || goal.flange_pose.is_some()
 }
 
 /// What is to be reached.
@@ -382,14 +399,24 @@ fn written(
                 Some(lesion) => edit.set(&section, "lesion", &format!("\"{lesion}\""))?,
                 None => edit.set(&section, "target_mm", &format!("[{x}, {y}, {z}]"))?,
             }
+            // It was judged with these.
+            if let Some(like) = own.first().filter(|goal| goal.flange_pose.is_none()) {
+                edit.set(&section, "standoff_mm", &format!("{}", like.standoff_mm))?;
+                edit.set(&section, "approach_mm", &format!("{}", like.approach_mm))?;
+            }
         }
         let [azimuth, elevation] = entry.direction_deg;
+        // Comments on the lines of the former entry go with it; those elsewhere cannot be told.
+        let length = edit.text().len();
         edit.remove(&section, "entry_mm")?;
-        edit.set(
-            &section,
-            "entry_direction_deg",
-            &format!("[{azimuth}, {elevation}]"),
-        )?;
+        edit.remove(&section, "entry_direction_deg")?;
+        let former = if edit.text().len() < length {
+            "; what comments here say of an entry is of the former one"
+        } else {
+            ""
+        };
+        let value = format!("[{azimuth}, {elevation}] # proposed by suggest{former}");
+        edit.set(&section, "entry_direction_deg", &value)?;
     }
     // A place that serves is kept, unless only places were asked for.
     let place = found

@@ -136,7 +136,7 @@ fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
         "suggest",
         "s.toml",
         "--lesion",
-        "left_perihilar",
+        "left_lower_lobe",
         "--places",
         "1",
         "--write",
@@ -150,12 +150,12 @@ fn a_scenario_is_written_that_passes_check_and_keeps_its_comments() {
     assert!(text.contains("name = \"new\""), "{text}");
     assert!(said.contains(" rib") && !said.contains("rib_"), "{said}");
     assert!(
-        text.contains("# Driven out of the bore") && text.contains("lesion = \"left_perihilar\""),
+        text.contains("# Driven out of the bore") && text.contains("lesion = \"left_lower_lobe\""),
         "{text}"
     );
     for name in [
-        "left_perihilar.entries.png",
-        "left_perihilar.entries.svg",
+        "left_lower_lobe.entries.png",
+        "left_lower_lobe.entries.svg",
         "places.png",
         "places.svg",
     ] {

@@ -1,12 +1,13 @@
 //! Commands in the guide.
 //!
 //! Blocks in `console` are run, and what they print is compared. What takes too long for that stands in a block
-//! without a language, and has to be a command line that the program understands.
+//! in `sh`, and has to be a command line that the program understands.
 
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::process::Command;
 use std::time::Duration;
 
 use crate::book::{blocks, chapters, workspace};
@@ -50,7 +51,22 @@ fn run(chapter: &Path, folder: &Path) {
     for (name, value) in ENVIRONMENT {
         cases.env(name, value);
     }
+    // The same in every build.
+    cases.insert_var("[BUILD]", build()).unwrap();
     cases.timeout(LONGEST).case(chapter).run();
+}
+
+/// What stands in brackets behind the program's version.
+fn build() -> String {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_needlebench"));
+    let said = program.arg("--version").output().unwrap().stdout;
+    let said = String::from_utf8(said).unwrap();
+    let (_, build) = said
+        .trim_end()
+        .trim_end_matches(')')
+        .split_once('(')
+        .unwrap();
+    build.to_owned()
 }
 
 /// Command lines in blocks that are not run.

@@ -72,12 +72,13 @@ pub fn budget_figure(goal: &GoalReport, label: &str) -> Option<Chart> {
         .collect();
     let (label, budget) = of_all.iter().find(|(each, _)| *each == label)?;
     let title = format!("{}, {label}: where the needle goes", goal.name);
-    Some(tiles(title, &[(label, budget)], reach_m(&of_all)))
+    let named = named_sources(&of_all);
+    Some(tiles(title, &[(label, budget)], reach_m(&of_all), &named))
 }
 
 fn chart(goal: &str, budgets: &[(&str, &ErrorBudget)]) -> Chart {
     let title = format!("{goal}: where the needle goes");
-    tiles(title, budgets, reach_m(budgets))
+    tiles(title, budgets, reach_m(budgets), &named_sources(budgets))
 }
 
 /// Half the side of all panels, m.
@@ -93,7 +94,7 @@ fn reach_m(budgets: &[(&str, &ErrorBudget)]) -> f64 {
         * 1.08
 }
 
-fn tiles(title: String, budgets: &[(&str, &ErrorBudget)], reach_m: f64) -> Chart {
+fn tiles(title: String, budgets: &[(&str, &ErrorBudget)], reach_m: f64, named: &[Source]) -> Chart {
     let columns = COLUMNS.min(budgets.len());
     let width = columns as f64 * (TILE_PX[0] + GAP_PX) + GAP_PX;
     let mut chart = Chart::new([width, 0.0], &*title);
@@ -115,7 +116,7 @@ fn tiles(title: String, budgets: &[(&str, &ErrorBudget)], reach_m: f64) -> Chart
             GAP_PX + (index % columns) as f64 * (TILE_PX[0] + GAP_PX),
             top + (index / columns) as f64 * (TILE_PX[1] + GAP_PX),
         ];
-        tile(&mut chart, corner, label, budget, reach_m);
+        tile(&mut chart, corner, (label, budget), reach_m, named);
     }
     let rows = budgets.len().div_ceil(columns) as f64;
     chart.size[1] = top + rows * (TILE_PX[1] + GAP_PX);
@@ -126,7 +127,13 @@ fn limit() -> Stroke {
     Stroke::full(Paint::Limit, 1.2)
 }
 
-fn tile(chart: &mut Chart, [left, top]: [f64; 2], label: &str, budget: &ErrorBudget, reach_m: f64) {
+fn tile(
+    chart: &mut Chart,
+    [left, top]: [f64; 2],
+    (label, budget): (&str, &ErrorBudget),
+    reach_m: f64,
+    named: &[Source],
+) {
     let total = &budget.total;
     let heading = format!(
         "{label}: {} mm rms, {} mm across",
@@ -169,7 +176,7 @@ fn tile(chart: &mut Chart, [left, top]: [f64; 2], label: &str, budget: &ErrorBud
         }
     }
     let bar = [left + BESIDE_PX, top + ABOVE_PX + PANEL_PX + BELOW_PX];
-    shares(chart, bar, TILE_PX[0] - BESIDE_PX, budget);
+    shares(chart, bar, TILE_PX[0] - BESIDE_PX, budget, named);
 }
 
 /// Closed outline of the 95 % ellipse in two of the axes, mm.
@@ -193,11 +200,38 @@ fn ellipse_points(moments: &Moments, (x, y): (usize, usize)) -> Vec<[f64; 2]> {
         .collect()
 }
 
+/// Share of the mean square from which a source is named.
+const WORTH_A_NAME: f64 = 0.02;
+
+fn square(each: &SourceBudget) -> f64 {
+    each.at_target.analytic.rms_m.powi(2)
+}
+
+/// Sources that any of the budgets names, in the order of reports: each has one colour in all of them.
+fn named_sources(budgets: &[(&str, &ErrorBudget)]) -> Vec<Source> {
+    let is_named = |source: &Source| {
+        budgets.iter().any(|(_, budget)| {
+            let sum: f64 = budget.sources.iter().map(square).sum();
+            let mine = budget
+                .sources
+                .iter()
+                .find(|each| each.source == Some(*source));
+            mine.is_some_and(|each| square(each) >= WORTH_A_NAME * sum)
+        })
+    };
+    Source::ALL.into_iter().filter(is_named).collect()
+}
+
 /// A bar of the sources' shares of the mean square, with their names in the order of their size.
-fn shares(chart: &mut Chart, [left, top]: [f64; 2], width: f64, budget: &ErrorBudget) {
+fn shares(
+    chart: &mut Chart,
+    [left, top]: [f64; 2],
+    width: f64,
+    budget: &ErrorBudget,
+    named: &[Source],
+) {
     /// Between an entry's colour and its text, and between entries, px.
     const SPACE_PX: [f64; 2] = [5.0, 14.0];
-    let square = |each: &SourceBudget| each.at_target.analytic.rms_m.powi(2);
     let sum: f64 = budget.sources.iter().map(square).sum();
     if sum <= 0.0 {
         return;
@@ -206,7 +240,7 @@ fn shares(chart: &mut Chart, [left, top]: [f64; 2], width: f64, budget: &ErrorBu
     let mut drawn: f64 = 0.0;
     for each in &budget.sources {
         let Some(source) = each.source else { continue };
-        let color = Source::ALL
+        let color = named
             .iter()
             .position(|known| *known == source)
             .map_or(Paint::Soft, Paint::Series);
@@ -215,8 +249,8 @@ fn shares(chart: &mut Chart, [left, top]: [f64; 2], width: f64, budget: &ErrorBu
         let (from, to) = (place(drawn), place(drawn + share));
         chart.fill([left + from, top], [to - from, BAR_PX], color);
         drawn += share;
-        if share >= 0.02 {
-            let name = format!("{} {:.0} %", source.name(), share * 100.0);
+        if share >= WORTH_A_NAME {
+            let name = format!("{} {:.0} %", source.name().replace('_', " "), share * 100.0);
             names.push((share, color, name));
         }
     }

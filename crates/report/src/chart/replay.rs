@@ -9,9 +9,10 @@ use super::legend::{Sample, legend};
 use super::paint::{Overlay, Paint, Stroke};
 use super::panel::Panel;
 
+/// Wider than the engines' curves, which are drawn over it and leave a rim of it to be seen.
 const REAL: Stroke = Stroke {
-    paint: Paint::Ink,
-    width: 1.4,
+    paint: Paint::Soft,
+    width: 5.0,
     dash: None,
 };
 

@@ -11,6 +11,7 @@ use quick_junit::{NonSuccessKind, SerializeError, TestCase, TestCaseStatus, Test
 use super::failure::{failure, not_judged};
 use super::times::{seconds, share_time};
 use crate::number::value_and_limit;
+use crate::table::verdict::missed_as_expected;
 
 /// Reports as one JUnit document. Of two runs of the same inputs its times alone differ: each report's time
 /// of planning and simulation, shared evenly among its cases.
@@ -29,6 +30,8 @@ pub fn junit(reports: &[&Report]) -> Result<String, SerializeError> {
                     .iter()
                     .filter(|result| result.goal == goal.name && !result.pass)
                     .filter(|result| result.label.as_deref() == Some(configuration.label))
+                    // As the verdict has it; the lines of its values say that it is missed.
+                    .filter(|result| !missed_as_expected(report, result))
                     .map(described)
                     .collect();
                 let open = open(report, &goal.name, Some(configuration.label));

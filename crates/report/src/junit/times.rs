@@ -2,23 +2,26 @@
 
 use std::time::Duration;
 
-use quick_junit::Report;
+use quick_junit::{Report, TestCase, TestCaseStatus};
 
-/// Shares a time out evenly among all cases of a document: what a case took by itself is not known, as many are
-/// computed at once.
+/// Shares a time out evenly among all cases of a document that were not skipped, and says so: what a case took by
+/// itself is not known, as many are computed at once.
 pub(super) fn share_time(document: &mut Report, total: Duration) {
-    let count: usize = document
+    let has_run = |case: &&mut TestCase| !matches!(case.status, TestCaseStatus::Skipped { .. });
+    let cases = document
         .test_suites
-        .iter()
-        .map(|suite| suite.test_cases.len())
-        .sum();
+        .iter_mut()
+        .flat_map(|suite| &mut suite.test_cases);
+    let count = cases.filter(has_run).count();
     let each = total / u32::try_from(count.max(1)).unwrap_or(u32::MAX);
     for suite in &mut document.test_suites {
-        let cases = u32::try_from(suite.test_cases.len()).unwrap_or(u32::MAX);
-        for case in &mut suite.test_cases {
+        let mut of_suite = Duration::ZERO;
+        for case in suite.test_cases.iter_mut().filter(has_run) {
             case.set_time(each);
+            of_suite += each;
         }
-        suite.set_time(each * cases);
+        suite.set_time(of_suite);
+        suite.add_property(("time", "of all cases together, shared evenly"));
     }
     document.set_time(total);
 }

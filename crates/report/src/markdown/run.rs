@@ -11,7 +11,7 @@ use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::shown::{Shown, shown_metrics};
 use crate::table::verdict::{counts, status};
-use crate::table::{fissures_in_words, route_in_words};
+use crate::table::{fissures_in_words, route_in_words, route_wanted_m};
 
 /// The report as Markdown; `engines` are those that there are, with their titles.
 pub fn markdown(report: &Report, engines: &[&'static dyn Engine]) -> String {
@@ -41,7 +41,7 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
             writeln!(out, "{comparison}")?;
         }
         if let Some(route) = &goal.needle_route {
-            let words = route_in_words(route);
+            let words = route_in_words(route, route_wanted_m(report, goal));
             writeln!(
                 out,
                 "{}\n",

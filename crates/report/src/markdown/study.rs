@@ -5,7 +5,8 @@ use std::fmt::Write;
 use needlebench_evaluation::report::Verdict;
 
 use super::escape::inline;
-use crate::table::study::document::{Block, Document};
+use crate::table::study::block::Block;
+use crate::table::study::document::Document;
 
 /// Text that breaks no table.
 fn cell_text(text: &str) -> String {

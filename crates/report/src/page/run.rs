@@ -44,9 +44,9 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
     if let Some(report) = document["report"].as_object_mut() {
         report.remove("timings");
     }
-    let unwanted = ClearanceClass::ALL.into_iter();
-    let unwanted = unwanted.filter(|class| class.is_unwanted());
-    document["unwantedClasses"] = json!(unwanted.map(ClearanceClass::name).collect::<Vec<_>>());
+    let around = ClearanceClass::ALL.into_iter();
+    let around = around.filter(|class| class.is_surroundings());
+    document["classesAround"] = json!(around.map(ClearanceClass::name).collect::<Vec<_>>());
     if !resolved.goals.is_empty() {
         document["explore"] = explore(resolved, &mut pack);
     }

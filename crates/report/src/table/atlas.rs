@@ -1,5 +1,7 @@
 //! The atlas as a table.
 
+use std::fmt::Write;
+
 use needlebench_bench::GoalAtlas;
 use needlebench_cell::{Cell, Goal, Roll, rule_in_words};
 use needlebench_kinematics::ik::Configuration;
@@ -8,44 +10,98 @@ use needlebench_planning::{Aim, Edge, Member, RollRange};
 use super::plain_table;
 
 /// A goal's ranges, with the best roll of each.
-pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas) -> String {
-    let mut table = plain_table(&[
+///
+/// `wide` adds what ends a range, the margins of its best roll, and the configurations that work nowhere as rows of
+/// the table.
+pub fn text(cell: &Cell, goal: &Goal, atlas: &GoalAtlas, wide: bool) -> String {
+    let mut header = vec![
         "configuration",
-        "works\nfrom (deg)",
-        "\nto (deg)",
-        "before it",
-        "after it",
-        "best\nroll (deg)",
+        "works\n(deg)",
+        "best roll\n(deg)",
         "nearest\n(mm)",
         "between",
-        "joint\nmargin",
-        "|sin q5|",
-        "|sin q3|",
-    ]);
-    for family in &atlas.families {
+    ];
+    if wide {
+        header.extend([
+            "before it",
+            "after it",
+            "joint\nmargin",
+            "|sin q5|",
+            "|sin q3|",
+        ]);
+    }
+    let mut table = plain_table(&header);
+    let all = atlas.families.iter();
+    for family in all.filter(|family| wide || !family.ranges.is_empty()) {
         let label = family.configuration.label().to_owned();
         if family.ranges.is_empty() {
             table.add_row([
                 label.clone(),
                 "nowhere".to_owned(),
                 String::new(),
+                String::new(),
                 nearest_miss(atlas, family.configuration),
             ]);
         }
         for range in &family.ranges {
-            table.add_row(row(cell, atlas, label.clone(), range));
+            let mut row = row(cell, atlas, label.clone(), range);
+            row.truncate(header.len());
+            table.add_row(row);
         }
     }
     let fixed = match goal.roll {
         Roll::Fixed(roll_rad) => format!("; the goal fixes {:.1} deg", roll_rad.to_degrees()),
         Roll::Free => String::new(),
     };
-    format!(
-        "goal {}: {} rolls of the guide about the needle; the best roll is best for {}{fixed}\n{table}",
-        goal.name,
+    let mut text = format!("goal {}: {}", goal.name, answer(atlas));
+    let _ = write!(
+        text,
+        "\n{} rolls of the guide about the needle; the best roll is best for {}{fixed}\n{table}",
         atlas.rolls_rad.len(),
         aim_in_words(atlas.aim),
+    );
+    let nowhere = atlas
+        .families
+        .iter()
+        .filter(|family| !wide && family.ranges.is_empty());
+    for family in nowhere {
+        let _ = write!(
+            text,
+            "\nnowhere: {} ({})",
+            family.configuration.label(),
+            nearest_miss(atlas, family.configuration)
+        );
+    }
+    text
+}
+
+/// How many configurations work at some roll, and which has most rolls.
+fn answer(atlas: &GoalAtlas) -> String {
+    let working = atlas
+        .families
+        .iter()
+        .filter(|family| !family.ranges.is_empty());
+    let count = working.clone().count();
+    // The last of equals would come first.
+    let freest = working
+        .rev()
+        .max_by(|a, b| width_rad(&a.ranges).total_cmp(&width_rad(&b.ranges)));
+    let freest = freest.map_or(String::new(), |family| {
+        format!(
+            "; {} has most room to turn, {:.0} of 360 deg",
+            family.configuration.label(),
+            width_rad(&family.ranges).to_degrees()
+        )
+    });
+    format!(
+        "{count} of {} configurations work{freest}",
+        atlas.families.len()
     )
+}
+
+/// All rolls of some ranges together.
+fn width_rad(ranges: &[RollRange]) -> f64 {
+    ranges.iter().map(RollRange::width_rad).sum()
 }
 
 /// What a roll is best at.
@@ -70,17 +126,14 @@ fn row(cell: &Cell, atlas: &GoalAtlas, label: String, range: &RollRange) -> Vec<
     let least = best.least_clearance();
     let margins = best.candidate.as_ref().map(|candidate| candidate.margins);
     let margin = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.2}"));
-    let (from, to) = if range.is_whole_circle {
-        ("all round".to_owned(), String::new())
+    let works = if range.is_whole_circle {
+        "all round".to_owned()
     } else {
-        (degrees(range.from_rad), degrees(range.to_rad))
+        format!("{} to {}", degrees(range.from_rad), degrees(range.to_rad))
     };
     vec![
         label,
-        from,
-        to,
-        edge(&range.before),
-        edge(&range.after),
+        works,
         degrees(best.roll_rad),
         least.map_or(String::new(), |pair| {
             format!("{:.1}", pair.separation.distance_m * 1e3)
@@ -89,6 +142,8 @@ fn row(cell: &Cell, atlas: &GoalAtlas, label: String, range: &RollRange) -> Vec<
             let [a, b] = pair.in_words(cell);
             format!("{a}, {b}")
         }),
+        edge(&range.before),
+        edge(&range.after),
         margin(margins.map(|margins| margins.joint_limit)),
         margin(margins.map(|margins| margins.wrist_sine)),
         margin(margins.map(|margins| margins.elbow_sine)),

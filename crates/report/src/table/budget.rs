@@ -40,7 +40,7 @@ pub fn budget_text(goal: &GoalReport) -> Option<String> {
         .filter_map(|each| each.source)
         .collect();
     let mut header = vec!["configuration".to_owned()];
-    header.extend(sources.iter().map(|source| source.name().to_owned()));
+    header.extend(sources.iter().map(|source| source.name().replace('_', " ")));
     header.extend(
         [
             "all",
@@ -119,7 +119,10 @@ fn write_remarks(
         .filter(|(configuration, _)| configuration.rejections.is_empty())
         .min_by(|(_, a), (_, b)| rms(a).total_cmp(&rms(b)));
     if let Some((configuration, budget)) = best {
-        let dominant = budget.dominant.map_or("nothing", Source::name);
+        let dominant = budget
+            .dominant
+            .map_or("nothing", Source::name)
+            .replace('_', " ");
         writeln!(
             out,
             "least off of those that work: {}, {} mm, most of it by {dominant}",
@@ -146,7 +149,7 @@ fn write_remarks(
                     writeln!(
                         out,
                         "to {}: least sensitive {} ({} mm), most {} ({} mm)",
-                        source.name(),
+                        source.name().replace('_', " "),
                         least.0.label,
                         mm(low),
                         most.0.label,

@@ -302,9 +302,10 @@ fn metric_changes<'a>(goals: &[&'a GoalComparison]) -> Vec<MetricChanges<'a>> {
                 });
             let changes = &mut all[at];
             match found.outcome {
-                Change::Better | Change::New => changes.better += 1,
+                Change::Better => changes.better += 1,
                 Change::Worse | Change::Lost => changes.worse += 1,
-                Change::Changed | Change::Same => {}
+                // What was not measured before is neither.
+                Change::New | Change::Changed | Change::Same => {}
             }
             let size = |found: &MetricComparison| {
                 let is_loss = matches!(found.outcome, Change::Worse | Change::Lost);
@@ -331,11 +332,14 @@ fn metrics_table(metrics: &[MetricChanges<'_>]) -> Table {
         let (largest, place) = each
             .largest
             .map_or_else(Default::default, |(goal, of, found)| {
-                let [_, a, b, ..] = metric_texts(found);
-                (
-                    format!("{a} to {b}"),
-                    format!("{} {}", goal.name(), of.label),
-                )
+                let [_, a, b, change, _] = metric_texts(found);
+                // Below the digits that both are shown with.
+                let from_to = if a == b {
+                    format!("{a}, by {change}")
+                } else {
+                    format!("{a} to {b}")
+                };
+                (from_to, format!("{} {}", goal.name(), of.label))
             });
         let worse = if each.worse > 0 {
             right(each.worse).fg(Color::Red)

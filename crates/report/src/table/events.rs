@@ -32,6 +32,59 @@ pub fn events_text(goal: &GoalReport) -> Option<String> {
     Some(text)
 }
 
+/// The same in a sentence: the worst of each kind over configurations and engines.
+pub fn events_in_words(goal: &GoalReport) -> Option<String> {
+    let events = || {
+        goal.configurations
+            .iter()
+            .filter_map(|each| each.events.as_ref())
+    };
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.reduce(f64::max);
+    let presses = || events().flat_map(|each| &each.press);
+    let stops = || events().filter_map(|each| each.stop.as_ref());
+    let mut parts = Vec::new();
+    let staged = presses().filter(|each| each.not_staged.is_none()).count();
+    let left_out = presses().count() - staged;
+    let episodes = presses()
+        .flat_map(|each| each.engines.values())
+        .flat_map(|each| &each.episodes);
+    if let Some(force) = largest(&mut episodes.map(|each| each.peak_force_n)) {
+        let left_out = match left_out {
+            0 => String::new(),
+            count => format!(" ({count} more could not be staged)"),
+        };
+        parts.push(format!(
+            "{staged} contacts that were asked for{left_out}, at most {force:.1} N against a rigid surface"
+        ));
+    } else if left_out > 0 {
+        parts.push(format!(
+            "none of {left_out} contacts that were asked for could be staged"
+        ));
+    }
+    let measured = || stops().flat_map(|each| each.engines.values());
+    if let Some(way_m) = largest(&mut measured().map(|each| each.tip_distance_m)) {
+        let time = largest(&mut measured().filter_map(|each| each.stopping_time_s));
+        let time = time.map_or(String::new(), |s| format!(" in {:.0} ms", s * 1e3));
+        parts.push(format!(
+            "in an emergency stop the tip goes {:.1} mm at most{time}",
+            way_m * 1e3
+        ));
+    }
+    let ways = || events().flat_map(|each| each.retract.values());
+    if let Some(off_m) = largest(&mut ways().map(|each| each.largest_lateral_deviation_m)) {
+        let touching = ways().filter(|each| !each.contacts.is_empty()).count();
+        let touching = match touching {
+            0 => "touches nothing".to_owned(),
+            count => format!("touches something in {count} of {}", ways().count()),
+        };
+        parts.push(format!(
+            "the way back leaves the axis by {} at most and {touching}",
+            small_length(off_m)
+        ));
+    }
+    (!parts.is_empty()).then(|| format!("events, worst of all: {}", parts.join("; ")))
+}
+
 fn add(table: &mut Table, row: Vec<String>, texts: usize) {
     let cells = row.into_iter().enumerate().map(|(at, text)| {
         let cell = Cell::new(text);

@@ -8,7 +8,7 @@ use needlebench_evaluation::iso9283::{
 };
 
 use super::plain_table;
-use crate::number::{small_length, small_length_or_zero};
+use crate::number::{LengthUnit, small_length_or_zero, unit_of_length};
 
 /// What a run prints of its test.
 pub fn report_text(report: &Iso9283Report) -> String {
@@ -95,23 +95,44 @@ pub fn measured_text(report: &MeasuredReport) -> String {
     text
 }
 
+/// The unit that all lengths of a table have, so that a column can be read down.
+fn shared_unit(
+    statistics: &ProtocolStatistics,
+    stabilisation: &[StabilisationReport],
+) -> LengthUnit {
+    let poses = statistics.poses.iter();
+    let lengths = poses.flat_map(|each| [each.ap_m, each.rp_m]);
+    let overshoots = stabilisation.iter().filter_map(|each| each.overshoot_m);
+    unit_of_length(lengths.chain(overshoots).fold(0.0, f64::max))
+}
+
 /// AP, RP, vAP, stabilisation and drift as tables and lines.
 fn statistics_text(
     statistics: &ProtocolStatistics,
     stabilisation: &[StabilisationReport],
     drift: Option<&Drift>,
 ) -> String {
+    let unit = shared_unit(statistics, stabilisation);
+    let headed = |name: &str| format!("{name}\n({})", unit.name);
+    // No minus before what rounds to zero.
+    let text = |metres: f64| format!("{:.2}", metres * unit.per_metre).replace("-0.00", "0.00");
+    let (ap, mean, rp, overshoot) = (
+        headed("AP"),
+        format!("mean minus command\nx, y, z ({})", unit.name),
+        headed("RP"),
+        headed("overshoot"),
+    );
     let mut table = plain_table(&[
         "pose",
         "n",
-        "AP",
-        "mean minus command\n(x, y, z)",
-        "RP",
-        "AP a, b, c (mdeg)",
-        "RP a, b, c (mdeg)",
+        &ap,
+        &mean,
+        &rp,
+        "AP a, b, c\n(mdeg)",
+        "RP a, b, c\n(mdeg)",
         "stabilisation\n(s)",
         "after motion\n(s)",
-        "overshoot",
+        &overshoot,
     ]);
     for each in &statistics.poses {
         let settled = stabilisation.iter().find(|found| found.pose == each.pose);
@@ -128,9 +149,9 @@ fn statistics_text(
         table.add_row([
             format!("P{}", each.pose),
             each.count.to_string(),
-            small_length_or_zero(each.ap_m),
-            each.ap_xyz_m.map(small_length).join(", "),
-            small_length_or_zero(each.rp_m),
+            text(each.ap_m),
+            each.ap_xyz_m.map(text).join(", "),
+            text(each.rp_m),
             angles(each.angles.map(|angles| angles.ap_rad)),
             angles(each.angles.map(|angles| angles.rp_rad)),
             seconds(settled.and_then(|each| each.time_s)),
@@ -141,7 +162,7 @@ fn statistics_text(
                     if metres == 0.0 {
                         "none".to_owned()
                     } else {
-                        small_length_or_zero(metres)
+                        text(metres)
                     }
                 }),
         ]);

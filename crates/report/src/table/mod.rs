@@ -21,4 +21,5 @@ pub mod suggest;
 pub(crate) mod verdict;
 
 pub use plain::{Table, plain_table};
+pub(crate) use run::route_wanted_m;
 pub use run::{fissures_in_words, rejected_in_words, report_screen, report_text, route_in_words};

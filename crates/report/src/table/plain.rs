@@ -1,5 +1,6 @@
 //! The look of all tables, and how they keep to the width.
 
+use std::collections::HashSet;
 use std::fmt;
 use std::ops::{Deref, DerefMut};
 
@@ -22,7 +23,7 @@ const LOOK: TableStyle = TableStyle::new()
 /// A table that keeps to the width of [`crate::layout`] when it is shown.
 ///
 /// First columns of words are broken at spaces. Where that is not enough the table is divided between columns,
-/// with the first column in each part; numbers are never broken.
+/// with the columns that tell its rows apart in each part; numbers are never broken.
 #[derive(Debug, Clone)]
 pub struct Table(comfy_table::Table);
 
@@ -39,7 +40,7 @@ impl Table {
     /// The text of this table, no wider than `width` as far as its numbers and words allow.
     pub fn fitted(&self, width: usize) -> String {
         let columns = columns(&self.0);
-        let parts: Vec<String> = parts(&columns, width)
+        let parts: Vec<String> = parts(&columns, keys(&self.0, &columns, width), width)
             .into_iter()
             .map(|part| shown(&self.0, &columns, &part, width))
             .collect();
@@ -117,8 +118,32 @@ fn longest(text: &str, ends: impl Fn(char) -> bool) -> Option<usize> {
     text.split(ends).map(|piece| piece.chars().count()).max()
 }
 
-/// The columns of each table that a table is divided into.
-fn parts(columns: &[Shape], width: usize) -> Vec<Vec<usize>> {
+/// How many of the first columns tell the rows apart; one where no few of them do, or where they would leave
+/// no room for others.
+fn keys(table: &comfy_table::Table, columns: &[Shape], width: usize) -> usize {
+    const MOST: usize = 3;
+    let tell_apart = |count: usize| {
+        let mut seen = HashSet::new();
+        table.row_iter().all(|row| {
+            let key: Vec<String> = row.cell_iter().take(count).map(Cell::content).collect();
+            seen.insert(key)
+        })
+    };
+    let has_room = |count: &usize| {
+        let taken: usize = columns[..*count]
+            .iter()
+            .map(|each| each.least + usize::from(GAP))
+            .sum();
+        *count < columns.len() && (*count == 1 || 2 * taken <= width)
+    };
+    (1..=MOST)
+        .take_while(has_room)
+        .find(|count| tell_apart(*count))
+        .unwrap_or(1)
+}
+
+/// The columns of each table that a table is divided into, the first `keys` in each.
+fn parts(columns: &[Shape], keys: usize, width: usize) -> Vec<Vec<usize>> {
     let taken = |at: usize| columns[at].least + usize::from(GAP);
     let mut parts: Vec<Vec<usize>> = Vec::new();
     let mut room = 0_usize;
@@ -128,11 +153,15 @@ fn parts(columns: &[Shape], width: usize) -> Vec<Vec<usize>> {
             .take_while(|next| next.goes_on)
             .count();
         let wanted: usize = (at..=at + further).map(taken).sum();
-        let is_full = parts.last().is_some_and(|part| part.len() > 1) && !columns[at].goes_on;
+        let is_full = parts.last().is_some_and(|part| part.len() > keys) && !columns[at].goes_on;
         // The last column needs no gap behind it.
         if parts.is_empty() || (is_full && wanted > room.saturating_add(usize::from(GAP))) {
-            let first = if at == 0 { vec![] } else { vec![0] };
-            room = width.saturating_sub(first.iter().map(|&at: &usize| taken(at)).sum());
+            let first: Vec<usize> = if at < keys {
+                vec![]
+            } else {
+                (0..keys).collect()
+            };
+            room = width.saturating_sub(first.iter().copied().map(taken).sum());
             parts.push(first);
         }
         parts.last_mut().expect("there is one").push(at);
@@ -212,6 +241,25 @@ mod tests {
             }
         }
         assert_eq!(table.fitted(usize::MAX).lines().count(), 4);
+    }
+
+    #[test]
+    fn parts_of_a_table_have_the_columns_that_tell_its_rows_apart() {
+        let mut table = plain_table(&[
+            "joint",
+            "engine",
+            "rise (ms)",
+            "overshoot (%)",
+            "settled (ms)",
+        ]);
+        for joint in ["elbow", "wrist_1"] {
+            for engine in ["rapier", "mujoco"] {
+                table.add_row([joint, engine, "12.345", "0.125", "345.678"]);
+            }
+        }
+        let text = table.fitted(44);
+        assert_eq!(text.matches("engine").count(), 2, "{text}");
+        assert_eq!(text.matches("wrist_1  mujoco").count(), 2, "{text}");
     }
 
     #[test]

@@ -7,16 +7,18 @@ use needlebench_kinematics::JOINT_LABELS;
 use needlebench_recorded::{CalibrationFit, Estimate, LogKind, PoseError};
 
 use super::plain_table;
-use crate::number::{rounded, value_and_limit};
+use crate::number::{rounded, small_length, value_and_limit};
 
 /// The whole report, for a terminal of 80 columns.
 pub fn text(report: &ReplayReport) -> String {
     let mut out = String::new();
+    verdict(&mut out, report);
     head(&mut out, report);
+    answer(&mut out, report);
     calibration(&mut out, report);
     identification(&mut out, report);
     comparison(&mut out, report);
-    verdict(&mut out, report);
+    notes(&mut out, report);
     out.trim_end().to_owned()
 }
 
@@ -154,9 +156,9 @@ fn identification(out: &mut String, report: &ReplayReport) {
         let mut table = plain_table(&[
             "controller's model",
             "rotor (kg m^2)",
-            "left (N m)",
-            "held out",
-            "by data",
+            "left\n(N m)",
+            "held out\n(N m)",
+            "by data\n(N m)",
         ]);
         for (joint, label) in JOINT_LABELS.iter().enumerate() {
             let by_data = fit.rms_by_data_nm.map(|rms| rms[joint]);
@@ -193,8 +195,8 @@ fn identification(out: &mut String, report: &ReplayReport) {
             law.of,
             "k (N m/A)",
             "sliding (N m)",
-            "viscous",
-            "held out (A)",
+            "viscous\n(N m s/rad)",
+            "held out\n(A)",
         ]);
         for (label, drive) in JOINT_LABELS.iter().zip(&law.joints) {
             table.add_row([
@@ -210,10 +212,10 @@ fn identification(out: &mut String, report: &ReplayReport) {
     if let Some(fit) = &found.measured {
         let mut table = plain_table(&[
             "measured",
-            "rotor (kg m^2)",
-            "sliding (N m)",
-            "viscous",
-            "held out",
+            "rotor\n(kg m^2)",
+            "sliding\n(N m)",
+            "viscous\n(N m s/rad)",
+            "held out\n(N m)",
         ]);
         for (joint, label) in JOINT_LABELS.iter().enumerate() {
             table.add_row([
@@ -233,8 +235,7 @@ fn identification(out: &mut String, report: &ReplayReport) {
     if found.controller.is_some() || found.current.is_some() || found.measured.is_some() {
         let _ = writeln!(
             out,
-            "+- is half of a 95 % interval; in parentheses: not identifiable from this run;\n\
-             viscous friction in N m s/rad\n"
+            "+- is half of a 95 % interval; in parentheses: not identifiable from this run\n"
         );
     }
 }
@@ -327,7 +328,58 @@ fn comparison(out: &mut String, report: &ReplayReport) {
     let _ = writeln!(out);
 }
 
+/// What the log and its replay say, before any table.
+fn answer(out: &mut String, report: &ReplayReport) {
+    let length = |m: f64| {
+        if m < 1e-6 {
+            small_length(m)
+        } else {
+            format!("{} mm", rounded(m * 1e3, 4))
+        }
+    };
+    if let Some(fit) = report.calibration.as_ref().filter(|fit| fit.is_worth) {
+        let _ = writeln!(
+            out,
+            "calibration: poses that it has not seen are off by {} rms, by nominal lengths {}",
+            length(fit.held_out.rms_m),
+            length(fit.nominal_held_out.rms_m)
+        );
+    }
+    if let Some(real) = &report.real {
+        let lag = real.lag_of_all_s.value;
+        let lag = lag.map_or(String::new(), |s| {
+            format!("; it lags {} ms", rounded(s * 1e3, 2))
+        });
+        let _ = writeln!(
+            out,
+            "the arm follows its set-points within {} rms at the tip, {} at most{lag}",
+            length(real.tip_rms_m),
+            length(real.tip_largest_m)
+        );
+    }
+    for (name, engine) in &report.engines {
+        if let Some(real) = &engine.against_real {
+            let _ = writeln!(
+                out,
+                "{name} follows the arm's own tip within {} rms, {} at most",
+                length(real.tip_rms_m),
+                length(real.tip_largest_m)
+            );
+        }
+    }
+    let _ = writeln!(out);
+}
+
 fn verdict(out: &mut String, report: &ReplayReport) {
+    let judged = report.criteria.len() + report.not_judged.len();
+    if judged > 0 {
+        let met = report.criteria.iter().filter(|result| result.pass).count();
+        let _ = writeln!(
+            out,
+            "{}: {met} of {judged} criteria met",
+            report.verdict.name().to_uppercase()
+        );
+    }
     for failure in &report.engine_failures {
         let _ = writeln!(out, "{} failed: {}", failure.engine, failure.message);
     }
@@ -358,15 +410,9 @@ fn verdict(out: &mut String, report: &ReplayReport) {
             open.criterion, open.reason
         );
     }
-    let judged = report.criteria.len() + report.not_judged.len();
-    if judged > 0 {
-        let met = report.criteria.iter().filter(|result| result.pass).count();
-        let _ = writeln!(
-            out,
-            "{}: {met} of {judged} criteria met",
-            report.verdict.name().to_uppercase()
-        );
-    }
+}
+
+fn notes(out: &mut String, report: &ReplayReport) {
     if !report.notes.is_empty() {
         let _ = writeln!(out, "notes:");
         for note in &report.notes {

@@ -23,38 +23,16 @@ pub fn text(report: &ServoReport) -> String {
         posture.join(", "),
         report.timestep_s * 1e3
     );
-    let mut table = plain_table(&[
-        "setting",
-        "unit",
-        "value, shoulder pan to wrist 3",
-        "source",
-    ]);
-    for setting in &report.settings {
-        // Standard gravity has five.
-        let decimals = if setting.unit == "m/s^2" { 5 } else { 4 };
-        let values: Vec<String> = setting
-            .values
-            .iter()
-            .map(|value| rounded(*value, decimals))
-            .collect();
-        let same = values.iter().all(|value| *value == values[0]);
-        table.add_row([
-            setting.name.to_owned(),
-            setting.unit.to_owned(),
-            if same {
-                values[0].clone()
-            } else {
-                values.join(", ")
-            },
-            setting.source.clone(),
-        ]);
-    }
-    let _ = writeln!(out, "{table}\n");
     let margins = &report.margins;
     let _ = writeln!(
         out,
-        "all joints together: the slowest motion shrinks to {:.4} in a step; stable up to {} these \
-         gains, or steps {}",
+        "{}: all joints together and sampled, the slowest motion shrinks to {:.4} in a step; stays stable up to {} \
+         these gains, or steps {}\n",
+        if margins.spectral_radius < 1.0 {
+            "STABLE"
+        } else {
+            "UNSTABLE"
+        },
         margins.spectral_radius,
         margins
             .gain_factor
@@ -73,7 +51,7 @@ pub fn text(report: &ServoReport) -> String {
         "natural (Hz)",
         "damping",
         "bandwidth (Hz)",
-        "gain margin",
+        "gain margin\nof it alone",
     ]);
     for joint in &report.joints {
         let closed = &joint.closed_loop;
@@ -107,6 +85,33 @@ pub fn text(report: &ServoReport) -> String {
                 table.add_row(row);
             }
         }
+    }
+    let _ = writeln!(out, "{table}\n");
+    let mut table = plain_table(&[
+        "setting",
+        "unit",
+        "value, shoulder pan to wrist 3",
+        "source",
+    ]);
+    for setting in &report.settings {
+        // Standard gravity has five.
+        let decimals = if setting.unit == "m/s^2" { 5 } else { 4 };
+        let values: Vec<String> = setting
+            .values
+            .iter()
+            .map(|value| rounded(*value, decimals))
+            .collect();
+        let same = values.iter().all(|value| *value == values[0]);
+        table.add_row([
+            setting.name.to_owned(),
+            setting.unit.to_owned(),
+            if same {
+                values[0].clone()
+            } else {
+                values.join(", ")
+            },
+            setting.source.clone(),
+        ]);
     }
     let _ = write!(out, "{table}");
     out

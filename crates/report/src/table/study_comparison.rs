@@ -68,6 +68,8 @@ fn paired_lines(paired: &Paired) -> Vec<String> {
     for each in &paired.configurations {
         lines.extend(transition_text(&each.label, &each.success));
     }
+    // What is said of several configurations is said once, with their names.
+    let mut said: Vec<(String, Vec<&str>)> = Vec::new();
     for each in &paired.differences {
         let largest = [("worse", &each.losses), ("better", &each.gains)];
         for (way, cases) in largest {
@@ -75,17 +77,24 @@ fn paired_lines(paired: &Paired) -> Vec<String> {
             let Some(first) = cases.first().filter(|first| first.value > SAME) else {
                 continue;
             };
-            lines.push(format!(
-                "{} of {}: case {} {way} by {}; on average {} (B less A, {} layouts)",
+            let sentence = format!(
+                "{}: case {} {way} by {}; on average {} (B less A, {} layouts)",
                 each.words,
-                each.of,
                 first.case,
                 value_text(first.value, &each.unit),
                 value_text(each.mean, &each.unit),
                 each.count
-            ));
+            );
+            match said.iter_mut().find(|(known, _)| *known == sentence) {
+                Some((_, of)) => of.push(&each.of),
+                None => said.push((sentence, vec![&each.of])),
+            }
         }
     }
+    lines.extend(
+        said.iter()
+            .map(|(sentence, of)| format!("{sentence}: {}", of.join(", "))),
+    );
     lines
 }
 

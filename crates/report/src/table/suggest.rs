@@ -7,10 +7,9 @@ use needlebench_bench::suggest::{
     ENTRY_TERMS, Entry, EntryRule, EntrySearch, PlaceSearch, Refused,
 };
 
-use needlebench_cell::part_in_words;
+use needlebench_cell::{part_in_words, reason_in_words};
 
 use super::plain_table;
-use super::study::reasons::reason_in_words;
 
 /// Entries for a target.
 pub fn entries_text(found: &EntrySearch) -> String {
@@ -27,8 +26,8 @@ pub fn entries_text(found: &EntrySearch) -> String {
         "target [{x:.1}, {y:.1}, {z:.1}] mm; {} of {} directions have an allowed route{}",
         found.allowed,
         found.tried,
-        counts(&found.refused, |rule| {
-            EntryRule::of_name(rule).map_or(String::new(), |rule| rule.in_words().to_owned())
+        counts(&found.refused, |each| {
+            EntryRule::of_name(&each.rule).map_or(String::new(), |rule| rule.in_words().to_owned())
         }),
     );
     if found.entries.is_empty() {
@@ -46,7 +45,7 @@ pub fn entries_text(found: &EntrySearch) -> String {
         .map(|tissue| format!("{tissue}\n(mm)"))
         .collect();
     header.extend(headings.iter().map(String::as_str));
-    header.extend(["works", "score"]);
+    header.extend(["works", "score\nof 100"]);
     let is_planned = found
         .entries
         .iter()
@@ -101,7 +100,7 @@ fn entry_row(index: usize, entry: &Entry, tissues: &[&str], is_planned: bool) ->
         let planned = entry.working_planned;
         row.push(planned.map_or_else(|| "-".to_owned(), |count| format!("{count} of 8")));
     }
-    row.push(format!("{:.2}", entry.score));
+    row.push(format!("{:.0}", 100.0 * entry.score));
     row
 }
 
@@ -122,7 +121,7 @@ pub fn places_text(found: &PlaceSearch) -> String {
         } else {
             "all of them"
         },
-        counts(&found.refused, reason_in_words),
+        counts(&found.refused, Refused::in_words),
     );
     if found.places.is_empty() {
         let _ = write!(text, "none: {}", found.why_none());
@@ -137,7 +136,7 @@ pub fn places_text(found: &PlaceSearch) -> String {
     if is_planned {
         header.push("with a\nmotion");
     }
-    header.extend(["arm clear\n(mm)", "best"]);
+    header.extend(["arm clear\n(mm)", "clearest"]);
     let mut table = plain_table(&header);
     let present = found.present.iter().map(|place| ("now".to_owned(), place));
     let proposed = found.places.iter().enumerate();
@@ -165,7 +164,7 @@ pub fn places_text(found: &PlaceSearch) -> String {
     }
     let _ = writeln!(
         text,
-        "{table}\nordered by the goal with fewest configurations, then by how clear the arm of its\nbest one is of patient, table, gantry, mount and obstacles"
+        "{table}\nordered by the goal with fewest configurations, then by how clear the arm is in its\nclearest one of patient, table, gantry, mount and obstacles; run ranks by all that it measures"
     );
     for (index, place) in found.places.iter().enumerate() {
         let _ = writeln!(text, "\n# {}\n[robot]\n{}", index + 1, place.toml);
@@ -173,12 +172,12 @@ pub fn places_text(found: &PlaceSearch) -> String {
     text.trim_end().to_owned()
 }
 
-fn counts(refused: &[Refused], words: impl Fn(&str) -> String) -> String {
+fn counts(refused: &[Refused], words: impl Fn(&Refused) -> String) -> String {
     /// Lines of them; the others are counted together.
     const MOST: usize = 6;
     let mut text = String::new();
     for each in refused.iter().take(MOST) {
-        let _ = write!(text, "\n  {:5} refused: {}", each.count, words(&each.rule));
+        let _ = write!(text, "\n  {:5} refused: {}", each.count, words(each));
     }
     let others: usize = refused.iter().skip(MOST).map(|each| each.count).sum();
     if others > 0 {

@@ -129,19 +129,19 @@ impl IkAnswer {
     pub(super) fn text(&self) -> String {
         let mut table = needlebench_report::plain_table(&[
             "configuration",
-            "q1 (rad)",
-            "q2",
-            "q3",
-            "q4",
-            "q5",
-            "q6",
-            "residual (m)",
-            "(rad)",
+            "q1\n(rad)",
+            "q2\n(rad)",
+            "q3\n(rad)",
+            "q4\n(rad)",
+            "q5\n(rad)",
+            "q6\n(rad)",
+            "residual\n(m)",
+            "residual\n(rad)",
             "remarks",
         ]);
         for row in self.solutions.iter().chain(&self.nearest) {
             let mut cells = vec![row.label.to_owned()];
-            cells.extend(row.joints_rad.iter().map(|q| format!("{q:.6}")));
+            cells.extend(row.joints_rad.iter().map(|q| format!("{q:.5}")));
             cells.push(format!("{:.1e}", row.residual_m));
             cells.push(format!("{:.1e}", row.residual_rad));
             cells.push(row.remarks());
@@ -237,8 +237,15 @@ impl FkAnswer {
     }
 
     pub(super) fn text(&self) -> String {
-        let mut table =
-            needlebench_report::plain_table(&["frame", "x (m)", "y", "z", "rx (rad)", "ry", "rz"]);
+        let mut table = needlebench_report::plain_table(&[
+            "frame",
+            "position\nx (m)",
+            "\ny (m)",
+            "\nz (m)",
+            "rotation vector\nx (rad)",
+            "\ny (rad)",
+            "\nz (rad)",
+        ]);
         let mut row = |name: String, pose: &PoseAnswer| {
             let mut cells = vec![name];
             let numbers = pose.position_m.iter().chain(&pose.rotvec_rad);

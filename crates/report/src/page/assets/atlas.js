@@ -7,6 +7,12 @@ NB.ruleStyle = function (colors, name) {
   return [colors[name] || '#999999', name === 'works' || name === 'unreachable' || at < 0 ? 0 : at % 3 + 1];
 };
 
+/** What a roll is best at. */
+NB.aims = {
+  clearance: 'clearance', joint_margin: 'distance from the joint limits', singularity: 'distance from singularities',
+  tip_accuracy: 'accuracy of the tip', balanced: 'all aims together',
+};
+
 NB.AtlasPage = class {
   constructor(page, app) {
     this.page = page;
@@ -123,8 +129,8 @@ NB.AtlasPage = class {
     this.slider.max = String(360 - 360 / goal.rolls);
     this.sideTable();
     this.rangeTable();
-    const best = goal.branches.findIndex((branch) => branch.ranges.length);
-    const range = goal.branches[Math.max(best, 0)].ranges[0];
+    const best = this.freest(goal);
+    const range = goal.branches[Math.max(best, 0)].ranges.reduce((a, b) => (!a || b.width_rad > a.width_rad ? b : a), undefined);
     this.setBranch(Math.max(best, 0));
     this.setRoll(range ? range.best[goal.aim].roll_rad * 180 / Math.PI : 0);
   }
@@ -173,7 +179,7 @@ NB.AtlasPage = class {
   }
 
   sideTable() {
-    const total = (branch) => branch.ranges.reduce((sum, range) => sum + (range.is_whole_circle ? 2 * Math.PI : range.width_rad), 0);
+    const total = (branch) => this.turns(branch);
     const table = NB.table('Choose a configuration', [
       { title: 'Configuration', cell: (b) => b.label },
       { title: 'At this roll', cell: () => '' },
@@ -185,11 +191,19 @@ NB.AtlasPage = class {
     NB.clear(this.side, table, this.goal.fixedRoll === null ? null : NB.el('p', { class: 'soft small', text: `The goal fixes the roll at ${NB.deg(this.goal.fixedRoll)}\u00b0.` }));
   }
 
+  /** How far a configuration can turn about the needle, over all its ranges. */
+  turns(branch) { return branch.ranges.reduce((sum, range) => sum + (range.is_whole_circle ? 2 * Math.PI : range.width_rad), 0); }
+
+  /** The configuration with most room to turn, the first of equals; -1 where none works. */
+  freest(goal) {
+    return goal.branches.reduce((best, branch, at) => (branch.ranges.length && (best < 0 || this.turns(branch) > this.turns(goal.branches[best])) ? at : best), -1);
+  }
+
   rangeTable() {
     const { goal } = this;
     const rows = goal.branches.flatMap((branch, index) => (branch.ranges.length ? branch.ranges.map((range) => ({ branch, range, index })) : [{ branch, range: null, index }]));
     const edge = (found) => (found ? `${NB.words(found.rule)}: ${found.detail}` : '');
-    const table = NB.table(`Goal ${NB.words(goal.name)}: what stands against the rolls before and after each range; best roll for ${NB.words(goal.aim)}`, [
+    const table = NB.table(`Goal ${NB.words(goal.name)}: what stands against the rolls before and after each range; best roll for ${NB.aims[goal.aim] || NB.words(goal.aim)}`, [
       { title: 'Configuration', cell: ({ branch }) => branch.label },
       { title: 'From', unit: 'deg', numeric: true, cell: ({ range }) => (range ? (range.is_whole_circle ? 'all round' : NB.deg(range.from_rad, 2)) : 'nowhere') },
       { title: 'To', unit: 'deg', numeric: true, cell: ({ range }) => (range && !range.is_whole_circle ? `${NB.deg(range.to_rad % (2 * Math.PI), 2)}${range.to_rad > 2 * Math.PI ? ', past 360' : ''}` : '') },
@@ -205,8 +219,11 @@ NB.AtlasPage = class {
       this.setBranch(rows[at].index);
       if (rows[at].range) this.setRoll(rows[at].range.best[goal.aim].roll_rad * 180 / Math.PI);
     });
-    NB.mark(elements, 0);
-    NB.clear(this.table, table);
+    const freest = this.freest(goal);
+    NB.mark(elements, Math.max(rows.findIndex(({ index }) => index === freest), 0));
+    const working = goal.branches.filter((branch) => branch.ranges.length).length;
+    const answer = `${working} of ${goal.branches.length} configurations work${freest < 0 ? '' : `; ${goal.branches[freest].label} has most room to turn, ${NB.deg(this.turns(goal.branches[freest]), 0)} of 360\u00b0`}.`;
+    NB.clear(this.table, NB.el('p', null, NB.el('strong', { text: answer })), table);
   }
 
   paint(context, width, height) {
@@ -269,7 +286,7 @@ NB.AtlasPage = class {
       const rejecting = [...used].filter(([name]) => name !== 'works');
       NB.clear(this.stripLegend, [...used].filter(([name]) => name === 'works').map(key),
         rejecting.length ? NB.el('strong', { class: 'small', text: 'Rejected by:' }) : null, rejecting.map(key),
-        NB.el('span', { class: 'soft small', text: 'Black frame: a range that works, to the exact angle; diamond: its best roll; dashed line: the roll that the goal fixes.' }));
+        NB.el('span', { class: 'soft small', text: `Black frame: a range that works, to the exact angle; diamond: its best roll${this.fixedMark(this.goal) === null ? '' : '; dashed line: the roll that the goal fixes'}.` }));
     }
   }
 

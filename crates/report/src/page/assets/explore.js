@@ -124,6 +124,8 @@ NB.Explore = class {
     this.arm ||= this.view.arm('tried');
     this.resetAll();
     this.sign.hidden = false;
+    // It says what the run's posture keeps.
+    this.run.now.hidden = true;
     this.view.element.classList.add('trying');
     this.applyLayers();
     this.sliders[0].focus();
@@ -139,6 +141,7 @@ NB.Explore = class {
     this.bar.hidden = false;
     this.body.hidden = true;
     this.sign.hidden = true;
+    this.run.now.hidden = false;
     this.view.element.classList.remove('trying');
     for (const name of ['tried', 'tried-from', 'tried-lines', 'tried-handle']) this.view.group(name).visible = false;
     this.view.empty('tried-lines');

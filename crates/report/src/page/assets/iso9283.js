@@ -31,7 +31,7 @@ NB.TestPage = class {
     this.spread = this.spreadFactor();
     const { protocol } = report;
     app.append(
-      NB.el('p', { text: `The arm goes from P1 to P5 and back ${protocol.cycles} times as ${protocol.configuration}, at ${NB.percent(protocol.speed_share)} % of its rated joint speeds, with ${NB.significant(protocol.load_kg)} kg at the flange. A tracker measures where it comes to rest; its noise has a standard deviation of ${NB.length(protocol.tracker_noise_m)} on each axis.` }),
+      NB.el('p', { text: `The arm goes from P1 to P5 and back as ${protocol.configuration}, at ${NB.percent(protocol.speed_share)} % of its rated joint speeds, with ${NB.significant(protocol.load_kg)} kg at the flange. A tracker measures where it comes to rest; its noise has a standard deviation of ${NB.length(protocol.tracker_noise_m)} on each axis.` }),
       NB.el('div', { class: 'grid' },
         NB.el('div', null,
           NB.el('div', { class: 'bar no-print', role: 'group', 'aria-label': 'Pose' }, NB.el('span', { text: 'Arm at' }), this.poseButtons,
@@ -114,9 +114,9 @@ NB.TestPage = class {
         pose, settled: each.stabilisation.find((s) => s.pose === pose.pose), direction: each.directional.find((d) => d.pose === pose.pose),
       }));
       return [
-        NB.table(`${engine}: by pose`, [
+        NB.table(`${engine}: by pose; ${each.cycles_simulated} cycles simulated, each pose read with the tracker's noise`, [
           { title: 'Pose', cell: ({ pose }) => `P${pose.pose}` },
-          { title: 'Measured', numeric: true, cell: ({ pose }) => `${pose.count} times` },
+          { title: 'Measured', numeric: true, cell: ({ pose }) => `${pose.count} readings` },
           { title: 'AP', numeric: true, cell: ({ pose }) => NB.length(pose.ap_m) },
           ...['x', 'y', 'z'].map((axis, k) => ({ title: `AP ${axis}`, numeric: true, cell: ({ pose }) => NB.length(pose.ap_xyz_m[k]) })),
           { title: 'RP', numeric: true, cell: ({ pose }) => NB.length(pose.rp_m) },

@@ -201,7 +201,7 @@ NB.RunPage = class {
     this.drawPeople();
     this.sideTable();
     this.configurationTable();
-    NB.clear(this.answer, NB.sections.answer(this.goal));
+    NB.clear(this.answer, NB.sections.answer(this.goal, this.report.criteria));
     NB.clear(this.people, NB.sections.people(this.goal));
     if (this.goalTable) NB.mark(this.goalTable.rows, index);
     const around = [[-0.25, -0.25, -0.1], [0.25, 0.25, 0.3]].map((offset) => offset.map((value, k) => target[k] + value));
@@ -391,9 +391,9 @@ NB.RunPage = class {
     };
   }
 
-  /** The least clearance over the whole motion, of what should not touch. */
+  /** The least clearance over the whole motion of arm and tool from what stands around them. */
   leastOf(configuration) {
-    const all = Object.entries(configuration.clearance).filter(([name, found]) => found?.witness_points_m && this.page.unwantedClasses.includes(name));
+    const all = Object.entries(configuration.clearance).filter(([name, found]) => found?.witness_points_m && this.page.classesAround.includes(name));
     const least = all.reduce((best, each) => (!best || each[1].minimum_m < best[1].minimum_m ? each : best), null);
     return least && { name: least[0], ...least[1] };
   }
@@ -423,6 +423,8 @@ NB.RunPage = class {
     const now = found && NB.el('p', { text: `Nearest ${this.shown.length ? `now, at ${this.time.toFixed(2)} s` : 'in the final posture'}: ${pairWords(found)}, ${NB.mm(found.minimum_m)} mm.` });
     const all = least && this.shown.length && NB.el('p', null, `Least over the whole motion: ${pairWords(least)}, ${NB.mm(least.minimum_m)} mm${least.time_s === null ? '. ' : ` at ${least.time_s.toFixed(2)} s. `}`,
       least.time_s === null ? null : NB.el('button', { type: 'button', class: 'no-print save', onclick: () => { this.pause(); this.seek(Math.min(least.time_s, this.end)); } }, 'Go there'));
+    const own = this.configuration.clearance.self;
+    if (all && own) all.append(`Of the arm from itself, by its build: ${pairWords(own)}, ${NB.mm(own.minimum_m)} mm. `);
     if (this.playing && this.now.firstChild && now) {
       // The button stays where it is.
       this.now.firstChild.replaceWith(now);
@@ -492,7 +494,7 @@ NB.RunPage = class {
     if (total && view.works) {
       const turn = new THREE.Matrix4().makeRotationFromQuaternion(new THREE.Quaternion(...this.extra.guideExit.slice(3)));
       const entry = this.goal.entry_m;
-      for (const [where, at, color] of [['target', this.goal.target_m, [0.84, 0.37, 0, 0.55]], ['skin', entry, [0, 0.45, 0.7, 0.55]]]) {
+      for (const [where, at, color] of [['target', this.goal.target_m, [0, 0.45, 0.7, 0.55]], ['skin', entry, [0.84, 0.37, 0, 0.55]]]) {
         const moments = total[`at_${where}`]?.analytic;
         if (!at || !moments) continue;
         const spread = NB.cholesky(moments.covariance_m2);
@@ -585,9 +587,9 @@ NB.RunPage = class {
       { title: 'Status', cell: (c) => this.status(c) },
       { title: 'Rank', numeric: true, cell: (c) => (c.ranking ? String(c.ranking.rank) : '\u2013') },
       { title: 'Pareto set', cell: (c) => (c.pareto ? 'yes' : c.dominated_by ? `no: ${c.dominated_by.label} is better` : ''), help: 'in it: no other that works is as good in everything and better in something' },
-      { title: 'Score', numeric: true, cell: (c) => NB.fixed(c.ranking?.score, 3) },
-      ...NB.metricColumns(this.extra.columns.table),
+      { title: 'Score of 100', numeric: true, cell: (c) => NB.fixed(c.ranking && 100 * c.ranking.score, 1) },
       { title: 'First reason against', text: true, cell: (c) => (c.rejections[0] ? `${NB.words(c.rejections[0].rule)}: ${c.rejections[0].detail}` : '') },
+      ...NB.metricColumns(this.extra.columns.table),
     ];
     const table = NB.table(`${NB.words(this.goal.name)}: clearances are the least over the recorded motions of all engines; those that are proven hold between the samples, too`, columns, this.goal.configurations, { class: 'choose small' });
     this.tableRows = [...table.querySelectorAll('tbody tr')];

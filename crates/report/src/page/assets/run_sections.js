@@ -25,24 +25,26 @@ NB.criterionWords = function (name) {
 
 NB.sections = {
   /** What to choose, and why, before all else. */
-  answer(goal) {
+  answer(goal, criteria) {
     const { recommended } = goal;
     return [
       recommended
         ? NB.el('p', null, NB.el('strong', { text: `Recommended: ${recommended.label}. ` }), recommended.reason.charAt(0).toUpperCase() + recommended.reason.slice(1), '.')
         : NB.el('p', { class: 'error', text: 'Recommended: none, no configuration works.' }),
-      NB.sections.route(goal),
+      NB.sections.route(goal, criteria),
     ];
   },
 
   /** How the planned needle keeps away from bone, vessels and organs; red where it does not. */
-  route(goal) {
+  route(goal, criteria) {
     const { needle_route: route, fissures_crossed: fissures } = goal;
     const parts = [];
     if (route) {
+      // The criterion where it asks for more than the margin.
+      const wanted = criteria.find((each) => each.goal === goal.name && each.criterion === 'min_clearance_mm.needle_route')?.limit ?? 0;
       const part = `${NB.words(route.part)} (${route.tissue})`;
       const where = route.distance_m < 0 ? `goes ${NB.mm(-route.distance_m, 1)} mm deep through the ${part}` : `passes ${NB.mm(route.distance_m, 1)} mm from the ${part}`;
-      parts.push(NB.el('p', { class: route.kept ? '' : 'error', text: `The planned needle${route.kept ? '' : ' is refused: it'} ${where}; it has to keep ${NB.mm(route.margin_m, 1)} mm.` }));
+      parts.push(NB.el('p', { class: route.kept ? '' : 'error', text: `The planned needle${route.kept ? '' : ' is refused: it'} ${where}; it has to keep ${NB.mm(Math.max(route.margin_m, wanted), 1)} mm.` }));
     }
     if (fissures?.length) parts.push(NB.el('p', { class: 'bad', text: `The needle crosses ${fissures.map(NB.words).join(', ')} of the lung.` }));
     return parts;

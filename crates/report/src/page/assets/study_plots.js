@@ -251,7 +251,9 @@ NB.StudyPlots = class {
 
   padded(axis) {
     const pad = axis.labels ? 0 : 0.03 * (axis.high - axis.low);
-    return { ...axis, low: axis.low - pad, high: axis.high + pad };
+    // Marks of a level are spread so that they can be seen: they all have its value.
+    const title = axis.labels && !this.places().grid ? `${axis.title} (marks spread about each level)` : axis.title;
+    return { ...axis, title, low: axis.low - pad, high: axis.high + pad };
   }
 
   shape(context, [, color, shape], x, y, size) {

@@ -378,9 +378,9 @@ NB.View = class {
       const [w, h] = [element.offsetWidth, element.offsetHeight];
       const x = Math.min(Math.max((place.x + 1) / 2 * width + 10, 2), width - w - 2);
       let y = Math.min(Math.max((1 - place.y) / 2 * height - h / 2, 2), height - h - 2);
-      for (const box of taken) {
-        if (x < box.x + box.w && box.x < x + w && y < box.y + box.h && box.y < y + h) y = box.y + box.h + 2;
-      }
+      // Downwards until it covers none: what is below one may lie on another.
+      const covered = () => taken.find((box) => x < box.x + box.w && box.x < x + w && y < box.y + box.h && box.y < y + h);
+      for (let box = covered(); box; box = covered()) y = box.y + box.h + 2;
       taken.push({ x, y, w, h });
       element.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px)`;
     }

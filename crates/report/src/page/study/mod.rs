@@ -5,7 +5,7 @@ mod looks;
 #[cfg(test)]
 mod tests;
 
-use needlebench_cell::ResolvedScenario;
+use needlebench_cell::{ResolvedScenario, reason_in_words};
 use needlebench_kinematics::ik::Configuration;
 use needlebench_study::{FactorKind, Results, ResultsError};
 use serde_json::{Value, json};
@@ -15,8 +15,6 @@ use super::scene;
 use super::viewer::Viewer;
 use columns::{Columns, LABELLED};
 use looks::Looks;
-
-use crate::table::study::reasons::reason_in_words;
 
 const SCRIPT: &str = concat!(
     include_str!("../assets/study_figure.js"),

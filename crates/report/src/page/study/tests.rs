@@ -328,7 +328,7 @@ fn a_case_looks_like_itself() {
             .map(|part| part["group"].as_str().unwrap().to_owned())
             .collect()
     };
-    assert_eq!(groups(of(0)[0]), ["robot"]);
+    assert!(groups(of(0)[0]).iter().all(|group| group == "robot"));
     for tissue in ["skin", "bone", "lesion"] {
         assert!(groups(of(4)[1]).iter().any(|group| group == tissue));
     }
@@ -348,7 +348,7 @@ fn an_obstacle_stands_where_its_case_has_it_or_not_at_all() {
     let results = Synthetic::new(3);
     let scenarios = |case: u64| match case {
         0 => family.vary(&goal, &[]).ok(),
-        1 => vary("obstacles[0].position_mm[0]", Setting::from(350.0)).ok(),
+        1 => vary("obstacles[0].position_mm[0]", Setting::from(120.0)).ok(),
         _ => vary("obstacles[0].present", Setting::from(false)).ok(),
     };
     let page = StudyPage {

@@ -261,10 +261,19 @@ fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::
     let before = range(&|budget| Some(budget.before_insertion?.lateral_rms_m));
     let after = range(&|budget| Some(budget.total.at_target.analytic.rms_m));
     if let (Some(before), Some(after)) = (before, after) {
+        let is_judged = report
+            .criteria
+            .iter()
+            .any(|each| each.criterion == "max_tip_rms_mm");
+        let judged = if is_judged {
+            "judged by `max_tip_rms_mm`"
+        } else {
+            "which nothing here judges, `max_tip_rms_mm` under [criteria] would"
+        };
         writeln!(
             out,
             "published needle robots: across the needle before it goes in {} to {} mm, here {before}; at the target \
-             {} to {} mm, here {after}, allowed {} mm",
+             {} to {} mm, here {after}; radiologists allow {} mm, {judged}",
             mm(CLINICAL_LATERAL_M[0]),
             mm(CLINICAL_LATERAL_M[1]),
             mm(CLINICAL_M[0]),
@@ -536,7 +545,9 @@ fn by_how_much(rejection: &RejectionReport) -> String {
 }
 
 /// How the planned needle keeps away from what it must not meet, in a sentence.
-pub fn route_in_words(route: &RouteReport) -> String {
+///
+/// `wanted_m` is what a criterion asks for, of which and the margin the larger has to be kept.
+pub fn route_in_words(route: &RouteReport, wanted_m: Option<f64>) -> String {
     let mm = 1e3 * route.distance_m;
     let RouteReport { part, tissue, .. } = route;
     let part = part_in_words(part);
@@ -546,10 +557,17 @@ pub fn route_in_words(route: &RouteReport) -> String {
         format!("{mm:.1} mm from {part} ({tissue})")
     };
     format!(
-        "needle route{}: {where_it_goes}, margin {:.1} mm",
+        "needle route{}: {where_it_goes}, to keep {:.1} mm",
         if route.kept { "" } else { " REFUSED" },
-        1e3 * route.margin_m
+        1e3 * wanted_m.map_or(route.margin_m, |wanted_m| wanted_m.max(route.margin_m))
     )
+}
+
+/// What a criterion asks of a goal's needle, m.
+pub(crate) fn route_wanted_m(report: &Report, goal: &GoalReport) -> Option<f64> {
+    let of_goal = report.criteria.iter().filter(|each| each.goal == goal.name);
+    let mut of_route = of_goal.filter(|each| each.criterion == "min_clearance_mm.needle_route");
+    of_route.find_map(|each| each.limit)
 }
 
 /// What crossing fissures means, in a sentence; nothing where none is crossed.
@@ -607,7 +625,11 @@ pub(crate) fn margin_in_words(configuration: &ConfigurationReport) -> Option<Str
 
 fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::fmt::Result {
     if let Some(route) = &goal.needle_route {
-        writeln!(out, "{}", route_in_words(route))?;
+        writeln!(
+            out,
+            "{}",
+            route_in_words(route, route_wanted_m(report, goal))
+        )?;
     }
     if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
         writeln!(out, "{words}")?;

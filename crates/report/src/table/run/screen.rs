@@ -12,11 +12,12 @@ use needlebench_evaluation::report::{ConfigurationReport, GoalReport, Report, St
 
 use super::{
     fissures_in_words, goal_heading, missed_in_words, rejected_in_words, route_in_words,
-    write_expected,
+    route_wanted_m, write_expected,
 };
 use crate::layout;
 use crate::number::millimetres;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
+use crate::table::events::events_in_words;
 use crate::table::plain::{Table, plain_table};
 use crate::table::ranking::words;
 use crate::table::shown::shown_metrics;
@@ -24,6 +25,8 @@ use crate::table::verdict::{capitals, counts, missed_as_expected, status};
 
 /// Missed criteria that are listed; of more the number is said.
 const MOST_MISSED: usize = 8;
+/// Width of a goal's column among those of other goals.
+const GOAL_WIDTH: usize = 13;
 /// Spaces between columns of a table.
 const GAP: usize = 2;
 
@@ -133,9 +136,16 @@ fn write_goal(
         }
     }
     write_rejected(out, goal)?;
+    if let Some(words) = events_in_words(goal) {
+        writeln!(out, "{words}")?;
+    }
     write_expected(out, report, goal)?;
     if let Some(route) = &goal.needle_route {
-        writeln!(out, "{}", route_in_words(route))?;
+        writeln!(
+            out,
+            "{}",
+            route_in_words(route, route_wanted_m(report, goal))
+        )?;
     }
     if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
         writeln!(out, "{words}")?;
@@ -383,10 +393,11 @@ fn write_goals(
             .needle_route
             .as_ref()
             .filter(|_| !kept)
-            .map(route_in_words);
+            .map(|route| route_in_words(route, route_wanted_m(report, goal)));
         for words in words
             .into_iter()
             .chain(fissures_in_words(&goal.fissures_crossed))
+            .chain(events_in_words(goal))
         {
             writeln!(out, "{}: {words}", goal.name)?;
         }
@@ -411,8 +422,24 @@ fn goals_table(goals: &[GoalReport], engines: &[EngineHeading]) -> Table {
         let route = goal.needle_route.as_ref()?;
         Some(millimetres(route.distance_m))
     });
-    columns.push(Column::new("needle\nroute (mm)", routes.collect(), 0));
+    // Before the time that a motion takes, which is the first to go where there is no room.
+    let route = Column::new("needle\nroute (mm)", routes.collect(), 0);
+    columns.insert(columns.len().min(2), route);
     columns.retain(|column| column.texts.iter().any(|text| text != "-"));
+    loop {
+        let table = goals_table_of(goals, &chosen, &columns);
+        if columns.len() < 2 || !table.to_string().contains("\n\n") {
+            return table;
+        }
+        columns.pop();
+    }
+}
+
+fn goals_table_of(
+    goals: &[GoalReport],
+    chosen: &[Option<&ConfigurationReport>],
+    columns: &[Column],
+) -> Table {
     let mut header = vec!["goal", "work", "recommended"];
     header.extend(columns.iter().map(|column| column.heading.as_str()));
     let mut table = plain_table(&header);
@@ -439,7 +466,7 @@ fn recommended(goal: &GoalReport) -> Option<&ConfigurationReport> {
 fn works_where(report: &Report, goals: &[GoalReport]) -> Table {
     let names: Vec<String> = goals
         .iter()
-        .map(|goal| layout::in_lines(&goal.name, 13))
+        .map(|goal| layout::in_lines(&goal.name, GOAL_WIDTH))
         .collect();
     let mut header = vec!["configuration"];
     header.extend(names.iter().map(String::as_str));
@@ -459,7 +486,8 @@ fn works_where(report: &Report, goals: &[GoalReport]) -> Table {
 /// Score, or what stands against a configuration.
 fn outcome(report: &Report, goal: &GoalReport, each: &ConfigurationReport) -> Cell {
     if let Some(first) = each.rejections.first() {
-        return Cell::new(rule_in_words(first.rule)).fg(Color::Yellow);
+        let rule = layout::in_lines(rule_in_words(first.rule), GOAL_WIDTH);
+        return Cell::new(rule).fg(Color::Yellow);
     }
     let state = status(report, &goal.name, each);
     let is_chosen = goal
@@ -484,7 +512,9 @@ fn outcome(report: &Report, goal: &GoalReport, each: &ConfigurationReport) -> Ce
             });
             let first = missed.next();
             let why = first.map_or("", |result| short(&result.criterion));
-            Cell::new(format!("failed: {why}").trim_end_matches([':', ' '])).fg(Color::Red)
+            let text = format!("failed: {why}");
+            let text = text.trim_end_matches([':', ' ']);
+            Cell::new(layout::in_lines(text, GOAL_WIDTH)).fg(Color::Red)
         }
         (_, state) => Cell::new(state),
     }

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use needlebench_bench::study::{StudyCase, StudyColumns};
+use needlebench_cell::reason_in_words;
 use needlebench_evaluation::metric::Show;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_study::{CaseResult, Design, FactorKind, FactorValue, Row};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::document::Block;
-use super::reasons::reason_in_words;
+use super::block::Block;
 use super::text::summary_text;
 use crate::number::three_digits;
 

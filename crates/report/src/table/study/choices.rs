@@ -3,7 +3,7 @@
 use needlebench_study::statistics::{Choice, QuantileValue, Summary};
 
 use super::answer::{Answer, Comparison, has_tip_errors, percents, spaced};
-use super::document::{Block, case_list, or_dash, rate_text};
+use super::block::{Block, case_list, or_dash, rate_text};
 use crate::number::in_percent;
 
 /// Choices on the first screen, and in the whole table.

@@ -1,11 +1,11 @@
 //! How often each configuration works, how near it comes to anything, and what is in its way.
 
+use needlebench_cell::reason_in_words;
 use needlebench_study::statistics::{BEST, ConfigurationCounts, Summary};
 use needlebench_study::{Measure, MetricColumn};
 
 use super::answer::{Answer, has_tip_errors, spaced};
-use super::document::{Block, MOST_REASONS, or_dash, rate_text, table};
-use super::reasons::reason_in_words;
+use super::block::{Block, MOST_REASONS, or_dash, rate_text, table};
 use crate::number::in_percent;
 
 /// Share of the layouts below which a reason is not worth a word on the first screen.

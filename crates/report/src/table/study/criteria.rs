@@ -5,7 +5,7 @@ use needlebench_evaluation::report::TraceOutcome;
 use needlebench_study::statistics::{BEST, CriterionResult};
 
 use super::answer::spaced;
-use super::document::{Block, case_list, table};
+use super::block::{Block, case_list, table};
 use crate::number::{in_percent, measured};
 
 /// Whether the limit of a criterion is the least that is allowed; the other limits are the most.
@@ -41,6 +41,18 @@ fn verdict(result: &CriterionResult) -> &'static str {
         (false, true) => "MISSED",
         (false, false) => "not judged",
     }
+}
+
+/// Whether a criterion is met by its estimate, and the unfavourable end of the interval would miss it.
+fn is_met_by_estimate(result: &CriterionResult) -> bool {
+    result.pass
+        && result.interval.is_some_and(|interval| {
+            if is_lower_limit(&result.criterion) {
+                interval.low < result.limit
+            } else {
+                interval.high > result.limit
+            }
+        })
 }
 
 /// A row for each criterion; those that are missed first.
@@ -89,10 +101,22 @@ pub(super) fn criteria_first(criteria: &[CriterionResult], blocks: &mut Vec<Bloc
             .collect(),
         rows,
     });
+    let mut remarks = Vec::new();
     if criteria.iter().any(|each| each.confidence) {
-        blocks.push(Block::Lines(vec![
-            "judged by the unfavourable end of the interval".to_owned(),
-        ]));
+        remarks.push("judged by the unfavourable end of the interval".to_owned());
+    }
+    let by_estimate = criteria
+        .iter()
+        .filter(|each| is_met_by_estimate(each))
+        .count();
+    if by_estimate > 0 {
+        remarks.push(format!(
+            "of {by_estimate} that are met the interval reaches beyond the limit: so few cases do not show it; \
+             `confidence = true` judges by the interval"
+        ));
+    }
+    if !remarks.is_empty() {
+        blocks.push(Block::Lines(remarks));
     }
 }
 

@@ -1,34 +1,15 @@
 //! A study's statistics as headings, tables and lines, for terminals and for Markdown.
 
-use needlebench_study::statistics::{
-    BEST, BinMean, CriterionResult, Interval, Rate, RegionMap, Summary,
-};
+use needlebench_study::statistics::{BEST, BinMean, CriterionResult, RegionMap, Summary};
 
 use super::ROUNDING_MM;
 use super::answer::{Answer, has_tip_errors, spaced};
+use super::block::{Block, MOST_REASONS, case_list, rate_text, table};
 use super::choices::{all_choices, compared_first};
 use super::configurations::{all_configurations, configurations_first};
 use super::criteria::{criteria_first, criteria_in_full};
 use crate::number::{in_percent, rounded, three_digits};
 
-/// One part of a document.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Block {
-    /// The answer, in a sentence.
-    Answer(String),
-    /// A heading.
-    Heading(String),
-    /// A table: its first column is text, the others are numbers unless their heading starts with `<`.
-    Table {
-        header: Vec<String>,
-        rows: Vec<Vec<String>>,
-    },
-    /// Lines of text.
-    Lines(Vec<String>),
-}
-
-/// Reasons that are shown of each configuration.
-pub(super) const MOST_REASONS: usize = 3;
 /// Interactions that are shown of each response.
 const MOST_INTERACTIONS: usize = 3;
 
@@ -69,6 +50,7 @@ impl Document {
             .map(capital)
             .into_iter()
             .chain(parts.answer.remarks.iter().cloned())
+            .chain(that_cannot_exist(summary))
             .collect();
         if !beside.is_empty() {
             first.push(Block::Lines(beside));
@@ -103,39 +85,24 @@ impl Document {
     }
 }
 
+/// How many cases no rate is of, and mostly why.
+fn that_cannot_exist(summary: &Summary) -> Option<String> {
+    let overall = &summary.overall;
+    let mostly = overall.invalid_details.first();
+    let mostly = mostly.map_or(String::new(), |detail| {
+        format!(", mostly because of {}", detail.detail)
+    });
+    (overall.invalid > 0).then(|| {
+        format!(
+            "{} of {} cases are layouts that cannot exist and in no rate{mostly}",
+            overall.invalid, overall.cases
+        )
+    })
+}
+
 /// `postures only: ...` with its warning in capitals.
 fn capital(headline: &str) -> String {
     headline.replacen("postures", "POSTURES", 1)
-}
-
-pub fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>) -> Block {
-    Block::Table {
-        header: header.map(str::to_owned).to_vec(),
-        rows,
-    }
-}
-
-pub(super) fn between(interval: Interval, text: impl Fn(f64) -> String) -> String {
-    format!("{} .. {}", text(interval.low), text(interval.high))
-}
-
-/// `93.2 (92.1 .. 94.0)`.
-pub fn rate_text(rate: &Rate) -> String {
-    match (rate.rate, rate.interval) {
-        (Some(share), Some(interval)) => {
-            format!("{} ({})", in_percent(share), between(interval, in_percent))
-        }
-        _ => "-".to_owned(),
-    }
-}
-
-pub(super) fn or_dash(value: Option<f64>) -> String {
-    value.map_or("-".to_owned(), three_digits)
-}
-
-pub(super) fn case_list(cases: &[u64]) -> String {
-    let cases: Vec<String> = cases.iter().map(ToString::to_string).collect();
-    cases.join(", ")
 }
 
 fn overview(summary: &Summary) -> Vec<String> {

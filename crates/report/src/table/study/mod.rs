@@ -1,13 +1,13 @@
 //! A study's statistics, and one of its cases, as text.
 
 pub(crate) mod answer;
+pub(crate) mod block;
 mod case;
 mod choices;
 mod configurations;
 pub(crate) mod criteria;
 pub(crate) mod document;
 pub(crate) mod postures;
-pub(crate) mod reasons;
 pub(crate) mod robustness;
 pub(crate) mod text;
 

@@ -4,7 +4,7 @@ use needlebench_bench::study::{PreparedStudy, Replanned};
 use needlebench_cell::study::StudyMode;
 use needlebench_study::statistics::{ANY, Gap};
 
-use super::document::{Block, table};
+use super::block::{Block, table};
 use crate::number::in_percent;
 
 /// Which cases are of postures only.

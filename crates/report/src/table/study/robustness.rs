@@ -4,7 +4,7 @@ use needlebench_bench::study::RobustnessResult;
 use needlebench_bench::study::robustness::{RESOLUTION, Robustness, SmallestFound, Unaware};
 use needlebench_study::statistics::Method;
 
-use super::document::{Block, table};
+use super::block::{Block, table};
 
 /// All radii of a result.
 fn radii(found: &Robustness) -> impl Iterator<Item = &SmallestFound> {

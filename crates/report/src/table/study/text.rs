@@ -2,7 +2,7 @@
 
 use comfy_table::{Cell, CellAlignment};
 
-use super::document::Block;
+use super::block::Block;
 use crate::layout;
 use crate::table::plain_table;
 
