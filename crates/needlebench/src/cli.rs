@@ -67,16 +67,13 @@ enum Command {
         after_help = "Example: needlebench atlas scenarios/supine_suite.toml --goal right_upper_anterior"
     )]
     Atlas(AtlasArguments),
-    /// CT volumes: synthetic ones of phantoms.
-    #[command(after_help = "Example: needlebench ct synth male-p50-supine --out out/ct")]
-    Ct(CtArguments),
     /// Two results side by side: what changed, and whether more was lost than is allowed.
     #[command(
         after_help = "Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm",
         after_long_help = command::compare_help()
     )]
     Compare(Box<CompareArguments>),
-    /// CT volumes: what they are.
+    /// CT volumes: what one is, and synthetic ones of phantoms.
     #[command(after_help = "Example: needlebench ct info scan.nii.gz")]
     Ct(CtArguments),
     /// Many cases of one scenario: a table of results, statistics, and a page to look at them.
@@ -176,7 +173,6 @@ fn run() -> ExitCode {
         Command::Fk(arguments) => command::fk(&arguments),
         Command::Clearance(arguments) => command::clearance(&arguments),
         Command::Atlas(arguments) => command::atlas(&arguments),
-        Command::Ct(arguments) => command::ct(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
         Command::Ct(arguments) => command::ct(&arguments),
         Command::Study(arguments) => command::study(&arguments),

@@ -7,6 +7,8 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 use super::loft::assert_convex_and_closed;
+use needlebench_geometry::Shape;
+
 use super::*;
 
 /// Rounding of coordinates below 1 m, with two decimal digits to spare.
