@@ -216,7 +216,7 @@ fn shares(chart: &mut Chart, [left, top]: [f64; 2], width: f64, budget: &ErrorBu
         chart.fill([left + from, top], [to - from, BAR_PX], color);
         drawn += share;
         if share >= 0.02 {
-            let name = format!("{} {:.0} %", source.name(), share * 100.0);
+            let name = format!("{} {:.0} %", each.in_words(), share * 100.0);
             names.push((share, color, name));
         }
     }
@@ -268,6 +268,7 @@ mod tests {
     fn of(source: Option<Source>, rms_m: f64) -> SourceBudget {
         SourceBudget {
             source,
+            basis: None,
             at_skin: point(0.8 * rms_m),
             at_target: point(rms_m),
         }

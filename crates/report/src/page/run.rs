@@ -3,7 +3,7 @@
 use needlebench_cell::{ClearanceClass, ResolvedScenario};
 use needlebench_engine::ENGINES;
 use needlebench_evaluation::metric::{Heading, Show};
-use needlebench_evaluation::report::GoalReport;
+use needlebench_evaluation::report::{GoalReport, Report};
 use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::Joints;
 use serde_json::{Value, json};
@@ -17,6 +17,7 @@ use super::scene::{chain, pose, surroundings};
 use super::viewer::Viewer;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::shown::{Shown, shown_metrics};
+use crate::table::true_target::true_target_in_words;
 use crate::table::verdict::{counts, missed_as_expected};
 use needlebench_bench::ScenarioRun;
 
@@ -61,6 +62,9 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
     document["missedAsExpected"] = json!(expected.map(|(index, _)| index).collect::<Vec<_>>());
     document["iso9283"] = json!(charts::of_test(resolved, finished, &mut pack));
     document["words"] = super::words::words(resolved);
+    for (source, words) in localisations(report) {
+        document["words"][source] = json!(words);
+    }
     let page = Viewer {
         kind: "run",
         name: &report.scenario.name,
@@ -69,6 +73,17 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
         style: "",
     };
     page.html(pack, &document)
+}
+
+/// Names of sources of error budgets that say what they rest on, and how.
+fn localisations(report: &Report) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let configurations = report.goals.iter().flat_map(|goal| &goal.configurations);
+    let budgets = configurations.filter_map(|each| each.budget.as_ref());
+    let sources = budgets.flat_map(|budget| &budget.sources);
+    sources.filter_map(|each| {
+        each.basis?;
+        Some((each.source?.name(), each.in_words()))
+    })
 }
 
 /// Columns of metrics that any configuration has, as the page shows them.
@@ -145,6 +160,7 @@ fn goal(
             "table": columns(report, &engines, |heading| heading.page),
             "side": columns(report, &engines, |heading| heading.page_side),
         },
+        "trueTarget": true_target_in_words(report),
         "guideExit": pose(&resolved.goals[goal].world_from_guide_exit),
         "charts": charts::of_goal(finished, goal),
         "room": room::people(resolved, room, goal),

@@ -20,6 +20,7 @@ use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::plain::{Table, plain_table};
 use crate::table::ranking::words;
 use crate::table::shown::shown_metrics;
+use crate::table::true_target::true_target_in_words;
 use crate::table::verdict::{capitals, counts, missed_as_expected, status};
 
 /// Missed criteria that are listed; of more the number is said.
@@ -138,6 +139,9 @@ fn write_goal(
         writeln!(out, "{}", route_in_words(route))?;
     }
     if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
+        writeln!(out, "{words}")?;
+    }
+    if let Some(words) = true_target_in_words(goal) {
         writeln!(out, "{words}")?;
     }
     Ok(())
@@ -387,6 +391,7 @@ fn write_goals(
         for words in words
             .into_iter()
             .chain(fissures_in_words(&goal.fissures_crossed))
+            .chain(true_target_in_words(goal))
         {
             writeln!(out, "{}: {words}", goal.name)?;
         }
