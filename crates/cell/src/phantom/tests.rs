@@ -2,13 +2,11 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
-use needlebench_geometry::{PreparedShape, separation};
+use needlebench_geometry::{PreparedShape, Shape, separation};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
 use super::loft::assert_convex_and_closed;
-use needlebench_geometry::Shape;
-
 use super::*;
 
 /// Rounding of coordinates below 1 m, with two decimal digits to spare.

@@ -5,6 +5,8 @@
 //! per patient). A run uses one draw, made from the scenario's seed; the error budget uses the
 //! distribution.
 
+mod measured;
+
 use needlebench_kinematics::JOINT_COUNT;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
@@ -13,6 +15,9 @@ use super::models::names_or_path;
 use crate::Finding;
 use crate::arm::Arm;
 use crate::toml_text::TomlText;
+
+pub use measured::CovarianceMm2;
+pub(crate) use measured::covariance_m2;
 
 /// How the real arm and phantom differ from the nominal ones.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -350,6 +355,9 @@ pub struct GuideBlock {
 }
 
 /// Registration of the phantom by markers.
+///
+/// How well the markers are localised is assumed, the same for all (`localisation_error_mm`), or was measured, for
+/// each of them (`covariance_mm2`). The controller then weighs each marker by the inverse of its covariance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RegistrationBlock {
@@ -361,6 +369,11 @@ pub struct RegistrationBlock {
     /// localisation error), mm. Assumed: a third of a CT voxel and as much again of a tracker.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub localisation_error_mm: f64,
+    /// Measured covariance of each of `markers_mm`, in their order, `[xx, yy, zz, xy, xz, yz]` in the phantom
+    /// frame, mm^2, instead of `localisation_error_mm`: of its place in the scan, plus that of its place as the
+    /// robot has it (by drawing, or touched with the tip).
+    #[schemars(length(min = 3), inner(inner(range(min = -10000.0, max = 10000.0))))]
+    pub covariance_mm2: Option<Vec<CovarianceMm2>>,
 }
 
 impl Default for RegistrationBlock {
@@ -375,6 +388,7 @@ impl Default for RegistrationBlock {
                 [0.0, -110.0, 110.0],
             ],
             localisation_error_mm: 0.5,
+            covariance_mm2: None,
         }
     }
 }
@@ -431,7 +445,7 @@ impl Default for SkinMarkersBlock {
 /// Where the target is seen in the image.
 ///
 /// Each axis of the target is uniform within half a voxel, and off by what the reader's choice of its
-/// centre is off.
+/// centre is off: assumed. Or how well its centre is known was measured (`covariance_mm2`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImagingBlock {
@@ -442,6 +456,10 @@ pub struct ImagingBlock {
     /// Standard deviation of the chosen centre of the target along each axis, mm. Assumed.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub reader_mm: f64,
+    /// Measured covariance of the target's centre, `[xx, yy, zz, xy, xz, yz]` in the phantom frame, mm^2,
+    /// instead of `voxel_mm` and `reader_mm`.
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
+    pub covariance_mm2: Option<CovarianceMm2>,
 }
 
 impl Default for ImagingBlock {
@@ -449,6 +467,7 @@ impl Default for ImagingBlock {
         Self {
             voxel_mm: [0.7, 0.7, 2.0],
             reader_mm: 0.3,
+            covariance_mm2: None,
         }
     }
 }
@@ -635,6 +654,10 @@ pub(super) fn check(toml: &TomlText<'_>, section: &ImperfectionsSection) -> Vec<
                     .hint("the phantom could turn about it: move one of them away"),
             );
         }
+        findings.extend(measured::check_markers(toml, block));
+    }
+    if let Some(block) = &section.imaging {
+        findings.extend(measured::check_target(toml, block));
     }
     findings
 }

@@ -50,13 +50,13 @@ pub use excitation::{ExcitationSection, PayloadSection, SweepSection};
 pub use fixtures::{GantrySection, MountKind, MountSection, TableSection};
 pub(crate) use goals::EVERY_CONFIGURATION;
 pub use goals::{FlangePose, GoalSection, REJECTION_RULES, Target};
-pub(crate) use imperfections::POPULATION;
 pub use imperfections::{
-    ArmClass, BreathState, BreathingBlock, CalibrationBlock, ControlBlock, ElasticityBlock,
-    EncoderBlock, ExpectedSection, FrictionBlock, GuideBlock, HandEyeBlock, ImagingBlock,
-    ImperfectionsSection, IndentationBlock, NeedleBlock, PayloadBlock, RegistrationBlock,
-    SkinMarkersBlock, TorqueLimitsBlock,
+    ArmClass, BreathState, BreathingBlock, CalibrationBlock, ControlBlock, CovarianceMm2,
+    ElasticityBlock, EncoderBlock, ExpectedSection, FrictionBlock, GuideBlock, HandEyeBlock,
+    ImagingBlock, ImperfectionsSection, IndentationBlock, NeedleBlock, PayloadBlock,
+    RegistrationBlock, SkinMarkersBlock, TorqueLimitsBlock,
 };
+pub(crate) use imperfections::{POPULATION, covariance_m2};
 pub use iso9283::{
     Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES, STANDARD_EDGES_MM,
 };
@@ -223,6 +223,11 @@ pub(crate) fn check_together(
         toml,
         &scenario.goals,
         with_goals && scenario.iso9283.is_none() && scenario.excitation.is_none(),
+    ));
+    findings.extend(goals::check_true_targets(
+        toml,
+        &scenario.goals,
+        &scenario.criteria,
     ));
     findings.extend(ranking::check(toml, &scenario.ranking));
     findings.extend(events::check(toml, scenario));

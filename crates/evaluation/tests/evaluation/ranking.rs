@@ -66,6 +66,7 @@ fn budget(rms_m: f64) -> ErrorBudget {
         sources: Vec::new(),
         total: SourceBudget {
             source: None,
+            basis: None,
             at_skin: point(),
             at_target: point(),
         },
@@ -175,6 +176,7 @@ fn goal(configurations: Vec<ConfigurationReport>) -> GoalReport {
         name: "pose".into(),
         lesion: None,
         entry_m: None,
+        true_target_m: None,
         target_m: [0.0; 3],
         axis: [0.0, 0.0, 1.0],
         insertion_length_m: 0.1,

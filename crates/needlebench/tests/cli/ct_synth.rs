@@ -89,8 +89,8 @@ fn a_scenario_gives_a_volume_labels_and_a_truth_that_names_the_robot() {
     }
     let rigid = matrix(&truth["robot_from_ct"]);
     assert_eq!(rigid[3], [0.0, 0.0, 0.0, 1.0]);
-    for row in 0..3 {
-        let norm: f64 = rigid[row][..3].iter().map(|x| x * x).sum();
+    for row in &rigid[..3] {
+        let norm: f64 = row[..3].iter().map(|x| x * x).sum();
         assert!((norm - 1.0).abs() < 1e-12);
     }
 }

@@ -250,7 +250,7 @@ fn shares(
         chart.fill([left + from, top], [to - from, BAR_PX], color);
         drawn += share;
         if share >= WORTH_A_NAME {
-            let name = format!("{} {:.0} %", source.name().replace('_', " "), share * 100.0);
+            let name = format!("{} {:.0} %", each.in_words(), share * 100.0);
             names.push((share, color, name));
         }
     }
@@ -302,6 +302,7 @@ mod tests {
     fn of(source: Option<Source>, rms_m: f64) -> SourceBudget {
         SourceBudget {
             source,
+            basis: None,
             at_skin: point(0.8 * rms_m),
             at_target: point(rms_m),
         }
