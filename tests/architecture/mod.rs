@@ -57,7 +57,6 @@ const LAYERS: [(&str, &[&str]); 17] = [
             "live",
             "render",
             "bench",
-            "imaging",
             "recorded",
             "study",
             "evaluation",
@@ -104,7 +103,7 @@ const LAYERS: [(&str, &[&str]); 17] = [
 ];
 
 /// Dependencies that one crate alone has, hidden behind its own types.
-const OWNERS: [(&str, &str); 17] = [
+const OWNERS: [(&str, &str); 16] = [
     ("rapier3d-f64", "engine"),
     ("parry3d-f64", "geometry"),
     ("toml", "cell"),
@@ -116,7 +115,6 @@ const OWNERS: [(&str, &str); 17] = [
     ("zstd", "study"),
     ("crc32fast", "study"),
     ("mcap", "recorded"),
-    ("flate2", "imaging"),
     ("dicom-transfer-syntax-registry", "imaging"),
     ("png", "render"),
     ("quick-junit", "report"),

@@ -29,6 +29,8 @@ mkdirSync(out, { recursive: true });
 /** A page that fails on every error and every request that leaves the file. */
 async function open(running, file) {
   const page = await running.newPage({ viewport: SIZE });
+  // Pictures are drawn in software, on machines that may have other things to do.
+  page.setDefaultTimeout(120_000);
   const problems = [];
   page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`); });
   page.on('pageerror', (error) => problems.push(error.message));
@@ -63,6 +65,15 @@ async function notBlank(judge, locator, name, least = 12) {
 
 const settle = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 const picture = async (page) => { await settle(page); return page.evaluate(() => NB.current.view.renderer.domElement.toDataURL()); };
+
+/** Whether the picture becomes another one; it is drawn when there is time for it. */
+async function changes(page, before) {
+  for (let look = 0; look < 50; look++) {
+    if (await picture(page) !== before) return true;
+    await page.waitForTimeout(100);
+  }
+  return false;
+}
 
 /** Tab reaches every control, and shows where it is. */
 async function walk(page) {
@@ -154,7 +165,7 @@ async function testRun(page, judge, name) {
   await page.getByRole('button', { name: 'Pause' }).click();
   const paused = await page.evaluate(() => NB.current.time);
   assert.ok(paused > 0.4 && paused < end);
-  assert.notEqual(await picture(page), still, 'the replay moves nothing');
+  assert.ok(await changes(page, still), 'the replay moves nothing');
   await page.screenshot({ path: `${out}/${name}-replay.png` });
   await page.locator('.replay input[type=range]').focus();
   await page.keyboard.press('ArrowLeft');
@@ -199,12 +210,14 @@ async function testAtlas(page, judge, name) {
   assert.deepEqual(await page.evaluate(() => ({ goal: NB.current.goal.name, configuration: NB.current.branch.label, roll: String(NB.current.roll) })), asked);
   const legend = await page.locator('.curves .legend').first().textContent();
   assert.ok(legend.indexOf('works') < legend.indexOf('Rejected by:'), legend);
+  // At a roll that works: elsewhere there may be no posture to move.
+  await page.evaluate(() => NB.current.setGoal(NB.current.goalIndex));
   const before = await picture(page);
   const roll = await page.evaluate(() => NB.current.roll);
   await page.locator('.replay input[type=range]').focus();
   await page.keyboard.press('ArrowRight');
   assert.notEqual(await page.evaluate(() => NB.current.roll), roll);
-  assert.notEqual(await picture(page), before, 'the roll moves nothing');
+  assert.ok(await changes(page, before), 'the roll moves nothing');
   await page.locator('.choose').first().locator('tbody tr').nth(4).click();
   assert.equal(await page.evaluate(() => NB.current.branchIndex), 4);
   const strips = page.locator('.plot canvas').nth(0);

@@ -7,11 +7,12 @@ Each probe is a document at, inside or outside one limit that a schema states, w
 said of it. The validator (jsonschema) has to say the same, and every shipped file has to fit.
 """
 
-import copy
 import json
 import sys
 import tomllib
 from collections import Counter
+from functools import cache
+from multiprocessing import Pool
 from pathlib import Path
 
 from jsonschema import Draft7Validator
@@ -25,29 +26,45 @@ SCHEMAS = {
 LEAST_PROBES = {"scenario": 2000, "study": 150}
 
 
+@cache
+def readers() -> dict[str, Draft7Validator]:
+    """Validators of what the reader knows."""
+    found: dict[str, Draft7Validator] = {}
+    for kind, file in SCHEMAS.items():
+        schema = json.loads(file.read_text())
+        # Which engines there are is said to the reader when a file is resolved, not when it is read.
+        del schema["definitions"]["EngineName"]["enum"]
+        found[kind] = Draft7Validator(schema)
+    return found
+
+
+def judge(line: str) -> tuple[str, bool, str | None]:
+    """Schema and validity of a probe, and what disagrees."""
+    probe = json.loads(line)
+    is_valid = readers()[probe["schema"]].is_valid(probe["document"])
+    wrong = None
+    if not is_valid == probe["is_read"] == probe["fits"]:
+        wrong = (
+            f"{probe['schema']} {probe['key']}: valid {is_valid}, read {probe['is_read']}, "
+            f"meant to fit {probe['fits']}: {probe['document']}"
+        )
+    return probe["schema"], is_valid, wrong
+
+
 def main() -> int:
     """Runs the comparison; the exit status is 1 if anything disagrees."""
     validators: dict[str, Draft7Validator] = {}
-    readers: dict[str, Draft7Validator] = {}
     for kind, file in SCHEMAS.items():
         schema = json.loads(file.read_text())
         Draft7Validator.check_schema(schema)
         validators[kind] = Draft7Validator(schema)
-        # Which engines there are is said to the reader when a file is resolved, not when it is read.
-        nameless = copy.deepcopy(schema)
-        del nameless["definitions"]["EngineName"]["enum"]
-        readers[kind] = Draft7Validator(nameless)
     wrong: list[str] = []
     seen: Counter[tuple[str, bool]] = Counter()
-    for line in Path(sys.argv[1]).read_text().splitlines():
-        probe = json.loads(line)
-        is_valid = readers[probe["schema"]].is_valid(probe["document"])
-        seen[probe["schema"], is_valid] += 1
-        if not is_valid == probe["is_read"] == probe["fits"]:
-            wrong.append(
-                f"{probe['schema']} {probe['key']}: valid {is_valid}, read {probe['is_read']}, "
-                f"meant to fit {probe['fits']}: {probe['document']}"
-            )
+    with Pool() as pool, Path(sys.argv[1]).open() as lines:
+        for kind, is_valid, disagreement in pool.imap(judge, lines, chunksize=200):
+            seen[kind, is_valid] += 1
+            if disagreement:
+                wrong.append(disagreement)
     for kind in SCHEMAS:
         count = seen[kind, True] + seen[kind, False]
         print(f"{kind}: {count} probes, of which {seen[kind, False]} are to be refused")

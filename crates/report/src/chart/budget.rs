@@ -207,22 +207,33 @@ fn square(each: &SourceBudget) -> f64 {
     each.at_target.analytic.rms_m.powi(2)
 }
 
-/// Sources that any of the budgets names, in the order of reports: each has one colour in all of them.
+/// Sources that have a colour of their own, the largest over all budgets first; what is left is one grey rest.
 fn named_sources(budgets: &[(&str, &ErrorBudget)]) -> Vec<Source> {
-    let is_named = |source: &Source| {
-        budgets.iter().any(|(_, budget)| {
+    /// As many as have room below the bar, and colours that nobody takes for one another.
+    const MOST: usize = 5;
+    let share = |source: Source| -> f64 {
+        let of_one = budgets.iter().map(|(_, budget)| {
             let sum: f64 = budget.sources.iter().map(square).sum();
             let mine = budget
                 .sources
                 .iter()
-                .find(|each| each.source == Some(*source));
-            mine.is_some_and(|each| square(each) >= WORTH_A_NAME * sum)
-        })
+                .find(|each| each.source == Some(source));
+            mine.map_or(0.0, |each| square(each) / sum.max(f64::MIN_POSITIVE))
+        });
+        of_one.fold(0.0, f64::max)
     };
-    Source::ALL.into_iter().filter(is_named).collect()
+    let mut named: Vec<(Source, f64)> = Source::ALL
+        .into_iter()
+        .map(|source| (source, share(source)))
+        .collect();
+    named.retain(|(_, share)| *share >= WORTH_A_NAME);
+    // The sort is stable: equals stay in the order of reports.
+    named.sort_by(|a, b| b.1.total_cmp(&a.1));
+    named.truncate(MOST);
+    named.into_iter().map(|(source, _)| source).collect()
 }
 
-/// A bar of the sources' shares of the mean square, with their names in the order of their size.
+/// A bar of the sources' shares of the mean square, the largest over all configurations first.
 fn shares(
     chart: &mut Chart,
     [left, top]: [f64; 2],
@@ -236,27 +247,44 @@ fn shares(
     if sum <= 0.0 {
         return;
     }
-    let mut names = Vec::new();
-    let mut drawn: f64 = 0.0;
-    for each in &budget.sources {
-        let Some(source) = each.source else { continue };
-        let color = named
+    let share_of = |source: Source| {
+        let mine = budget
+            .sources
             .iter()
-            .position(|known| *known == source)
-            .map_or(Paint::Soft, Paint::Series);
-        let share = square(each) / sum;
+            .find(|each| each.source == Some(source));
+        mine.map_or(0.0, |each| square(each) / sum)
+    };
+    let mut parts: Vec<(f64, Paint, String)> = named
+        .iter()
+        .enumerate()
+        .map(|(at, source)| {
+            (
+                share_of(*source),
+                Paint::Series(at),
+                source.name().replace('_', " "),
+            )
+        })
+        .collect();
+    let rest = 1.0 - parts.iter().map(|(share, ..)| share).sum::<f64>();
+    parts.push((rest, Paint::Soft, "others".to_owned()));
+    let mut drawn: f64 = 0.0;
+    let mut names = Vec::new();
+    for (share, color, name) in parts {
         let place = |share: f64| (share * width).round();
         let (from, to) = (place(drawn), place(drawn + share));
         chart.fill([left + from, top], [to - from, BAR_PX], color);
         drawn += share;
         if share >= WORTH_A_NAME {
+<<<<<<< HEAD
             let name = format!("{} {:.0} %", each.in_words(), share * 100.0);
             names.push((share, color, name));
+=======
+            names.push((color, format!("{name} {:.0} %", share * 100.0)));
+>>>>>>> 2fcd4bedf44c72be58dda623bd24b4569c57a19f
         }
     }
-    names.sort_by(|a, b| b.0.total_cmp(&a.0));
     let (mut x, mut y, mut row) = (left, top + BAR_PX + 13.0, 1);
-    for (_, color, name) in names {
+    for (color, name) in names {
         let length = 10.0 + SPACE_PX[0] + Size::Small.width(&name);
         if x > left && x + length > left + width {
             row += 1;

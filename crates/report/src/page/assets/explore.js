@@ -418,6 +418,10 @@ NB.Explore = class {
     if (!(this.coarseInMs > NB.Explore.COARSE_MS)) {
       this.showReach(6, false);
       this.coarseInMs = this.reachedInMs;
+    } else {
+      // What is shown is of another place: nothing of it can be taken.
+      this.reached.dataset.rolls = 'of another place';
+      for (const button of this.reached.querySelectorAll('button')) button.disabled = true;
     }
     clearTimeout(this.later);
     this.later = setTimeout(() => { if (this.active) this.showReach(NB.Explore.ROLLS, true); }, 200);
