@@ -254,16 +254,17 @@ fn shares(
             .find(|each| each.source == Some(source));
         mine.map_or(0.0, |each| square(each) / sum)
     };
+    let words_of = |source: Source| {
+        let mine = budget
+            .sources
+            .iter()
+            .find(|each| each.source == Some(source));
+        mine.map_or_else(String::new, |each| each.in_words().to_owned())
+    };
     let mut parts: Vec<(f64, Paint, String)> = named
         .iter()
         .enumerate()
-        .map(|(at, source)| {
-            (
-                share_of(*source),
-                Paint::Series(at),
-                source.name().replace('_', " "),
-            )
-        })
+        .map(|(at, source)| (share_of(*source), Paint::Series(at), words_of(*source)))
         .collect();
     let rest = 1.0 - parts.iter().map(|(share, ..)| share).sum::<f64>();
     parts.push((rest, Paint::Soft, "others".to_owned()));
@@ -275,12 +276,7 @@ fn shares(
         chart.fill([left + from, top], [to - from, BAR_PX], color);
         drawn += share;
         if share >= WORTH_A_NAME {
-<<<<<<< HEAD
-            let name = format!("{} {:.0} %", each.in_words(), share * 100.0);
-            names.push((share, color, name));
-=======
             names.push((color, format!("{name} {:.0} %", share * 100.0)));
->>>>>>> 2fcd4bedf44c72be58dda623bd24b4569c57a19f
         }
     }
     let (mut x, mut y, mut row) = (left, top + BAR_PX + 13.0, 1);
