@@ -42,7 +42,8 @@ fn needle(tip_error_m: f64) -> NeedleMeasurement {
         entry_lateral_error_m: Some(1e-4),
         axial_angle_error_rad: Some(1e-3),
         sagittal_angle_error_rad: Some(1e-3),
-        ..NeedleMeasurement::default()
+        true_target_error_m: Some(1e-3),
+        true_target_lateral_m: Some(5e-4),
     }
 }
 
