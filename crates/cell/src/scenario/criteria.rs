@@ -87,7 +87,7 @@ pub struct CriteriaSection {
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_true_target_error_mm: Option<f64>,
-    /// The same across the needle: distance of `true_target_mm` from the needle's axis, mm.
+    /// Largest settled distance of the goal's `true_target_mm` from the needle's axis, across the needle, mm.
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_true_target_lateral_mm: Option<f64>,

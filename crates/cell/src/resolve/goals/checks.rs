@@ -45,7 +45,8 @@ pub(super) fn true_target(
     let refused = |message: String| {
         let [x, y, z] = (planned.coords * 1e3).into();
         Err(text.finding(&key("true_target_mm"), message).hint(format!(
-            "it is where the lesion that is aimed at really is, in the phantom frame (left, posterior, superior) in              mm; it is planned to be at [{x:.1}, {y:.1}, {z:.1}]"
+            "it is where the lesion that is aimed at really is, in the phantom frame (left, posterior, superior) in \
+             mm; it is planned to be at [{x:.1}, {y:.1}, {z:.1}]"
         )))
     };
     let depth_m = phantom.skin_signed_depth(&at);
