@@ -35,6 +35,7 @@ fn clearance(minimum_m: f64, certified_lower_bound_m: Option<f64>) -> ClassClear
 fn needle(tip_error_m: f64) -> NeedleMeasurement {
     NeedleMeasurement {
         tip_position_error_m: tip_error_m,
+        depth_error_m: 0.0,
         lateral_error_m: 1e-4,
         needle_angle_error_rad: 1e-3,
         guide_position_error_m: 1e-4,
