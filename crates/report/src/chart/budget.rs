@@ -203,8 +203,18 @@ fn ellipse_points(moments: &Moments, (x, y): (usize, usize)) -> Vec<[f64; 2]> {
 /// Share of the mean square from which a source is named.
 const WORTH_A_NAME: f64 = 0.02;
 
-fn square(each: &SourceBudget) -> f64 {
-    each.at_target.analytic.rms_m.powi(2)
+/// What a source has of the sources' mean square at the target; 0 where there is none.
+fn share_of(budget: &ErrorBudget, source: Source) -> f64 {
+    let square = |each: &SourceBudget| each.at_target.analytic.rms_m.powi(2);
+    let sum: f64 = budget.sources.iter().map(square).sum();
+    let mut of_it = budget
+        .sources
+        .iter()
+        .filter(|each| each.source == Some(source));
+    of_it
+        .next()
+        .filter(|_| sum > 0.0)
+        .map_or(0.0, |each| square(each) / sum)
 }
 
 /// Sources that have a colour of their own, the largest over all budgets first; what is left is one grey rest.
@@ -212,15 +222,8 @@ fn named_sources(budgets: &[(&str, &ErrorBudget)]) -> Vec<Source> {
     /// As many as have room below the bar, and colours that nobody takes for one another.
     const MOST: usize = 5;
     let share = |source: Source| -> f64 {
-        let of_one = budgets.iter().map(|(_, budget)| {
-            let sum: f64 = budget.sources.iter().map(square).sum();
-            let mine = budget
-                .sources
-                .iter()
-                .find(|each| each.source == Some(source));
-            mine.map_or(0.0, |each| square(each) / sum.max(f64::MIN_POSITIVE))
-        });
-        of_one.fold(0.0, f64::max)
+        let of_each = budgets.iter().map(|(_, budget)| share_of(budget, source));
+        of_each.fold(0.0, f64::max)
     };
     let mut named: Vec<(Source, f64)> = Source::ALL
         .into_iter()
@@ -243,17 +246,14 @@ fn shares(
 ) {
     /// Between an entry's colour and its text, and between entries, px.
     const SPACE_PX: [f64; 2] = [5.0, 14.0];
-    let sum: f64 = budget.sources.iter().map(square).sum();
-    if sum <= 0.0 {
+    // A goal whose arms and patients have no errors has nothing to share.
+    if budget
+        .sources
+        .iter()
+        .all(|each| each.at_target.analytic.rms_m <= 0.0)
+    {
         return;
     }
-    let share_of = |source: Source| {
-        let mine = budget
-            .sources
-            .iter()
-            .find(|each| each.source == Some(source));
-        mine.map_or(0.0, |each| square(each) / sum)
-    };
     let words_of = |source: Source| {
         let mine = budget
             .sources
@@ -264,7 +264,10 @@ fn shares(
     let mut parts: Vec<(f64, Paint, String)> = named
         .iter()
         .enumerate()
-        .map(|(at, source)| (share_of(*source), Paint::Series(at), words_of(*source)))
+        .map(|(at, source)| {
+            let share = share_of(budget, *source);
+            (share, Paint::Series(at), words_of(*source))
+        })
         .collect();
     let rest = 1.0 - parts.iter().map(|(share, ..)| share).sum::<f64>();
     parts.push((rest, Paint::Soft, "others".to_owned()));

@@ -263,15 +263,14 @@ fn write_expected(out: &mut String, report: &Report, goal: &GoalReport) -> std::
     let before = range(&|budget| Some(budget.before_insertion?.lateral_rms_m));
     let after = range(&|budget| Some(budget.total.at_target.analytic.rms_m));
     if let (Some(before), Some(after)) = (before, after) {
-        let is_judged = report
-            .criteria
-            .iter()
-            .any(|each| each.criterion == "max_tip_rms_mm");
-        let judged = if is_judged {
-            "judged by `max_tip_rms_mm`"
-        } else {
-            "which nothing here judges, `max_tip_rms_mm` under [criteria] would"
-        };
+        let mut criteria = report.criteria.iter().filter(|each| each.goal == goal.name);
+        let limit_m = criteria
+            .find(|each| each.criterion == "max_tip_rms_mm")
+            .and_then(|each| each.limit);
+        let judged = limit_m.map_or_else(
+            || "which nothing here judges: `max_tip_rms_mm` under [criteria] would".to_owned(),
+            |limit_m| format!("`max_tip_rms_mm` here {} mm", mm(limit_m)),
+        );
         writeln!(
             out,
             "published needle robots: across the needle before it goes in {} to {} mm, here {before}; at the target \

@@ -22,6 +22,7 @@ pub enum Block {
 
 /// Reasons that are shown of each configuration.
 pub(super) const MOST_REASONS: usize = 3;
+
 pub fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>) -> Block {
     Block::Table {
         header: header.map(str::to_owned).to_vec(),
