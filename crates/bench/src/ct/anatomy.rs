@@ -290,7 +290,8 @@ fn scaled(mesh: &TriangleMesh, by_m: f64) -> Option<TriangleMesh> {
 
 #[cfg(test)]
 mod tests {
-    use needlebench_cell::phantom::{MarkerKind, PhantomParameters};
+    use needlebench_cell::phantom::PhantomParameters;
+    use needlebench_cell::scenario::MarkerKind;
 
     use super::*;
 

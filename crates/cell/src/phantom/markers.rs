@@ -5,9 +5,10 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 use super::half_spaces::HalfSpaces;
-use super::parameters::{MarkerKind, MarkerParameters};
+use super::parameters::MarkerParameters;
 use super::solids::{ball, cuboid, cylinder, facing, pose};
 use super::{Marker, MarkerSphere, PhantomError, PhantomParameters, PhantomPart, Tissue};
+use crate::scenario::MarkerKind;
 
 const WHITE_RGBA: [f32; 4] = [0.97, 0.97, 0.97, 1.0];
 const BLACK_RGBA: [f32; 4] = [0.04, 0.04, 0.04, 1.0];

@@ -32,9 +32,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::PhantomError;
 pub(crate) use parameters::PARAMETERS;
-pub use parameters::{
-    LesionParameters, LimbSizes, MarkerKind, MarkerParameters, Measured, PhantomParameters,
-};
+pub use parameters::{LesionParameters, LimbSizes, MarkerParameters, Measured, PhantomParameters};
 pub use route_obstacles::{RouteObstacle, RouteObstacles};
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::PhantomError;
-use crate::scenario::ChestSize;
+use crate::scenario::{ChestSize, MarkerKind};
 use crate::schema::{FileSchema, LONGEST_NAME, NAME};
 
 /// What a parameter file may hold.
@@ -22,17 +22,6 @@ pub enum Measured {
     Standing,
     /// On the back, as in CT.
     Supine,
-}
-
-/// What the markers on the skin are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum MarkerKind {
-    /// A plastic disc, for cameras and touching: CT does not tell it from skin.
-    #[default]
-    Disc,
-    /// The same disc on a carrier of foam that holds a dense sphere against the skin, for CT as well.
-    CtSphere,
 }
 
 /// Size and contents of a chest phantom.

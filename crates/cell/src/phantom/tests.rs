@@ -1,3 +1,4 @@
+use crate::scenario::MarkerKind;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 

@@ -69,7 +69,7 @@ pub use obstacles::{
 pub use people::{
     ElbowPreference, Handedness, PeopleSection, PersonSection, Role, Side, StaturePercentile,
 };
-pub use phantom::{Arms, LengthUnit, PartSection, PartTissue, PhantomSection, Posture};
+pub use phantom::{Arms, LengthUnit, MarkerKind, PartSection, PartTissue, PhantomSection, Posture};
 pub(crate) use phantom::{ChestSize, NO_MODEL};
 pub use planning::{NeedleRouteSection, PlanningSection, RollAim};
 pub use ranking::RankingSection;

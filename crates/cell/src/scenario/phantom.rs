@@ -4,7 +4,6 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 
 use super::models::reference_schema;
-use crate::phantom::MarkerKind;
 use crate::schema::{LONGEST_NAME, NAME};
 
 /// Value of `model` for a phantom of the user's parts alone.
@@ -35,6 +34,17 @@ pub enum Arms {
     Beside,
     /// Raised above the head, as for a CT of the chest.
     Overhead,
+}
+
+/// What the markers on the skin are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MarkerKind {
+    /// A plastic disc, for cameras and touching: CT does not tell it from skin.
+    #[default]
+    Disc,
+    /// The same disc on a carrier of foam that holds a dense sphere against the skin, for CT as well.
+    CtSphere,
 }
 
 /// The phantom and where it lies.

@@ -88,7 +88,7 @@ impl ByteStream {
         if says_so && !is_compressed && file_bytes > 0 {
             // Read as it is: the header decides whether it makes sense.
             let first = reader.fill_buf().map_err(unreadable)?;
-            if !super::header::begins_as_header(first) {
+            if !super::version::begins_as_header(first) {
                 return Err(ImagingError::refused(
                     "it is called .gz, but its first bytes are not those of gzip",
                 )

@@ -3,12 +3,10 @@
 use super::bytes::ByteStream;
 use super::fields::Fields;
 use super::orientation::{self, Placement};
+use super::version::{BYTES_1, BYTES_2, version_of};
 use crate::read::ReadOptions;
 use crate::read::scalar::{Kind, Rescale, Stored};
 use crate::{ImagingError, Remark, VoxelGrid};
-
-const BYTES_1: usize = 348;
-const BYTES_2: usize = 540;
 
 /// What a header says of the voxels.
 #[derive(Debug)]
@@ -23,28 +21,6 @@ pub(super) struct Header {
     pub(super) remarks: Vec<Remark>,
 }
 
-/// Whether bytes begin with the size of a header, in either byte order.
-pub(super) fn begins_as_header(first: &[u8]) -> bool {
-    kind_of(first).is_some()
-}
-
-/// Version and byte order.
-fn kind_of(first: &[u8]) -> Option<(u8, bool)> {
-    let size: [u8; 4] = first.get(..4)?.try_into().ok()?;
-    [(1, BYTES_1), (2, BYTES_2)]
-        .into_iter()
-        .find_map(|(version, bytes)| {
-            let bytes = u32::try_from(bytes).ok()?;
-            if u32::from_le_bytes(size) == bytes {
-                Some((version, false))
-            } else if u32::from_be_bytes(size) == bytes {
-                Some((version, true))
-            } else {
-                None
-            }
-        })
-}
-
 impl Header {
     pub(super) fn read(
         stream: &mut ByteStream,
@@ -52,7 +28,7 @@ impl Header {
     ) -> Result<Self, ImagingError> {
         let mut bytes = [0; BYTES_2];
         let mut length = stream.fill(&mut bytes[..BYTES_1])?;
-        let Some((version, is_big_endian)) = kind_of(&bytes[..length]) else {
+        let Some((version, is_big_endian)) = version_of(&bytes[..length]) else {
             return Err(ImagingError::refused(
                 "it is no NIfTI file: it does not begin with the size of a header, 348 or 540",
             )

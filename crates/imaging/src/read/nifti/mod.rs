@@ -7,6 +7,7 @@ mod bytes;
 mod fields;
 mod header;
 mod orientation;
+mod version;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,7 +31,7 @@ pub(super) struct Nifti {
 
 /// Whether a file begins as a NIfTI file does, or is named as one.
 pub(super) fn is_nifti(path: &Path, first: &[u8]) -> bool {
-    header::begins_as_header(first) || has_name(path)
+    version::begins_as_header(first) || has_name(path)
 }
 
 /// Whether it is called `.nii`, `.nii.gz`, `.hdr` or `.img`, with or without `.gz`.

@@ -9,7 +9,8 @@ use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
 use needlebench_bench::ct::{CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan};
 use needlebench_bench::progress::Progress;
-use needlebench_cell::phantom::{MarkerKind, Phantom, PhantomParameters, SIZE_PRESETS};
+use needlebench_cell::phantom::{Phantom, PhantomParameters, SIZE_PRESETS};
+use needlebench_cell::scenario::MarkerKind;
 use needlebench_cell::{FileKind, Finding, ResolvedScenario, load_scenario, read_text};
 use needlebench_imaging::ImagingError;
 use needlebench_imaging::synth::{
