@@ -57,6 +57,7 @@ const LAYERS: [(&str, &[&str]); 17] = [
             "live",
             "render",
             "bench",
+            "imaging",
             "recorded",
             "study",
             "evaluation",

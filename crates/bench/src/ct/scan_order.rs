@@ -105,6 +105,8 @@ pub struct SyntheticScan {
     pub scene: Scene,
     /// Where the voxels are.
     pub grid: VoxelGrid,
+    /// Place of the phantom in `ct`.
+    pub ct_from_phantom: Pose,
     /// The truth.
     pub truth: ScanTruth,
 }
@@ -153,7 +155,12 @@ impl SyntheticScan {
             lesions: lesions(phantom, &ct_from_phantom),
             markers: markers(phantom, &ct_from_phantom),
         };
-        Ok(Self { scene, grid, truth })
+        Ok(Self {
+            scene,
+            grid,
+            ct_from_phantom,
+            truth,
+        })
     }
 }
 

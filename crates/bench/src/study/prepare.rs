@@ -170,7 +170,9 @@ fn has_true_targets(study: &ResolvedStudy) -> bool {
     let is_varied = levels(study)
         .flat_map(|level| &level.changes)
         .any(|(key, _)| key.to_string().starts_with("goal.true_target_mm"));
-    is_varied || goals.iter().any(|goal| goal.true_target_mm.is_some())
+    study.family.base().scenario.ct.is_some()
+        || is_varied
+        || goals.iter().any(|goal| goal.true_target_mm.is_some())
 }
 
 fn product(study: &ResolvedStudy, levels: impl Iterator<Item = usize>, samples: u64) -> String {

@@ -46,7 +46,7 @@ use crate::toml_text::TomlText;
 use crate::{Finding, Robot};
 use arm_values::check_brakes;
 use assumed::assume;
-pub(crate) use assumed::name_from_file;
+pub use assumed::name_from_file;
 pub use entry::{ChosenEntry, EntryChooser, GoalPlacer, OpenScenario};
 use excitation::{ExcitationProtocol, check_sweeps, resolve_excitation};
 pub use expected::Expected;

@@ -132,6 +132,11 @@ pub struct ExpectedSection {
     pub arm: Option<ArmClass>,
     /// Whether the breath is held.
     pub breath: BreathState,
+    /// Markers with their measured covariances, instead of the assumed ones. They hold the robot's own error in
+    /// touching them: there is no hand-eye calibration beside them.
+    pub registration: Option<RegistrationBlock>,
+    /// The target's measured covariance, instead of the assumed one.
+    pub imaging: Option<ImagingBlock>,
 }
 
 /// Joint origins of the real arm.
@@ -616,6 +621,36 @@ impl ImperfectionsSection {
     }
 }
 
+/// What is measured, of the expected tip error.
+pub(super) fn check_expected(toml: &TomlText<'_>, scenario: &super::Scenario) -> Vec<Finding> {
+    let section = &scenario.expected;
+    let mut findings = Vec::new();
+    if let Some(block) = &section.registration {
+        findings.extend(measured::check_markers(
+            toml,
+            "expected.registration",
+            block,
+        ));
+    }
+    if let Some(block) = &section.imaging {
+        findings.extend(measured::check_target(toml, "expected.imaging", block));
+    }
+    let measured = [
+        ("registration", section.registration.is_some()),
+        ("imaging", section.imaging.is_some()),
+    ];
+    for (block, _) in measured.into_iter().filter(|(_, given)| *given) {
+        if scenario.imperfections.is_some() {
+            let key = format!("expected.{block}");
+            let finding = toml.finding(&key, format!("`{block}` contradicts [imperfections]"));
+            findings.push(finding.hint(format!(
+                "the expected tip error is of the [imperfections]: write it as [imperfections.{block}]"
+            )));
+        }
+    }
+    findings
+}
+
 /// Blocks that contradict themselves.
 pub(super) fn check(toml: &TomlText<'_>, section: &ImperfectionsSection) -> Vec<Finding> {
     let mut findings = Vec::new();
@@ -654,10 +689,14 @@ pub(super) fn check(toml: &TomlText<'_>, section: &ImperfectionsSection) -> Vec<
                     .hint("the phantom could turn about it: move one of them away"),
             );
         }
-        findings.extend(measured::check_markers(toml, block));
+        findings.extend(measured::check_markers(
+            toml,
+            "imperfections.registration",
+            block,
+        ));
     }
     if let Some(block) = &section.imaging {
-        findings.extend(measured::check_target(toml, block));
+        findings.extend(measured::check_target(toml, "imperfections.imaging", block));
     }
     findings
 }

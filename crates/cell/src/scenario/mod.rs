@@ -7,6 +7,7 @@
 
 mod controller;
 mod criteria;
+mod ct;
 mod engines;
 pub mod envelope;
 mod events;
@@ -43,6 +44,7 @@ use requirements::scenario_requirements;
 
 pub use controller::ControllerSection;
 pub use criteria::{ClearanceCriteria, CriteriaSection};
+pub use ct::{CtSection, ScanKernel, ScanSlices};
 pub use engines::{EnginesSection, MujocoSection, RapierSection, STANDARD_GRAVITY_M_S2};
 pub use envelope::EnvelopeSection;
 pub use events::{EventsSection, PressClass, PressSection, StopSection};
@@ -108,6 +110,9 @@ pub struct Scenario {
     /// The chest phantom; none if left out.
     #[serde(default)]
     pub phantom: Option<PhantomSection>,
+    /// The synthetic CT that a run begins from; without it, a run knows the phantom as it is.
+    #[serde(default)]
+    pub ct: Option<CtSection>,
     /// CT table; none if left out.
     #[serde(default)]
     pub table: Option<TableSection>,
@@ -234,6 +239,8 @@ pub(crate) fn check_together(
     if let Some(section) = &scenario.imperfections {
         findings.extend(imperfections::check(toml, section));
     }
+    findings.extend(ct::check(toml, scenario));
+    findings.extend(imperfections::check_expected(toml, scenario));
     findings.extend(iso9283::check(toml, scenario));
     findings.extend(excitation::check(toml, scenario));
     findings

@@ -5,6 +5,7 @@
 //! [`Remark`].
 
 mod dicom;
+mod label_names;
 mod labels;
 mod nifti;
 mod placing;
@@ -22,6 +23,7 @@ use self::nifti::Nifti;
 use self::scalar::Tally;
 use crate::{ImagingError, Orientation, Remark, Volume, VoxelGrid};
 
+pub use label_names::read_label_names;
 pub use labels::{ReadLabels, read_labels};
 
 /// How to read.

@@ -21,6 +21,14 @@ pub(super) fn write_whole(
     })
 }
 
+/// Writes a file of these bytes, whole or not at all.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ImagingError> {
+    write_whole(path, |file| file.write_all(bytes))
+}
+
 fn stream(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,

@@ -5,6 +5,9 @@
 mod dicom;
 mod file;
 mod nifti;
+mod stl;
 
 pub use dicom::{DicomSeries, write_dicom};
+pub use file::write_bytes;
 pub use nifti::{write_label_nifti, write_nifti};
+pub use stl::write_stl;

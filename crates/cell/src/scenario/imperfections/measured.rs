@@ -25,19 +25,22 @@ pub(crate) fn covariance_m2([xx, yy, zz, xy, xz, yz]: CovarianceMm2) -> Matrix3<
 }
 
 /// What is wrong with what was measured of the markers.
-pub(super) fn check_markers(toml: &TomlText<'_>, block: &RegistrationBlock) -> Vec<Finding> {
-    const BLOCK: &str = "imperfections.registration";
+pub(super) fn check_markers(
+    toml: &TomlText<'_>,
+    place: &str,
+    block: &RegistrationBlock,
+) -> Vec<Finding> {
     let Some(covariances) = &block.covariance_mm2 else {
         return Vec::new();
     };
-    let key = format!("{BLOCK}.covariance_mm2");
-    let markers_key = format!("{BLOCK}.markers_mm");
+    let key = format!("{place}.covariance_mm2");
+    let markers_key = format!("{place}.markers_mm");
     let is_default =
         block.localisation_error_mm == RegistrationBlock::default().localisation_error_mm;
-    let mut findings = contradiction(toml, BLOCK, "localisation_error_mm", is_default);
+    let mut findings = contradiction(toml, place, "localisation_error_mm", is_default);
     let (given, wanted) = (covariances.len(), block.markers_mm.len());
     // What a study changes has no text, and no places in it.
-    let are_assumed = toml.span_of(BLOCK).is_some() && toml.span_of(&markers_key).is_none();
+    let are_assumed = toml.span_of(place).is_some() && toml.span_of(&markers_key).is_none();
     if are_assumed {
         findings.push(
             toml.finding(&key, "these are covariances of markers that are not given")
@@ -58,16 +61,15 @@ pub(super) fn check_markers(toml: &TomlText<'_>, block: &RegistrationBlock) -> V
 }
 
 /// What is wrong with what was measured of the target.
-pub(super) fn check_target(toml: &TomlText<'_>, block: &ImagingBlock) -> Vec<Finding> {
-    const BLOCK: &str = "imperfections.imaging";
+pub(super) fn check_target(toml: &TomlText<'_>, place: &str, block: &ImagingBlock) -> Vec<Finding> {
     let Some(covariance) = &block.covariance_mm2 else {
         return Vec::new();
     };
     let default = ImagingBlock::default();
-    let mut findings = contradiction(toml, BLOCK, "voxel_mm", block.voxel_mm == default.voxel_mm);
+    let mut findings = contradiction(toml, place, "voxel_mm", block.voxel_mm == default.voxel_mm);
     let is_default = block.reader_mm == default.reader_mm;
-    findings.extend(contradiction(toml, BLOCK, "reader_mm", is_default));
-    let key = format!("{BLOCK}.covariance_mm2");
+    findings.extend(contradiction(toml, place, "reader_mm", is_default));
+    let key = format!("{place}.covariance_mm2");
     let what = "the covariance of the target";
     findings.extend(not_positive(toml, &key, what, covariance));
     findings

@@ -39,7 +39,7 @@ pub(crate) struct ReadArguments {
     /// Most memory that the voxels may take, in MiB.
     #[arg(long, value_name = "MIB", default_value_t = 4096)]
     max_memory: u32,
-    /// Threads that decode slices; as many as the machine has cores if left out.
+    /// Threads; as many as the machine has cores if left out. Results do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
 }
@@ -55,13 +55,22 @@ impl ReadArguments {
             series: self.series.clone(),
             fill_gaps: self.fill_gaps,
             assume_orientation: self.assume_orientation,
-            max_bytes: u64::from(self.max_memory) << 20,
+            max_bytes: self.max_bytes(),
         };
-        let threads = self.jobs.map_or_else(
+        read_volume(path, &options, self.threads(), cancel)
+    }
+
+    /// Most bytes that the voxels may take.
+    pub(crate) fn max_bytes(&self) -> u64 {
+        u64::from(self.max_memory) << 20
+    }
+
+    /// Threads.
+    pub(crate) fn threads(&self) -> usize {
+        self.jobs.map_or_else(
             || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
             usize::from,
-        );
-        read_volume(path, &options, threads, cancel)
+        )
     }
 }
 

@@ -1,5 +1,6 @@
 //! `needlebench ct`: CT volumes.
 
+mod build;
 mod info;
 mod synth;
 
@@ -8,6 +9,7 @@ use clap::{Args, Subcommand};
 
 use crate::exit::ExitStatus;
 
+use build::{BUILD_HELP, BuildArguments, build_scan};
 use info::{InfoArguments, info};
 use synth::{SYNTH_HELP, SynthArguments, synth};
 
@@ -22,6 +24,12 @@ enum CtCommand {
     /// What a volume is: geometry, Hounsfield units, and what is wrong with it.
     #[command(after_help = "Example: needlebench ct info scan.nii.gz")]
     Info(InfoArguments),
+    /// Surfaces, lesions, markers and a scenario from a volume.
+    #[command(
+        after_help = "Example: needlebench ct build scan.nii.gz --out out/patient --lesion nodule=-60,40,-112 --markers markers.toml",
+        after_long_help = BUILD_HELP
+    )]
+    Build(Box<BuildArguments>),
     /// Synthetic CT of a phantom, with the truth beside it.
     #[command(
         after_help = "Example: needlebench ct synth scenarios/supine_suite.toml --out out/ct --preset biopsy --markers ct-sphere",
@@ -34,6 +42,7 @@ enum CtCommand {
 pub(crate) fn ct(arguments: &CtArguments) -> Result<ExitStatus> {
     match &arguments.command {
         CtCommand::Info(arguments) => info(arguments),
+        CtCommand::Build(arguments) => build_scan(arguments),
         CtCommand::Synth(arguments) => synth(arguments),
     }
 }

@@ -174,7 +174,7 @@ enum MarkersArgument {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Numbers<const N: usize>([f64; N]);
+pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
 
 fn finite(text: &str) -> Result<f64, String> {
     let value: f64 = text.trim().parse().map_err(|_| "not a number".to_owned())?;
@@ -185,7 +185,7 @@ fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub(super) fn positive(text: &str) -> Result<f64, String> {
     let value = finite(text)?;
     if value > 0.0 {
         Ok(value)
@@ -214,7 +214,7 @@ fn tilt(text: &str) -> Result<f64, String> {
     }
 }
 
-fn numbers<const N: usize>(text: &str) -> Result<Numbers<N>, String> {
+pub(super) fn numbers<const N: usize>(text: &str) -> Result<Numbers<N>, String> {
     let values: Vec<f64> = text.split(',').map(finite).collect::<Result<_, _>>()?;
     <[f64; N]>::try_from(values)
         .map(Numbers)
