@@ -48,11 +48,11 @@ pub struct MarkerList {
     /// Standard deviation of each place along each axis, mm.
     #[schemars(range(min = 0.001, max = 20.0))]
     pub sd_mm: f64,
-    /// Standard deviation of how the markers were put on, mm, where the list is a drawing that people follow: for telling
-    /// which is which, not for the registration.
+    /// Standard deviation of how each marker was put on, mm, where the list is a drawing that people follow: for telling
+    /// which is which, not for the registration. 0.5 mm if left out.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 20.0))]
-    pub placement_mm: f64,
+    #[schemars(range(min = 0.01, max = 20.0))]
+    pub placement_mm: Option<f64>,
     /// The markers, in any order; some may be missing in the scan.
     #[schemars(length(min = 3), extend("x-hint" = "a rigid registration needs three that are not on one line"))]
     pub markers: Vec<ListedMarker>,

@@ -1,9 +1,10 @@
 //! From a volume to surfaces, markers, registration and targets.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
-use needlebench_imaging::markers::{Found, MarkerModel, Options, find_markers};
+use needlebench_imaging::markers::{DetectedMarker, Found, MarkerModel, Options, find_markers};
 use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_labels};
 use needlebench_imaging::registration::{
     MarkerMatch, MatchOptions, ReferenceFrame, ReferenceMarker, Registration, TargetError,
@@ -25,8 +26,9 @@ pub struct KnownMarkers {
     pub frame: ReferenceFrame,
     /// What they look like.
     pub model: MarkerModel,
-    /// Standard deviation of what the list may be off by as a whole: placement by hand, breath. For the match alone.
-    pub placement_sigma_m: f64,
+    /// Standard deviation of how each marker was put on along each axis, where people followed a drawing: for the match
+    /// alone. A usual one if left out.
+    pub placement_sigma_m: Option<f64>,
     /// The markers.
     pub markers: Vec<ReferenceMarker>,
 }
@@ -58,8 +60,6 @@ pub struct BuildOptions {
 /// Markers of a scan, and the registration by them.
 #[derive(Debug, Clone)]
 pub struct Registered {
-    /// What was found.
-    pub found: Found,
     /// Which is which.
     pub matched: MarkerMatch,
     /// Where the patient is.
@@ -84,20 +84,31 @@ pub struct BuiltTarget {
     pub registration: Option<TargetError>,
 }
 
-/// What was made of a scan.
-#[derive(Debug, Clone)]
-pub struct ScanBuild {
+/// What a scan shows by itself, whatever is known of its markers.
+#[derive(Debug)]
+pub struct SeenScan {
     /// The volume, along the patient's axes.
     pub volume: Volume,
     /// Where it came from.
     pub source: Description,
     /// Surfaces, labels and lesions.
     pub made: Reconstruction,
+    /// Markers; none if none were looked for.
+    pub markers: Option<Found>,
+    /// What is worth knowing: of reading, of markers, of tissues.
+    pub remarks: Vec<Remark>,
+}
+
+/// What was made of a scan.
+#[derive(Debug, Clone)]
+pub struct ScanBuild {
+    /// What it shows.
+    pub seen: Arc<SeenScan>,
     /// Markers and registration; none if none were asked for.
     pub registered: Option<Registered>,
     /// The lesions that have a surface.
     pub targets: Vec<BuiltTarget>,
-    /// What is worth knowing: of reading, of markers, of tissues.
+    /// What is worth knowing: of the scan, and of the registration.
     pub remarks: Vec<Remark>,
 }
 
@@ -112,6 +123,16 @@ pub fn build(
     options: &BuildOptions,
     control: &Control<'_>,
 ) -> Result<ScanBuild, ImagingError> {
+    let seen = Arc::new(see(read, options, control)?);
+    register(seen, options)
+}
+
+/// What a scan shows.
+pub(super) fn see(
+    read: ReadVolume,
+    options: &BuildOptions,
+    control: &Control<'_>,
+) -> Result<SeenScan, ImagingError> {
     let Control {
         threads,
         cancel,
@@ -125,13 +146,16 @@ pub fn build(
     let labels =
         labels.map(|given| labels_of(given, &volume, options.max_bytes, control, &mut remarks));
     let labels = labels.transpose()?;
-    let registered = match &options.markers {
-        None => None,
-        Some(known) => {
-            progress.message("markers");
-            Some(registered(&volume, known, control, &mut remarks)?)
-        }
-    };
+    let markers = options.markers.as_ref().map(|known| {
+        progress.message("markers");
+        find_markers(&volume, &known.model, &Options::default(), threads, cancel)
+    });
+    let markers = markers.transpose()?;
+    remarks.extend(
+        markers
+            .iter()
+            .flat_map(|found| found.remarks.iter().cloned()),
+    );
     let wanted = ReconstructOptions {
         lesions: options.lesions.clone(),
         labels,
@@ -150,11 +174,28 @@ pub fn build(
     };
     let made = reconstruct(&volume, &wanted, threads, cancel, &step)?;
     remarks.extend(made.remarks.iter().cloned());
-    let targets = targets(&volume, &made, registered.as_ref());
-    Ok(ScanBuild {
+    Ok(SeenScan {
         volume,
         source: read.description,
         made,
+        markers,
+        remarks,
+    })
+}
+
+/// With what is known of the markers.
+pub(super) fn register(
+    seen: Arc<SeenScan>,
+    options: &BuildOptions,
+) -> Result<ScanBuild, ImagingError> {
+    let mut remarks = seen.remarks.clone();
+    let registered = match (&seen.markers, &options.markers) {
+        (Some(found), Some(known)) => Some(registered(found, known, &mut remarks)?),
+        _ => None,
+    };
+    let targets = targets(&seen.volume, &seen.made, registered.as_ref());
+    Ok(ScanBuild {
+        seen,
         registered,
         targets,
         remarks,
@@ -207,26 +248,22 @@ fn labels_of(
 }
 
 fn registered(
-    volume: &Volume,
+    found: &Found,
     known: &KnownMarkers,
-    control: &Control<'_>,
     remarks: &mut Vec<Remark>,
 ) -> Result<Registered, ImagingError> {
-    let found = find_markers(
-        volume,
-        &known.model,
-        &Options::default(),
-        control.threads,
-        control.cancel,
-    )?;
-    remarks.extend(found.remarks.iter().cloned());
-    let detected: Vec<_> = found.markers.iter().map(|each| each.localised()).collect();
+    let detected: Vec<_> = found
+        .markers
+        .iter()
+        .map(DetectedMarker::localised)
+        .collect();
+    let usual = MatchOptions::default();
     let options = MatchOptions {
-        placement_sigma_m: known.placement_sigma_m,
-        ..MatchOptions::default()
+        placement_sigma_m: known.placement_sigma_m.unwrap_or(usual.placement_sigma_m),
+        ..usual
     };
     let matched = match_markers(&detected, &known.markers, &options)
-        .map_err(|error| with_found(error, &found))?;
+        .map_err(|error| with_found(error, found))?;
     remarks.extend(matched.remarks.iter().cloned());
     let registration = register_weighted(&matched, &detected, &known.markers, known.frame)?;
     remarks.extend(registration.remarks.iter().cloned());
@@ -246,7 +283,6 @@ fn registered(
     let places_m = matched.pairs.iter();
     let places_m = places_m.map(|pair| detected[pair.detected].at_m).collect();
     Ok(Registered {
-        found,
         matched,
         registration,
         covariances_m2,
@@ -284,7 +320,7 @@ fn targets(
     lesions
         .filter_map(|measured| {
             let size = measured.size.as_ref()?;
-            let covariance = target_covariance_m2(volume, &measured.lesion, size);
+            let covariance = target_covariance_m2(volume, &measured.lesion);
             Some(BuiltTarget {
                 name: measured.lesion.name.clone(),
                 center_m: size.centroid_m.coords.into(),

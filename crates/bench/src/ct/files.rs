@@ -105,22 +105,22 @@ pub struct MarkersReport<'b> {
     pub rejected: &'b [Rejected],
     /// Standard deviation of the scan's noise in soft tissue, HU, if it has homogeneous tissue.
     pub noise_hu: Option<f64>,
-    /// Which is which.
-    pub matched: &'b MarkerMatch,
+    /// Which is which; none without a registration.
+    pub matched: Option<&'b MarkerMatch>,
 }
 
 impl<'b> BuildReport<'b> {
     /// Of what was built.
     pub fn of(build: &'b ScanBuild) -> Self {
-        let grid = &build.volume.grid;
-        let made = &build.made;
+        let grid = &build.seen.volume.grid;
+        let made = &build.seen.made;
         Self {
             schema_version: 1,
-            source: &build.source,
+            source: &build.seen.source,
             size: grid.size(),
             spacing_m: grid.spacing_m(),
             first_voxel_m: grid.first_m().coords.into(),
-            slice_thickness_m: build.volume.slice_thickness_m,
+            slice_thickness_m: build.seen.volume.slice_thickness_m,
             phantom_origin_m: PatientFrame::of(build).origin_in_ct_m.into(),
             surfaces: made
                 .surfaces
@@ -151,11 +151,14 @@ impl<'b> BuildReport<'b> {
                 })
                 .collect(),
             labels: &made.facts,
-            markers: build.registered.as_ref().map(|registered| MarkersReport {
-                found: &registered.found.markers,
-                rejected: &registered.found.rejected,
-                noise_hu: registered.found.noise.as_ref().map(|noise| noise.sd_hu),
-                matched: &registered.matched,
+            markers: build.seen.markers.as_ref().map(|found| MarkersReport {
+                found: &found.markers,
+                rejected: &found.rejected,
+                noise_hu: found.noise.as_ref().map(|noise| noise.sd_hu),
+                matched: build
+                    .registered
+                    .as_ref()
+                    .map(|registered| &registered.matched),
             }),
             registration: build
                 .registered
@@ -199,14 +202,18 @@ pub fn write_build(
         ImagingError::refused(format!("it cannot be made: {error}"))
             .at(surfaces.display().to_string())
     })?;
-    for surface in &build.made.surfaces {
+    for surface in &build.seen.made.surfaces {
         let file = surface_file(&surface.name);
         write_stl(&folder.join(&file), &surface.mesh)?;
         files.push(file);
     }
     if with_labels {
-        write_label_nifti(&folder.join("labels.nii.gz"), &build.made.labels, cancel)?;
-        let names = build.made.labels.names.iter();
+        write_label_nifti(
+            &folder.join("labels.nii.gz"),
+            &build.seen.made.labels,
+            cancel,
+        )?;
+        let names = build.seen.made.labels.names.iter();
         let names = LabelNames {
             schema_version: 1,
             labels: names

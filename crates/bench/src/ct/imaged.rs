@@ -1,6 +1,7 @@
 //! From a phantom through a synthetic scan to the scenario of those who know the scan alone.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -13,11 +14,11 @@ use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker};
 use needlebench_imaging::synth::{Kernel, Noise, ScanPreset, Scanner, Streaks, synthesise_watched};
 use needlebench_imaging::{ImagingError, LesionSeed};
 use needlebench_kinematics::Pose;
-use needlebench_kinematics::random::NormalPairs;
 
-use super::build::{BuildOptions, KnownMarkers, ScanBuild, build};
+use super::build::{BuildOptions, KnownMarkers, ScanBuild, SeenScan, register, see};
 use super::files::{write_build, write_json, write_scenario};
-use super::patient::{PatientFrame, Room, patient_scenario, resolved_at, set_base};
+use super::patient::{PatientFrame, Room, patient_scenario};
+use super::touched::Draws;
 use super::{CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan};
 use crate::Control;
 use crate::progress::Silent;
@@ -65,6 +66,61 @@ pub struct Imaged {
     pub file: PathBuf,
 }
 
+/// The last scan that was made: of several cases that differ in what is done with it, it is made once.
+#[derive(Debug, Default)]
+pub struct LastScan(Option<(String, Arc<SeenScan>)>);
+
+impl LastScan {
+    fn of(&self, key: Option<&str>) -> Option<Arc<SeenScan>> {
+        let (known, seen) = self.0.as_ref()?;
+        (Some(known.as_str()) == key).then(|| Arc::clone(seen))
+    }
+}
+
+/// All that a scan depends on, and what is pointed to in it.
+fn key(resolved: &ResolvedScenario, section: &CtSection) -> String {
+    let scan = CtSection {
+        touch_mm: 0.0,
+        markers: None,
+        ..section.clone()
+    };
+    let scenario = &resolved.scenario;
+    let lesions: Vec<_> = resolved.goals.iter().map(|goal| &goal.lesion).collect();
+    format!(
+        "{:?} {:?} {} {lesions:?}",
+        scan, scenario.phantom, scenario.seed
+    )
+}
+
+/// Makes a scan, and looks at it.
+fn seen(
+    scan: &SyntheticScan,
+    options: &BuildOptions,
+    control: &Control<'_>,
+) -> Result<SeenScan, ImagingError> {
+    control.progress.message("scanning");
+    control.progress.expect(scan.grid.size()[2] as u64);
+    let volume = synthesise_watched(
+        &scan.scene,
+        &scan.truth.scanner,
+        &scan.grid,
+        scan.truth.seed,
+        control.threads,
+        control.cancel,
+        &|| control.progress.step(),
+    )?;
+    let read = ReadVolume {
+        volume,
+        remarks: Vec::new(),
+        description: Description {
+            format: "synthetic".to_owned(),
+            modality: Some("CT".to_owned()),
+            ..Description::default()
+        },
+    };
+    see(read, options, control)
+}
+
 /// Scans the phantom of a scenario with `[ct]`, builds what is seen of it into `folder`, and gives the scenario of that.
 /// With the same seed the same bytes, whatever the number of threads.
 ///
@@ -75,6 +131,7 @@ pub fn imaged(
     folder: &Path,
     overrides: &Overrides,
     with_labels: bool,
+    last: Option<&mut LastScan>,
     control: &Control<'_>,
 ) -> Result<Imaged, BuildStop> {
     let file = resolved.source.file.as_str();
@@ -91,28 +148,16 @@ pub fn imaged(
     };
     let scan = SyntheticScan::new(&subject, &order).map_err(|error| stopped(file, error))?;
     let options = wanted(resolved, section, subject.phantom, &scan, &mut draws)?;
-    control.progress.message("scanning");
-    control.progress.expect(scan.grid.size()[2] as u64);
-    let volume = synthesise_watched(
-        &scan.scene,
-        &scan.truth.scanner,
-        &scan.grid,
-        scan.truth.seed,
-        control.threads,
-        control.cancel,
-        &|| control.progress.step(),
-    )
-    .map_err(|error| stopped(file, error))?;
-    let read = ReadVolume {
-        volume,
-        remarks: Vec::new(),
-        description: Description {
-            format: "synthetic".to_owned(),
-            modality: Some("CT".to_owned()),
-            ..Description::default()
-        },
+    let key = last.as_ref().map(|_| key(resolved, section));
+    let known = last.as_ref().and_then(|last| last.of(key.as_deref()));
+    let seen = match known {
+        Some(seen) => seen,
+        None => Arc::new(seen(&scan, &options, control).map_err(|error| stopped(file, error))?),
     };
-    let build = build(read, &options, control).map_err(|error| stopped(file, error))?;
+    if let (Some(last), Some(key)) = (last, key) {
+        last.0 = Some((key, Arc::clone(&seen)));
+    }
+    let build = register(seen, &options).map_err(|error| stopped(file, error))?;
     let goals = goals(resolved, &scan, &build).map_err(|error| stopped(file, error))?;
     let room = Room {
         scenario: &resolved.scenario,
@@ -123,16 +168,7 @@ pub fn imaged(
         "{}, as it was built from a synthetic scan of its phantom",
         resolved.scenario.name
     );
-    let path = write_patient(
-        folder,
-        &room,
-        &build,
-        goals,
-        overrides,
-        with_labels,
-        &first,
-        control,
-    )?;
+    let path = write_patient(folder, &room, &build, goals, with_labels, &first, control)?;
     write_json(&folder.join("truth.json"), &scan.truth).map_err(|error| stopped(file, error))?;
     let scenario = load_scenario(&path, overrides)?;
     Ok(Imaged {
@@ -150,6 +186,7 @@ pub fn imaged(
 pub fn scanned(
     resolved: ResolvedScenario,
     overrides: &Overrides,
+    last: &mut LastScan,
 ) -> Result<ResolvedScenario, Vec<Finding>> {
     if resolved.scenario.ct.is_none() {
         return Ok(resolved);
@@ -163,7 +200,14 @@ pub fn scanned(
         cancel: &AtomicBool::new(false),
         progress: &Silent,
     };
-    match imaged(&resolved, folder.path(), overrides, false, &control) {
+    match imaged(
+        &resolved,
+        folder.path(),
+        overrides,
+        false,
+        Some(last),
+        &control,
+    ) {
         Ok(made) => Ok(made.scenario),
         Err(BuildStop::Refused(findings)) => Err(findings),
         Err(BuildStop::Interrupted) => Err(one("interrupted".to_owned())),
@@ -174,13 +218,11 @@ pub fn scanned(
 ///
 /// # Errors
 /// What cannot be written, or resolved; interrupted.
-#[expect(clippy::too_many_arguments, reason = "what is written, where, and how")]
 pub fn write_patient(
     folder: &Path,
     room: &Room<'_>,
     build: &ScanBuild,
     goals: Vec<GoalSection>,
-    overrides: &Overrides,
     with_labels: bool,
     first: &str,
     control: &Control<'_>,
@@ -190,29 +232,9 @@ pub fn write_patient(
     control.progress.message("writing");
     write_build(folder, build, with_labels, control.cancel)
         .map_err(|error| stopped(&name, error))?;
-    let mut scenario = patient_scenario(room, build, goals, folder);
-    let lying = resolved_at(&scenario, &path, overrides)?;
-    set_base(&mut scenario, &lying, build);
+    let scenario = patient_scenario(room, build, goals, folder);
     write_scenario(&path, &scenario, first).map_err(|error| stopped(&name, error))?;
     Ok(path)
-}
-
-/// Everything random of a scan but its noise.
-struct Draws(NormalPairs);
-
-impl Draws {
-    fn new(seed: u64) -> Self {
-        // Apart from the noise, which has the scenario's seed itself.
-        Self(NormalPairs::new(seed ^ 0x5ca1_ab1e_0000_0017))
-    }
-
-    fn normal(&mut self, sigma: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| sigma * self.0.next_normal())
-    }
-
-    fn uniform(&mut self) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| self.0.uniform(-0.5, 0.5))
-    }
 }
 
 fn order(section: &CtSection, seed: u64, draws: &mut Draws) -> ScanOrder {
@@ -281,7 +303,7 @@ fn wanted(
         .key("phantom.markers")
         .hint("`markers = \"ct_sphere\"` under [phantom]")));
     };
-    let robot_from_ct = robot_from_ct(resolved, scan);
+    let robot_from_ct = scan.robot_from_ct.unwrap_or_else(Pose::identity);
     let touch_m = 1e-3 * section.touch_mm;
     let mut markers = Vec::new();
     for marker in &scan.truth.markers {
@@ -333,20 +355,12 @@ fn wanted(
         markers: Some(KnownMarkers {
             frame: ReferenceFrame::Robot,
             model: MarkerModel::phantom_sphere(1e-3 * sphere_mm),
-            placement_sigma_m: 0.0,
+            placement_sigma_m: None,
             markers,
         }),
         max_bytes: u64::MAX,
         ..BuildOptions::default()
     })
-}
-
-/// Where the robot really has the scan's places.
-fn robot_from_ct(resolved: &ResolvedScenario, scan: &SyntheticScan) -> Pose {
-    let robot_from_world = resolved.cell.robot.world_from_base_link.inverse();
-    let placed = resolved.phantom.as_ref();
-    let world_from_phantom = placed.map_or_else(Pose::identity, |placed| placed.world_from_phantom);
-    robot_from_world * world_from_phantom * scan.ct_from_phantom.inverse()
 }
 
 /// The scenario's goals as they are seen in the scan.
@@ -356,7 +370,7 @@ fn goals(
     build: &ScanBuild,
 ) -> Result<Vec<GoalSection>, ImagingError> {
     let frame = PatientFrame::of(build);
-    let true_robot_from_ct = robot_from_ct(resolved, scan);
+    let true_robot_from_ct = scan.robot_from_ct.unwrap_or_else(Pose::identity);
     let placed = resolved.phantom.as_ref();
     let world_from_phantom = placed.map_or_else(Pose::identity, |placed| placed.world_from_phantom);
     let ct_from_world = scan.ct_from_phantom * world_from_phantom.inverse();

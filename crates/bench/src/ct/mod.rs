@@ -7,6 +7,7 @@ mod imaged;
 mod localisation;
 mod patient;
 mod scan_order;
+mod touched;
 mod truth;
 
 /// The room that a patient is put into unless somebody names another.
@@ -14,10 +15,11 @@ pub const USUAL_ROOM: &str = include_str!("room.toml");
 
 pub use anatomy::{Materials, phantom_scene};
 pub use build::{
-    BuildOptions, BuiltTarget, GivenLabels, KnownMarkers, Registered, ScanBuild, build,
+    BuildOptions, BuiltTarget, GivenLabels, KnownMarkers, Registered, ScanBuild, SeenScan, build,
 };
 pub use files::{BuildReport, write_build};
-pub use imaged::{BuildStop, Imaged, imaged, scanned, write_patient};
+pub use imaged::{BuildStop, Imaged, LastScan, imaged, scanned, write_patient};
 pub use patient::{PatientFrame, Room};
 pub use scan_order::{CtSubject, ScanOrder, ScanRange, SyntheticScan};
+pub use touched::marker_list;
 pub use truth::{LesionTruth, MarkerTruth, ScanTruth};

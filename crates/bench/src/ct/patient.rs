@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+use needlebench_cell::ResolvedScenario;
 use needlebench_cell::phantom::Tissue;
 use needlebench_cell::scenario::{
-    CovarianceMm2, GoalSection, ImagingBlock, PartSection, PartTissue, PhantomSection, Posture,
+    CovarianceMm2, GoalSection, ImagingBlock, PartSection, PartTissue, PhantomSection,
     RegistrationBlock, Scenario,
 };
-use needlebench_cell::{Finding, Overrides, ResolvedScenario};
 use needlebench_imaging::SurfaceTissue;
 use needlebench_imaging::registration::ReferenceFrame;
 use needlebench_kinematics::Pose;
@@ -18,9 +18,8 @@ use super::ScanBuild;
 /// Folder of the surfaces, beside the scenario.
 pub(super) const SURFACES: &str = "surfaces";
 
-/// Steps that numbers in the scenario are rounded to, mm and deg: far below what anything here is known to.
+/// Step that places in the scenario are rounded to, mm: far below what anything here is known to.
 const PLACE_STEP: f64 = 1e-6;
-const ANGLE_STEP: f64 = 1e-9;
 
 /// The patient that was built, about the middle of the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,6 +32,7 @@ impl PatientFrame {
     /// Of what was built.
     pub fn of(build: &ScanBuild) -> Self {
         let skin = build
+            .seen
             .made
             .surfaces
             .iter()
@@ -95,7 +95,8 @@ pub fn patient_scenario(
         let reference_from_phantom =
             registered.registration.reference_from_ct * frame.ct_from_phantom();
         if registered.registration.frame == ReferenceFrame::Robot {
-            place(&mut phantom, &mut scenario, room, &reference_from_phantom);
+            let world_from_robot = room.resolved.cell.robot.world_from_base_link;
+            phantom.set_pose(&(world_from_robot * reference_from_phantom));
         }
         let measured = RegistrationBlock {
             markers_mm: registered
@@ -140,71 +141,6 @@ pub fn patient_scenario(
     scenario
 }
 
-/// Robot and patient as the registration has them: the patient on the table, about where the robot's usual place has
-/// them, and the robot's base where it is from there.
-fn place(
-    phantom: &mut PhantomSection,
-    scenario: &mut Scenario,
-    room: &Room<'_>,
-    robot_from_phantom: &Pose,
-) {
-    let world_from_robot = room.resolved.cell.robot.world_from_base_link;
-    let about = world_from_robot * robot_from_phantom;
-    let head = about.rotation * Vector3::z();
-    let down = about.rotation.inverse() * -Vector3::z();
-    phantom.posture = posture(&down);
-    phantom.body_roll_deg = 0.0;
-    phantom.head_yaw_deg = rounded(head.y.atan2(head.x).to_degrees(), 1e-3);
-    let at = about.translation.vector * 1e3;
-    phantom.position_mm = [
-        rounded(at.x, 1e-3),
-        rounded(at.y, 1e-3),
-        phantom.position_mm[2],
-    ];
-    if !phantom.rest_on_table {
-        phantom.position_mm[2] = rounded(at.z, 1e-3);
-    }
-    scenario.robot.base_position_mm = None;
-    scenario.robot.base_rpy_deg = None;
-}
-
-/// Sets the robot's base by where the patient came to lie.
-pub(super) fn set_base(scenario: &mut Scenario, lying: &ResolvedScenario, build: &ScanBuild) {
-    let Some(registered) = &build.registered else {
-        return;
-    };
-    let Some(placed) = &lying.phantom else { return };
-    if registered.registration.frame != ReferenceFrame::Robot {
-        return;
-    }
-    let frame = PatientFrame::of(build);
-    let robot_from_phantom = registered.registration.reference_from_ct * frame.ct_from_phantom();
-    let base = placed.world_from_phantom * robot_from_phantom.inverse();
-    let (roll, pitch, yaw) = base.rotation.euler_angles();
-    let place = base
-        .translation
-        .vector
-        .map(|metres| rounded(metres * 1e3, PLACE_STEP));
-    scenario.robot.base_position_mm = Some(place.into());
-    scenario.robot.base_rpy_deg =
-        Some([roll, pitch, yaw].map(|angle| rounded(angle.to_degrees(), ANGLE_STEP)));
-}
-
-/// The posture of which gravity points the most along this direction of the patient.
-fn posture(down: &Vector3<f64>) -> Posture {
-    if down.x.abs() > down.y.abs() {
-        if down.x > 0.0 {
-            Posture::LeftLateral
-        } else {
-            Posture::RightLateral
-        }
-    } else if down.y < 0.0 {
-        Posture::Prone
-    } else {
-        Posture::Supine
-    }
-}
-
 fn phantom(
     own: PhantomSection,
     room: &Room<'_>,
@@ -239,7 +175,7 @@ fn phantom(
         }
     }
     let position_mm = frame.in_mm(&Point3::origin());
-    let surfaces = build.made.surfaces.iter();
+    let surfaces = build.seen.made.surfaces.iter();
     let parts = surfaces.map(|surface| PartSection {
         name: surface.name.clone(),
         file: format!("{SURFACES}/{}.stl", surface.name),
@@ -289,18 +225,4 @@ fn in_mm2(covariance_m2: &Matrix3<f64>) -> CovarianceMm2 {
     let step = 10_f64.powf(most.max(1e-12).log10().floor() - 8.0);
     [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
         .map(|(row, column)| rounded(at(row, column), step))
-}
-
-/// What the room is resolved with once more: the file is named by `file`.
-pub(super) fn resolved_at(
-    scenario: &Scenario,
-    file: &Path,
-    overrides: &Overrides,
-) -> Result<ResolvedScenario, Vec<Finding>> {
-    let name = file.display().to_string();
-    let text = needlebench_cell::scenario_text(scenario)
-        .map_err(|message| vec![Finding::new(&name, message)])?;
-    let folder = file.parent().unwrap_or(Path::new(""));
-    let open = needlebench_cell::resolve_open_scenario(&name, &text, folder, overrides)?;
-    Ok(open.resolved)
 }

@@ -107,6 +107,8 @@ pub struct SyntheticScan {
     pub grid: VoxelGrid,
     /// Place of the phantom in `ct`.
     pub ct_from_phantom: Pose,
+    /// From `ct` to the robot's `base_link`, where there is a robot.
+    pub robot_from_ct: Option<Pose>,
     /// The truth.
     pub truth: ScanTruth,
 }
@@ -159,6 +161,7 @@ impl SyntheticScan {
             scene,
             grid,
             ct_from_phantom,
+            robot_from_ct,
             truth,
         })
     }

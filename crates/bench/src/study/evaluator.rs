@@ -9,7 +9,7 @@ use super::dynamic::dynamic_rows;
 use super::planned::planned_rows;
 use super::rows::StudyColumns;
 use super::static_case::{StaticWorker, invalid_rows};
-use crate::ct::scanned;
+use crate::ct::{LastScan, scanned};
 
 /// Computes the cases of a study.
 pub struct StudyEvaluator<'a> {
@@ -37,6 +37,7 @@ impl CaseEvaluator for StudyEvaluator<'_> {
             columns: self.columns,
             postures: StaticWorker::default(),
             pool: EnginePool::new(ENGINES),
+            scan: LastScan::default(),
         }))
     }
 }
@@ -47,6 +48,7 @@ struct Worker<'a> {
     columns: &'a StudyColumns,
     postures: StaticWorker,
     pool: EnginePool,
+    scan: LastScan,
 }
 
 impl CaseWorker for Worker<'_> {
@@ -54,7 +56,7 @@ impl CaseWorker for Worker<'_> {
         let layout = StudyCase::new(self.study, self.design, case);
         let scenario = layout
             .scenario(self.study)
-            .and_then(|resolved| scanned(resolved, self.study.family.overrides()));
+            .and_then(|resolved| scanned(resolved, self.study.family.overrides(), &mut self.scan));
         let rows = match scenario {
             Err(findings) => invalid_rows(&findings),
             Ok(resolved) => match layout.mode {

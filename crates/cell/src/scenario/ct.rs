@@ -148,13 +148,13 @@ pub(super) fn check(toml: &TomlText<'_>, scenario: &Scenario) -> Vec<Finding> {
                 .hint("add [[goals]], or leave [ct] out"),
         );
     }
-    if let Some(names) = scenario.ct.as_ref().and_then(|ct| ct.markers.as_ref()) {
-        if names.len() < 3 {
-            findings.push(
-                toml.finding("ct.markers", format!("{} markers", names.len()))
-                    .hint("a rigid registration needs three that are not on one line"),
-            );
-        }
+    if let Some(names) = scenario.ct.as_ref().and_then(|ct| ct.markers.as_ref())
+        && names.len() < 3
+    {
+        findings.push(
+            toml.finding("ct.markers", format!("{} markers", names.len()))
+                .hint("a rigid registration needs three that are not on one line"),
+        );
     }
     findings
 }

@@ -216,8 +216,9 @@ pub(super) fn check_true_targets(
     toml: &TomlText<'_>,
     goals: &[GoalSection],
     criteria: &CriteriaSection,
+    come_later: bool,
 ) -> Vec<Finding> {
-    if goals.iter().any(|goal| goal.true_target_mm.is_some()) {
+    if come_later || goals.iter().any(|goal| goal.true_target_mm.is_some()) {
         return Vec::new();
     }
     let limits = [

@@ -229,10 +229,12 @@ pub(crate) fn check_together(
         &scenario.goals,
         with_goals && scenario.iso9283.is_none() && scenario.excitation.is_none(),
     ));
+    // A synthetic scan brings true targets along.
     findings.extend(goals::check_true_targets(
         toml,
         &scenario.goals,
         &scenario.criteria,
+        !with_goals || scenario.ct.is_some(),
     ));
     findings.extend(ranking::check(toml, &scenario.ranking));
     findings.extend(events::check(toml, scenario));

@@ -75,6 +75,9 @@ pub struct PhantomSection {
     /// Turn about the long axis away from the posture, deg.
     #[schemars(range(min = -720.0, max = 720.0))]
     pub body_roll_deg: f64,
+    /// Lift of the head over the feet, about the horizontal axis across the patient, deg.
+    #[schemars(range(min = -60.0, max = 60.0))]
+    pub head_up_deg: f64,
     /// Position of the phantom's origin (mid-chest) in the world, mm. With `rest_on_table` the
     /// third number is the height of a cushion over the table.
     #[schemars(inner(range(min = -5000.0, max = 5000.0)))]
@@ -101,6 +104,7 @@ impl Default for PhantomSection {
             posture: Posture::Supine,
             head_yaw_deg: 0.0,
             body_roll_deg: 0.0,
+            head_up_deg: 0.0,
             position_mm: [0.0; 3],
             rest_on_table: true,
             arms: Arms::None,

@@ -231,7 +231,14 @@ fn scanned(
         progress: &progress,
     };
     let made = match prepare_folder(&folder) {
-        Ok(()) => imaged(scenario.scenario(), &folder, scan.overrides, true, &control),
+        Ok(()) => imaged(
+            scenario.scenario(),
+            &folder,
+            scan.overrides,
+            true,
+            None,
+            &control,
+        ),
         Err(finding) => Err(BuildStop::Refused(vec![finding])),
     };
     progress.finish();

@@ -13,6 +13,7 @@ mod clearance;
 mod compare;
 mod compare_studies;
 mod credibility;
+mod ct_build;
 mod ct_info;
 mod ct_synth;
 mod determinism;

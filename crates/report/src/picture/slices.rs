@@ -97,6 +97,7 @@ struct Slice {
 pub fn slice_pictures(build: &ScanBuild) -> Result<Vec<SlicePicture>, PictureError> {
     let mut wanted = Vec::new();
     let skin = build
+        .seen
         .made
         .surfaces
         .iter()
@@ -113,7 +114,7 @@ pub fn slice_pictures(build: &ScanBuild) -> Result<Vec<SlicePicture>, PictureErr
             });
         }
     }
-    for measured in &build.made.lesions {
+    for measured in &build.seen.made.lesions {
         let Some(size) = &measured.size else { continue };
         for view in [AXIAL, CORONAL, SAGITTAL] {
             wanted.push(Slice {
@@ -212,7 +213,7 @@ fn whole(value: f64) -> usize {
 }
 
 fn drawn(build: &ScanBuild, slice: &Slice) -> Result<SlicePicture, PictureError> {
-    let frame = Frame::new(&build.volume, slice.view);
+    let frame = Frame::new(&build.seen.volume, slice.view);
     let [width, height] = frame.size_px;
     let legend_px = TextSize::SMALL.line_px() + 8;
     let mut image = Image::filled(
@@ -222,7 +223,7 @@ fn drawn(build: &ScanBuild, slice: &Slice) -> Result<SlicePicture, PictureError>
     );
     shade(&mut image, build, slice, &frame);
     let mut shown: Vec<(&str, [u8; 3])> = Vec::new();
-    for surface in &build.made.surfaces {
+    for surface in &build.seen.made.surfaces {
         let color = color(surface.tissue);
         let segments = cut(&surface.mesh, slice.view.cut, slice.at_m);
         if !segments.is_empty() {
@@ -249,7 +250,7 @@ fn shade(image: &mut Image, build: &ScanBuild, slice: &Slice, frame: &Frame) {
     for y in 0..height {
         for x in 0..width {
             let hu = interpolated(
-                &build.volume,
+                &build.seen.volume,
                 &frame.place(slice.at_m, [x, y]),
                 slice.view.cut,
             );
@@ -367,6 +368,7 @@ fn marks(image: &mut Image, build: &ScanBuild, slice: &Slice, frame: &Frame) -> 
         }
     }
     for size in build
+        .seen
         .made
         .lesions
         .iter()

@@ -17,9 +17,9 @@ pub(super) use body::Cell;
 use body::{Body, Lies};
 use plane_cut::Plane;
 
-/// Halvings of a cell in which surfaces meet: each of its edges four times. What then is left is a quarter of a cell
-/// and is put together as if surfaces crossed it independently of each other.
-const HALVINGS: u32 = 6;
+/// Halvings of a cell in which surfaces meet: each of its edges twice. What then is left is half a cell, an eighth of a
+/// millimetre, and is put together as if surfaces crossed it independently of each other.
+const HALVINGS: u32 = 3;
 /// Shares below this count as none: rounding.
 const NOTHING: f64 = 1e-9;
 

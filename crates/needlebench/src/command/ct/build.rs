@@ -306,7 +306,6 @@ fn make(arguments: &BuildArguments, control: &Control<'_>) -> Result<(ScanBuild,
         &room,
         &built,
         goals,
-        &overrides,
         !arguments.no_labels,
         first,
         control,
@@ -341,6 +340,7 @@ fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, St
     if let (Some(posture), Some(phantom)) = (arguments.posture, &mut scenario.phantom) {
         phantom.posture = posture.into();
         phantom.body_roll_deg = 0.0;
+        phantom.head_up_deg = 0.0;
     }
     Ok(OwnRoom {
         scenario,
@@ -433,7 +433,7 @@ fn known_markers(list: &MarkerList) -> KnownMarkers {
         } else {
             MarkerModel::bare_sphere(diameter_m)
         },
-        placement_sigma_m: 1e-3 * list.placement_mm,
+        placement_sigma_m: list.placement_mm.map(|mm| 1e-3 * mm),
         markers: markers.collect(),
     }
 }

@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
-use needlebench_bench::ct::{CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan};
+use needlebench_bench::ct::{
+    CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan, marker_list,
+};
 use needlebench_bench::progress::Progress;
 use needlebench_cell::phantom::{Phantom, PhantomParameters, SIZE_PRESETS};
 use needlebench_cell::scenario::MarkerKind;
@@ -37,6 +39,7 @@ Writes into DIR:
   labels.nii.gz       what is at the centre of each voxel; its names are in labels.json
   truth.json          scanner, materials, transforms (robot_from_ct of a scenario), lesions, markers; m and rad
   lesions.json, markers.json
+  marker_list.toml    spheres as the robot has touched them, for `ct build --markers`; of a phantom alone by its drawing
 
 Frame ct is the patient's LPS. The same file, options and seed give the same bytes.";
 
@@ -115,6 +118,9 @@ pub(crate) struct SynthArguments {
     /// Hounsfield units of vessels: 150 to 300 with contrast medium; 45 if left out.
     #[arg(long, value_name = "HU", value_parser = finite)]
     vessels: Option<f64>,
+    /// Standard deviation along each axis of the places in marker_list.toml, mm.
+    #[arg(long, value_name = "MM", default_value_t = 0.3, value_parser = positive)]
+    touch_mm: f64,
     /// No bed under the patient.
     #[arg(long)]
     no_bed: bool,
@@ -565,6 +571,10 @@ fn write_truth(
         "markers.json",
         serde_json::to_string_pretty(&listed("markers", &truth.markers)),
     )?;
+    if let Some(list) = marker_list(scan, MarkerKind::CtSphere, 1e-3 * arguments.touch_mm) {
+        let text = list.text().map_err(anyhow::Error::msg)?;
+        write("marker_list.toml", Ok(text.trim_end().to_owned()))?;
+    }
     if !arguments.no_labels {
         write(
             "labels.json",
