@@ -196,7 +196,7 @@ fn what_is_wrong_is_said_with_what_to_do() {
     for (arguments, words) in [
         (vec!["--lesion", "1,2,3"], "a name and three numbers"),
         (vec!["--lesion", "skin=1,2,3"], "nii"),
-        (vec!["--markers", "markers.toml"], "markers.toml:7"),
+        (vec!["--markers", "markers.toml"], "markers.toml:5"),
         (
             vec!["--labels", "l.nii", "--label-names", "names.json"],
             "no names",

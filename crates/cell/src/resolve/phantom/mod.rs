@@ -19,7 +19,7 @@ use crate::toml_text::TomlText;
 use crate::{Finding, nearest_name};
 use mesh_parts::with_mesh_parts;
 pub use place::PlacedPhantom;
-pub(super) use place::place_phantom;
+pub(super) use place::{off_the_table, place_phantom};
 
 /// A phantom before it is placed, and the files that it is made of.
 #[derive(Debug)]

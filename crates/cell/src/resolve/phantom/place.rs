@@ -76,6 +76,31 @@ pub(crate) fn place_phantom(
     })
 }
 
+/// What is odd about a phantom whose place is given, over a table that it does not rest on by itself.
+pub(crate) fn off_the_table(
+    section: &PhantomSection,
+    table: Option<&TableSection>,
+    phantom: &UnplacedPhantom,
+    placed: &PlacedPhantom,
+) -> Option<String> {
+    /// Deeper than a mattress gives way, higher than one is thick, mm.
+    const USUAL_MM: [f64; 2] = [-20.0, 100.0];
+    let table = table.filter(|_| !section.rest_on_table)?;
+    let pose = &placed.world_from_phantom;
+    let down = pose.rotation.inverse() * -Vector3::z();
+    let lowest_m = pose.translation.vector.z + phantom.lowest_m(&-down);
+    let over_mm = lowest_m * 1e3 - table.top_height_mm;
+    if (USUAL_MM[0]..=USUAL_MM[1]).contains(&over_mm) {
+        return None;
+    }
+    let side = if over_mm < 0.0 { "below" } else { "above" };
+    Some(format!(
+        "the patient's lowest point is {:.0} mm {side} the table's top: check `top_height_mm` under [table], and where \
+         the robot stands",
+        over_mm.abs()
+    ))
+}
+
 /// What head and arms are made after; none if none are wanted.
 fn limb_sizes<'p>(
     toml: &TomlText<'_>,
