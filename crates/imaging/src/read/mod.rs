@@ -157,10 +157,13 @@ fn format_of(path: &Path) -> Result<Format, ImagingError> {
     if first.is_empty() {
         return Err(ImagingError::refused("the file is empty"));
     }
-    if nifti::is_nifti(path, &first) {
+    // Bytes count before names: DICOM files are called .img, too.
+    if nifti::begins_as_header(&first) {
         Ok(Format::Nifti)
     } else if dicom::is_dicom(&first) {
         Ok(Format::Dicom)
+    } else if nifti::has_name(path) {
+        Ok(Format::Nifti)
     } else {
         Err(
             ImagingError::refused("it is neither NIfTI nor DICOM by its first bytes")

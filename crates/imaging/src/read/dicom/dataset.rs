@@ -70,11 +70,12 @@ impl Encoding {
 }
 
 impl DataSet {
-    /// A text without its padding.
+    /// A text without its padding, and without what terminals would take for a command.
     pub(super) fn text(&self, tag: Tag) -> Option<String> {
         let bytes = &self.values.get(&tag)?.bytes;
         let text = String::from_utf8_lossy(bytes);
-        let text = text.trim_matches(|letter: char| letter == '\0' || letter.is_whitespace());
+        let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
+        let text = text.trim();
         (!text.is_empty()).then(|| text.to_owned())
     }
 
@@ -100,18 +101,22 @@ impl DataSet {
                         .map_or(f64::NAN, |four| f64::from(f32::from_le_bytes(four))),
                 }
             });
-            return Ok(Some(numbers.collect()));
+            let numbers: Vec<f64> = numbers.collect();
+            if !numbers.iter().all(|number| number.is_finite()) {
+                return Err(no_number(tag));
+            }
+            return Ok((!numbers.is_empty()).then_some(numbers));
         }
         let Some(text) = self.text(tag) else {
             return Ok(None);
         };
         let clean = |word: &str| {
-            let word = word.trim_matches(|letter: char| letter == '\0' || letter.is_whitespace());
-            word.parse::<f64>().ok().filter(|number| number.is_finite())
+            let number = word.trim().parse::<f64>().ok();
+            number.filter(|number| number.is_finite())
         };
         match text.split('\\').map(clean).collect() {
             Some(numbers) => Ok(Some(numbers)),
-            None => Err(ImagingError::refused("holds what is no number").at(tag::written(tag))),
+            None => Err(no_number(tag)),
         }
     }
 
@@ -184,6 +189,12 @@ struct Head {
     tag: Tag,
     vr: [u8; 2],
     length: u64,
+}
+
+fn no_number(tag: Tag) -> ImagingError {
+    ImagingError::refused("holds what is no number")
+        .at(tag::written(tag))
+        .hint("correct the element, e.g. with dcmodify (DCMTK), or export the series again")
 }
 
 /// Why elements cannot be read.

@@ -116,10 +116,20 @@ impl OpenedFile {
             }));
         }
         let mut encoding = syntax.encoding();
-        if encoding == Encoding::EXPLICIT && guessed(&head) == Encoding::IMPLICIT {
-            assumed =
-                Some("the file says that its elements have VRs, but they have none: read without");
-            encoding = Encoding::IMPLICIT;
+        match (encoding, guessed(&head)) {
+            (Encoding::EXPLICIT, Encoding::IMPLICIT) => {
+                assumed = Some(
+                    "the file says that its elements have VRs, but they have none: read without",
+                );
+                encoding = Encoding::IMPLICIT;
+            }
+            (Encoding::IMPLICIT, Encoding::EXPLICIT) => {
+                assumed = Some(
+                    "the file says that its elements have no VRs, but they have: read with them",
+                );
+                encoding = Encoding::EXPLICIT;
+            }
+            _ => {}
         }
         let (data, pixels) = Elements::new(&mut input, start, end, encoding)?.data()?;
         Ok(Some(Self {

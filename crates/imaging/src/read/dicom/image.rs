@@ -41,6 +41,8 @@ pub(super) struct ImageFile {
     pub(super) padding: Option<[f64; 2]>,
     pub(super) assumed: Option<&'static str>,
     pub(super) is_lossy: bool,
+    /// Whether the compression leaves it open, and the file says nothing.
+    pub(super) may_be_lossy: bool,
     /// Text of (0018,1120): for information only, its sign differs between makers.
     pub(super) gantry_tilt: Option<f64>,
     pub(super) segmentation: Option<Segmentation>,
@@ -178,7 +180,10 @@ pub(super) fn slices(
         ))
         .at(name));
     }
+    check_frames(&data, [rows, columns], frames, pixels.as_ref())
+        .map_err(|problem| problem.at(name))?;
     let stored = stored(&data, &syntax);
+    let lossy = data.text(tag::LOSSY);
     let is_signed = data.integer(tag::PIXEL_REPRESENTATION) == Some(1);
     let file = Arc::new(ImageFile {
         name: name.to_owned(),
@@ -190,7 +195,8 @@ pub(super) fn slices(
         stored,
         padding: padding(&data, is_signed),
         assumed,
-        is_lossy: syntax.is_lossy() || data.text(tag::LOSSY).as_deref() == Some("01"),
+        is_lossy: syntax.is_lossy() || lossy.as_deref() == Some("01"),
+        may_be_lossy: syntax.may_be_lossy() && lossy.is_none(),
         gantry_tilt: data.real(tag::GANTRY_TILT).ok().flatten(),
         segmentation: segmentation(&data),
         bits_allocated: data.integer(tag::BITS_ALLOCATED).unwrap_or(0),
@@ -244,6 +250,33 @@ fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
         ],
         segment: integer(tag::REFERENCED_SEGMENT),
     }
+}
+
+/// Refuses frames that the pixels cannot be, before anything is kept of each of them.
+fn check_frames(
+    data: &DataSet,
+    [rows, columns]: [u16; 2],
+    frames: usize,
+    pixels: Option<&Pixels>,
+) -> Result<(), ImagingError> {
+    let bits = data.integer(tag::BITS_ALLOCATED).unwrap_or(0).max(1);
+    let most = match pixels {
+        None => 0,
+        Some(Pixels::Plain { bytes, .. }) => {
+            let bits = u64::from(rows) * u64::from(columns) * bits.unsigned_abs();
+            bytes.saturating_mul(8) / bits
+        }
+        // Each begins with a piece of its own.
+        Some(Pixels::Fragments { pieces, .. }) => pieces.len() as u64,
+    };
+    // A single one says by itself what is missing.
+    if frames > 1 && frames as u64 > most {
+        return Err(ImagingError::refused(format!(
+            "the file is cut off: it says that it has {frames} frames, but has pixels of {most}"
+        ))
+        .hint("copy or export it again"));
+    }
+    Ok(())
 }
 
 /// A problem with an element of a file.

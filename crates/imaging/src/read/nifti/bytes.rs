@@ -1,7 +1,7 @@
 //! The bytes of a file, whether it is compressed or not.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::GzDecoder;
@@ -168,8 +168,7 @@ impl ByteStream {
             return Ok(());
         };
         let mut reader = decoder.into_inner();
-        let first = reader
-            .fill_buf()
+        let first = two_bytes(&mut reader)
             .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))?;
         if first.starts_with(&GZIP) {
             self.source = Source::Gzip(Box::new(GzDecoder::new(reader)));
@@ -207,4 +206,14 @@ impl ByteStream {
             _ => None,
         })
     }
+}
+
+/// What comes next, at least two bytes of it where the file has them: the buffer may end between them.
+fn two_bytes(reader: &mut BufReader<File>) -> std::io::Result<&[u8]> {
+    if reader.buffer().len() < GZIP.len() {
+        let at = reader.stream_position()?;
+        // Empties the buffer.
+        reader.seek(SeekFrom::Start(at))?;
+    }
+    reader.fill_buf()
 }

@@ -18,6 +18,8 @@ use super::scalar::{Converter, Tally};
 use super::{ReadOptions, reserved, zeroed};
 use crate::{ImagingError, Remark, VoxelGrid};
 
+pub(super) use self::version::begins_as_header;
+
 /// Bytes that are converted at a time: they stay in the second cache, and hold whole numbers of any type.
 const PIECE: usize = 1 << 18;
 
@@ -29,13 +31,8 @@ pub(super) struct Nifti {
     data_path: PathBuf,
 }
 
-/// Whether a file begins as a NIfTI file does, or is named as one.
-pub(super) fn is_nifti(path: &Path, first: &[u8]) -> bool {
-    version::begins_as_header(first) || has_name(path)
-}
-
 /// Whether it is called `.nii`, `.nii.gz`, `.hdr` or `.img`, with or without `.gz`.
-fn has_name(path: &Path) -> bool {
+pub(super) fn has_name(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
