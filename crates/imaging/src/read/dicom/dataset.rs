@@ -9,6 +9,7 @@ use std::io::{Read, Seek, SeekFrom};
 
 use super::tag::{self, Tag};
 use crate::ImagingError;
+use crate::read::unreadable;
 
 /// Sequences in sequences: more are no image.
 const DEPTH: usize = 12;
@@ -136,6 +137,7 @@ impl DataSet {
         numbers.try_into().map(Some).map_err(|_| {
             ImagingError::refused(format!("has {count} numbers instead of {N}"))
                 .at(tag::written(tag))
+                .hint("correct the element, e.g. with dcmodify (DCMTK), or export the series again")
         })
     }
 
@@ -212,9 +214,7 @@ impl<R: Read + Seek> Elements<R> {
         end: u64,
         encoding: Encoding,
     ) -> Result<Self, ImagingError> {
-        input
-            .seek(SeekFrom::Start(at))
-            .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))?;
+        input.seek(SeekFrom::Start(at)).map_err(unreadable)?;
         Ok(Self {
             input,
             at,
@@ -298,9 +298,7 @@ impl<R: Read + Seek> Elements<R> {
 
     fn skip(&mut self, bytes: u64) -> Result<(), ImagingError> {
         let forward = i64::try_from(bytes).map_err(|_| damaged("a length of 2^63", self.at))?;
-        self.input
-            .seek_relative(forward)
-            .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))?;
+        self.input.seek_relative(forward).map_err(unreadable)?;
         self.at += bytes;
         Ok(())
     }

@@ -171,14 +171,17 @@ pub(super) fn slices(
         .ok()
         .filter(|_| (1..=FRAMES).contains(&stated))
         .ok_or_else(|| {
-            ImagingError::refused(format!("it says that it has {stated} frames")).at(name)
+            ImagingError::refused(format!("it says that it has {stated} frames"))
+                .at(name)
+                .hint("copy or export it again")
         })?;
     if frames > 1 && !of_frames.is_empty() && of_frames.len() != frames {
         return Err(ImagingError::refused(format!(
             "it says that it has {frames} frames, but describes {}",
             of_frames.len()
         ))
-        .at(name));
+        .at(name)
+        .hint("copy or export it again"));
     }
     check_frames(&data, [rows, columns], frames, pixels.as_ref())
         .map_err(|problem| problem.at(name))?;
@@ -329,14 +332,16 @@ fn plane(layers: &Layers) -> Result<Plane, ImagingError> {
         return Err(ImagingError::refused(format!(
             "[{a}, {b}, {c}] and [{d}, {e}, {f}] are no two directions at right angles"
         ))
-        .at(tag::written(tag::ORIENTATION)));
+        .at(tag::written(tag::ORIENTATION))
+        .hint("export the series again"));
     }
     if !spacing_mm.iter().all(|spacing| *spacing > 0.0) {
         return Err(ImagingError::refused(format!(
             "pixels are {} x {} mm apart",
             spacing_mm[0], spacing_mm[1]
         ))
-        .at(tag::written(tag::PIXEL_SPACING)));
+        .at(tag::written(tag::PIXEL_SPACING))
+        .hint("export the series again"));
     }
     // Written with few digits they are a little short or long, and not quite square to each other.
     let along_row = along_row / along_row.norm();
@@ -355,14 +360,16 @@ fn rescale(layers: &Layers) -> Result<Rescale, ImagingError> {
         return Err(ImagingError::refused(
             "HU are given by a table (Modality LUT) instead of slope and intercept, which is not read",
         )
-        .at(tag::written(tag::MODALITY_LUT)));
+        .at(tag::written(tag::MODALITY_LUT))
+        .hint("export it as CT Image Storage with RescaleSlope and RescaleIntercept"));
     }
     let slope = layers.real(tag::SLOPE)?.unwrap_or(1.0);
     let intercept = layers.real(tag::INTERCEPT)?.unwrap_or(0.0);
     if slope == 0.0 {
         return Err(
             ImagingError::refused("the slope is 0: all voxels would be the same")
-                .at(tag::written(tag::SLOPE)),
+                .at(tag::written(tag::SLOPE))
+                .hint("export the series again; stored numbers are HU where the slope is left out"),
         );
     }
     Ok(Rescale { slope, intercept })
@@ -378,8 +385,11 @@ fn stored(data: &DataSet, syntax: &TransferSyntax) -> Result<Stored, ImagingErro
         .at(tag::written(tag::PHOTOMETRIC))
         .hint("leave screen shots and reports out of the folder"));
     }
-    let missing =
-        |tag| ImagingError::refused("how the pixels are stored is not said").at(tag::written(tag));
+    let missing = |tag| {
+        ImagingError::refused("how the pixels are stored is not said")
+            .at(tag::written(tag))
+            .hint("export the series again")
+    };
     let allocated = data
         .integer(tag::BITS_ALLOCATED)
         .ok_or_else(|| missing(tag::BITS_ALLOCATED))?;
@@ -406,7 +416,8 @@ fn stored(data: &DataSet, syntax: &TransferSyntax) -> Result<Stored, ImagingErro
         return Err(ImagingError::refused(format!(
             "{bits} bits up to bit {high} do not fit into {allocated}"
         ))
-        .at(tag::written(tag::BITS_STORED)));
+        .at(tag::written(tag::BITS_STORED))
+        .hint("export the series again"));
     }
     let bits = u32::try_from(bits).unwrap_or(0);
     let high = u32::try_from(high).unwrap_or(0);

@@ -165,9 +165,8 @@ fn find(path: &Path, options: &ReadOptions, cancel: &AtomicBool) -> Result<Found
 
 /// Files of a folder and its folders. Links to folders are not followed: they may lead in circles.
 fn collect(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), ImagingError> {
-    let unreadable = |error: std::io::Error| {
-        ImagingError::refused(format!("cannot be read: {error}")).at(folder.display().to_string())
-    };
+    let unreadable =
+        |error: std::io::Error| super::unreadable(error).at(folder.display().to_string());
     for entry in folder.read_dir().map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
         let kind = entry.file_type().map_err(unreadable)?;

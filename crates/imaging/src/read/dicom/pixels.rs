@@ -11,7 +11,7 @@ use super::stack::Source;
 use super::syntax::{Compressed, TransferSyntax};
 use crate::ImagingError;
 use crate::read::scalar::{Converter, Stored, Tally};
-use crate::read::{ReadOptions, reserved, zeroed};
+use crate::read::{ReadOptions, reserved, unreadable, zeroed};
 
 /// What compression can make of a byte at most: the decoders' own limit.
 const MOST_INFLATION: u64 = 64;
@@ -137,7 +137,7 @@ impl LastFile {
         input
             .seek(SeekFrom::Start(at))
             .and_then(|_| input.read_exact(&mut buffer[start..]))
-            .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))
+            .map_err(unreadable)
     }
 
     fn of(
@@ -149,10 +149,7 @@ impl LastFile {
         let known = self.0.take().filter(|(known, _)| known == path);
         let known = match known {
             Some(known) => known,
-            None => (
-                path.to_owned(),
-                file::pixel_bytes(path, syntax, max_bytes)?,
-            ),
+            None => (path.to_owned(), file::pixel_bytes(path, syntax, max_bytes)?),
         };
         Ok(&mut self.0.insert(known).1)
     }

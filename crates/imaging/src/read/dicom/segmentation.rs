@@ -116,7 +116,8 @@ fn threshold(
         }
         other => Err(
             ImagingError::refused(format!("segmentations of type {other} are not read"))
-                .at("(0062,0001)"),
+                .at("(0062,0001)")
+                .hint("export it as BINARY, FRACTIONAL or LABELMAP, or as NIfTI"),
         ),
     }
 }

@@ -253,7 +253,8 @@ pub(super) fn choose(
         Some(modality) if modality != "CT" => Err(ImagingError::refused(format!(
             "the modality is {modality}, and not CT"
         ))
-        .at(format!("series {}", chosen.label))),
+        .at(format!("series {}", chosen.label))
+        .hint("name the folder or file of a CT")),
         None => {
             remarks.push(Remark::new("the modality is not said: taken as CT"));
             Ok((chosen, remarks))

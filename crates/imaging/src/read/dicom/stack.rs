@@ -175,8 +175,11 @@ fn grid(plane: &Plane, step_mm: Vector3<f64>, size: [usize; 3]) -> Result<VoxelG
         plane.down_column * plane.spacing_mm[0],
         step_mm,
     ]);
-    VoxelGrid::new(size, steps_mm / 1e3, Point3::from(plane.position_mm / 1e3))
-        .map_err(|problem| ImagingError::refused(problem.to_string()))
+    VoxelGrid::new(size, steps_mm / 1e3, Point3::from(plane.position_mm / 1e3)).map_err(|problem| {
+        ImagingError::refused(problem.to_string())
+            .at("(0020,0032), (0020,0037)")
+            .hint("export the series again")
+    })
 }
 
 fn same_place(a: &Slice, b: &Slice, height_mm: f64) -> ImagingError {

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use flate2::bufread::GzDecoder;
 
 use crate::ImagingError;
+use crate::read::unreadable;
 
 /// What deflate can make of a byte at most (RFC 1951: 258 bytes from two bits, less the codes' tables).
 const MOST_INFLATION: u64 = 1032;
@@ -75,9 +76,7 @@ pub(super) fn pair(path: &Path) -> (PathBuf, PathBuf) {
 impl ByteStream {
     pub(super) fn open(path: &Path) -> Result<Self, ImagingError> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let unreadable = |error: std::io::Error| {
-            ImagingError::refused(format!("cannot be read: {error}")).at(name.clone())
-        };
+        let unreadable = |error: std::io::Error| unreadable(error).at(name.clone());
         let file = File::open(path).map_err(unreadable)?;
         let file_bytes = file.metadata().map_err(unreadable)?.len();
         let mut reader = BufReader::with_capacity(BUFFER, file);
@@ -168,8 +167,7 @@ impl ByteStream {
             return Ok(());
         };
         let mut reader = decoder.into_inner();
-        let first = two_bytes(&mut reader)
-            .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))?;
+        let first = two_bytes(&mut reader).map_err(unreadable)?;
         if first.starts_with(&GZIP) {
             self.source = Source::Gzip(Box::new(GzDecoder::new(reader)));
         } else if first.iter().any(|byte| *byte != 0) {

@@ -44,7 +44,10 @@ pub(super) fn has_name(path: &Path) -> bool {
 impl Nifti {
     pub(super) fn open(path: &Path, options: &ReadOptions) -> Result<Self, ImagingError> {
         let (header_path, data_path) = bytes::pair(path);
-        let mut stream = ByteStream::open(&header_path)?;
+        let mut stream = opened(
+            &header_path,
+            "the header belongs beside the voxels, in a file of the same name that ends in .hdr",
+        )?;
         let header = Header::read(&mut stream, options)?;
         if header.is_pair && header_path == data_path {
             return Err(ImagingError::refused(
@@ -55,7 +58,11 @@ impl Nifti {
             ));
         }
         let (stream, data_path) = if header.is_pair {
-            (ByteStream::open(&data_path)?, data_path)
+            let voxels = opened(
+                &data_path,
+                "the voxels belong beside the header, in a file of the same name that ends in .img",
+            )?;
+            (voxels, data_path)
         } else {
             (stream, header_path)
         };
@@ -210,6 +217,17 @@ impl Nifti {
         let beyond = self.stream.finish(&mut piece)?;
         Ok(beyond.into_iter().map(Remark::new).collect())
     }
+}
+
+/// One of a pair, with what to do where it is missing.
+fn opened(path: &Path, hint: &str) -> Result<ByteStream, ImagingError> {
+    ByteStream::open(path).map_err(|problem| {
+        if path.exists() {
+            problem
+        } else {
+            problem.hint(hint)
+        }
+    })
 }
 
 fn cut_off(path: &Path, how: &str) -> ImagingError {
