@@ -253,13 +253,14 @@ impl Conversion {
     fn of(&mut self, slice: &Slice, stored: Stored) -> Result<&Converter, ImagingError> {
         let rescale = slice.rescale.clone()?;
         let padding = applicable_padding(slice);
+        let pixels = usize::from(slice.file.rows) * usize::from(slice.file.columns);
         let key = (
             stored,
             [rescale.slope.to_bits(), rescale.intercept.to_bits()],
             padding.map(|range| range.map(f64::to_bits)),
         );
         if self.0.as_ref().is_none_or(|(known, _)| *known != key) {
-            self.0 = Some((key, Converter::new(stored, rescale, padding)));
+            self.0 = Some((key, Converter::new(stored, rescale, padding, pixels)));
         }
         match &self.0 {
             Some((_, converter)) => Ok(converter),

@@ -1,5 +1,6 @@
 //! The series of a folder: which slices belong together, and which series is meant.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use super::image::{Plane, SeriesKey, Slice};
@@ -38,6 +39,9 @@ pub(super) fn all(slices: Vec<Slice>) -> Vec<Series> {
             None => groups.push(vec![slice]),
         }
     }
+    for groups in by_key.values_mut() {
+        groups.sort_by(|a, b| by_direction(&a[0], &b[0]));
+    }
     let mut all: Vec<Series> = by_key
         .into_values()
         .flatten()
@@ -65,6 +69,23 @@ pub(super) fn all(slices: Vec<Slice>) -> Vec<Series> {
         };
     }
     all
+}
+
+/// Order of groups of a series, whatever their files are called: axial, coronal, sagittal, and what has no place.
+fn by_direction(a: &Slice, b: &Slice) -> Ordering {
+    let numbers = |slice: &Slice| -> Vec<f64> {
+        let Ok(plane) = &slice.plane else {
+            return Vec::new();
+        };
+        let cosines = plane.along_row.iter().chain(plane.down_column.iter());
+        cosines.chain(&plane.spacing_mm).copied().collect()
+    };
+    let (a, b) = (numbers(a), numbers(b));
+    let differing = a.iter().zip(&b).map(|(a, b)| b.total_cmp(a));
+    differing
+        .chain([b.len().cmp(&a.len())])
+        .find(|order| order.is_ne())
+        .unwrap_or(Ordering::Equal)
 }
 
 /// Whether two slices may lie in one stack; what has no place is together with its like.

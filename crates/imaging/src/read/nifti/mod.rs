@@ -109,7 +109,7 @@ impl Nifti {
     ) -> Result<(Vec<i16>, Tally, Vec<Remark>), ImagingError> {
         let count = self.header.grid.len();
         self.check_size(count * size_of::<i16>(), options)?;
-        let converter = Converter::new(self.header.stored, self.header.rescale, None);
+        let converter = Converter::new(self.header.stored, self.header.rescale, None, count);
         let mut hu = zeroed(count)?;
         let mut tally = Tally::default();
         let mut rest = hu.as_mut_slice();
