@@ -11,14 +11,14 @@ import pydicom
 import SimpleITK as sitk
 from common import BIRTH_DATE, NAME, PATIENT_ID, Reader, as_hu, refused, remarked, same
 from pydicom.data import get_testdata_files
-from pydicom.encaps import encapsulate, generate_frames
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
+from pydicom.encaps import encapsulate, generate_frames
 from pydicom.sequence import Sequence
 from pydicom.uid import (
+    JPEG2000,
     MPEG2MPML,
     CTImageStorage,
     DeflatedExplicitVRLittleEndian,
-    JPEG2000,
     EnhancedCTImageStorage,
     ExplicitVRBigEndian,
     ExplicitVRLittleEndian,
