@@ -81,6 +81,7 @@ fn reserved<T>(count: usize) -> Result<Vec<T>, ImagingError> {
             "this machine has no {} of memory left for the voxels",
             in_mib((count * size_of::<T>()) as u64)
         ))
+        .hint("crop it or take every second voxel beforehand")
     })?;
     Ok(values)
 }
@@ -137,6 +138,13 @@ pub fn read_volume(
     }
 }
 
+/// What the system says of a file or a folder.
+#[expect(clippy::needless_pass_by_value, reason = "errors are mapped by it")]
+fn unreadable(error: std::io::Error) -> ImagingError {
+    ImagingError::refused(format!("cannot be read: {error}"))
+        .hint("check that it is there, whole, and yours to read")
+}
+
 /// What a path holds, by its first bytes.
 enum Format {
     Nifti,
@@ -144,8 +152,6 @@ enum Format {
 }
 
 fn format_of(path: &Path) -> Result<Format, ImagingError> {
-    let unreadable =
-        |error: std::io::Error| ImagingError::refused(format!("cannot be read: {error}"));
     if path.metadata().map_err(unreadable)?.is_dir() {
         return Ok(Format::Dicom);
     }
@@ -155,12 +161,15 @@ fn format_of(path: &Path) -> Result<Format, ImagingError> {
         .read_to_end(&mut first)
         .map_err(unreadable)?;
     if first.is_empty() {
-        return Err(ImagingError::refused("the file is empty"));
+        return Err(ImagingError::refused("the file is empty").hint("copy or export it again"));
     }
-    if nifti::is_nifti(path, &first) {
+    // Bytes count before names: DICOM files are called .img, too.
+    if nifti::begins_as_header(&first) {
         Ok(Format::Nifti)
     } else if dicom::is_dicom(&first) {
         Ok(Format::Dicom)
+    } else if nifti::has_name(path) {
+        Ok(Format::Nifti)
     } else {
         Err(
             ImagingError::refused("it is neither NIfTI nor DICOM by its first bytes")

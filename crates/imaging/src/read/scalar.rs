@@ -13,6 +13,9 @@ const ROUNDING_HU: f64 = 1e-3;
 /// Values that are converted at a time where they need no more than an offset: a piece stays in the first cache.
 const PIECE: usize = 4096;
 
+/// Numbers for which a table is worth its making.
+const A_TABLE: usize = 1 << 16;
+
 /// Type of a stored number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Kind {
@@ -221,15 +224,20 @@ struct Table {
 }
 
 impl Converter {
-    /// `padding` is the range of stored numbers that were not measured.
-    pub(crate) fn new(stored: Stored, rescale: Rescale, padding: Option<[f64; 2]>) -> Self {
+    /// For `count` numbers; `padding` is the range of stored ones that were not measured.
+    pub(crate) fn new(
+        stored: Stored,
+        rescale: Rescale,
+        padding: Option<[f64; 2]>,
+        count: usize,
+    ) -> Self {
         let mut converter = Self {
             stored,
             rescale,
             padding,
             table: None,
         };
-        if matches!(stored.kind, Kind::I16 | Kind::U16) {
+        if count >= A_TABLE && matches!(stored.kind, Kind::I16 | Kind::U16) {
             converter.table = Some(converter.table());
         }
         converter
@@ -426,7 +434,7 @@ mod tests {
                         ..SIGNED
                     };
                     let rescale = Rescale { slope, intercept };
-                    let converter = Converter::new(stored, rescale, Some([17.0, 17.0]));
+                    let converter = Converter::new(stored, rescale, Some([17.0, 17.0]), A_TABLE);
                     let plain = Converter {
                         table: None,
                         ..converter.clone()
@@ -444,7 +452,7 @@ mod tests {
             ..SIGNED
         };
         let (hu, _) = converted(
-            &Converter::new(big, Rescale::NONE, None),
+            &Converter::new(big, Rescale::NONE, None, A_TABLE),
             &[0xff, 0x38, 0, 7],
         );
         assert_eq!(hu, [-200, 7]);
@@ -460,7 +468,10 @@ mod tests {
             .into_iter()
             .flat_map(f32::to_le_bytes)
             .collect();
-        let (hu, tally) = converted(&Converter::new(floats, Rescale::NONE, None), &bytes);
+        let (hu, tally) = converted(
+            &Converter::new(floats, Rescale::NONE, None, A_TABLE),
+            &bytes,
+        );
         assert_eq!(hu, [0, 2, 7, i16::MAX, AIR_HU, AIR_HU, AIR_HU]);
         assert_eq!(
             (
@@ -482,7 +493,7 @@ mod tests {
         };
         // 0xf830 has garbage above bit 11; its 12 bits are 0x830, which is -2000 + ... of 12 bits.
         let (hu, _) = converted(
-            &Converter::new(stored, Rescale::NONE, None),
+            &Converter::new(stored, Rescale::NONE, None, A_TABLE),
             &[0x18, 0xfc, 0xff, 0x07],
         );
         assert_eq!(hu, [-1000, 2047]);

@@ -65,6 +65,8 @@ class Reader:
             check=False,
         )
         assert run.returncode == 0, run.stderr
+        # Of decoders that give up, too.
+        assert not run.stderr, run.stderr
         self.everything_said += [run.stdout, run.stderr]
         lines = run.stdout.splitlines()
         assert len(lines) == len(paths)
@@ -109,6 +111,7 @@ def same(answer: Answer, hu: np.ndarray, ct_from_index_mm: np.ndarray, what: str
 def refused(answer: Answer, *words: str) -> None:
     """Answered with words that say what is wrong, and how to mend it."""
     assert answer.refused is not None, f"{answer.path} was read: {answer.said}"
+    assert answer.text["hint"], f"{answer.path}: what is to be done? {answer.said}"
     for word in words:
         assert word in answer.said, f"{answer.path}: no '{word}' in {answer.said}"
 

@@ -12,8 +12,10 @@ import SimpleITK as sitk
 from common import BIRTH_DATE, NAME, PATIENT_ID, Reader, as_hu, refused, remarked, same
 from pydicom.data import get_testdata_files
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
+from pydicom.encaps import encapsulate, generate_frames
 from pydicom.sequence import Sequence
 from pydicom.uid import (
+    JPEG2000,
     MPEG2MPML,
     CTImageStorage,
     DeflatedExplicitVRLittleEndian,
@@ -81,6 +83,7 @@ def shipped(reader: Reader, folder: Path) -> list[str]:
         path = answer.path
         if answer.refused is not None:
             assert answer.refused.strip()
+            assert not is_ct_slice(path), f"{path}: {answer.said}"
             table.append(f"{path.name}: refused, {answer.refused}")
             continue
         dataset = pydicom.dcmread(path, force=True)
@@ -93,6 +96,18 @@ def shipped(reader: Reader, folder: Path) -> list[str]:
             same(answer, *single_slice(dataset))
         table.append(f"{path.name}: same")
     return table
+
+
+def is_ct_slice(path: Path) -> bool:
+    """Whether pydicom finds all in it that a slice of a CT has."""
+    try:
+        dataset = pydicom.dcmread(path, force=True)
+    except (pydicom.errors.InvalidDicomError, OSError, ValueError, KeyError, EOFError):
+        return False
+    needed = ["PixelData", "ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing"]
+    if dataset.get("Modality") != "CT" or not all(key in dataset for key in needed):
+        return False
+    return "LOCALIZER" not in dataset.get("ImageType", [])
 
 
 def single_slice(dataset: Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -210,6 +225,10 @@ def geometries(reader: Reader, folder: Path) -> int:
         "tilted-table": series(orientation=tilted, step=(0, 0.3, 1.5)),
         "coronal": series(orientation=(1, 0, 0, 0, 0, -1), step=(0, 2, 0)),
         "flipped": series(orientation=(-1, 0, 0, 0, 1, 0)),
+        "prone": series(orientation=(-1, 0, 0, 0, -1, 0), step=(0, 0, -1.25)),
+        "decubitus": series(orientation=(0, 1, 0, -1, 0, 0)),
+        "sagittal": series(orientation=(0, 1, 0, 0, 0, -1), step=(-1.5, 0, 0)),
+        "decreasing-columns": series(orientation=(0, 0, -1, 0, 1, 0), step=(2, 0, 0)),
         "feet-first": series(orientation=(-1, 0, 0, 0, -1, 0)),
         "oblique": series(orientation=(0.8, 0.6, 0, -0.6, 0.8, 0), step=(0.1, 0.2, 3)),
         "12-bits": series(BitsStored=12, HighBit=11),
@@ -289,12 +308,58 @@ def compressed(reader: Reader, folder: Path) -> None:
         each.PixelData = packed.PixelData
         each["PixelData"].is_undefined_length = True
     same(reader.one(saved(folder / "jpeg-lossless", slices)), *reference)
+    lossy = series(BitsStored=12, HighBit=11)
+    for each in lossy:
+        each.compress(JPEG2000Lossless, generate_instance_uid=False)
+        each.file_meta.TransferSyntaxUID = JPEG2000
+    path = saved(folder / "maybe-lossy", lossy)
+    remarked(reader.one(path), "may have been compressed with loss")
+    for each in lossy:
+        each.LossyImageCompression = "00"
+    remarks = reader.one(saved(path, lossy)).text["remarks"]
+    assert not any("loss" in remark for remark in remarks), remarks
+    damaged_streams(reader, folder, slices, lossy)
     for each in slices:
         each.file_meta.TransferSyntaxUID = JPEGLSLossless
     refused(reader.one(saved(folder / "jpeg-ls", slices)), "JPEG-LS", "dcmdjpls", "gdcmconv")
     for each in slices:
         each.file_meta.TransferSyntaxUID = MPEG2MPML
     refused(reader.one(saved(folder / "film", slices)), "MPEG2", "gdcmconv")
+
+
+def damaged_streams(reader: Reader, folder: Path, *kinds: list[FileDataset]) -> None:
+    """Streams cut, changed, and of another width: never silently other numbers, and no word of a decoder's panic."""
+    for slices in kinds:
+        whole = slices[0].PixelData
+        good = pydicom.dcmread(saved(folder / "stream", slices[:1]) / "s000").pixel_array
+        frame = next(generate_frames(whole, number_of_frames=1))
+        for keep in range(4, len(frame) - 8, 97):
+            slices[0].PixelData = encapsulate([frame[:keep]])
+            refused(reader.one(saved(folder / "stream", slices[:1])), "damaged")
+        paths = []
+        for trial in range(60):
+            changed = bytearray(frame)
+            for at in RNG.integers(2, len(frame), 4):
+                changed[at] = RNG.integers(256)
+            slices[0].PixelData = encapsulate([bytes(changed)])
+            slices[0].save_as(folder / "stream" / f"t{trial}", enforce_file_format=True)
+            paths.append(folder / "stream" / f"t{trial}")
+        for answer in reader.read(*paths):
+            assert answer.refused is None or "damaged" in answer.said, answer.said
+        # As wide as the file says, and a number for each pixel.
+        changed = bytearray(frame)
+        if changed[2:4] == b"\xff\x51":
+            changed[43] = 2
+            slices[0].PixelData = encapsulate([bytes(changed)])
+            refused(reader.one(saved(folder / "stream", slices[:1])), "several of them")
+        else:
+            at = changed.index(b"\xff\xc3")
+            changed[at + 4] = 8
+            slices[0].PixelData = encapsulate([bytes(changed)])
+            refused(reader.one(saved(folder / "stream", slices[:1])), "8 bits")
+        slices[0].PixelData = whole
+        shutil.rmtree(folder / "stream")
+        assert good.shape == (ROWS, COLUMNS)
 
 
 def enhanced(slices: list[FileDataset], shared_orientation: bool = True) -> FileDataset:
@@ -359,6 +424,16 @@ def multi_frame(reader: Reader, folder: Path) -> None:
             same(answer, *reference, what=name)
             assert answer.text["description"]["kernel"] == "B30f"
             assert answer.text["slice_thickness_m"] == 1.25e-3
+    deflated = series()
+    reference = expected(deflated)
+    whole = enhanced(deflated)
+    whole.file_meta.TransferSyntaxUID = DeflatedExplicitVRLittleEndian
+    whole.save_as(folder / "enhanced-deflated.dcm", enforce_file_format=True)
+    same(reader.one(folder / "enhanced-deflated.dcm"), *reference)
+    fewer = enhanced(series())
+    fewer.NumberOfFrames = 60000
+    fewer.save_as(folder / "enhanced-60000.dcm", enforce_file_format=True)
+    refused(reader.one(folder / "enhanced-60000.dcm"), "describes 6", "copy or export")
     legacy = slice_of(0, stored_slices()[0], (0, 0, 0), NumberOfFrames=3)
     legacy.PixelData = legacy.PixelData * 3
     legacy.save_as(folder / "frames-at-one-place.dcm", enforce_file_format=True)
@@ -394,6 +469,36 @@ def folders(reader: Reader, folder: Path) -> None:
     path = saved(folder / "phases", phases)
     refused(reader.one(path), "3.1", "3.2")
     same(reader.one(path, "--series", "3.2"), *expected(phases[6:]))
+
+    # Two breath-holds that overlap, at places of their own: even each, uneven together.
+    first = series(AcquisitionNumber=1)
+    second = [
+        slice_of(at, stored, (-12.5, 30.25, -95.6 + 1.25 * at), AcquisitionNumber=2)
+        for at, stored in enumerate(stored_slices())
+    ]
+    path = saved(folder / "interleaved", [*first, *second])
+    refused(reader.one(path), "3.1: 6 slices", "3.2: 6 slices", "--series")
+    same(reader.one(path, "--series", "3.2"), *expected(second))
+    # Step and shoot: every slice its own acquisition, one of them missing.
+    shots = series(9)
+    for at, each in enumerate(shots):
+        each.AcquisitionNumber = at // 2
+    same(reader.one(saved(folder / "shots", shots)), *expected(shots))
+    del shots[3]
+    refused(reader.one(saved(folder / "shots-gap", shots)), "missing between")
+
+    # A disc as burned: folders, an index of them, other things, a file of another size.
+    disc = series()
+    for at, each in enumerate(disc):
+        saved(folder / "disc" / "DICOM" / f"A{at % 2}", [each], prefix=f"I{at}")
+    (folder / "disc" / "AUTORUN.INF").write_text("[autorun]")
+    (folder / "disc" / "empty").touch()
+    index = Path(pydicom.data.get_testdata_file("DICOMDIR"))
+    shutil.copy(index, folder / "disc" / "DICOMDIR")
+    same(reader.one(folder / "disc"), *expected(disc))
+    other = slice_of(9, np.zeros((16, 16), "u2"), (0, 0, 50))
+    path = saved(folder / "sizes", [*series(), other])
+    remarked(reader.one(path), "16 x 16")
 
     copies = series()
     path = saved(folder / "copies", copies)
@@ -507,6 +612,21 @@ def odd(reader: Reader, folder: Path) -> None:
         answer = reader.one(path)
         same(answer, *reference)
         remarked(answer, "no transfer syntax")
+
+    # Called as other files are, and written in another way than it says.
+    single = slice_of(0, stored_slices()[0], (0, 0, 0))
+    for name in ["scan.img", "scan.nii", "no-ending"]:
+        single.save_as(folder / name, enforce_file_format=True)
+        same(reader.one(folder / name), *single_slice(single))
+    data = (folder / "no-ending").read_bytes()
+    at = data.index(b"1.2.840.10008.1.2.1\0")
+    (folder / "no-ending").write_bytes(data[:at] + b"1.2.840.10008.1.2\0\0\0" + data[at + 20 :])
+    answer = reader.one(folder / "no-ending")
+    same(answer, *single_slice(single))
+    remarked(answer, "no VRs")
+    shouting = slice_of(0, stored_slices()[0], (0, 0, 0), ConvolutionKernel="\x1b[31mB30f\x07")
+    shouting.save_as(folder / "shouting.dcm", enforce_file_format=True)
+    assert reader.one(folder / "shouting.dcm").text["description"]["kernel"] == "[31mB30f"
 
     damaged = series()
     for each in damaged:

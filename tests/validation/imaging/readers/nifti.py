@@ -133,7 +133,14 @@ def odd(reader: Reader, folder: Path) -> int:
     good = bytes(raw(simple()))
     packed = gzip.compress(good, mtime=0)
     hu, affine = reference(written("good.nii", good))
-    remarked(read("members.nii.gz", gzip.compress(good[:500]) + gzip.compress(good[500:])), )
+    # The first byte of the second member is the last of what is read from the disk at a time.
+    first = bytearray(gzip.compress(good[:500], mtime=0))
+    # With a file's name and a comment.
+    first[3] |= 0x18
+    comment = 131071 - len(first) - 65302
+    first[10:10] = b"a" * 65300 + b"\0" + b"b" * comment + b"\0"
+    assert len(first) == 131071
+    same(read("members-apart.nii.gz", bytes(first) + gzip.compress(good[500:])), hu, affine)
     same(read("members.nii.gz", gzip.compress(good[:500]) + gzip.compress(good[500:])), hu, affine)
     same(read("unnamed-gzip.nii", packed), hu, affine)
     same(read("not-packed.nii.gz", good), hu, affine)

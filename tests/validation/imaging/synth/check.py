@@ -37,7 +37,9 @@ LPS_FROM_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 CASES = {
     "straight": [],
     "tilted": ["--tilt", "18"],
-    "turned_flipped": ["--turn", "9", "--axes", "RAI", "--shift-mm", "12.5,-148.25,-731.5"],
+    "turned_flipped": ["--turn", "9", "--axes", "RAI", "--shift-mm", "12.5,-148.25,-731.5",
+                       # Of the scan's own frame.
+                       "--range-mm=-711.5,-601.5"],
     "biopsy": ["--preset", "biopsy", "--kernel", "sharp"],
     "tilted_no_circle": ["--tilt", "-11.5", "--no-circle", "--preset", "biopsy"],
 }
@@ -59,7 +61,9 @@ def expect(condition, text):
 
 def scan(program, out, extra):
     command = [program, "ct", "synth", "male-p50-supine", "--out", out, "--format", "both", "--markers", "ct-sphere",
-               "--noise", "0", "--range-mm", "20,130", "--json", *extra]
+               "--noise", "0", "--json", *extra]
+    if not any(word.startswith("--range-mm") for word in extra):
+        command += ["--range-mm", "20,130"]
     result = subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True)
     return json.loads(result.stdout)
 
@@ -178,14 +182,16 @@ def main():
             for lesion in truth["lesions"]:
                 centre = np.array(lesion["center_m"])
                 index = np.linalg.solve(affine[:3, :3], centre - affine[:3, 3])
-                if lesion["organ"] is None or np.any(index < 12) or np.any(index > np.array(hu.shape) - 13):
+                reach = 0.5 * lesion["diameter_m"] + 2.5e-3 + truth["scanner"]["slice_thickness_m"]
+                # Wholly within the scan, with what is looked at around it.
+                margin = np.ceil(reach / np.linalg.norm(affine[:3, :3], axis=0)) + 2
+                if lesion["organ"] is None or np.any(index < margin) or np.any(index > np.array(hu.shape) - 1 - margin):
                     continue
                 seen += 1
                 expect(labels[tuple(np.round(index).astype(int))] == names["lesion_" + lesion["name"]],
                        f"label of {lesion['name']}")
                 if lesion["name"] in ("pleural_based", "left_perihilar"):
                     continue  # other tissue is next to it
-                reach = 0.5 * lesion["diameter_m"] + 2.5e-3 + truth["scanner"]["slice_thickness_m"]
                 off = centroid(hu, affine, centre, reach, truth["materials_hu"]["lung"]) - centre
                 normal = np.cross(affine[:3, 0], affine[:3, 1])
                 normal /= np.linalg.norm(normal)

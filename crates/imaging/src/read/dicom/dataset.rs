@@ -9,6 +9,7 @@ use std::io::{Read, Seek, SeekFrom};
 
 use super::tag::{self, Tag};
 use crate::ImagingError;
+use crate::read::unreadable;
 
 /// Sequences in sequences: more are no image.
 const DEPTH: usize = 12;
@@ -70,11 +71,12 @@ impl Encoding {
 }
 
 impl DataSet {
-    /// A text without its padding.
+    /// A text without its padding, and without what terminals would take for a command.
     pub(super) fn text(&self, tag: Tag) -> Option<String> {
         let bytes = &self.values.get(&tag)?.bytes;
         let text = String::from_utf8_lossy(bytes);
-        let text = text.trim_matches(|letter: char| letter == '\0' || letter.is_whitespace());
+        let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
+        let text = text.trim();
         (!text.is_empty()).then(|| text.to_owned())
     }
 
@@ -100,18 +102,22 @@ impl DataSet {
                         .map_or(f64::NAN, |four| f64::from(f32::from_le_bytes(four))),
                 }
             });
-            return Ok(Some(numbers.collect()));
+            let numbers: Vec<f64> = numbers.collect();
+            if !numbers.iter().all(|number| number.is_finite()) {
+                return Err(no_number(tag));
+            }
+            return Ok((!numbers.is_empty()).then_some(numbers));
         }
         let Some(text) = self.text(tag) else {
             return Ok(None);
         };
         let clean = |word: &str| {
-            let word = word.trim_matches(|letter: char| letter == '\0' || letter.is_whitespace());
-            word.parse::<f64>().ok().filter(|number| number.is_finite())
+            let number = word.trim().parse::<f64>().ok();
+            number.filter(|number| number.is_finite())
         };
         match text.split('\\').map(clean).collect() {
             Some(numbers) => Ok(Some(numbers)),
-            None => Err(ImagingError::refused("holds what is no number").at(tag::written(tag))),
+            None => Err(no_number(tag)),
         }
     }
 
@@ -131,6 +137,7 @@ impl DataSet {
         numbers.try_into().map(Some).map_err(|_| {
             ImagingError::refused(format!("has {count} numbers instead of {N}"))
                 .at(tag::written(tag))
+                .hint("correct the element, e.g. with dcmodify (DCMTK), or export the series again")
         })
     }
 
@@ -186,6 +193,12 @@ struct Head {
     length: u64,
 }
 
+fn no_number(tag: Tag) -> ImagingError {
+    ImagingError::refused("holds what is no number")
+        .at(tag::written(tag))
+        .hint("correct the element, e.g. with dcmodify (DCMTK), or export the series again")
+}
+
 /// Why elements cannot be read.
 fn damaged(what: impl Into<String>, at: u64) -> ImagingError {
     let what = what.into();
@@ -201,9 +214,7 @@ impl<R: Read + Seek> Elements<R> {
         end: u64,
         encoding: Encoding,
     ) -> Result<Self, ImagingError> {
-        input
-            .seek(SeekFrom::Start(at))
-            .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))?;
+        input.seek(SeekFrom::Start(at)).map_err(unreadable)?;
         Ok(Self {
             input,
             at,
@@ -287,9 +298,7 @@ impl<R: Read + Seek> Elements<R> {
 
     fn skip(&mut self, bytes: u64) -> Result<(), ImagingError> {
         let forward = i64::try_from(bytes).map_err(|_| damaged("a length of 2^63", self.at))?;
-        self.input
-            .seek_relative(forward)
-            .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))?;
+        self.input.seek_relative(forward).map_err(unreadable)?;
         self.at += bytes;
         Ok(())
     }

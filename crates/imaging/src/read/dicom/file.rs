@@ -10,6 +10,7 @@ use super::dataset::{DataSet, Elements, Encoding, Pixels};
 use super::syntax::{self, TransferSyntax};
 use super::tag;
 use crate::ImagingError;
+use crate::read::unreadable;
 
 /// Bytes by which a file is told from others.
 pub(in crate::read) const FIRST_BYTES: u64 = 256;
@@ -116,10 +117,20 @@ impl OpenedFile {
             }));
         }
         let mut encoding = syntax.encoding();
-        if encoding == Encoding::EXPLICIT && guessed(&head) == Encoding::IMPLICIT {
-            assumed =
-                Some("the file says that its elements have VRs, but they have none: read without");
-            encoding = Encoding::IMPLICIT;
+        match (encoding, guessed(&head)) {
+            (Encoding::EXPLICIT, Encoding::IMPLICIT) => {
+                assumed = Some(
+                    "the file says that its elements have VRs, but they have none: read without",
+                );
+                encoding = Encoding::IMPLICIT;
+            }
+            (Encoding::IMPLICIT, Encoding::EXPLICIT) => {
+                assumed = Some(
+                    "the file says that its elements have no VRs, but they have: read with them",
+                );
+                encoding = Encoding::EXPLICIT;
+            }
+            _ => {}
         }
         let (data, pixels) = Elements::new(&mut input, start, end, encoding)?.data()?;
         Ok(Some(Self {
@@ -149,11 +160,6 @@ pub(super) fn pixel_bytes(
     Ok(Box::new(Cursor::new(inflated(
         &mut file, start, most_bytes,
     )?)))
-}
-
-#[expect(clippy::needless_pass_by_value, reason = "errors are mapped by it")]
-fn unreadable(error: std::io::Error) -> ImagingError {
-    ImagingError::refused(format!("cannot be read: {error}"))
 }
 
 /// The first bytes from a place on, as many as there are.

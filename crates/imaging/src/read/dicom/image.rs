@@ -41,6 +41,8 @@ pub(super) struct ImageFile {
     pub(super) padding: Option<[f64; 2]>,
     pub(super) assumed: Option<&'static str>,
     pub(super) is_lossy: bool,
+    /// Whether the compression leaves it open, and the file says nothing.
+    pub(super) may_be_lossy: bool,
     /// Text of (0018,1120): for information only, its sign differs between makers.
     pub(super) gantry_tilt: Option<f64>,
     pub(super) segmentation: Option<Segmentation>,
@@ -169,16 +171,22 @@ pub(super) fn slices(
         .ok()
         .filter(|_| (1..=FRAMES).contains(&stated))
         .ok_or_else(|| {
-            ImagingError::refused(format!("it says that it has {stated} frames")).at(name)
+            ImagingError::refused(format!("it says that it has {stated} frames"))
+                .at(name)
+                .hint("copy or export it again")
         })?;
     if frames > 1 && !of_frames.is_empty() && of_frames.len() != frames {
         return Err(ImagingError::refused(format!(
             "it says that it has {frames} frames, but describes {}",
             of_frames.len()
         ))
-        .at(name));
+        .at(name)
+        .hint("copy or export it again"));
     }
+    check_frames(&data, [rows, columns], frames, pixels.as_ref())
+        .map_err(|problem| problem.at(name))?;
     let stored = stored(&data, &syntax);
+    let lossy = data.text(tag::LOSSY);
     let is_signed = data.integer(tag::PIXEL_REPRESENTATION) == Some(1);
     let file = Arc::new(ImageFile {
         name: name.to_owned(),
@@ -190,7 +198,8 @@ pub(super) fn slices(
         stored,
         padding: padding(&data, is_signed),
         assumed,
-        is_lossy: syntax.is_lossy() || data.text(tag::LOSSY).as_deref() == Some("01"),
+        is_lossy: syntax.is_lossy() || lossy.as_deref() == Some("01"),
+        may_be_lossy: syntax.may_be_lossy() && lossy.is_none(),
         gantry_tilt: data.real(tag::GANTRY_TILT).ok().flatten(),
         segmentation: segmentation(&data),
         bits_allocated: data.integer(tag::BITS_ALLOCATED).unwrap_or(0),
@@ -246,6 +255,33 @@ fn slice_of(file: &Arc<ImageFile>, frame: usize, layers: &Layers) -> Slice {
     }
 }
 
+/// Refuses frames that the pixels cannot be, before anything is kept of each of them.
+fn check_frames(
+    data: &DataSet,
+    [rows, columns]: [u16; 2],
+    frames: usize,
+    pixels: Option<&Pixels>,
+) -> Result<(), ImagingError> {
+    let bits = data.integer(tag::BITS_ALLOCATED).unwrap_or(0).max(1);
+    let most = match pixels {
+        None => 0,
+        Some(Pixels::Plain { bytes, .. }) => {
+            let bits = u64::from(rows) * u64::from(columns) * bits.unsigned_abs();
+            bytes.saturating_mul(8) / bits
+        }
+        // Each begins with a piece of its own.
+        Some(Pixels::Fragments { pieces, .. }) => pieces.len() as u64,
+    };
+    // A single one says by itself what is missing.
+    if frames > 1 && frames as u64 > most {
+        return Err(ImagingError::refused(format!(
+            "the file is cut off: it says that it has {frames} frames, but has pixels of {most}"
+        ))
+        .hint("copy or export it again"));
+    }
+    Ok(())
+}
+
 /// A problem with an element of a file.
 pub(super) fn named(problem: ImagingError, file: &str) -> ImagingError {
     let place = match &problem {
@@ -296,14 +332,16 @@ fn plane(layers: &Layers) -> Result<Plane, ImagingError> {
         return Err(ImagingError::refused(format!(
             "[{a}, {b}, {c}] and [{d}, {e}, {f}] are no two directions at right angles"
         ))
-        .at(tag::written(tag::ORIENTATION)));
+        .at(tag::written(tag::ORIENTATION))
+        .hint("export the series again"));
     }
     if !spacing_mm.iter().all(|spacing| *spacing > 0.0) {
         return Err(ImagingError::refused(format!(
             "pixels are {} x {} mm apart",
             spacing_mm[0], spacing_mm[1]
         ))
-        .at(tag::written(tag::PIXEL_SPACING)));
+        .at(tag::written(tag::PIXEL_SPACING))
+        .hint("export the series again"));
     }
     // Written with few digits they are a little short or long, and not quite square to each other.
     let along_row = along_row / along_row.norm();
@@ -322,14 +360,16 @@ fn rescale(layers: &Layers) -> Result<Rescale, ImagingError> {
         return Err(ImagingError::refused(
             "HU are given by a table (Modality LUT) instead of slope and intercept, which is not read",
         )
-        .at(tag::written(tag::MODALITY_LUT)));
+        .at(tag::written(tag::MODALITY_LUT))
+        .hint("export it as CT Image Storage with RescaleSlope and RescaleIntercept"));
     }
     let slope = layers.real(tag::SLOPE)?.unwrap_or(1.0);
     let intercept = layers.real(tag::INTERCEPT)?.unwrap_or(0.0);
     if slope == 0.0 {
         return Err(
             ImagingError::refused("the slope is 0: all voxels would be the same")
-                .at(tag::written(tag::SLOPE)),
+                .at(tag::written(tag::SLOPE))
+                .hint("export the series again; stored numbers are HU where the slope is left out"),
         );
     }
     Ok(Rescale { slope, intercept })
@@ -345,8 +385,11 @@ fn stored(data: &DataSet, syntax: &TransferSyntax) -> Result<Stored, ImagingErro
         .at(tag::written(tag::PHOTOMETRIC))
         .hint("leave screen shots and reports out of the folder"));
     }
-    let missing =
-        |tag| ImagingError::refused("how the pixels are stored is not said").at(tag::written(tag));
+    let missing = |tag| {
+        ImagingError::refused("how the pixels are stored is not said")
+            .at(tag::written(tag))
+            .hint("export the series again")
+    };
     let allocated = data
         .integer(tag::BITS_ALLOCATED)
         .ok_or_else(|| missing(tag::BITS_ALLOCATED))?;
@@ -373,7 +416,8 @@ fn stored(data: &DataSet, syntax: &TransferSyntax) -> Result<Stored, ImagingErro
         return Err(ImagingError::refused(format!(
             "{bits} bits up to bit {high} do not fit into {allocated}"
         ))
-        .at(tag::written(tag::BITS_STORED)));
+        .at(tag::written(tag::BITS_STORED))
+        .hint("export the series again"));
     }
     let bits = u32::try_from(bits).unwrap_or(0);
     let high = u32::try_from(high).unwrap_or(0);

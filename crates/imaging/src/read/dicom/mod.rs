@@ -3,6 +3,7 @@
 //! The elements that are needed are read by a reader of our own, which skips all others unread and holds each length
 //! against the file; pixels are decoded by dicom-rs.
 
+mod caught;
 mod dataset;
 mod file;
 mod image;
@@ -164,9 +165,8 @@ fn find(path: &Path, options: &ReadOptions, cancel: &AtomicBool) -> Result<Found
 
 /// Files of a folder and its folders. Links to folders are not followed: they may lead in circles.
 fn collect(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), ImagingError> {
-    let unreadable = |error: std::io::Error| {
-        ImagingError::refused(format!("cannot be read: {error}")).at(folder.display().to_string())
-    };
+    let unreadable =
+        |error: std::io::Error| super::unreadable(error).at(folder.display().to_string());
     for entry in folder.read_dir().map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
         let kind = entry.file_type().map_err(unreadable)?;
@@ -213,6 +213,12 @@ fn header_remarks(stack: &Stack) -> Vec<Remark> {
     if let Some((slice, count)) = first_with(&|slice| slice.file.is_lossy) {
         let message = format!(
             "{count} slices were compressed with loss: HU are no longer those that were measured"
+        );
+        remarks.push(Remark::new(message).at(&*slice.file.name));
+    }
+    if let Some((slice, count)) = first_with(&|slice| slice.file.may_be_lossy) {
+        let message = format!(
+            "{count} slices may have been compressed with loss: their compression can, and the file does not say"
         );
         remarks.push(Remark::new(message).at(&*slice.file.name));
     }

@@ -1,16 +1,17 @@
 //! Pixels of slices, decoded and turned into HU, some slices at a time.
 
 use std::io::{Read, SeekFrom};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::dataset::Pixels;
-use super::file;
+use super::file::{self, Bytes};
 use super::image::{ImageFile, Slice, named};
 use super::stack::Source;
-use super::syntax::Compressed;
+use super::syntax::{Compressed, TransferSyntax};
 use crate::ImagingError;
 use crate::read::scalar::{Converter, Stored, Tally};
-use crate::read::{ReadOptions, reserved, zeroed};
+use crate::read::{ReadOptions, reserved, unreadable, zeroed};
 
 /// What compression can make of a byte at most: the decoders' own limit.
 const MOST_INFLATION: u64 = 64;
@@ -100,11 +101,11 @@ fn pieces(image: &ImageFile, frame: usize) -> Result<&[(u64, u64)], ImagingError
         ))
         .hint("decompress it with gdcmconv --raw IN OUT (GDCM)")
     };
-    // Offsets count from the first piece's item, whose head is 8 bytes before its bytes.
+    // Offsets count from the first piece's item; bytes of all begin 8 behind their item. Pieces are in order.
     let origin = pieces.first().ok_or_else(unknown)?.0;
     let index = |frame: usize| {
-        let start = u64::from(*starts.get(frame)?);
-        pieces.iter().position(|(at, _)| at - origin == start)
+        let start = origin + u64::from(*starts.get(frame)?);
+        pieces.binary_search_by_key(&start, |(at, _)| *at).ok()
     };
     let first = index(frame).ok_or_else(unknown)?;
     let next = if frame + 1 == image.frames {
@@ -115,44 +116,76 @@ fn pieces(image: &ImageFile, frame: usize) -> Result<&[(u64, u64)], ImagingError
     pieces.get(first..next).ok_or_else(unknown)
 }
 
-/// Stored numbers of a frame, and how they are stored once decoded.
-pub(super) fn stored_frame(
-    slice: &Slice,
-    options: &ReadOptions,
-    buffer: &mut Vec<u8>,
-) -> Result<Stored, ImagingError> {
-    let image = &*slice.file;
-    read_frame(slice, options, buffer).map_err(|problem| named(problem, &image.name))
-}
+/// The file that was read last: frames of one file follow one another, and one that is deflated is inflated once.
+#[derive(Default)]
+pub(super) struct LastFile(Option<(PathBuf, Box<dyn Bytes>)>);
 
-fn read_frame(
-    slice: &Slice,
-    options: &ReadOptions,
-    buffer: &mut Vec<u8>,
-) -> Result<Stored, ImagingError> {
-    let image = &*slice.file;
-    let stored = image.stored.clone()?;
-    let mut input = file::pixel_bytes(&image.path, &image.syntax, options.max_bytes)?;
-    let mut take = |at: u64, bytes: u64, buffer: &mut Vec<u8>| {
+impl LastFile {
+    /// Bytes of a file from `at` on, behind what is in the buffer.
+    fn append(
+        &mut self,
+        image: &ImageFile,
+        options: &ReadOptions,
+        at: u64,
+        bytes: u64,
+        buffer: &mut Vec<u8>,
+    ) -> Result<(), ImagingError> {
+        let input = self.of(&image.path, &image.syntax, options.max_bytes)?;
         let start = buffer.len();
         let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
         buffer.resize(start.saturating_add(bytes), 0);
         input
             .seek(SeekFrom::Start(at))
             .and_then(|_| input.read_exact(&mut buffer[start..]))
-            .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))
-    };
+            .map_err(unreadable)
+    }
+
+    fn of(
+        &mut self,
+        path: &Path,
+        syntax: &TransferSyntax,
+        max_bytes: u64,
+    ) -> Result<&mut Box<dyn Bytes>, ImagingError> {
+        let known = self.0.take().filter(|(known, _)| known == path);
+        let known = match known {
+            Some(known) => known,
+            None => (path.to_owned(), file::pixel_bytes(path, syntax, max_bytes)?),
+        };
+        Ok(&mut self.0.insert(known).1)
+    }
+}
+
+/// Stored numbers of a frame, and how they are stored once decoded.
+pub(super) fn stored_frame(
+    slice: &Slice,
+    options: &ReadOptions,
+    last: &mut LastFile,
+    buffer: &mut Vec<u8>,
+) -> Result<Stored, ImagingError> {
+    let image = &*slice.file;
+    read_frame(slice, options, last, buffer).map_err(|problem| named(problem, &image.name))
+}
+
+fn read_frame(
+    slice: &Slice,
+    options: &ReadOptions,
+    last: &mut LastFile,
+    buffer: &mut Vec<u8>,
+) -> Result<Stored, ImagingError> {
+    let image = &*slice.file;
+    let stored = image.stored.clone()?;
     buffer.clear();
     #[expect(clippy::single_match_else, reason = "two ways of the same weight")]
     match &image.pixels {
         Some(Pixels::Plain { offset, .. }) => {
             let bytes = frame_bytes(image, &stored);
-            take(offset + bytes * slice.frame as u64, bytes, buffer)?;
+            let at = offset + bytes * slice.frame as u64;
+            last.append(image, options, at, bytes, buffer)?;
             Ok(stored)
         }
         _ => {
             for (at, bytes) in pieces(image, slice.frame)? {
-                take(*at, *bytes, buffer)?;
+                last.append(image, options, *at, *bytes, buffer)?;
             }
             let bits = u16::try_from(stored.kind.bytes() * 8).unwrap_or(0);
             let used = stored.bits.and_then(|(used, _)| u16::try_from(used).ok());
@@ -176,6 +209,7 @@ fn read_frame(
 pub(super) fn bits(
     slice: &Slice,
     options: &ReadOptions,
+    last: &mut LastFile,
     buffer: &mut Vec<u8>,
     mut take: impl FnMut(u16),
 ) -> Result<(), ImagingError> {
@@ -190,18 +224,22 @@ pub(super) fn bits(
     if end > *bytes {
         return Err(wrong("the file is cut off: pixels are missing"));
     }
-    let mut input = file::pixel_bytes(&image.path, &image.syntax, options.max_bytes)?;
     buffer.clear();
-    buffer.resize(usize::try_from(end - start).unwrap_or(0), 0);
-    input
-        .seek(SeekFrom::Start(offset + start))
-        .and_then(|_| input.read_exact(buffer))
-        .map_err(|error| wrong(&format!("cannot be read: {error}")))?;
+    last.append(image, options, offset + start, end - start, buffer)
+        .map_err(|problem| named(problem, &image.name))?;
     let skipped = usize::try_from(first % 8).unwrap_or(0);
     for bit in skipped..skipped + usize::try_from(count).unwrap_or(0) {
         take(u16::from(buffer[bit / 8] >> (bit % 8) & 1));
     }
     Ok(())
+}
+
+/// What a thread keeps from one slice to the next.
+#[derive(Default)]
+struct Kept {
+    conversion: Conversion,
+    last: LastFile,
+    buffer: Vec<u8>,
 }
 
 /// One converter at a time: slices of a series mostly have the same.
@@ -215,13 +253,14 @@ impl Conversion {
     fn of(&mut self, slice: &Slice, stored: Stored) -> Result<&Converter, ImagingError> {
         let rescale = slice.rescale.clone()?;
         let padding = applicable_padding(slice);
+        let pixels = usize::from(slice.file.rows) * usize::from(slice.file.columns);
         let key = (
             stored,
             [rescale.slope.to_bits(), rescale.intercept.to_bits()],
             padding.map(|range| range.map(f64::to_bits)),
         );
         if self.0.as_ref().is_none_or(|(known, _)| *known != key) {
-            self.0 = Some((key, Converter::new(stored, rescale, padding)));
+            self.0 = Some((key, Converter::new(stored, rescale, padding, pixels)));
         }
         match &self.0 {
             Some((_, converter)) => Ok(converter),
@@ -253,13 +292,10 @@ pub(super) fn hu(
     let plane = usize::from(slices[0].file.rows) * usize::from(slices[0].file.columns);
     let is_plain =
         sources.len() == slices.len() && sources.iter().all(|source| source.weight == 0.0);
-    let read = |slice: &Slice,
-                conversion: &mut Conversion,
-                out: &mut [i16],
-                tally: &mut Tally,
-                buffer: &mut Vec<u8>| {
-        let stored = stored_frame(slice, options, buffer)?;
-        conversion.of(slice, stored)?.convert(buffer, out, tally);
+    let read = |slice: &Slice, kept: &mut Kept, out: &mut [i16], tally: &mut Tally| {
+        let stored = stored_frame(slice, options, &mut kept.last, &mut kept.buffer)?;
+        let converter = kept.conversion.of(slice, stored)?;
+        converter.convert(&kept.buffer, out, tally);
         Ok(())
     };
     let (measured, tally) = in_threads(slices, plane, threads, cancel, read)?;
@@ -300,14 +336,7 @@ fn in_threads<F>(
     read: F,
 ) -> Result<(Vec<i16>, Tally), ImagingError>
 where
-    F: Fn(
-            &Slice,
-            &mut Conversion,
-            &mut [i16],
-            &mut Tally,
-            &mut Vec<u8>,
-        ) -> Result<(), ImagingError>
-        + Sync,
+    F: Fn(&Slice, &mut Kept, &mut [i16], &mut Tally) -> Result<(), ImagingError> + Sync,
 {
     let mut hu: Vec<i16> = zeroed(plane * slices.len())?;
     let threads = threads.clamp(1, slices.len());
@@ -317,13 +346,12 @@ where
     }
     let work = |part: Vec<(usize, &mut [i16])>| {
         let mut tally = Tally::default();
-        let mut conversion = Conversion::default();
-        let mut buffer = Vec::new();
+        let mut kept = Kept::default();
         for (at, out) in part {
             let outcome = if cancel.load(Ordering::Relaxed) {
                 Err(ImagingError::Interrupted)
             } else {
-                read(&slices[at], &mut conversion, out, &mut tally, &mut buffer)
+                read(&slices[at], &mut kept, out, &mut tally)
             };
             if let Err(problem) = outcome {
                 return Err((at, problem));

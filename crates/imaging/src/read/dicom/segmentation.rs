@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::find;
 use super::image::{Segmentation, Slice, named};
-use super::pixels;
+use super::pixels::{self, LastFile};
 use crate::read::scalar::{Kind, Stored};
 use crate::read::{ReadOptions, zeroed};
 use crate::{ImagingError, LabelMap, Remark, VoxelGrid};
@@ -43,7 +43,7 @@ pub(in crate::read) fn read(
     options.check_memory(grid, (grid.len() * size_of::<u16>()) as u64)?;
     let mut labels = zeroed(grid.len())?;
     let mut overlapping = 0_u64;
-    let mut buffer = Vec::new();
+    let (mut last, mut buffer) = (LastFile::default(), Vec::new());
     for slice in &slices {
         if cancel.load(Ordering::Relaxed) {
             return Err(ImagingError::Interrupted);
@@ -54,7 +54,7 @@ pub(in crate::read) fn read(
             None => None,
             Some(_) => Some(number_of(slice, segmentation)?),
         };
-        read_frame(slice, options, &mut buffer, |value| {
+        read_frame(slice, options, &mut last, &mut buffer, |value| {
             let Some(at) = place.next() else { return };
             let new = match (label, threshold) {
                 (Some(label), Some(threshold)) => {
@@ -116,7 +116,8 @@ fn threshold(
         }
         other => Err(
             ImagingError::refused(format!("segmentations of type {other} are not read"))
-                .at("(0062,0001)"),
+                .at("(0062,0001)")
+                .hint("export it as BINARY, FRACTIONAL or LABELMAP, or as NIfTI"),
         ),
     }
 }
@@ -218,14 +219,15 @@ impl<'a> Placing<'a> {
 fn read_frame(
     slice: &Slice,
     options: &ReadOptions,
+    last: &mut LastFile,
     buffer: &mut Vec<u8>,
     mut take: impl FnMut(u16),
 ) -> Result<(), ImagingError> {
     if slice.file.is_bits() {
-        return pixels::bits(slice, options, buffer, take);
+        return pixels::bits(slice, options, last, buffer, take);
     }
     pixels::check(std::slice::from_ref(slice))?;
-    let stored = pixels::stored_frame(slice, options, buffer)?;
+    let stored = pixels::stored_frame(slice, options, last, buffer)?;
     if !matches!(
         stored,
         Stored {

@@ -1,13 +1,17 @@
 //! The series of a folder: which slices belong together, and which series is meant.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use super::image::{Plane, SeriesKey, Slice};
-use super::stack::{duplicates, in_order};
+use super::stack::{are_even, are_interleaved, duplicates, in_order};
 use crate::{ImagingError, Orientation, Remark, VoxelGrid};
 
-/// Difference of direction cosines up to which slices are parallel: 0.06 degrees.
-const PARALLEL: f64 = 1e-3;
+/// Difference of direction cosines up to which slices are parallel: 0.006 degrees, 0.05 mm over half a metre.
+const PARALLEL: f64 = 1e-4;
+
+/// Series of a folder that are listed.
+const LISTED: usize = 40;
 
 /// Difference of pixel spacings up to which they are the same.
 const SAME_SPACING_MM: f64 = 1e-5;
@@ -35,6 +39,9 @@ pub(super) fn all(slices: Vec<Slice>) -> Vec<Series> {
             None => groups.push(vec![slice]),
         }
     }
+    for groups in by_key.values_mut() {
+        groups.sort_by(|a, b| by_direction(&a[0], &b[0]));
+    }
     let mut all: Vec<Series> = by_key
         .into_values()
         .flatten()
@@ -45,17 +52,40 @@ pub(super) fn all(slices: Vec<Slice>) -> Vec<Series> {
             copies,
         })
         .collect();
-    let numbers: Vec<Option<i64>> = all.iter().map(|each| each.slices[0].key.number).collect();
-    for (at, series) in all.iter_mut().enumerate() {
-        let same = |other: &&Option<i64>| **other == numbers[at];
-        let name = numbers[at].map_or("none".to_owned(), |number| number.to_string());
-        series.label = if numbers.iter().filter(same).count() == 1 {
+    let mut with_number: BTreeMap<Option<i64>, usize> = BTreeMap::new();
+    for series in &all {
+        *with_number.entry(series.key().number).or_default() += 1;
+    }
+    let mut labelled: BTreeMap<Option<i64>, usize> = BTreeMap::new();
+    for series in &mut all {
+        let number = series.key().number;
+        let name = number.map_or("none".to_owned(), |number| number.to_string());
+        let nth = labelled.entry(number).or_default();
+        *nth += 1;
+        series.label = if with_number[&number] == 1 {
             name
         } else {
-            format!("{name}.{}", numbers[..=at].iter().filter(same).count())
+            format!("{name}.{nth}")
         };
     }
     all
+}
+
+/// Order of groups of a series, whatever their files are called: axial, coronal, sagittal, and what has no place.
+fn by_direction(a: &Slice, b: &Slice) -> Ordering {
+    let numbers = |slice: &Slice| -> Vec<f64> {
+        let Ok(plane) = &slice.plane else {
+            return Vec::new();
+        };
+        let cosines = plane.along_row.iter().chain(plane.down_column.iter());
+        cosines.chain(&plane.spacing_mm).copied().collect()
+    };
+    let (a, b) = (numbers(a), numbers(b));
+    let differing = a.iter().zip(&b).map(|(a, b)| b.total_cmp(a));
+    differing
+        .chain([b.len().cmp(&a.len())])
+        .find(|order| order.is_ne())
+        .unwrap_or(Ordering::Equal)
 }
 
 /// Whether two slices may lie in one stack; what has no place is together with its like.
@@ -71,15 +101,16 @@ fn are_parallel(a: &Slice, b: &Slice) -> bool {
         && (a1 - b1).abs() < SAME_SPACING_MM
 }
 
-/// One group of slices, taken apart where it holds a place several times and something tells the times apart. With
-/// the number of copies left out.
+/// One group of slices, taken apart where it holds a place several times, or is uneven because even stacks lie among
+/// each other, and something tells the stacks apart. With the number of copies left out.
 fn phases(slices: Vec<Slice>) -> Vec<(Vec<Slice>, usize)> {
     let unordered = slices.clone();
     let Ok(slices) = in_order(slices) else {
         return vec![(unordered, 0)];
     };
     let (slices, copies) = without_copies(slices);
-    if duplicates(&slices).is_empty() {
+    let is_doubled = !duplicates(&slices).is_empty();
+    if !is_doubled && are_even(&slices) {
         return vec![(slices, copies)];
     }
     let ways = slices.first().map_or(0, |slice| slice.phase.len());
@@ -94,18 +125,22 @@ fn phases(slices: Vec<Slice>) -> Vec<(Vec<Slice>, usize)> {
         let are_whole = parts
             .values()
             .all(|part| part.len() > 1 && duplicates(part).is_empty());
-        if parts.len() > 1 && are_whole {
-            let mut parts: Vec<_> = parts.into_iter().collect();
-            parts.sort_by_key(|(name, _)| {
-                name.as_ref()
-                    .and_then(|name| name.parse::<f64>().ok())
-                    .map_or(i64::MIN, |number| {
-                        #[expect(clippy::cast_possible_truncation, reason = "an order is wanted")]
-                        let thousandths = (number * 1e3) as i64;
-                        thousandths
-                    })
-            });
-            return parts.into_iter().map(|(_, part)| (part, copies)).collect();
+        if parts.len() < 2 || !are_whole {
+            continue;
+        }
+        let mut parts: Vec<_> = parts.into_iter().collect();
+        parts.sort_by_key(|(name, _)| {
+            name.as_ref()
+                .and_then(|name| name.parse::<f64>().ok())
+                .map_or(i64::MIN, |number| {
+                    #[expect(clippy::cast_possible_truncation, reason = "an order is wanted")]
+                    let thousandths = (number * 1e3) as i64;
+                    thousandths
+                })
+        });
+        let parts: Vec<Vec<Slice>> = parts.into_iter().map(|(_, part)| part).collect();
+        if is_doubled || parts.iter().all(|part| are_even(part)) && are_interleaved(&parts) {
+            return parts.into_iter().map(|part| (part, copies)).collect();
         }
     }
     vec![(slices, copies)]
@@ -203,7 +238,10 @@ fn view(plane: &Plane) -> Option<String> {
 
 /// All series in a list.
 fn list(all: &[Series]) -> String {
-    let lines: Vec<String> = all.iter().map(Series::in_words).collect();
+    let mut lines: Vec<String> = all.iter().take(LISTED).map(Series::in_words).collect();
+    if all.len() > LISTED {
+        lines.push(format!("and {} more", all.len() - LISTED));
+    }
     lines.join("; ")
 }
 
@@ -236,7 +274,8 @@ pub(super) fn choose(
         Some(modality) if modality != "CT" => Err(ImagingError::refused(format!(
             "the modality is {modality}, and not CT"
         ))
-        .at(format!("series {}", chosen.label))),
+        .at(format!("series {}", chosen.label))
+        .hint("name the folder or file of a CT")),
         None => {
             remarks.push(Remark::new("the modality is not said: taken as CT"));
             Ok((chosen, remarks))

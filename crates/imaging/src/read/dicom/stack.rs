@@ -106,6 +106,33 @@ pub(super) fn duplicates(slices: &[Slice]) -> Vec<(usize, usize)> {
         .collect()
 }
 
+/// Whether slices that are in order are as far apart everywhere, as far as rounding leaves them so.
+pub(super) fn are_even(slices: &[Slice]) -> bool {
+    let Ok(plane) = plane_of(slices) else {
+        return false;
+    };
+    let heights = heights_mm(slices, &plane.along_row.cross(&plane.down_column));
+    let gaps = heights.windows(2).map(|pair| pair[1] - pair[0]);
+    let least = gaps.clone().fold(f64::INFINITY, f64::min);
+    let greatest = gaps.fold(0.0, f64::max);
+    greatest - least <= (2.0 * ROUNDED_MM).min(ROUNDED_SHARE * greatest)
+}
+
+/// Whether slices of one group lie among those of another one. Those of each are in order.
+pub(super) fn are_interleaved(groups: &[Vec<Slice>]) -> bool {
+    let Some(plane) = groups.first().and_then(|group| plane_of(group).ok()) else {
+        return false;
+    };
+    let normal = plane.along_row.cross(&plane.down_column);
+    let mut ranges: Vec<[f64; 2]> = groups
+        .iter()
+        .map(|group| heights_mm(group, &normal))
+        .filter_map(|heights| Some([*heights.first()?, *heights.last()?]))
+        .collect();
+    ranges.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    ranges.windows(2).any(|pair| pair[1][0] < pair[0][1])
+}
+
 /// The grid of slices that are in order.
 pub(super) fn stack(slices: Vec<Slice>, fill_gaps: bool) -> Result<Stack, ImagingError> {
     let plane = plane_of(&slices)?.clone();
@@ -148,8 +175,11 @@ fn grid(plane: &Plane, step_mm: Vector3<f64>, size: [usize; 3]) -> Result<VoxelG
         plane.down_column * plane.spacing_mm[0],
         step_mm,
     ]);
-    VoxelGrid::new(size, steps_mm / 1e3, Point3::from(plane.position_mm / 1e3))
-        .map_err(|problem| ImagingError::refused(problem.to_string()))
+    VoxelGrid::new(size, steps_mm / 1e3, Point3::from(plane.position_mm / 1e3)).map_err(|problem| {
+        ImagingError::refused(problem.to_string())
+            .at("(0020,0032), (0020,0037)")
+            .hint("export the series again")
+    })
 }
 
 fn same_place(a: &Slice, b: &Slice, height_mm: f64) -> ImagingError {

@@ -1,13 +1,13 @@
 //! Transfer syntaxes: how elements are written, how pixels are compressed.
 
 use std::borrow::Cow;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use dicom_encoding::Codec;
 use dicom_encoding::adapters::{PixelDataObject, RawPixelData};
 use dicom_encoding::transfer_syntax::TransferSyntaxIndex;
 use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
 
+use super::caught::caught;
 use super::dataset::Encoding;
 use crate::ImagingError;
 
@@ -42,6 +42,8 @@ const ALWAYS_LOSSY: [&str; 3] = [
     "1.2.840.10008.1.2.4.51",
     "1.2.840.10008.1.2.4.81",
 ];
+/// Which may be either: JPEG 2000 and its kind of high throughput.
+const MAYBE_LOSSY: [&str; 2] = ["1.2.840.10008.1.2.4.91", "1.2.840.10008.1.2.4.203"];
 
 /// How a file is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -93,6 +95,11 @@ impl TransferSyntax {
 
     pub(super) fn is_lossy(&self) -> bool {
         ALWAYS_LOSSY.contains(&self.uid.as_str())
+    }
+
+    /// Whether pixels may be lossy where a file does not say that they are not.
+    pub(super) fn may_be_lossy(&self) -> bool {
+        MAYBE_LOSSY.contains(&self.uid.as_str())
     }
 
     /// For people.
@@ -150,6 +157,16 @@ impl TransferSyntax {
                 stated.components, stated.tiles
             )));
         }
+        // Decoders write what they have and leave the rest zero; of numbers that are too wide they write a part.
+        if stated.is_subsampled {
+            return Err(wrong("one number stands for several of them"));
+        }
+        if !stated.has_width(frame.bits_allocated) {
+            return Err(wrong(&format!(
+                "they have {} bits, the file says {} for each",
+                stated.bits, frame.bits_allocated
+            )));
+        }
         let Some(Codec::EncapsulatedPixelData(Some(decoder), _)) = TransferSyntaxRegistry
             .get(&self.uid)
             .map(dicom_encoding::TransferSyntax::codec)
@@ -157,18 +174,15 @@ impl TransferSyntax {
             return Err(wrong("there is no decoder"));
         };
         let mut decoded = Vec::new();
+        let object = Encapsulated {
+            syntax: self,
+            frame,
+        };
         // Decoders index as the stream tells them; what they stumble over is the stream's fault.
-        let outcome = catch_unwind(AssertUnwindSafe(|| {
-            let object = Encapsulated {
-                syntax: self,
-                frame,
-            };
-            decoder.decode_frame(&object, 0, &mut decoded)
-        }));
-        match outcome {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => return Err(wrong(&with_sources(&error))),
-            Err(_) => return Err(wrong("the decoder gave up")),
+        match caught(|| decoder.decode_frame(&object, 0, &mut decoded)) {
+            Some(Ok(())) => {}
+            Some(Err(error)) => return Err(wrong(&with_sources(&error))),
+            None => return Err(wrong("the decoder gave up")),
         }
         if decoded.len() != expected {
             return Err(wrong(&format!(
@@ -195,6 +209,23 @@ struct Stated {
     rows: u32,
     components: u16,
     tiles: u64,
+    /// Of one number.
+    bits: u16,
+    /// Whether the decoder makes numbers of the width that it is asked for, rather than of whole bytes.
+    is_any_width: bool,
+    /// Whether a number stands for several pixels.
+    is_subsampled: bool,
+}
+
+impl Stated {
+    /// Whether decoded numbers are just as wide as those of the file.
+    fn has_width(&self, bits_allocated: u16) -> bool {
+        if self.is_any_width {
+            self.bits <= bits_allocated
+        } else {
+            self.bits.next_multiple_of(8) == bits_allocated
+        }
+    }
 }
 
 /// Tiles of one slice: more are no CT's.
@@ -270,7 +301,7 @@ fn codestream_stated(bytes: &[u8]) -> Option<Stated> {
     // Markers, length and capabilities come before them. Ends and begins of the image, then size and begin of tiles.
     let (right, bottom, left, top) = (number(8)?, number(12)?, number(16)?, number(20)?);
     let (tile_width, tile_height) = (number(24)?, number(28)?);
-    let [high, low] = *bytes.get(at + 40..at + 42)? else {
+    let [high, low, depth, step_x, step_y] = *bytes.get(at + 40..at + 45)? else {
         return None;
     };
     if tile_width == 0 || tile_height == 0 {
@@ -281,6 +312,10 @@ fn codestream_stated(bytes: &[u8]) -> Option<Stated> {
         rows: bottom.checked_sub(top)?,
         components: u16::from_be_bytes([high, low]),
         tiles: u64::from(right.div_ceil(tile_width)) * u64::from(bottom.div_ceil(tile_height)),
+        // The highest bit is the sign's.
+        bits: u16::from(depth & 0x7F) + 1,
+        is_any_width: true,
+        is_subsampled: [step_x, step_y] != [1, 1],
     })
 }
 
@@ -293,7 +328,7 @@ fn jpeg_stated(bytes: &[u8]) -> Option<Stated> {
         };
         let is_frame = (0xC0..=0xCF).contains(&marker) && ![0xC4, 0xC8, 0xCC].contains(&marker);
         if is_frame {
-            let [a, b, c, d, components] = *bytes.get(at + 5..at + 10)? else {
+            let [bits, a, b, c, d, components] = *bytes.get(at + 4..at + 10)? else {
                 return None;
             };
             return Some(Stated {
@@ -301,6 +336,9 @@ fn jpeg_stated(bytes: &[u8]) -> Option<Stated> {
                 rows: u16::from_be_bytes([a, b]).into(),
                 components: components.into(),
                 tiles: 1,
+                bits: bits.into(),
+                is_any_width: false,
+                is_subsampled: false,
             });
         }
         at += 2 + usize::from(u16::from_be_bytes([high, low]));

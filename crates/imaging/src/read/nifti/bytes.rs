@@ -1,12 +1,13 @@
 //! The bytes of a file, whether it is compressed or not.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, ErrorKind, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::GzDecoder;
 
 use crate::ImagingError;
+use crate::read::unreadable;
 
 /// What deflate can make of a byte at most (RFC 1951: 258 bytes from two bits, less the codes' tables).
 const MOST_INFLATION: u64 = 1032;
@@ -75,9 +76,7 @@ pub(super) fn pair(path: &Path) -> (PathBuf, PathBuf) {
 impl ByteStream {
     pub(super) fn open(path: &Path) -> Result<Self, ImagingError> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let unreadable = |error: std::io::Error| {
-            ImagingError::refused(format!("cannot be read: {error}")).at(name.clone())
-        };
+        let unreadable = |error: std::io::Error| unreadable(error).at(name.clone());
         let file = File::open(path).map_err(unreadable)?;
         let file_bytes = file.metadata().map_err(unreadable)?.len();
         let mut reader = BufReader::with_capacity(BUFFER, file);
@@ -168,9 +167,7 @@ impl ByteStream {
             return Ok(());
         };
         let mut reader = decoder.into_inner();
-        let first = reader
-            .fill_buf()
-            .map_err(|error| ImagingError::refused(format!("cannot be read: {error}")))?;
+        let first = two_bytes(&mut reader).map_err(unreadable)?;
         if first.starts_with(&GZIP) {
             self.source = Source::Gzip(Box::new(GzDecoder::new(reader)));
         } else if first.iter().any(|byte| *byte != 0) {
@@ -207,4 +204,14 @@ impl ByteStream {
             _ => None,
         })
     }
+}
+
+/// What comes next, at least two bytes of it where the file has them: the buffer may end between them.
+fn two_bytes(reader: &mut BufReader<File>) -> std::io::Result<&[u8]> {
+    if reader.buffer().len() < GZIP.len() {
+        let at = reader.stream_position()?;
+        // Empties the buffer.
+        reader.seek(SeekFrom::Start(at))?;
+    }
+    reader.fill_buf()
 }

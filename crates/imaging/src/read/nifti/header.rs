@@ -8,6 +8,8 @@ use crate::read::ReadOptions;
 use crate::read::scalar::{Kind, Rescale, Stored};
 use crate::{ImagingError, Remark, VoxelGrid};
 
+const DAMAGED: &str = "the header is damaged: copy or export it again";
+
 /// What a header says of the voxels.
 #[derive(Debug)]
 pub(super) struct Header {
@@ -112,7 +114,11 @@ fn size(fields: &Fields, is_first: bool) -> Result<[usize; 3], ImagingError> {
     };
     let count = dimension(0);
     if !(1..=7).contains(&count) {
-        return Err(ImagingError::refused(format!("it has {count} dimensions")).at("dim[0]"));
+        return Err(ImagingError::refused(format!(
+            "it has {count} dimensions, where 1 to 7 are possible"
+        ))
+        .at("dim[0]")
+        .hint(DAMAGED));
     }
     let mut size = [1; 3];
     for (index, place) in (1..).zip(&mut size) {
@@ -127,6 +133,7 @@ fn size(fields: &Fields, is_first: bool) -> Result<[usize; 3], ImagingError> {
             .ok_or_else(|| {
                 ImagingError::refused(format!("it is {voxels} voxels long"))
                     .at(format!("dim[{index}]"))
+                    .hint(DAMAGED)
             })?;
     }
     for index in 4..=usize::try_from(count).unwrap_or(0) {
@@ -182,7 +189,7 @@ fn kind(fields: &Fields, is_first: bool) -> Result<Kind, ImagingError> {
             kind.name()
         ))
         .at("bitpix")
-        .hint("the header is damaged: copy or export it again"));
+        .hint(DAMAGED));
     }
     Ok(kind)
 }
@@ -233,7 +240,7 @@ fn data_offset(
             "the voxels begin at byte {given}, but the header needs the first {least}"
         ))
         .at("vox_offset")
-        .hint("the header is damaged: copy or export it again"));
+        .hint(DAMAGED));
     }
     #[expect(
         clippy::cast_possible_truncation,

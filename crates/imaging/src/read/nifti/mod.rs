@@ -18,6 +18,8 @@ use super::scalar::{Converter, Tally};
 use super::{ReadOptions, reserved, zeroed};
 use crate::{ImagingError, Remark, VoxelGrid};
 
+pub(super) use self::version::begins_as_header;
+
 /// Bytes that are converted at a time: they stay in the second cache, and hold whole numbers of any type.
 const PIECE: usize = 1 << 18;
 
@@ -29,13 +31,8 @@ pub(super) struct Nifti {
     data_path: PathBuf,
 }
 
-/// Whether a file begins as a NIfTI file does, or is named as one.
-pub(super) fn is_nifti(path: &Path, first: &[u8]) -> bool {
-    version::begins_as_header(first) || has_name(path)
-}
-
 /// Whether it is called `.nii`, `.nii.gz`, `.hdr` or `.img`, with or without `.gz`.
-fn has_name(path: &Path) -> bool {
+pub(super) fn has_name(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
@@ -47,7 +44,10 @@ fn has_name(path: &Path) -> bool {
 impl Nifti {
     pub(super) fn open(path: &Path, options: &ReadOptions) -> Result<Self, ImagingError> {
         let (header_path, data_path) = bytes::pair(path);
-        let mut stream = ByteStream::open(&header_path)?;
+        let mut stream = opened(
+            &header_path,
+            "the header belongs beside the voxels, in a file of the same name that ends in .hdr",
+        )?;
         let header = Header::read(&mut stream, options)?;
         if header.is_pair && header_path == data_path {
             return Err(ImagingError::refused(
@@ -58,7 +58,11 @@ impl Nifti {
             ));
         }
         let (stream, data_path) = if header.is_pair {
-            (ByteStream::open(&data_path)?, data_path)
+            let voxels = opened(
+                &data_path,
+                "the voxels belong beside the header, in a file of the same name that ends in .img",
+            )?;
+            (voxels, data_path)
         } else {
             (stream, header_path)
         };
@@ -105,7 +109,7 @@ impl Nifti {
     ) -> Result<(Vec<i16>, Tally, Vec<Remark>), ImagingError> {
         let count = self.header.grid.len();
         self.check_size(count * size_of::<i16>(), options)?;
-        let converter = Converter::new(self.header.stored, self.header.rescale, None);
+        let converter = Converter::new(self.header.stored, self.header.rescale, None, count);
         let mut hu = zeroed(count)?;
         let mut tally = Tally::default();
         let mut rest = hu.as_mut_slice();
@@ -213,6 +217,17 @@ impl Nifti {
         let beyond = self.stream.finish(&mut piece)?;
         Ok(beyond.into_iter().map(Remark::new).collect())
     }
+}
+
+/// One of a pair, with what to do where it is missing.
+fn opened(path: &Path, hint: &str) -> Result<ByteStream, ImagingError> {
+    ByteStream::open(path).map_err(|problem| {
+        if path.exists() {
+            problem
+        } else {
+            problem.hint(hint)
+        }
+    })
 }
 
 fn cut_off(path: &Path, how: &str) -> ImagingError {

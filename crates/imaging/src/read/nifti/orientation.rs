@@ -181,6 +181,14 @@ fn in_ct(
     )
 }
 
+const AFFINE: &str = "write the affine into the header again, e.g. with nibabel";
+
+fn not_a_grid(problem: &NotAGrid, place: &str) -> ImagingError {
+    ImagingError::refused(problem.to_string())
+        .at(place)
+        .hint(AFFINE)
+}
+
 /// The grid of the header, by the form that counts.
 pub(super) fn grid(
     placement: &Placement,
@@ -190,8 +198,7 @@ pub(super) fn grid(
 ) -> Result<VoxelGrid, ImagingError> {
     let unit_m = placement.unit_m(remarks);
     let of_form = |form: &Matrix3x4<f64>, name: &str| {
-        in_ct(form, unit_m, size)
-            .map_err(|problem| ImagingError::refused(problem.to_string()).at(name))
+        in_ct(form, unit_m, size).map_err(|problem| not_a_grid(&problem, name))
     };
     let has_sform = placement.sform_code > 0;
     let has_qform = placement.qform_code > 0;
@@ -200,7 +207,8 @@ pub(super) fn grid(
         Some(form) => of_form(&form, "qform"),
         None => Err(
             ImagingError::refused("the quaternion is longer than 1: no rotation has it")
-                .at("qform"),
+                .at("qform")
+                .hint(AFFINE),
         ),
     });
     let grid = match (by_sform, by_qform) {
@@ -288,5 +296,5 @@ fn without_forms(
         placement.spacing.map(|each| each.abs() * unit_m),
         size,
     )
-    .map_err(|problem| ImagingError::refused(problem.to_string()).at("pixdim"))
+    .map_err(|problem| not_a_grid(&problem, "pixdim"))
 }

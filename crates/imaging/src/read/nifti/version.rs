@@ -6,7 +6,7 @@ pub(super) const BYTES_1: usize = 348;
 pub(super) const BYTES_2: usize = 540;
 
 /// Whether bytes begin with the size of a header, in either byte order.
-pub(super) fn begins_as_header(first: &[u8]) -> bool {
+pub(in crate::read) fn begins_as_header(first: &[u8]) -> bool {
     version_of(first).is_some()
 }
 

@@ -160,6 +160,76 @@ fn phases_of_one_series_are_told_apart() {
 }
 
 #[test]
+fn even_stacks_among_each_other_are_series_of_their_own() {
+    let acquisition = |number: &'static str, shift_mm: f64| {
+        (0..4).map(move |at| {
+            Slice::at(f64::from(at) * 2.0 + shift_mm).with(0x0020_0012, *b"IS", number)
+        })
+    };
+    let slices: Vec<Slice> = acquisition("1", 0.0).chain(acquisition("2", 4.7)).collect();
+    let said = refusal(read_slices(&slices, &default()));
+    assert!(
+        said.contains("4.1: 4 slices") && said.contains("4.2: 4 slices"),
+        "{said}"
+    );
+    // One behind the other they are one scan.
+    let slices: Vec<Slice> = acquisition("1", 0.0).chain(acquisition("2", 8.0)).collect();
+    let read = read_slices(&slices, &default()).unwrap();
+    assert_eq!(read.volume.grid.size()[2], 8);
+}
+
+#[test]
+fn bytes_count_before_names() {
+    let whole = Slice::at(0.0).bytes();
+    let expected = read_as("a.dcm", &whole).unwrap().volume;
+    for name in ["a.img", "a.nii", "a"] {
+        assert_eq!(read_as(name, &whole).unwrap().volume, expected, "{name}");
+    }
+}
+
+#[test]
+fn elements_with_vrs_are_read_so_whatever_the_file_says() {
+    let whole = Slice {
+        syntax: "1.2.840.10008.1.2",
+        ..Slice::at(0.0)
+    };
+    let read = read_as("a.dcm", &whole.bytes()).unwrap();
+    assert_eq!(read.volume.hu, plane_hu());
+    assert!(remarks(&read).contains("no VRs"), "{}", remarks(&read));
+}
+
+#[test]
+fn more_frames_than_pixels_are_refused() {
+    let slice = Slice::at(0.0).with(0x0028_0008, *b"IS", "60000");
+    let said = refusal(read_as("a.dcm", &slice.bytes()));
+    assert!(
+        said.contains("60000 frames, but has pixels of 1") && said.contains("copy or export"),
+        "{said}"
+    );
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_refused_with_their_element() {
+    let position: Vec<u8> = [0.0, f64::NAN, 0.0]
+        .into_iter()
+        .flat_map(f64::to_le_bytes)
+        .collect();
+    let slice = Slice::at(0.0).with(0x0020_0032, *b"FD", position);
+    let said = refusal(read_as("a.dcm", &slice.bytes()));
+    assert!(
+        said.contains("(0020,0032)") && said.contains("no number"),
+        "{said}"
+    );
+}
+
+#[test]
+fn texts_command_no_terminal() {
+    let slice = Slice::at(0.0).with(0x0018_1210, *b"SH", "\x1b[31mB30f\x07");
+    let read = read_as("a.dcm", &slice.bytes()).unwrap();
+    assert_eq!(read.description.kernel.as_deref(), Some("[31mB30f"));
+}
+
+#[test]
 fn padding_is_air_and_does_not_count() {
     let mut slices = stack(3);
     for slice in &mut slices {
