@@ -68,10 +68,10 @@ const MEAN_ERROR_M: f64 = 0.12e-3;
 pub const SURFACE_ERROR_M: f64 = 0.25e-3;
 
 /// Cells of skin and lungs: several voxels where these are finer. Vertices lie on the voxels' surface all the same.
-const LARGE_CELL_M: f64 = 2.15e-3;
+const LARGE_CELL_M: f64 = 2.05e-3;
 
 /// Cells of bone, which has plates of 2 mm.
-const BONE_CELL_M: f64 = 2.0e-3;
+const BONE_CELL_M: f64 = 1.45e-3;
 
 /// Cells of what is small: voxels.
 const SMALL_CELL_M: f64 = 0.0;
