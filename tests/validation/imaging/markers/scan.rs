@@ -81,7 +81,7 @@ fn main() -> Result<(), Failure> {
                 let told = registration.tre(&Point3::from(lesion.center_m));
                 json!({
                     "error_m": (told.at_m - wanted).as_slice(),
-                    "covariance_m2": told.covariance_m2,
+                    "covariance_m2": <[[f64; 3]; 3]>::from(told.covariance_m2),
                 })
             });
             json!({ "targets": targets.collect::<Vec<_>>(), "chi_square": registration.chi_square })
