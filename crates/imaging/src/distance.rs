@@ -410,10 +410,8 @@ impl Ways {
         let mut sides = before.zip(after).skip(AT_ONCE * skipped);
         for squares in self.squares.iter().skip(skipped) {
             // No farther value can be less than its way.
-            let matters = least
-                .iter()
-                .fold(false, |any, &value| any | (value > squares[0]));
-            if !matters {
+            let farther = |any, &value: &f32| any | u32::from(value > squares[0]);
+            if least.iter().fold(0, farther) == 0 {
                 break;
             }
             for (&square, (before, after)) in squares.iter().zip(&mut sides) {
