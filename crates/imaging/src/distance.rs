@@ -1,8 +1,10 @@
 //! Exact Euclidean distances from a set of voxels.
 //!
-//! Felzenszwalb and Huttenlocher, *Distance transforms of sampled functions*, Theory of Computing 8 (2012): along k
-//! by counting, then along j and i the lower envelope of parabolas, slice by slice. Parabolas beyond the cap are never
-//! looked at. Counts and results share one array of 16 bits, so that a field takes two bytes a voxel of its box.
+//! An axis at a time, as squares of distances allow: along k by counting, then slice by slice along j and i the least
+//! sum of a square and of the squared way to it. Ways are looked at from the shortest one on until none can be less,
+//! which at the distances in a body takes fewer operations, side by side, than lower envelopes of parabolas do
+//! (Felzenszwalb and Huttenlocher, *Distance transforms of sampled functions*, Theory of Computing 8, 2012). Counts and
+//! results share one array of 16 bits, so that a field takes two bytes a voxel of its box.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -186,7 +188,7 @@ fn distances(
     let mut steps = counts_along_k(mask, far);
     let slices_each = nz.div_ceil(options.threads.max(1));
     let part = |slices: &mut [i16]| -> Result<(), ImagingError> {
-        let mut work = InSlice::new([nx, ny], spacing_m, far, options.cap_m);
+        let mut work = InSlice::new([nx, ny], spacing_m, options.cap_m);
         for slice in slices.chunks_exact_mut(nx * ny) {
             if options.cancel.load(Ordering::Relaxed) {
                 return Err(ImagingError::Interrupted);
@@ -244,73 +246,114 @@ fn counts_along_k(mask: &Mask, far: i16) -> Vec<i16> {
     counts
 }
 
-/// Columns that are taken at a time: those of a cache line.
-const COLUMNS: usize = 16;
+/// Voxels beside each other that are taken at a time: those of a cache line.
+const LANES: usize = 16;
+
+/// Ways that are looked at before it is asked whether the next one can matter.
+const AT_ONCE: usize = 4;
 
 /// What one slice needs.
 struct InSlice {
     size: [usize; 2],
+    step_k_squared: f32,
     cap_squared: f32,
     steps_per_m: f32,
-    /// Squared distance of each count of slices.
-    squares: Vec<f32>,
-    along_i: Envelope,
-    along_j: Envelope,
+    along_i: Ways,
+    along_j: Ways,
+    /// Squares of the slice, and then those of the columns that are taken at a time, or of a row, with what is beyond.
     slice: Vec<f32>,
-    lines: Vec<f32>,
-    line: Vec<f32>,
+    columns: Vec<[f32; LANES]>,
+    row: Vec<f32>,
+    /// Which lines of the columns have something within the cap.
+    near: Vec<bool>,
 }
 
 impl InSlice {
-    fn new([nx, ny]: [usize; 2], spacing_m: [f64; 3], far: i16, cap_m: f64) -> Self {
-        let squares = (0..=far).map(|count| single((f64::from(count) * spacing_m[2]).powi(2)));
+    fn new([nx, ny]: [usize; 2], spacing_m: [f64; 3], cap_m: f64) -> Self {
+        let [along_i, along_j] =
+            [(nx, spacing_m[0]), (ny, spacing_m[1])].map(|(n, step_m)| Ways::new(n, step_m, cap_m));
+        let cap_squared = single(cap_m * cap_m);
         Self {
             size: [nx, ny],
-            cap_squared: single(cap_m * cap_m),
+            step_k_squared: single(spacing_m[2] * spacing_m[2]),
+            cap_squared,
             steps_per_m: single(f64::from(STEPS) / cap_m),
-            squares: squares.collect(),
-            along_i: Envelope::new(nx, spacing_m[0], cap_m),
-            along_j: Envelope::new(ny, spacing_m[1], cap_m),
             slice: vec![0.0; nx * ny],
-            lines: vec![0.0; COLUMNS * ny],
-            line: vec![0.0; nx.max(ny)],
+            columns: vec![[cap_squared; LANES]; ny + 2 * along_j.reach()],
+            row: vec![cap_squared; nx.next_multiple_of(LANES) + 2 * along_i.reach()],
+            near: vec![false; ny],
+            along_i,
+            along_j,
         }
     }
 
     /// Turns counts of slices into distances.
     fn finish(&mut self, counts: &mut [i16]) {
-        let [nx, ny] = self.size;
+        let [nx, _] = self.size;
         for (square, &count) in self.slice.iter_mut().zip(&*counts) {
-            *square = self.squares[usize::from(count.unsigned_abs())];
+            let count = f32::from(count);
+            *square = lower(count * count * self.step_k_squared, self.cap_squared);
         }
-        for first in (0..nx).step_by(COLUMNS) {
-            let columns = COLUMNS.min(nx - first);
-            for (j, row) in self.slice.chunks_exact(nx).enumerate() {
-                for (column, &value) in row[first..first + columns].iter().enumerate() {
-                    self.lines[column * ny + j] = value;
-                }
-            }
-            for line in self.lines.chunks_exact_mut(ny).take(columns) {
-                self.along_j.lower(line, &mut self.line);
-            }
-            for (j, row) in self.slice.chunks_exact_mut(nx).enumerate() {
-                for (column, value) in row[first..first + columns].iter_mut().enumerate() {
-                    *value = self.lines[column * ny + j];
-                }
-            }
-        }
-        for (row, out) in self
-            .slice
-            .chunks_exact_mut(nx)
-            .zip(counts.chunks_exact_mut(nx))
-        {
-            self.along_i.lower(row, &mut self.line);
-            for (steps, &squared) in out.iter_mut().zip(&*row) {
-                let scaled = squared.min(self.cap_squared).sqrt() * self.steps_per_m;
-                *steps = rounded(scaled);
+        self.lower_along_j();
+        let reach = self.along_i.reach();
+        let rows = self.slice.chunks_exact(nx);
+        for (row, out) in rows.zip(counts.chunks_exact_mut(nx)) {
+            self.row[reach..reach + nx].copy_from_slice(row);
+            for (block, out) in out.chunks_mut(LANES).enumerate() {
+                let at = reach + LANES * block;
+                let before = side_by_side(&self.row[at - reach..at + LANES - 1]).rev();
+                let mut after = side_by_side(&self.row[at..at + reach + LANES]);
+                let here = after.next().expect("it is in the row");
+                let least = self.along_i.least(*here, before, after, 0);
+                let steps = least.map(|squared| rounded(squared.sqrt() * self.steps_per_m));
+                out.copy_from_slice(&steps[..out.len()]);
             }
         }
     }
+
+    fn lower_along_j(&mut self) {
+        let [nx, ny] = self.size;
+        let reach = self.along_j.reach();
+        for first in (0..nx).step_by(LANES) {
+            let wide = LANES.min(nx - first);
+            let rows = self.slice.chunks_exact(nx);
+            let lines = &mut self.columns[reach..reach + ny];
+            for ((line, near), row) in lines.iter_mut().zip(&mut self.near).zip(rows) {
+                line[..wide].copy_from_slice(&row[first..first + wide]);
+                *near = line.iter().any(|&square| square < self.cap_squared);
+            }
+            let none = far_lines(&self.near);
+            for (j, row) in self.slice.chunks_exact_mut(nx).enumerate() {
+                let at = reach + j;
+                let before = self.columns[at - reach..at].iter().rev();
+                let after = self.columns[at + 1..=at + reach].iter();
+                let least = self.along_j.least(self.columns[at], before, after, none[j]);
+                row[first..first + wide].copy_from_slice(&least[..wide]);
+            }
+        }
+    }
+}
+
+/// For each line, how many of those next to it, on either side, are not near.
+fn far_lines(near: &[bool]) -> Vec<usize> {
+    let count = |far: &mut usize, near: &bool| {
+        let before = *far;
+        *far = if *near { 0 } else { before + 1 };
+        Some(before)
+    };
+    let mut none: Vec<usize> = near.iter().scan(near.len(), count).collect();
+    let after: Vec<usize> = near.iter().rev().scan(near.len(), count).collect();
+    for (none, after) in none.iter_mut().zip(after.into_iter().rev()) {
+        *none = after.min(*none);
+    }
+    none
+}
+
+/// All that many values in a row.
+fn side_by_side(values: &[f32]) -> impl DoubleEndedIterator<Item = &[f32; LANES]> {
+    values
+        .windows(LANES)
+        .map(|window| window.first_chunk().expect("a window has its width"))
 }
 
 /// To the nearest whole number, of 0 to 2^15 - 1: adding 2^23 leaves it in the lowest bits.
@@ -327,71 +370,57 @@ fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// Lower envelope of parabolas of one curvature along a line of voxels.
-struct Envelope {
-    step_squared: f64,
-    cap_squared: f32,
-    /// `0.5 / n` of each distance n between voxels.
-    halves: Vec<f64>,
-    /// Where the parabolas of the envelope stand, their height over the step squared plus the square of that place,
-    /// and where each begins.
-    parabolas: Vec<(usize, f64, f64)>,
+/// The lower one of two numbers; one instruction, unlike `f32::min`.
+fn lower(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
-impl Envelope {
+/// The ways along an axis up to the cap.
+struct Ways {
+    /// Squared ways of 1, 2, ... voxels: so many that all which are below the cap, and within the line, are among them.
+    squares: Vec<[f32; AT_ONCE]>,
+}
+
+impl Ways {
     fn new(length: usize, step_m: f64, cap_m: f64) -> Self {
+        let reach = whole(cap_m / step_m).min(length - 1);
+        let squares = (0..reach.div_ceil(AT_ONCE)).map(|group| {
+            std::array::from_fn(|at| single(((AT_ONCE * group + at + 1) as f64 * step_m).powi(2)))
+        });
         Self {
-            step_squared: step_m * step_m,
-            cap_squared: single(cap_m * cap_m),
-            halves: (0..=length).map(|n| 0.5 / n as f64).collect(),
-            parabolas: Vec::with_capacity(length),
+            squares: squares.collect(),
         }
     }
 
-    /// Replaces the heights of parabolas on a line by their lower envelope.
-    fn lower(&mut self, line: &mut [f32], scratch: &mut [f32]) {
-        let inverse = 1.0 / self.step_squared;
-        self.parabolas.clear();
-        for (at, &height) in line.iter().enumerate() {
-            if height >= self.cap_squared {
-                continue;
+    /// Voxels that have to be there on both sides of one whose distance is looked for.
+    fn reach(&self) -> usize {
+        AT_ONCE * self.squares.len()
+    }
+
+    /// Least sums of a value and of the squared way to it, for voxels side by side, from those before and after them
+    /// along the axis, the nearest ones first. Of the nearest `none` nothing is within the cap.
+    fn least<'a>(
+        &self,
+        mut least: [f32; LANES],
+        before: impl Iterator<Item = &'a [f32; LANES]>,
+        after: impl Iterator<Item = &'a [f32; LANES]>,
+        none: usize,
+    ) -> [f32; LANES] {
+        let skipped = none / AT_ONCE;
+        let mut sides = before.zip(after).skip(AT_ONCE * skipped);
+        for squares in self.squares.iter().skip(skipped) {
+            // No farther value can be less than its way.
+            let farther = |any, &value: &f32| any | u32::from(value > squares[0]);
+            if least.iter().fold(0, farther) == 0 {
+                break;
             }
-            let place = at as f64;
-            let lifted = f64::from(height) * inverse + place * place;
-            let mut begins = f64::NEG_INFINITY;
-            while let Some(&(below, below_lifted, below_begins)) = self.parabolas.last() {
-                begins = (lifted - below_lifted) * self.halves[at - below];
-                if begins > below_begins {
-                    break;
+            for (&square, (before, after)) in squares.iter().zip(&mut sides) {
+                for ((least, &before), &after) in least.iter_mut().zip(before).zip(after) {
+                    *least = lower(lower(before, after) + square, *least);
                 }
-                self.parabolas.pop();
-                begins = f64::NEG_INFINITY;
             }
-            self.parabolas.push((at, lifted, begins));
         }
-        if self.parabolas.is_empty() {
-            return;
-        }
-        let length = line.len();
-        let scratch = &mut scratch[..length];
-        let step_squared = single(self.step_squared);
-        let mut from = 0;
-        for (number, &(at, _, _)) in self.parabolas.iter().enumerate() {
-            let to = match self.parabolas.get(number + 1) {
-                Some(&(_, _, next)) => whole(next)
-                    .saturating_add(usize::from(next >= 0.0))
-                    .min(length),
-                None => length,
-            };
-            let height = line[at];
-            let mut away = from as f32 - at as f32;
-            for value in scratch.iter_mut().take(to).skip(from) {
-                *value = height + away * away * step_squared;
-                away += 1.0;
-            }
-            from = from.max(to);
-        }
-        line.copy_from_slice(scratch);
+        least
     }
 }
 

@@ -71,6 +71,24 @@ fn pack(bytes: [u8; 8]) -> u64 {
     u64::from_le_bytes(bytes).wrapping_mul(0x0102_0408_1020_4080) >> 56
 }
 
+/// Bits of the values that are wanted, of a row.
+pub(crate) fn pack_row<T: Copy>(row: &[T], out: &mut [u64], wanted: impl Fn(T) -> bool) {
+    let (blocks, rest) = row.as_chunks::<64>();
+    for (block, word) in blocks.iter().zip(out.iter_mut()) {
+        let mut bytes = [0; 64];
+        for (byte, &value) in bytes.iter_mut().zip(block) {
+            *byte = u8::from(wanted(value));
+        }
+        let (eights, _) = bytes.as_chunks::<8>();
+        *word = (0..8).fold(0, |word, at| word | pack(eights[at]) << (8 * at));
+    }
+    if let Some(last) = out.get_mut(blocks.len()) {
+        *last = rest.iter().enumerate().fold(0, |word, (bit, &value)| {
+            word | u64::from(wanted(value)) << bit
+        });
+    }
+}
+
 impl Mask {
     /// No voxel of a grid.
     pub fn empty(size: [usize; 3]) -> Self {
@@ -84,23 +102,22 @@ impl Mask {
 
     /// Voxels whose value is wanted; values in the order of [`crate::VoxelGrid::offset`].
     pub fn of<T: Copy>(size: [usize; 3], values: &[T], wanted: impl Fn(T) -> bool) -> Self {
-        let mut mask = Self::empty(size);
-        let rows = values.chunks_exact(size[0]);
-        for (row, out) in rows.zip(mask.words.chunks_exact_mut(mask.words_per_row)) {
-            let (blocks, rest) = row.as_chunks::<64>();
-            for (block, word) in blocks.iter().zip(out.iter_mut()) {
-                let mut bytes = [0; 64];
-                for (byte, &value) in bytes.iter_mut().zip(block) {
-                    *byte = u8::from(wanted(value));
-                }
-                let (eights, _) = bytes.as_chunks::<8>();
-                *word = (0..8).fold(0, |word, at| word | pack(eights[at]) << (8 * at));
-            }
-            if let Some(last) = out.get_mut(blocks.len()) {
-                for (bit, &value) in rest.iter().enumerate() {
-                    *last |= u64::from(wanted(value)) << bit;
-                }
-            }
+        Self::of_box(size, values, &IndexBox::whole(size), wanted)
+    }
+
+    /// The same of a box of the grid, as a mask of the box.
+    pub fn of_box<T: Copy>(
+        size: [usize; 3],
+        values: &[T],
+        within: &IndexBox,
+        wanted: impl Fn(T) -> bool,
+    ) -> Self {
+        let mut mask = Self::empty(within.size());
+        let [i, _, _] = within.first;
+        let [columns, rows, slices] = mask.size;
+        for (j, k) in (0..slices).flat_map(|k| (0..rows).map(move |j| (j, k))) {
+            let from = ((k + within.first[2]) * size[1] + j + within.first[1]) * size[0] + i;
+            pack_row(&values[from..from + columns], mask.row_mut(j, k), &wanted);
         }
         mask
     }

@@ -74,34 +74,65 @@ pub fn dilated(mask: &Mask, radius_m: f64, spacing_m: [f64; 3]) -> Mask {
     let last = mask.last_word();
     let mut out = Mask::empty(mask.size());
     let mut scratch = vec![0; mask.words_per_row()];
-    let mut wide = Mask::empty([mask.size()[0], ny, 1]);
-    let mut occupied: Vec<usize> = Vec::with_capacity(ny);
-    for k in 0..nz {
-        occupied.clear();
-        occupied.extend((0..ny).filter(|&j| mask.row(j, k).iter().any(|&word| word != 0)));
+    let mut wide = vec![0; mask.words_per_row()];
+    for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
+        let row = mask.row(j, k);
+        if row.iter().all(|&word| word == 0) {
+            continue;
+        }
+        let covered = Covered::new(mask, j, k);
         for group in rows.chunk_by(|a, b| a.0 == b.0) {
-            let by = group[0].0;
-            for &j in &occupied {
-                let row = wide.row_mut(j, 0);
-                row.copy_from_slice(mask.row(j, k));
-                spread(row, by, last, &mut scratch);
-            }
-            for &(_, [dj, dk]) in group {
-                let Some(to_k) = k.checked_add_signed(dk).filter(|&k| k < nz) else {
+            let mut is_spread = false;
+            for &(by, [dj, dk]) in group {
+                let to_j = j.checked_add_signed(dj).filter(|&j| j < ny);
+                let to_k = k.checked_add_signed(dk).filter(|&k| k < nz);
+                let Some((to_j, to_k)) = to_j.zip(to_k).filter(|_| !covered.has([dj, dk])) else {
                     continue;
                 };
-                for &j in &occupied {
-                    let Some(to_j) = j.checked_add_signed(dj).filter(|&j| j < ny) else {
-                        continue;
-                    };
-                    for (to, &from) in out.row_mut(to_j, to_k).iter_mut().zip(wide.row(j, 0)) {
-                        *to |= from;
-                    }
+                if !is_spread {
+                    wide.copy_from_slice(row);
+                    spread(&mut wide, by, last, &mut scratch);
+                    is_spread = true;
+                }
+                for (to, &from) in out.row_mut(to_j, to_k).iter_mut().zip(&wide) {
+                    *to |= from;
                 }
             }
         }
     }
     out
+}
+
+/// Directions in which the next row has all that a row has. It is nearer to what lies there, and a ball's rows are
+/// the wider the nearer they are: nothing has to be carried from this row in such a direction.
+struct Covered {
+    along_j: [bool; 2],
+    along_k: [bool; 2],
+}
+
+impl Covered {
+    fn new(mask: &Mask, j: usize, k: usize) -> Self {
+        let [_, ny, nz] = mask.size();
+        let row = mask.row(j, k);
+        let has_all = |j: Option<usize>, k: Option<usize>| {
+            let next = j.filter(|&j| j < ny).zip(k.filter(|&k| k < nz));
+            next.is_some_and(|(j, k)| {
+                let pairs = row.iter().zip(mask.row(j, k));
+                pairs.fold(0, |lacks, (here, there)| lacks | (here & !there)) == 0
+            })
+        };
+        Self {
+            along_j: [j.checked_sub(1), Some(j + 1)].map(|j| has_all(j, Some(k))),
+            along_k: [k.checked_sub(1), Some(k + 1)].map(|k| has_all(Some(j), k)),
+        }
+    }
+
+    fn has(&self, [dj, dk]: [isize; 2]) -> bool {
+        dj < 0 && self.along_j[0]
+            || dj > 0 && self.along_j[1]
+            || dk < 0 && self.along_k[0]
+            || dk > 0 && self.along_k[1]
+    }
 }
 
 /// Voxels that are farther than a distance from all that are not in the mask. What is beyond the volume does not

@@ -19,7 +19,8 @@ use crate::segment::{
 use crate::spacing::{orthogonal, whole};
 use crate::structures::{Structure, SurfaceTissue, structure_of};
 use crate::surface::{
-    Field, Level, SurfaceError, Values, local_level, refine, simplify, surface_error, surface_net,
+    Field, Level, SurfaceError, Values, at_middles, local_level, refine, simplify, surface_error,
+    surface_net,
 };
 use crate::volume::{LabelMap, Volume};
 
@@ -553,17 +554,20 @@ fn make(volume: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Ma
         return Err(ImagingError::Interrupted);
     }
     let grid = &volume.grid;
+    let sharp = match job.runs {
+        Runs::BoneMiddle => at_middles(volume, &job.bounds),
+        _ => None,
+    };
+    let hu = sharp.as_deref().unwrap_or(&volume.hu);
     let levels = match job.runs {
-        Runs::BoneMiddle => local_level(&volume.hu, grid, job.mask, &job.bounds, |hu| {
-            hu > SOFT_FROM_HU
-        }),
+        Runs::BoneMiddle => local_level(hu, grid, job.mask, &job.bounds, |hu| hu > SOFT_FROM_HU),
         _ => None,
     };
     let refined = levels
         .as_ref()
-        .map(|levels| refine(&volume.hu, grid, job.mask, &job.bounds, levels));
+        .map(|levels| refine(hu, grid, job.mask, &job.bounds, levels));
     let hounsfield = |level, typical| Values::Hounsfield {
-        hu: &volume.hu,
+        hu,
         size: grid.size(),
         level,
         typical,

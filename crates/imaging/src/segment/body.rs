@@ -6,7 +6,7 @@ use crate::mask::{IndexBox, Mask};
 use crate::morphology::{dilated, opened};
 use crate::volume::{AIR_HU, Volume};
 
-use super::{Scan, side_in_words};
+use super::{Scan, below, side_in_words};
 
 /// Between air (-1000) and skin (+40), where the blur of the scanner leaves the surface. Half-integer: no voxel is on it.
 pub const SKIN_LEVEL_HU: f64 = -479.5;
@@ -46,8 +46,8 @@ pub struct Body {
 }
 
 pub(super) fn find(scan: &Scan<'_>, remarks: &mut Vec<Remark>) -> Result<Body, ImagingError> {
-    let level = scan.levels.skin_hu;
-    let tissue = Mask::of(scan.size(), &scan.volume.hu, |hu| f64::from(hu) > level);
+    let level = below(scan.levels.skin_hu);
+    let tissue = Mask::of(scan.size(), &scan.volume.hu, |hu| hu > level);
     scan.check()?;
     let solid = without_bed(scan, &tissue, remarks)?;
     scan.check()?;

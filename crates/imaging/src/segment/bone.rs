@@ -52,10 +52,7 @@ pub(super) fn find(
     remarks: &mut Vec<Remark>,
 ) -> Result<Bone, ImagingError> {
     let bounds = body.bounds;
-    let level = scan.levels.bone_hu;
-    let dense = Mask::of(scan.size(), &scan.volume.hu, |hu| f64::from(hu) > level);
-    let mut dense = dense.cropped(&bounds);
-    dense.intersect(&body.mask.cropped(&bounds));
+    let dense = scan.denser(&body.mask.cropped(&bounds), &bounds, scan.levels.bone_hu);
     scan.check()?;
     let parts = Components::of(&dense, Connectivity::Faces);
     let facts = densities(scan, &parts, &bounds);

@@ -138,9 +138,19 @@ pub fn paint(map: &mut LabelMap, within: &IndexBox, mask: &Mask, label: u16) {
 /// Voxels and volume of every label that a map names.
 pub fn label_facts(map: &LabelMap) -> Vec<LabelFacts> {
     let mut counts = vec![0_usize; 1 << 16];
-    // Neighbours mostly have the same label: a run is counted at once.
-    for run in map.labels.chunk_by(|a, b| a == b) {
-        counts[usize::from(run[0])] += run.len();
+    // Neighbours mostly have the same label: these are counted at once.
+    for some in map.labels.chunks(64) {
+        let first = some[0];
+        let differ = some
+            .iter()
+            .fold(0, |differ, &label| differ | (label ^ first));
+        if differ == 0 {
+            counts[usize::from(first)] += some.len();
+        } else {
+            for &label in some {
+                counts[usize::from(label)] += 1;
+            }
+        }
     }
     let voxel_m3 = map.grid.steps_m().determinant().abs();
     map.names

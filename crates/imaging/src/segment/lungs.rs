@@ -2,7 +2,7 @@
 
 use crate::components::{Components, Connectivity};
 use crate::error::{ImagingError, Remark};
-use crate::mask::{IndexBox, Mask};
+use crate::mask::{IndexBox, Mask, pack_row};
 use crate::morphology::{bridged, dilated, eroded};
 
 use super::body::Body;
@@ -81,10 +81,8 @@ pub(super) fn find(
     remarks: &mut Vec<Remark>,
 ) -> Result<Lungs, ImagingError> {
     let bounds = body.bounds;
-    let level = scan.levels.lung_hu;
-    let mut airy = Mask::of(scan.size(), &scan.volume.hu, |hu| f64::from(hu) < level);
-    airy.intersect(&body.mask);
-    let airy = airy.cropped(&bounds);
+    let mut airy = body.mask.cropped(&bounds);
+    airy.subtract(&scan.denser(&airy, &bounds, scan.levels.lung_hu));
     scan.check()?;
     let parts = Components::of(&airy, Connectivity::Faces);
     let large = scan.voxels_of(LEAST_LUNG_L);
@@ -230,33 +228,41 @@ fn airways(
 fn emptier_than(scan: &Scan<'_>, airy: &Mask, bounds: &IndexBox, level: i32) -> Mask {
     let [nx, ny, nz] = scan.size();
     let mut found = Mask::empty(airy.size());
-    let [_, rows, slices] = airy.size();
+    let [columns, rows, slices] = airy.size();
+    let mut sums = vec![0; columns];
     for (j, k) in (0..slices).flat_map(|k| (0..rows).map(move |j| (j, k))) {
         let [at_j, at_k] = [j + bounds.first[1], k + bounds.first[2]];
-        if at_j == 0 || at_j == ny - 1 {
+        if at_j == 0 || at_j == ny - 1 || airy.row(j, k).iter().all(|&word| word == 0) {
             continue;
         }
-        let whole = |j: usize, k: usize| scan.row([0, nx], j, k);
-        let here = whole(at_j, at_k);
-        // At the first and the last slice, the slice itself stands for its neighbour.
-        let beside = [
-            whole(at_j - 1, at_k),
-            whole(at_j + 1, at_k),
-            whole(at_j, at_k.saturating_sub(1)),
-            whole(at_j, (at_k + 1).min(nz - 1)),
-        ];
-        for [from, to] in airy.runs(j, k) {
-            for i in from..to {
-                let at = i + bounds.first[0];
-                if at == 0 || at == nx - 1 {
-                    continue;
-                }
-                let in_row: i32 = here[at - 1..=at + 1].iter().map(|&hu| i32::from(hu)).sum();
-                let others: i32 = beside.iter().map(|row| i32::from(row[at])).sum();
-                if in_row + others < 7 * level {
-                    found.insert([i, j, k]);
-                }
+        sums.fill(0);
+        // At the first and the last slice, the slice itself stands for its neighbour; at the first and the last
+        // column there is no voxel to be found.
+        for (step, at_j, at_k) in [
+            (-1, at_j, at_k),
+            (0, at_j, at_k),
+            (1, at_j, at_k),
+            (0, at_j - 1, at_k),
+            (0, at_j + 1, at_k),
+            (0, at_j, at_k.saturating_sub(1)),
+            (0, at_j, (at_k + 1).min(nz - 1)),
+        ] {
+            let row = scan.row([0, nx], at_j, at_k);
+            let first = bounds.first[0].saturating_add_signed(step);
+            let from = usize::from(bounds.first[0] == 0 && step < 0);
+            for (sum, &hu) in sums[from..].iter_mut().zip(&row[first..]) {
+                *sum += i32::from(hu);
             }
+        }
+        for at in [0, nx - 1] {
+            if let Some(at) = at.checked_sub(bounds.first[0]).filter(|&at| at < columns) {
+                sums[at] = i32::MAX;
+            }
+        }
+        let row = found.row_mut(j, k);
+        pack_row(&sums, row, |sum| sum < 7 * level);
+        for (word, &airy) in row.iter_mut().zip(airy.row(j, k)) {
+            *word &= airy;
         }
     }
     found

@@ -157,6 +157,14 @@ impl Scan<'_> {
         self.volume.hu[self.volume.grid.offset(voxel)]
     }
 
+    /// Voxels of a mask of a box that are denser than a level, which is at a half-integer.
+    fn denser(&self, part: &Mask, bounds: &IndexBox, level: f64) -> Mask {
+        let level = below(level);
+        let mut found = Mask::of_box(self.size(), &self.volume.hu, bounds, |hu| hu > level);
+        found.intersect(part);
+        found
+    }
+
     /// Voxels of a mask of a box whose value is wanted, as a mask of the box.
     fn within(&self, part: &Mask, bounds: &IndexBox, wanted: impl Fn(i16) -> bool) -> Mask {
         let mut found = Mask::empty(part.size());
@@ -207,6 +215,15 @@ impl Scan<'_> {
         }
         Ok(())
     }
+}
+
+/// The whole number below a level, which is within 16 bits.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "levels are checked to be within 16 bits"
+)]
+fn below(level: f64) -> i16 {
+    level.floor() as i16
 }
 
 /// The direction in words in which an axis of the grid runs, at its start or its end.

@@ -48,16 +48,41 @@ pub enum Level<'a> {
 #[derive(Debug, Clone)]
 pub struct LocalLevel {
     /// First voxel of the box in the grid.
-    pub first: [usize; 3],
-    /// Voxels of a block.
-    pub block: [usize; 3],
+    first: [usize; 3],
     /// Blocks.
-    pub size: [usize; 3],
+    size: [usize; 3],
     /// A level per block, HU.
-    pub levels_hu: Vec<f32>,
+    levels_hu: Vec<f32>,
+    /// For every voxel of the box along each axis the block whose middle is before it, the next one, and the share of
+    /// the latter.
+    between: [Vec<(usize, usize, f32)>; 3],
 }
 
 impl LocalLevel {
+    /// Of the blocks of a box whose first voxel is `first`; a block has `block` voxels, and there are `size` of them.
+    pub fn new(
+        first: [usize; 3],
+        block: [usize; 3],
+        size: [usize; 3],
+        levels_hu: Vec<f32>,
+    ) -> Self {
+        let between = std::array::from_fn(|axis| {
+            let last = size[axis] - 1;
+            let places = (0..block[axis] * size[axis]).map(|along| {
+                let place = ((along as f32 + 0.5) / block[axis] as f32 - 0.5).max(0.0);
+                let low = floor(place).min(last);
+                (low, (low + 1).min(last), (place - low as f32).min(1.0))
+            });
+            places.collect()
+        });
+        Self {
+            first,
+            size,
+            levels_hu,
+            between,
+        }
+    }
+
     /// Median of the blocks, HU.
     pub fn median(&self) -> Option<f64> {
         let mut levels = self.levels_hu.clone();
@@ -65,32 +90,23 @@ impl LocalLevel {
         levels.get(levels.len() / 2).map(|&level| f64::from(level))
     }
 
-    /// Level at a voxel of the grid, HU.
+    /// Level at a voxel of the grid, HU; beyond the box that of its nearest voxel.
     pub fn at(&self, voxel: [usize; 3]) -> f32 {
-        let mut low = [0; 3];
-        let mut part = [0.0; 3];
-        for axis in 0..3 {
-            let along = voxel[axis].saturating_sub(self.first[axis]) as f32 + 0.5;
-            let place = (along / self.block[axis] as f32 - 0.5).max(0.0);
-            let last = self.size[axis] - 1;
-            low[axis] = floor(place).min(last);
-            part[axis] = (place - low[axis] as f32).min(1.0);
-        }
-        let mut sum = 0.0;
-        for corner in 0..8 {
-            let mut at = low;
-            let mut weight = 1.0;
-            for axis in 0..3 {
-                if corner >> axis & 1 == 1 {
-                    at[axis] = (low[axis] + 1).min(self.size[axis] - 1);
-                    weight *= part[axis];
-                } else {
-                    weight *= 1.0 - part[axis];
-                }
-            }
-            sum += weight * self.levels_hu[(at[2] * self.size[1] + at[1]) * self.size[0] + at[0]];
-        }
-        sum
+        let [(i, next_i, x), (j, next_j, y), (k, next_k, z)] = [0, 1, 2].map(|axis| {
+            let between = &self.between[axis];
+            let along = voxel[axis].saturating_sub(self.first[axis]);
+            between[along.min(between.len() - 1)]
+        });
+        let along_i = |j: usize, k: usize| {
+            let row = &self.levels_hu[(k * self.size[1] + j) * self.size[0]..];
+            row[i] + x * (row[next_i] - row[i])
+        };
+        let along_j = |k: usize| {
+            let (low, high) = (along_i(j, k), along_i(next_j, k));
+            low + y * (high - low)
+        };
+        let (low, high) = (along_j(k), along_j(next_k));
+        low + z * (high - low)
     }
 }
 
@@ -101,6 +117,13 @@ impl LocalLevel {
 )]
 fn floor(place: f32) -> usize {
     place as usize
+}
+
+/// The eight voxels around a place, as far as they have been looked at.
+#[derive(Debug, Clone, Copy)]
+pub struct Around {
+    low: [isize; 3],
+    values: [f64; 8],
 }
 
 impl Field<'_> {
@@ -246,38 +269,50 @@ impl Field<'_> {
         }
     }
 
-    /// Value and gradient per voxel at a place between voxels of the grid, trilinear.
-    pub fn at(&self, place: &Vector3<f64>) -> (f64, Vector3<f64>) {
-        let low = place.map(f64::floor);
-        let part = place - low;
-        let low = [0, 1, 2].map(|axis| index(low[axis]));
-        let mut value = 0.0;
-        let mut gradient = Vector3::zeros();
-        for corner in 0..8_usize {
-            let bit = |axis: usize| corner >> axis & 1;
-            let at = [0, 1, 2].map(|axis| low[axis] + bit(axis).cast_signed());
-            let here = f64::from(self.at_voxel(at));
-            let weight = |axis: usize| {
-                if bit(axis) == 1 {
-                    part[axis]
-                } else {
-                    1.0 - part[axis]
-                }
-            };
-            let [x, y, z] = [weight(0), weight(1), weight(2)];
-            value += x * y * z * here;
-            let slope = |axis: usize| if bit(axis) == 1 { here } else { -here };
-            gradient += Vector3::new(slope(0) * y * z, slope(1) * x * z, slope(2) * x * y);
-        }
-        (value, gradient)
+    /// Value and gradient per voxel at a place between voxels of the grid, trilinear. What was looked at for a place
+    /// before is used where it can be.
+    pub fn at(&self, place: &Vector3<f64>, known: &mut Option<Around>) -> (f64, Vector3<f64>) {
+        let low = [0, 1, 2].map(|axis| index(place[axis]));
+        let around = known
+            .filter(|around| around.low == low)
+            .unwrap_or_else(|| Around {
+                low,
+                values: std::array::from_fn(|corner| {
+                    let at = [0, 1, 2].map(|axis| low[axis] + (corner >> axis & 1).cast_signed());
+                    f64::from(self.at_voxel(at))
+                }),
+            });
+        *known = Some(around);
+        let [x, y, z] = [0, 1, 2].map(|axis| place[axis] - low[axis] as f64);
+        let v = &around.values;
+        // Along x on the four lines, along y on the two faces, along z.
+        let lines = [0, 2, 4, 6].map(|at| (v[at] + x * (v[at + 1] - v[at]), v[at + 1] - v[at]));
+        let faces = [0, 2].map(|at| {
+            let [(low, low_slope), (high, high_slope)] = [lines[at], lines[at + 1]];
+            (
+                low + y * (high - low),
+                low_slope + y * (high_slope - low_slope),
+                high - low,
+            )
+        });
+        let [low, high] = faces;
+        (
+            low.0 + z * (high.0 - low.0),
+            Vector3::new(
+                low.1 + z * (high.1 - low.1),
+                low.2 + z * (high.2 - low.2),
+                high.0 - low.0,
+            ),
+        )
     }
 }
 
-/// Of a voxel, which may lie outside the grid.
+/// The voxel at or before a place, which may lie outside the grid.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "places are within a voxel of the grid"
 )]
 fn index(place: f64) -> isize {
-    place as isize
+    let towards_zero = place as isize;
+    towards_zero - isize::from(place < towards_zero as f64)
 }

@@ -2,7 +2,7 @@
 
 use crate::components::{Components, Connectivity};
 use crate::grid::VoxelGrid;
-use crate::mask::{IndexBox, Mask};
+use crate::mask::{IndexBox, Mask, set_bits};
 use crate::morphology::{dilated, eroded};
 
 use super::field::LocalLevel;
@@ -41,13 +41,21 @@ pub fn local_level(
     let mut values: [Vec<Vec<i16>>; 2] = [0, 1].map(|_| vec![Vec::new(); size.iter().product()]);
     let mut shell = dilated(inside, AROUND_M[1], spacing_m);
     shell.subtract(&dilated(inside, AROUND_M[0], spacing_m));
-    for (side, mask) in [inside, &shell].into_iter().enumerate() {
-        for [i, j, k] in mask.voxels() {
-            let [x, y, z] = bounds.first;
-            let value = hu[grid.offset([i + x, j + y, k + z])];
-            if side == 0 || around(value) {
-                let at = (k / block[2] * size[1] + j / block[1]) * size[0] + i / block[0];
-                values[side][at].push(value);
+    let [_, ny, nz] = inside.size();
+    let rows = (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k)));
+    for (j, k) in rows {
+        let [x, y, z] = bounds.first;
+        let row = &hu[grid.offset([x, j + y, k + z])..];
+        let first = (k / block[2] * size[1] + j / block[1]) * size[0];
+        for [from, to] in inside.runs(j, k) {
+            for at in from / block[0]..=(to - 1) / block[0] {
+                let [from, to] = [from.max(at * block[0]), to.min((at + 1) * block[0])];
+                values[0][first + at].extend_from_slice(&row[from..to]);
+            }
+        }
+        for i in set_bits(shell.row(j, k)) {
+            if around(row[i]) {
+                values[1][first + i / block[0]].push(row[i]);
             }
         }
     }
@@ -62,12 +70,7 @@ pub fn local_level(
         let around = quantile(&mut around, 0.5).unwrap_or(whole[1]);
         0.5 * (inside + around)
     });
-    Some(LocalLevel {
-        first: bounds.first,
-        block,
-        size,
-        levels_hu: levels.collect(),
-    })
+    Some(LocalLevel::new(bounds.first, block, size, levels.collect()))
 }
 
 /// A structure by its levels instead of by the threshold that found it: within a voxel or so of its surface a voxel is

@@ -4,12 +4,14 @@ mod accuracy;
 mod cases;
 mod field;
 mod local_level;
+mod middles;
 mod nets;
 mod simplify;
 
 pub use accuracy::{SurfaceError, surface_error};
 pub use field::{Field, Level, Values};
 pub use local_level::{local_level, refine};
+pub use middles::at_middles;
 pub use nets::surface_net;
 pub use simplify::simplify;
 

@@ -22,6 +22,9 @@ use super::field::Field;
 /// Steps of Newton's method towards the trilinear surface; the first halves of them leave a micrometre.
 const STEPS: usize = 4;
 
+/// Nearer to the surface is on it.
+const NEAR_M: f64 = 1e-6;
+
 /// The surface of a field as a closed manifold in `ct`, triangles counter-clockwise seen from outside.
 ///
 /// `stride` is the number of voxels along each axis of a cell; details between are smoothed over.
@@ -195,15 +198,17 @@ impl<'a> Net<'a> {
         let squares = Vector3::from(self.grid.spacing_m()).map(|step| step * step);
         let mut place = start;
         let mut best = (f64::INFINITY, start);
+        let mut known = None;
         for _ in 0..STEPS {
-            let (value, gradient) = self.field.at(&place);
+            let (value, gradient) = self.field.at(&place, &mut known);
             if value.abs() < best.0 {
                 best = (value.abs(), place);
             }
             // The shortest way in metres, not in voxels.
             let way = gradient.component_div(&squares);
             let rate = gradient.dot(&way);
-            if rate <= 0.0 || value == 0.0 {
+            // The way that is left, squared, is the square of the value over the rate.
+            if rate <= 0.0 || value * value <= NEAR_M * NEAR_M * rate {
                 break;
             }
             place = (place - way * (value / rate)).sup(&low).inf(&high);

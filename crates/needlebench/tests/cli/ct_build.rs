@@ -212,7 +212,7 @@ fn what_is_wrong_is_said_with_what_to_do() {
     let with_ct = |more: &str| format!("{}\n[ct]\n{more}", suite());
     for (text, words) in [
         (with_ct(""), "CT does not tell"),
-        (with_ct("slices = \"thinnest\""), "thick_overlap"),
+        (with_ct("slices = \"thinnest\""), "did you mean `thin`"),
         (with_ct("markers = [\"a\", \"b\"]"), "three"),
         (with_ct("touch_mm = 0"), "touch_mm"),
         (
