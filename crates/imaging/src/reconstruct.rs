@@ -19,8 +19,8 @@ use crate::segment::{
 use crate::spacing::{orthogonal, whole};
 use crate::structures::{Structure, SurfaceTissue, structure_of};
 use crate::surface::{
-    Field, Level, SurfaceError, Values, at_middles, local_level, refine, simplify, surface_error,
-    surface_net,
+    Field, Level, SurfaceError, Values, at_middles, local_level, refine, simplify, sound,
+    surface_error, surface_net,
 };
 use crate::volume::{LabelMap, Volume};
 
@@ -599,7 +599,7 @@ fn make(volume: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Ma
     if fine.triangles.is_empty() {
         return Ok(None);
     }
-    let coarse = simplify(&fine, job.target, MEAN_ERROR_M);
+    let coarse = sound(simplify(&fine, job.target, MEAN_ERROR_M));
     if cancel.load(Ordering::Relaxed) {
         return Err(ImagingError::Interrupted);
     }

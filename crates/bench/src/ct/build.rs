@@ -140,6 +140,7 @@ pub(super) fn see(
     } = *control;
     let mut remarks = read.remarks;
     let resampled = resample(read.volume, options.max_bytes, threads, cancel)?;
+    let is_interpolated = resampled.remark.is_some();
     remarks.extend(resampled.remark);
     let volume = resampled.volume;
     let labels = options.labels.as_ref();
@@ -150,7 +151,10 @@ pub(super) fn see(
         progress.message("markers");
         find_markers(&volume, &known.model, &Options::default(), threads, cancel)
     });
-    let markers = markers.transpose()?;
+    let mut markers = markers.transpose()?;
+    if is_interpolated {
+        markers = markers.map(|found| found.of_interpolated(&volume));
+    }
     remarks.extend(
         markers
             .iter()

@@ -7,6 +7,7 @@ mod local_level;
 mod middles;
 mod nets;
 mod simplify;
+mod sound;
 
 pub use accuracy::{SurfaceError, surface_error};
 pub use field::{Field, Level, Values};
@@ -14,6 +15,7 @@ pub use local_level::{local_level, refine};
 pub use middles::at_middles;
 pub use nets::surface_net;
 pub use simplify::simplify;
+pub use sound::sound;
 
 #[cfg(test)]
 mod tests;

@@ -19,6 +19,8 @@ import numpy as np
 
 # Root mean square of errors in space, all presets but thick.
 RMS_M = 5e-5
+# The same where slices lean and voxels are interpolated.
+RMS_INTERPOLATED_M = 1e-4
 # Probability at which chi-square counts as inconsistent with the covariances.
 UNLIKELY = 1e-4
 
@@ -62,7 +64,8 @@ def look(program, finder, subject, preset, effects):
     chi_squares = np.einsum("ni,nij,nj->n", errors, np.linalg.inv(covariances), errors)
     rms = np.sqrt((errors**2).sum(axis=1).mean())
     told = np.sqrt(np.trace(covariances, axis1=1, axis2=2).mean())
-    if preset != "thick" and rms > RMS_M:
+    limit = RMS_INTERPOLATED_M if "--tilt" in effects else RMS_M
+    if preset != "thick" and rms > limit:
         wrong.append(f"{1e3 * rms:.3f} mm rms")
     low, high = limits(3 * len(errors))
     if chi_squares.sum() > high:

@@ -48,11 +48,15 @@ fn main() -> Result<(), Failure> {
     let cancel = AtomicBool::new(false);
     let options = ReadOptions::default();
     let read = read_volume(&folder.join("ct.nii.gz"), &options, 1, &cancel)?;
-    let volume = resample(read.volume, options.max_bytes, 1, &cancel)?.volume;
+    let resampled = resample(read.volume, options.max_bytes, 1, &cancel)?;
+    let volume = resampled.volume;
     let diameter_m = truth.markers.first().ok_or("no markers")?.sphere_diameter_m;
     let model = MarkerModel::phantom_sphere(diameter_m);
     let start = Instant::now();
-    let found = find_markers(&volume, &model, &Options::default(), 1, &cancel)?;
+    let mut found = find_markers(&volume, &model, &Options::default(), 1, &cancel)?;
+    if resampled.remark.is_some() {
+        found = found.of_interpolated(&volume);
+    }
     let phantom_from_ct = Matrix4::from_fn(|row, column| truth.ct_from_phantom[row][column])
         .try_inverse()
         .ok_or("ct_from_phantom")?;

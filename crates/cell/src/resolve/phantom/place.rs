@@ -196,7 +196,7 @@ impl PhantomSection {
         let rounded = |value: f64, per_unit: f64| (value * per_unit).round() / per_unit + 0.0;
         let degrees = |angle: f64| rounded(angle.to_degrees(), 1e9);
         self.head_yaw_deg = degrees(head.y.atan2(head.x));
-        self.head_up_deg = degrees(head.z.clamp(-1.0, 1.0).asin());
+        self.head_up_deg = degrees(head.z.atan2(head.x.hypot(head.y)));
         self.body_roll_deg = 0.0;
         let rest = orientation(self).inverse() * world_from_phantom.rotation;
         self.body_roll_deg = degrees(rest.scaled_axis().z);

@@ -321,16 +321,13 @@ struct OwnRoom {
 }
 
 fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, Stop> {
-    let (open, folder) = match &arguments.room {
-        Some(path) => {
-            let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-            (load_open_scenario(path, overrides)?, folder)
-        }
-        None => {
-            let text = needlebench_bench::ct::USUAL_ROOM;
-            let open = resolve_open_scenario("room.toml", text, Path::new(""), overrides)?;
-            (open, PathBuf::new())
-        }
+    let (open, folder) = if let Some(path) = &arguments.room {
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        (load_open_scenario(path, overrides)?, folder)
+    } else {
+        let text = needlebench_bench::ct::USUAL_ROOM;
+        let open = resolve_open_scenario("room.toml", text, Path::new(""), overrides)?;
+        (open, PathBuf::new())
     };
     let resolved = open.resolved;
     let mut scenario = resolved.scenario.clone();
@@ -349,6 +346,16 @@ fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, St
     })
 }
 
+/// Names of surfaces that are always looked for.
+const TAKEN: [&str; 6] = [
+    "skin",
+    "bone",
+    "trachea",
+    "lung_left",
+    "lung_right",
+    "contrast_vessels",
+];
+
 fn lesions(arguments: &BuildArguments, read: &ReadVolume) -> Result<Vec<LesionSeed>, Stop> {
     let file = arguments.path.display().to_string();
     let by_place = arguments.lesions.iter().map(|place| LesionSeed {
@@ -364,14 +371,6 @@ fn lesions(arguments: &BuildArguments, read: &ReadVolume) -> Result<Vec<LesionSe
     for seed in &all {
         *known.entry(&seed.name).or_default() += 1;
     }
-    const TAKEN: [&str; 6] = [
-        "skin",
-        "bone",
-        "trachea",
-        "lung_left",
-        "lung_right",
-        "contrast_vessels",
-    ];
     if let Some((name, _)) = known
         .iter()
         .find(|(name, count)| **count > 1 || TAKEN.contains(name))
