@@ -65,7 +65,7 @@ pub use input::{
 };
 pub use limit::{Limit, digits_apart};
 pub use log_columns::{LogColumns, MappedColumns};
-pub use marker_list::{ListedMarker, MarkerFrame, MarkerList};
+pub use marker_list::{ListedMarker, MarkerFrame, MarkerList, marker_list_schema};
 pub use model::{
     AppliedCalibration, ArmInUse, ArmReport, BodyKind, BodyPair, Cell, ClearanceClass,
     CollisionBody, Frame, LeftOut, Link, LinkMember, Needle, NeedleCorridor, PairRule, Robot, Tool,

@@ -74,6 +74,11 @@ pub struct ListedMarker {
     pub sd_mm: Option<f64>,
 }
 
+/// The JSON schema (draft-07) of such lists, for editors.
+pub fn marker_list_schema() -> serde_json::Value {
+    FileSchema::of::<MarkerList>().published()
+}
+
 fn yes() -> bool {
     true
 }
