@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/` and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 16] = [
+const LAYERS: [(&str, &[&str]); 17] = [
     ("kinematics", &[]),
     ("geometry", &["kinematics"]),
     ("cell", &["geometry", "kinematics"]),
@@ -23,6 +23,7 @@ const LAYERS: [(&str, &[&str]); 16] = [
     ("uncertainty", &["engine", "cell", "kinematics"]),
     ("study", &["cell", "kinematics"]),
     ("recorded", &["cell", "kinematics"]),
+    ("imaging", &["geometry", "kinematics"]),
     (
         "evaluation",
         &[
@@ -37,6 +38,7 @@ const LAYERS: [(&str, &[&str]); 16] = [
     (
         "bench",
         &[
+            "imaging",
             "recorded",
             "study",
             "evaluation",
@@ -45,6 +47,7 @@ const LAYERS: [(&str, &[&str]); 16] = [
             "planning",
             "clearance",
             "cell",
+            "geometry",
             "kinematics",
         ],
     ),
@@ -54,6 +57,7 @@ const LAYERS: [(&str, &[&str]); 16] = [
             "live",
             "render",
             "bench",
+            "imaging",
             "recorded",
             "study",
             "evaluation",
@@ -86,6 +90,7 @@ const LAYERS: [(&str, &[&str]); 16] = [
             "paper",
             "report",
             "bench",
+            "imaging",
             "recorded",
             "study",
             "evaluation",
@@ -99,7 +104,7 @@ const LAYERS: [(&str, &[&str]); 16] = [
 ];
 
 /// Dependencies that one crate alone has, hidden behind its own types.
-const OWNERS: [(&str, &str); 15] = [
+const OWNERS: [(&str, &str); 16] = [
     ("rapier3d-f64", "engine"),
     ("parry3d-f64", "geometry"),
     ("toml", "cell"),
@@ -111,6 +116,7 @@ const OWNERS: [(&str, &str); 15] = [
     ("zstd", "study"),
     ("crc32fast", "study"),
     ("mcap", "recorded"),
+    ("dicom-transfer-syntax-registry", "imaging"),
     ("png", "render"),
     ("quick-junit", "report"),
     ("indicatif", "needlebench"),

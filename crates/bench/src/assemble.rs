@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Point3;
-use needlebench_cell::imperfections::{ArmClass, BreathState};
+use needlebench_cell::imperfections::{ArmClass, BreathState, Imperfections};
 use needlebench_cell::{ArmInUse, ClearanceClass, Expected, Goal, ResolvedScenario, enclosures};
 use needlebench_engine::{EngineIdentity, Recording, pieces_in_words};
 use needlebench_evaluation::metric::measured;
@@ -24,6 +24,7 @@ use needlebench_planning::{
     ConfigurationPlan, GoalPlan, Margin, Planner, PostureMargins, Rejection, Rule,
     crossed_fissures, judge_route, needle_route,
 };
+use needlebench_uncertainty::Source;
 
 use crate::adjudication::Adjudicated;
 use crate::budgets::Budgets;
@@ -124,6 +125,8 @@ pub(crate) fn assumed(resolved: &ResolvedScenario) -> BTreeMap<String, String> {
 /// The notes of a scenario, and where engines ran of what they collide with.
 pub(crate) fn notes(resolved: &ResolvedScenario, engines: &[&str]) -> Vec<String> {
     let mut notes = resolved.notes.clone();
+    let expected = resolved.expected.as_ref();
+    notes.extend(expected.and_then(|expected| bases_in_words(&expected.imperfections)));
     if !engines.is_empty() {
         notes.extend(pieces_in_words(&resolved.cell));
     }
@@ -146,13 +149,55 @@ fn expected_report(expected: &Expected) -> ExpectedReport {
                 "the controller knows a calibration measured in place with the tool on: what is left is \
                  what that leaves"
             }
-            None => "as the scenario's [imperfections] say",
+            None => own_in_words(&expected.imperfections),
         },
         breath: match expected.breath {
             BreathState::Hold => "hold",
             BreathState::Free => "free",
         },
     }
+}
+
+/// Of which arm and patient it is, where the scenario says it: what was measured is said.
+fn own_in_words(imperfections: &Imperfections) -> &'static str {
+    let [markers, target] = [Source::Registration, Source::Imaging]
+        .map(|source| source.is_measured_in(imperfections) == Some(true));
+    match (markers, target) {
+        (false, false) => "as the scenario's [imperfections] say",
+        (true, false) => "as the scenario's [imperfections] say, marker localisation as measured",
+        (false, true) => "as the scenario's [imperfections] say, target localisation as measured",
+        (true, true) => {
+            "as the scenario's [imperfections] say, localisation of markers and target as measured"
+        }
+    }
+}
+
+/// Which sources of the error budget were measured, and which are assumed; none where none was measured.
+fn bases_in_words(imperfections: &Imperfections) -> Option<String> {
+    let there = Source::ALL
+        .into_iter()
+        .filter(|source| source.is_in(imperfections));
+    let (measured, assumed): (Vec<Source>, Vec<Source>) =
+        there.partition(|source| source.is_measured_in(imperfections) == Some(true));
+    if measured.is_empty() {
+        return None;
+    }
+    let listed = |sources: &[Source]| {
+        let names: Vec<&str> = sources.iter().map(|source| source.name()).collect();
+        names.join(", ")
+    };
+    let others = if assumed.is_empty() {
+        String::new()
+    } else {
+        format!(
+            "; as the scenario and its defaults assume: {}",
+            listed(&assumed)
+        )
+    };
+    let measured = listed(&measured);
+    Some(format!(
+        "error budget by measured covariances: {measured}{others}"
+    ))
 }
 
 /// How the planned needle of a goal keeps away from what it must not meet.
@@ -187,6 +232,7 @@ pub(crate) fn goal_report(
         lesion: goal.lesion.clone(),
         entry_m: goal.entry_m.map(|point| point.coords.into()),
         target_m: goal.target_m.coords.into(),
+        true_target_m: goal.true_target_m.map(|point| point.coords.into()),
         axis: goal.axis.into_inner().into(),
         insertion_length_m: goal.insertion_length_m,
         standoff_m: goal.standoff_m,

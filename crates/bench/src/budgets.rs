@@ -56,6 +56,7 @@ pub(crate) fn analytic_budget(moments: [Moments; 2]) -> ErrorBudget {
         sources: Vec::new(),
         total: SourceBudget {
             source: None,
+            basis: None,
             at_skin,
             at_target,
         },

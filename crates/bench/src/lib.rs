@@ -14,6 +14,7 @@ pub mod atlas;
 mod budgets;
 mod control;
 pub mod credibility;
+pub mod ct;
 mod events;
 pub mod excitation;
 mod iso9283;

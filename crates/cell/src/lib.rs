@@ -19,9 +19,9 @@
 //! | [`requirements`], [`judgement`] | what criteria stand for; what people state about results |
 //! | [`phantom`], [`fixtures`] | chests and furniture as solids |
 //! | `resolve` with [`imperfections`], [`people`], [`iso9283`], [`excitation`] | from sections to a [`Cell`] with goals in the world |
-//! | `excitation_text`, `scenario_edit` | the text of a scenario, given a run that excites every joint, or changed key by key |
+//! | `excitation_text`, `scenario_edit`, `scenario_text` | the text of a scenario: given a run that excites every joint, changed key by key, or written anew |
 //! | [`family`], [`study`], `thresholds` | many scenarios from one, and what is asked of them |
-//! | `log_columns` | which column of a recorded log is what |
+//! | `log_columns`, `marker_list` | which column of a recorded log is what; where markers are |
 
 pub mod arm;
 mod engine_name;
@@ -35,6 +35,7 @@ mod input;
 pub mod judgement;
 mod limit;
 mod log_columns;
+mod marker_list;
 mod model;
 pub mod phantom;
 mod printable;
@@ -44,6 +45,7 @@ mod resolve;
 mod robot;
 pub mod scenario;
 mod scenario_edit;
+mod scenario_text;
 mod schema;
 pub mod study;
 mod thresholds;
@@ -63,6 +65,7 @@ pub use input::{
 };
 pub use limit::{Limit, digits_apart};
 pub use log_columns::{LogColumns, MappedColumns};
+pub use marker_list::{ListedMarker, MarkerFrame, MarkerList, marker_list_schema};
 pub use model::{
     AppliedCalibration, ArmInUse, ArmReport, BodyKind, BodyPair, Cell, ClearanceClass,
     CollisionBody, Frame, LeftOut, Link, LinkMember, Needle, NeedleCorridor, PairRule, Robot, Tool,
@@ -73,7 +76,7 @@ pub use resolve::{
     ChosenEntry, EntryChooser, Expectation, Expected, FOOT_M, Goal, GoalPlacer, GravitySettings,
     OpenScenario, Overrides, PlacedPhantom, RIGID_M, ResolvedScenario, Roll, ServoSettings,
     direction, excitation, imperfections, iso9283, load_open_scenario, load_robot, load_scenario,
-    people, pose_of, resolve_open_scenario, resolve_scenario,
+    name_from_file, people, pose_of, resolve_open_scenario, resolve_scenario,
 };
 pub use robot::{
     Calibration, DisabledPair, LinkEnclosure, MOVING_LINK_LABELS, MissingInertia, OriginDeviation,
@@ -81,6 +84,7 @@ pub use robot::{
 };
 pub use scenario::{REJECTION_RULES, envelope, ranking};
 pub use scenario_edit::ScenarioEdit;
+pub use scenario_text::{relative, scenario_text};
 pub use study::criteria as study_criteria;
 pub use thresholds::ThresholdsFile;
 pub use words::{pair_in_words, part_in_words, reason_in_words, rule_in_words};

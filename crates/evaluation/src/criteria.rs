@@ -56,11 +56,15 @@ fn of_engines<'a>(
                 let Source::Engines(read) = metric.source else {
                     return None;
                 };
+                let value = read(report);
+                if value.is_none() && criterion.missing == Missing::Skips {
+                    return None;
+                }
                 Some(Checked {
                     metric,
                     criterion,
                     engine: Some((name.as_str(), report)),
-                    value: read(report),
+                    value,
                     limit,
                 })
             })
@@ -146,6 +150,9 @@ pub fn check_configuration(
     for name in &absent {
         let of_engine = limits(criteria, mode)
             .filter(|(metric, ..)| matches!(metric.source, Source::Engines(_)))
+            .filter(|(metric, criterion, _)| {
+                criterion.missing != Missing::Skips || is_known(metric.family, configuration)
+            })
             .map(|(_, criterion, _)| criterion.key);
         // Even without a limit on what it measures it was to show that the motion can be made.
         let keys: Vec<&str> = of_engine.collect();
@@ -191,6 +198,13 @@ pub fn check_configuration(
     judged
 }
 
+/// Whether a configuration has any of a family's metrics.
+fn is_known(family: &str, configuration: &ConfigurationReport) -> bool {
+    metrics()
+        .filter(|metric| metric.family == family)
+        .any(|metric| metric.read(configuration).is_some())
+}
+
 /// Keys of criteria that are skipped where nothing is measured, but could be judged in another mode: there
 /// is something to measure.
 fn planned_alone(
@@ -200,13 +214,10 @@ fn planned_alone(
 ) -> Vec<&'static str> {
     let mut keys: Vec<&'static str> = limits(criteria, mode)
         .filter(|(metric, criterion, _)| {
-            let is_known = |other: &&Metric| other.read(configuration).is_some();
             matches!(metric.source, Source::Configuration(_))
                 && criterion.missing == Missing::Skips
                 && metric.read(configuration).is_none()
-                && metrics()
-                    .filter(|other| other.family == metric.family)
-                    .any(|other| is_known(&other))
+                && is_known(metric.family, configuration)
         })
         .map(|(_, criterion, _)| criterion.key)
         .collect();

@@ -34,6 +34,12 @@ pub struct NeedleMeasurement {
     pub axial_angle_error_rad: Option<f64>,
     /// The same in the sagittal plane (posterior and superior).
     pub sagittal_angle_error_rad: Option<f64>,
+    /// `|p_tip - t'|`, m, with `t'` where the lesion really is; none where that is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub true_target_error_m: Option<f64>,
+    /// `|(I - v v^T)(t' - g)|`, m: distance of the true target from the actual axis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub true_target_lateral_m: Option<f64>,
 }
 
 /// Shortest shadow of the planned needle's direction on a plane in which an angle is still measured: that of
@@ -110,5 +116,7 @@ pub fn measure_guide(
         entry_lateral_error_m: goal.entry_m.map(|entry| off_axis_m(entry - exit_point)),
         axial_angle_error_rad: in_plane([0, 1]),
         sagittal_angle_error_rad: in_plane([1, 2]),
+        true_target_error_m: goal.true_target_m.map(|at| (tip - at).norm()),
+        true_target_lateral_m: goal.true_target_m.map(|at| off_axis_m(at - exit_point)),
     }
 }

@@ -119,6 +119,9 @@ pub struct GoalReport {
     pub entry_m: Option<[f64; 3]>,
     /// Target in the world.
     pub target_m: [f64; 3],
+    /// Where the lesion really is, in the world before breathing and tissue move it; none where that is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub true_target_m: Option<[f64; 3]>,
     /// Direction of insertion in the world.
     pub axis: [f64; 3],
     /// From guide exit to needle tip.

@@ -8,6 +8,7 @@
 //! `tool0` and the controller shows at a zero TCP.
 
 mod chain;
+pub mod chi_square;
 mod dynamics;
 mod forward_dynamics;
 mod geometry;

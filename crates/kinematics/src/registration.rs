@@ -16,6 +16,12 @@ use nalgebra::{Matrix3, Matrix4, Matrix6, Point3, Quaternion, UnitQuaternion, Ve
 
 use crate::Pose;
 
+mod weighted;
+
+pub use weighted::{
+    Localised, Residual, WeightedFit, leave_one_out, prediction, register_weighted,
+};
+
 /// Fewest points that determine a rotation.
 pub const FEWEST_FIDUCIALS: usize = 3;
 
@@ -84,6 +90,21 @@ pub enum RegistrationError {
         /// The error, m.
         fle_rms_m: f64,
     },
+    /// A covariance that is none, or that says that a pair of points has no error.
+    #[error(
+        "the covariances of fiducial {index} have to be finite, symmetric and not negative, and together \
+         positive in every direction"
+    )]
+    BadCovariance {
+        /// Which pair, from 0.
+        index: usize,
+    },
+    /// Covariances so wide that a shift or a turn is not determined.
+    #[error("the covariances are so wide in one direction that they leave the transform open")]
+    Undetermined,
+    /// A weighted fit that goes on moving.
+    #[error("the weighted fit does not settle; the points are probably not in the same order")]
+    NotSettled,
 }
 
 /// The rigid transform `to_from_from` that brings `from` nearest to `to`, in the sense of least
@@ -240,11 +261,17 @@ pub fn tre_covariance(
     fle_rms_m: f64,
 ) -> Result<Matrix3<f64>, RegistrationError> {
     let (centroid, covariance) = transform_covariance(fiducials_m, fle_rms_m)?;
-    let lever = (at_m - centroid).cross_matrix();
+    Ok(displacement_covariance(&covariance, &(at_m - centroid)))
+}
+
+/// Covariance, m^2, of the displacement `t + w x r` of a point at `r` from where `(t, w)` is counted.
+pub fn displacement_covariance(covariance: &Matrix6<f64>, lever_m: &Vector3<f64>) -> Matrix3<f64> {
+    // A small rotation w moves the point by w x r = -[r] w.
+    let lever = lever_m.cross_matrix();
     let translation = covariance.fixed_view::<3, 3>(0, 0);
     let rotation = covariance.fixed_view::<3, 3>(3, 3);
-    // A small rotation w moves the point by w x r = -[r] w.
-    Ok(translation + lever * rotation * lever.transpose())
+    let crossed = lever * covariance.fixed_view::<3, 3>(3, 0);
+    translation + lever * rotation * lever.transpose() - crossed - crossed.transpose()
 }
 
 /// Centroid of the fiducials and covariance of the fitted transform's small error there.

@@ -7,9 +7,9 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 
 use crate::clock::elapsed;
 use crate::command::{
-    self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, FkArguments,
-    ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, MergeArguments, PairsArguments,
-    PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
+    self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, CtArguments,
+    FkArguments, ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, MergeArguments,
+    PairsArguments, PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
     ReportArguments, RunArguments, STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
     SuggestArguments,
 };
@@ -73,6 +73,9 @@ enum Command {
         after_long_help = command::compare_help()
     )]
     Compare(Box<CompareArguments>),
+    /// CT volumes: what one is, and synthetic ones of phantoms.
+    #[command(after_help = "Example: needlebench ct info scan.nii.gz")]
+    Ct(CtArguments),
     /// Many cases of one scenario: a table of results, statistics, and a page to look at them.
     #[command(
         after_help = "Example: needlebench study scenarios/studies/layouts.toml",
@@ -171,6 +174,7 @@ fn run() -> ExitCode {
         Command::Clearance(arguments) => command::clearance(&arguments),
         Command::Atlas(arguments) => command::atlas(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
+        Command::Ct(arguments) => command::ct(&arguments),
         Command::Study(arguments) => command::study(&arguments),
         Command::Merge(arguments) => command::merge(&arguments),
         Command::Iso9283(arguments) => command::iso9283(&arguments),

@@ -155,15 +155,49 @@ pub struct PointBudget {
     pub bias_difference_m: Option<f64>,
 }
 
+/// What the size of a source rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Basis {
+    /// A covariance that was measured.
+    Measured,
+    /// What the scenario's block assumes.
+    Assumed,
+}
+
 /// Budget of one source, or of all.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SourceBudget {
     /// The source; none for all together.
     pub source: Option<Source>,
+    /// Of the localisation of markers and target, in a budget of which either was measured: what it rests on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub basis: Option<Basis>,
     /// Needle where it should enter the skin (at the guide's exit without a phantom).
     pub at_skin: PointBudget,
     /// Needle's tip at the end of the insertion.
     pub at_target: PointBudget,
+}
+
+impl SourceBudget {
+    /// What people call the source: its name, and of localisations in a budget of which one was measured what they
+    /// rest on.
+    pub fn in_words(&self) -> &'static str {
+        let markers = match self.source {
+            None => return "all",
+            Some(Source::Registration) => true,
+            Some(Source::Imaging) => false,
+            Some(other) => return other.name(),
+        };
+        match (self.basis, markers) {
+            (Some(Basis::Measured), true) => "marker localisation, measured",
+            (Some(Basis::Assumed), true) => "marker localisation, assumed",
+            (Some(Basis::Measured), false) => "target localisation, measured",
+            (Some(Basis::Assumed), false) => "target localisation, assumed",
+            (None, true) => Source::Registration.name(),
+            (None, false) => Source::Imaging.name(),
+        }
+    }
 }
 
 /// How many draws a budget takes.
@@ -192,6 +226,18 @@ pub struct ErrorBudget {
     /// At the target of a patient who breathes freely, where the breath is held in the rest of the
     /// budget. By Jacobians; none in a budget of totals.
     pub breathing_freely: Option<Moments>,
+}
+
+impl ErrorBudget {
+    /// What people call the source with the largest mean square at the target.
+    pub fn dominant_in_words(&self) -> Option<&'static str> {
+        let dominant = self.dominant?;
+        let own = self
+            .sources
+            .iter()
+            .find(|each| each.source == Some(dominant));
+        Some(own.map_or(dominant.name(), SourceBudget::in_words))
+    }
 }
 
 /// The budget of a configuration; `seed` is that of its draws.
@@ -284,9 +330,20 @@ fn source_budget(
     };
     Ok(SourceBudget {
         source,
+        basis: source.and_then(|source| basis(source, case.imperfections)),
         at_skin: point(0),
         at_target: point(1),
     })
+}
+
+/// What a localisation rests on, where that is not the same for all.
+fn basis(source: Source, all: &Imperfections) -> Option<Basis> {
+    let is_measured = |source: Source| source.is_measured_in(all);
+    let own = is_measured(source)?;
+    let any = Source::ALL.into_iter().filter_map(is_measured);
+    let mut any = any.filter(|measured| *measured);
+    any.next()?;
+    Some(if own { Basis::Measured } else { Basis::Assumed })
 }
 
 /// The same patient with no breath held; none who does not hold it, or does not breathe.

@@ -13,6 +13,7 @@
 
 pub mod budget;
 mod distribution;
+mod fit;
 mod jitter;
 mod settle;
 mod truth;

@@ -4,16 +4,17 @@ use std::ops::Range;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
 use needlebench_cell::imperfections::{
-    self, ArmPopulation, Breathing, GearTwist, Imperfections, NeedleBending,
+    self, ArmPopulation, Breathing, GearTwist, Imperfections, Markers, NeedleBending,
 };
 use needlebench_cell::{BodyKind, Cell, Goal, PlacedPhantom};
 use needlebench_engine::{Actuation, CommandTiming, Encoder, JointFriction};
 use needlebench_kinematics::random::SplitMix64;
-use needlebench_kinematics::registration::{RegistrationError, register};
+use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::{Body, Chain, Dynamics, JOINT_COUNT, Joints, Pose};
 use serde::Serialize;
 
 use crate::distribution::{Variable, hypercube};
+use crate::fit::{fitted, seen_off_m};
 
 /// Least factor on a compliance or a friction: a draw beyond it would turn its sign.
 const LEAST_FACTOR: f64 = 0.01;
@@ -96,6 +97,16 @@ impl Source {
         }
     }
 
+    /// Whether its size was measured, and not assumed, where it is one that can be measured as a covariance: how well
+    /// markers and target are localised.
+    pub fn is_measured_in(self, all: &Imperfections) -> Option<bool> {
+        match self {
+            Self::Registration => all.registration.as_ref().map(Markers::are_measured),
+            Self::Imaging => all.imaging.map(|seen| seen.is_measured),
+            _ => None,
+        }
+    }
+
     /// Whether the imperfections have it.
     pub fn is_in(self, all: &Imperfections) -> bool {
         match self {
@@ -108,7 +119,7 @@ impl Source {
             Self::HandEye => all.hand_eye.is_some(),
             Self::Registration => all.registration.is_some(),
             Self::SkinMarkers => all.skin_markers.is_some(),
-            Self::Imaging => all.imaging_m.is_some(),
+            Self::Imaging => all.imaging.is_some(),
             Self::Needle => all.needle.is_some(),
             Self::Indentation => all.indentation.is_some(),
             Self::Breathing => all.breathing.is_some(),
@@ -141,7 +152,7 @@ pub(crate) fn only(all: &Imperfections, wanted: impl Fn(Source) -> bool) -> Impe
             .skin_markers
             .clone()
             .filter(|_| wanted(Source::SkinMarkers)),
-        imaging_m: all.imaging_m.filter(|_| wanted(Source::Imaging)),
+        imaging: all.imaging.filter(|_| wanted(Source::Imaging)),
         needle: all.needle.filter(|_| wanted(Source::Needle)),
         indentation: all.indentation.filter(|_| wanted(Source::Indentation)),
         breathing: all.breathing.filter(|_| wanted(Source::Breathing)),
@@ -186,12 +197,15 @@ impl Layout {
                     Source::HandEye => add(6, Variable::Normal),
                     Source::Registration => {
                         let markers = imperfections.registration.as_ref();
-                        add(markers.map_or(0, |(at, _)| 3 * at.len()), Variable::Normal);
+                        add(
+                            markers.map_or(0, |each| 3 * each.places_m.len()),
+                            Variable::Normal,
+                        );
                     }
                     Source::SkinMarkers => {
                         let markers = imperfections.skin_markers.as_ref();
                         add(
-                            markers.map_or(0, |each| 3 * each.markers_m.len()),
+                            markers.map_or(0, |each| 3 * each.markers.places_m.len()),
                             Variable::Normal,
                         );
                         add(1, Variable::Normal);
@@ -370,12 +384,10 @@ impl Truth {
                 (moved, allowance_m)
             },
         );
-        let unseen_m = imperfections
-            .imaging_m
-            .map_or_else(Vector3::zeros, |spread_m| {
-                let values = Vector3::from_column_slice(of(Source::Imaging));
-                shift.rotation * (place.rotation * spread_m.component_mul(&values))
-            });
+        let unseen_m = imperfections.imaging.map_or_else(Vector3::zeros, |seen| {
+            let values = Vector3::from_column_slice(of(Source::Imaging));
+            shift.rotation * (place.rotation * (seen.root_m * values))
+        });
         let side_force = imperfections.needle.map(|needle| {
             let values = of(Source::Needle);
             // Equal and independent along both axes: any direction, and this root mean square.
@@ -457,28 +469,44 @@ impl Truth {
     ///
     /// What bends the needle off its line counts as a motion of skin and target the other way.
     pub fn wanted(&self, goal: &Goal, planned: &[Point3<f64>; 2]) -> [Point3<f64>; 2] {
+        let unseen_m = [Vector3::zeros(), self.unseen_m];
+        std::array::from_fn(|at| {
+            self.at_insertion(goal, at, self.shift * planned[at], unseen_m[at])
+        })
+    }
+
+    /// Where skin (0) or target (1) is when the needle is in, as the straight needle sees it, world: from where it
+    /// lies before, and how far that is beside where it is seen.
+    fn at_insertion(
+        &self,
+        goal: &Goal,
+        at: usize,
+        before: Point3<f64>,
+        unseen_m: Vector3<f64>,
+    ) -> Point3<f64> {
         let length_m = goal.insertion_length_m;
         let depths_m = [goal.standoff_m.unwrap_or(0.0), length_m];
-        std::array::from_fn(|at| {
-            let bent_m = self
-                .side_force
-                .map_or_else(Vector3::zeros, |(force_n, needle)| {
-                    let across = force_n * needle.compliance_m_per_n(depths_m[at], length_m);
-                    goal.world_from_guide_exit.rotation * Vector3::new(across.x, across.y, 0.0)
-                });
-            let pushed_m = goal.axis.into_inner() * self.indented_m[at];
-            let unseen_m = [Vector3::zeros(), self.unseen_m][at];
-            self.shift * planned[at] + self.breath_m[at] + unseen_m + pushed_m - bent_m
-        })
+        let bent_m = self
+            .side_force
+            .map_or_else(Vector3::zeros, |(force_n, needle)| {
+                let across = force_n * needle.compliance_m_per_n(depths_m[at], length_m);
+                goal.world_from_guide_exit.rotation * Vector3::new(across.x, across.y, 0.0)
+            });
+        let pushed_m = goal.axis.into_inner() * self.indented_m[at];
+        before + self.breath_m[at] + unseen_m + pushed_m - bent_m
     }
 
     /// The goal with its target and entry point where they really are, as [`Truth::wanted`] has them; the
     /// plan's guide pose stays.
+    ///
+    /// A true target is where it is, whatever registration and image say of it: breathing and tissue alone move it.
     pub fn goal(&self, planned: &Goal) -> Goal {
         let entry_m = planned.entry_m.unwrap_or(planned.target_m);
         let [entry_m, target_m] = self.wanted(planned, &[entry_m, planned.target_m]);
+        let known = planned.true_target_m;
         Goal {
             target_m,
+            true_target_m: known.map(|at| self.at_insertion(planned, 1, at, Vector3::zeros())),
             entry_m: planned.entry_m.map(|_| entry_m),
             ..planned.clone()
         }
@@ -557,31 +585,27 @@ fn registered(
 ) -> Result<Pose, RegistrationError> {
     let registration = imperfections.registration.as_ref();
     let skin = imperfections.skin_markers.as_ref();
-    let Some(markers) = registration
-        .map(|(markers, _)| markers)
-        .or(skin.map(|skin| &skin.markers_m))
-    else {
+    let Some(markers) = registration.or(skin.map(|skin| &skin.markers)) else {
         return Ok(Pose::identity());
     };
-    let mut places = markers.clone();
-    let mut scatter = |values: &[f64], spread_m: f64| {
-        for (place, off) in places.iter_mut().zip(values.chunks_exact(3)) {
-            *place += Vector3::new(off[0], off[1], off[2]) * spread_m;
+    let mut places_m = markers.places_m.clone();
+    let mut moved_by = |off_m: Vec<Vector3<f64>>| {
+        for (place, off_m) in places_m.iter_mut().zip(off_m) {
+            *place += off_m;
         }
     };
-    if let Some((_, fle_rms_m)) = registration {
-        scatter(seen, fle_rms_m / 3.0_f64.sqrt());
+    if let Some(markers) = registration {
+        moved_by(seen_off_m(markers, seen));
     }
     if let Some(skin) = skin {
-        let (shifts, breathing) = moved.split_at(3 * skin.markers_m.len());
-        scatter(shifts, skin.shift_m);
+        let (shifts, breathing) = moved.split_at(3 * skin.markers.places_m.len());
+        let shifts = shifts.chunks_exact(3).map(Vector3::from_column_slice);
+        moved_by(shifts.map(|each| each * skin.shift_m).collect());
         let risen = skin.breathing.skin_m * breath(phase(&skin.breathing, breathing));
-        for place in &mut places {
-            *place += risen;
-        }
+        moved_by(vec![risen; markers.places_m.len()]);
     }
     // The plan believes in a phantom fitted to what was seen of markers that are really elsewhere.
-    Ok(register(markers, &places)?.inverse())
+    Ok(fitted(markers, &places_m)?.inverse())
 }
 
 /// Uniform point of the unit disc from two uniform numbers in (-1, 1): concentric squares to

@@ -24,6 +24,8 @@ from model import (
 # Fixed-point steps of the balance of torques: each contracts by what a radian changes the weight's torque by, over
 # the stiffness: 1e-2.
 BALANCE_STEPS = 4
+# Steps of a weighted fit from the unweighted one: each leaves a hundredth, since turns are of some milliradians.
+FIT_STEPS = 6
 # Halvings of the way that a joint springs back: a way of a milliradian to rounding.
 HALVINGS = 50
 # Postures that a calibration is made from, and what a radian of the flange counts beside a metre.
@@ -78,6 +80,7 @@ class Truth:
         default_factory=lambda: np.zeros((1, 6, 6))
     )  # of joint origins
     markers: Array | None = None
+    weights: Array | None = None  # inverse of each marker's covariance; none: all alike
     seen_off: Array | float = 0.0  # of each marker, phantom frame
     base_turn: Array = field(default_factory=lambda: np.eye(3)[None])
     base_place: Array = field(default_factory=lambda: np.zeros((1, 3)))
@@ -262,11 +265,31 @@ def guide(case: Case, block: dict, random: np.random.Generator, truth: Truth) ->
     truth.in_guide = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
+def covariances(given: list) -> Array:
+    """Symmetric matrices, m^2, of `[xx, yy, zz, xy, xz, yz]`, mm^2."""
+    order = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
+    return np.array(given)[..., order] * 1e-6
+
+
+def place_markers(block: dict, truth: Truth) -> None:
+    """Where the markers are, and how much each counts in the fit."""
+    truth.markers = np.array(block["markers_mm"]) * 1e-3
+    if "covariance_mm2" in block:
+        truth.weights = np.linalg.inv(covariances(block["covariance_mm2"]))
+
+
 def registration(
     case: Case, block: dict, random: np.random.Generator, truth: Truth
 ) -> None:
-    """Markers seen with an error."""
-    truth.markers = np.array(block["markers_mm"]) * 1e-3
+    """Markers seen with an error: the same for all, or as was measured of each."""
+    place_markers(block, truth)
+    if "covariance_mm2" in block:
+        each = [
+            random.multivariate_normal(np.zeros(3), covariance, truth.count, method="eigh")
+            for covariance in covariances(block["covariance_mm2"])
+        ]
+        truth.seen_off = truth.seen_off + np.stack(each, axis=1)
+        return
     sigma = block["localisation_error_mm"] * 1e-3 / np.sqrt(3.0)
     truth.seen_off = truth.seen_off + sigma * random.standard_normal(
         (truth.count, *truth.markers.shape)
@@ -277,7 +300,7 @@ def skin_markers(
     case: Case, block: dict, random: np.random.Generator, truth: Truth
 ) -> None:
     """Markers that shift on the skin, and rise with it at a phase of their own."""
-    truth.markers = np.array(defaults("RegistrationBlock", case.blocks["registration"])["markers_mm"]) * 1e-3
+    place_markers(defaults("RegistrationBlock", case.blocks["registration"]), truth)
     shift = block["shift_mm"] * 1e-3 * random.standard_normal((truth.count, *truth.markers.shape))
     breath = defaults("BreathingBlock", case.blocks["breathing"])
     own = breath | {"phase": 0.0, "phase_spread": block["phase_spread"]}
@@ -286,8 +309,28 @@ def skin_markers(
     truth.seen_off = truth.seen_off + shift + risen[:, None]
 
 
+def weighted(
+    markers: Array, seen: Array, weights: Array, turn: Array, place: Array
+) -> tuple[Array, Array]:
+    """Least squares of `(turn m + place - seen)` with a weight for each marker, by Gauss and Newton."""
+    for _ in range(FIT_STEPS):
+        turned = np.einsum("nij,kj->nki", turn, markers)
+        left = seen - turned - place[:, None]
+        moves = np.zeros((*turned.shape, 6))  # of each marker, by a shift and a small turn
+        moves[..., :3] = np.eye(3)
+        for axis in range(3):
+            moves[..., 3 + axis] = np.cross(np.eye(3)[axis], turned)
+        information = np.einsum("nkia,kij,nkjb->nab", moves, weights, moves)
+        gradient = np.einsum("nkia,kij,nkj->na", moves, weights, left)
+        step = np.linalg.solve(information, gradient[..., None])[..., 0]
+        turn, place = from_vector(step[:, 3:]) @ turn, place + step[:, :3]
+    return turn, place
+
+
 def fit(case: Case, truth: Truth) -> None:
     """The rigid least-squares fit (Kabsch, by SVD) to where markers were seen, then the robot's own place.
+
+    Where markers count by weights it is where the weighted squares are least, from there by Newton's way.
 
     The phantom is planned where the fit has it. So it really is where the fit's inverse leads from there.
     """
@@ -305,6 +348,8 @@ def fit(case: Case, truth: Truth) -> None:
         mirror[:, 2] = np.linalg.det(turn)
         turn = right.transpose(0, 2, 1) @ (mirror[..., None] * left.transpose(0, 2, 1))
         place = seen_middle - turn @ middle
+        if truth.weights is not None:
+            turn, place = weighted(markers, seen, truth.weights, turn, place)
         # Back: x_true = turn^T (x_planned - place), in the phantom's frame; then as seen in the world.
         back = turn.transpose(0, 2, 1)
         back_place = -(back @ place[..., None])[..., 0]
@@ -328,7 +373,11 @@ def hand_eye(
 
 
 def imaging(case: Case, block: dict, random: np.random.Generator, truth: Truth) -> None:
-    """The target is anywhere in its voxel, and its centre is chosen with an error."""
+    """The target is anywhere in its voxel, and its centre is chosen with an error; or as was measured."""
+    if "covariance_mm2" in block:
+        covariance = covariances(block["covariance_mm2"])
+        truth.unseen = random.multivariate_normal(np.zeros(3), covariance, truth.count, method="eigh")
+        return
     voxel = np.array(block["voxel_mm"]) * 1e-3
     within = voxel * random.uniform(-0.5, 0.5, (truth.count, 3))
     truth.unseen = within + block["reader_mm"] * 1e-3 * random.standard_normal((truth.count, 3))

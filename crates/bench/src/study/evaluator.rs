@@ -9,6 +9,7 @@ use super::dynamic::dynamic_rows;
 use super::planned::planned_rows;
 use super::rows::StudyColumns;
 use super::static_case::{StaticWorker, invalid_rows};
+use crate::ct::{LastScan, scanned};
 
 /// Computes the cases of a study.
 pub struct StudyEvaluator<'a> {
@@ -36,6 +37,7 @@ impl CaseEvaluator for StudyEvaluator<'_> {
             columns: self.columns,
             postures: StaticWorker::default(),
             pool: EnginePool::new(ENGINES),
+            scan: LastScan::default(),
         }))
     }
 }
@@ -46,12 +48,16 @@ struct Worker<'a> {
     columns: &'a StudyColumns,
     postures: StaticWorker,
     pool: EnginePool,
+    scan: LastScan,
 }
 
 impl CaseWorker for Worker<'_> {
     fn evaluate(&mut self, case: u64) -> Result<CaseResult, CaseError> {
         let layout = StudyCase::new(self.study, self.design, case);
-        let rows = match layout.scenario(self.study) {
+        let scenario = layout
+            .scenario(self.study)
+            .and_then(|resolved| scanned(resolved, self.study.family.overrides(), &mut self.scan));
+        let rows = match scenario {
             Err(findings) => invalid_rows(&findings),
             Ok(resolved) => match layout.mode {
                 StudyMode::Static => self.postures.rows(&resolved),

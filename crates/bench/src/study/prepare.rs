@@ -156,7 +156,23 @@ fn columns(study: &ResolvedStudy) -> StudyColumns {
     let place = |name: &str| ENGINES.iter().position(|engine| engine.name() == name);
     engines.sort_by_key(|name| place(name).unwrap_or(ENGINES.len()));
     let modes: Vec<StudyMode> = modes.into_iter().collect();
-    StudyColumns::new(&modes, &engines)
+    let columns = StudyColumns::new(&modes, &engines);
+    if has_true_targets(study) {
+        columns
+    } else {
+        columns.without_true_targets()
+    }
+}
+
+/// Whether any case may have a goal with a true target.
+fn has_true_targets(study: &ResolvedStudy) -> bool {
+    let goals = &study.family.base().scenario.goals;
+    let is_varied = levels(study)
+        .flat_map(|level| &level.changes)
+        .any(|(key, _)| key.to_string().starts_with("goal.true_target_mm"));
+    study.family.base().scenario.ct.is_some()
+        || is_varied
+        || goals.iter().any(|goal| goal.true_target_mm.is_some())
 }
 
 fn product(study: &ResolvedStudy, levels: impl Iterator<Item = usize>, samples: u64) -> String {

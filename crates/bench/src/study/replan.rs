@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::case::StudyCase;
 use super::planned::planned_rows;
 use super::prepare::PreparedStudy;
+use crate::ct::{LastScan, scanned};
 use crate::parallel::in_parallel;
 use crate::progress::Progress;
 
@@ -158,10 +159,19 @@ pub struct ReplanControl<'a> {
 /// Configurations that are ok with their motions.
 fn planned_bits(prepared: &PreparedStudy, case: u64) -> Result<u8, String> {
     let layout = StudyCase::new(&prepared.study, &prepared.design, case);
-    let resolved = layout.scenario(&prepared.study).map_err(|findings| {
-        let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
-        format!("case {case}: {}", texts.join("; "))
-    })?;
+    let resolved = layout
+        .scenario(&prepared.study)
+        .and_then(|resolved| {
+            scanned(
+                resolved,
+                prepared.study.family.overrides(),
+                &mut LastScan::default(),
+            )
+        })
+        .map_err(|findings| {
+            let texts: Vec<String> = findings.iter().map(ToString::to_string).collect();
+            format!("case {case}: {}", texts.join("; "))
+        })?;
     let rows = planned_rows(&resolved).map_err(|message| format!("case {case}: {message}"))?;
     let ok = rows.iter().enumerate();
     let ok = ok.filter(|(_, row)| row.outcome == Outcome::Ok);

@@ -59,6 +59,12 @@ impl StudyColumns {
         Self(MetricKey::columns(modes, engines))
     }
 
+    /// Without those that are of true targets alone.
+    pub fn without_true_targets(mut self) -> Self {
+        self.0.retain(|key| !key.metric().is_of_true_target);
+        self
+    }
+
     /// The metrics, in the order of the columns.
     pub fn keys(&self) -> &[MetricKey] {
         &self.0

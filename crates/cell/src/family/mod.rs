@@ -66,6 +66,11 @@ impl ScenarioFamily {
         &self.base
     }
 
+    /// What replaces parts of its files.
+    pub fn overrides(&self) -> &Overrides {
+        &self.overrides
+    }
+
     /// Names of its goals, in the order of the file.
     pub fn goals(&self) -> impl ExactSizeIterator<Item = &str> {
         let goals = self.editable.scenario.goals.iter();

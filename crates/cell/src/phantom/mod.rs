@@ -26,8 +26,8 @@ mod tests;
 
 use std::fmt;
 
-use nalgebra::{Point3, UnitQuaternion, UnitVector3};
-use needlebench_geometry::{Shape, Solid};
+use nalgebra::{Point3, UnitVector3};
+use needlebench_geometry::Solid;
 use serde::{Deserialize, Serialize};
 
 pub use error::PhantomError;
@@ -129,6 +129,17 @@ pub struct Marker {
     pub center_m: Point3<f64>,
     /// Outward normal of the disc and of the skin under it, phantom frame.
     pub normal: UnitVector3<f64>,
+    /// What CT sees of it, if it does: the part `NAME.sphere`.
+    pub sphere: Option<MarkerSphere>,
+}
+
+/// A dense ball in a marker, between its disc and the skin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarkerSphere {
+    /// Centre, phantom frame: on the disc's axis.
+    pub center_m: Point3<f64>,
+    /// Diameter, m.
+    pub diameter_m: f64,
 }
 
 /// The chest phantom.
@@ -298,11 +309,7 @@ fn lesion(
         name: name.clone(),
         tissue: Tissue::Lesion,
         organ: organ.clone(),
-        solid: Solid {
-            name,
-            shape: Shape::Sphere { radius_m },
-            parent_from_shape: solids::pose(center_m, UnitQuaternion::identity()),
-        },
+        solid: solids::ball(name, center_m, radius_m),
         color_rgba: LESION_RGBA,
     };
     let lesion = Lesion {

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::PhantomError;
-use crate::scenario::ChestSize;
+use crate::scenario::{ChestSize, MarkerKind};
 use crate::schema::{FileSchema, LONGEST_NAME, NAME};
 
 /// What a parameter file may hold.
@@ -85,6 +85,13 @@ pub struct PhantomParameters {
     #[serde(default = "default_marker_thickness_mm")]
     #[schemars(range(min = 0.2, max = 5.0))]
     pub marker_thickness_mm: f64,
+    /// `disc`, or `ct_sphere` for markers that CT sees too.
+    #[serde(default)]
+    pub marker_kind: MarkerKind,
+    /// Diameter of the sphere of `ct_sphere` markers, mm; their discs lie so much higher above the skin.
+    #[serde(default = "default_marker_sphere_mm")]
+    #[schemars(range(min = 3.0, max = 15.0))]
+    pub marker_sphere_mm: f64,
     /// Head and arms, for scenarios that have them.
     #[serde(default)]
     pub limbs: LimbSizes,
@@ -210,6 +217,10 @@ fn default_marker_diameter_mm() -> f64 {
 }
 fn default_marker_thickness_mm() -> f64 {
     1.0
+}
+
+fn default_marker_sphere_mm() -> f64 {
+    8.0
 }
 
 macro_rules! preset {

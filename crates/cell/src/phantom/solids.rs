@@ -76,6 +76,15 @@ pub(super) fn cylinder(name: String, from: Point3<f64>, to: Point3<f64>, radius_
     }
 }
 
+/// Ball about a point.
+pub(super) fn ball(name: String, centre: Point3<f64>, radius_m: f64) -> Solid {
+    Solid {
+        name,
+        shape: Shape::Sphere { radius_m },
+        parent_from_shape: pose(centre, UnitQuaternion::identity()),
+    }
+}
+
 /// Box centred on a pose.
 pub(super) fn cuboid(name: String, half_extents_m: Vector3<f64>, parent_from_shape: Pose) -> Solid {
     Solid {

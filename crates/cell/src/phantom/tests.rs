@@ -1,8 +1,9 @@
+use crate::scenario::MarkerKind;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
-use needlebench_geometry::{PreparedShape, separation};
+use needlebench_geometry::{PreparedShape, Shape, separation};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -411,6 +412,39 @@ fn markers_lie_on_the_skin_and_never_in_it() {
         for part in phantom.parts.iter().filter(|p| p.tissue == Tissue::Marker) {
             assert!(HalfSpaces::of(phantom.skin()).unwrap().gap_m(&part.solid) > -ROUNDING_M);
         }
+    }
+}
+
+#[test]
+fn ct_markers_hold_a_sphere_between_skin_and_disc_and_leave_all_else_as_it_is() {
+    for plain in every_size() {
+        let mut parameters = plain.parameters.clone().unwrap();
+        parameters.marker_kind = MarkerKind::CtSphere;
+        let phantom = Phantom::build(&parameters).unwrap();
+        let sphere_m = 1e-3 * parameters.marker_sphere_mm;
+        let skin = HalfSpaces::of(phantom.skin()).unwrap();
+        for (marker, disc) in phantom.markers.iter().zip(&plain.markers) {
+            let raised = disc.center_m + sphere_m * disc.normal.into_inner();
+            assert!((marker.center_m - raised).norm() < ROUNDING_M);
+            assert_eq!(marker.normal, disc.normal);
+            assert_eq!(disc.sphere, None);
+            let sphere = marker.sphere.unwrap();
+            assert_eq!(sphere.diameter_m, sphere_m);
+            let above_skin_m = -phantom.skin_signed_depth(&sphere.center_m);
+            assert!((above_skin_m - 0.5 * sphere_m).abs() < ROUNDING_M);
+            let name = format!("{}.sphere", marker.name);
+            let part = phantom.parts.iter().find(|part| part.name == name);
+            let place = part.unwrap().solid.parent_from_shape.translation.vector;
+            assert_eq!(place, sphere.center_m.coords);
+        }
+        for part in phantom.parts.iter().filter(|p| p.tissue == Tissue::Marker) {
+            assert!(skin.gap_m(&part.solid) > -ROUNDING_M);
+        }
+        let anatomy = |phantom: &Phantom| {
+            let parts = phantom.parts.iter().filter(|p| p.tissue != Tissue::Marker);
+            parts.cloned().collect::<Vec<_>>()
+        };
+        assert_eq!(anatomy(&phantom), anatomy(&plain));
     }
 }
 

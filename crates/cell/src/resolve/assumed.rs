@@ -62,7 +62,7 @@ fn name_scenario(file: &str, scenario: &mut Scenario) {
 }
 
 /// A scenario's name from that of its file, as far as it can be one.
-pub(crate) fn name_from_file(file: &Path) -> String {
+pub fn name_from_file(file: &Path) -> String {
     let stem = file.file_stem().and_then(|stem| stem.to_str());
     let is_of_names = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     let name = stem.unwrap_or_default().chars();

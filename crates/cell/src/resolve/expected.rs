@@ -133,7 +133,16 @@ impl RealThings<'_> {
         } else {
             ArmClass::FactoryCalibrated
         });
-        let blocks = ImperfectionsSection::of_class(class, section.breath);
+        let mut blocks = ImperfectionsSection::of_class(class, section.breath);
+        if let Some(registration) = &section.registration {
+            blocks.registration = Some(registration.clone());
+            if registration.covariance_mm2.is_some() {
+                blocks.hand_eye = None;
+            }
+        }
+        if let Some(imaging) = &section.imaging {
+            blocks.imaging = Some(imaging.clone());
+        }
         match self.resolve(&blocks, notes) {
             Ok(imperfections) => Ok(Some(Expected {
                 class: Some(class),

@@ -46,7 +46,7 @@ use crate::toml_text::TomlText;
 use crate::{Finding, Robot};
 use arm_values::check_brakes;
 use assumed::assume;
-pub(crate) use assumed::name_from_file;
+pub use assumed::name_from_file;
 pub use entry::{ChosenEntry, EntryChooser, GoalPlacer, OpenScenario};
 use excitation::{ExcitationProtocol, check_sweeps, resolve_excitation};
 pub use expected::Expected;
@@ -65,7 +65,7 @@ use obstacles::{check_obstacle_names, place_obstacles};
 pub use overrides::Overrides;
 use people::{People, Room, resolve_people};
 pub use phantom::PlacedPhantom;
-use phantom::place_phantom;
+use phantom::{off_the_table, place_phantom};
 pub use robot::load_robot;
 pub use servo::ServoSettings;
 use servo::{note_assumed_drives, servo_settings};
@@ -345,6 +345,12 @@ pub(crate) fn resolve(
         return Err(findings);
     }
     let mut notes = Vec::new();
+    if scenario.ct.is_some() {
+        notes.push(
+            "this is the phantom itself: `run` and `study` begin with a scan of it ([ct]) and know what that shows"
+                .to_owned(),
+        );
+    }
     let robot = library
         .robot(toml, &scenario.robot, base, overrides)
         .map_err(one)?;
@@ -387,7 +393,14 @@ pub(crate) fn resolve(
         let unplaced = library.phantom(toml, section, base)?;
         notes.extend(unplaced.notes.iter().cloned());
         let placed = place_phantom(toml, section, scenario.table.as_ref(), &unplaced);
-        phantom = Some(placed.map_err(one)?);
+        let placed = placed.map_err(one)?;
+        notes.extend(off_the_table(
+            section,
+            scenario.table.as_ref(),
+            &unplaced,
+            &placed,
+        ));
+        phantom = Some(placed);
         phantom_source.clone_from(&unplaced.model);
         phantom_parts.clone_from(&unplaced.parts);
         lying = Some(unplaced);

@@ -82,6 +82,15 @@ pub struct CriteriaSection {
     #[serde(with = "switch")]
     #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
     pub max_tip_position_error_mm: Option<f64>,
+    /// Largest settled distance of the needle's tip from the goal's `true_target_mm`, mm; says nothing of goals
+    /// without one.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
+    pub max_true_target_error_mm: Option<f64>,
+    /// Largest settled distance of the goal's `true_target_mm` from the needle's axis, across the needle, mm.
+    #[serde(with = "switch")]
+    #[schemars(with = "Option<f64>", range(min = 1e-12, max = 100.0), extend("x-off" = true))]
+    pub max_true_target_lateral_mm: Option<f64>,
     /// Largest root mean square distance of the needle's tip from the target over all arms and
     /// patients of `[imperfections]`, mm.
     #[serde(with = "switch")]
@@ -143,6 +152,8 @@ impl Default for CriteriaSection {
     fn default() -> Self {
         Self {
             max_tip_position_error_mm: Some(0.1),
+            max_true_target_error_mm: None,
+            max_true_target_lateral_mm: None,
             max_tip_rms_mm: None,
             max_tip_lateral_rms_mm: None,
             max_needle_angle_error_deg: Some(0.05),

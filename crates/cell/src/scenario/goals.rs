@@ -6,6 +6,7 @@ use needlebench_kinematics::ik::Configuration;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
+use super::criteria::CriteriaSection;
 use crate::Finding;
 use crate::schema::{LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
@@ -76,6 +77,14 @@ pub struct GoalSection {
     #[serde(default)]
     #[schemars(inner(range(min = -5000.0, max = 5000.0)))]
     pub target_offset_mm: Option<[f64; 3]>,
+    /// Where the lesion really is, phantom frame (left, posterior, superior), mm: known where the planned
+    /// target comes from a reconstruction and a registration that are off, and these are simulated. Nothing
+    /// is planned by it: the engines measure how far from it the needle's tip ends. Breathing and tissue move
+    /// it; draws of `hand_eye`, `registration`, `skin_markers` and `imaging` do not, since where it is
+    /// is known. At most 50 mm from the planned target.
+    #[serde(default)]
+    #[schemars(inner(range(min = -5000.0, max = 5000.0)))]
+    pub true_target_mm: Option<[f64; 3]>,
     /// Pose of the flange, instead of entry and target. The needle then follows the guide.
     #[serde(default)]
     pub flange_pose: Option<FlangePose>,
@@ -132,6 +141,7 @@ impl GoalSection {
             target_mm,
             lesion,
             target_offset_mm: None,
+            true_target_mm: None,
             flange_pose: None,
             insertion_length_mm: None,
             standoff_mm: default_standoff_mm(),
@@ -199,6 +209,37 @@ fn outcomes(_: &mut SchemaGenerator) -> Schema {
         "propertyNames": { "enum": names },
         "additionalProperties": { "type": "string", "enum": outcomes },
     })
+}
+
+/// Criteria of the file on true targets, where no goal has one.
+pub(super) fn check_true_targets(
+    toml: &TomlText<'_>,
+    goals: &[GoalSection],
+    criteria: &CriteriaSection,
+    come_later: bool,
+) -> Vec<Finding> {
+    if come_later || goals.iter().any(|goal| goal.true_target_mm.is_some()) {
+        return Vec::new();
+    }
+    let limits = [
+        (
+            "max_true_target_error_mm",
+            criteria.max_true_target_error_mm,
+        ),
+        (
+            "max_true_target_lateral_mm",
+            criteria.max_true_target_lateral_mm,
+        ),
+    ];
+    let asked = limits.into_iter().filter(|(_, limit)| limit.is_some());
+    let keys = asked.map(|(name, _)| format!("criteria.{name}"));
+    // A study computes goal by goal: one of them may have none.
+    keys.filter(|key| toml.span_of(key).is_some())
+        .map(|key| {
+            toml.finding(&key, "no goal has a true target to be judged by")
+                .hint("`true_target_mm` under [[goals]]: where the lesion really is")
+        })
+        .collect()
 }
 
 /// Two goals of one name, and no goal at all.

@@ -5,6 +5,8 @@
 //! per patient). A run uses one draw, made from the scenario's seed; the error budget uses the
 //! distribution.
 
+mod measured;
+
 use needlebench_kinematics::JOINT_COUNT;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
@@ -13,6 +15,9 @@ use super::models::names_or_path;
 use crate::Finding;
 use crate::arm::Arm;
 use crate::toml_text::TomlText;
+
+pub use measured::CovarianceMm2;
+pub(crate) use measured::covariance_m2;
 
 /// How the real arm and phantom differ from the nominal ones.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -127,6 +132,11 @@ pub struct ExpectedSection {
     pub arm: Option<ArmClass>,
     /// Whether the breath is held.
     pub breath: BreathState,
+    /// Markers with their measured covariances, instead of the assumed ones. They hold the robot's own error in
+    /// touching them: there is no hand-eye calibration beside them.
+    pub registration: Option<RegistrationBlock>,
+    /// The target's measured covariance, instead of the assumed one.
+    pub imaging: Option<ImagingBlock>,
 }
 
 /// Joint origins of the real arm.
@@ -350,6 +360,9 @@ pub struct GuideBlock {
 }
 
 /// Registration of the phantom by markers.
+///
+/// How well the markers are localised is assumed, the same for all (`localisation_error_mm`), or was measured, for
+/// each of them (`covariance_mm2`). The controller then weighs each marker by the inverse of its covariance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RegistrationBlock {
@@ -361,6 +374,11 @@ pub struct RegistrationBlock {
     /// localisation error), mm. Assumed: a third of a CT voxel and as much again of a tracker.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub localisation_error_mm: f64,
+    /// Measured covariance of each of `markers_mm`, in their order, `[xx, yy, zz, xy, xz, yz]` in the phantom
+    /// frame, mm^2, instead of `localisation_error_mm`: of its place in the scan, plus that of its place as the
+    /// robot has it (by drawing, or touched with the tip).
+    #[schemars(length(min = 3), inner(inner(range(min = -10000.0, max = 10000.0))))]
+    pub covariance_mm2: Option<Vec<CovarianceMm2>>,
 }
 
 impl Default for RegistrationBlock {
@@ -375,6 +393,7 @@ impl Default for RegistrationBlock {
                 [0.0, -110.0, 110.0],
             ],
             localisation_error_mm: 0.5,
+            covariance_mm2: None,
         }
     }
 }
@@ -431,7 +450,7 @@ impl Default for SkinMarkersBlock {
 /// Where the target is seen in the image.
 ///
 /// Each axis of the target is uniform within half a voxel, and off by what the reader's choice of its
-/// centre is off.
+/// centre is off: assumed. Or how well its centre is known was measured (`covariance_mm2`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImagingBlock {
@@ -442,6 +461,10 @@ pub struct ImagingBlock {
     /// Standard deviation of the chosen centre of the target along each axis, mm. Assumed.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub reader_mm: f64,
+    /// Measured covariance of the target's centre, `[xx, yy, zz, xy, xz, yz]` in the phantom frame, mm^2,
+    /// instead of `voxel_mm` and `reader_mm`.
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
+    pub covariance_mm2: Option<CovarianceMm2>,
 }
 
 impl Default for ImagingBlock {
@@ -449,6 +472,7 @@ impl Default for ImagingBlock {
         Self {
             voxel_mm: [0.7, 0.7, 2.0],
             reader_mm: 0.3,
+            covariance_mm2: None,
         }
     }
 }
@@ -597,6 +621,36 @@ impl ImperfectionsSection {
     }
 }
 
+/// What is measured, of the expected tip error.
+pub(super) fn check_expected(toml: &TomlText<'_>, scenario: &super::Scenario) -> Vec<Finding> {
+    let section = &scenario.expected;
+    let mut findings = Vec::new();
+    if let Some(block) = &section.registration {
+        findings.extend(measured::check_markers(
+            toml,
+            "expected.registration",
+            block,
+        ));
+    }
+    if let Some(block) = &section.imaging {
+        findings.extend(measured::check_target(toml, "expected.imaging", block));
+    }
+    let measured = [
+        ("registration", section.registration.is_some()),
+        ("imaging", section.imaging.is_some()),
+    ];
+    for (block, _) in measured.into_iter().filter(|(_, given)| *given) {
+        if scenario.imperfections.is_some() {
+            let key = format!("expected.{block}");
+            let finding = toml.finding(&key, format!("`{block}` contradicts [imperfections]"));
+            findings.push(finding.hint(format!(
+                "the expected tip error is of the [imperfections]: write it as [imperfections.{block}]"
+            )));
+        }
+    }
+    findings
+}
+
 /// Blocks that contradict themselves.
 pub(super) fn check(toml: &TomlText<'_>, section: &ImperfectionsSection) -> Vec<Finding> {
     let mut findings = Vec::new();
@@ -635,6 +689,14 @@ pub(super) fn check(toml: &TomlText<'_>, section: &ImperfectionsSection) -> Vec<
                     .hint("the phantom could turn about it: move one of them away"),
             );
         }
+        findings.extend(measured::check_markers(
+            toml,
+            "imperfections.registration",
+            block,
+        ));
+    }
+    if let Some(block) = &section.imaging {
+        findings.extend(measured::check_target(toml, "imperfections.imaging", block));
     }
     findings
 }

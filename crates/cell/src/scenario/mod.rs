@@ -7,6 +7,7 @@
 
 mod controller;
 mod criteria;
+mod ct;
 mod engines;
 pub mod envelope;
 mod events;
@@ -43,6 +44,7 @@ use requirements::scenario_requirements;
 
 pub use controller::ControllerSection;
 pub use criteria::{ClearanceCriteria, CriteriaSection};
+pub use ct::{CtSection, ScanKernel, ScanSlices};
 pub use engines::{EnginesSection, MujocoSection, RapierSection, STANDARD_GRAVITY_M_S2};
 pub use envelope::EnvelopeSection;
 pub use events::{EventsSection, PressClass, PressSection, StopSection};
@@ -50,13 +52,13 @@ pub use excitation::{ExcitationSection, PayloadSection, SweepSection};
 pub use fixtures::{GantrySection, MountKind, MountSection, TableSection};
 pub(crate) use goals::EVERY_CONFIGURATION;
 pub use goals::{FlangePose, GoalSection, REJECTION_RULES, Target};
-pub(crate) use imperfections::POPULATION;
 pub use imperfections::{
-    ArmClass, BreathState, BreathingBlock, CalibrationBlock, ControlBlock, ElasticityBlock,
-    EncoderBlock, ExpectedSection, FrictionBlock, GuideBlock, HandEyeBlock, ImagingBlock,
-    ImperfectionsSection, IndentationBlock, NeedleBlock, PayloadBlock, RegistrationBlock,
-    SkinMarkersBlock, TorqueLimitsBlock,
+    ArmClass, BreathState, BreathingBlock, CalibrationBlock, ControlBlock, CovarianceMm2,
+    ElasticityBlock, EncoderBlock, ExpectedSection, FrictionBlock, GuideBlock, HandEyeBlock,
+    ImagingBlock, ImperfectionsSection, IndentationBlock, NeedleBlock, PayloadBlock,
+    RegistrationBlock, SkinMarkersBlock, TorqueLimitsBlock,
 };
+pub(crate) use imperfections::{POPULATION, covariance_m2};
 pub use iso9283::{
     Horizontal, Iso9283Criteria, Iso9283Section, STANDARD_CYCLES, STANDARD_EDGES_MM,
 };
@@ -69,7 +71,7 @@ pub use obstacles::{
 pub use people::{
     ElbowPreference, Handedness, PeopleSection, PersonSection, Role, Side, StaturePercentile,
 };
-pub use phantom::{Arms, LengthUnit, PartSection, PartTissue, PhantomSection, Posture};
+pub use phantom::{Arms, LengthUnit, MarkerKind, PartSection, PartTissue, PhantomSection, Posture};
 pub(crate) use phantom::{ChestSize, NO_MODEL};
 pub use planning::{NeedleRouteSection, PlanningSection, RollAim};
 pub use ranking::RankingSection;
@@ -108,6 +110,9 @@ pub struct Scenario {
     /// The chest phantom; none if left out.
     #[serde(default)]
     pub phantom: Option<PhantomSection>,
+    /// The synthetic CT that a run begins from; without it, a run knows the phantom as it is.
+    #[serde(default)]
+    pub ct: Option<CtSection>,
     /// CT table; none if left out.
     #[serde(default)]
     pub table: Option<TableSection>,
@@ -224,11 +229,20 @@ pub(crate) fn check_together(
         &scenario.goals,
         with_goals && scenario.iso9283.is_none() && scenario.excitation.is_none(),
     ));
+    // A synthetic scan brings true targets along.
+    findings.extend(goals::check_true_targets(
+        toml,
+        &scenario.goals,
+        &scenario.criteria,
+        !with_goals || scenario.ct.is_some(),
+    ));
     findings.extend(ranking::check(toml, &scenario.ranking));
     findings.extend(events::check(toml, scenario));
     if let Some(section) = &scenario.imperfections {
         findings.extend(imperfections::check(toml, section));
     }
+    findings.extend(ct::check(toml, scenario));
+    findings.extend(imperfections::check_expected(toml, scenario));
     findings.extend(iso9283::check(toml, scenario));
     findings.extend(excitation::check(toml, scenario));
     findings

@@ -36,6 +36,17 @@ pub enum Arms {
     Overhead,
 }
 
+/// What the markers on the skin are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MarkerKind {
+    /// A plastic disc, for cameras and touching: CT does not tell it from skin.
+    #[default]
+    Disc,
+    /// The same disc on a carrier of foam that holds a dense sphere against the skin, for CT as well.
+    CtSphere,
+}
+
 /// The phantom and where it lies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -54,6 +65,8 @@ pub struct PhantomSection {
     /// Length of the phantom, mm; the model's own if left out.
     #[schemars(range(min = ChestSize::LENGTH_MM[0], max = ChestSize::LENGTH_MM[1]))]
     pub length_mm: Option<f64>,
+    /// What the markers on the skin are: `disc`, or `ct_sphere` for markers that CT sees too; the model's own if left out.
+    pub markers: Option<MarkerKind>,
     /// How it lies.
     pub posture: Posture,
     /// Direction from feet to head in the world's horizontal plane: 0 is world x, 90 world y, deg.
@@ -62,6 +75,9 @@ pub struct PhantomSection {
     /// Turn about the long axis away from the posture, deg.
     #[schemars(range(min = -720.0, max = 720.0))]
     pub body_roll_deg: f64,
+    /// Lift of the head over the feet, about the horizontal axis across the patient, deg.
+    #[schemars(range(min = -60.0, max = 60.0))]
+    pub head_up_deg: f64,
     /// Position of the phantom's origin (mid-chest) in the world, mm. With `rest_on_table` the
     /// third number is the height of a cushion over the table.
     #[schemars(inner(range(min = -5000.0, max = 5000.0)))]
@@ -84,9 +100,11 @@ impl Default for PhantomSection {
             breadth_mm: None,
             depth_mm: None,
             length_mm: None,
+            markers: None,
             posture: Posture::Supine,
             head_yaw_deg: 0.0,
             body_roll_deg: 0.0,
+            head_up_deg: 0.0,
             position_mm: [0.0; 3],
             rest_on_table: true,
             arms: Arms::None,

@@ -2,7 +2,7 @@
 
 /// Ends of keys, how their units are written, and in words where that is not the same; longer ends
 /// first.
-const UNITS: [(&str, &str, &str); 20] = [
+const UNITS: [(&str, &str, &str); 21] = [
     ("_mm_s3", "mm/s^3", ""),
     ("_mm_s2", "mm/s^2", ""),
     ("_mm_s", "mm/s", ""),
@@ -14,6 +14,7 @@ const UNITS: [(&str, &str, &str); 20] = [
     ("_kgm2", "kg m^2", ""),
     ("_per_s2", "1/s^2", ""),
     ("_per_s", "1/s", ""),
+    ("_mm2", "mm^2", "square millimetres"),
     ("_mm", "mm", "millimetres"),
     ("_um", "um", "micrometres"),
     ("_deg", "deg", "degrees"),

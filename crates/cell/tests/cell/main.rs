@@ -8,6 +8,7 @@ mod foreign_urdf;
 mod goal_direction;
 mod layouts;
 mod limbs;
+mod measured;
 mod moves;
 mod obstacles;
 mod pair_classes;

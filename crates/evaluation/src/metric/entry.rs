@@ -236,6 +236,8 @@ pub struct Metric {
     pub heading: Heading,
     /// Unit of its column in studies, and of its ranking key.
     pub unit: Unit,
+    /// Whether it is of a goal's true target alone: studies without any have no columns of it.
+    pub is_of_true_target: bool,
     /// Whether studies have columns of each engine's value too.
     pub each_engine: bool,
     /// What a study's statistics do with it.
@@ -288,6 +290,7 @@ impl Metric {
                 case: None,
             },
             unit: quantity.column_unit(),
+            is_of_true_target: false,
             each_engine: false,
             statistics: Statistics::NONE,
             static_statistics: Statistics::NONE,
@@ -464,6 +467,13 @@ impl Metric {
     pub(super) const fn each_engine(self) -> Self {
         Self {
             each_engine: true,
+            ..self
+        }
+    }
+
+    pub(super) const fn of_true_target(self) -> Self {
+        Self {
+            is_of_true_target: true,
             ..self
         }
     }

@@ -355,3 +355,29 @@ fn sensitivity_of_the_tip_is_the_norm_of_its_displacements_under_each_joint() {
         );
     }
 }
+
+#[test]
+fn a_lesion_that_is_elsewhere_is_missed_by_as_much_across_and_along_the_needle() {
+    let mut resolved = table3();
+    let planned = flange(&resolved, &Pose::identity());
+    let measured = |resolved: &ResolvedScenario| {
+        measure_needle(
+            &resolved.cell,
+            resolved.phantom.as_ref(),
+            &resolved.goals[0],
+            &planned,
+        )
+    };
+    let without = measured(&resolved);
+    assert_eq!(without.true_target_error_m, None);
+    assert_eq!(without.true_target_lateral_m, None);
+    // 3 mm and 4 mm across, 12 mm along: 5 mm and 13 mm.
+    let goal = &mut resolved.goals[0];
+    let off_m = goal.world_from_guide_exit.rotation * Vector3::new(3e-3, 4e-3, 12e-3);
+    goal.true_target_m = Some(goal.target_m + off_m);
+    let found = measured(&resolved);
+    assert!((found.true_target_error_m.unwrap() - 13e-3).abs() < ROUNDING);
+    assert!((found.true_target_lateral_m.unwrap() - 5e-3).abs() < ROUNDING);
+    // The planned target is met all the same.
+    assert_eq!(found.tip_position_error_m, without.tip_position_error_m);
+}

@@ -35,6 +35,7 @@ fn clearance(minimum_m: f64, certified_lower_bound_m: Option<f64>) -> ClassClear
 fn needle(tip_error_m: f64) -> NeedleMeasurement {
     NeedleMeasurement {
         tip_position_error_m: tip_error_m,
+        depth_error_m: 0.0,
         lateral_error_m: 1e-4,
         needle_angle_error_rad: 1e-3,
         guide_position_error_m: 1e-4,
@@ -42,7 +43,8 @@ fn needle(tip_error_m: f64) -> NeedleMeasurement {
         entry_lateral_error_m: Some(1e-4),
         axial_angle_error_rad: Some(1e-3),
         sagittal_angle_error_rad: Some(1e-3),
-        ..NeedleMeasurement::default()
+        true_target_error_m: Some(1e-3),
+        true_target_lateral_m: Some(5e-4),
     }
 }
 
@@ -66,6 +68,7 @@ fn budget(rms_m: f64) -> ErrorBudget {
         sources: Vec::new(),
         total: SourceBudget {
             source: None,
+            basis: None,
             at_skin: point(),
             at_target: point(),
         },
@@ -175,6 +178,7 @@ fn goal(configurations: Vec<ConfigurationReport>) -> GoalReport {
         name: "pose".into(),
         lesion: None,
         entry_m: None,
+        true_target_m: None,
         target_m: [0.0; 3],
         axis: [0.0, 0.0, 1.0],
         insertion_length_m: 0.1,

@@ -70,6 +70,7 @@ fn report(configurations: Vec<ConfigurationReport>) -> Vec<GoalReport> {
         lesion: None,
         entry_m: None,
         target_m: [0.0; 3],
+        true_target_m: None,
         axis: [0.0, 0.0, 1.0],
         insertion_length_m: 0.1,
         standoff_m: None,
@@ -203,4 +204,52 @@ fn a_criterion_is_judged_by_what_is_known_and_in_one_order() {
         (tip.to_owned(), Some(false))
     );
     assert_eq!(keys(StudyMode::Dynamic, &made)[1].0, rms);
+}
+
+/// Predicted alone, and simulated.
+#[test]
+fn a_limit_on_true_targets_says_nothing_of_goals_without_one() {
+    let criteria = CriteriaSection {
+        max_tip_position_error_mm: None,
+        max_true_target_error_mm: Some(3.0),
+        max_true_target_lateral_mm: Some(1.0),
+        ..CriteriaSection::default()
+    };
+    let needle = NeedleMeasurement {
+        true_target_error_m: Some(2e-3),
+        true_target_lateral_m: Some(1.5e-3),
+        ..NeedleMeasurement::default()
+    };
+    let judged = |needle: NeedleMeasurement, mode, engines: &[&str]| {
+        let mut made = configuration(0, 0.05, 0.5);
+        made.predicted = Some(needle);
+        let judged = check_configuration("pose", &made, &criteria, mode, engines);
+        let is_of_lesion = |key: &str| key.contains("true_target");
+        let results = judged.results.into_iter();
+        let results = results.map(|each| (each.criterion, Some(each.pass)));
+        let open = judged.not_judged.into_iter();
+        let open = open.map(|each| (each.criterion, None));
+        let mut all: Vec<(String, Option<bool>)> = results.chain(open).collect();
+        all.retain(|(key, _)| is_of_lesion(key));
+        all
+    };
+    let (tip, lateral) = ("max_true_target_error_mm", "max_true_target_lateral_mm");
+    assert_eq!(
+        judged(needle, StudyMode::Planned, &[]),
+        [
+            (tip.to_owned(), Some(true)),
+            (lateral.to_owned(), Some(false))
+        ]
+    );
+    // What was to be simulated, and was not.
+    assert_eq!(
+        judged(needle, StudyMode::Dynamic, &["rapier"]),
+        [(tip.to_owned(), None), (lateral.to_owned(), None)]
+    );
+    for (mode, engines) in [
+        (StudyMode::Planned, [].as_slice()),
+        (StudyMode::Dynamic, &["rapier"]),
+    ] {
+        assert_eq!(judged(NeedleMeasurement::default(), mode, engines), []);
+    }
 }

@@ -195,7 +195,7 @@ fn first_inverted(mesh: &TriangleMesh, parts: Vec<usize>) -> Option<MeshDefect> 
 }
 
 /// Whether rounding cannot tell a triangle from a line or a point.
-pub(super) fn has_no_area(mesh: &TriangleMesh, triangle: [u32; 3]) -> bool {
+pub fn has_no_area(mesh: &TriangleMesh, triangle: [u32; 3]) -> bool {
     /// Twice the area over the longest edge squared: rounding of its computation.
     const ROUNDING: f64 = 1e-14;
     let [a, b, c] = triangle;

@@ -11,7 +11,7 @@ mod solid;
 mod stl;
 mod surface_index;
 
-pub use check::{MeshDefect, MeshFacts, check_closed, inverted_part, open_edges};
+pub use check::{MeshDefect, MeshFacts, check_closed, has_no_area, inverted_part, open_edges};
 pub(crate) use decompose::as_convex;
 pub use decompose::decompose;
 pub use fidelity::{Fidelity, points_on};

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
-use needlebench_cell::Finding;
+use needlebench_cell::{Finding, Overrides};
 use needlebench_engine::ENGINES;
 use needlebench_evaluation::report::Report;
 use serde::Serialize;
@@ -22,7 +22,8 @@ use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::progress::TerminalProgress;
 use needlebench_bench::accuracy::{accuracy_of_run, check_run};
-use needlebench_bench::{RunOptions, Runnable, ScenarioRun};
+use needlebench_bench::ct::{BuildStop, imaged};
+use needlebench_bench::{Control, RunOptions, Runnable, ScenarioRun};
 use needlebench_report::files::{Folder, RunFiles, write_run};
 use needlebench_report::{junit, markdown, report_screen, report_text, write_atomically};
 
@@ -153,7 +154,24 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
         },
         quiet: arguments.quiet,
     };
-    for (runnable, folder) in scenarios.iter().zip(&folders) {
+    for (scenario, folder) in scenarios.iter().zip(&folders) {
+        let scan = Scan {
+            folder,
+            overrides: &overrides,
+            jobs,
+            quiet: arguments.quiet,
+        };
+        let scanned = match scanned(scenario, &scan, &cancel) {
+            Ok(scanned) => scanned,
+            Err(outcome) => {
+                status = status.max(outcome);
+                if outcome == ExitStatus::Interrupted {
+                    break;
+                }
+                continue;
+            }
+        };
+        let runnable = scanned.as_ref().unwrap_or(scenario);
         let (outcome, report) = run_into(runnable, &options, folder, outputs, &cancel)?;
         status = status.max(outcome);
         // What was interrupted is no sample of anything.
@@ -185,6 +203,60 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     }
     append_to_step_summary(&all)?;
     Ok(status)
+}
+
+/// How a scan is made.
+struct Scan<'s> {
+    /// The scenario's results folder.
+    folder: &'s Path,
+    overrides: &'s Overrides,
+    jobs: usize,
+    quiet: bool,
+}
+
+/// The scenario of what is seen in the scan that a scenario begins with; none if it begins with none.
+fn scanned(
+    scenario: &Runnable,
+    scan: &Scan<'_>,
+    cancel: &AtomicBool,
+) -> Result<Option<Runnable>, ExitStatus> {
+    if scenario.scenario().scenario.ct.is_none() {
+        return Ok(None);
+    }
+    let folder = scan.folder.join("ct");
+    let progress = TerminalProgress::new(scan.quiet);
+    let control = Control {
+        threads: scan.jobs,
+        cancel,
+        progress: &progress,
+    };
+    let made = match prepare_folder(&folder) {
+        Ok(()) => imaged(
+            scenario.scenario(),
+            &folder,
+            scan.overrides,
+            true,
+            None,
+            &control,
+        ),
+        Err(finding) => Err(BuildStop::Refused(vec![finding])),
+    };
+    progress.finish();
+    let checked = made.and_then(|made| {
+        let runnable = Runnable::checked(made.scenario);
+        runnable.map_err(|finding| BuildStop::Refused(vec![finding]))
+    });
+    match checked {
+        Ok(runnable) => Ok(Some(runnable)),
+        Err(BuildStop::Interrupted) => {
+            complain("interrupted while the scan was made: there are no results");
+            Err(ExitStatus::Interrupted)
+        }
+        Err(BuildStop::Refused(findings)) => {
+            print_findings(&findings);
+            Err(ExitStatus::BadInput)
+        }
+    }
 }
 
 /// What a run leaves besides its report.

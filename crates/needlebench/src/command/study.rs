@@ -26,6 +26,7 @@ use crate::progress::TerminalProgress;
 use arguments::StudyResultArguments;
 pub(crate) use arguments::{MergeArguments, STUDY_HELP, StudyArguments};
 use needlebench_bench::accuracy::{AccuracyError, accuracy_of_study, check_study};
+use needlebench_bench::ct::{LastScan, scanned};
 use needlebench_bench::progress::Progress as _;
 use needlebench_bench::study::{PreparedStudy, StudyCase, StudyEvaluator, in_words, time_per_case};
 use needlebench_bench::{RunOptions, Runnable};
@@ -373,9 +374,13 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
 fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus> {
     let mut runs: Vec<(Runnable, PathBuf, RunOptions)> = Vec::new();
     let folder = arguments.out.join(&prepared.study.file.name).join("cases");
+    let mut last = LastScan::default();
     for &number in &arguments.case {
         let layout = StudyCase::new(&prepared.study, &prepared.design, number);
-        match layout.scenario(&prepared.study) {
+        let scenario = layout
+            .scenario(&prepared.study)
+            .and_then(|resolved| scanned(resolved, prepared.study.family.overrides(), &mut last));
+        match scenario {
             Ok(mut resolved) => {
                 resolved.scenario.name = format!("case_{number}");
                 resolved.scenario.description =

@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "init",
     "suggest",
     "run",
@@ -12,6 +12,7 @@ const COMMANDS: [&str; 18] = [
     "clearance",
     "atlas",
     "compare",
+    "ct",
     "iso9283",
     "record-plan",
     "replay",

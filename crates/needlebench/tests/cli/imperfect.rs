@@ -198,3 +198,118 @@ fn the_small_scenario_is_sound_before_it_is_spoilt() {
     let bench = Bench::with_scenario(&with_edit(&imperfect(BLOCKS), "budget_samples = 200", ""));
     bench.run(&["check", "s.toml"]).exits_with(0);
 }
+
+/// Markers and target as a scan was found to show them.
+const MEASURED: &str = "
+[imperfections]
+budget_samples = 50
+[imperfections.hand_eye]
+[imperfections.registration]
+markers_mm = [[-90, -80, 60], [90, -80, 60], [0, -110, -70], [20, -100, 90]]
+covariance_mm2 = [
+    [0.01, 0.01, 0.5, 0, 0, 0],
+    [0.01, 0.02, 0.4, 0, 0, 0.01],
+    [0.03, 0.01, 0.01, 0, 0, 0],
+    [0.01, 0.01, 0.02, 0, 0, 0],
+]
+[imperfections.imaging]
+";
+
+#[test]
+fn what_is_no_covariance_is_refused_with_its_marker() {
+    refused(&MEASURED.replace("[0.03, 0.01, 0.01, 0, 0, 0]", "[0.03, 0.01, 0, 0, 0, 0]"))
+        .key("imperfections.registration.covariance_mm2[2]")
+        .says("not positive definite")
+        .hints("[xx, yy, zz, xy, xz, yz] in mm^2");
+}
+
+/// The small scenario with a lesion that really is there, mm.
+fn with_lesion_at([x, y, z]: [f64; 3]) -> String {
+    let length = "insertion_length_mm = 86";
+    let text = with_edit(
+        SMALL,
+        length,
+        &format!("{length}\ntrue_target_mm = [{x}, {y}, {z}]"),
+    );
+    with_edit(
+        &text,
+        "[criteria]",
+        "[criteria]\nmax_true_target_error_mm = 2",
+    )
+}
+
+#[test]
+fn the_needle_is_measured_against_the_true_lesion() {
+    // Where the target is planned to be is said where no lesion can be.
+    let bench = Bench::with_scenario(&with_lesion_at([0.0, 900.0, 0.0]));
+    let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(2);
+    let hint = answer.json()["findings"][0]["hint"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    let (_, planned) = hint.rsplit_once('[').unwrap();
+    let mut planned = planned.trim_end_matches(']').split(", ");
+    let planned_mm: [f64; 3] = std::array::from_fn(|_| planned.next().unwrap().parse().unwrap());
+
+    let [x, y, z] = planned_mm;
+    let text = with_lesion_at([x, y, z + 4.0]);
+    let bench = Bench::with_scenario(&format!("{text}{MEASURED}"));
+    let arguments = ["run", "s.toml", "--engine", "rapier", "--out", "a"];
+    // Lines are broken where the terminal ends.
+    let said = |more: &[&str]| {
+        let answer = bench.run(&[&arguments[..], more].concat());
+        let words: Vec<&str> = answer.stdout.split_whitespace().collect();
+        words.join(" ")
+    };
+    let screen = said(&[]);
+    let wide = said(&["--wide"]);
+    for (text, part) in [
+        (&screen, "true lesion: tip "),
+        (&screen, "mm across the needle"),
+        (&screen, "marker localisation as measured"),
+        (&wide, "true lesion: tip "),
+        (
+            &wide,
+            "note: error budget by measured covariances: registration; as the scenario and its defaults assume: \
+             hand_eye, imaging",
+        ),
+    ] {
+        assert!(text.contains(part), "no `{part}` in {text}");
+    }
+    let report = report(&bench, "a/small/report.json");
+    let goal = &report["goals"][0];
+    assert!(goal["true_target_m"].is_array());
+    let mut simulated = 0;
+    for each in goal["configurations"].as_array().unwrap() {
+        let Some(engine) = each["engines"].get("rapier") else {
+            continue;
+        };
+        simulated += 1;
+        let off_m = engine["true_target_error_m"].as_f64().unwrap();
+        // To the rounding of the hint: draws of what is believed of the target do not count.
+        assert!((off_m - 4e-3).abs() < 0.1e-3, "{off_m}");
+        assert!(engine["true_target_lateral_m"].as_f64().unwrap() <= off_m);
+        assert_eq!(each["metrics"]["true_target_error"].as_f64(), Some(off_m));
+        let sources = each["budget"]["sources"].as_array().unwrap();
+        let bases: Vec<Option<&str>> = sources.iter().map(|each| each["basis"].as_str()).collect();
+        assert_eq!(bases, [None, Some("measured"), Some("assumed")]);
+    }
+    assert!(simulated > 0);
+    let missed = report["criteria"].as_array().unwrap().iter();
+    let missed = missed.filter(|each| each["criterion"] == "max_true_target_error_mm");
+    let missed: Vec<&Value> = missed.filter(|each| each["pass"] == false).collect();
+    assert_eq!(missed.len(), simulated);
+}
+
+#[test]
+fn goals_without_a_true_lesion_have_no_numbers_of_one() {
+    let bench = Bench::with_scenario(SMALL);
+    let answer = bench.run(&[
+        "run", "s.toml", "--engine", "rapier", "--out", "a", "--wide",
+    ]);
+    assert!(!answer.stdout.contains("true lesion"), "{answer:#?}");
+    let text = String::from_utf8(bench.read("a/small/report.json")).unwrap();
+    assert!(!text.contains("true_target") && !text.contains("\"basis\""));
+    let summary = String::from_utf8(bench.read("a/small/summary.md")).unwrap();
+    assert!(!summary.contains("true lesion"));
+}

@@ -13,6 +13,9 @@ mod clearance;
 mod compare;
 mod compare_studies;
 mod credibility;
+mod ct_build;
+mod ct_info;
+mod ct_synth;
 mod determinism;
 #[cfg(target_os = "linux")]
 mod environment;

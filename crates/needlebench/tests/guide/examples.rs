@@ -1,4 +1,4 @@
-//! Examples of scenarios, studies and arms' data in the guide.
+//! Examples of scenarios, studies, arms' data and lists of markers in the guide.
 
 use serde_json::Value;
 
@@ -53,6 +53,7 @@ fn keys_of_examples_exist() {
         needlebench_cell::scenario::scenario_schema(),
         needlebench_cell::study::study_schema(),
         needlebench_cell::arm::data::arm_schema(),
+        needlebench_cell::marker_list_schema(),
     ];
     let mut seen = 0;
     for chapter in chapters() {

@@ -249,15 +249,19 @@ fn shares(
     {
         return;
     }
+    let words_of = |source: Source| {
+        let mine = budget
+            .sources
+            .iter()
+            .find(|each| each.source == Some(source));
+        mine.map_or_else(String::new, |each| each.in_words().to_owned())
+    };
     let mut parts: Vec<(f64, Paint, String)> = named
         .iter()
         .enumerate()
         .map(|(at, source)| {
-            (
-                share_of(budget, *source),
-                Paint::Series(at),
-                source.name().replace('_', " "),
-            )
+            let share = share_of(budget, *source);
+            (share, Paint::Series(at), words_of(*source))
         })
         .collect();
     let rest = 1.0 - parts.iter().map(|(share, ..)| share).sum::<f64>();
@@ -320,6 +324,7 @@ mod tests {
     fn of(source: Option<Source>, rms_m: f64) -> SourceBudget {
         SourceBudget {
             source,
+            basis: None,
             at_skin: point(0.8 * rms_m),
             at_target: point(rms_m),
         }

@@ -10,6 +10,7 @@ use super::escape::{inline, paragraph};
 use super::ranking::ranking_markdown;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::shown::{Shown, shown_metrics};
+use crate::table::true_target::true_target_in_words;
 use crate::table::verdict::{counts, status};
 use crate::table::{fissures_in_words, route_in_words, route_wanted_m};
 
@@ -53,6 +54,9 @@ fn write_report(out: &mut String, report: &Report, engines: &[EngineHeading]) ->
             )?;
         }
         if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
+            writeln!(out, "{words}\n")?;
+        }
+        if let Some(words) = true_target_in_words(goal) {
             writeln!(out, "{words}\n")?;
         }
         for each in &goal.configurations {
@@ -215,7 +219,9 @@ fn write_configurations(
     goal: &GoalReport,
     engines: &[EngineHeading],
 ) -> std::fmt::Result {
-    let columns: Vec<(String, Shown)> = shown_metrics(engines, |heading| heading.summary).collect();
+    let columns: Vec<(String, Shown)> = shown_metrics(engines, |heading| heading.summary)
+        .filter(|(_, shown)| shown.says_something(goal))
+        .collect();
     let is_least = |shown: &Shown| shown.metric().family == "least_clearance";
     write!(out, "| Configuration | Status |")?;
     for (heading, shown) in &columns {

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::pack::Pack;
 
 /// Triangles of one merged surface above which it is thinned out.
-pub(super) const MOST_TRIANGLES: usize = 24_000;
+pub(super) const MOST_TRIANGLES: usize = 16_000;
 /// Edge of the cubes by which the first attempt merges vertices, m, and factor to the next one.
 const FIRST_CUBE_M: f64 = 1e-3;
 const NEXT_CUBE: f64 = 1.3;

@@ -3,7 +3,7 @@
 use needlebench_cell::{ClearanceClass, ResolvedScenario};
 use needlebench_engine::ENGINES;
 use needlebench_evaluation::metric::{Heading, Show};
-use needlebench_evaluation::report::GoalReport;
+use needlebench_evaluation::report::{GoalReport, Report};
 use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::Joints;
 use serde_json::{Value, json};
@@ -17,6 +17,7 @@ use super::scene::{chain, pose, surroundings};
 use super::viewer::Viewer;
 use crate::table::engine_headings::{EngineHeading, engine_headings};
 use crate::table::shown::{Shown, shown_metrics};
+use crate::table::true_target::true_target_in_words;
 use crate::table::verdict::{counts, missed_as_expected};
 use needlebench_bench::ScenarioRun;
 
@@ -61,6 +62,9 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
     document["missedAsExpected"] = json!(expected.map(|(index, _)| index).collect::<Vec<_>>());
     document["iso9283"] = json!(charts::of_test(resolved, finished, &mut pack));
     document["words"] = super::words::words(resolved);
+    for (source, words) in localisations(report) {
+        document["words"][source] = json!(words);
+    }
     let page = Viewer {
         kind: "run",
         name: &report.scenario.name,
@@ -69,6 +73,17 @@ pub fn run_page(resolved: &ResolvedScenario, finished: &ScenarioRun) -> String {
         style: "",
     };
     page.html(pack, &document)
+}
+
+/// Names of sources of error budgets that say what they rest on, and how.
+fn localisations(report: &Report) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let configurations = report.goals.iter().flat_map(|goal| &goal.configurations);
+    let budgets = configurations.filter_map(|each| each.budget.as_ref());
+    let sources = budgets.flat_map(|budget| &budget.sources);
+    sources.filter_map(|each| {
+        each.basis?;
+        Some((each.source?.name(), each.in_words()))
+    })
 }
 
 /// Columns of metrics that any configuration has, as the page shows them.
@@ -145,6 +160,7 @@ fn goal(
             "table": columns(report, &engines, |heading| heading.page),
             "side": columns(report, &engines, |heading| heading.page_side),
         },
+        "trueTarget": true_target_in_words(report),
         "guideExit": pose(&resolved.goals[goal].world_from_guide_exit),
         "charts": charts::of_goal(finished, goal),
         "room": room::people(resolved, room, goal),
@@ -156,11 +172,52 @@ fn goal(
 mod tests {
     use std::path::Path;
 
-    use needlebench_cell::{Overrides, load_scenario};
+    use needlebench_cell::{Overrides, ResolvedScenario, load_scenario, resolve_scenario};
 
     use super::*;
     use crate::page::pack::unpack::of_page;
     use needlebench_bench::{RunOptions, run_scenario};
+
+    /// Markers of which one is hardly seen along the slices, beside a target that is assumed to be seen.
+    const MEASURED: &str = "[imperfections]\nbudget_samples = 0\n[imperfections.imaging]\n\
+        [imperfections.registration]\nmarkers_mm = [[-90, -80, 60], [90, -80, 60], [0, -110, -70]]\n\
+        covariance_mm2 = [[0.01, 0.01, 0.5, 0, 0, 0], [0.01, 0.02, 0.1, 0, 0, 0], [0.03, 0.01, 0.1, 0, 0, 0]]\n";
+
+    #[test]
+    fn the_true_lesion_and_what_was_measured_are_said() {
+        const SMALL: &str = include_str!("../../../needlebench/tests/cli/small.toml");
+        let resolve = |text: &str| -> ResolvedScenario {
+            let (folder, overrides) = (Path::new("."), Overrides::default());
+            resolve_scenario("s.toml", text, folder, &overrides).unwrap()
+        };
+        let planned = resolve(SMALL);
+        let to_phantom = planned.phantom.unwrap().world_from_phantom.inverse();
+        let [x, y, z]: [f64; 3] = ((to_phantom * planned.goals[0].target_m).coords * 1e3).into();
+        let length = "insertion_length_mm = 86";
+        let lesion = format!("{length}\ntrue_target_mm = [{x}, {y}, {}]", z + 4.0);
+        let options = RunOptions {
+            engines: Some(vec!["rapier".into()]),
+            ..RunOptions::default()
+        };
+        let page_of = |text: &str| {
+            let resolved = resolve(text);
+            let finished = run_scenario(&resolved, &options).unwrap();
+            of_page(&run_page(&resolved, &finished)).document
+        };
+        let page = page_of(&format!("{}\n{MEASURED}", SMALL.replace(length, &lesion)));
+        let said = page["goals"][0]["trueTarget"].as_str().unwrap();
+        assert!(said.starts_with("true lesion: tip 4.00 mm off, "), "{said}");
+        assert_eq!(
+            page["words"]["registration"],
+            "marker localisation, measured"
+        );
+        assert_eq!(page["words"]["imaging"], "target localisation, assumed");
+        let columns = page["goals"][0]["columns"]["table"].to_string();
+        assert!(columns.contains("From the true lesion"), "{columns}");
+        let page = page_of(SMALL);
+        assert!(page["goals"][0]["trueTarget"].is_null());
+        assert!(page["words"].get("registration").is_none());
+    }
 
     #[test]
     fn recorded_motions_and_clearances_come_back() {

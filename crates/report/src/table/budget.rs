@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
-use needlebench_uncertainty::Source;
 use needlebench_uncertainty::budget::{ErrorBudget, SourceBudget};
 
 use super::plain_table;
+use crate::layout;
 
 /// Mean of the largest errors that 153 interventional radiologists allow, m.
 pub(crate) const ALLOWED_M: f64 = 2.7e-3;
@@ -34,13 +34,9 @@ pub(crate) fn mm(metres: f64) -> String {
 pub fn budget_text(goal: &GoalReport) -> Option<String> {
     let budgets = budgets(goal);
     let (_, first) = budgets.first()?;
-    let sources: Vec<Source> = first
-        .sources
-        .iter()
-        .filter_map(|each| each.source)
-        .collect();
     let mut header = vec!["configuration".to_owned()];
-    header.extend(sources.iter().map(|source| source.name().replace('_', " ")));
+    let named = first.sources.iter().map(SourceBudget::in_words);
+    header.extend(named.map(|words| layout::in_lines(words, 13)));
     header.extend(
         [
             "all",
@@ -119,23 +115,17 @@ fn write_remarks(
         .filter(|(configuration, _)| configuration.rejections.is_empty())
         .min_by(|(_, a), (_, b)| rms(a).total_cmp(&rms(b)));
     if let Some((configuration, budget)) = best {
-        let dominant = budget
-            .dominant
-            .map_or("nothing", Source::name)
-            .replace('_', " ");
+        let dominant = budget.dominant_in_words().unwrap_or("nothing");
         writeln!(
             out,
             "least off of those that work: {}, {} mm, most of it by {dominant}",
             configuration.label,
             mm(rms(budget))
         )?;
-        for source in budget.sources.iter().filter_map(|each| each.source) {
+        for own in &budget.sources {
             let of = |each: &SourceBudget| each.at_target.analytic.rms_m;
             let value = |budget: &ErrorBudget| {
-                let found = budget
-                    .sources
-                    .iter()
-                    .find(|each| each.source == Some(source));
+                let found = budget.sources.iter().find(|each| each.source == own.source);
                 found.map_or(f64::NAN, of)
             };
             let mut order: Vec<_> = budgets
@@ -149,7 +139,7 @@ fn write_remarks(
                     writeln!(
                         out,
                         "to {}: least sensitive {} ({} mm), most {} ({} mm)",
-                        source.name().replace('_', " "),
+                        own.in_words(),
                         least.0.label,
                         mm(low),
                         most.0.label,

@@ -18,6 +18,7 @@ pub(crate) mod shown;
 pub mod study;
 pub mod study_comparison;
 pub mod suggest;
+pub(crate) mod true_target;
 pub(crate) mod verdict;
 
 pub use plain::{Table, plain_table};

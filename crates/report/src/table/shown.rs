@@ -1,7 +1,7 @@
 //! Which metrics tables and pages show, and how.
 
 use needlebench_evaluation::metric::{Bound, Heading, Metric, MetricKey, metrics};
-use needlebench_evaluation::report::ConfigurationReport;
+use needlebench_evaluation::report::{ConfigurationReport, GoalReport};
 
 use super::engine_headings::EngineHeading;
 use crate::number::shown;
@@ -60,6 +60,12 @@ impl Shown {
         let mut keys = [&self.key].into_iter().chain(&self.otherwise);
         let value = keys.find_map(|key| key.read(configuration))?;
         Some((value, shown(self.metric().show, value)))
+    }
+
+    /// Whether there is anything to say of a goal: of true targets there is not where none is known.
+    pub fn says_something(&self, goal: &GoalReport) -> bool {
+        let mut all = goal.configurations.iter();
+        !self.metric().is_of_true_target || all.any(|each| self.value(each).is_some())
     }
 
     /// The text, or a dash.

@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Point3, SymmetricEigen, Vector3};
 use needlebench_cell::imperfections::{ArmPopulation, Breathing, Imperfections};
-use needlebench_kinematics::registration::{transform_covariance, tre_covariance};
 use needlebench_kinematics::{Dynamics, JOINT_COUNT, Joints, Pose};
 
 use super::{BudgetCase, BudgetError, Moments};
+use crate::fit::FitError;
 use crate::jitter::Jitter;
 use crate::settle::friction_error;
 use crate::truth::{joint_friction, moved_by};
@@ -48,20 +48,14 @@ pub(super) fn moments(
         }
         let place = case.place.copied().unwrap_or_else(Pose::identity);
         let turn = place.rotation.to_rotation_matrix();
-        let registration = imperfections.registration.as_ref();
-        let registration = registration.map(|(markers, fle_rms_m)| (markers, *fle_rms_m));
         let skin = imperfections.skin_markers.as_ref();
-        // Three axes of the same spread.
-        let moving = skin.map(|skin| (&skin.markers_m, skin.shift_m * 3.0_f64.sqrt()));
-        for (markers, fle_rms_m) in registration.into_iter().chain(moving) {
-            let in_phantom = tre_covariance(markers, &(place.inverse() * point), fle_rms_m)?;
-            covariance += turn * in_phantom * turn.inverse();
-            // A rotation w moves a point by w x r + w x (w x r) / 2.
-            let (centroid, transform) = transform_covariance(markers, fle_rms_m)?;
-            let rotation = transform.fixed_view::<3, 3>(3, 3).into_owned();
-            let arm = place.inverse() * point - centroid;
-            let curved = 0.5 * (rotation - Matrix3::identity() * rotation.trace()) * arm;
-            bias -= turn * curved;
+        let seen = imperfections.registration.as_ref();
+        let seen = seen.map(FitError::of_localisation);
+        let moving = skin.map(|skin| FitError::of_shifts(&skin.markers, skin.shift_m));
+        for fit in seen.into_iter().chain(moving) {
+            let (fit, in_phantom) = (fit?, place.inverse() * point);
+            covariance += turn * fit.covariance_at(&in_phantom) * turn.inverse();
+            bias += turn * fit.mean_at(&in_phantom);
         }
         if let Some(skin) = skin {
             // The phantom is believed to be where its markers have risen to.
@@ -79,8 +73,8 @@ pub(super) fn moments(
             // E[w x (w x r)] / 2 = -s^2 r; the target moves, so the error is the other way.
             bias += arm * turned;
         }
-        if let (Some(spread_m), 1) = (&imperfections.imaging_m, index) {
-            let in_phantom = Matrix3::from_diagonal(&spread_m.component_mul(spread_m));
+        if let (Some(seen), 1) = (&imperfections.imaging, index) {
+            let in_phantom = seen.root_m * seen.root_m.transpose();
             covariance += turn * in_phantom * turn.inverse();
         }
         let along = exit.rotation * Vector3::z();

@@ -184,3 +184,110 @@ fn breath_that_is_not_held_is_said_beside_one_that_is() {
     assert!((free - expected_m).abs() < 1e-9, "{free}");
     assert!(held < 0.1 * free);
 }
+
+/// Six markers, three of them hardly seen along the slices, of a target that is seen best across them.
+const MEASURED: &str = "
+[imperfections.registration]
+markers_mm = [[-110, -90, -90], [110, -90, -90], [-130, -70, 80], [130, -70, 80], [0, -115, -120], [0, -110, 110]]
+covariance_mm2 = [
+    [0.01, 0.01, 1.2, 0, 0, 0.01],
+    [0.02, 0.01, 1.0, 0.005, 0, 0],
+    [0.01, 0.02, 0.9, 0, -0.02, 0],
+    [0.3, 0.04, 0.05, 0.08, 0, 0],
+    [0.04, 0.04, 0.04, 0, 0, 0],
+    [0.02, 0.03, 0.05, 0, 0, 0.03],
+]
+[imperfections.imaging]
+covariance_mm2 = [0.04, 0.05, 0.6, 0.01, 0.05, -0.08]
+";
+
+/// Four standard errors of the norm of a covariance's difference from that many draws: at most `sqrt(2)` of its own
+/// norm over the root of their number each, in six elements; and what first order leaves out.
+const MEASURED_COVARIANCE: f64 = 0.05;
+
+#[test]
+fn measured_covariances_give_what_draws_of_weighted_fits_give() {
+    let blocks = format!(
+        "{MEASURED}[imperfections.skin_markers]\n[imperfections.breathing]\nhold_failure = 0\n"
+    );
+    for budget in budgets(&blocks, SAMPLES) {
+        let named: Vec<&str> = budget.sources.iter().map(SourceBudget::in_words).collect();
+        let expected = [
+            "marker localisation, measured",
+            "skin_markers",
+            "target localisation, measured",
+            "breathing",
+        ];
+        assert_eq!(named, expected);
+        for each in budget.sources.iter().chain([&budget.total]) {
+            let point = each.at_target;
+            let what = each.in_words();
+            let covariance = point.covariance_difference.expect("it varies");
+            println!("{what}: covariance off by {covariance:.4}");
+            assert!(covariance <= MEASURED_COVARIANCE, "{what}: {covariance}");
+            let spread_m = point.analytic.covariance().trace().sqrt();
+            let drawn_m = STANDARD_ERRORS * spread_m / (SAMPLES as f64).sqrt();
+            let bias_m = point.bias_difference_m.expect("sampled");
+            assert!(
+                bias_m <= BIAS_M + drawn_m,
+                "{what}: bias off by {bias_m:e} m"
+            );
+        }
+    }
+}
+
+/// Rounding of one way to the same numbers beside another.
+const SAME: f64 = 1e-10;
+
+#[test]
+fn equal_covariances_are_what_one_localisation_error_is() {
+    // 0.6 mm in all: 0.12 mm^2 along each axis.
+    let assumed = "[imperfections.registration]\nlocalisation_error_mm = 0.6\n";
+    let places = MEASURED.lines().find(|line| line.starts_with("markers_mm"));
+    let equal = ["[0.12, 0.12, 0.12, 0, 0, 0]"; 6].join(", ");
+    let measured = format!(
+        "[imperfections.registration]\n{}\ncovariance_mm2 = [{equal}]\n",
+        places.unwrap()
+    );
+    for (assumed, measured) in budgets(assumed, 0).iter().zip(budgets(&measured, 0)) {
+        let at_target = |budget: &ErrorBudget| budget.sources[0].at_target.analytic;
+        let (assumed, measured) = (at_target(assumed), at_target(&measured));
+        let size = assumed.covariance().norm();
+        let apart = (assumed.covariance() - measured.covariance()).norm();
+        assert!(apart < SAME * size, "{apart:e} of {size:e}");
+        assert!((assumed.bias() - measured.bias()).norm() < SAME * assumed.rms_m);
+    }
+}
+
+#[test]
+fn localisations_are_named_for_what_they_rest_on_where_one_was_measured() {
+    let imaging = MEASURED.find("[imperfections.imaging]").unwrap();
+    let named = |blocks: &str| -> Vec<&'static str> {
+        let budget = &budgets(blocks, 0)[0];
+        budget.sources.iter().map(SourceBudget::in_words).collect()
+    };
+    assert_eq!(
+        named(&format!(
+            "{}[imperfections.imaging]\n",
+            &MEASURED[..imaging]
+        )),
+        [
+            "marker localisation, measured",
+            "target localisation, assumed"
+        ]
+    );
+    assert_eq!(
+        named(&format!(
+            "{}[imperfections.registration]\n",
+            &MEASURED[imaging..]
+        )),
+        [
+            "marker localisation, assumed",
+            "target localisation, measured"
+        ]
+    );
+    assert_eq!(
+        named("[imperfections.registration]\n[imperfections.imaging]\n"),
+        ["registration", "imaging"]
+    );
+}

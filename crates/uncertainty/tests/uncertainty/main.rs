@@ -3,3 +3,4 @@
 mod budget;
 mod common;
 mod settled;
+mod true_target;

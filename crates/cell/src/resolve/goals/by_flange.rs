@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_kinematics::pose_from_rotation_vector;
 
-use super::checks::organ_at;
+use super::checks::{organ_at, true_target};
 use super::{Goal, Roll, Surroundings};
 use crate::Finding;
 use crate::scenario::GoalSection;
@@ -53,6 +53,7 @@ pub(super) fn from_flange_pose(
     let target_m = exit + axis.into_inner() * insertion_length_m;
     let mut standoff_m = None;
     let mut target_organ = None;
+    let mut true_target_m = None;
     if let Some(placed) = surroundings.phantom {
         let to_phantom = placed.world_from_phantom.inverse();
         let crossing = placed.phantom.skin_intersection(
@@ -78,11 +79,24 @@ pub(super) fn from_flange_pose(
         }
         standoff_m = Some(enters_m);
         target_organ = organ_at(&placed.phantom, &(to_phantom * target_m));
+        let found = true_target(
+            text,
+            key,
+            section,
+            &placed.phantom,
+            &(to_phantom * target_m),
+        )?;
+        true_target_m = found.map(|at| placed.world_from_phantom * at);
+    } else if section.true_target_mm.is_some() {
+        return Err(text
+            .finding(&key("true_target_mm"), "a true target needs a [phantom]")
+            .hint("it is a point of the phantom frame"));
     }
     Ok(Goal {
         name: section.name.clone(),
         entry_m: standoff_m.map(|distance| exit + axis.into_inner() * distance),
         target_m,
+        true_target_m,
         axis,
         world_from_guide_exit,
         roll: Roll::Fixed(0.0),

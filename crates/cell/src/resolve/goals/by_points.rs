@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_kinematics::Pose;
 
-use super::checks::organ_at;
+use super::checks::{organ_at, true_target};
 use super::{Goal, Roll, Surroundings};
 use crate::phantom::Phantom;
 use crate::scenario::GoalSection;
@@ -28,6 +28,7 @@ impl GoalInPhantom {
         Goal {
             entry_m: goal.entry_m.map(|entry| world_from_phantom * entry),
             target_m: world_from_phantom * goal.target_m,
+            true_target_m: goal.true_target_m.map(|at| world_from_phantom * at),
             axis: UnitVector3::new_normalize(axis),
             world_from_guide_exit: world_from_phantom * goal.world_from_guide_exit,
             ..goal.clone()
@@ -140,6 +141,7 @@ pub(super) fn from_entry_and_target(
         name: section.name.clone(),
         entry_m: Some(on_skin),
         target_m: target,
+        true_target_m: true_target(text, key, section, phantom, &target)?,
         axis,
         world_from_guide_exit: guide_exit,
         roll: section

@@ -26,6 +26,47 @@ pub(super) fn organ_at(phantom: &Phantom, point: &Point3<f64>) -> Option<String>
         })
 }
 
+/// Farthest that a lesion may be from where it was planned to be, m. Assumed: twenty times what needle robots are off by
+/// at most; beyond, it is another lesion, another frame or another unit.
+const FARTHEST_TRUE_TARGET_M: f64 = 0.05;
+
+/// Where the lesion really is, if that is known; phantom frame, as is `planned`.
+pub(super) fn true_target(
+    text: &TomlText<'_>,
+    key: &dyn Fn(&str) -> String,
+    section: &GoalSection,
+    phantom: &Phantom,
+    planned: &Point3<f64>,
+) -> Result<Option<Point3<f64>>, Finding> {
+    let Some(at) = section.true_target_mm else {
+        return Ok(None);
+    };
+    let at = Point3::from(at.map(|mm| mm * 1e-3));
+    let refused = |message: String| {
+        let [x, y, z] = (planned.coords * 1e3).into();
+        Err(text.finding(&key("true_target_mm"), message).hint(format!(
+            "it is where the lesion that is aimed at really is, in the phantom frame (left, posterior, superior) in \
+             mm; it is planned to be at [{x:.1}, {y:.1}, {z:.1}]"
+        )))
+    };
+    let depth_m = phantom.skin_signed_depth(&at);
+    if depth_m <= 0.0 {
+        let outside_mm = -depth_m * 1e3;
+        return refused(format!(
+            "the true target lies {outside_mm:.1} mm outside the phantom"
+        ));
+    }
+    let apart_m = (at - planned).norm();
+    if apart_m > FARTHEST_TRUE_TARGET_M {
+        return refused(format!(
+            "the true target lies {:.1} mm from the planned one, where at most {:.0} mm can be meant",
+            apart_m * 1e3,
+            FARTHEST_TRUE_TARGET_M * 1e3
+        ));
+    }
+    Ok(Some(at))
+}
+
 fn is_in((low, high): &Corners, point: &Point3<f64>) -> bool {
     (0..3).all(|axis| (low[axis]..=high[axis]).contains(&point[axis]))
 }

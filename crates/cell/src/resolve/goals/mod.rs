@@ -51,6 +51,8 @@ pub struct Goal {
     pub entry_m: Option<Point3<f64>>,
     /// Where the needle's tip is to come.
     pub target_m: Point3<f64>,
+    /// Where the lesion really is, if that is known; nothing is planned by it.
+    pub true_target_m: Option<Point3<f64>>,
     /// Direction of insertion.
     pub axis: UnitVector3<f64>,
     /// Pose of the guide's exit at roll 0; z is [`Goal::axis`].

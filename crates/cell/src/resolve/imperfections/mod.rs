@@ -2,14 +2,16 @@
 
 mod absorbed;
 mod arms;
+mod localised;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 
 pub use super::gears::GearTwist;
 pub(crate) use absorbed::absorbed_sag;
 pub use arms::{ArmPopulation, OriginDeviations};
 pub(crate) use arms::{RealArms, resolve_calibration};
+pub use localised::{Localisation, Markers, TargetLocalisation};
 
 pub use super::arm_values::JointFriction;
 use super::arm_values::{joint_friction, set_point_period_ms};
@@ -43,12 +45,12 @@ pub struct Imperfections {
     pub guide_clearance_m: Option<f64>,
     /// Place of the robot's base.
     pub hand_eye: Option<HandEye>,
-    /// Markers in the phantom frame and root mean square localisation error, m.
-    pub registration: Option<(Vec<Point3<f64>>, f64)>,
+    /// Markers, and how well they are localised.
+    pub registration: Option<Markers>,
     /// Motion of the markers.
     pub skin_markers: Option<SkinMarkers>,
-    /// Standard deviation of the target in the image along the phantom's axes, m.
-    pub imaging_m: Option<Vector3<f64>>,
+    /// How well the target is localised in the image.
+    pub imaging: Option<TargetLocalisation>,
     /// Bending of the needle.
     pub needle: Option<NeedleBending>,
     /// Motion of skin and target along the insertion.
@@ -75,7 +77,7 @@ impl Imperfections {
             hand_eye: None,
             registration: None,
             skin_markers: None,
-            imaging_m: None,
+            imaging: None,
             needle: None,
             indentation: None,
             breathing: None,
@@ -108,8 +110,8 @@ pub struct HandEye {
 /// Markers that move with the skin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SkinMarkers {
-    /// The markers, phantom frame.
-    pub markers_m: Vec<Point3<f64>>,
+    /// The markers, and how they are localised: the fit weighs them by that alone.
+    pub markers: Markers,
     /// Standard deviation of each along each axis, m.
     pub shift_m: f64,
     /// Their common motion.
@@ -207,19 +209,12 @@ pub(crate) fn resolve_imperfections(
         phase_spread: (!block.free).then_some(block.phase_spread),
         hold_failure: block.hold_failure,
     });
-    let registration = section.registration.as_ref().map(|block| {
-        let markers = block.markers_mm.iter();
-        let markers = markers.map(|mm| Point3::from(Vector3::from(*mm) * 1e-3));
-        (
-            markers.collect::<Vec<_>>(),
-            block.localisation_error_mm * 1e-3,
-        )
-    });
+    let registration = section.registration.as_ref().map(Markers::new);
     let skin_markers = section.skin_markers.as_ref().zip(registration.as_ref());
     let skin_markers = skin_markers
         .zip(breathing)
-        .map(|((block, (markers, _)), breathing)| SkinMarkers {
-            markers_m: markers.clone(),
+        .map(|((block, markers), breathing)| SkinMarkers {
+            markers: markers.clone(),
             shift_m: block.shift_mm * 1e-3,
             breathing: Breathing {
                 phase: 0.0,
@@ -268,10 +263,7 @@ pub(crate) fn resolve_imperfections(
         }),
         registration,
         skin_markers,
-        imaging_m: section.imaging.as_ref().map(|block| {
-            let reader = block.reader_mm * block.reader_mm;
-            Vector3::from(block.voxel_mm).map(|voxel| (voxel * voxel / 12.0 + reader).sqrt() * 1e-3)
-        }),
+        imaging: section.imaging.as_ref().map(TargetLocalisation::new),
         needle: section
             .needle
             .as_ref()

@@ -19,7 +19,7 @@ use crate::toml_text::TomlText;
 use crate::{Finding, nearest_name};
 use mesh_parts::with_mesh_parts;
 pub use place::PlacedPhantom;
-pub(super) use place::place_phantom;
+pub(super) use place::{off_the_table, place_phantom};
 
 /// A phantom before it is placed, and the files that it is made of.
 #[derive(Debug)]
@@ -139,12 +139,13 @@ pub(super) fn scenario_phantom(
 
 /// A phantom without a model is what its parts are.
 fn check_no_model(toml: &TomlText<'_>, section: &PhantomSection) -> Result<(), Finding> {
-    for (name, given) in [
-        ("breadth_mm", section.breadth_mm),
-        ("depth_mm", section.depth_mm),
-        ("length_mm", section.length_mm),
+    for (name, is_given) in [
+        ("breadth_mm", section.breadth_mm.is_some()),
+        ("depth_mm", section.depth_mm.is_some()),
+        ("length_mm", section.length_mm.is_some()),
+        ("markers", section.markers.is_some()),
     ] {
-        if given.is_some() {
+        if is_given {
             return Err(toml
                 .finding(
                     &format!("phantom.{name}"),
@@ -195,6 +196,7 @@ fn shipped_phantom(
             resized = true;
         }
     }
+    parameters.marker_kind = section.markers.unwrap_or(parameters.marker_kind);
     let phantom = Phantom::build(&parameters).map_err(|error| {
         one(if resized {
             let key = match &error {

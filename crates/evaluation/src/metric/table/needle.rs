@@ -27,6 +27,14 @@ fn angle_limit_rad(criteria: &CriteriaSection) -> Option<f64> {
     limit_deg.map(f64::to_radians)
 }
 
+fn true_target_limit_m(criteria: &CriteriaSection) -> Option<f64> {
+    criteria.max_true_target_error_mm.map(|mm| mm * MM)
+}
+
+fn true_target_lateral_limit_m(criteria: &CriteriaSection) -> Option<f64> {
+    criteria.max_true_target_lateral_mm.map(|mm| mm * MM)
+}
+
 fn guide_limit_m(criteria: &CriteriaSection) -> Option<f64> {
     criteria.max_guide_position_error_mm.map(|mm| mm * MM)
 }
@@ -157,6 +165,44 @@ pub(super) const PREDICTED: &[Metric] = &[
     .in_static_cases("needle_angle_sagittal_static")
     .better(Less, NEEDLE_RESOLUTION_RAD),
     Metric::new(
+        "true_target_error_predicted",
+        "predicted distance from the true target",
+        "distance of the needle's tip from where the lesion really is (`true_target_mm`), by the balance of \
+         torques; none where that is not known",
+        Length,
+        Configuration(|each| each.predicted?.true_target_error_m),
+    )
+    .of_true_target()
+    .family("true_target_error")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("true_target_error_static")
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
+    .criterion("max_true_target_error_mm", UNSIMULATED, true_target_limit_m)
+    .missing(Missing::Skips)
+    .statistics(Statistics::BY_CASE),
+    Metric::new(
+        "true_target_lateral_predicted",
+        "predicted distance of the true target across the needle",
+        "distance of where the lesion really is (`true_target_mm`) from the needle's axis, by the balance of \
+         torques; none where that is not known",
+        Length,
+        Configuration(|each| each.predicted?.true_target_lateral_m),
+    )
+    .of_true_target()
+    .family("true_target_lateral")
+    .known(Value, ThisDraw, FinalPosture)
+    .in_static_cases("true_target_lateral_static")
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
+    .criterion(
+        "max_true_target_lateral_mm",
+        UNSIMULATED,
+        true_target_lateral_limit_m,
+    )
+    .missing(Missing::Skips)
+    .statistics(Statistics::BY_CASE),
+    Metric::new(
         "entry_target_length",
         "entry-target length",
         "length of the planned needle from the skin to the target",
@@ -235,6 +281,48 @@ pub(super) const SIMULATED: &[Metric] = &[
     )
     .known(Value, ThisDraw, Simulated)
     .show(Show::SmallLength),
+    Metric::new(
+        "true_target_error",
+        "distance from the true target",
+        "distance of the settled needle's tip from where the lesion really is (`true_target_mm`); none where \
+         that is not known",
+        Length,
+        Engines(|each| each.needle.true_target_error_m),
+    )
+    .of_true_target()
+    .known(Value, ThisDraw, Simulated)
+    .each_engine()
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
+    .engines(5, "true lesion\n{engine}")
+    .summary(8, "From the true lesion, {engine}")
+    .page(22, "From the true lesion, {engine}")
+    .page_side(5, "From the true lesion")
+    .criterion("max_true_target_error_mm", &[Dynamic], true_target_limit_m)
+    .missing(Missing::Skips)
+    .statistics(Statistics::BY_CASE.page(Fine)),
+    Metric::new(
+        "true_target_lateral",
+        "distance of the true target across the needle",
+        "settled distance of where the lesion really is (`true_target_mm`) from the needle's axis; none where \
+         that is not known",
+        Length,
+        Engines(|each| each.needle.true_target_lateral_m),
+    )
+    .of_true_target()
+    .known(Value, ThisDraw, Simulated)
+    .better(Less, NEEDLE_RESOLUTION_M)
+    .show(Show::SmallLength)
+    .engines(6, "across\nthe needle")
+    .summary(9, "Across the needle")
+    .page(23, "Across the needle")
+    .criterion(
+        "max_true_target_lateral_mm",
+        &[Dynamic],
+        true_target_lateral_limit_m,
+    )
+    .missing(Missing::Skips)
+    .statistics(Statistics::BY_CASE.page(Fine)),
     Metric::new(
         "entry_error",
         "entry error",

@@ -201,7 +201,7 @@ NB.RunPage = class {
     this.drawPeople();
     this.sideTable();
     this.configurationTable();
-    NB.clear(this.answer, NB.sections.answer(this.goal, this.report.criteria));
+    NB.clear(this.answer, NB.sections.answer(this.goal, this.report.criteria, this.extra.trueTarget));
     NB.clear(this.people, NB.sections.people(this.goal));
     if (this.goalTable) NB.mark(this.goalTable.rows, index);
     const around = [[-0.25, -0.25, -0.1], [0.25, 0.25, 0.3]].map((offset) => offset.map((value, k) => target[k] + value));

@@ -25,13 +25,14 @@ NB.criterionWords = function (name) {
 
 NB.sections = {
   /** What to choose, and why, before all else. */
-  answer(goal, criteria) {
+  answer(goal, criteria, trueTarget) {
     const { recommended } = goal;
     return [
       recommended
         ? NB.el('p', null, NB.el('strong', { text: `Recommended: ${recommended.label}. ` }), recommended.reason.charAt(0).toUpperCase() + recommended.reason.slice(1), '.')
         : NB.el('p', { class: 'error', text: 'Recommended: none, no configuration works.' }),
       NB.sections.route(goal, criteria),
+      trueTarget ? NB.el('p', { text: `${trueTarget.charAt(0).toUpperCase()}${trueTarget.slice(1)}.` }) : [],
     ];
   },
 
@@ -99,7 +100,7 @@ NB.sections = {
       { title: '95 % within', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.budget?.total.at_target.radius_95_m, 2), help: 'distance that 95 % of the draws stay within' },
       { title: 'At the skin', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.budget?.total.at_skin?.analytic.rms_m, 2) },
       { title: 'Mostly by', cell: (c) => (c.budget ? NB.words(c.budget.dominant ?? '\u2013') : c.budget_failure) },
-      ...sources.map((source) => ({ title: `By ${NB.words(source)} alone`, unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.sources.find((each) => each.source === source)) })),
+      ...sources.map((source) => ({ title: `By ${NB.words(source)}${NB.words(source).includes(',') ? ',' : ''} alone`, unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.sources.find((each) => each.source === source)) })),
     ];
     const help = 'Ellipses hold 95 %. x and y are across the needle, z along it; both panels are in mm and to one scale, the same for all configurations of the goal. The bar: each source\u2019s share of the mean square.';
     return [

@@ -22,6 +22,7 @@ use super::engine_headings::{EngineHeading, engine_headings};
 use super::events::events_text;
 use super::ranking::comparison_text;
 use super::shown::{Shown, shown_metrics};
+use super::true_target::true_target_in_words;
 use super::verdict::{capitals, counts, missed_as_expected, status};
 use super::{Table, plain_table};
 use crate::layout;
@@ -54,7 +55,8 @@ fn write_report(
         writeln!(out, "* worst of those that work, < recommended")?;
         write_constant(out, goal, &constant)?;
         write_expected(out, report, goal)?;
-        let checks = columns(&headings, |heading| heading.engines);
+        let mut checks = columns(&headings, |heading| heading.engines);
+        checks.retain(|column| column.metric.says_something(goal));
         if goal
             .configurations
             .iter()
@@ -307,7 +309,7 @@ enum Mostly {
 
 /// The eight rows of a goal; the worst number of each column is marked with `*` and in colour.
 fn goal_table(report: &Report, goal: &GoalReport, columns: &[Column], mostly: Mostly) -> Table {
-    let dominant = |each: &ConfigurationReport| Some(each.budget.as_ref()?.dominant?.name());
+    let dominant = |each: &ConfigurationReport| each.budget.as_ref()?.dominant_in_words();
     let mostly = mostly == Mostly::Shown
         && goal
             .configurations
@@ -631,6 +633,9 @@ fn write_remarks(out: &mut String, report: &Report, goal: &GoalReport) -> std::f
         )?;
     }
     if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
+        writeln!(out, "{words}")?;
+    }
+    if let Some(words) = true_target_in_words(goal) {
         writeln!(out, "{words}")?;
     }
     for configuration in &goal.configurations {

@@ -21,6 +21,7 @@ use crate::table::events::events_in_words;
 use crate::table::plain::{Table, plain_table};
 use crate::table::ranking::words;
 use crate::table::shown::shown_metrics;
+use crate::table::true_target::true_target_in_words;
 use crate::table::verdict::{capitals, counts, missed_as_expected, status};
 
 /// Missed criteria that are listed; of more the number is said.
@@ -148,6 +149,9 @@ fn write_goal(
         )?;
     }
     if let Some(words) = fissures_in_words(&goal.fissures_crossed) {
+        writeln!(out, "{words}")?;
+    }
+    if let Some(words) = true_target_in_words(goal) {
         writeln!(out, "{words}")?;
     }
     Ok(())
@@ -398,6 +402,7 @@ fn write_goals(
             .into_iter()
             .chain(fissures_in_words(&goal.fissures_crossed))
             .chain(events_in_words(goal))
+            .chain(true_target_in_words(goal))
         {
             writeln!(out, "{}: {words}", goal.name)?;
         }

@@ -1,0 +1,338 @@
+//! From a volume to surfaces, markers, registration and targets.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Point3};
+use needlebench_imaging::markers::{DetectedMarker, Found, MarkerModel, Options, find_markers};
+use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_labels};
+use needlebench_imaging::registration::{
+    MarkerMatch, MatchOptions, ReferenceFrame, ReferenceMarker, Registration, TargetError,
+    match_markers, register_weighted,
+};
+use needlebench_imaging::{
+    ImagingError, LabelMap, LesionSeed, ReconstructOptions, Reconstruction, Remark, SurfaceSizes,
+    Volume, reconstruct, resample, structure_of,
+};
+use serde::Serialize;
+
+use super::localisation::target_covariance_m2;
+use crate::Control;
+
+/// Markers whose places are known apart from the scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownMarkers {
+    /// Whose frame the places are in.
+    pub frame: ReferenceFrame,
+    /// What they look like.
+    pub model: MarkerModel,
+    /// Standard deviation of how each marker was put on along each axis, where people followed a drawing: for the match
+    /// alone. A usual one if left out.
+    pub placement_sigma_m: Option<f64>,
+    /// The markers.
+    pub markers: Vec<ReferenceMarker>,
+}
+
+/// A label map from elsewhere.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GivenLabels {
+    /// NIfTI or DICOM segmentation, on the voxels of the volume.
+    pub file: PathBuf,
+    /// Which label is called what, where the file does not say it.
+    pub names: Vec<(u16, String)>,
+}
+
+/// What is to be built.
+#[derive(Debug, Clone, Default)]
+pub struct BuildOptions {
+    /// A point in each lesion.
+    pub lesions: Vec<LesionSeed>,
+    /// Structures from elsewhere.
+    pub labels: Option<GivenLabels>,
+    /// Markers to be found; none are looked for if left out.
+    pub markers: Option<KnownMarkers>,
+    /// Triangles of surfaces.
+    pub sizes: SurfaceSizes,
+    /// Most bytes that a volume may take.
+    pub max_bytes: u64,
+}
+
+/// Markers of a scan, and the registration by them.
+#[derive(Debug, Clone)]
+pub struct Registered {
+    /// Which is which.
+    pub matched: MarkerMatch,
+    /// Where the patient is.
+    pub registration: Registration,
+    /// Covariance of each registered marker, both sides together, in the axes of `ct`, m^2; in the order of the
+    /// registration's markers.
+    pub covariances_m2: Vec<Matrix3<f64>>,
+    /// Where each of them is in `ct`, m.
+    pub places_m: Vec<Point3<f64>>,
+}
+
+/// A lesion as a target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BuiltTarget {
+    /// Name of the lesion.
+    pub name: String,
+    /// Its centroid in `ct`, m.
+    pub center_m: [f64; 3],
+    /// Covariance of how well the centroid is localised in the scan, rows, m^2.
+    pub covariance_m2: [[f64; 3]; 3],
+    /// The registration's error there, with its covariance; none without a registration.
+    pub registration: Option<TargetError>,
+}
+
+/// What a scan shows by itself, whatever is known of its markers.
+#[derive(Debug)]
+pub struct SeenScan {
+    /// The volume, along the patient's axes.
+    pub volume: Volume,
+    /// Where it came from.
+    pub source: Description,
+    /// Surfaces, labels and lesions.
+    pub made: Reconstruction,
+    /// Markers; none if none were looked for.
+    pub markers: Option<Found>,
+    /// What is worth knowing: of reading, of markers, of tissues.
+    pub remarks: Vec<Remark>,
+}
+
+/// What was made of a scan.
+#[derive(Debug, Clone)]
+pub struct ScanBuild {
+    /// What it shows.
+    pub seen: Arc<SeenScan>,
+    /// Markers and registration; none if none were asked for.
+    pub registered: Option<Registered>,
+    /// The lesions that have a surface.
+    pub targets: Vec<BuiltTarget>,
+    /// What is worth knowing: of the scan, and of the registration.
+    pub remarks: Vec<Remark>,
+}
+
+/// Builds a patient from a scan.
+///
+/// The result does not depend on the number of threads.
+///
+/// # Errors
+/// What keeps it from being built, with what to do; interrupted.
+pub fn build(
+    read: ReadVolume,
+    options: &BuildOptions,
+    control: &Control<'_>,
+) -> Result<ScanBuild, ImagingError> {
+    let seen = Arc::new(see(read, options, control)?);
+    register(seen, options)
+}
+
+/// What a scan shows.
+pub(super) fn see(
+    read: ReadVolume,
+    options: &BuildOptions,
+    control: &Control<'_>,
+) -> Result<SeenScan, ImagingError> {
+    let Control {
+        threads,
+        cancel,
+        progress,
+    } = *control;
+    let mut remarks = read.remarks;
+    let resampled = resample(read.volume, options.max_bytes, threads, cancel)?;
+    let is_interpolated = resampled.remark.is_some();
+    remarks.extend(resampled.remark);
+    let volume = resampled.volume;
+    let labels = options.labels.as_ref();
+    let labels =
+        labels.map(|given| labels_of(given, &volume, options.max_bytes, control, &mut remarks));
+    let labels = labels.transpose()?;
+    let markers = options.markers.as_ref().map(|known| {
+        progress.message("markers");
+        find_markers(&volume, &known.model, &Options::default(), threads, cancel)
+    });
+    let mut markers = markers.transpose()?;
+    if is_interpolated {
+        markers = markers.map(|found| found.of_interpolated(&volume));
+    }
+    remarks.extend(
+        markers
+            .iter()
+            .flat_map(|found| found.remarks.iter().cloned()),
+    );
+    let wanted = ReconstructOptions {
+        lesions: options.lesions.clone(),
+        labels,
+        sizes: options.sizes,
+        ..ReconstructOptions::default()
+    };
+    let step = |what: &str, share: f64| {
+        const STEPS: f64 = 1000.0;
+        progress.message(what);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of a thousand"
+        )]
+        progress.at((share.clamp(0.0, 1.0) * STEPS) as u64, STEPS as u64);
+    };
+    let made = reconstruct(&volume, &wanted, threads, cancel, &step)?;
+    remarks.extend(made.remarks.iter().cloned());
+    Ok(SeenScan {
+        volume,
+        source: read.description,
+        made,
+        markers,
+        remarks,
+    })
+}
+
+/// With what is known of the markers.
+pub(super) fn register(
+    seen: Arc<SeenScan>,
+    options: &BuildOptions,
+) -> Result<ScanBuild, ImagingError> {
+    let mut remarks = seen.remarks.clone();
+    let registered = match (&seen.markers, &options.markers) {
+        (Some(found), Some(known)) => Some(registered(found, known, &mut remarks)?),
+        _ => None,
+    };
+    let targets = targets(&seen.volume, &seen.made, registered.as_ref());
+    Ok(ScanBuild {
+        seen,
+        registered,
+        targets,
+        remarks,
+    })
+}
+
+/// The label map, with its names.
+fn labels_of(
+    given: &GivenLabels,
+    volume: &Volume,
+    max_bytes: u64,
+    control: &Control<'_>,
+    remarks: &mut Vec<Remark>,
+) -> Result<LabelMap, ImagingError> {
+    let options = ReadOptions {
+        max_bytes,
+        ..ReadOptions::default()
+    };
+    let place = given.file.display().to_string();
+    let read = read_labels(&given.file, &volume.grid, &options, control.cancel)
+        .map_err(|error| error.at(place.clone()))?;
+    remarks.extend(
+        read.remarks
+            .into_iter()
+            .map(|remark| remark.at("label map")),
+    );
+    let mut map = read.labels;
+    for (label, name) in &mut map.names {
+        if let Some((_, given)) = given.names.iter().find(|(known, _)| known == label) {
+            name.clone_from(given);
+        }
+    }
+    if map
+        .names
+        .iter()
+        .all(|(_, name)| structure_of(name).is_none())
+    {
+        let names = map
+            .names
+            .iter()
+            .map(|(label, name)| format!("{label} `{name}`"));
+        return Err(ImagingError::refused(format!(
+            "none of its labels has a name with a known meaning: {}",
+            names.take(8).collect::<Vec<_>>().join(", ")
+        ))
+        .at(place)
+        .hint("say what they are called with --label-names: names as TotalSegmentator's or 3D Slicer's are known"));
+    }
+    Ok(map)
+}
+
+fn registered(
+    found: &Found,
+    known: &KnownMarkers,
+    remarks: &mut Vec<Remark>,
+) -> Result<Registered, ImagingError> {
+    let detected: Vec<_> = found
+        .markers
+        .iter()
+        .map(DetectedMarker::localised)
+        .collect();
+    let usual = MatchOptions::default();
+    let options = MatchOptions {
+        placement_sigma_m: known.placement_sigma_m.unwrap_or(usual.placement_sigma_m),
+        ..usual
+    };
+    let matched = match_markers(&detected, &known.markers, &options)
+        .map_err(|error| with_found(error, found))?;
+    remarks.extend(matched.remarks.iter().cloned());
+    let registration = register_weighted(&matched, &detected, &known.markers, known.frame)?;
+    remarks.extend(registration.remarks.iter().cloned());
+    for pair in &matched.pairs {
+        let name = &known.markers[pair.reference].name;
+        let of_it = found.markers[pair.detected].remarks.iter();
+        remarks.extend(of_it.map(|remark| remark.clone().at(format!("marker `{name}`"))));
+    }
+    let ct_from_reference = registration.reference_from_ct.rotation.inverse();
+    let turn = ct_from_reference.to_rotation_matrix();
+    let covariances_m2 = matched.pairs.iter().map(|pair| {
+        let of_reference = known.markers[pair.reference].covariance_m2;
+        let both = detected[pair.detected].covariance_m2 + turn * of_reference * turn.transpose();
+        0.5 * (both + both.transpose())
+    });
+    let covariances_m2 = covariances_m2.collect();
+    let places_m = matched.pairs.iter();
+    let places_m = places_m.map(|pair| detected[pair.detected].at_m).collect();
+    Ok(Registered {
+        matched,
+        registration,
+        covariances_m2,
+        places_m,
+    })
+}
+
+/// How many were found belongs to what is said of a match that there is not.
+fn with_found(error: ImagingError, found: &Found) -> ImagingError {
+    match error {
+        ImagingError::Refused {
+            place,
+            message,
+            hint,
+        } => ImagingError::Refused {
+            place: place.or_else(|| Some("markers".to_owned())),
+            message: format!("{message}; {} were found in the scan", found.markers.len()),
+            hint: hint.or_else(|| {
+                Some(
+                    "check diameter and kind of the markers, and that the list is of this patient"
+                        .to_owned(),
+                )
+            }),
+        },
+        other @ ImagingError::Interrupted => other,
+    }
+}
+
+fn targets(
+    volume: &Volume,
+    made: &Reconstruction,
+    registered: Option<&Registered>,
+) -> Vec<BuiltTarget> {
+    let lesions = made.lesions.iter();
+    lesions
+        .filter_map(|measured| {
+            let size = measured.size.as_ref()?;
+            let covariance = target_covariance_m2(volume, &measured.lesion);
+            Some(BuiltTarget {
+                name: measured.lesion.name.clone(),
+                center_m: size.centroid_m.coords.into(),
+                covariance_m2: std::array::from_fn(|row| {
+                    std::array::from_fn(|column| covariance[(row, column)])
+                }),
+                registration: registered.map(|it| it.registration.tre(&size.centroid_m)),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,25 @@
+//! From phantoms and scenarios to CT volumes, and from CT volumes to scenarios.
+
+mod anatomy;
+mod build;
+mod files;
+mod imaged;
+mod localisation;
+mod patient;
+mod scan_order;
+mod touched;
+mod truth;
+
+/// The room that a patient is put into unless somebody names another.
+pub const USUAL_ROOM: &str = include_str!("room.toml");
+
+pub use anatomy::{Materials, phantom_scene};
+pub use build::{
+    BuildOptions, BuiltTarget, GivenLabels, KnownMarkers, Registered, ScanBuild, SeenScan, build,
+};
+pub use files::{BuildReport, write_build};
+pub use imaged::{BuildStop, Imaged, LastScan, imaged, scanned, write_patient};
+pub use patient::{PatientFrame, Room};
+pub use scan_order::{CtSubject, ScanOrder, ScanRange, SyntheticScan};
+pub use touched::marker_list;
+pub use truth::{LesionTruth, MarkerTruth, ScanTruth};

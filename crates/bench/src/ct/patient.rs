@@ -1,0 +1,228 @@
+//! A scenario with the patient that was built from a scan.
+
+use std::path::Path;
+
+use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+use needlebench_cell::ResolvedScenario;
+use needlebench_cell::phantom::Tissue;
+use needlebench_cell::scenario::{
+    CovarianceMm2, GoalSection, ImagingBlock, PartSection, PartTissue, PhantomSection,
+    RegistrationBlock, Scenario,
+};
+use needlebench_imaging::SurfaceTissue;
+use needlebench_imaging::registration::ReferenceFrame;
+use needlebench_kinematics::Pose;
+
+use super::ScanBuild;
+
+/// Folder of the surfaces, beside the scenario.
+pub(super) const SURFACES: &str = "surfaces";
+
+/// Step that places in the scenario are rounded to, mm: far below what anything here is known to.
+const PLACE_STEP: f64 = 1e-6;
+
+/// The patient that was built, about the middle of the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PatientFrame {
+    /// Origin of the phantom's frame in `ct`, m: the middle of the skin's box, to a millimetre. Axes are those of `ct`.
+    pub origin_in_ct_m: Vector3<f64>,
+}
+
+impl PatientFrame {
+    /// Of what was built.
+    pub fn of(build: &ScanBuild) -> Self {
+        let skin = build
+            .seen
+            .made
+            .surfaces
+            .iter()
+            .find(|each| each.tissue == SurfaceTissue::Skin);
+        let origin = skin.map_or_else(Vector3::zeros, |skin| {
+            let [low, high] = needlebench_geometry::mesh::extent_m(&skin.mesh);
+            nalgebra::center(&low, &high).coords
+        });
+        Self {
+            origin_in_ct_m: origin.map(|metres| (metres * 1e3).round() * 1e-3),
+        }
+    }
+
+    /// A place of `ct` in the phantom's frame, mm.
+    pub fn in_mm(&self, place_m: &Point3<f64>) -> [f64; 3] {
+        (place_m.coords - self.origin_in_ct_m)
+            .map(|metres| rounded(metres * 1e3, PLACE_STEP))
+            .into()
+    }
+
+    /// From the phantom's frame to `ct`.
+    pub fn ct_from_phantom(&self) -> Pose {
+        Pose::from_parts(self.origin_in_ct_m.into(), UnitQuaternion::identity())
+    }
+}
+
+fn rounded(value: f64, step: f64) -> f64 {
+    // Not -0, which reads as if it meant something.
+    let digits = (1.0 / step).round();
+    (value * digits).round() / digits + 0.0
+}
+
+/// The room without its own patient.
+#[derive(Debug, Clone)]
+pub struct Room<'r> {
+    /// Robot, tool, table and all else; its phantom says how the patient lies.
+    pub scenario: &'r Scenario,
+    /// The same, resolved.
+    pub resolved: &'r ResolvedScenario,
+    /// The folder that its paths are relative to.
+    pub folder: &'r Path,
+}
+
+/// The scenario of a patient that was built: surfaces as parts, the robot where the registration puts it, measured
+/// covariances, and these goals. It is for a file in `folder`, with the surfaces in [`SURFACES`] beside it.
+pub fn patient_scenario(
+    room: &Room<'_>,
+    build: &ScanBuild,
+    goals: Vec<GoalSection>,
+    folder: &Path,
+) -> Scenario {
+    let frame = PatientFrame::of(build);
+    let mut scenario = room.scenario.clone();
+    scenario.moved_files(room.folder, folder);
+    scenario.ct = None;
+    scenario.goals = goals;
+    let own = scenario.phantom.take().unwrap_or_default();
+    let mut phantom = phantom(own, room, build, &frame);
+    if let Some(registered) = &build.registered {
+        let reference_from_phantom =
+            registered.registration.reference_from_ct * frame.ct_from_phantom();
+        if registered.registration.frame == ReferenceFrame::Robot {
+            let world_from_robot = room.resolved.cell.robot.world_from_base_link;
+            phantom.set_pose(&(world_from_robot * reference_from_phantom));
+        }
+        let measured = RegistrationBlock {
+            markers_mm: registered
+                .places_m
+                .iter()
+                .map(|place| frame.in_mm(place))
+                .collect(),
+            covariance_mm2: Some(registered.covariances_m2.iter().map(in_mm2).collect()),
+            ..RegistrationBlock::default()
+        };
+        match &mut scenario.imperfections {
+            Some(blocks) => {
+                blocks.registration = Some(measured);
+                if registered.registration.frame == ReferenceFrame::Robot {
+                    // The markers' places are the robot's own: there is no other way from the scan to it.
+                    blocks.hand_eye = None;
+                }
+            }
+            None => scenario.expected.registration = Some(measured),
+        }
+    }
+    let least_certain = build.targets.iter().max_by(|a, b| {
+        let spread = |target: &super::BuiltTarget| {
+            (0..3)
+                .map(|axis| target.covariance_m2[axis][axis])
+                .sum::<f64>()
+        };
+        spread(a).total_cmp(&spread(b))
+    });
+    if let Some(target) = least_certain {
+        let rows = &target.covariance_m2;
+        let measured = ImagingBlock {
+            covariance_mm2: Some(in_mm2(&Matrix3::from_fn(|row, column| rows[row][column]))),
+            ..ImagingBlock::default()
+        };
+        match &mut scenario.imperfections {
+            Some(blocks) => blocks.imaging = Some(measured),
+            None => scenario.expected.imaging = Some(measured),
+        }
+    }
+    scenario.phantom = Some(phantom);
+    scenario
+}
+
+fn phantom(
+    own: PhantomSection,
+    room: &Room<'_>,
+    build: &ScanBuild,
+    frame: &PatientFrame,
+) -> PhantomSection {
+    let has_limbs = own.head || own.arms != needlebench_cell::scenario::Arms::None;
+    let model = room
+        .resolved
+        .phantom
+        .as_ref()
+        .filter(|placed| has_limbs && placed.phantom.parameters.is_some());
+    let mut replaces = Vec::new();
+    if let Some(placed) = model {
+        for tissue in [
+            Tissue::Skin,
+            Tissue::Bone,
+            Tissue::Vessel,
+            Tissue::Organ,
+            Tissue::Fissure,
+            Tissue::Lesion,
+            Tissue::Marker,
+        ] {
+            if placed
+                .phantom
+                .parts
+                .iter()
+                .any(|part| part.tissue == tissue)
+            {
+                replaces.push(tissue.to_string());
+            }
+        }
+    }
+    let position_mm = frame.in_mm(&Point3::origin());
+    let surfaces = build.seen.made.surfaces.iter();
+    let parts = surfaces.map(|surface| PartSection {
+        name: surface.name.clone(),
+        file: format!("{SURFACES}/{}.stl", surface.name),
+        tissue: match surface.tissue {
+            SurfaceTissue::Skin => PartTissue::Skin,
+            SurfaceTissue::Bone => PartTissue::Bone,
+            SurfaceTissue::Vessel => PartTissue::Vessel,
+            SurfaceTissue::Organ => PartTissue::Organ,
+            SurfaceTissue::Lung => PartTissue::Lung,
+            SurfaceTissue::Lesion => PartTissue::Lesion,
+        },
+        unit: needlebench_cell::scenario::LengthUnit::Mm,
+        position_mm,
+        rpy_deg: [0.0; 3],
+        flip: false,
+        replaces: if surface.tissue == SurfaceTissue::Skin {
+            replaces.clone()
+        } else {
+            Vec::new()
+        },
+    });
+    let parts = parts.collect();
+    match model {
+        Some(_) => PhantomSection {
+            markers: None,
+            parts,
+            ..own
+        },
+        None => PhantomSection {
+            model: "none".to_owned(),
+            breadth_mm: None,
+            depth_mm: None,
+            length_mm: None,
+            markers: None,
+            arms: needlebench_cell::scenario::Arms::None,
+            head: false,
+            parts,
+            ..own
+        },
+    }
+}
+
+fn in_mm2(covariance_m2: &Matrix3<f64>) -> CovarianceMm2 {
+    let at = |row: usize, column: usize| covariance_m2[(row, column)] * 1e6;
+    // Digits that a person reads, and more than are known: eight of the largest.
+    let most = (0..3).map(|axis| at(axis, axis)).fold(0.0, f64::max);
+    let step = 10_f64.powf(most.max(1e-12).log10().floor() - 8.0);
+    [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+        .map(|(row, column)| rounded(at(row, column), step))
+}

@@ -1,0 +1,51 @@
+//! CT volumes: read, synthesised, segmented, turned into surfaces, and registered to the robot by markers.
+//!
+//! Metres and Hounsfield units throughout. Frame `ct` is the patient's LPS: +x to the patient's left, +y posterior,
+//! +z towards the head; its axes are those of the frame `phantom`. An index (i, j, k) means a voxel's centre: column,
+//! row, slice. A volume of n columns spans -0.5 to n - 0.5.
+//!
+//! Names and birth dates of patients are never read into any value of this crate.
+
+mod components;
+mod distance;
+mod error;
+mod grid;
+mod histogram;
+pub mod markers;
+mod mask;
+mod morphology;
+mod orientation;
+pub mod read;
+mod reconstruct;
+pub mod registration;
+mod resample;
+mod segment;
+mod serial;
+mod spacing;
+mod structures;
+mod surface;
+pub mod synth;
+mod volume;
+pub mod write;
+
+pub use components::{Component, Components, Connectivity};
+pub use distance::{DistanceField, DistanceOptions};
+pub use error::{ImagingError, Remark};
+pub use grid::{NotAGrid, VoxelGrid};
+pub use histogram::HuHistogram;
+pub use mask::{IndexBox, Mask};
+pub use morphology::{bridged, closed, dilated, eroded, opened};
+pub use orientation::{NoOrientation, Orientation};
+pub use reconstruct::{
+    LesionSize, MeasuredLesion, Progress, ReconstructOptions, Reconstruction, SURFACE_ERROR_M,
+    Surface, SurfaceSizes, reconstruct,
+};
+pub use resample::{Resampled, resample};
+pub use segment::{
+    BONE_LEVEL_HU, Body, Bone, FIRST_LESION, LUNG_LEVEL_HU, Label, LabelFacts, Lesion, LesionSeed,
+    Levels, Lung, Lungs, SKIN_LEVEL_HU, Segmentation, Side, grow_lesion, label_facts, label_map,
+    segment,
+};
+pub use structures::{Structure, SurfaceTissue, structure_of};
+pub use surface::{Field, Level, SurfaceError, Values, simplify, surface_error, surface_net};
+pub use volume::{AIR_HU, LabelMap, Volume};

@@ -1,0 +1,217 @@
+//! Noise of a scan, and how it is correlated between voxels.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Volume;
+
+/// Side of a patch in voxels.
+const PATCH: usize = 16;
+
+/// Farthest lag across the slice, in voxels: what kernels blur.
+pub const REACH: usize = 3;
+
+/// Farthest lag between slices: overlapping ones share their noise.
+pub const SLICES: usize = 2;
+
+/// What may be soft tissue, HU; metal, bone, fat against lung are not homogeneous.
+const SOFT_HU: std::ops::RangeInclusive<i16> = -250..=350;
+
+/// Patches are taken on a lattice of at most so many along each direction.
+const LATTICE: [usize; 3] = [24, 24, 16];
+
+/// Most patches whose correlation is taken: hundreds of thousands of voxels.
+const MOST: usize = 160;
+
+/// Fewest patches that say something.
+const FEWEST: usize = 6;
+
+const WIDTH: usize = 2 * REACH + 1;
+
+/// Standard deviation and correlation of a scan's noise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Noise {
+    /// Median over patches of soft tissue.
+    pub sd_hu: f64,
+    /// Correlation between voxels: `[dk][dj + 3][di + 3]` for `dk` from 0; the other half is the same, mirrored.
+    pub correlation: Vec<[[f64; WIDTH]; WIDTH]>,
+}
+
+impl Noise {
+    /// Correlation between voxels that are so far apart.
+    pub fn between(&self, [di, dj, dk]: [isize; 3]) -> f64 {
+        let (di, dj, dk) = if dk < 0 {
+            (-di, -dj, -dk)
+        } else {
+            (di, dj, dk)
+        };
+        let lag = |d: isize| usize::try_from(d + REACH as isize).ok();
+        let (Some(i), Some(j), Ok(k)) = (lag(di), lag(dj), usize::try_from(dk)) else {
+            return 0.0;
+        };
+        let row = self.correlation.get(k).and_then(|plane| plane.get(j));
+        row.and_then(|row| row.get(i)).copied().unwrap_or(0.0)
+    }
+
+    /// Voxels that tell as much as one without correlation.
+    pub fn voxels_per_value(&self) -> f64 {
+        let all = |plane: &[[f64; WIDTH]; WIDTH]| plane.iter().flatten().sum::<f64>();
+        let others: f64 = self.correlation.iter().skip(1).map(all).sum();
+        (self.correlation.first().map_or(1.0, all) + 2.0 * others).max(1.0)
+    }
+}
+
+/// Noise as homogeneous patches of soft tissue show it; nothing where there are none, or no noise.
+///
+/// Planes are taken out of the patches, so that slow changes of tissue do not count. Patches with structure have a
+/// larger variance: standard deviation and correlation are those of the half with the smaller one, put right for what
+/// that choice and the planes leave out.
+pub fn measure_noise(volume: &Volume) -> Option<Noise> {
+    let size = volume.grid.size();
+    if size[0] < PATCH || size[1] < PATCH {
+        return None;
+    }
+    let places = |axis: usize, reach: usize| -> Vec<usize> {
+        let room = size[axis] - reach;
+        let count = LATTICE[axis].min(room / 4 + 1);
+        (0..count)
+            .map(|n| room * (2 * n + 1) / (2 * count))
+            .collect()
+    };
+    let mut patches = Vec::new();
+    for &k in &places(2, 1) {
+        for &j in &places(1, PATCH) {
+            for &i in &places(0, PATCH) {
+                patches
+                    .extend(flat(volume, [i, j, k]).map(|values| (variance(&values), [i, j, k])));
+            }
+        }
+    }
+    if patches.len() < FEWEST {
+        return None;
+    }
+    patches.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let median = patches[patches.len() / 2].0;
+    let half = patches.len().div_ceil(2);
+    let mut sums = vec![[[0.0; WIDTH]; WIDTH]; SLICES + 1];
+    for (_, place) in patches[..half].iter().step_by(half.div_ceil(MOST)) {
+        add_products(volume, *place, &mut sums);
+    }
+    let whole = sums[0][REACH][REACH];
+    if whole <= 0.0 || median <= 0.0 {
+        return None;
+    }
+    for value in sums.iter_mut().flatten().flatten() {
+        *value /= whole;
+    }
+    let mut noise = Noise {
+        sd_hu: median.sqrt(),
+        correlation: sums,
+    };
+    // A plane takes three values of those that a patch is worth.
+    let plane = &noise.correlation[0];
+    let per_value = plane.iter().flatten().sum::<f64>().max(1.0);
+    let worth = (PATCH * PATCH) as f64 / per_value;
+    noise.sd_hu *= (worth / (worth - 3.0).max(1.0)).sqrt();
+    Some(noise)
+}
+
+fn variance(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
+}
+
+/// Adds a patch's mean products by lag.
+fn add_products(volume: &Volume, [i, j, k]: [usize; 3], sums: &mut [[[f64; WIDTH]; WIDTH]]) {
+    let planes: Vec<Vec<f64>> = (k..(k + SLICES + 1).min(volume.grid.size()[2]))
+        .map_while(|k| flat(volume, [i, j, k]))
+        .collect();
+    let Some(first) = planes.first() else { return };
+    let reach = REACH as isize;
+    let side = PATCH as isize;
+    for (plane, sums) in planes.iter().zip(sums) {
+        for dj in -reach..=reach {
+            for di in -reach..=reach {
+                let mut sum = 0.0;
+                for y in 0.max(-dj)..side.min(side - dj) {
+                    for x in 0.max(-di)..side.min(side - di) {
+                        let at = |x: isize, y: isize| (y * side + x) as usize;
+                        sum += first[at(x, y)] * plane[at(x + di, y + dj)];
+                    }
+                }
+                let count = (side - di.abs()) * (side - dj.abs());
+                sums[(dj + reach) as usize][(di + reach) as usize] += sum / count as f64;
+            }
+        }
+    }
+}
+
+/// Soft tissue less its plane; nothing if something else is there.
+fn flat(volume: &Volume, [i, j, k]: [usize; 3]) -> Option<Vec<f64>> {
+    let mut values = Vec::with_capacity(PATCH * PATCH);
+    for y in 0..PATCH {
+        let start = volume.grid.offset([i, j + y, k]);
+        let row = &volume.hu[start..start + PATCH];
+        if !row.iter().all(|hu| SOFT_HU.contains(hu)) {
+            return None;
+        }
+        values.extend(row.iter().map(|&hu| f64::from(hu)));
+    }
+    let middle = (PATCH as f64 - 1.0) / 2.0;
+    let count = (PATCH * PATCH) as f64;
+    let (mut mean, mut by_x, mut by_y, mut square) = (0.0, 0.0, 0.0, 0.0);
+    for (index, value) in values.iter().enumerate() {
+        let (x, y) = (
+            (index % PATCH) as f64 - middle,
+            (index / PATCH) as f64 - middle,
+        );
+        mean += value / count;
+        by_x += value * x;
+        by_y += value * y;
+        square += x * x;
+    }
+    for (index, value) in values.iter_mut().enumerate() {
+        let (x, y) = (
+            (index % PATCH) as f64 - middle,
+            (index / PATCH) as f64 - middle,
+        );
+        *value -= mean + (by_x * x + by_y * y) / square;
+    }
+    Some(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+    use needlebench_kinematics::random::NormalPairs;
+
+    use super::*;
+    use crate::VoxelGrid;
+
+    #[test]
+    fn filtered_noise_is_measured_with_its_correlation() {
+        let size = [96, 96, 12];
+        let grid = VoxelGrid::aligned(size, [7e-4, 7e-4, 1e-3], Point3::origin()).unwrap();
+        let mut random = NormalPairs::new(5);
+        // Mean of two neighbours along x: correlation a half at lag 1, none at 2; a slope that is no noise.
+        let mut hu = Vec::new();
+        for _ in 0..size[1] * size[2] {
+            let row: Vec<f64> = (0..=size[0]).map(|_| 30.0 * random.next_normal()).collect();
+            #[expect(clippy::cast_possible_truncation, reason = "some hundred HU")]
+            hu.extend(
+                (0..size[0]).map(|x| (0.5 * (row[x] + row[x + 1]) + 0.5 * x as f64).round() as i16),
+            );
+        }
+        let noise = measure_noise(&Volume {
+            grid,
+            hu,
+            slice_thickness_m: None,
+        })
+        .unwrap();
+        let sd = 30.0 / 2.0_f64.sqrt();
+        assert!((noise.sd_hu / sd - 1.0).abs() < 0.05, "{}", noise.sd_hu);
+        assert!((noise.between([1, 0, 0]) - 0.5).abs() < 0.06);
+        assert!(noise.between([2, 0, 0]).abs() < 0.06 && noise.between([0, 1, 0]).abs() < 0.06);
+        assert!(noise.between([0, 0, 1]).abs() < 0.06);
+        assert_eq!(noise.between([-1, 2, -1]), noise.between([1, -2, 1]));
+        assert_eq!(noise.between([9, 0, 0]), 0.0);
+    }
+}

@@ -1,0 +1,301 @@
+//! DICOM: one file, or all files of a folder and its folders.
+//!
+//! The elements that are needed are read by a reader of our own, which skips all others unread and holds each length
+//! against the file; pixels are decoded by dicom-rs.
+
+mod caught;
+mod dataset;
+mod file;
+mod image;
+mod pixels;
+mod segmentation;
+mod series;
+mod stack;
+mod syntax;
+mod tag;
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use self::file::OpenedFile;
+use self::image::{Slice, named, slices};
+use self::stack::Stack;
+use super::placing::within_reason;
+use super::{Description, ReadOptions, ReadVolume, plausibility};
+use crate::{ImagingError, Remark, Volume};
+
+pub(super) use file::{FIRST_BYTES, is_dicom};
+pub(super) use segmentation::read as read_segmentation;
+
+/// Folders within folders, as exports have them: patient, study, series.
+const DEPTH: usize = 8;
+
+/// Files that a folder may hold.
+const FILES: usize = 200_000;
+
+/// Difference in degrees between the tilt that the positions have and that of the header, which is worth a remark.
+const TILT_DEG: f64 = 0.5;
+
+/// What was found at a path.
+struct Found {
+    slices: Vec<Slice>,
+    /// Files that are DICOM, and could not be read, with why.
+    broken: Vec<ImagingError>,
+    others: usize,
+}
+
+pub(super) fn read(
+    path: &Path,
+    options: &ReadOptions,
+    threads: usize,
+    cancel: &AtomicBool,
+) -> Result<ReadVolume, ImagingError> {
+    let Found {
+        slices,
+        mut broken,
+        others,
+    } = find(path, options, cancel)?;
+    if slices.is_empty() {
+        return Err(if broken.is_empty() {
+            without_images(path, others)
+        } else {
+            broken.swap_remove(0)
+        });
+    }
+    let (series, mut remarks) = series::choose(series::all(slices), options.series.as_deref())?;
+    if let Some(problem) = broken.first() {
+        // Which series it was of is not known: it may be the missing slice.
+        return Err(ImagingError::refused(format!(
+            "{} of the files cannot be read; {}",
+            broken.len(),
+            problem
+        ))
+        .at(place_of(problem))
+        .hint("copy or export it again, or take it out of the folder"));
+    }
+    let label = series.label.clone();
+    let stack = stack::stack(series.slices, options.fill_gaps)?;
+    remarks.extend(header_remarks(&stack));
+    within_reason(&stack.grid, true, &mut remarks)?;
+    let measured = stack.slices.len().max(stack.sources.len()) as u64;
+    let plane = (stack.grid.size()[0] * stack.grid.size()[1]) as u64;
+    let copies = if stack.sources.len() == stack.slices.len() {
+        1
+    } else {
+        2
+    };
+    options.check_memory(
+        &stack.grid,
+        plane * measured * size_of::<i16>() as u64 * copies,
+    )?;
+    pixels::check(&stack.slices)?;
+    let (hu, tally) = pixels::hu(&stack.slices, &stack.sources, options, threads, cancel)?;
+    let description = description(&stack, label, tally.padding);
+    let volume = Volume {
+        grid: stack.grid,
+        hu,
+        slice_thickness_m: stack.slices[0].thickness_mm.map(|mm| mm / 1e3),
+    };
+    remarks.extend(stack.remarks);
+    remarks.extend(plausibility::remarks(&volume, &tally));
+    Ok(ReadVolume {
+        volume,
+        remarks,
+        description,
+    })
+}
+
+fn without_images(path: &Path, files: usize) -> ImagingError {
+    let what = match (path.is_dir(), files) {
+        (false, _) => "it is DICOM, but no image".to_owned(),
+        (true, 0) => "the folder is empty".to_owned(),
+        (true, files) => format!("none of its {files} files is a DICOM image"),
+    };
+    ImagingError::refused(what)
+        .hint("name a folder with the DICOM files of a scan, or a .nii or .nii.gz file")
+}
+
+fn place_of(problem: &ImagingError) -> String {
+    match problem {
+        ImagingError::Refused {
+            place: Some(place), ..
+        } => place.clone(),
+        _ => String::new(),
+    }
+}
+
+/// All slices of the files at a path.
+fn find(path: &Path, options: &ReadOptions, cancel: &AtomicBool) -> Result<Found, ImagingError> {
+    let mut files = Vec::new();
+    if path.is_dir() {
+        collect(path, DEPTH, &mut files)?;
+        files.sort();
+    } else {
+        files.push(path.to_owned());
+    }
+    let mut found = Found {
+        slices: Vec::new(),
+        broken: Vec::new(),
+        others: 0,
+    };
+    for file in files {
+        if cancel.load(Ordering::Relaxed) {
+            return Err(ImagingError::Interrupted);
+        }
+        let name = match file.strip_prefix(path) {
+            Ok(inner) if inner.components().next().is_some() => inner.display().to_string(),
+            _ => file
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+        };
+        let opened = OpenedFile::open(&file, options.max_bytes);
+        match opened.map(|opened| opened.map(|opened| slices(opened, &file, &name))) {
+            Ok(None) => found.others += 1,
+            Ok(Some(Ok(slices))) if slices.is_empty() => found.others += 1,
+            Ok(Some(Ok(slices))) => found.slices.extend(slices),
+            Ok(Some(Err(problem))) => found.broken.push(problem),
+            Err(problem) => found.broken.push(named(problem, &name)),
+        }
+    }
+    Ok(found)
+}
+
+/// Files of a folder and its folders. Links to folders are not followed: they may lead in circles.
+fn collect(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), ImagingError> {
+    let unreadable =
+        |error: std::io::Error| super::unreadable(error).at(folder.display().to_string());
+    for entry in folder.read_dir().map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?;
+        let kind = entry.file_type().map_err(unreadable)?;
+        let path = entry.path();
+        if kind.is_dir() && depth > 0 {
+            collect(&path, depth - 1, files)?;
+        } else if kind.is_file() || kind.is_symlink() && path.is_file() {
+            files.push(path);
+        }
+        if files.len() > FILES {
+            return Err(
+                ImagingError::refused(format!("it holds more than {FILES} files"))
+                    .hint("name the folder of one study or series"),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// What is odd in the headers of slices.
+fn header_remarks(stack: &Stack) -> Vec<Remark> {
+    let slices = &stack.slices;
+    let mut remarks = Vec::new();
+    let first_with = |is_odd: &dyn Fn(&Slice) -> bool| {
+        let odd = slices.iter().filter(|slice| is_odd(slice));
+        let count = odd.clone().count();
+        odd.into_iter().next().map(|slice| (slice, count))
+    };
+    if let Some((slice, _)) = first_with(&|slice| slice.file.assumed.is_some()) {
+        remarks.push(Remark::new(slice.file.assumed.unwrap_or_default()).at(&*slice.file.name));
+    }
+    if let Some((slice, count)) = first_with(&|slice| !slice.has_rescale) {
+        let message = format!(
+            "{count} slices have no slope and intercept: their stored numbers are taken as HU"
+        );
+        remarks.push(Remark::new(message).at(&*slice.file.name));
+    }
+    if let Some((slice, _)) = first_with(&|slice| slice.rescale_type.is_some()) {
+        let kind = slice.rescale_type.as_deref().unwrap_or_default();
+        remarks.push(
+            Remark::new(format!("the unit is said to be {kind}, and not HU")).at(&*slice.file.name),
+        );
+    }
+    if let Some((slice, count)) = first_with(&|slice| slice.file.is_lossy) {
+        let message = format!(
+            "{count} slices were compressed with loss: HU are no longer those that were measured"
+        );
+        remarks.push(Remark::new(message).at(&*slice.file.name));
+    }
+    if let Some((slice, count)) = first_with(&|slice| slice.file.may_be_lossy) {
+        let message = format!(
+            "{count} slices may have been compressed with loss: their compression can, and the file does not say"
+        );
+        remarks.push(Remark::new(message).at(&*slice.file.name));
+    }
+    let has_wrong_padding =
+        |slice: &Slice| slice.file.padding.is_some() && pixels::applicable_padding(slice).is_none();
+    if let Some((slice, _)) = first_with(&has_wrong_padding) {
+        let [least, _] = slice.file.padding.unwrap_or_default();
+        remarks.push(
+            Remark::new(format!(
+                "padding is said to be stored as {least}, which may be tissue by slope and intercept: not applied"
+            ))
+            .at(&*slice.file.name),
+        );
+    }
+    remarks.extend(varying_rescale(slices));
+    remarks.extend(tilt(stack));
+    remarks
+}
+
+fn varying_rescale(slices: &[Slice]) -> Option<Remark> {
+    let pairs: BTreeSet<[u64; 2]> = slices
+        .iter()
+        .filter_map(|slice| slice.rescale.as_ref().ok())
+        .map(|rescale| [rescale.slope.to_bits(), rescale.intercept.to_bits()])
+        .collect();
+    (pairs.len() > 1).then(|| {
+        Remark::new(format!(
+            "slope and intercept differ between slices ({} pairs): each slice has its own",
+            pairs.len()
+        ))
+    })
+}
+
+fn tilt(stack: &Stack) -> Option<Remark> {
+    let by_positions_deg = stack.grid.tilt_rad().to_degrees();
+    // Tilted slices of a table that moves along its own axis are sheared; the header's angle is not to be
+    // computed with (PS3.3, C.8.2.1.1.5).
+    let stated_deg = stack.slices[0].file.gantry_tilt.unwrap_or(0.0).abs();
+    let differs = (by_positions_deg - stated_deg).abs() > TILT_DEG && stack.slices.len() > 1;
+    if by_positions_deg > TILT_DEG {
+        let by_header = if differs {
+            format!("; the header says {stated_deg} deg, which does not count")
+        } else {
+            String::new()
+        };
+        return Some(Remark::new(format!(
+            "the gantry was tilted: slices lean by {by_positions_deg:.2} deg by their positions{by_header}"
+        )));
+    }
+    None
+}
+
+fn description(stack: &Stack, label: String, padding_voxels: u64) -> Description {
+    let first = &stack.slices[0];
+    let stored = first.file.stored.as_ref();
+    let kind = stored.map_or("", |stored| stored.kind.name());
+    let bits = stored
+        .ok()
+        .and_then(|stored| stored.bits)
+        .map_or(String::new(), |(bits, _)| format!(" ({bits} used)"));
+    let frames = if first.file.frames > 1 {
+        ", multi-frame"
+    } else {
+        ""
+    };
+    let files: BTreeSet<&Path> = stack
+        .slices
+        .iter()
+        .map(|slice| slice.file.path.as_path())
+        .collect();
+    Description {
+        format: format!("DICOM, {kind}{bits}{frames}, {}", first.file.syntax.name()),
+        modality: first.key.modality.clone(),
+        series: Some(label),
+        kernel: first.key.kernel.clone(),
+        tube_voltage_v: first.tube_voltage_kv.map(|kilovolts| kilovolts * 1e3),
+        files: files.len(),
+        padding_voxels,
+    }
+}

@@ -1,0 +1,321 @@
+//! The series of a folder: which slices belong together, and which series is meant.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+use super::image::{Plane, SeriesKey, Slice};
+use super::stack::{are_even, are_interleaved, duplicates, in_order};
+use crate::{ImagingError, Orientation, Remark, VoxelGrid};
+
+/// Difference of direction cosines up to which slices are parallel: 0.006 degrees, 0.05 mm over half a metre.
+const PARALLEL: f64 = 1e-4;
+
+/// Series of a folder that are listed.
+const LISTED: usize = 40;
+
+/// Difference of pixel spacings up to which they are the same.
+const SAME_SPACING_MM: f64 = 1e-5;
+
+/// Slices of one volume, it may be.
+#[derive(Debug)]
+pub(super) struct Series {
+    /// By which it is chosen.
+    pub(super) label: String,
+    pub(super) slices: Vec<Slice>,
+    /// Copies of files that were left out.
+    copies: usize,
+}
+
+/// The series that slices make, in order of number and UID.
+pub(super) fn all(slices: Vec<Slice>) -> Vec<Series> {
+    let mut by_key: BTreeMap<SeriesKey, Vec<Vec<Slice>>> = BTreeMap::new();
+    for slice in slices {
+        let groups = by_key.entry(slice.key.clone()).or_default();
+        let group = groups
+            .iter_mut()
+            .find(|group| are_parallel(&group[0], &slice));
+        match group {
+            Some(group) => group.push(slice),
+            None => groups.push(vec![slice]),
+        }
+    }
+    for groups in by_key.values_mut() {
+        groups.sort_by(|a, b| by_direction(&a[0], &b[0]));
+    }
+    let mut all: Vec<Series> = by_key
+        .into_values()
+        .flatten()
+        .flat_map(phases)
+        .map(|(slices, copies)| Series {
+            label: String::new(),
+            slices,
+            copies,
+        })
+        .collect();
+    let mut with_number: BTreeMap<Option<i64>, usize> = BTreeMap::new();
+    for series in &all {
+        *with_number.entry(series.key().number).or_default() += 1;
+    }
+    let mut labelled: BTreeMap<Option<i64>, usize> = BTreeMap::new();
+    for series in &mut all {
+        let number = series.key().number;
+        let name = number.map_or("none".to_owned(), |number| number.to_string());
+        let nth = labelled.entry(number).or_default();
+        *nth += 1;
+        series.label = if with_number[&number] == 1 {
+            name
+        } else {
+            format!("{name}.{nth}")
+        };
+    }
+    all
+}
+
+/// Order of groups of a series, whatever their files are called: axial, coronal, sagittal, and what has no place.
+fn by_direction(a: &Slice, b: &Slice) -> Ordering {
+    let numbers = |slice: &Slice| -> Vec<f64> {
+        let Ok(plane) = &slice.plane else {
+            return Vec::new();
+        };
+        let cosines = plane.along_row.iter().chain(plane.down_column.iter());
+        cosines.chain(&plane.spacing_mm).copied().collect()
+    };
+    let (a, b) = (numbers(a), numbers(b));
+    let differing = a.iter().zip(&b).map(|(a, b)| b.total_cmp(a));
+    differing
+        .chain([b.len().cmp(&a.len())])
+        .find(|order| order.is_ne())
+        .unwrap_or(Ordering::Equal)
+}
+
+/// Whether two slices may lie in one stack; what has no place is together with its like.
+fn are_parallel(a: &Slice, b: &Slice) -> bool {
+    let (Ok(a), Ok(b)) = (&a.plane, &b.plane) else {
+        return a.plane.is_err() && b.plane.is_err();
+    };
+    let [a0, a1] = a.spacing_mm;
+    let [b0, b1] = b.spacing_mm;
+    (a.along_row - b.along_row).amax() < PARALLEL
+        && (a.down_column - b.down_column).amax() < PARALLEL
+        && (a0 - b0).abs() < SAME_SPACING_MM
+        && (a1 - b1).abs() < SAME_SPACING_MM
+}
+
+/// One group of slices, taken apart where it holds a place several times, or is uneven because even stacks lie among
+/// each other, and something tells the stacks apart. With the number of copies left out.
+fn phases(slices: Vec<Slice>) -> Vec<(Vec<Slice>, usize)> {
+    let unordered = slices.clone();
+    let Ok(slices) = in_order(slices) else {
+        return vec![(unordered, 0)];
+    };
+    let (slices, copies) = without_copies(slices);
+    let is_doubled = !duplicates(&slices).is_empty();
+    if !is_doubled && are_even(&slices) {
+        return vec![(slices, copies)];
+    }
+    let ways = slices.first().map_or(0, |slice| slice.phase.len());
+    for way in 0..ways {
+        let mut parts: BTreeMap<Option<String>, Vec<Slice>> = BTreeMap::new();
+        for slice in &slices {
+            parts
+                .entry(slice.phase[way].clone())
+                .or_default()
+                .push(slice.clone());
+        }
+        let are_whole = parts
+            .values()
+            .all(|part| part.len() > 1 && duplicates(part).is_empty());
+        if parts.len() < 2 || !are_whole {
+            continue;
+        }
+        let mut parts: Vec<_> = parts.into_iter().collect();
+        parts.sort_by_key(|(name, _)| {
+            name.as_ref()
+                .and_then(|name| name.parse::<f64>().ok())
+                .map_or(i64::MIN, |number| {
+                    #[expect(clippy::cast_possible_truncation, reason = "an order is wanted")]
+                    let thousandths = (number * 1e3) as i64;
+                    thousandths
+                })
+        });
+        let parts: Vec<Vec<Slice>> = parts.into_iter().map(|(_, part)| part).collect();
+        if is_doubled || parts.iter().all(|part| are_even(part)) && are_interleaved(&parts) {
+            return parts.into_iter().map(|part| (part, copies)).collect();
+        }
+    }
+    vec![(slices, copies)]
+}
+
+/// Without files that are there twice, of slices in order.
+fn without_copies(slices: Vec<Slice>) -> (Vec<Slice>, usize) {
+    let before = slices.len();
+    let mut kept: Vec<Slice> = Vec::with_capacity(before);
+    for slice in slices {
+        let is_copy = |other: &Slice| {
+            slice.instance.is_some()
+                && other.instance == slice.instance
+                && other.frame == slice.frame
+                && other.plane == slice.plane
+        };
+        // Copies are at the same place, and so among the last.
+        if !kept.iter().rev().take(8).any(is_copy) {
+            kept.push(slice);
+        }
+    }
+    let copies = before - kept.len();
+    (kept, copies)
+}
+
+impl Series {
+    fn key(&self) -> &SeriesKey {
+        &self.slices[0].key
+    }
+
+    /// Whether it can be a volume, as far as one sees from outside.
+    fn is_volume(&self) -> bool {
+        let key = self.key();
+        let is_ct = key
+            .modality
+            .as_deref()
+            .is_none_or(|modality| modality == "CT");
+        is_ct && !key.is_scout && self.slices[0].plane.is_ok()
+    }
+
+    /// For the list of what a folder holds: no more than what tells series apart.
+    fn in_words(&self) -> String {
+        let key = self.key();
+        let count = self.slices.len();
+        let mut words = vec![format!(
+            "{count} {} of {} x {}",
+            if count == 1 { "slice" } else { "slices" },
+            key.columns,
+            key.rows
+        )];
+        words.extend(self.slices[0].plane.as_ref().ok().and_then(view));
+        if let Some(thickness_mm) = self.slices[0].thickness_mm {
+            words.push(format!("{thickness_mm} mm thick"));
+        }
+        if let Some(kernel) = &key.kernel {
+            words.push(format!("kernel {kernel}"));
+        }
+        match &key.modality {
+            Some(modality) if modality != "CT" => {
+                words.push(format!("modality {modality}, not CT"));
+            }
+            _ => {}
+        }
+        if key.is_scout {
+            words.push("a scout".to_owned());
+        } else if self.slices[0].plane.is_err() {
+            words.push("without a place".to_owned());
+        }
+        format!("{}: {}", self.label, words.join(", "))
+    }
+
+    /// What was left out of it.
+    pub(super) fn remarks(&self) -> Vec<Remark> {
+        if self.copies == 0 {
+            return Vec::new();
+        }
+        vec![Remark::new(format!(
+            "{} of the files are there twice: one of each was read",
+            self.copies
+        ))]
+    }
+}
+
+/// In which plane slices lie.
+fn view(plane: &Plane) -> Option<String> {
+    let steps = nalgebra::Matrix3::from_columns(&[
+        plane.along_row,
+        plane.down_column,
+        plane.along_row.cross(&plane.down_column),
+    ]);
+    let grid = VoxelGrid::new([1; 3], steps, nalgebra::Point3::origin()).ok()?;
+    let (normal, _) = Orientation::of(&grid).axes()[2];
+    Some(["sagittal", "coronal", "axial"][normal].to_owned())
+}
+
+/// All series in a list.
+fn list(all: &[Series]) -> String {
+    let mut lines: Vec<String> = all.iter().take(LISTED).map(Series::in_words).collect();
+    if all.len() > LISTED {
+        lines.push(format!("and {} more", all.len() - LISTED));
+    }
+    lines.join("; ")
+}
+
+/// The series that is asked for; where none is, the only volume that there is.
+pub(super) fn choose(
+    mut all: Vec<Series>,
+    wanted: Option<&str>,
+) -> Result<(Series, Vec<Remark>), ImagingError> {
+    let at = match wanted {
+        Some(wanted) => asked_for(&all, wanted)?,
+        None => only_volume(&all)?,
+    };
+    let chosen = all.remove(at);
+    let mut remarks = chosen.remarks();
+    if !all.is_empty() && wanted.is_none() {
+        remarks.push(Remark::new(format!(
+            "series {} is the only volume; left out: {}",
+            chosen.label,
+            list(&all)
+        )));
+    }
+    if chosen.key().is_scout {
+        return Err(
+            ImagingError::refused("it is a scout (LOCALIZER), and no volume")
+                .at(format!("series {}", chosen.label))
+                .hint("name the folder or file of the scan"),
+        );
+    }
+    match &chosen.key().modality {
+        Some(modality) if modality != "CT" => Err(ImagingError::refused(format!(
+            "the modality is {modality}, and not CT"
+        ))
+        .at(format!("series {}", chosen.label))
+        .hint("name the folder or file of a CT")),
+        None => {
+            remarks.push(Remark::new("the modality is not said: taken as CT"));
+            Ok((chosen, remarks))
+        }
+        Some(_) => Ok((chosen, remarks)),
+    }
+}
+
+fn asked_for(all: &[Series], wanted: &str) -> Result<usize, ImagingError> {
+    let matching: Vec<usize> = (0..all.len())
+        .filter(|at| all[*at].label == wanted || all[*at].key().uid == wanted)
+        .collect();
+    let what = match matching.as_slice() {
+        [at] => return Ok(*at),
+        [] => format!("there is no series {wanted}"),
+        several => format!("{} series are {wanted}", several.len()),
+    };
+    Err(ImagingError::refused(what).hint(format!("the series are {}", list(all))))
+}
+
+fn only_volume(all: &[Series]) -> Result<usize, ImagingError> {
+    let volumes: Vec<usize> = (0..all.len()).filter(|at| all[*at].is_volume()).collect();
+    let stacks: Vec<usize> = volumes
+        .iter()
+        .copied()
+        .filter(|at| all[*at].slices.len() > 1)
+        .collect();
+    match (stacks.as_slice(), volumes.as_slice(), all) {
+        ([at], _, _) | ([], [at], _) => Ok(*at),
+        // What is wrong with the only one says itself when it is read.
+        ([], [], [_]) => Ok(0),
+        ([], [], _) => Err(ImagingError::refused("no series is a volume of CT")
+            .hint(format!("the series are {}", list(all)))),
+        _ => {
+            let several = if stacks.is_empty() { &volumes } else { &stacks };
+            Err(ImagingError::refused(format!(
+                "there are {} series that may be meant",
+                several.len()
+            ))
+            .hint(format!("choose one with --series: {}", list(all))))
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! Volumes and label maps from NIfTI and DICOM.
+//!
+//! Headers are read first: what they ask for is held against the file and against a limit before memory is taken.
+//! Where a file leaves room for a guess it is refused; what is used although something about it is odd comes with a
+//! [`Remark`].
+
+mod dicom;
+mod label_names;
+mod labels;
+mod nifti;
+mod placing;
+mod plausibility;
+mod scalar;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use serde::Serialize;
+
+use self::nifti::Nifti;
+use self::scalar::Tally;
+use crate::{ImagingError, Orientation, Remark, Volume, VoxelGrid};
+
+pub use label_names::read_label_names;
+pub use labels::{ReadLabels, read_labels};
+
+/// How to read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOptions {
+    /// Which series of a folder: its label in the list that a refusal names, or its UID.
+    pub series: Option<String>,
+    /// Interpolate single missing slices, which are refused otherwise.
+    pub fill_gaps: bool,
+    /// How the voxels of a NIfTI file run that does not say it.
+    pub assume_orientation: Option<Orientation>,
+    /// Most bytes that the voxels may take in memory.
+    pub max_bytes: u64,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            series: None,
+            fill_gaps: false,
+            assume_orientation: None,
+            max_bytes: 4 << 30,
+        }
+    }
+}
+
+impl ReadOptions {
+    /// Refuses what takes more memory than allowed.
+    fn check_memory(&self, grid: &VoxelGrid, bytes: u64) -> Result<(), ImagingError> {
+        if bytes <= self.max_bytes {
+            return Ok(());
+        }
+        let [columns, rows, slices] = grid.size();
+        Err(ImagingError::refused(format!(
+            "{columns} x {rows} x {slices} voxels take {} of memory, the limit is {}",
+            in_mib(bytes),
+            in_mib(self.max_bytes)
+        ))
+        .hint(
+            "crop it or take every second voxel beforehand, or raise the limit with --max-memory",
+        ))
+    }
+}
+
+/// Rounded up, lest what is above a limit looks as if it were not.
+fn in_mib(bytes: u64) -> String {
+    format!("{} MiB", bytes.div_ceil(1 << 20))
+}
+
+/// Room for values; an error where the machine has none.
+fn reserved<T>(count: usize) -> Result<Vec<T>, ImagingError> {
+    let mut values = Vec::new();
+    values.try_reserve_exact(count).map_err(|_| {
+        ImagingError::refused(format!(
+            "this machine has no {} of memory left for the voxels",
+            in_mib((count * size_of::<T>()) as u64)
+        ))
+        .hint("crop it or take every second voxel beforehand")
+    })?;
+    Ok(values)
+}
+
+/// The same, filled with zeros.
+fn zeroed<T: Clone + Default>(count: usize) -> Result<Vec<T>, ImagingError> {
+    // Taken anew: memory that comes as zeros need not be written to become so.
+    drop(reserved::<T>(count)?);
+    Ok(vec![T::default(); count])
+}
+
+/// A volume, and what there is to know of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadVolume {
+    /// The voxels, on the file's own grid: oblique or sheared where that is. See [`crate::resample`].
+    pub volume: Volume,
+    /// What is odd.
+    pub remarks: Vec<Remark>,
+    /// Where it comes from.
+    pub description: Description,
+}
+
+/// Where a volume comes from. Nothing of it names the patient.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Description {
+    /// Format, type of the stored numbers, compression.
+    pub format: String,
+    /// `CT`, where the file says it.
+    pub modality: Option<String>,
+    /// Label of the series within its folder.
+    pub series: Option<String>,
+    /// Reconstruction kernel, by its maker's name.
+    pub kernel: Option<String>,
+    /// Peak voltage of the tube.
+    pub tube_voltage_v: Option<f64>,
+    /// Files that the voxels are from.
+    pub files: usize,
+    /// Voxels that the scanner did not see: air in the volume, and not to be counted in statistics.
+    pub padding_voxels: u64,
+}
+
+/// Reads a CT: `.nii`, `.nii.gz`, `.hdr` with `.img`, a DICOM file, or a folder of DICOM files.
+///
+/// The result is the same whatever the number of `threads`.
+pub fn read_volume(
+    path: &Path,
+    options: &ReadOptions,
+    threads: usize,
+    cancel: &AtomicBool,
+) -> Result<ReadVolume, ImagingError> {
+    match format_of(path)? {
+        Format::Nifti => read_nifti(path, options, cancel),
+        Format::Dicom => dicom::read(path, options, threads, cancel),
+    }
+}
+
+/// What the system says of a file or a folder.
+#[expect(clippy::needless_pass_by_value, reason = "errors are mapped by it")]
+fn unreadable(error: std::io::Error) -> ImagingError {
+    ImagingError::refused(format!("cannot be read: {error}"))
+        .hint("check that it is there, whole, and yours to read")
+}
+
+/// What a path holds, by its first bytes.
+enum Format {
+    Nifti,
+    Dicom,
+}
+
+fn format_of(path: &Path) -> Result<Format, ImagingError> {
+    if path.metadata().map_err(unreadable)?.is_dir() {
+        return Ok(Format::Dicom);
+    }
+    let mut first = Vec::new();
+    let file = File::open(path).map_err(unreadable)?;
+    file.take(dicom::FIRST_BYTES)
+        .read_to_end(&mut first)
+        .map_err(unreadable)?;
+    if first.is_empty() {
+        return Err(ImagingError::refused("the file is empty").hint("copy or export it again"));
+    }
+    // Bytes count before names: DICOM files are called .img, too.
+    if nifti::begins_as_header(&first) {
+        Ok(Format::Nifti)
+    } else if dicom::is_dicom(&first) {
+        Ok(Format::Dicom)
+    } else if nifti::has_name(path) {
+        Ok(Format::Nifti)
+    } else {
+        Err(
+            ImagingError::refused("it is neither NIfTI nor DICOM by its first bytes")
+                .hint("a CT is read from .nii, .nii.gz, .hdr with .img, a DICOM file, or a folder of DICOM files"),
+        )
+    }
+}
+
+fn read_nifti(
+    path: &Path,
+    options: &ReadOptions,
+    cancel: &AtomicBool,
+) -> Result<ReadVolume, ImagingError> {
+    if let Some(series) = &options.series {
+        return Err(ImagingError::refused(format!(
+            "series {series} is asked for, but a NIfTI file holds one volume"
+        ))
+        .hint("leave out --series"));
+    }
+    let nifti = Nifti::open(path, options)?;
+    let mut remarks = nifti.remarks().to_vec();
+    let grid = nifti.grid().clone();
+    let format = nifti.format();
+    let (hu, tally, of_bytes) = nifti.hu(options, cancel)?;
+    remarks.extend(of_bytes);
+    let volume = Volume {
+        grid,
+        hu,
+        slice_thickness_m: None,
+    };
+    remarks.extend(plausibility::remarks(&volume, &tally));
+    Ok(ReadVolume {
+        volume,
+        remarks,
+        description: Description {
+            format,
+            files: 1,
+            padding_voxels: tally.padding + tally.not_numbers,
+            ..Description::default()
+        },
+    })
+}

@@ -1,0 +1,755 @@
+//! From a volume to surfaces, in one call.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use nalgebra::Point3;
+use needlebench_geometry::TriangleMesh;
+use needlebench_geometry::mesh::{SurfaceIndex, check_closed, volume_m3};
+use serde::Serialize;
+
+use crate::error::{ImagingError, Remark};
+use crate::grid::VoxelGrid;
+use crate::mask::{IndexBox, Mask};
+use crate::segment::{
+    FIRST_LESION, LabelFacts, Lesion, LesionSeed, Levels, Segmentation, Side, grow_lesion,
+    label_facts, label_map, paint, segment,
+};
+use crate::spacing::{orthogonal, whole};
+use crate::structures::{Structure, SurfaceTissue, structure_of};
+use crate::surface::{
+    Field, Level, SurfaceError, Values, at_middles, local_level, refine, simplify, sound,
+    surface_error, surface_net,
+};
+use crate::volume::{LabelMap, Volume};
+
+/// What is to be made of a volume.
+#[derive(Debug, Clone, Default)]
+pub struct ReconstructOptions {
+    /// Where lesions are.
+    pub lesions: Vec<LesionSeed>,
+    /// Structures from elsewhere, on the same grid: their surfaces come from it instead of from the Hounsfield units.
+    pub labels: Option<LabelMap>,
+    /// Triangles of surfaces.
+    pub sizes: SurfaceSizes,
+    /// Where surfaces run.
+    pub levels: Levels,
+}
+
+/// Triangles that surfaces are reduced to, as long as they stay near the voxels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SurfaceSizes {
+    /// Skin.
+    pub skin: usize,
+    /// Each lung.
+    pub lung: usize,
+    /// All bone that is one surface.
+    pub bone: usize,
+    /// Any other surface.
+    pub other: usize,
+}
+
+impl Default for SurfaceSizes {
+    fn default() -> Self {
+        Self {
+            skin: 20_000,
+            lung: 20_000,
+            bone: 30_000,
+            other: 8_000,
+        }
+    }
+}
+
+/// How far a vertex may leave the planes of the surface that it stands for, root mean square: 99 % of the surface keep
+/// to twice that.
+const MEAN_ERROR_M: f64 = 0.12e-3;
+
+/// Distance from the voxels' surface that 99 % of it keep to.
+pub const SURFACE_ERROR_M: f64 = 0.25e-3;
+
+/// Cells of skin and lungs: several voxels where these are finer. Vertices lie on the voxels' surface all the same.
+const LARGE_CELL_M: f64 = 2.05e-3;
+
+/// Cells of bone, which has plates of 2 mm.
+const BONE_CELL_M: f64 = 1.45e-3;
+
+/// Cells of what is small: voxels.
+const SMALL_CELL_M: f64 = 0.0;
+
+/// Typical of air, lung, soft tissue and bone, HU: stand in where the mask knows better than the voxel.
+const AIR: f32 = -1000.0;
+const LUNG: f32 = -850.0;
+const SOFT: f32 = 40.0;
+const DENSE: f32 = 800.0;
+
+/// What is around bone and counts for its level: soft tissue, not lung.
+const SOFT_FROM_HU: i16 = -200;
+
+/// A closed surface.
+#[derive(Debug, Clone)]
+pub struct Surface {
+    /// What it is called: `skin`, `lung_left`, `bone`, ..., and a lesion's own name.
+    pub name: String,
+    /// What it is of.
+    pub tissue: SurfaceTissue,
+    /// The organ that it is in, where it is a lesion.
+    pub organ: Option<String>,
+    /// In `ct`, m; closed, oriented, every edge with two triangles.
+    pub mesh: TriangleMesh,
+    /// Where it runs, HU; none where it runs between voxels of a mask.
+    pub level_hu: Option<f64>,
+    /// From the surface of the voxels to this one.
+    pub error: SurfaceError,
+    /// Volume within, m^3.
+    pub volume_m3: f64,
+    /// Triangles before simplification.
+    pub triangles_before: usize,
+}
+
+/// Sizes of a lesion, measured on its surface before simplification.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LesionSize {
+    /// Volume, m^3.
+    pub volume_m3: f64,
+    /// Diameter of the ball of this volume, m.
+    pub equivalent_diameter_m: f64,
+    /// Longest distance within, m.
+    pub longest_m: f64,
+    /// Longest distance in one slice, m.
+    pub axial_longest_m: f64,
+    /// Width perpendicular to that, in the same slice, m.
+    pub axial_width_m: f64,
+    /// Centroid, in `ct`, m.
+    #[serde(skip)]
+    pub centroid_m: Point3<f64>,
+}
+
+/// A lesion with its size.
+#[derive(Debug, Clone)]
+pub struct MeasuredLesion {
+    /// Its voxels and how it was bounded.
+    pub lesion: Lesion,
+    /// How large it is; none if it has no surface.
+    pub size: Option<LesionSize>,
+}
+
+/// What was made of a volume.
+#[derive(Debug, Clone)]
+pub struct Reconstruction {
+    /// Every voxel's label.
+    pub labels: LabelMap,
+    /// What is known of each label.
+    pub facts: Vec<LabelFacts>,
+    /// Masks of body, lungs, airways, vessels and bone.
+    pub segmentation: Segmentation,
+    /// Surfaces: the skin first, then by name of what they are.
+    pub surfaces: Vec<Surface>,
+    /// Lesions in the order in which they were asked for.
+    pub lesions: Vec<MeasuredLesion>,
+    /// What a user has to know.
+    pub remarks: Vec<Remark>,
+}
+
+/// Told of each step: what it is, and the share of all steps that is done.
+pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
+
+/// Segments a volume and makes closed surfaces of what it finds.
+///
+/// What comes out does not depend on the number of threads.
+///
+/// # Errors
+/// If there is no body, a lesion cannot be grown, a label map is of another grid, or it was told to stop.
+pub fn reconstruct(
+    volume: &Volume,
+    options: &ReconstructOptions,
+    threads: usize,
+    cancel: &AtomicBool,
+    progress: Progress<'_>,
+) -> Result<Reconstruction, ImagingError> {
+    orthogonal(&volume.grid)?;
+    progress("tissues", 0.0);
+    let mut found = segment(volume, &options.levels, cancel)?;
+    let mut remarks = std::mem::take(&mut found.remarks);
+    let given = match &options.labels {
+        Some(map) => given_structures(map, &volume.grid, &mut remarks)?,
+        None => Vec::new(),
+    };
+    take_over(&mut found, &given);
+    progress("lesions", 0.3);
+    let mut lesions = Vec::with_capacity(options.lesions.len());
+    for seed in &options.lesions {
+        lesions.push(grow_lesion(volume, &found, seed, cancel, &mut remarks)?);
+    }
+    progress("surfaces", 0.4);
+    let jobs = jobs(&found, &given, &lesions, options);
+    let made = make_all(volume, &jobs, threads, cancel, progress)?;
+    let (surfaces, sizes) = sort(made, &jobs, lesions.len(), &mut remarks);
+    progress("label map", 0.95);
+    let (labels, facts) = labels(volume, &found, &lesions, options);
+    let lesions = lesions.into_iter().zip(sizes);
+    Ok(Reconstruction {
+        labels,
+        facts,
+        segmentation: found,
+        surfaces,
+        lesions: lesions
+            .map(|(lesion, size)| MeasuredLesion { lesion, size })
+            .collect(),
+        remarks,
+    })
+}
+
+/// A structure of a label map from elsewhere.
+struct Given {
+    structure: Structure,
+    bounds: IndexBox,
+    mask: Mask,
+}
+
+/// Structures that a label map names, each with all its labels.
+fn given_structures(
+    map: &LabelMap,
+    grid: &VoxelGrid,
+    remarks: &mut Vec<Remark>,
+) -> Result<Vec<Given>, ImagingError> {
+    check_same_grid(&map.grid, grid)?;
+    let mut structures: BTreeMap<String, (Structure, Vec<u16>)> = BTreeMap::new();
+    let mut unknown = Vec::new();
+    for (label, name) in &map.names {
+        match structure_of(name) {
+            Some(structure) => {
+                let entry = structures.entry(structure.name.clone());
+                entry.or_insert((structure, Vec::new())).1.push(*label);
+            }
+            None => unknown.push(format!("{label} `{name}`")),
+        }
+    }
+    if !unknown.is_empty() {
+        remarks.push(
+            Remark::new(format!(
+                "labels without a known meaning are left out: {}",
+                unknown.join(", ")
+            ))
+            .at("label map"),
+        );
+    }
+    let mut given = Vec::new();
+    for (structure, labels) in structures.into_values() {
+        let mut wanted = vec![false; 1 << 16];
+        for label in labels {
+            wanted[usize::from(label)] = true;
+        }
+        let mask = Mask::of(grid.size(), &map.labels, |label| wanted[usize::from(label)]);
+        if let Some(bounds) = mask.bounds() {
+            given.push(Given {
+                structure,
+                mask: mask.cropped(&bounds),
+                bounds,
+            });
+        }
+    }
+    Ok(given)
+}
+
+/// A hundredth of a voxel at the corners: what rounding of headers to single precision leaves.
+const SAME_PLACE: f64 = 0.01;
+
+fn check_same_grid(map: &VoxelGrid, volume: &VoxelGrid) -> Result<(), ImagingError> {
+    let hint =
+        "resample the label map to the volume (3D Slicer: Resample Image, with nearest neighbour)";
+    if map.size() != volume.size() {
+        let words = |[i, j, k]: [usize; 3]| format!("{i} x {j} x {k}");
+        return Err(ImagingError::refused(format!(
+            "it has {} voxels, the volume {}",
+            words(map.size()),
+            words(volume.size())
+        ))
+        .at("label map")
+        .hint(hint));
+    }
+    let spacing_m = volume.spacing_m().into_iter().fold(f64::INFINITY, f64::min);
+    for corner in 0..8_usize {
+        let index = Point3::from([0, 1, 2].map(|axis| {
+            if corner >> axis & 1 == 1 {
+                volume.size()[axis] as f64 - 1.0
+            } else {
+                0.0
+            }
+        }));
+        let apart_m = (map.ct_from_index(&index) - volume.ct_from_index(&index)).norm();
+        if apart_m > SAME_PLACE * spacing_m {
+            return Err(ImagingError::refused(format!(
+                "its corners are up to {:.2} mm from the volume's",
+                1e3 * apart_m
+            ))
+            .at("label map")
+            .hint(hint));
+        }
+    }
+    Ok(())
+}
+
+/// Structures of a label map instead of those that were found.
+fn take_over(found: &mut Segmentation, given: &[Given]) {
+    let body = found.body.bounds;
+    let of = |name: &str| given.iter().find(|each| each.structure.name == name);
+    let in_body = |each: &Given| {
+        let mut whole = Mask::empty(found.body.mask.size());
+        whole.unite_within(&each.bounds, &each.mask);
+        whole.cropped(&body)
+    };
+    for (side, name) in [(Side::Left, "lung_left"), (Side::Right, "lung_right")] {
+        if let Some(mask) = of(name).map(in_body) {
+            for lung in found
+                .lungs
+                .lungs
+                .iter_mut()
+                .filter(|lung| lung.side == side)
+            {
+                lung.mask = mask.clone();
+            }
+        }
+    }
+    let bones = given
+        .iter()
+        .filter(|each| each.structure.tissue == SurfaceTissue::Bone);
+    let mut bone: Option<Mask> = None;
+    for mask in bones.map(in_body) {
+        bone.get_or_insert_with(|| Mask::empty(body.size()))
+            .unite(&mask);
+    }
+    if let Some(bone) = bone {
+        found.bone.bone = bone;
+    }
+}
+
+/// Where a surface runs.
+enum Runs {
+    At {
+        level_hu: f64,
+        typical: [f32; 2],
+    },
+    /// At the middle between bone and what is around it, place by place.
+    BoneMiddle,
+    Mask,
+}
+
+/// A surface to be made.
+struct Job<'a> {
+    name: String,
+    tissue: SurfaceTissue,
+    organ: Option<String>,
+    bounds: IndexBox,
+    mask: &'a Mask,
+    runs: Runs,
+    target: usize,
+    cell_m: f64,
+    /// Number of the lesion that it is.
+    lesion: Option<usize>,
+}
+
+fn jobs<'a>(
+    found: &'a Segmentation,
+    given: &'a [Given],
+    lesions: &'a [Lesion],
+    options: &ReconstructOptions,
+) -> Vec<Job<'a>> {
+    let sizes = options.sizes;
+    let levels = options.levels;
+    let mut jobs = Vec::new();
+    let whole = IndexBox::whole(found.body.mask.size());
+    let mut add = |name: &str, tissue, bounds, mask: &'a Mask, runs, target, cell_m| {
+        // What a label map has comes from it.
+        let is_given = given.iter().any(|each| {
+            each.structure.name == name
+                || tissue == SurfaceTissue::Bone && each.structure.tissue == tissue
+        });
+        if !is_given && !mask.is_empty() {
+            jobs.push(Job {
+                name: name.to_owned(),
+                tissue,
+                organ: None,
+                bounds,
+                mask,
+                runs,
+                target,
+                cell_m,
+                lesion: None,
+            });
+        }
+    };
+    let skin = Runs::At {
+        level_hu: levels.skin_hu,
+        typical: [SOFT, AIR],
+    };
+    add(
+        "skin",
+        SurfaceTissue::Skin,
+        whole,
+        &found.body.mask,
+        skin,
+        sizes.skin,
+        LARGE_CELL_M,
+    );
+    let lungs = &found.lungs;
+    for lung in &lungs.lungs {
+        let name = match lung.side {
+            Side::Left => "lung_left",
+            Side::Right => "lung_right",
+        };
+        let runs = Runs::At {
+            level_hu: levels.lung_hu,
+            typical: [LUNG, SOFT],
+        };
+        add(
+            name,
+            SurfaceTissue::Lung,
+            lungs.bounds,
+            &lung.mask,
+            runs,
+            sizes.lung,
+            LARGE_CELL_M,
+        );
+    }
+    let airways = Runs::At {
+        level_hu: levels.lung_hu,
+        typical: [AIR, SOFT],
+    };
+    add(
+        "trachea",
+        SurfaceTissue::Organ,
+        lungs.bounds,
+        &lungs.airways,
+        airways,
+        sizes.other,
+        SMALL_CELL_M,
+    );
+    let bone = &found.bone;
+    add(
+        "bone",
+        SurfaceTissue::Bone,
+        bone.bounds,
+        &bone.bone,
+        Runs::BoneMiddle,
+        sizes.bone,
+        BONE_CELL_M,
+    );
+    let contrast = Runs::At {
+        level_hu: levels.bone_hu,
+        typical: [DENSE, SOFT],
+    };
+    add(
+        "contrast_vessels",
+        SurfaceTissue::Vessel,
+        bone.bounds,
+        &bone.contrast,
+        contrast,
+        sizes.other,
+        SMALL_CELL_M,
+    );
+    for each in given {
+        let target = match each.structure.tissue {
+            SurfaceTissue::Skin => sizes.skin,
+            SurfaceTissue::Lung => sizes.lung,
+            SurfaceTissue::Bone => sizes.bone,
+            _ => sizes.other,
+        };
+        jobs.push(Job {
+            name: each.structure.name.clone(),
+            tissue: each.structure.tissue,
+            organ: None,
+            bounds: each.bounds,
+            mask: &each.mask,
+            runs: Runs::Mask,
+            target,
+            cell_m: SMALL_CELL_M,
+            lesion: None,
+        });
+    }
+    for (number, lesion) in lesions.iter().enumerate() {
+        jobs.push(Job {
+            name: lesion.name.clone(),
+            tissue: SurfaceTissue::Lesion,
+            organ: organ_of(found, lesion),
+            bounds: lesion.bounds,
+            mask: &lesion.mask,
+            runs: Runs::At {
+                level_hu: lesion.level_hu,
+                typical: if lesion.in_lung {
+                    [SOFT, LUNG]
+                } else {
+                    [f32::from(lesion.median_hu), AIR]
+                },
+            },
+            target: sizes.other,
+            cell_m: SMALL_CELL_M,
+            lesion: Some(number),
+        });
+    }
+    jobs.sort_by_key(|job| job.tissue != SurfaceTissue::Skin);
+    jobs
+}
+
+fn organ_of(found: &Segmentation, lesion: &Lesion) -> Option<String> {
+    let shares = found.lungs.lungs.iter().map(|lung| {
+        let mut whole = Mask::empty(found.body.mask.size());
+        whole.unite_within(&found.lungs.bounds, &lung.mask);
+        let mut part = whole.cropped(&lesion.bounds);
+        part.intersect(&lesion.mask);
+        (part.count(), lung.side)
+    });
+    let (count, side) = shares.max_by_key(|(count, _)| *count)?;
+    (2 * count > lesion.mask.count()).then(|| match side {
+        Side::Left => "lung_left".to_owned(),
+        Side::Right => "lung_right".to_owned(),
+    })
+}
+
+/// A surface and what was measured on the fine one.
+struct Made {
+    surface: Surface,
+    size: Option<LesionSize>,
+}
+
+/// Where a thread leaves what became of a surface: none while it is not made.
+type Slot = Mutex<Option<Result<Option<Made>, ImagingError>>>;
+
+/// All surfaces, on so many threads; the largest first.
+fn make_all(
+    volume: &Volume,
+    jobs: &[Job<'_>],
+    threads: usize,
+    cancel: &AtomicBool,
+    progress: Progress<'_>,
+) -> Result<Vec<Option<Made>>, ImagingError> {
+    let next = AtomicUsize::new(0);
+    let done: Vec<Slot> = jobs.iter().map(|_| Mutex::new(None)).collect();
+    let work = || {
+        while let Some((job, slot)) = {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            jobs.get(at).zip(done.get(at))
+        } {
+            let made = make(volume, job, cancel);
+            let share = next.load(Ordering::Relaxed).min(jobs.len()) as f64 / jobs.len() as f64;
+            progress(&format!("surface of {}", job.name), 0.4 + 0.5 * share);
+            if let Ok(mut slot) = slot.lock() {
+                *slot = Some(made);
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads.min(jobs.len()) {
+            scope.spawn(work);
+        }
+        work();
+    });
+    done.into_iter()
+        .map(|slot| slot.into_inner().ok().flatten().unwrap_or(Ok(None)))
+        .collect()
+}
+
+fn make(volume: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Made>, ImagingError> {
+    if cancel.load(Ordering::Relaxed) {
+        return Err(ImagingError::Interrupted);
+    }
+    let grid = &volume.grid;
+    let sharp = match job.runs {
+        Runs::BoneMiddle => at_middles(volume, &job.bounds),
+        _ => None,
+    };
+    let hu = sharp.as_deref().unwrap_or(&volume.hu);
+    let levels = match job.runs {
+        Runs::BoneMiddle => local_level(hu, grid, job.mask, &job.bounds, |hu| hu > SOFT_FROM_HU),
+        _ => None,
+    };
+    let refined = levels
+        .as_ref()
+        .map(|levels| refine(hu, grid, job.mask, &job.bounds, levels));
+    let hounsfield = |level, typical| Values::Hounsfield {
+        hu,
+        size: grid.size(),
+        level,
+        typical,
+    };
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "half-integers of HU are exact"
+    )]
+    let (values, level_hu) = match (&job.runs, &levels) {
+        (Runs::At { level_hu, typical }, _) => (
+            hounsfield(Level::Everywhere(*level_hu as f32), *typical),
+            Some(*level_hu),
+        ),
+        (Runs::BoneMiddle, Some(levels)) => (
+            hounsfield(Level::Local(levels), [DENSE, SOFT]),
+            levels.median(),
+        ),
+        (Runs::BoneMiddle | Runs::Mask, _) => (Values::MaskOnly, None),
+    };
+    let field = Field {
+        bounds: job.bounds,
+        inside: refined.as_ref().unwrap_or(job.mask),
+        values,
+    };
+    let stride = grid
+        .spacing_m()
+        .map(|step| whole(job.cell_m / step).clamp(1, 4));
+    let fine = surface_net(&field, grid, stride);
+    if fine.triangles.is_empty() {
+        return Ok(None);
+    }
+    let coarse = sound(simplify(&fine, job.target, MEAN_ERROR_M));
+    if cancel.load(Ordering::Relaxed) {
+        return Err(ImagingError::Interrupted);
+    }
+    let facts = check_closed(&coarse).map_err(|defect| {
+        ImagingError::refused(format!("its surface is not that of a solid: {defect}"))
+            .at(job.name.clone())
+    })?;
+    let index = SurfaceIndex::new(coarse);
+    let Some(error) = surface_error(&field, grid, &index) else {
+        return Ok(None);
+    };
+    let size = job.lesion.map(|_| size_of(&fine, grid));
+    Ok(Some(Made {
+        surface: Surface {
+            name: job.name.clone(),
+            tissue: job.tissue,
+            organ: job.organ.clone(),
+            mesh: index.mesh().clone(),
+            level_hu,
+            error,
+            volume_m3: facts.volume_m3,
+            triangles_before: fine.triangles.len(),
+        },
+        size,
+    }))
+}
+
+/// Surfaces, and the sizes of lesions in their order.
+fn sort(
+    made: Vec<Option<Made>>,
+    jobs: &[Job<'_>],
+    lesions: usize,
+    remarks: &mut Vec<Remark>,
+) -> (Vec<Surface>, Vec<Option<LesionSize>>) {
+    let mut surfaces = Vec::new();
+    let mut sizes = vec![None; lesions];
+    for (made, job) in made.into_iter().zip(jobs) {
+        let Some(Made { surface, size }) = made else {
+            remarks.push(
+                Remark::new("it has no surface: it is thinner than the voxels")
+                    .at(job.name.clone()),
+            );
+            continue;
+        };
+        if surface.error.p99_m > SURFACE_ERROR_M {
+            remarks.push(
+                Remark::new(format!(
+                    "1 % of its surface is more than {:.2} mm from that of the voxels, which is the goal; it is {:.2} \
+                     mm at {} triangles",
+                    1e3 * SURFACE_ERROR_M,
+                    1e3 * surface.error.p99_m,
+                    surface.mesh.triangles.len()
+                ))
+                .at(job.name.clone()),
+            );
+        }
+        if surface.level_hu.is_none() {
+            remarks.push(
+                Remark::new("its surface is that of a voxel mask, which is known to half a voxel")
+                    .at(job.name.clone()),
+            );
+        }
+        if let (Some(number), Some(size)) = (job.lesion, size) {
+            sizes[number] = Some(size);
+        }
+        surfaces.push(surface);
+    }
+    (surfaces, sizes)
+}
+
+/// Points that are compared in pairs, at most.
+const PAIRED: usize = 2000;
+
+/// Longest distance between points, and the two.
+fn longest(points: &[Point3<f64>]) -> (f64, [Point3<f64>; 2]) {
+    let some: Vec<Point3<f64>> = points
+        .iter()
+        .step_by(points.len().div_ceil(PAIRED).max(1))
+        .copied()
+        .collect();
+    let mut best = (0.0, [Point3::origin(); 2]);
+    for (at, a) in some.iter().enumerate() {
+        for b in &some[at + 1..] {
+            let squared = (a - b).norm_squared();
+            if squared > best.0 {
+                best = (squared, [*a, *b]);
+            }
+        }
+    }
+    (best.0.sqrt(), best.1)
+}
+
+fn size_of(mesh: &TriangleMesh, grid: &VoxelGrid) -> LesionSize {
+    let volume_m3 = volume_m3(mesh);
+    let mut slices: BTreeMap<i64, Vec<Point3<f64>>> = BTreeMap::new();
+    for vertex in &mesh.vertices_m {
+        #[expect(clippy::cast_possible_truncation, reason = "a slice's number")]
+        let slice = grid.index_from_ct(vertex).z.round() as i64;
+        slices.entry(slice).or_default().push(*vertex);
+    }
+    let normal = grid.steps_m().column(2).normalize();
+    let in_slices = slices.values().map(|points| {
+        // In the plane of the slice.
+        let flat: Vec<Point3<f64>> = points
+            .iter()
+            .map(|p| p - normal * normal.dot(&p.coords))
+            .collect();
+        (longest(&flat), flat)
+    });
+    let longest_in_slice = in_slices.max_by(|(a, _), (b, _)| a.0.total_cmp(&b.0));
+    let (axial_longest_m, axial_width_m) =
+        longest_in_slice.map_or((0.0, 0.0), |((length_m, [a, b]), flat)| {
+            let across = normal.cross(&(b - a)).normalize();
+            let places = flat.iter().map(|p| across.dot(&p.coords));
+            let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
+                (low.min(at), high.max(at))
+            });
+            (length_m, high - low)
+        });
+    LesionSize {
+        volume_m3,
+        equivalent_diameter_m: (6.0 * volume_m3.max(0.0) / std::f64::consts::PI).cbrt(),
+        longest_m: longest(&mesh.vertices_m).0,
+        axial_longest_m,
+        axial_width_m,
+        centroid_m: needlebench_geometry::mesh::centroid_m(mesh),
+    }
+}
+
+/// The label map that was given with the lesions in it, or one of what was found.
+fn labels(
+    volume: &Volume,
+    found: &Segmentation,
+    lesions: &[Lesion],
+    options: &ReconstructOptions,
+) -> (LabelMap, Vec<LabelFacts>) {
+    let Some(given) = &options.labels else {
+        return label_map(volume, found, lesions);
+    };
+    let mut map = given.clone();
+    let free = map
+        .names
+        .iter()
+        .map(|(label, _)| label + 1)
+        .max()
+        .unwrap_or(0);
+    for (label, lesion) in (free.max(FIRST_LESION)..).zip(lesions) {
+        paint(&mut map, &lesion.bounds, &lesion.mask, label);
+        map.names.push((label, lesion.name.clone()));
+    }
+    let facts = label_facts(&map);
+    (map, facts)
+}

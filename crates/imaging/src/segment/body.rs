@@ -1,0 +1,307 @@
+//! The patient without the bed.
+
+use crate::components::{Components, Connectivity};
+use crate::error::{ImagingError, Remark};
+use crate::mask::{IndexBox, Mask};
+use crate::morphology::{dilated, opened};
+use crate::volume::{AIR_HU, Volume};
+
+use super::{Scan, below, side_in_words};
+
+/// Between air (-1000) and skin (+40), where the blur of the scanner leaves the surface. Half-integer: no voxel is on it.
+pub const SKIN_LEVEL_HU: f64 = -479.5;
+
+/// What is thinner than twice this is cut off: the shell of a bed, tubes, blankets.
+const BED_HALF_THICKNESS_M: f64 = 3e-3;
+
+/// A patient, or a phantom, is not smaller.
+const LEAST_BODY_L: f64 = 0.05;
+
+/// Something beside the body that is worth a remark.
+const OTHER_PART_L: f64 = 0.2;
+
+/// Outside air; lungs that the field of view cuts are denser.
+const OUTSIDE_HU: f64 = -940.0;
+
+/// Air at the border of the volume that may be a lung which the field of view cuts.
+const CUT_LUNG_L: f64 = 0.05;
+
+/// Area of contact, or of a cut, that is worth a remark.
+const WORTH_MENTIONING_M2: f64 = 1e-4;
+
+/// The patient without the bed, with all that the skin encloses.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// Its voxels.
+    pub mask: Mask,
+    /// The least box around them.
+    pub bounds: IndexBox,
+    /// Centroid, as an index.
+    pub centroid: [f64; 3],
+    /// Where the field of view cuts it (`left`, `anterior`, ...) other than at the first and last slice.
+    pub cut_sides: Vec<&'static str>,
+    /// Area at which its surface touches something else that is not air, such as the bed, m^2. There the surface is
+    /// known to half a voxel only.
+    pub contact_m2: f64,
+}
+
+pub(super) fn find(scan: &Scan<'_>, remarks: &mut Vec<Remark>) -> Result<Body, ImagingError> {
+    let level = below(scan.levels.skin_hu);
+    let tissue = Mask::of(scan.size(), &scan.volume.hu, |hu| hu > level);
+    scan.check()?;
+    let solid = without_bed(scan, &tissue, remarks)?;
+    scan.check()?;
+    let mask = filled(scan, &solid, remarks);
+    let Some(bounds) = mask.bounds() else {
+        return Err(nothing_there());
+    };
+    let mut others = tissue;
+    others.subtract(&mask);
+    let contact_m2 = contact_m2(scan, &mask, &others);
+    if contact_m2 > WORTH_MENTIONING_M2 {
+        remarks.push(Remark::new(format!(
+            "the skin touches something else (bed, marker, cushion) over {:.0} cm2: there its surface is known to half \
+             a voxel only",
+            1e4 * contact_m2
+        )));
+    }
+    let cut_sides = cut_sides(scan, &solid, remarks);
+    Ok(Body {
+        centroid: centroid(&mask),
+        mask,
+        bounds,
+        cut_sides,
+        contact_m2,
+    })
+}
+
+fn nothing_there() -> ImagingError {
+    ImagingError::refused(format!(
+        "nothing of {LEAST_BODY_L} l is denser than {SKIN_LEVEL_HU} HU"
+    ))
+    .hint("is this a CT of a patient, in Hounsfield units?")
+}
+
+fn centroid(mask: &Mask) -> [f64; 3] {
+    let mut sums = [0.0; 3];
+    let mut count = 0.0;
+    let [_, ny, nz] = mask.size();
+    for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
+        for [from, to] in mask.runs(j, k) {
+            let length = (to - from) as f64;
+            let middle = 0.5 * (from + to - 1) as f64;
+            for (sum, at) in sums.iter_mut().zip([middle, j as f64, k as f64]) {
+                *sum += length * at;
+            }
+            count += length;
+        }
+    }
+    sums.map(|sum| sum / f64::max(count, 1.0))
+}
+
+/// Tissue of the largest part after what is thin was cut off.
+fn without_bed(
+    scan: &Scan<'_>,
+    tissue: &Mask,
+    remarks: &mut Vec<Remark>,
+) -> Result<Mask, ImagingError> {
+    let least = scan.voxels_of(LEAST_BODY_L);
+    for radius_m in [BED_HALF_THICKNESS_M, 0.5 * BED_HALF_THICKNESS_M, 0.0] {
+        let open = if radius_m > 0.0 {
+            opened(tissue, radius_m, scan.spacing_m)
+        } else {
+            tissue.clone()
+        };
+        let parts = Components::of(&open, Connectivity::Faces);
+        let Some(largest) = parts.largest() else {
+            continue;
+        };
+        // A thin shell loses most of itself, and its rest is not the body.
+        if parts.parts()[largest].voxels < least.max(tissue.count() / 10) {
+            continue;
+        }
+        if radius_m < BED_HALF_THICKNESS_M {
+            remarks.push(Remark::new(format!(
+                "the body is mostly thinner than {:.0} mm (a shell?): only what is thinner than {:.0} mm was cut off, \
+                 and the bed may be part of the body",
+                2e3 * BED_HALF_THICKNESS_M,
+                2e3 * radius_m
+            )));
+        }
+        note_others(scan, &parts, largest, remarks);
+        let kept = parts.mask_of(|part| part == largest);
+        // Rounding of the ball to voxels takes a layer off some corners.
+        let layer_m = 1.5 * scan.spacing_m[0].max(scan.spacing_m[1]);
+        let mut solid = dilated(&kept, layer_m, scan.spacing_m);
+        solid.intersect(tissue);
+        return Ok(solid);
+    }
+    Err(nothing_there())
+}
+
+fn note_others(scan: &Scan<'_>, parts: &Components, body: usize, remarks: &mut Vec<Remark>) {
+    let others = parts.parts().iter().enumerate();
+    for (_, other) in others.filter(|(part, _)| *part != body) {
+        let litres = scan.litres(other.voxels);
+        if litres < OTHER_PART_L {
+            continue;
+        }
+        let [i, j, k] = other.centroid();
+        let at = 1e3
+            * scan
+                .volume
+                .grid
+                .ct_from_index(&nalgebra::Point3::new(i, j, k));
+        remarks.push(Remark::new(format!(
+            "something of {litres:.1} l at [{:.0}, {:.0}, {:.0}] mm is not connected to the body and is left out (an \
+             arm, the bed?)",
+            at.x, at.y, at.z
+        )));
+    }
+}
+
+/// With all that it encloses.
+fn filled(scan: &Scan<'_>, solid: &Mask, remarks: &mut Vec<Remark>) -> Mask {
+    let around = Components::of(&solid.complement(), Connectivity::Faces);
+    let [nx, ny, _] = scan.size();
+    let touches_side = |bounds: &IndexBox| {
+        bounds.first[0] == 0
+            || bounds.first[1] == 0
+            || bounds.last[0] == nx - 1
+            || bounds.last[1] == ny - 1
+    };
+    let mut sums = vec![(0.0, 0.0); around.parts().len()];
+    for (part, [from, to], j, k) in around.runs() {
+        // The middle of a run stands for it: noise averages out over all runs.
+        let length = (to - from) as f64;
+        let hu = scan.hu([from.midpoint(to - 1), j, k]);
+        sums[part].0 += length * f64::from(hu);
+        sums[part].1 += length;
+    }
+    let largest = around.largest();
+    let is_outside: Vec<bool> = around
+        .parts()
+        .iter()
+        .enumerate()
+        .map(|(part, each)| {
+            let at_side = touches_side(&each.bounds);
+            let lung_like = Some(part) != largest
+                && sums[part].0 / sums[part].1 > OUTSIDE_HU
+                && scan.litres(each.voxels) > CUT_LUNG_L;
+            if at_side && lung_like {
+                remarks.push(Remark::new(format!(
+                    "{:.1} l of air that touches the border of the volume was taken for a lung that the field of view \
+                     cuts",
+                    scan.litres(each.voxels)
+                )));
+            }
+            at_side && !lung_like
+        })
+        .collect();
+    let body = around.mask_of(|part| is_outside[part]).complement();
+    let parts = Components::of(&body, Connectivity::Faces);
+    let largest = parts.largest();
+    parts.mask_of(|part| Some(part) == largest)
+}
+
+/// Area of the faces between two masks that do not overlap, other than along k, m^2.
+fn contact_m2(scan: &Scan<'_>, one: &Mask, other: &Mask) -> f64 {
+    let [_, ny, nz] = one.size();
+    let [mut along_i, mut along_j] = [0_u32; 2];
+    for k in 0..nz {
+        for j in 0..ny {
+            let beside = other.row(j, k);
+            if beside.iter().all(|&word| word == 0) {
+                continue;
+            }
+            let row = one.row(j, k);
+            for (at, &word) in beside.iter().enumerate() {
+                let up = word << 1 | at.checked_sub(1).map_or(0, |at| beside[at] >> 63);
+                let down = word >> 1 | beside.get(at + 1).map_or(0, |next| next << 63);
+                along_i += (row[at] & up).count_ones() + (row[at] & down).count_ones();
+            }
+            for near in [j.checked_sub(1), Some(j + 1).filter(|&j| j < ny)]
+                .into_iter()
+                .flatten()
+            {
+                let pairs = one.row(near, k).iter().zip(beside);
+                along_j += pairs.map(|(a, b)| (a & b).count_ones()).sum::<u32>();
+            }
+        }
+    }
+    let [x, y, z] = scan.spacing_m;
+    f64::from(along_i) * y * z + f64::from(along_j) * x * z
+}
+
+/// Where the body is cut by the volume's sides, or by the circle that a scanner fills.
+fn cut_sides(scan: &Scan<'_>, solid: &Mask, remarks: &mut Vec<Remark>) -> Vec<&'static str> {
+    let [nx, ny, nz] = scan.size();
+    let [x, y, z] = scan.spacing_m;
+    // Faces at i = 0, i = nx - 1, j = 0, j = ny - 1.
+    let mut counts = [0_usize; 4];
+    let circle = padding_circle(scan.volume);
+    for k in 0..nz {
+        for j in 0..ny {
+            counts[0] += usize::from(solid.get([0, j, k]));
+            counts[1] += usize::from(solid.get([nx - 1, j, k]));
+        }
+        counts[2] += solid.runs(0, k).map(|[from, to]| to - from).sum::<usize>();
+        counts[3] += solid
+            .runs(ny - 1, k)
+            .map(|[from, to]| to - from)
+            .sum::<usize>();
+        let Some(radius) = circle else {
+            continue;
+        };
+        let middle = [0.5 * (nx - 1) as f64, 0.5 * (ny - 1) as f64];
+        for j in 0..ny {
+            for i in solid.runs(j, k).flat_map(|[from, to]| [from, to - 1]) {
+                let away = [i as f64 - middle[0], j as f64 - middle[1]];
+                if away[0].hypot(away[1]) > radius - 1.5 {
+                    let side = match (away[0].abs() > away[1].abs(), away[0] > 0.0, away[1] > 0.0) {
+                        (true, right, _) => usize::from(right),
+                        (false, _, back) => 2 + usize::from(back),
+                    };
+                    counts[side] += 1;
+                }
+            }
+        }
+    }
+    let mut sides = Vec::new();
+    for (face, (count, area_m2)) in counts
+        .into_iter()
+        .zip([y * z, y * z, x * z, x * z])
+        .enumerate()
+    {
+        let area_m2 = count as f64 * area_m2;
+        if area_m2 > WORTH_MENTIONING_M2 {
+            let side = side_in_words(scan.volume, face / 2, face % 2 == 1);
+            remarks.push(Remark::new(format!(
+                "the field of view cuts the body on its {side} side, over {:.0} cm2: the skin is not seen there, and \
+                 the surface ends at the cut",
+                1e4 * area_m2
+            )));
+            sides.push(side);
+        }
+    }
+    sides
+}
+
+/// Radius in voxels of the circle outside which a scanner has filled everything with one value; none if there is none.
+fn padding_circle(volume: &Volume) -> Option<f64> {
+    let [nx, ny, nz] = volume.grid.size();
+    let middle = [0.5 * (nx - 1) as f64, 0.5 * (ny - 1) as f64];
+    let mut radius: f64 = 0.0;
+    for j in 0..ny {
+        for i in 0..nx {
+            if volume.hu[volume.grid.offset([i, j, nz / 2])] != AIR_HU {
+                radius = radius.max((i as f64 - middle[0]).hypot(j as f64 - middle[1]));
+            }
+        }
+    }
+    // Not the half diagonal: the corners are empty. Not far inside: air without noise would do that.
+    let half = 0.5 * nx.min(ny) as f64;
+    (0.9 * half..1.02 * half)
+        .contains(&radius)
+        .then_some(radius)
+}

@@ -1,0 +1,191 @@
+//! Bone, and vessels with contrast medium.
+
+use crate::components::{Component, Components, Connectivity};
+use crate::error::{ImagingError, Remark};
+use crate::mask::{IndexBox, Mask};
+use crate::morphology::closed;
+use crate::spacing::whole;
+
+use super::Scan;
+use super::body::Body;
+use super::lungs::Lungs;
+
+/// Denser than soft tissue and blood without contrast medium.
+pub const BONE_LEVEL_HU: f64 = 190.5;
+
+/// What is bone has some voxels that are denser than this: hysteresis against noise.
+const SURE_HU: i16 = 280;
+
+/// Cortical bone; blood with contrast medium is less dense.
+const CORTICAL_HU: i16 = 450;
+
+/// A bone has at least this share of cortical voxels.
+const CORTICAL_SHARE: f64 = 0.02;
+
+/// Less is noise, calcification or an artefact, mm^3.
+const LEAST_BONE_MM3: f64 = 50.0;
+
+/// Gaps in the shell of a bone that are closed.
+const CLOSING_M: f64 = 1.2e-3;
+
+/// Marrow that a shell encloses.
+const MOST_MARROW_L: f64 = 0.3;
+
+/// A part that is not surely bone or contrast medium and is worth a remark.
+const UNSURE_L: f64 = 1e-3;
+
+/// Bone and what is as dense. Masks are of the box.
+#[derive(Debug, Clone)]
+pub struct Bone {
+    /// The box that the masks cover: the body's.
+    pub bounds: IndexBox,
+    /// Bone with its marrow.
+    pub bone: Mask,
+    /// Blood with contrast medium: dense, but nowhere as dense as cortical bone.
+    pub contrast: Mask,
+}
+
+pub(super) fn find(
+    scan: &Scan<'_>,
+    body: &Body,
+    lungs: &Lungs,
+    remarks: &mut Vec<Remark>,
+) -> Result<Bone, ImagingError> {
+    let bounds = body.bounds;
+    let dense = scan.denser(&body.mask.cropped(&bounds), &bounds, scan.levels.bone_hu);
+    scan.check()?;
+    let parts = Components::of(&dense, Connectivity::Faces);
+    let facts = densities(scan, &parts, &bounds);
+    let least = whole((1e-9 * LEAST_BONE_MM3 / scan.voxel_m3()).ceil()).max(1);
+    let kinds: Vec<Kind> = parts
+        .parts()
+        .iter()
+        .zip(&facts)
+        .map(|(part, facts)| {
+            if part.voxels < least || facts.sure == 0 {
+                Kind::Speck
+            } else if facts.cortical as f64 >= CORTICAL_SHARE * part.voxels as f64 {
+                Kind::Bone
+            } else if is_between(scan, lungs, part) {
+                Kind::Contrast
+            } else {
+                Kind::Unsure
+            }
+        })
+        .collect();
+    note_unsure(scan, &parts, &kinds, remarks);
+    let of_kind = |wanted: &[Kind]| parts.mask_of(|part| wanted.contains(&kinds[part]));
+    let bone = solid(scan, &of_kind(&[Kind::Bone, Kind::Unsure]))?;
+    let mut contrast = of_kind(&[Kind::Contrast]);
+    contrast.subtract(&bone);
+    if bone.is_empty() {
+        remarks.push(Remark::new(format!(
+            "no bone was found: nothing in the body is denser than {SURE_HU} HU"
+        )));
+    }
+    Ok(Bone {
+        bounds,
+        bone,
+        contrast,
+    })
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Speck,
+    Bone,
+    Contrast,
+    Unsure,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Density {
+    sure: usize,
+    cortical: usize,
+}
+
+fn densities(scan: &Scan<'_>, parts: &Components, bounds: &IndexBox) -> Vec<Density> {
+    let mut facts = vec![Density::default(); parts.parts().len()];
+    for (part, run, j, k) in parts.runs() {
+        let there = run.map(|i| i + bounds.first[0]);
+        for &hu in scan.row(there, j + bounds.first[1], k + bounds.first[2]) {
+            facts[part].sure += usize::from(hu > SURE_HU);
+            facts[part].cortical += usize::from(hu > CORTICAL_HU);
+        }
+    }
+    facts
+}
+
+/// Whether a part lies between the lungs, where heart and great vessels are: its middle within the box of both, and
+/// in front of their back quarter, where the spine is.
+fn is_between(scan: &Scan<'_>, lungs: &Lungs, part: &Component) -> bool {
+    let mut both = Mask::empty(lungs.gas.size());
+    for lung in &lungs.lungs {
+        both.unite(&lung.mask);
+    }
+    let Some(bounds) = both.bounds() else {
+        return false;
+    };
+    let middle = part.centroid();
+    let within = |axis: usize| {
+        (bounds.first[axis] as f64..=bounds.last[axis] as f64).contains(&middle[axis])
+    };
+    let posterior = scan.volume.grid.steps_m().row(1).transpose().iamax();
+    let depth =
+        (middle[posterior] - bounds.first[posterior] as f64) / (bounds.size()[posterior] as f64);
+    let runs_back = scan.volume.grid.steps_m()[(1, posterior)] > 0.0;
+    let depth = if runs_back { depth } else { 1.0 - depth };
+    (0..3).all(within) && (0.1..0.75).contains(&depth)
+}
+
+fn note_unsure(scan: &Scan<'_>, parts: &Components, kinds: &[Kind], remarks: &mut Vec<Remark>) {
+    let sum = |wanted: Kind| {
+        let of_kind = parts
+            .parts()
+            .iter()
+            .zip(kinds)
+            .filter(|(_, kind)| **kind == wanted);
+        scan.litres(of_kind.map(|(part, _)| part.voxels).sum())
+    };
+    let contrast_l = sum(Kind::Contrast);
+    if contrast_l > UNSURE_L {
+        remarks.push(Remark::new(format!(
+            "{:.0} ml between the lungs are dense like blood with contrast medium (over {BONE_LEVEL_HU} HU, not \
+             {CORTICAL_HU}): taken for vessels, which is a guess by place and density",
+            1e3 * contrast_l
+        )));
+    }
+    let unsure_l = sum(Kind::Unsure);
+    if unsure_l > UNSURE_L {
+        remarks.push(Remark::new(format!(
+            "{:.0} ml of what was taken for bone have nearly nothing above {CORTICAL_HU} HU: it may be vessels with \
+             contrast medium",
+            1e3 * unsure_l
+        )));
+    }
+}
+
+/// With gaps in the shell closed and the marrow inside.
+fn solid(scan: &Scan<'_>, shell: &Mask) -> Result<Mask, ImagingError> {
+    let Some(bounds) = shell.bounds() else {
+        return Ok(shell.clone());
+    };
+    let margin = [0, 1, 2].map(|axis| scan.voxels_across(CLOSING_M, axis) + 1);
+    let around = bounds.widened(margin, shell.size());
+    let tight = closed(&shell.cropped(&around), CLOSING_M, scan.spacing_m);
+    scan.check()?;
+    let holes = Components::of(&tight.complement(), Connectivity::Faces);
+    let most = scan.voxels_of(MOST_MARROW_L);
+    let size = tight.size();
+    let marrow = holes.mask_of(|part| {
+        let hole = &holes.parts()[part];
+        // A bone that the first or the last slice cuts is open there.
+        let inside = (0..2)
+            .all(|axis| hole.bounds.first[axis] > 0 && hole.bounds.last[axis] < size[axis] - 1);
+        inside && hole.voxels <= most
+    });
+    let mut solid = shell.clone();
+    solid.unite_within(&around, &tight);
+    solid.unite_within(&around, &marrow);
+    Ok(solid)
+}

@@ -1,0 +1,435 @@
+//! Lungs, airways and the vessels in the lungs.
+
+use crate::components::{Components, Connectivity};
+use crate::error::{ImagingError, Remark};
+use crate::mask::{IndexBox, Mask, pack_row};
+use crate::morphology::{bridged, dilated, eroded};
+
+use super::body::Body;
+use super::{Scan, side_in_words};
+
+/// Between lung (-850) and the soft tissue around it (+40). Half-integer: no voxel is on it.
+pub const LUNG_LEVEL_HU: f64 = -400.5;
+
+/// A lung has at least so much air.
+const LEAST_LUNG_L: f64 = 0.3;
+
+/// A piece of a lung, such as a lobe behind a fissure, has at least so much.
+const LEAST_PIECE_L: f64 = 0.02;
+
+/// A merged lung has at least this share of its air on either side of the body.
+const MERGED_SHARE: f64 = 0.2;
+
+/// What is soft and has lung on both sides along two axes within this is a vessel in the lung. A dome, such as the
+/// diaphragm's, loses a cap of this width: 0.13 mm of one with a radius of 60 mm.
+const VESSEL_WIDTH_M: f64 = 8e-3;
+
+/// What is soft and has lung on both sides along all three axes within this is in the lung.
+const ENCLOSED_WIDTH_M: f64 = 40e-3;
+
+/// Smoothed air is airway at the middle between air and lung if these are at least so far apart.
+const AIRWAY_CONTRAST_HU: i16 = 80;
+
+/// The airways of adults that CT shows: trachea, main and lobar bronchi.
+const AIRWAYS_L: [f64; 2] = [2e-3, 0.2];
+
+/// Trachea and main bronchi are at least so long.
+const AIRWAY_LENGTH_M: f64 = 30e-3;
+
+/// Which lung.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Side {
+    /// At the patient's left: larger x.
+    Left,
+    /// At the patient's right.
+    Right,
+}
+
+/// One lung, with its vessels and what else it encloses.
+#[derive(Debug, Clone)]
+pub struct Lung {
+    /// Which one.
+    pub side: Side,
+    /// Its voxels, of the box of [`Lungs`].
+    pub mask: Mask,
+    /// Of its air, l.
+    pub air_l: f64,
+    /// Whether the first or the last slice cuts it.
+    pub cut: bool,
+}
+
+/// Lungs and what is in them. Masks are of the box.
+#[derive(Debug, Clone)]
+pub struct Lungs {
+    /// The box that the masks cover: the body's.
+    pub bounds: IndexBox,
+    /// None, one, or the left one and the right one.
+    pub lungs: Vec<Lung>,
+    /// Trachea and bronchi, as far as they are wider than about two voxels; their inside.
+    pub airways: Mask,
+    /// Soft tissue in the lungs: vessels, and nodules that nobody has pointed at.
+    pub vessels: Mask,
+    /// Other enclosed air: stomach, bowel.
+    pub gas: Mask,
+    /// Median of the air in the lungs; none without lungs.
+    pub air_hu: Option<i16>,
+}
+
+pub(super) fn find(
+    scan: &Scan<'_>,
+    body: &Body,
+    remarks: &mut Vec<Remark>,
+) -> Result<Lungs, ImagingError> {
+    let bounds = body.bounds;
+    let mut airy = body.mask.cropped(&bounds);
+    airy.subtract(&scan.denser(&airy, &bounds, scan.levels.lung_hu));
+    scan.check()?;
+    let parts = Components::of(&airy, Connectivity::Faces);
+    let large = scan.voxels_of(LEAST_LUNG_L);
+    let candidates = parts.mask_of(|part| parts.parts()[part].voxels >= large);
+    let mut lungs = Lungs {
+        bounds,
+        lungs: Vec::new(),
+        airways: Mask::empty(airy.size()),
+        vessels: Mask::empty(airy.size()),
+        gas: airy.clone(),
+        air_hu: scan.median(&candidates, &bounds),
+    };
+    let Some(air_hu) = lungs.air_hu else {
+        remarks.push(Remark::new(format!(
+            "no lungs were found: no enclosed air of {LEAST_LUNG_L} l"
+        )));
+        return Ok(lungs);
+    };
+    lungs.airways = airways(scan, &airy, &bounds, air_hu, remarks);
+    scan.check()?;
+    let mut air = airy.clone();
+    air.subtract(&lungs.airways);
+    let by_side = sides(scan, body, &air, remarks)?;
+    for (side, air) in by_side {
+        let air_l = scan.litres(air.count());
+        if air_l < LEAST_LUNG_L {
+            continue;
+        }
+        scan.check()?;
+        let mask = with_enclosed(scan, &air);
+        let [_, ny, nz] = mask.size();
+        let at_end = |k: usize| (0..ny).any(|j| mask.runs(j, k).next().is_some());
+        let cut = [0, nz - 1].into_iter().any(|k| {
+            let in_volume = k + bounds.first[2];
+            (in_volume == 0 || in_volume == scan.size()[2] - 1) && at_end(k)
+        });
+        lungs.gas.subtract(&air);
+        lungs.lungs.push(Lung {
+            side,
+            mask,
+            air_l,
+            cut,
+        });
+    }
+    separate(&mut lungs, &airy);
+    lungs.lungs.sort_by_key(|lung| lung.side);
+    lungs.gas.subtract(&lungs.airways);
+    note_missing(scan, &lungs, remarks);
+    Ok(lungs)
+}
+
+/// What both lungs enclose belongs to neither; soft tissue in them is vessels.
+fn separate(lungs: &mut Lungs, airy: &Mask) {
+    if let [one, other] = &mut lungs.lungs[..] {
+        let mut both = one.mask.clone();
+        both.intersect(&other.mask);
+        one.mask.subtract(&both);
+        other.mask.subtract(&both);
+    }
+    for lung in &mut lungs.lungs {
+        lung.mask.subtract(&lungs.airways);
+        lungs.vessels.unite(&lung.mask);
+    }
+    lungs.vessels.subtract(airy);
+}
+
+fn note_missing(scan: &Scan<'_>, lungs: &Lungs, remarks: &mut Vec<Remark>) {
+    match &lungs.lungs[..] {
+        [] => remarks.push(Remark::new(format!(
+            "no lung with {LEAST_LUNG_L} l of air was found"
+        ))),
+        [lung] => remarks.push(Remark::new(format!(
+            "one lung was found, at the patient's {} side",
+            match lung.side {
+                Side::Left => "left",
+                Side::Right => "right",
+            }
+        ))),
+        _ => {}
+    }
+    for lung in lungs.lungs.iter().filter(|lung| lung.cut) {
+        let ends = [0, scan.size()[2] - 1];
+        let side = side_in_words(
+            scan.volume,
+            2,
+            lung.mask
+                .bounds()
+                .is_some_and(|b| b.last[2] + lungs.bounds.first[2] == ends[1]),
+        );
+        remarks.push(Remark::new(format!(
+            "the {} lung is cut at the {side} end of the volume",
+            match lung.side {
+                Side::Left => "left",
+                Side::Right => "right",
+            }
+        )));
+    }
+}
+
+/// Trachea and bronchi: air that is clearly emptier than lung, of the size and length of airways.
+fn airways(
+    scan: &Scan<'_>,
+    airy: &Mask,
+    bounds: &IndexBox,
+    lung_hu: i16,
+    remarks: &mut Vec<Remark>,
+) -> Mask {
+    let none = Mask::empty(airy.size());
+    let contrast = lung_hu.saturating_add(1000);
+    if contrast < AIRWAY_CONTRAST_HU {
+        remarks.push(Remark::new(format!(
+            "the air in the lungs is at {lung_hu} HU, like that of the airways: these were not told apart"
+        )));
+        return none;
+    }
+    let level = i32::from(lung_hu) - i32::from(contrast) / 2;
+    let core = emptier_than(scan, airy, bounds, level);
+    let parts = Components::of(&core, Connectivity::Faces);
+    let is_airway = |part: usize| {
+        let each = &parts.parts()[part];
+        let length_m = (0..3)
+            .map(|axis| each.bounds.size()[axis] as f64 * scan.spacing_m[axis])
+            .fold(0.0, f64::max);
+        let litres = scan.litres(each.voxels);
+        (AIRWAYS_L[0]..=AIRWAYS_L[1]).contains(&litres) && length_m >= AIRWAY_LENGTH_M
+    };
+    // The trachea is the largest of them; bronchi hang on it or are cut off by noise.
+    let inside = parts.mask_of(is_airway);
+    if inside.is_empty() {
+        remarks.push(Remark::new(
+            "no airways were found: they may be part of the lungs",
+        ));
+        return none;
+    }
+    // The rim of their inside is as dense as lung by partial volume.
+    let layer_m = 1.5 * scan.spacing_m[0].max(scan.spacing_m[1]);
+    let mut airways = dilated(&inside, layer_m, scan.spacing_m);
+    airways.intersect(airy);
+    airways
+}
+
+/// Voxels whose mean with their neighbours along i, j and k is below a level.
+fn emptier_than(scan: &Scan<'_>, airy: &Mask, bounds: &IndexBox, level: i32) -> Mask {
+    let [nx, ny, nz] = scan.size();
+    let mut found = Mask::empty(airy.size());
+    let [columns, rows, slices] = airy.size();
+    let mut sums = vec![0; columns];
+    for (j, k) in (0..slices).flat_map(|k| (0..rows).map(move |j| (j, k))) {
+        let [at_j, at_k] = [j + bounds.first[1], k + bounds.first[2]];
+        if at_j == 0 || at_j == ny - 1 || airy.row(j, k).iter().all(|&word| word == 0) {
+            continue;
+        }
+        sums.fill(0);
+        // At the first and the last slice, the slice itself stands for its neighbour; at the first and the last
+        // column there is no voxel to be found.
+        for (step, at_j, at_k) in [
+            (-1, at_j, at_k),
+            (0, at_j, at_k),
+            (1, at_j, at_k),
+            (0, at_j - 1, at_k),
+            (0, at_j + 1, at_k),
+            (0, at_j, at_k.saturating_sub(1)),
+            (0, at_j, (at_k + 1).min(nz - 1)),
+        ] {
+            let row = scan.row([0, nx], at_j, at_k);
+            let first = bounds.first[0].saturating_add_signed(step);
+            let from = usize::from(bounds.first[0] == 0 && step < 0);
+            for (sum, &hu) in sums[from..].iter_mut().zip(&row[first..]) {
+                *sum += i32::from(hu);
+            }
+        }
+        for at in [0, nx - 1] {
+            if let Some(at) = at.checked_sub(bounds.first[0]).filter(|&at| at < columns) {
+                sums[at] = i32::MAX;
+            }
+        }
+        let row = found.row_mut(j, k);
+        pack_row(&sums, row, |sum| sum < 7 * level);
+        for (word, &airy) in row.iter_mut().zip(airy.row(j, k)) {
+            *word &= airy;
+        }
+    }
+    found
+}
+
+/// The air of each lung: pieces by the side of the body that they are on, and a piece that is on both cut in two.
+fn sides(
+    scan: &Scan<'_>,
+    body: &Body,
+    air: &Mask,
+    remarks: &mut Vec<Remark>,
+) -> Result<Vec<(Side, Mask)>, ImagingError> {
+    let pieces = Components::of(air, Connectivity::Faces);
+    let axis = left_axis(scan);
+    let middle = body.centroid[axis] - body.bounds.first[axis] as f64;
+    let mut left = Mask::empty(air.size());
+    let mut right = Mask::empty(air.size());
+    let least = scan.voxels_of(LEAST_PIECE_L);
+    for (part, piece) in pieces.parts().iter().enumerate() {
+        if piece.voxels < least {
+            continue;
+        }
+        let mask = pieces.mask_of(|each| each == part);
+        let share = share_beyond(&mask, axis, middle);
+        if share.min(1.0 - share) < MERGED_SHARE {
+            let is_left = (piece.centroid()[axis] > middle) == runs_left(scan, axis);
+            (if is_left { &mut left } else { &mut right }).unite(&mask);
+            continue;
+        }
+        scan.check()?;
+        let (halves, how) = split(scan, &mask, axis, middle)?;
+        remarks.push(Remark::new(format!(
+            "the lungs are connected; they were parted {how}"
+        )));
+        for half in halves {
+            let beyond = share_beyond(&half, axis, middle) > 0.5;
+            (if beyond == runs_left(scan, axis) {
+                &mut left
+            } else {
+                &mut right
+            })
+            .unite(&half);
+        }
+    }
+    Ok(vec![(Side::Left, left), (Side::Right, right)])
+}
+
+/// The axis of the grid that runs most along x.
+fn left_axis(scan: &Scan<'_>) -> usize {
+    let x = scan.volume.grid.steps_m().row(0).transpose();
+    x.iamax()
+}
+
+/// Whether an axis of the grid runs to the patient's left.
+fn runs_left(scan: &Scan<'_>, axis: usize) -> bool {
+    scan.volume.grid.steps_m()[(0, axis)] > 0.0
+}
+
+/// Share of a mask's voxels whose index along an axis is beyond a place.
+fn share_beyond(mask: &Mask, axis: usize, place: f64) -> f64 {
+    let [_, ny, nz] = mask.size();
+    let (mut beyond, mut all) = (0, 0);
+    for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
+        for [from, to] in mask.runs(j, k) {
+            all += to - from;
+            beyond += match axis {
+                0 => (from..to).filter(|&i| i as f64 > place).count(),
+                1 if j as f64 > place => to - from,
+                2 if k as f64 > place => to - from,
+                _ => 0,
+            };
+        }
+    }
+    beyond as f64 / f64::max(f64::from(u32::try_from(all).unwrap_or(u32::MAX)), 1.0)
+}
+
+/// Parts a mask at its narrowest place: worn away until it falls apart, then grown back from the pieces.
+fn split(
+    scan: &Scan<'_>,
+    mask: &Mask,
+    axis: usize,
+    middle: f64,
+) -> Result<([Mask; 2], String), ImagingError> {
+    let total = mask.count();
+    for radius_mm in [0.8, 1.2, 1.6, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0] {
+        scan.check()?;
+        let worn = eroded(mask, 1e-3 * radius_mm, scan.spacing_m);
+        let pieces = Components::of(&worn, Connectivity::Faces);
+        let mut order: Vec<usize> = (0..pieces.parts().len()).collect();
+        order.sort_by_key(|&part| std::cmp::Reverse(pieces.parts()[part].voxels));
+        let [Some(&one), Some(&other)] = [order.first(), order.get(1)] else {
+            continue;
+        };
+        let [a, b] = [one, other].map(|part| &pieces.parts()[part]);
+        let apart = (a.centroid()[axis] > middle) != (b.centroid()[axis] > middle);
+        if !apart || b.voxels < total / 10 {
+            continue;
+        }
+        let mut halves = [one, other].map(|part| pieces.mask_of(|each| each == part));
+        grow_back(scan, &mut halves, mask);
+        let how = format!(
+            "where their connection is narrowest, at most {:.1} mm wide",
+            2.0 * radius_mm
+        );
+        return Ok((halves, how));
+    }
+    let mut halves = [Mask::empty(mask.size()), Mask::empty(mask.size())];
+    for voxel in mask.voxels() {
+        halves[usize::from(voxel[axis] as f64 > middle)].insert(voxel);
+    }
+    Ok((
+        halves,
+        "at the middle of the body, because their connection is wide".to_owned(),
+    ))
+}
+
+/// Grows two masks within a third one, a layer at a time in turn, until all that they reach is theirs.
+fn grow_back(scan: &Scan<'_>, halves: &mut [Mask; 2], within: &Mask) {
+    let layer_m = 1.01 * scan.spacing_m.iter().copied().fold(0.0, f64::max);
+    loop {
+        let mut grew = false;
+        for turn in 0..2 {
+            let mut grown = dilated(&halves[turn], layer_m, scan.spacing_m);
+            grown.intersect(within);
+            grown.subtract(&halves[1 - turn]);
+            grew |= grown != halves[turn];
+            halves[turn] = grown;
+        }
+        if !grew {
+            return;
+        }
+    }
+}
+
+/// With the soft tissue that it encloses: vessels and nodules.
+fn with_enclosed(scan: &Scan<'_>, air: &Mask) -> Mask {
+    let Some(bounds) = air.bounds() else {
+        return air.clone();
+    };
+    let part = air.cropped(&bounds);
+    let gap = |width_m: f64, axis: usize| scan.voxels_across(width_m, axis);
+    let along = |width_m: f64| [0, 1, 2].map(|axis| bridged(&part, axis, gap(width_m, axis)));
+    let [i, j, k] = along(VESSEL_WIDTH_M);
+    let mut enclosed = i.clone();
+    enclosed.intersect(&j);
+    for pair in [[&i, &k], [&j, &k]] {
+        let mut both = pair[0].clone();
+        both.intersect(pair[1]);
+        enclosed.unite(&both);
+    }
+    let [mut all, j, k] = along(ENCLOSED_WIDTH_M);
+    all.intersect(&j);
+    all.intersect(&k);
+    enclosed.unite(&all);
+    enclosed.unite(&part);
+    enclosed.unite(&holes(&enclosed));
+    let mut filled = air.clone();
+    filled.unite_within(&bounds, &enclosed);
+    filled
+}
+
+/// What a mask encloses.
+fn holes(mask: &Mask) -> Mask {
+    let size = mask.size();
+    let around = Components::of(&mask.complement(), Connectivity::Faces);
+    around.mask_of(|part| {
+        let bounds = &around.parts()[part].bounds;
+        (0..3).all(|axis| bounds.first[axis] > 0 && bounds.last[axis] < size[axis] - 1)
+    })
+}

@@ -1,0 +1,37 @@
+//! Grids on which distances can be counted in voxels.
+
+use crate::ImagingError;
+use crate::grid::VoxelGrid;
+
+/// Cosine of the angle between two steps below which they count as perpendicular: a millimetre over a metre.
+const PERPENDICULAR: f64 = 1e-3;
+
+/// Spacing in m of a grid whose axes are perpendicular.
+pub(crate) fn orthogonal(grid: &VoxelGrid) -> Result<[f64; 3], ImagingError> {
+    let steps = grid.steps_m();
+    for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+        let (one, other) = (steps.column(a), steps.column(b));
+        let cosine = one.dot(&other).abs() / (one.norm() * other.norm());
+        if cosine > PERPENDICULAR {
+            return Err(ImagingError::refused(format!(
+                "the voxels' axes {a} and {b} are {:.2} degrees from perpendicular",
+                cosine
+                    .min(1.0)
+                    .atan2((1.0 - cosine * cosine).max(0.0).sqrt())
+                    .to_degrees()
+            ))
+            .hint("resample the volume to a perpendicular grid first"));
+        }
+    }
+    Ok(grid.spacing_m())
+}
+
+/// Whole steps in a length; what is more than there are voxels saturates.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a count, which is never negative"
+)]
+pub(crate) fn whole(steps: f64) -> usize {
+    steps.floor().max(0.0) as usize
+}

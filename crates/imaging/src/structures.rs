@@ -1,0 +1,225 @@
+//! What names of structures in label maps mean, and what surfaces are of.
+
+use serde::Serialize;
+
+/// What a surface is of, in the words of `[[phantom.parts]]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SurfaceTissue {
+    /// Outside of the body.
+    Skin,
+    /// Bone.
+    Bone,
+    /// Blood vessel.
+    Vessel,
+    /// Organ other than a lung.
+    Organ,
+    /// Lung.
+    Lung,
+    /// Lesion.
+    Lesion,
+}
+
+/// What a label stands for. Labels with the same name are one structure.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Structure {
+    /// Its name here: `ribs`, `lung_left`.
+    pub name: String,
+    /// What it is.
+    pub tissue: SurfaceTissue,
+}
+
+/// Words, all of which a name has; the structure that it is of; what that is. The first row that fits counts.
+const TABLE: &[(&[&str], &str, SurfaceTissue)] = &[
+    (&["nodule"], "", SurfaceTissue::Lesion),
+    (&["nodules"], "", SurfaceTissue::Lesion),
+    (&["tumor"], "", SurfaceTissue::Lesion),
+    (&["tumour"], "", SurfaceTissue::Lesion),
+    (&["lesion"], "", SurfaceTissue::Lesion),
+    (&["lung", "vessels"], "lung_vessels", SurfaceTissue::Vessel),
+    (&["lung", "trachea"], "trachea", SurfaceTissue::Organ),
+    (&["lung", "left"], "lung_left", SurfaceTissue::Lung),
+    (&["lung", "right"], "lung_right", SurfaceTissue::Lung),
+    (&["lobe", "left"], "lung_left", SurfaceTissue::Lung),
+    (&["lobe", "right"], "lung_right", SurfaceTissue::Lung),
+    (&["skin"], "skin", SurfaceTissue::Skin),
+    (&["body"], "skin", SurfaceTissue::Skin),
+    (&["external"], "skin", SurfaceTissue::Skin),
+    (&["vertebra"], "vertebrae", SurfaceTissue::Bone),
+    (&["vertebrae"], "vertebrae", SurfaceTissue::Bone),
+    (&["spine"], "vertebrae", SurfaceTissue::Bone),
+    (&["sacrum"], "sacrum", SurfaceTissue::Bone),
+    (&["rib"], "ribs", SurfaceTissue::Bone),
+    (&["ribs"], "ribs", SurfaceTissue::Bone),
+    (&["costal"], "costal_cartilages", SurfaceTissue::Bone),
+    (&["sternum"], "sternum", SurfaceTissue::Bone),
+    (&["scapula", "left"], "scapula_left", SurfaceTissue::Bone),
+    (&["scapula", "right"], "scapula_right", SurfaceTissue::Bone),
+    (&["clavicula", "left"], "clavicle_left", SurfaceTissue::Bone),
+    (
+        &["clavicula", "right"],
+        "clavicle_right",
+        SurfaceTissue::Bone,
+    ),
+    (&["clavicle", "left"], "clavicle_left", SurfaceTissue::Bone),
+    (
+        &["clavicle", "right"],
+        "clavicle_right",
+        SurfaceTissue::Bone,
+    ),
+    (&["humerus", "left"], "humerus_left", SurfaceTissue::Bone),
+    (&["humerus", "right"], "humerus_right", SurfaceTissue::Bone),
+    (&["hip"], "hips", SurfaceTissue::Bone),
+    (&["skull"], "skull", SurfaceTissue::Bone),
+    (&["bone"], "bone", SurfaceTissue::Bone),
+    (&["aorta"], "aorta", SurfaceTissue::Vessel),
+    (
+        &["pulmonary", "vein"],
+        "pulmonary_veins",
+        SurfaceTissue::Vessel,
+    ),
+    (
+        &["pulmonary", "venous"],
+        "pulmonary_veins",
+        SurfaceTissue::Vessel,
+    ),
+    (
+        &["pulmonary", "artery"],
+        "pulmonary_arteries",
+        SurfaceTissue::Vessel,
+    ),
+    (
+        &["vena", "superior"],
+        "superior_vena_cava",
+        SurfaceTissue::Vessel,
+    ),
+    (
+        &["vena", "inferior"],
+        "inferior_vena_cava",
+        SurfaceTissue::Vessel,
+    ),
+    (&["portal"], "portal_veins", SurfaceTissue::Vessel),
+    (
+        &["brachiocephalic"],
+        "brachiocephalic_vessels",
+        SurfaceTissue::Vessel,
+    ),
+    (
+        &["subclavian"],
+        "subclavian_arteries",
+        SurfaceTissue::Vessel,
+    ),
+    (&["carotid"], "carotid_arteries", SurfaceTissue::Vessel),
+    (
+        &["iliac", "artery"],
+        "iliac_arteries",
+        SurfaceTissue::Vessel,
+    ),
+    (&["iliac", "vena"], "iliac_veins", SurfaceTissue::Vessel),
+    (&["artery"], "arteries", SurfaceTissue::Vessel),
+    (&["vein"], "veins", SurfaceTissue::Vessel),
+    (&["vessel"], "vessels", SurfaceTissue::Vessel),
+    (&["vessels"], "vessels", SurfaceTissue::Vessel),
+    (&["heart"], "heart", SurfaceTissue::Organ),
+    (&["atrial"], "heart", SurfaceTissue::Organ),
+    (&["atrium"], "heart", SurfaceTissue::Organ),
+    (&["ventricle"], "heart", SurfaceTissue::Organ),
+    (&["myocardium"], "heart", SurfaceTissue::Organ),
+    (&["trachea"], "trachea", SurfaceTissue::Organ),
+    (&["airway"], "trachea", SurfaceTissue::Organ),
+    (&["airways"], "trachea", SurfaceTissue::Organ),
+    (&["bronchus"], "trachea", SurfaceTissue::Organ),
+    (&["bronchi"], "trachea", SurfaceTissue::Organ),
+    (&["bronchie"], "trachea", SurfaceTissue::Organ),
+    (&["esophagus"], "esophagus", SurfaceTissue::Organ),
+    (&["oesophagus"], "esophagus", SurfaceTissue::Organ),
+    (&["thyroid"], "thyroid", SurfaceTissue::Organ),
+    (&["liver"], "liver", SurfaceTissue::Organ),
+    (&["spleen"], "spleen", SurfaceTissue::Organ),
+    (&["stomach"], "stomach", SurfaceTissue::Organ),
+    (&["gallbladder"], "gallbladder", SurfaceTissue::Organ),
+    (&["pancreas"], "pancreas", SurfaceTissue::Organ),
+    (&["kidney", "left"], "kidney_left", SurfaceTissue::Organ),
+    (&["kidney", "right"], "kidney_right", SurfaceTissue::Organ),
+    (&["adrenal"], "adrenal_glands", SurfaceTissue::Organ),
+    (&["colon"], "colon", SurfaceTissue::Organ),
+    (&["duodenum"], "duodenum", SurfaceTissue::Organ),
+    (&["bowel"], "bowel", SurfaceTissue::Organ),
+    (&["spinal", "cord"], "spinal_cord", SurfaceTissue::Organ),
+];
+
+/// What a name of 3D Slicer, TotalSegmentator or this program stands for; none if it is not known.
+///
+/// Names are taken apart into words of letters; `l` and `r` stand for left and right. A lesion keeps its name.
+pub fn structure_of(name: &str) -> Option<Structure> {
+    let lower = name.to_lowercase();
+    let words: Vec<&str> = lower
+        .split(|c: char| !c.is_alphabetic())
+        .map(|word| match word {
+            "l" => "left",
+            "r" => "right",
+            "lungs" => "lung",
+            other => other,
+        })
+        .collect();
+    let (_, structure, tissue) = TABLE
+        .iter()
+        .find(|(wanted, _, _)| wanted.iter().all(|word| words.contains(word)))?;
+    let name = match *tissue {
+        SurfaceTissue::Lesion => words
+            .iter()
+            .filter(|word| !word.is_empty())
+            .copied()
+            .chain(digits(&lower))
+            .collect::<Vec<_>>()
+            .join("_"),
+        _ => (*structure).to_owned(),
+    };
+    Some(Structure {
+        name,
+        tissue: *tissue,
+    })
+}
+
+/// The last number in a name.
+fn digits(name: &str) -> Option<&str> {
+    name.split(|c: char| !c.is_ascii_digit())
+        .rfind(|part| !part.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_other_programs_are_known() {
+        for (name, wanted, tissue) in [
+            ("lung_upper_lobe_left", "lung_left", SurfaceTissue::Lung),
+            ("lung_middle_lobe_right", "lung_right", SurfaceTissue::Lung),
+            ("Right Lung", "lung_right", SurfaceTissue::Lung),
+            ("Lung_L", "lung_left", SurfaceTissue::Lung),
+            ("left lower lobe", "lung_left", SurfaceTissue::Lung),
+            ("rib_left_7", "ribs", SurfaceTissue::Bone),
+            ("vertebrae_T5", "vertebrae", SurfaceTissue::Bone),
+            ("scapula_right", "scapula_right", SurfaceTissue::Bone),
+            ("heart_atrium_left", "heart", SurfaceTissue::Organ),
+            ("heart", "heart", SurfaceTissue::Organ),
+            ("pulmonary_vein", "pulmonary_veins", SurfaceTissue::Vessel),
+            ("iliac_vena_left", "iliac_veins", SurfaceTissue::Vessel),
+            ("lung_vessels", "lung_vessels", SurfaceTissue::Vessel),
+            ("lung_trachea_bronchia", "trachea", SurfaceTissue::Organ),
+            ("body", "skin", SurfaceTissue::Skin),
+            ("body_trunc", "skin", SurfaceTissue::Skin),
+            ("Liver", "liver", SurfaceTissue::Organ),
+            ("lung_nodules", "lung_nodules", SurfaceTissue::Lesion),
+            ("lesion 2", "lesion_2", SurfaceTissue::Lesion),
+        ] {
+            let structure = structure_of(name);
+            let found = structure.map(|found| (found.name, found.tissue));
+            assert_eq!(found, Some((wanted.to_owned(), tissue)), "{name}");
+        }
+        for name in ["", "autochthon_left", "air", "face"] {
+            assert_eq!(structure_of(name), None, "{name}");
+        }
+    }
+}

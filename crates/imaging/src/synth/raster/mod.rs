@@ -1,0 +1,288 @@
+//! Which part of a scene is where: boxes of cells are halved until each lies within one part or is a cell.
+//!
+//! Parts that a box lies outside of, and faces of polyhedra that cannot cut it, are dropped on the way down; the first
+//! part from the top that holds the whole box ends the list. So most of a slice is filled in large pieces, and a cell
+//! asks the few faces that are near it.
+
+mod body;
+mod plane_cut;
+
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use needlebench_kinematics::Pose;
+
+use super::Scene;
+pub(super) use body::Cell;
+use body::{Body, Lies};
+use plane_cut::Plane;
+
+/// Halvings of a cell in which surfaces meet: each of its edges twice. What then is left is half a cell, an eighth of a
+/// millimetre, and is asked at eight points: as often on one side of a surface as on the other, where taking the shares of
+/// surfaces for independent would see gaps between parts that touch.
+const HALVINGS: u32 = 3;
+/// Half of the edge of a point, m: what is within it of a surface is on either side of it.
+const POINT_M: f64 = 1e-9;
+/// Shares below this count as none: rounding.
+const NOTHING: f64 = 1e-9;
+
+/// The parts of a scene in a frame along the axes of the slices.
+#[derive(Debug)]
+pub(super) struct Raster {
+    parts: Vec<RasterPart>,
+    around_hu: f64,
+    /// Axes of the slices in `ct`: columns, rows, normal.
+    frame_from_ct: UnitQuaternion<f64>,
+}
+
+#[derive(Debug)]
+struct RasterPart {
+    body: Body,
+    hu: f64,
+    label: u16,
+    low: Vector3<f64>,
+    high: Vector3<f64>,
+}
+
+/// What fills a box wholly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Material {
+    pub hu: f64,
+    pub label: u16,
+}
+
+/// A part that may cut a box, and its faces that may.
+#[derive(Debug, Clone)]
+struct Candidate {
+    part: u32,
+    planes: Range<u32>,
+}
+
+/// Lists of the boxes that contain each other, the smallest last; each is the top of two stacks.
+#[derive(Debug, Default)]
+pub(super) struct Stack {
+    candidates: Vec<Candidate>,
+    planes: Vec<Plane>,
+}
+
+/// What may be in a box: parts that may cut it, from the top down, over what holds all of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Contents {
+    first: usize,
+    last: usize,
+    planes: usize,
+    beneath: Material,
+}
+
+impl Contents {
+    /// What the whole box is made of, if nothing cuts it.
+    pub fn uniform(&self) -> Option<Material> {
+        (self.first == self.last).then_some(self.beneath)
+    }
+
+    /// Whether one part alone may cut the box.
+    pub fn is_single(&self) -> bool {
+        self.last - self.first == 1
+    }
+
+    /// Label of what is beneath all that may cut the box.
+    pub fn beneath_label(&self) -> u16 {
+        self.beneath.label
+    }
+}
+
+impl Raster {
+    /// For slices whose columns and rows follow one another along these unit vectors, at a right angle to each other.
+    pub fn new(scene: &Scene, along_columns: &Vector3<f64>, along_rows: &Vector3<f64>) -> Self {
+        let normal = along_columns.cross(along_rows);
+        let axes = Matrix3::from_columns(&[*along_columns, *along_rows, normal]);
+        let ct_from_frame =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+        let frame_from_ct = ct_from_frame.inverse();
+        let pose = Pose::from_parts(Vector3::zeros().into(), frame_from_ct);
+        let parts = scene.parts.iter().map(|part| {
+            let mut solid = part.solid.clone();
+            solid.parent_from_shape = pose * solid.parent_from_shape;
+            let (low, high) = solid.bounding_box();
+            RasterPart {
+                body: Body::new(&solid),
+                hu: part.hu,
+                label: part.label,
+                low: low.coords,
+                high: high.coords,
+            }
+        });
+        Self {
+            parts: parts.collect(),
+            around_hu: scene.around_hu,
+            frame_from_ct,
+        }
+    }
+
+    /// Where a point of `ct` is in the frame of the slices.
+    pub fn in_frame(&self, point: &Point3<f64>) -> Vector3<f64> {
+        self.frame_from_ct * point.coords
+    }
+
+    /// What may be in a box, of all that there is.
+    pub fn all_in(&self, cell: &Cell, stack: &mut Stack) -> Contents {
+        stack.candidates.clear();
+        stack.planes.clear();
+        let (low, high) = (cell.centre - cell.half, cell.centre + cell.half);
+        for (index, part) in self.parts.iter().enumerate().rev() {
+            let is_near =
+                (0..3).all(|axis| part.low[axis] <= high[axis] && low[axis] <= part.high[axis]);
+            if is_near {
+                let first = stack.planes.len() as u32;
+                stack.planes.extend(part.body.planes());
+                stack.candidates.push(Candidate {
+                    part: index as u32,
+                    planes: first..stack.planes.len() as u32,
+                });
+            }
+        }
+        Contents {
+            first: 0,
+            last: stack.candidates.len(),
+            planes: stack.planes.len(),
+            beneath: Material {
+                hu: self.around_hu,
+                label: 0,
+            },
+        }
+    }
+
+    /// What may be in a box, of what may be in one around it.
+    pub fn within(&self, outer: &Contents, cell: &Cell, stack: &mut Stack) -> Contents {
+        // What boxes inside the outer one left is no longer wanted.
+        stack.candidates.truncate(outer.last);
+        stack.planes.truncate(outer.planes);
+        let mut beneath = outer.beneath;
+        for index in outer.first..outer.last {
+            let Candidate { part, planes } = stack.candidates[index].clone();
+            let first = stack.planes.len();
+            let body = &self.parts[part as usize].body;
+            match body.lies(cell, &mut stack.planes, planes) {
+                Lies::Outside => stack.planes.truncate(first),
+                Lies::Inside => {
+                    stack.planes.truncate(first);
+                    beneath = self.material(part);
+                    break;
+                }
+                Lies::Across => stack.candidates.push(Candidate {
+                    part,
+                    planes: first as u32..stack.planes.len() as u32,
+                }),
+            }
+        }
+        Contents {
+            first: outer.last,
+            last: stack.candidates.len(),
+            planes: stack.planes.len(),
+            beneath,
+        }
+    }
+
+    /// Mean of the Hounsfield units in a small box, with what may be in it.
+    pub fn mean_hu(&self, contents: &Contents, cell: &Cell, stack: &mut Stack) -> f64 {
+        self.mean_hu_within(contents, cell, stack, HALVINGS)
+    }
+
+    fn mean_hu_within(
+        &self,
+        contents: &Contents,
+        cell: &Cell,
+        stack: &mut Stack,
+        halvings: u32,
+    ) -> f64 {
+        let mut left = 1.0;
+        let mut sum = 0.0;
+        let mut cuts = 0;
+        let mut is_rough = false;
+        for candidate in &stack.candidates[contents.first..contents.last] {
+            let part = &self.parts[candidate.part as usize];
+            let planes =
+                &stack.planes[candidate.planes.start as usize..candidate.planes.end as usize];
+            let filled = part.body.fills(cell, planes);
+            is_rough |= filled.is_rough;
+            if filled.share > NOTHING {
+                sum += left * filled.share * part.hu;
+                left *= 1.0 - filled.share;
+                if left < NOTHING {
+                    break;
+                }
+                cuts += 1;
+            }
+        }
+        if is_rough || cuts > 1 {
+            return if halvings > 0 {
+                self.mean_of_halves(contents, cell, stack, halvings - 1)
+            } else {
+                self.mean_of_points(contents, cell, stack)
+            };
+        }
+        sum + left * contents.beneath.hu
+    }
+
+    /// Mean over the middles of a box's eighths.
+    fn mean_of_points(&self, contents: &Contents, cell: &Cell, stack: &mut Stack) -> f64 {
+        let mut sum = 0.0;
+        for corner in 0..8_u8 {
+            let offset = Vector3::from_fn(|axis, _| {
+                let sign = if corner >> axis & 1 == 1 { 0.5 } else { -0.5 };
+                sign * cell.half[axis]
+            });
+            let point = Cell {
+                centre: cell.centre + offset,
+                half: Vector3::repeat(POINT_M),
+            };
+            let at = self.within(contents, &point, stack);
+            let top = stack.candidates[at.first..at.last].first();
+            sum += top.map_or(at.beneath.hu, |candidate| {
+                0.5 * (self.parts[candidate.part as usize].hu + at.beneath.hu)
+            });
+        }
+        sum / 8.0
+    }
+
+    fn mean_of_halves(
+        &self,
+        contents: &Contents,
+        cell: &Cell,
+        stack: &mut Stack,
+        halvings: u32,
+    ) -> f64 {
+        let mut sum = 0.0;
+        for half in cell.halves() {
+            let inner = self.within(contents, &half, stack);
+            sum += 0.5
+                * match inner.uniform() {
+                    Some(material) => material.hu,
+                    None => self.mean_hu_within(&inner, &half, stack, halvings),
+                };
+        }
+        sum
+    }
+
+    fn material(&self, part: u32) -> Material {
+        let part = &self.parts[part as usize];
+        Material {
+            hu: part.hu,
+            label: part.label,
+        }
+    }
+}
+
+impl Cell {
+    /// Its two halves along its longest edge.
+    fn halves(&self) -> [Self; 2] {
+        let axis = self.half.imax();
+        let mut half = self.half;
+        half[axis] *= 0.5;
+        [-1.0, 1.0].map(|sign| {
+            let mut centre = self.centre;
+            centre[axis] += sign * half[axis];
+            Self { centre, half }
+        })
+    }
+}

@@ -1,0 +1,13 @@
+//! Volumes and label maps into files that other programs read.
+//!
+//! Files are either whole or not there.
+
+mod dicom;
+mod file;
+mod nifti;
+mod stl;
+
+pub use dicom::{DicomSeries, write_dicom};
+pub use file::write_bytes;
+pub use nifti::{write_label_nifti, write_nifti};
+pub use stl::write_stl;

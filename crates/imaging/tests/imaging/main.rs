@@ -1,0 +1,5 @@
+//! CT volumes, from outside the crate.
+
+mod readers;
+mod reconstruct;
+mod synth;

@@ -1,0 +1,168 @@
+//! Label maps of a CT.
+
+use std::sync::atomic::AtomicBool;
+
+use needlebench_imaging::ImagingError;
+use needlebench_imaging::VoxelGrid;
+use needlebench_imaging::read::{ReadLabels, ReadOptions, read_labels};
+
+use super::made::{SIZE, Slice, nifti, read_as, refusal, write};
+
+fn labels_as(name: &str, bytes: &[u8], grid: &VoxelGrid) -> Result<ReadLabels, ImagingError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    read_labels(
+        &path,
+        grid,
+        &ReadOptions::default(),
+        &AtomicBool::new(false),
+    )
+}
+
+/// The CT's file with labels for values: 7 in the first row.
+fn labelled() -> Vec<u8> {
+    let mut file = nifti(1, false);
+    for index in 0..SIZE.iter().product::<usize>() {
+        let label = if index < 3 { 7_i16 } else { 0 };
+        file[352 + 2 * index..][..2].copy_from_slice(&label.to_le_bytes());
+    }
+    file
+}
+
+#[test]
+fn labels_on_the_grid_of_the_ct_are_taken_as_they_are() {
+    let grid = read_as("a.nii", &nifti(1, false)).unwrap().volume.grid;
+    let read = labels_as("labels.nii", &labelled(), &grid).unwrap();
+    assert_eq!(read.labels.labels[..4], [7, 7, 7, 0]);
+    assert_eq!(read.labels.names, [(7, "label 7".to_owned())]);
+    assert_eq!(read.labels.grid, grid);
+}
+
+#[test]
+fn axes_that_run_the_other_way_are_turned_without_loss() {
+    let grid = read_as("a.nii", &nifti(1, false)).unwrap().volume.grid;
+    // Columns the other way: step 0.5 from RAS x = 8 instead of -0.5 from 10.
+    let mut file = labelled();
+    file[280..284].copy_from_slice(&0.5_f32.to_le_bytes());
+    file[292..296].copy_from_slice(&8.0_f32.to_le_bytes());
+    let read = labels_as("labels.nii", &file, &grid).unwrap();
+    assert_eq!(read.labels.labels[..5], [0, 0, 7, 7, 7]);
+}
+
+#[test]
+fn labels_of_another_volume_and_what_is_no_label_are_refused() {
+    let grid = read_as("a.nii", &nifti(1, false)).unwrap().volume.grid;
+    let mut file = labelled();
+    file[292..296].copy_from_slice(&10.1_f32.to_le_bytes());
+    let said = refusal(labels_as("labels.nii", &file, &grid));
+    assert!(said.contains("0.100 mm from the CT's"), "{said}");
+    let said = refusal(labels_as("labels.nii", &nifti(1, false), &grid));
+    assert!(said.contains("-1000 is no label"), "{said}");
+}
+
+/// A segmentation of the slices at 0 and 2 mm: bits of a pattern for each of two segments.
+fn segmentation(kind: &str, positions: &[&str]) -> Vec<u8> {
+    let item = |elements: &[(u32, [u8; 2], Vec<u8>)]| {
+        let mut inner = Vec::new();
+        for (tag, vr, value) in elements {
+            write(&mut inner, *tag, *vr, value);
+        }
+        let mut bytes = vec![0xFE, 0xFF, 0x00, 0xE0];
+        bytes.extend(u32::try_from(inner.len()).unwrap().to_le_bytes());
+        bytes.extend(inner);
+        bytes
+    };
+    let short = |number: u16| number.to_le_bytes().to_vec();
+    let segment = |number: u16, label: &str| {
+        item(&[
+            (0x0062_0004, *b"US", short(number)),
+            (0x0062_0005, *b"LO", label.as_bytes().to_vec()),
+        ])
+    };
+    let frames: Vec<u8> = (1..)
+        .zip(positions)
+        .flat_map(|(number, position)| {
+            item(&[
+                (
+                    0x0020_9113,
+                    *b"SQ",
+                    item(&[(0x0020_0032, *b"DS", position.as_bytes().to_vec())]),
+                ),
+                (
+                    0x0062_000A,
+                    *b"SQ",
+                    item(&[(0x0062_000B, *b"US", short(number))]),
+                ),
+            ])
+        })
+        .collect();
+    // 20 pixels a frame, so that the second begins within a byte: pixels 0 and 1; pixels 1 and 19.
+    let mut slice = Slice::at(0.0)
+        .with(0x0008_0060, *b"CS", "SEG")
+        .with(0x0028_0008, *b"IS", positions.len().to_string())
+        .with(0x0062_0001, *b"CS", kind)
+        .with(
+            0x0062_0002,
+            *b"SQ",
+            [segment(1, "Lesion"), segment(2, "Lung")].concat(),
+        )
+        .with(0x5200_9230, *b"SQ", frames);
+    if kind == "BINARY" {
+        slice = slice
+            .with(0x0028_0100, *b"US", short(1))
+            .with(0x0028_0101, *b"US", short(1))
+            .with(0x0028_0102, *b"US", short(0));
+        let bits: u64 = 0b11 | (1 << 21) | (1 << 39);
+        slice.pixels = bits.to_le_bytes()[..6].to_vec();
+    } else {
+        slice = slice
+            .with(0x0028_0100, *b"US", short(8))
+            .with(0x0028_0101, *b"US", short(8))
+            .with(0x0028_0102, *b"US", short(7))
+            .with(0x0062_000E, *b"US", short(100));
+        slice.pixels = vec![0; 40];
+        slice.pixels[..3].copy_from_slice(&[49, 50, 100]);
+    }
+    slice.bytes()
+}
+
+fn ct() -> VoxelGrid {
+    super::made::read_slices(&super::made::stack(3), &ReadOptions::default())
+        .unwrap()
+        .volume
+        .grid
+}
+
+#[test]
+fn a_binary_segmentation_is_placed_by_its_positions() {
+    let file = segmentation("BINARY", &["-10\\20\\4", "-10\\20\\0"]);
+    let read = labels_as("seg.dcm", &file, &ct()).unwrap();
+    let labelled: Vec<(usize, u16)> = (0..)
+        .zip(read.labels.labels.iter().copied())
+        .filter(|(_, label)| *label > 0)
+        .collect();
+    assert_eq!(labelled, [(1, 2), (19, 2), (40, 1), (41, 1)]);
+    let names = [(1, "Lesion".to_owned()), (2, "Lung".to_owned())];
+    assert_eq!(read.labels.names, names);
+}
+
+#[test]
+fn fractions_are_cut_at_half_with_a_remark() {
+    let file = segmentation("FRACTIONAL", &["-10\\20\\0", "-10\\20\\2"]);
+    let read = labels_as("seg.dcm", &file, &ct()).unwrap();
+    assert_eq!(read.labels.labels[..4], [0, 1, 1, 0]);
+    assert!(read.remarks[0].message.contains("fractions"));
+}
+
+#[test]
+fn a_segmentation_of_another_place_is_refused() {
+    let file = segmentation("BINARY", &["-10\\20\\0", "-10\\20\\3"]);
+    let said = refusal(labels_as("seg.dcm", &file, &ct()));
+    assert!(
+        said.contains("1.000 mm") && said.contains("frame 2"),
+        "{said}"
+    );
+    let said = refusal(labels_as("ct.dcm", &Slice::at(0.0).bytes(), &ct()));
+    assert!(said.contains("no segmentation"), "{said}");
+}

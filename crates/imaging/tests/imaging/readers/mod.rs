@@ -1,0 +1,7 @@
+//! Readers: what is read as meant, what is refused, and that nothing makes them panic.
+
+mod dicom;
+mod labels;
+mod made;
+mod mutated;
+mod nifti;

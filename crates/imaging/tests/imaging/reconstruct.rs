@@ -1,0 +1,510 @@
+//! Reconstruction of chests of analytic solids, rendered by supersampling.
+
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use needlebench_geometry::mesh::check_closed;
+use needlebench_imaging::{
+    FIRST_LESION, ImagingError, Label, LabelMap, LesionSeed, Levels, Lung, ReconstructOptions,
+    Reconstruction, Side, SurfaceTissue, Volume, VoxelGrid, reconstruct,
+};
+
+const MM: f64 = 1e-3;
+
+/// Voxels: coarse, so that the tests are quick.
+const SPACING_MM: [f64; 3] = [2.5, 2.5, 3.0];
+const SIZE: [usize; 3] = [144, 104, 64];
+
+/// Samples along each edge of a voxel.
+const SAMPLES: usize = 3;
+
+/// Whether a place, in mm from the volume's middle, is inside.
+type Inside = Box<dyn Fn(&Vector3<f64>) -> bool>;
+
+/// A solid in mm from the volume's middle, and its density.
+struct Solid(Inside, f64);
+
+fn ellipsoid(at: [f64; 3], axes: [f64; 3]) -> Inside {
+    let (at, axes) = (Vector3::from(at), Vector3::from(axes));
+    Box::new(move |p| (p - at).component_div(&axes).norm() <= 1.0)
+}
+
+const LUNG_AXES_MM: [f64; 3] = [52.0, 68.0, 80.0];
+const BODY_AXES_MM: [f64; 2] = [150.0, 100.0];
+const NODULE_MM: [f64; 3] = [-70.0, 20.0, 10.0];
+const NODULE_RADIUS_MM: f64 = 9.0;
+
+fn left_lung() -> Solid {
+    Solid(ellipsoid([72.0, 0.0, 0.0], LUNG_AXES_MM), -850.0)
+}
+
+fn right_lung() -> Solid {
+    Solid(ellipsoid([-72.0, 0.0, 0.0], LUNG_AXES_MM), -850.0)
+}
+
+fn nodule() -> Solid {
+    Solid(ellipsoid(NODULE_MM, [NODULE_RADIUS_MM; 3]), 40.0)
+}
+
+fn body_and_bed() -> Vec<Solid> {
+    let [a, b] = BODY_AXES_MM;
+    vec![
+        // A shell of 4 mm that touches the back.
+        Solid(
+            Box::new(|p| (100.0..104.0).contains(&p.y) && p.x.abs() < 160.0),
+            -100.0,
+        ),
+        Solid(Box::new(move |p| (p.x / a).hypot(p.y / b) <= 1.0), 40.0),
+        // A spine with marrow.
+        Solid(Box::new(|p| p.x.hypot(p.y - 66.0) <= 18.0), 700.0),
+        Solid(Box::new(|p| p.x.hypot(p.y - 66.0) <= 13.0), 180.0),
+    ]
+}
+
+fn chest() -> Vec<Solid> {
+    let mut solids = body_and_bed();
+    solids.extend([left_lung(), right_lung(), nodule()]);
+    solids
+}
+
+fn grid() -> VoxelGrid {
+    let first =
+        Point3::from([0, 1, 2].map(|axis| -0.5 * MM * SPACING_MM[axis] * (SIZE[axis] - 1) as f64));
+    VoxelGrid::aligned(SIZE, SPACING_MM.map(|mm| mm * MM), first).unwrap()
+}
+
+fn render(solids: &[Solid], grid: VoxelGrid) -> Volume {
+    let at = |index: Point3<f64>| {
+        let place = grid.ct_from_index(&index).coords / MM;
+        let solid = solids.iter().rev().find(|solid| solid.0(&place));
+        solid.map_or(-1000.0, |solid| solid.1)
+    };
+    let [nx, ny, nz] = grid.size();
+    let voxels = |nx, ny, nz| {
+        (0..nz).flat_map(move |k| (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k])))
+    };
+    // Where all corners of a voxel are alike it is of one solid: none is smaller.
+    let corners: Vec<f64> = voxels(nx + 1, ny + 1, nz + 1)
+        .map(|[i, j, k]| at(Point3::new(i as f64 - 0.5, j as f64 - 0.5, k as f64 - 0.5)))
+        .collect();
+    let corner = |[i, j, k]: [usize; 3], c: usize| {
+        corners[((k + (c >> 2)) * (ny + 1) + j + (c >> 1 & 1)) * (nx + 1) + i + (c & 1)]
+    };
+    let sample = |at: usize| (at as f64 + 0.5) / SAMPLES as f64 - 0.5;
+    let hu = voxels(nx, ny, nz).map(|voxel| {
+        let first = corner(voxel, 0);
+        if (1..8).all(|c| corner(voxel, c) == first) {
+            return first;
+        }
+        let [i, j, k] = voxel.map(|index| index as f64);
+        let sum: f64 = voxels(SAMPLES, SAMPLES, SAMPLES)
+            .map(|[x, y, z]| at(Point3::new(i + sample(x), j + sample(y), k + sample(z))))
+            .sum();
+        sum / (SAMPLES * SAMPLES * SAMPLES) as f64
+    });
+    #[expect(clippy::cast_possible_truncation, reason = "Hounsfield units")]
+    let hu = hu.map(|hu: f64| hu.round() as i16).collect();
+    Volume {
+        grid,
+        hu,
+        slice_thickness_m: None,
+    }
+}
+
+fn options() -> ReconstructOptions {
+    ReconstructOptions::default()
+}
+
+fn seed(name: &str, at_mm: [f64; 3]) -> LesionSeed {
+    LesionSeed {
+        name: name.to_owned(),
+        point_m: Point3::from(at_mm) * MM,
+    }
+}
+
+fn run(volume: &Volume, options: &ReconstructOptions) -> Result<Reconstruction, ImagingError> {
+    reconstruct(volume, options, 2, &AtomicBool::new(false), &|_, _| {})
+}
+
+fn remarks(made: &Reconstruction) -> String {
+    let messages = made.remarks.iter().map(|remark| remark.message.as_str());
+    messages.collect::<Vec<_>>().join("\n")
+}
+
+fn ellipsoid_m3(axes_mm: [f64; 3]) -> f64 {
+    4.0 / 3.0 * std::f64::consts::PI * axes_mm.iter().product::<f64>() * 1e-9
+}
+
+/// Distance of 99 % of a surface from that of the voxels over a voxel's edge: what the flat ends' edges lose.
+const SURFACE_SHARE: f64 = 0.25;
+
+/// Of volumes: a tenth of a voxel over their surface.
+const VOLUME: f64 = 0.015;
+
+#[test]
+fn chest_is_taken_apart_into_closed_surfaces_of_the_right_size() {
+    let volume = render(&chest(), grid());
+    let mut options = options();
+    options.lesions = vec![seed("nodule", NODULE_MM)];
+    let made = run(&volume, &options).unwrap();
+    let names: Vec<&str> = made
+        .surfaces
+        .iter()
+        .map(|each| each.name.as_str())
+        .collect();
+    assert_eq!(names, ["skin", "lung_left", "lung_right", "bone", "nodule"]);
+    for surface in &made.surfaces {
+        let facts = check_closed(&surface.mesh).unwrap();
+        assert_eq!(
+            (facts.components, facts.shared_edges),
+            (1, 0),
+            "{}",
+            surface.name
+        );
+        assert!(
+            surface.error.p99_m < SURFACE_SHARE * 2.5 * MM,
+            "{} {:?}",
+            surface.name,
+            surface.error
+        );
+    }
+    let height_mm = SPACING_MM[2] * SIZE[2] as f64;
+    let [a, b] = BODY_AXES_MM;
+    let body_m3 = std::f64::consts::PI * a * b * height_mm * 1e-9;
+    for (at, wanted_m3) in [
+        (0, body_m3),
+        (1, ellipsoid_m3(LUNG_AXES_MM)),
+        (2, ellipsoid_m3(LUNG_AXES_MM)),
+    ] {
+        let ratio = made.surfaces[at].volume_m3 / wanted_m3;
+        assert!((ratio - 1.0).abs() < VOLUME, "{} {ratio}", names[at]);
+    }
+    // The bed is no part of the body, the nodule one of the lung.
+    assert!(
+        remarks(&made).contains("touches something else"),
+        "{}",
+        remarks(&made)
+    );
+    let label_at = |at_mm: [f64; 3]| {
+        let index = volume.grid.index_from_ct(&(Point3::from(at_mm) * MM));
+        let voxel = [0, 1, 2].map(|axis| {
+            (0..SIZE[axis])
+                .find(|&i| (i as f64 - index[axis]).abs() <= 0.5)
+                .unwrap()
+        });
+        made.labels.labels[volume.grid.offset(voxel)]
+    };
+    assert_eq!(label_at([140.0, 102.0, 0.0]), 0);
+    assert_eq!(label_at([72.0, 0.0, 0.0]), Label::LungLeft as u16);
+    assert_eq!(label_at([-72.0, -20.0, 0.0]), Label::LungRight as u16);
+    assert_eq!(label_at([0.0, 66.0, 0.0]), Label::Bone as u16);
+    assert_eq!(label_at([0.0, 0.0, 0.0]), Label::SoftTissue as u16);
+    assert_eq!(label_at(NODULE_MM), FIRST_LESION);
+    let lesion = &made.lesions[0];
+    assert!(lesion.lesion.in_lung && !lesion.lesion.leaked && !lesion.lesion.cut_at_wall);
+    let size = lesion.size.as_ref().unwrap();
+    // A third of a voxel: partial volume makes small balls smaller.
+    assert!(
+        (size.equivalent_diameter_m / MM - 18.0).abs() < 0.8,
+        "{size:?}"
+    );
+    assert!(
+        (size.longest_m / MM - 18.0).abs() < 1.0 && (size.axial_width_m / MM - 18.0).abs() < 1.0
+    );
+    assert!((size.centroid_m - Point3::from(NODULE_MM) * MM).norm() < 0.1 * MM);
+    assert_eq!(made.surfaces[4].organ.as_deref(), Some("lung_right"));
+}
+
+#[test]
+fn threads_do_not_change_what_comes_out() {
+    let volume = render(&chest(), grid());
+    let once = |threads| {
+        let made = reconstruct(
+            &volume,
+            &options(),
+            threads,
+            &AtomicBool::new(false),
+            &|_, _| {},
+        )
+        .unwrap();
+        made.surfaces
+            .into_iter()
+            .map(|each| each.mesh)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(once(1), once(3));
+}
+
+#[test]
+fn turned_and_mirrored_grids_give_the_same_patient() {
+    let upright = grid();
+    let [i, j, k] = [0, 1, 2].map(|axis| upright.steps_m().column(axis).into_owned());
+    let [nx, ny, _] = SIZE;
+    let corner = upright.ct_from_index(&Point3::new((nx - 1) as f64, 0.0, 0.0));
+    // Columns run to the right, and rows and columns are exchanged.
+    for (size, steps, first) in [
+        (SIZE, Matrix3::from_columns(&[-i, j, k]), corner),
+        (
+            [ny, nx, SIZE[2]],
+            Matrix3::from_columns(&[j, i, k]),
+            upright.first_m(),
+        ),
+    ] {
+        let volume = render(&chest(), VoxelGrid::new(size, steps, first).unwrap());
+        let made = run(&volume, &options()).unwrap();
+        let left = made
+            .surfaces
+            .iter()
+            .find(|each| each.name == "lung_left")
+            .unwrap();
+        let ratio = left.volume_m3 / ellipsoid_m3(LUNG_AXES_MM);
+        assert!((ratio - 1.0).abs() < VOLUME);
+        let middle = needlebench_geometry::mesh::centroid_m(&left.mesh);
+        assert!(
+            (middle - Point3::new(0.072, 0.0, 0.0)).norm() < MM,
+            "{middle}"
+        );
+    }
+}
+
+#[test]
+fn one_lung_and_none_are_said() {
+    let mut solids = body_and_bed();
+    let made = run(&render(&solids, grid()), &options()).unwrap();
+    assert!(made.segmentation.lungs.lungs.is_empty());
+    assert!(remarks(&made).contains("no lungs were found"));
+    solids.push(left_lung());
+    let made = run(&render(&solids, grid()), &options()).unwrap();
+    assert!(matches!(
+        &made.segmentation.lungs.lungs[..],
+        [Lung {
+            side: Side::Left,
+            ..
+        }]
+    ));
+    assert!(remarks(&made).contains("one lung was found, at the patient's left side"));
+}
+
+#[test]
+fn merged_lungs_are_parted_at_their_connection() {
+    let mut solids = chest();
+    // A bridge of 8 mm: the anterior junction.
+    solids.push(Solid(
+        Box::new(|p| p.x.abs() < 30.0 && (p.y + 10.0).hypot(p.z) < 8.0),
+        -850.0,
+    ));
+    let made = run(&render(&solids, grid()), &options()).unwrap();
+    assert!(
+        remarks(&made).contains("the lungs are connected"),
+        "{}",
+        remarks(&made)
+    );
+    assert_eq!(made.segmentation.lungs.lungs.len(), 2);
+    for name in ["lung_left", "lung_right"] {
+        let lung = made.surfaces.iter().find(|each| each.name == name).unwrap();
+        let ratio = lung.volume_m3 / ellipsoid_m3(LUNG_AXES_MM);
+        assert!((ratio - 1.0).abs() < 0.03, "{name} {ratio}");
+    }
+}
+
+#[test]
+fn field_of_view_that_cuts_the_body_is_said_with_its_side() {
+    // 80 mm of the patient's left are not seen.
+    let narrow = VoxelGrid::aligned(
+        [112, SIZE[1], SIZE[2]],
+        SPACING_MM.map(|mm| mm * MM),
+        grid().first_m(),
+    )
+    .unwrap();
+    let made = run(&render(&chest(), narrow), &options()).unwrap();
+    assert_eq!(made.segmentation.body.cut_sides, ["left"]);
+    assert!(
+        remarks(&made).contains("cuts the body on its left side"),
+        "{}",
+        remarks(&made)
+    );
+    assert!(check_closed(&made.surfaces[0].mesh).is_ok());
+}
+
+fn refusal(error: &ImagingError) -> (Option<&str>, &str) {
+    match error {
+        ImagingError::Interrupted => (None, "interrupted"),
+        ImagingError::Refused { place, message, .. } => (place.as_deref(), message),
+    }
+}
+
+#[test]
+fn seeds_that_are_in_no_lesion_are_refused_by_name() {
+    let volume = render(&chest(), grid());
+    for (at_mm, word) in [
+        ([0.0, 0.0, 900.0], "outside the volume"),
+        ([170.0, 0.0, 0.0], "outside the body"),
+        ([72.0, 0.0, 0.0], "in air"),
+        ([0.0, 0.0, 0.0], "cannot be told from"),
+        ([f64::NAN, 0.0, 0.0], "outside the volume"),
+    ] {
+        let mut options = options();
+        options.lesions = vec![seed("wrong", at_mm)];
+        let error = run(&volume, &options).err().unwrap();
+        let (place, message) = refusal(&error);
+        assert!(
+            place.is_some_and(|place| place.contains("lesion `wrong`")),
+            "{error:?}"
+        );
+        assert!(message.contains(word), "{message}");
+    }
+}
+
+#[test]
+fn nodule_at_a_vessel_and_at_the_wall_is_cut_there() {
+    let mut solids = chest();
+    // A vessel through the nodule, to the mediastinum.
+    solids.push(Solid(
+        Box::new(|p| (p.y - 20.0).hypot(p.z - 10.0) < 3.0 && (-70.0..0.0).contains(&p.x)),
+        40.0,
+    ));
+    // Half in the wall.
+    solids.push(Solid(ellipsoid([122.0, 0.0, 0.0], [8.0; 3]), 40.0));
+    let mut options = options();
+    options.lesions = vec![
+        seed("at_vessel", NODULE_MM),
+        seed("at_wall", [119.0, 0.0, 0.0]),
+    ];
+    let made = run(&render(&solids, grid()), &options).unwrap();
+    let [at_vessel, at_wall] = &made.lesions[..] else {
+        panic!("two lesions");
+    };
+    let diameter_mm = at_vessel.size.as_ref().unwrap().equivalent_diameter_m / MM;
+    assert!((diameter_mm - 18.0).abs() < 1.5, "{diameter_mm}");
+    assert!(!at_vessel.lesion.leaked);
+    assert!(
+        at_wall.lesion.cut_at_wall && !at_wall.lesion.leaked,
+        "{:?}",
+        at_wall.size
+    );
+    let volume_m3 = at_wall.size.as_ref().unwrap().volume_m3;
+    // Two thirds of it are in the lung, less a voxel that the wall's closing may lose.
+    let ball_m3 = ellipsoid_m3([8.0; 3]);
+    assert!(
+        (0.2..0.7).contains(&(volume_m3 / ball_m3)),
+        "{}",
+        volume_m3 / ball_m3
+    );
+}
+
+#[test]
+fn what_is_no_patient_is_refused() {
+    let empty = Volume {
+        grid: grid(),
+        hu: vec![-1000; grid().len()],
+        slice_thickness_m: None,
+    };
+    assert!(
+        refusal(&run(&empty, &options()).err().unwrap())
+            .1
+            .contains("denser than")
+    );
+    let short = Volume {
+        hu: vec![0; 5],
+        ..empty.clone()
+    };
+    assert!(
+        refusal(&run(&short, &options()).err().unwrap())
+            .1
+            .contains("voxels")
+    );
+    let steps = Matrix3::new(1e-3, 3e-4, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3);
+    let sheared = Volume {
+        grid: VoxelGrid::new(SIZE, steps, Point3::origin()).unwrap(),
+        ..empty.clone()
+    };
+    assert!(
+        refusal(&run(&sheared, &options()).err().unwrap())
+            .1
+            .contains("perpendicular")
+    );
+    let mut wrong = options();
+    wrong.levels = Levels {
+        skin_hu: 300.0,
+        ..Levels::default()
+    };
+    assert!(
+        refusal(&run(&empty, &wrong).err().unwrap())
+            .1
+            .contains("levels")
+    );
+    // A solid block has no air around it; a single voxel no body.
+    let solid = Volume {
+        hu: vec![40; grid().len()],
+        ..empty
+    };
+    let made = run(&solid, &options()).unwrap();
+    assert_eq!(made.segmentation.body.cut_sides.len(), 4);
+    let stop = reconstruct(&solid, &options(), 1, &AtomicBool::new(true), &|_, _| {});
+    assert_eq!(stop.err(), Some(ImagingError::Interrupted));
+}
+
+/// A label map of the chest, by the density of its voxels.
+fn given(volume: &Volume) -> LabelMap {
+    let middle = SIZE[0] / 2;
+    let labels = volume.hu.iter().enumerate().map(|(at, &hu)| match hu {
+        -900..-600 if at % SIZE[0] >= middle => 10,
+        -900..-600 => 11,
+        100.. => 3,
+        _ => 0,
+    });
+    LabelMap {
+        grid: volume.grid.clone(),
+        labels: labels.collect(),
+        names: [
+            (3, "vertebrae_T8"),
+            (10, "lung_lower_lobe_left"),
+            (11, "Right Lung"),
+            (12, "wombat"),
+        ]
+        .map(|(label, name)| (label, name.to_owned()))
+        .to_vec(),
+    }
+}
+
+#[test]
+fn label_map_from_elsewhere_stands_for_what_it_has() {
+    let volume = render(&chest(), grid());
+    let mut options = options();
+    options.labels = Some(given(&volume));
+    options.lesions = vec![seed("nodule", NODULE_MM)];
+    let made = run(&volume, &options).unwrap();
+    let names: Vec<&str> = made
+        .surfaces
+        .iter()
+        .map(|each| each.name.as_str())
+        .collect();
+    assert_eq!(
+        names,
+        ["skin", "lung_left", "lung_right", "vertebrae", "nodule"]
+    );
+    assert!(remarks(&made).contains("12 `wombat`"));
+    assert_eq!(made.surfaces[1].level_hu, None);
+    assert_eq!(made.surfaces[3].tissue, SurfaceTissue::Bone);
+    let left = &made.surfaces[1];
+    assert!(check_closed(&left.mesh).is_ok());
+    // Half a voxel over its surface.
+    assert!(
+        (left.volume_m3 / ellipsoid_m3(LUNG_AXES_MM) - 1.0).abs() < 0.06,
+        "{}",
+        left.volume_m3
+    );
+    assert_eq!(made.labels.names.last().unwrap().1, "nodule");
+}
+
+#[test]
+fn label_map_of_another_grid_is_refused() {
+    let volume = render(&chest(), grid());
+    let mut map = given(&volume);
+    map.grid = VoxelGrid::aligned(SIZE, SPACING_MM.map(|mm| mm * MM), Point3::origin()).unwrap();
+    let mut options = options();
+    options.labels = Some(map);
+    let error = run(&volume, &options).err().unwrap();
+    assert_eq!(refusal(&error).0, Some("label map"));
+    assert!(refusal(&error).1.contains("corners"));
+}

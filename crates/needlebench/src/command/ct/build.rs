@@ -1,0 +1,613 @@
+//! `needlebench ct build`.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use nalgebra::{Matrix3, Point3, Vector3};
+use needlebench_bench::Control;
+use needlebench_bench::ct::{
+    BuildOptions, BuildReport, BuildStop, GivenLabels, KnownMarkers, PatientFrame, Room, ScanBuild,
+    build, write_patient,
+};
+use needlebench_cell::scenario::{GoalSection, Posture, Target};
+use needlebench_cell::{
+    Finding, MarkerFrame, MarkerList, Overrides, load_open_scenario, name_from_file,
+    resolve_open_scenario,
+};
+use needlebench_imaging::markers::MarkerModel;
+use needlebench_imaging::read::{ReadVolume, read_label_names};
+use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registration};
+use needlebench_imaging::{ImagingError, LesionSeed, SurfaceSizes};
+use needlebench_report::layout;
+use needlebench_report::picture::{SlicePicture, slice_pictures};
+use needlebench_report::write_atomically;
+use serde::Serialize;
+
+use super::info::{ReadArguments, finding_of};
+use crate::arguments::{PicturesArguments, RobotArguments};
+use crate::command::run::prepare_folder;
+use crate::command::{overrides, print_json, print_text};
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::output::{complain, shown};
+use crate::progress::TerminalProgress;
+
+/// What `ct build --help` says after the options.
+pub(crate) const BUILD_HELP: &str = "\
+Example: needlebench ct build scan.nii.gz --out out/patient --lesion nodule=-60,40,-112 --markers markers.toml
+
+Writes into DIR:
+  scenario.toml       what `run`, `check`, `suggest` and all else take as it is
+  surfaces/           closed surfaces as STL, mm, LPS
+  labels.nii.gz       what each voxel is; its names are in labels.json
+  slices/             pictures of slices with the surfaces' outlines on them
+  report.json         surfaces with their distance from the voxels, lesions, markers, registration, errors; m and rad
+
+Places are in the patient's LPS frame of the scan (left, posterior, superior), mm. 3D Slicer shows RAS: there the first two
+numbers have the other sign.
+
+MARKERS.toml: frame = \"base_link\", \"base\" (as the controller shows it) or \"drawing\"; sphere_mm; sd_mm; and for each
+marker [[markers]] with name and position_mm. With \"base_link\" or \"base\" the robot is placed by them.";
+
+#[derive(Debug, Args)]
+pub(crate) struct BuildArguments {
+    /// .nii, .nii.gz, .hdr, a DICOM file, or a folder of DICOM files.
+    #[arg(value_name = "PATH")]
+    path: PathBuf,
+    /// Folder for what is built.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// A point in a lesion, mm of the scan (LPS): the lesion is grown from it, and is a goal.
+    #[arg(long = "lesion", value_name = "NAME=X,Y,Z", value_parser = named_place, allow_hyphen_values = true)]
+    lesions: Vec<NamedPlace>,
+    /// The same by the voxel, as viewers show it: column, row and slice in the file, from 0.
+    #[arg(long = "lesion-voxel", value_name = "NAME=I,J,K", value_parser = named_place)]
+    lesion_voxels: Vec<NamedPlace>,
+    /// Where the needle for a lesion enters the skin, mm of the scan; the best entry that `suggest` finds if left out.
+    #[arg(long = "entry", value_name = "NAME=X,Y,Z", value_parser = named_place, allow_hyphen_values = true)]
+    entries: Vec<NamedPlace>,
+    /// Structures from elsewhere, such as 3D Slicer or TotalSegmentator: NIfTI or DICOM segmentation.
+    #[arg(long, value_name = "FILE")]
+    labels: Option<PathBuf>,
+    /// Which label is called what: JSON, a colour table of 3D Slicer, or lines of `1,lung_left`.
+    #[arg(long, value_name = "FILE", requires = "labels")]
+    label_names: Option<PathBuf>,
+    /// Markers as the robot or a drawing has them, by which the patient is registered.
+    #[arg(long, value_name = "FILE")]
+    markers: Option<PathBuf>,
+    /// Robot, tool, table, people and criteria of this scenario; a UR3 beside a table if left out.
+    #[arg(long, value_name = "SCENARIO")]
+    room: Option<PathBuf>,
+    /// How the patient lies; as in the room's scenario, or on the back, if left out. With markers that the robot has touched
+    /// it follows from them.
+    #[arg(long, value_enum)]
+    posture: Option<PostureArgument>,
+    /// What a slice integrates over, mm, where the file does not say it.
+    #[arg(long, value_name = "MM", value_parser = super::synth::positive)]
+    thickness_mm: Option<f64>,
+    /// Triangles of the skin.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=2_000_000))]
+    skin_triangles: Option<u32>,
+    /// Write no label map.
+    #[arg(long)]
+    no_labels: bool,
+    /// Print what was built as one JSON document.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    pictures: PicturesArguments,
+    #[command(flatten)]
+    reading: ReadArguments,
+    #[command(flatten)]
+    robot: RobotArguments,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PostureArgument {
+    Supine,
+    Prone,
+    LeftLateral,
+    RightLateral,
+}
+
+impl From<PostureArgument> for Posture {
+    fn from(argument: PostureArgument) -> Self {
+        match argument {
+            PostureArgument::Supine => Self::Supine,
+            PostureArgument::Prone => Self::Prone,
+            PostureArgument::LeftLateral => Self::LeftLateral,
+            PostureArgument::RightLateral => Self::RightLateral,
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct NamedPlace {
+    name: String,
+    numbers: [f64; 3],
+}
+
+fn named_place(text: &str) -> Result<NamedPlace, String> {
+    let (name, numbers) = text
+        .split_once('=')
+        .ok_or_else(|| "a name and three numbers: nodule=-60,40,-112".to_owned())?;
+    let is_name = !name.is_empty()
+        && name.len() <= 64
+        && name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+    if !is_name {
+        return Err(format!("`{name}` is no name: letters, digits, `-` and `_`"));
+    }
+    Ok(NamedPlace {
+        name: name.to_owned(),
+        numbers: super::synth::numbers::<3>(numbers)?.0,
+    })
+}
+
+/// Why nothing was built.
+enum Stop {
+    Refused(Vec<Finding>),
+    Interrupted,
+}
+
+impl From<BuildStop> for Stop {
+    fn from(stop: BuildStop) -> Self {
+        match stop {
+            BuildStop::Refused(findings) => Self::Refused(findings),
+            BuildStop::Interrupted => Self::Interrupted,
+        }
+    }
+}
+
+impl From<Vec<Finding>> for Stop {
+    fn from(findings: Vec<Finding>) -> Self {
+        Self::Refused(findings)
+    }
+}
+
+impl From<Finding> for Stop {
+    fn from(finding: Finding) -> Self {
+        Self::Refused(vec![finding])
+    }
+}
+
+fn stop_of(path: &Path, problem: ImagingError) -> Stop {
+    match problem {
+        ImagingError::Interrupted => Stop::Interrupted,
+        problem @ ImagingError::Refused { .. } => finding_of(path, problem).into(),
+    }
+}
+
+#[derive(Serialize)]
+struct BuildAnswer<'a> {
+    schema_version: u32,
+    ok: bool,
+    findings: Vec<Finding>,
+    folder: String,
+    scenario: Option<String>,
+    report: Option<BuildReport<'a>>,
+}
+
+/// Builds a patient from a CT.
+pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus> {
+    let cancel = Arc::new(AtomicBool::new(false));
+    let requested = Arc::clone(&cancel);
+    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
+        .context("cannot watch for interrupts")?;
+    let progress = TerminalProgress::new(arguments.json);
+    let control = Control {
+        threads: arguments.reading.threads(),
+        cancel: &cancel,
+        progress: &progress,
+    };
+    let made = make(arguments, &control);
+    progress.finish();
+    match made {
+        Ok((built, file)) => {
+            if arguments.json {
+                print_json(&BuildAnswer {
+                    schema_version: 1,
+                    ok: true,
+                    findings: Vec::new(),
+                    folder: arguments.out.display().to_string(),
+                    scenario: Some(file.display().to_string()),
+                    report: Some(BuildReport::of(&built)),
+                })?;
+            } else {
+                let text = in_words(&built, &arguments.out, &file)?;
+                print_text(&layout::wrapped(&text))?;
+            }
+            Ok(ExitStatus::Success)
+        }
+        Err(Stop::Interrupted) => {
+            complain("interrupted: there is no scenario.toml yet");
+            Ok(ExitStatus::Interrupted)
+        }
+        Err(Stop::Refused(findings)) => {
+            if arguments.json {
+                print_json(&BuildAnswer {
+                    schema_version: 1,
+                    ok: false,
+                    findings,
+                    folder: arguments.out.display().to_string(),
+                    scenario: None,
+                    report: None,
+                })?;
+            } else {
+                print_findings(&findings);
+            }
+            Ok(ExitStatus::BadInput)
+        }
+    }
+}
+
+fn make(arguments: &BuildArguments, control: &Control<'_>) -> Result<(ScanBuild, PathBuf), Stop> {
+    let overrides = overrides(&arguments.robot)?;
+    let markers = arguments
+        .markers
+        .as_deref()
+        .map(MarkerList::load)
+        .transpose()?;
+    let names = arguments
+        .label_names
+        .as_deref()
+        .map(read_label_names)
+        .transpose();
+    let names = names.map_err(|error| stop_of(&arguments.path, error))?;
+    let room = room(arguments, &overrides)?;
+    prepare_folder(&arguments.out)?;
+    control.progress.message("reading");
+    let path = &arguments.path;
+    let mut read = arguments
+        .reading
+        .read(path, control.cancel)
+        .map_err(|error| stop_of(path, error))?;
+    if let Some(thickness_mm) = arguments.thickness_mm {
+        read.volume.slice_thickness_m = Some(1e-3 * thickness_mm);
+    }
+    let lesions = lesions(arguments, &read)?;
+    let goals_for: Vec<String> = lesions.iter().map(|seed| seed.name.clone()).collect();
+    check_entries(arguments, &goals_for)?;
+    let options = BuildOptions {
+        lesions,
+        labels: arguments.labels.clone().map(|file| GivenLabels {
+            file,
+            names: names.unwrap_or_default(),
+        }),
+        markers: markers.as_ref().map(known_markers),
+        sizes: SurfaceSizes {
+            skin: arguments
+                .skin_triangles
+                .map_or(SurfaceSizes::default().skin, |count| count as usize),
+            ..SurfaceSizes::default()
+        },
+        max_bytes: arguments.reading.max_bytes(),
+    };
+    let built = build(read, &options, control).map_err(|error| stop_of(path, error))?;
+    if arguments.pictures.are_wanted(arguments.json) {
+        control.progress.message("pictures");
+        draw(&built, &arguments.out)?;
+    }
+    let goals = goals(arguments, &built, &goals_for);
+    let first = "What `needlebench ct build` made of a scan; report.json says how.";
+    let room = Room {
+        scenario: &room.scenario,
+        resolved: &room.resolved,
+        folder: &room.folder,
+    };
+    let file = write_patient(
+        &arguments.out,
+        &room,
+        &built,
+        goals,
+        !arguments.no_labels,
+        first,
+        control,
+    )?;
+    Ok((built, file))
+}
+
+/// The room, by its own file or the usual one.
+struct OwnRoom {
+    scenario: needlebench_cell::scenario::Scenario,
+    resolved: needlebench_cell::ResolvedScenario,
+    folder: PathBuf,
+}
+
+fn room(arguments: &BuildArguments, overrides: &Overrides) -> Result<OwnRoom, Stop> {
+    let (open, folder) = if let Some(path) = &arguments.room {
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        (load_open_scenario(path, overrides)?, folder)
+    } else {
+        let text = needlebench_bench::ct::USUAL_ROOM;
+        let open = resolve_open_scenario("room.toml", text, Path::new(""), overrides)?;
+        (open, PathBuf::new())
+    };
+    let resolved = open.resolved;
+    let mut scenario = resolved.scenario.clone();
+    if arguments.room.is_none() {
+        scenario.name = name_from_file(&arguments.out);
+    }
+    if let (Some(posture), Some(phantom)) = (arguments.posture, &mut scenario.phantom) {
+        phantom.posture = posture.into();
+        phantom.body_roll_deg = 0.0;
+        phantom.head_up_deg = 0.0;
+    }
+    Ok(OwnRoom {
+        scenario,
+        resolved,
+        folder,
+    })
+}
+
+/// Names of surfaces that are always looked for.
+const TAKEN: [&str; 6] = [
+    "skin",
+    "bone",
+    "trachea",
+    "lung_left",
+    "lung_right",
+    "contrast_vessels",
+];
+
+fn lesions(arguments: &BuildArguments, read: &ReadVolume) -> Result<Vec<LesionSeed>, Stop> {
+    let file = arguments.path.display().to_string();
+    let by_place = arguments.lesions.iter().map(|place| LesionSeed {
+        name: place.name.clone(),
+        point_m: Point3::from(Vector3::from(place.numbers) * 1e-3),
+    });
+    let by_voxel = arguments.lesion_voxels.iter().map(|voxel| LesionSeed {
+        name: voxel.name.clone(),
+        point_m: read.volume.grid.ct_from_index(&Point3::from(voxel.numbers)),
+    });
+    let all: Vec<LesionSeed> = by_place.chain(by_voxel).collect();
+    let mut known: BTreeMap<&str, usize> = BTreeMap::new();
+    for seed in &all {
+        *known.entry(&seed.name).or_default() += 1;
+    }
+    if let Some((name, _)) = known
+        .iter()
+        .find(|(name, count)| **count > 1 || TAKEN.contains(name))
+    {
+        return Err(
+            Finding::new(file, format!("`{name}` is the name of something else too"))
+                .key("--lesion")
+                .hint("give each lesion its own name")
+                .into(),
+        );
+    }
+    Ok(all)
+}
+
+fn check_entries(arguments: &BuildArguments, lesions: &[String]) -> Result<(), Stop> {
+    let unknown = arguments
+        .entries
+        .iter()
+        .find(|entry| !lesions.contains(&entry.name));
+    match unknown {
+        None => Ok(()),
+        Some(entry) => Err(Finding::new(
+            arguments.path.display().to_string(),
+            format!("there is no lesion `{}`", entry.name),
+        )
+        .key("--entry")
+        .hint("an entry has the name of a --lesion")
+        .into()),
+    }
+}
+
+fn known_markers(list: &MarkerList) -> KnownMarkers {
+    let diameter_m = 1e-3 * list.sphere_mm;
+    let frame = match list.frame {
+        MarkerFrame::BaseLink | MarkerFrame::Base => ReferenceFrame::Robot,
+        MarkerFrame::Drawing => ReferenceFrame::Phantom,
+    };
+    let markers = list.markers.iter().map(|marker| {
+        let [x, y, z] = marker.position_mm.map(|mm| 1e-3 * mm);
+        let sigma_m = 1e-3 * marker.sd_mm.unwrap_or(list.sd_mm);
+        let covariance = Matrix3::from_diagonal_element(sigma_m * sigma_m);
+        match list.frame {
+            MarkerFrame::BaseLink => {
+                ReferenceMarker::touched(&marker.name, Point3::new(x, y, z), covariance)
+            }
+            // Half a turn about z, which `REP 199` and UR's own frames differ by.
+            MarkerFrame::Base => {
+                ReferenceMarker::touched(&marker.name, Point3::new(-x, -y, z), covariance)
+            }
+            MarkerFrame::Drawing => {
+                ReferenceMarker::from_cad(&marker.name, Point3::new(x, y, z), sigma_m)
+            }
+        }
+    });
+    KnownMarkers {
+        frame,
+        model: if list.carrier {
+            MarkerModel::phantom_sphere(diameter_m)
+        } else {
+            MarkerModel::bare_sphere(diameter_m)
+        },
+        placement_sigma_m: list.placement_mm.map(|mm| 1e-3 * mm),
+        markers: markers.collect(),
+    }
+}
+
+fn goals(arguments: &BuildArguments, built: &ScanBuild, lesions: &[String]) -> Vec<GoalSection> {
+    let frame = PatientFrame::of(built);
+    let seen = lesions
+        .iter()
+        .filter(|name| built.targets.iter().any(|target| target.name == **name));
+    seen.map(|name| {
+        let entry = arguments.entries.iter().find(|entry| entry.name == *name);
+        let entry_mm =
+            entry.map(|entry| frame.in_mm(&Point3::from(Vector3::from(entry.numbers) * 1e-3)));
+        GoalSection {
+            entry_mm,
+            standoff_mm: 15.0,
+            ..GoalSection::at(Target::Lesion(name.clone()))
+        }
+    })
+    .collect()
+}
+
+/// Pictures of slices, into a folder of their own.
+fn draw(built: &ScanBuild, out: &Path) -> Result<(), Stop> {
+    let folder = out.join("slices");
+    let failed = |path: &Path, error: &dyn std::fmt::Display| {
+        Stop::from(
+            Finding::new(
+                path.display().to_string(),
+                format!("it cannot be written: {error}"),
+            )
+            .key("--out"),
+        )
+    };
+    std::fs::create_dir_all(&folder).map_err(|error| failed(&folder, &error))?;
+    let pictures = slice_pictures(built).map_err(|error| failed(&folder, &error))?;
+    for SlicePicture { name, png } in pictures {
+        let path = folder.join(name);
+        write_atomically(&path, &png).map_err(|error| failed(&path, &error))?;
+    }
+    Ok(())
+}
+
+fn in_words(built: &ScanBuild, out: &Path, file: &Path) -> Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    let report = BuildReport::of(built);
+    let [columns, rows, slices] = report.size;
+    let [x, y, z] = report.spacing_m.map(|metres| metres * 1e3);
+    write!(
+        text,
+        "{}: {columns} x {rows} x {slices} voxels of {x:.3} x {y:.3} x {z:.3} mm",
+        report.source.format
+    )?;
+    write!(
+        text,
+        "\n\nsurface            triangles  volume (ml)  from voxels, 99 % (mm)"
+    )?;
+    for surface in &report.surfaces {
+        write!(
+            text,
+            "\n{:<18} {:>9}  {:>11.1}  {:>22.3}",
+            surface.name,
+            surface.triangles,
+            surface.volume_m3 * 1e6,
+            surface.distance_from_voxels.p99_m * 1e3
+        )?;
+    }
+    for lesion in &report.lesions {
+        match lesion.size {
+            Some(size) => {
+                let [x, y, z]: [f64; 3] = (size.centroid_m.coords * 1e3).into();
+                write!(
+                    text,
+                    "\n\nlesion {}: {:.1} ml, {:.1} x {:.1} mm in its slice, middle at ({x:.1}, {y:.1}, {z:.1}) mm of the scan",
+                    lesion.name,
+                    size.volume_m3 * 1e6,
+                    size.axial_longest_m * 1e3,
+                    size.axial_width_m * 1e3
+                )?;
+            }
+            None => write!(
+                text,
+                "\n\nlesion {}: it has no surface, and is no goal",
+                lesion.name
+            )?,
+        }
+    }
+    if let Some(registered) = &built.registered {
+        write_registration(&mut text, built, &registered.registration)?;
+    }
+    text.push('\n');
+    for remark in &built.remarks {
+        match &remark.place {
+            Some(place) => write!(text, "\nnote: {place}: {}", remark.message)?,
+            None => write!(text, "\nnote: {}", remark.message)?,
+        }
+    }
+    if built.registered.is_none() {
+        write!(
+            text,
+            "\nnote: there are no --markers, so nothing says where the robot is from this patient: it stands as in the room"
+        )?;
+    }
+    if report.targets.is_empty() {
+        write!(
+            text,
+            "\nnote: there is no lesion, so the scenario has no goals yet: --lesion NAME=X,Y,Z, or write [[goals]]"
+        )?;
+    }
+    write!(
+        text,
+        "\nresults: {}; next: needlebench check {}",
+        shown(out),
+        shown(file)
+    )?;
+    Ok(text)
+}
+
+fn write_registration(
+    text: &mut String,
+    built: &ScanBuild,
+    registration: &Registration,
+) -> std::fmt::Result {
+    write!(
+        text,
+        "\n\nmarker             residual (mm)  expected (mm)  by the others (mm)"
+    )?;
+    for marker in &registration.markers {
+        let others = marker.leave_one_out.as_ref().map_or_else(
+            || "-".to_owned(),
+            |left| format!("{:.2}", left.error_m.norm() * 1e3),
+        );
+        write!(
+            text,
+            "\n{:<18} {:>13.2}  {:>13.2}  {others:>18}",
+            marker.name,
+            marker.residual_m.norm() * 1e3,
+            marker.expected_residual_m * 1e3
+        )?;
+    }
+    write!(
+        text,
+        "\nmarkers agree to {:.2} mm rms (FRE; {:.2} expected), which does not tell the error at the target:",
+        registration.fre_rms_m * 1e3,
+        registration.expected_fre_rms_m * 1e3
+    )?;
+    for target in &built.targets {
+        if let Some(error) = &target.registration {
+            let seen = (0..3)
+                .map(|axis| target.covariance_m2[axis][axis])
+                .sum::<f64>()
+                .sqrt();
+            write!(
+                text,
+                "\n  {}: registration {:.2} mm rms (TRE), place in the scan {:.2} mm rms",
+                target.name,
+                error.rms_m * 1e3,
+                seen * 1e3
+            )?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_have_names() {
+        let place = named_place("nodule_1=-60, 40,-112.5").unwrap();
+        assert_eq!(place.name, "nodule_1");
+        assert_eq!(place.numbers, [-60.0, 40.0, -112.5]);
+        for wrong in ["1,2,3", "=1,2,3", "a b=1,2,3", "a=1,2", "a=1,2,nan"] {
+            assert!(named_place(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,364 @@
+//! `needlebench ct info`.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use needlebench_cell::Finding;
+use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_volume};
+use needlebench_imaging::{HuHistogram, ImagingError, Orientation, Remark};
+use needlebench_report::layout;
+use serde::Serialize;
+
+use crate::command::{print_json, print_text};
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::output::{complain, shown};
+
+/// Shares of the voxels whose Hounsfield units are printed.
+const QUANTILES: [f64; 7] = [0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99];
+
+/// Angle up to which slices lie straight above one another, in what people read.
+const STRAIGHT_DEG: f64 = 0.01;
+
+/// How a CT is read: of all commands that read one.
+#[derive(Debug, Args)]
+pub(crate) struct ReadArguments {
+    /// Which series of a DICOM folder, by its number in the list of a refusal, or by its UID.
+    #[arg(long, value_name = "SERIES")]
+    series: Option<String>,
+    /// Interpolate single missing slices, which are refused otherwise.
+    #[arg(long)]
+    fill_gaps: bool,
+    /// To which sides of the patient columns, rows and slices run, in a NIfTI file that does not say it.
+    #[arg(long, value_name = "LPS")]
+    assume_orientation: Option<Orientation>,
+    /// Most memory that the voxels may take, in MiB.
+    #[arg(long, value_name = "MIB", default_value_t = 4096)]
+    max_memory: u32,
+    /// Threads; as many as the machine has cores if left out. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+}
+
+impl ReadArguments {
+    /// Reads a CT.
+    pub(crate) fn read(
+        &self,
+        path: &Path,
+        cancel: &AtomicBool,
+    ) -> Result<ReadVolume, ImagingError> {
+        let options = ReadOptions {
+            series: self.series.clone(),
+            fill_gaps: self.fill_gaps,
+            assume_orientation: self.assume_orientation,
+            max_bytes: self.max_bytes(),
+        };
+        read_volume(path, &options, self.threads(), cancel)
+    }
+
+    /// Most bytes that the voxels may take.
+    pub(crate) fn max_bytes(&self) -> u64 {
+        u64::from(self.max_memory) << 20
+    }
+
+    /// Threads.
+    pub(crate) fn threads(&self) -> usize {
+        self.jobs.map_or_else(
+            || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            usize::from,
+        )
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InfoArguments {
+    /// .nii, .nii.gz, .hdr, a DICOM file, or a folder of DICOM files.
+    #[arg(value_name = "PATH")]
+    path: PathBuf,
+    #[command(flatten)]
+    reading: ReadArguments,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct InfoAnswer {
+    schema_version: u32,
+    ok: bool,
+    findings: Vec<Finding>,
+    remarks: Vec<Remark>,
+    volume: Option<VolumeAnswer>,
+}
+
+#[derive(Serialize)]
+struct VolumeAnswer {
+    source: Description,
+    size: [usize; 3],
+    spacing_m: [f64; 3],
+    extent_m: [f64; 3],
+    /// Letters of the sides of the patient to which i, j and k run.
+    orientation: String,
+    /// Centre of the first voxel, in LPS.
+    first_voxel_m: [f64; 3],
+    /// Steps along i, j and k, in LPS.
+    steps_m: [[f64; 3]; 3],
+    is_aligned: bool,
+    tilt_rad: f64,
+    slice_thickness_m: Option<f64>,
+    memory_bytes: usize,
+    hu: HuAnswer,
+}
+
+#[derive(Serialize)]
+struct HuAnswer {
+    minimum: Option<i16>,
+    maximum: Option<i16>,
+    mean: Option<f64>,
+    quantiles: Vec<Quantile>,
+    air_peak: Option<i16>,
+    has_air_peak: bool,
+}
+
+#[derive(Serialize)]
+struct Quantile {
+    share: f64,
+    hu: i16,
+}
+
+/// Reads a CT, and says what it is.
+pub(crate) fn info(arguments: &InfoArguments) -> Result<ExitStatus> {
+    let cancel = Arc::new(AtomicBool::new(false));
+    let requested = Arc::clone(&cancel);
+    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
+        .context("cannot watch for interrupts")?;
+    let read = match arguments.reading.read(&arguments.path, &cancel) {
+        Ok(read) => read,
+        Err(ImagingError::Interrupted) => {
+            complain("interrupted");
+            return Ok(ExitStatus::Interrupted);
+        }
+        Err(problem) => {
+            let finding = finding_of(&arguments.path, problem);
+            if arguments.json {
+                print_json(&InfoAnswer {
+                    schema_version: 1,
+                    ok: false,
+                    findings: vec![finding],
+                    remarks: Vec::new(),
+                    volume: None,
+                })?;
+            } else {
+                print_findings(&[finding]);
+            }
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let volume = answer(&read);
+    if arguments.json {
+        print_json(&InfoAnswer {
+            schema_version: 1,
+            ok: true,
+            findings: Vec::new(),
+            remarks: read.remarks,
+            volume: Some(volume),
+        })?;
+    } else {
+        let text = in_words(&arguments.path, &volume, &read.remarks)?;
+        print_text(&layout::wrapped(&text))?;
+    }
+    Ok(ExitStatus::Success)
+}
+
+/// Why a CT cannot be used.
+pub(crate) fn finding_of(path: &Path, problem: ImagingError) -> Finding {
+    let mut finding = Finding::new(path.display().to_string(), problem.to_string());
+    if let ImagingError::Refused { place, hint, .. } = problem {
+        finding.key = place;
+        finding.hint = hint;
+    }
+    finding
+}
+
+fn answer(read: &ReadVolume) -> VolumeAnswer {
+    let volume = &read.volume;
+    let grid = &volume.grid;
+    let histogram = HuHistogram::of(&volume.hu, read.description.padding_voxels);
+    let range_hu = histogram.range_hu();
+    let size = grid.size();
+    let spacing_m = grid.spacing_m();
+    let steps = grid.steps_m();
+    let first = grid.first_m();
+    let quantile = |share: f64| {
+        let hu = histogram.quantile_hu(share)?;
+        Some(Quantile { share, hu })
+    };
+    VolumeAnswer {
+        source: read.description.clone(),
+        size,
+        spacing_m,
+        extent_m: [0, 1, 2].map(|axis| spacing_m[axis] * size[axis] as f64),
+        orientation: Orientation::of(grid).to_string(),
+        first_voxel_m: [first.x, first.y, first.z],
+        steps_m: [0, 1, 2].map(|axis| [0, 1, 2].map(|row| steps[(row, axis)])),
+        is_aligned: grid.is_aligned(),
+        tilt_rad: grid.tilt_rad(),
+        slice_thickness_m: volume.slice_thickness_m,
+        memory_bytes: size_of_val(volume.hu.as_slice()),
+        hu: HuAnswer {
+            minimum: range_hu.map(|range| range[0]),
+            maximum: range_hu.map(|range| range[1]),
+            mean: histogram.mean_hu(),
+            quantiles: QUANTILES.into_iter().filter_map(quantile).collect(),
+            air_peak: histogram.air_peak_hu(),
+            has_air_peak: histogram.has_air_peak(),
+        },
+    }
+}
+
+fn in_words(
+    path: &Path,
+    volume: &VolumeAnswer,
+    remarks: &[Remark],
+) -> Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    let [columns, rows, slices] = volume.size;
+    let [x, y, z] = volume.spacing_m.map(|each| each * 1e3);
+    let [across, down, along] = volume.extent_m.map(|each| each * 1e3);
+    let source = &volume.source;
+    write!(text, "{}: {}", shown(path), source.format)?;
+    let mut line = |name: &str, value: String| write!(text, "\n  {name:<12} {value}");
+    let mut scan = Vec::new();
+    scan.extend(source.modality.clone());
+    scan.extend(
+        source
+            .series
+            .as_ref()
+            .map(|label| format!("series {label}")),
+    );
+    scan.extend(
+        source
+            .kernel
+            .as_ref()
+            .map(|kernel| format!("kernel {kernel}")),
+    );
+    scan.extend(
+        source
+            .tube_voltage_v
+            .map(|volts| format!("{} kV", volts / 1e3)),
+    );
+    if source.files > 1 {
+        scan.push(format!("{} files", source.files));
+    }
+    if !scan.is_empty() {
+        line("scan", scan.join(", "))?;
+    }
+    line(
+        "size",
+        format!(
+            "{columns} x {rows} x {slices} voxels, {:.0} MiB in memory",
+            (volume.memory_bytes as f64 / f64::from(1 << 20)).ceil()
+        ),
+    )?;
+    line("spacing", format!("{x:.4} x {y:.4} x {z:.4} mm"))?;
+    line("extent", format!("{across:.1} x {down:.1} x {along:.1} mm"))?;
+    line("thickness", thickness(volume))?;
+    line("orientation", orientation(volume))?;
+    let [px, py, pz] = volume.first_voxel_m.map(|each| each * 1e3);
+    line(
+        "first voxel",
+        format!("({px:.3}, {py:.3}, {pz:.3}) mm in LPS"),
+    )?;
+    let hu = &volume.hu;
+    if let (Some(least), Some(greatest), Some(mean)) = (hu.minimum, hu.maximum, hu.mean) {
+        line("HU", format!("{least} to {greatest}, mean {mean:.1}"))?;
+        let quantiles: Vec<String> = hu
+            .quantiles
+            .iter()
+            .map(|each| format!("{:.0} % {}", each.share * 100.0, each.hu))
+            .collect();
+        line("quantiles", quantiles.join(", "))?;
+        line(
+            "air",
+            match hu.air_peak {
+                Some(peak) if hu.has_air_peak => format!("peak at {peak} HU"),
+                Some(peak) => format!("peak at {peak} HU, which is not air's"),
+                None => "none".to_owned(),
+            },
+        )?;
+    }
+    for remark in remarks {
+        match &remark.place {
+            Some(place) => write!(text, "\n  note: {place}: {}", remark.message)?,
+            None => write!(text, "\n  note: {}", remark.message)?,
+        }
+    }
+    Ok(text)
+}
+
+/// Of slices, against the distance between them.
+fn thickness(volume: &VolumeAnswer) -> String {
+    let Some(thickness_m) = volume.slice_thickness_m else {
+        return "not known".to_owned();
+    };
+    let between_m = volume.spacing_m[2] * volume.tilt_rad.cos();
+    let thickness_mm = thickness_m * 1e3;
+    let difference_mm = thickness_mm - between_m * 1e3;
+    // A hundredth of a millimetre is rounding.
+    if volume.size[2] == 1 || difference_mm.abs() < 0.01 {
+        format!("{thickness_mm:.3} mm")
+    } else if difference_mm > 0.0 {
+        format!("{thickness_mm:.3} mm: slices overlap by {difference_mm:.3} mm")
+    } else {
+        format!(
+            "{thickness_mm:.3} mm: {:.3} mm between slices were not seen",
+            -difference_mm
+        )
+    }
+}
+
+fn orientation(volume: &VolumeAnswer) -> String {
+    let tilt_deg = volume.tilt_rad.to_degrees();
+    let mut words = format!(
+        "{} (columns, rows, slices run to {})",
+        volume.orientation,
+        sides(&volume.orientation)
+    );
+    if tilt_deg > STRAIGHT_DEG {
+        let _ = write!(words, "; sheared by {tilt_deg:.2} deg");
+    } else if !is_along_axes(volume) {
+        words.push_str("; oblique");
+    }
+    words
+}
+
+/// Whether each step runs along one axis of the patient.
+fn is_along_axes(volume: &VolumeAnswer) -> bool {
+    volume
+        .steps_m
+        .iter()
+        .zip(volume.spacing_m)
+        .all(|(step, spacing_m)| {
+            step.iter()
+                .any(|part| (part.abs() - spacing_m).abs() <= 1e-6 * spacing_m)
+        })
+}
+
+fn sides(letters: &str) -> String {
+    let sides: Vec<&str> = letters
+        .chars()
+        .map(|letter| match letter {
+            'L' => "left",
+            'R' => "right",
+            'P' => "back",
+            'A' => "front",
+            'S' => "head",
+            _ => "feet",
+        })
+        .collect();
+    sides.join(", ")
+}

@@ -1,0 +1,48 @@
+//! `needlebench ct`: CT volumes.
+
+mod build;
+mod info;
+mod synth;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+use crate::exit::ExitStatus;
+
+use build::{BUILD_HELP, BuildArguments, build_scan};
+use info::{InfoArguments, info};
+use synth::{SYNTH_HELP, SynthArguments, synth};
+
+#[derive(Debug, Args)]
+pub(crate) struct CtArguments {
+    #[command(subcommand)]
+    command: CtCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum CtCommand {
+    /// What a volume is: geometry, Hounsfield units, and what is wrong with it.
+    #[command(after_help = "Example: needlebench ct info scan.nii.gz")]
+    Info(InfoArguments),
+    /// Surfaces, lesions, markers and a scenario from a volume.
+    #[command(
+        after_help = "Example: needlebench ct build scan.nii.gz --out out/patient --lesion nodule=-60,40,-112 --markers markers.toml",
+        after_long_help = BUILD_HELP
+    )]
+    Build(Box<BuildArguments>),
+    /// Synthetic CT of a phantom, with the truth beside it.
+    #[command(
+        after_help = "Example: needlebench ct synth scenarios/supine_suite.toml --out out/ct --preset biopsy --markers ct-sphere",
+        after_long_help = SYNTH_HELP
+    )]
+    Synth(Box<SynthArguments>),
+}
+
+/// Runs what is asked for of a CT.
+pub(crate) fn ct(arguments: &CtArguments) -> Result<ExitStatus> {
+    match &arguments.command {
+        CtCommand::Info(arguments) => info(arguments),
+        CtCommand::Build(arguments) => build_scan(arguments),
+        CtCommand::Synth(arguments) => synth(arguments),
+    }
+}

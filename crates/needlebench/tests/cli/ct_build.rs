@@ -1,0 +1,242 @@
+//! `needlebench ct build`, and runs that begin with a scan.
+
+use std::fs;
+
+use crate::support::{Bench, has_keys, numbers, workspace};
+
+/// A chest of coarse pixels, with markers, lesions and a robot: about a tenth of a hospital's.
+const SCAN: [&str; 12] = [
+    "ct",
+    "synth",
+    "s.toml",
+    "--out",
+    "ct",
+    "--markers",
+    "ct-sphere",
+    "--pixels",
+    "224",
+    "--preset",
+    "thick-overlap",
+    "--no-labels",
+];
+
+fn suite() -> String {
+    fs::read_to_string(workspace().join("scenarios/supine_suite.toml")).unwrap()
+}
+
+/// A bench with a scan of the suite's patient.
+fn scanned() -> Bench {
+    let bench = Bench::with_scenario(&suite());
+    bench.run(&SCAN).exits_with(0);
+    bench
+}
+
+/// Of the phantom: a little beside the middle of a lesion.
+const LESION: &str = "nodule=-107,10,35";
+
+#[test]
+fn a_scan_becomes_a_patient_that_can_be_run() {
+    let bench = scanned();
+    let arguments = [
+        "ct",
+        "build",
+        "ct/ct.nii.gz",
+        "--out",
+        "patient",
+        "--lesion",
+        LESION,
+        "--thickness-mm",
+        "5",
+        "--markers",
+        "ct/marker_list.toml",
+        "--room",
+        "s.toml",
+        "--json",
+    ];
+    let made = bench.run(&arguments).exits_with(0).json();
+    has_keys(
+        &made,
+        &["schema_version", "ok", "folder", "scenario", "report"],
+    );
+    let report = bench.read_json("patient/report.json");
+    assert_eq!(made["report"], report);
+    let truth = bench.read_json("ct/truth.json");
+
+    // Every surface is there; the check below reads them.
+    let names: Vec<&str> = report["surfaces"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|each| each["name"].as_str().unwrap())
+        .collect();
+    for name in ["skin", "lung_left", "lung_right", "bone", "nodule"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    // The middle of the lesion, against the phantom's.
+    let seen = numbers(&report["targets"][0]["center_m"]);
+    let lesions = truth["lesions"].as_array().unwrap();
+    let real = lesions
+        .iter()
+        .find(|each| each["name"] == "pleural_based")
+        .unwrap();
+    for (seen, real) in seen.iter().zip(numbers(&real["center_m"])) {
+        assert!((seen - real).abs() < 0.3e-3, "{seen} {real}");
+    }
+    // All markers, each the right one, and the robot's place to what touching them leaves.
+    let registered = report["registration"]["markers"].as_array().unwrap();
+    assert_eq!(registered.len(), 8);
+    let found = report["markers"]["found"].as_array().unwrap();
+    for marker in registered {
+        let place = numbers(
+            &found[usize::try_from(marker["detected"].as_u64().unwrap()).unwrap()]["center_m"],
+        );
+        let markers = truth["markers"].as_array().unwrap();
+        let real = markers
+            .iter()
+            .find(|each| each["name"] == marker["name"])
+            .unwrap();
+        for (seen, real) in place.iter().zip(numbers(&real["sphere_center_m"])) {
+            assert!((seen - real).abs() < 0.15e-3, "{marker} {seen} {real}");
+        }
+    }
+    let target = &report["targets"][0]["registration"];
+    let rms_m = target["rms_m"].as_f64().unwrap();
+    let matrix: Vec<Vec<f64>> = truth["robot_from_ct"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(numbers)
+        .collect();
+    let off: f64 = numbers(&target["at_m"])
+        .iter()
+        .enumerate()
+        .map(|(row, at)| {
+            let place = matrix[row][3] + (0..3).map(|k| matrix[row][k] * seen[k]).sum::<f64>();
+            (at - place).powi(2)
+        })
+        .sum();
+    assert!(off.sqrt() < 4.0 * rms_m, "{off} {rms_m}");
+
+    // The scenario is taken as it is.
+    let checked = bench
+        .run(&["check", "patient/scenario.toml", "--json"])
+        .json();
+    let findings = checked.to_string();
+    assert!(!findings.contains("phantom.parts"), "{findings}");
+    // Pictures are left out with --json; the words say where the errors come from.
+    let words = bench
+        .run(&arguments[..arguments.len() - 1])
+        .exits_with(0)
+        .stdout;
+    for part in [
+        "FRE",
+        "does not tell the error at the target",
+        "TRE",
+        "needlebench check",
+    ] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+}
+
+#[test]
+fn a_run_begins_with_a_scan_and_is_measured_against_the_true_lesion() {
+    let text = fs::read_to_string(workspace().join("scenarios/ct/chest.toml")).unwrap();
+    let text = text.replace(
+        "slices = \"biopsy\"",
+        "slices = \"thick_overlap\"\npixels = 224",
+    );
+    // One needle is enough here.
+    let (first, rest) = text.split_once("# Second intercostal space").unwrap();
+    let (_, rest) = rest.split_once("[planning]").unwrap();
+    let bench = Bench::with_scenario(&format!("{first}[planning]{rest}"));
+    let arguments = [
+        "run",
+        "s.toml",
+        "--engine",
+        "rapier",
+        "--no-page",
+        "--no-pictures",
+        "--quiet",
+        "--json",
+    ];
+    let report = bench.run(&arguments).exits_with(0).json();
+    assert_eq!(report["verdict"], "pass");
+    let criteria = report["criteria"].to_string();
+    assert!(criteria.contains("max_true_target_error_mm"), "{criteria}");
+    // What was planned for is what was found, not what is there.
+    let scenario = String::from_utf8(bench.read("out/ct_chest/ct/scenario.toml")).unwrap();
+    assert!(
+        scenario.contains("true_target_mm") && scenario.contains("[[phantom.parts]]"),
+        "{scenario}"
+    );
+    assert!(!scenario.contains("[ct]"), "{scenario}");
+    // It can be run again as it is, and gives the same.
+    let again = bench.run(&[
+        "run",
+        "out/ct_chest/ct/scenario.toml",
+        "--engine",
+        "rapier",
+        "--no-page",
+        "--no-pictures",
+        "--quiet",
+        "--json",
+        "--out",
+        "again",
+    ]);
+    let again = again.exits_with(0).json();
+    assert_eq!(again["criteria"], report["criteria"]);
+}
+
+#[test]
+fn what_is_wrong_is_said_with_what_to_do() {
+    let bench = Bench::with_scenario(&suite());
+    bench.write("markers.toml", "frame = \"base_link\"\nsphere_mm = 8\nsd_mm = 0.3\n\n[[markers]]\nname = \"a\"\nposition_mm = [1, 2]\n");
+    bench.write("names.json", "{}");
+    bench.write("scan.nii.gz", "no volume");
+    for (arguments, words) in [
+        (vec!["--lesion", "1,2,3"], "a name and three numbers"),
+        (vec!["--lesion", "skin=1,2,3"], "nii"),
+        (vec!["--markers", "markers.toml"], "markers.toml:5"),
+        (
+            vec!["--labels", "l.nii", "--label-names", "names.json"],
+            "no names",
+        ),
+        (vec!["--room", "missing.toml"], "missing.toml"),
+        (vec![], "gzip"),
+    ] {
+        let mut all = vec!["ct", "build", "scan.nii.gz", "--out", "patient"];
+        all.extend(arguments);
+        let said = bench.run(&all).exits_with(2).stderr;
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let with_ct = |more: &str| format!("{}\n[ct]\n{more}", suite());
+    for (text, words) in [
+        (with_ct(""), "CT does not tell"),
+        (with_ct("slices = \"thinnest\""), "did you mean `thin`"),
+        (with_ct("markers = [\"a\", \"b\"]"), "three"),
+        (with_ct("touch_mm = 0"), "touch_mm"),
+        (
+            suite().replace("lesion = \"pleural_based\"", "target_mm = [-107, 10, 35]")
+                + "\n[ct]\n",
+            "names the lesion",
+        ),
+    ] {
+        let bench = Bench::with_scenario(
+            &text
+                .replace("[phantom]", "[phantom]\nmarkers = \"disc\"")
+                .replace(
+                    "markers = \"disc\"",
+                    if words == "CT does not tell" {
+                        "markers = \"disc\""
+                    } else {
+                        "markers = \"ct_sphere\""
+                    },
+                ),
+        );
+        let said = bench
+            .run(&["run", "s.toml", "--quiet"])
+            .exits_with(2)
+            .stderr;
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
