@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
+use nalgebra::{Matrix3, Point3, Vector3};
+use needlebench_imaging::VoxelGrid;
 use needlebench_imaging::read::{ReadOptions, read_labels, read_volume};
 
 /// Voxels may take this much: what a header asks for beyond it is refused before memory is taken.
@@ -11,7 +13,7 @@ const MEMORY: u64 = 1 << 22;
 
 static FOLDER: OnceLock<PathBuf> = OnceLock::new();
 
-/// Reads bytes as the file `name`: as a volume, and as its own label map.
+/// Reads bytes as the file `name`: as a volume, and as its own label map, or that of the corpus's slices.
 pub fn read(name: &str, bytes: &[u8]) {
     let folder = FOLDER.get_or_init(|| {
         let folder = PathBuf::from(format!("/dev/shm/needlebench-fuzz-{}", std::process::id()));
@@ -27,8 +29,20 @@ pub fn read(name: &str, bytes: &[u8]) {
         ..ReadOptions::default()
     };
     let never = AtomicBool::new(false);
-    if let Ok(read) = read_volume(&path, &options, 1, &never) {
-        assert_eq!(read.volume.hu.len(), read.volume.grid.len());
-        let _ = read_labels(&path, &read.volume.grid, &options, &never);
+    let grid = match read_volume(&path, &options, 1, &never) {
+        Ok(read) => {
+            assert_eq!(read.volume.hu.len(), read.volume.grid.len());
+            read.volume.grid
+        }
+        Err(_) => slices(),
+    };
+    if let Ok(read) = read_labels(&path, &grid, &options, &never) {
+        assert_eq!(read.labels.labels.len(), grid.len());
     }
+}
+
+/// Of the corpus's slices, which its segmentations are of.
+fn slices() -> VoxelGrid {
+    let steps_m = Matrix3::from_diagonal(&Vector3::new(0.5e-3, 0.75e-3, 2e-3));
+    VoxelGrid::new([5, 4, 3], steps_m, Point3::new(-10e-3, 20e-3, 0.0)).expect("a grid")
 }

@@ -56,13 +56,16 @@ pub(crate) struct Filled {
     pub share: f64,
     /// An edge or a thin part: smaller boxes would tell more.
     pub is_rough: bool,
+    /// Outward unit normal of the plane that cuts the box, if one alone does.
+    pub normal: Option<Vector3<f64>>,
 }
 
 impl Filled {
-    fn by_one_plane(share: f64) -> Self {
+    fn by_one_plane(share: f64, normal: Vector3<f64>) -> Self {
         Self {
             share,
             is_rough: false,
+            normal: Some(normal),
         }
     }
 }
@@ -187,10 +190,19 @@ impl Body {
                 Filled {
                     share,
                     is_rough: share > 0.0 && (side.is_rough || has_edge || is_thin),
+                    normal: if end < 1.0 {
+                        Some(if along_m < 0.0 { -axis } else { *axis })
+                    } else {
+                        side.normal
+                    },
                 }
             }
             Self::Faces(_) => {
-                let mut filled = Filled::by_one_plane(1.0);
+                let mut filled = Filled {
+                    share: 1.0,
+                    is_rough: false,
+                    normal: None,
+                };
                 let mut cutting: Option<Vector3<f64>> = None;
                 for plane in planes {
                     let share =
@@ -200,8 +212,12 @@ impl Body {
                     }
                     filled.share = filled.share.min(share);
                     match cutting {
-                        None => cutting = Some(plane.normal),
+                        None => {
+                            cutting = Some(plane.normal);
+                            filled.normal = cutting;
+                        }
                         Some(normal) => {
+                            filled.normal = None;
                             filled.is_rough |= normal.dot(&plane.normal) < SMOOTH_COSINE;
                         }
                     }
@@ -225,6 +241,7 @@ impl Body {
             return Filled {
                 share: 0.5,
                 is_rough: true,
+                normal: None,
             };
         };
         let height_m = normal.dot(&away);
@@ -239,6 +256,7 @@ impl Body {
         Filled {
             share: share_below(&normal, &cell.half, height_m),
             is_rough: !is_plane,
+            normal: Some(normal),
         }
     }
 
@@ -324,6 +342,7 @@ fn fills_round(
         return Filled {
             share: f64::from(u8::from(distance_m < radius_m)),
             is_rough: radius_m < 2.0 * reach_m,
+            normal: None,
         };
     }
     let normal = from_axis / distance_m;
@@ -334,7 +353,7 @@ fn fills_round(
     let across =
         reach_m * reach_m / 3.0 - variance(&normal) - axis.map_or(0.0, |axis| variance(&axis));
     let height_m = distance_m + 0.5 * across / distance_m - radius_m;
-    Filled::by_one_plane(share_below(&normal, &cell.half, height_m))
+    Filled::by_one_plane(share_below(&normal, &cell.half, height_m), normal)
 }
 
 fn cuboid(frame_from_shape: &Pose, half_extents_m: &Vector3<f64>) -> Vec<Plane> {

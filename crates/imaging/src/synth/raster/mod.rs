@@ -14,7 +14,7 @@ use needlebench_kinematics::Pose;
 
 use super::Scene;
 pub(super) use body::Cell;
-use body::{Body, Lies};
+use body::{Body, Filled, Lies};
 use plane_cut::Plane;
 
 /// Halvings of a cell in which surfaces meet: each of its edges twice. What then is left is half a cell, an eighth of a
@@ -23,6 +23,8 @@ use plane_cut::Plane;
 const HALVINGS: u32 = 3;
 /// Half of the edge of a point, m: what is within it of a surface is on either side of it.
 const POINT_M: f64 = 1e-9;
+/// Cosine of the angle up to which planes count as parallel, 0.08 degrees: of a box that both cut, less than 0.1 % is at stake.
+const PARALLEL_COSINE: f64 = 1.0 - 1e-6;
 /// Shares below this count as none: rounding.
 const NOTHING: f64 = 1e-9;
 
@@ -195,9 +197,8 @@ impl Raster {
         stack: &mut Stack,
         halvings: u32,
     ) -> f64 {
-        let mut left = 1.0;
+        let mut cut = PlaneCuts::default();
         let mut sum = 0.0;
-        let mut cuts = 0;
         let mut is_rough = false;
         for candidate in &stack.candidates[contents.first..contents.last] {
             let part = &self.parts[candidate.part as usize];
@@ -206,22 +207,20 @@ impl Raster {
             let filled = part.body.fills(cell, planes);
             is_rough |= filled.is_rough;
             if filled.share > NOTHING {
-                sum += left * filled.share * part.hu;
-                left *= 1.0 - filled.share;
-                if left < NOTHING {
+                sum += part.hu * cut.take(&filled);
+                if cut.left() < NOTHING {
                     break;
                 }
-                cuts += 1;
             }
         }
-        if is_rough || cuts > 1 {
+        if is_rough || !cut.is_exact {
             return if halvings > 0 {
                 self.mean_of_halves(contents, cell, stack, halvings - 1)
             } else {
                 self.mean_of_points(contents, cell, stack)
             };
         }
-        sum + left * contents.beneath.hu
+        sum + cut.left() * contents.beneath.hu
     }
 
     /// Mean over the middles of a box's eighths.
@@ -270,6 +269,59 @@ impl Raster {
             hu: part.hu,
             label: part.label,
         }
+    }
+}
+
+/// What parts, from the top down, leave of a box that they cut by planes at one angle: the middle of a pile of sheets.
+#[derive(Debug)]
+struct PlaneCuts {
+    /// Across the sheets: of the first cut, its normal if it is by one plane.
+    first: Option<Option<Vector3<f64>>>,
+    /// Share of the box that is taken on the normal's inner side, and where what is taken on the outer side begins.
+    taken_to: f64,
+    taken_from: f64,
+    /// All planes are parallel.
+    is_exact: bool,
+}
+
+impl Default for PlaneCuts {
+    fn default() -> Self {
+        Self {
+            first: None,
+            taken_to: 0.0,
+            taken_from: 1.0,
+            is_exact: true,
+        }
+    }
+}
+
+impl PlaneCuts {
+    fn left(&self) -> f64 {
+        (self.taken_from - self.taken_to).max(0.0)
+    }
+
+    /// Takes what the next part fills; returns how much of that was left.
+    fn take(&mut self, filled: &Filled) -> f64 {
+        let before = self.left();
+        let mut is_turned = false;
+        if filled.share < 1.0 {
+            let cosine = match (self.first, filled.normal) {
+                (None, normal) => {
+                    self.first = Some(normal);
+                    1.0
+                }
+                (Some(Some(first)), Some(normal)) => first.dot(&normal),
+                (Some(_), _) => 0.0,
+            };
+            self.is_exact &= cosine.abs() > PARALLEL_COSINE;
+            is_turned = cosine < 0.0;
+        }
+        if is_turned {
+            self.taken_from = self.taken_from.min(1.0 - filled.share);
+        } else {
+            self.taken_to = self.taken_to.max(filled.share);
+        }
+        before - self.left()
     }
 }
 
