@@ -92,12 +92,14 @@ impl HuHistogram {
         if share < SOME_AIR {
             return None;
         }
+        let first = low.iter().position(|count| *count > 0)?;
+        let last = low.iter().rposition(|count| *count > 0)?;
         let smooth = |at: usize| -> u64 {
             low[at.saturating_sub(5)..(at + 6).min(low.len())]
                 .iter()
                 .sum()
         };
-        let peak = (0..low.len()).max_by_key(|at| (smooth(*at), low[*at], usize::MAX - at))?;
+        let peak = (first..=last).max_by_key(|at| (smooth(*at), low[*at], usize::MAX - at))?;
         Some(value(peak))
     }
 

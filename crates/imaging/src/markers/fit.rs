@@ -28,6 +28,12 @@ const LEAST_NOISE_HU: f64 = 5.0;
 /// Largest value of 12-bit scanners: what is denser is shown as this.
 const CLIP_HU: i16 = 3071;
 
+/// Least value that scanners store.
+const LEAST_HU: i16 = -1024;
+
+/// Noise where it cannot be measured.
+const NOISE_HU: f64 = 20.0;
+
 /// Standard deviations of what is known of the unknowns beforehand: wide, but for what hardly shows.
 const HEIGHT_MM: f64 = 1.5;
 const TILT: f64 = 0.3;
@@ -157,7 +163,10 @@ pub fn localise(
     };
     let reach_mm = model.reach_m() * 1e3;
     let outward = outward(scan, seed, model)?;
-    let sd = noise.map_or(20.0, |noise| noise.sd_hu).max(LEAST_NOISE_HU) / 1e3;
+    let sd = noise
+        .map_or(NOISE_HU, |noise| noise.sd_hu)
+        .max(LEAST_NOISE_HU)
+        / 1e3;
     let per_value = noise.map_or(4.0, Noise::voxels_per_value);
     let weight = 1.0 / (sd * sd * per_value);
     let start = before(&of);
@@ -558,11 +567,12 @@ impl Task<'_> {
             return (None, Matrix3::identity() * CENTER_MM * CENTER_MM);
         };
         let per_value = noise.map_or(4.0, Noise::voxels_per_value);
-        let count = self.samples.len() as f64;
+        let (squares, count) = self.unclipped_squares(values, noise);
         // What the fit took of the residuals, in voxels: the priors' share of the unknowns took nothing.
         let prior: f64 = (0..UNKNOWNS).map(|k| inverse[(k, k)] * self.known[k]).sum();
-        let taken = (UNKNOWNS as f64 - prior) * per_value;
-        let variance = at.squares / (count - taken).max(0.2 * count);
+        let share = count / self.samples.len().max(1) as f64;
+        let taken = (UNKNOWNS as f64 - prior) * per_value * share;
+        let variance = squares / (count - taken).max(0.2 * count);
         let chi_square = noise.map(|noise| variance * 1e6 / (noise.sd_hu * noise.sd_hu));
 
         let rows = inverse.fixed_rows::<3>(0).into_owned();
@@ -580,6 +590,24 @@ impl Task<'_> {
         let known = rows * SMatrix::from_diagonal(&self.known) * rows.transpose();
         let shape = Matrix3::from_diagonal_element(SHAPE_MM * SHAPE_MM);
         (chi_square, correlated * variance + known + shape)
+    }
+
+    /// Squares of the residuals and their number, of voxels in which all of the noise shows: that of air is cut off at the
+    /// least value that scanners store.
+    fn unclipped_squares(&self, values: &Unknowns, noise: Option<&Noise>) -> (f64, f64) {
+        let reach_hu = 2.0 * noise.map_or(NOISE_HU, |noise| noise.sd_hu);
+        let least = (f64::from(LEAST_HU) + reach_hu) / 1e3;
+        let posed = Posed::new(self.of, &self.outward, values);
+        let mut by = Unknowns::zeros();
+        let (mut squares, mut count) = (0.0, 0.0);
+        for sample in &self.samples {
+            let density = posed.density(&sample.at, &mut by);
+            if density >= least {
+                squares += Self::residual(sample, density).powi(2);
+                count += 1.0;
+            }
+        }
+        (squares, count)
     }
 
     /// By how much each voxel moves the centre, mm per thousand of HU.

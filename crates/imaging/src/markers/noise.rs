@@ -1,5 +1,6 @@
 //! Noise of a scan, and how it is correlated between voxels.
 
+use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::Volume;
@@ -62,9 +63,9 @@ impl Noise {
 
 /// Noise as homogeneous patches of soft tissue show it; nothing where there are none, or no noise.
 ///
-/// Planes are taken out of the patches, so that slow changes of tissue do not count. Patches with structure have a
-/// larger variance: standard deviation and correlation are those of the half with the smaller one, put right for what
-/// that choice and the planes leave out.
+/// Planes are taken out of the patches, so that slow changes of tissue do not count, and their products are put right for
+/// it. Patches with structure have a larger variance: the correlation is that of the half with the smaller one. It is
+/// the slice below that chooses: chosen by its own variance, noise would seem weaker and less correlated than it is.
 pub fn measure_noise(volume: &Volume) -> Option<Noise> {
     let size = volume.grid.size();
     if size[0] < PATCH || size[1] < PATCH {
@@ -77,35 +78,51 @@ pub fn measure_noise(volume: &Volume) -> Option<Noise> {
             .map(|n| room * (2 * n + 1) / (2 * count))
             .collect()
     };
+    let mut variances = Vec::new();
     let mut patches = Vec::new();
     for &k in &places(2, 1) {
         for &j in &places(1, PATCH) {
             for &i in &places(0, PATCH) {
-                patches
-                    .extend(flat(volume, [i, j, k]).map(|values| (variance(&values), [i, j, k])));
+                let Some(values) = flat(volume, [i, j, k]) else {
+                    continue;
+                };
+                let own = variance(&values);
+                variances.push(own);
+                let below = k.checked_sub(1).map(|below| flat(volume, [i, j, below]));
+                match below {
+                    Some(Some(values)) => patches.push((variance(&values), [i, j, k])),
+                    Some(None) => {}
+                    None => patches.push((own, [i, j, k])),
+                }
             }
         }
     }
     if patches.len() < FEWEST {
         return None;
     }
+    variances.sort_by(f64::total_cmp);
+    let median = variances[variances.len() / 2];
     patches.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let median = patches[patches.len() / 2].0;
     let half = patches.len().div_ceil(2);
-    let mut sums = vec![[[0.0; WIDTH]; WIDTH]; SLICES + 1];
+    let mut sums = [([[0.0; WIDTH]; WIDTH], 0); SLICES + 1];
     for (_, place) in patches[..half].iter().step_by(half.div_ceil(MOST)) {
         add_products(volume, *place, &mut sums);
     }
-    let whole = sums[0][REACH][REACH];
+    let mut correlation: Vec<_> = sums
+        .iter()
+        .map(|(sums, added)| sums.map(|row| row.map(|sum| sum / (*added).max(1) as f64)))
+        .collect();
+    without_planes(&mut correlation)?;
+    let whole = correlation[0][REACH][REACH];
     if whole <= 0.0 || median <= 0.0 {
         return None;
     }
-    for value in sums.iter_mut().flatten().flatten() {
+    for value in correlation.iter_mut().flatten().flatten() {
         *value /= whole;
     }
     let mut noise = Noise {
         sd_hu: median.sqrt(),
-        correlation: sums,
+        correlation,
     };
     // A plane takes three values of those that a patch is worth.
     let plane = &noise.correlation[0];
@@ -115,32 +132,105 @@ pub fn measure_noise(volume: &Volume) -> Option<Noise> {
     Some(noise)
 }
 
+/// Products by lag as they were before planes were taken out of the patches.
+///
+/// Of noise with covariance `C` the residuals from planes have `(1 - P) C (1 - P)`, with `P` onto the planes: means over
+/// the pairs of a lag are linear in the covariances by lag, and solved for these.
+fn without_planes(products: &mut [[[f64; WIDTH]; WIDTH]]) -> Option<()> {
+    let lags = lags();
+    let mut taken = DMatrix::zeros(lags.len(), lags.len());
+    for (column, by) in lags.iter().enumerate() {
+        let mut both = Matrix3::zeros();
+        for (at, _) in pairs(*by) {
+            both += on_planes(at) * on_planes(at + by).transpose();
+        }
+        let moved = |at: Vector2<isize>| {
+            let is_inside = at.iter().all(|value| (0..PATCH as isize).contains(value));
+            if is_inside {
+                on_planes(at)
+            } else {
+                Vector3::zeros()
+            }
+        };
+        for (row, lag) in lags.iter().enumerate() {
+            let mut sum = 0.0;
+            let mut count = 0.0;
+            for (at, other) in pairs(*lag) {
+                let (first, second) = (on_planes(at), on_planes(other));
+                sum += first.dot(&(both * second))
+                    - first.dot(&moved(other - by))
+                    - moved(at + by).dot(&second);
+                count += 1.0;
+            }
+            taken[(row, column)] = sum / count + f64::from(u8::from(row == column));
+        }
+    }
+    let taken = taken.lu();
+    for plane in products {
+        let means = DVector::from_iterator(lags.len(), plane.iter().flatten().copied());
+        let before = taken.solve(&means)?;
+        for (value, before) in plane.iter_mut().flatten().zip(&before) {
+            *value = *before;
+        }
+    }
+    Some(())
+}
+
+/// All lags in a slice, in the order of a plane of sums.
+fn lags() -> Vec<Vector2<isize>> {
+    let reach = REACH as isize;
+    (-reach..=reach)
+        .flat_map(|dj| (-reach..=reach).map(move |di| Vector2::new(di, dj)))
+        .collect()
+}
+
+/// Places in a patch, and those that are so far from them.
+fn pairs(lag: Vector2<isize>) -> impl Iterator<Item = (Vector2<isize>, Vector2<isize>)> {
+    let side = PATCH as isize;
+    let range = move |by: isize| 0.max(-by)..side.min(side - by);
+    range(lag.y).flat_map(move |y| {
+        range(lag.x).map(move |x| (Vector2::new(x, y), Vector2::new(x, y) + lag))
+    })
+}
+
+/// What a place has of each of three planes over a patch, at right angles to each other and of unit length.
+fn on_planes(at: Vector2<isize>) -> Vector3<f64> {
+    let side = PATCH as f64;
+    let middle = (side - 1.0) / 2.0;
+    // Squares of whole steps from the middle, summed over a patch.
+    let slope = (side * side * (side * side - 1.0) / 12.0).sqrt();
+    Vector3::new(
+        1.0 / side,
+        (at.x as f64 - middle) / slope,
+        (at.y as f64 - middle) / slope,
+    )
+}
+
 fn variance(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
 }
 
+/// Mean products by lag in the slice, of slices that are so far apart; none where nothing was multiplied.
+type Products = [([[f64; WIDTH]; WIDTH], usize)];
+
 /// Adds a patch's mean products by lag.
-fn add_products(volume: &Volume, [i, j, k]: [usize; 3], sums: &mut [[[f64; WIDTH]; WIDTH]]) {
+fn add_products(volume: &Volume, [i, j, k]: [usize; 3], sums: &mut Products) {
     let planes: Vec<Vec<f64>> = (k..(k + SLICES + 1).min(volume.grid.size()[2]))
         .map_while(|k| flat(volume, [i, j, k]))
         .collect();
     let Some(first) = planes.first() else { return };
-    let reach = REACH as isize;
-    let side = PATCH as isize;
-    for (plane, sums) in planes.iter().zip(sums) {
-        for dj in -reach..=reach {
-            for di in -reach..=reach {
-                let mut sum = 0.0;
-                for y in 0.max(-dj)..side.min(side - dj) {
-                    for x in 0.max(-di)..side.min(side - di) {
-                        let at = |x: isize, y: isize| (y * side + x) as usize;
-                        sum += first[at(x, y)] * plane[at(x + di, y + dj)];
-                    }
-                }
-                let count = (side - di.abs()) * (side - dj.abs());
-                sums[(dj + reach) as usize][(di + reach) as usize] += sum / count as f64;
+    let at = |place: Vector2<isize>| (place.y * PATCH as isize + place.x) as usize;
+    for (plane, (sums, added)) in planes.iter().zip(sums) {
+        for (value, lag) in sums.iter_mut().flatten().zip(lags()) {
+            let mut sum = 0.0;
+            let mut count = 0.0;
+            for (place, other) in pairs(lag) {
+                sum += first[at(place)] * plane[at(other)];
+                count += 1.0;
             }
+            *value += sum / count;
         }
+        *added += 1;
     }
 }
 

@@ -193,7 +193,7 @@ fn table() {
 }
 
 #[test]
-#[ignore = "several hundred scans: a minute in release"]
+#[ignore = "several hundred scans: two minutes"]
 fn covariances_are_those_of_the_errors() {
     for (thickness, increment, noise) in [(1.0, 1.0, 50.0), (2.5, 2.5, 40.0)] {
         let scanner = Scanner::new(thickness, increment, noise);
