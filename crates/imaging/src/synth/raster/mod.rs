@@ -275,8 +275,9 @@ impl Raster {
 /// What parts, from the top down, leave of a box that they cut by planes at one angle: the middle of a pile of sheets.
 #[derive(Debug)]
 struct PlaneCuts {
-    /// Across the sheets: of the first cut, its normal if it is by one plane.
-    first: Option<Option<Vector3<f64>>>,
+    is_cut: bool,
+    /// Across the sheets: the first cut's normal, if it is by one plane.
+    normal: Option<Vector3<f64>>,
     /// Share of the box that is taken on the normal's inner side, and where what is taken on the outer side begins.
     taken_to: f64,
     taken_from: f64,
@@ -287,7 +288,8 @@ struct PlaneCuts {
 impl Default for PlaneCuts {
     fn default() -> Self {
         Self {
-            first: None,
+            is_cut: false,
+            normal: None,
             taken_to: 0.0,
             taken_from: 1.0,
             is_exact: true,
@@ -305,13 +307,13 @@ impl PlaneCuts {
         let before = self.left();
         let mut is_turned = false;
         if filled.share < 1.0 {
-            let cosine = match (self.first, filled.normal) {
-                (None, normal) => {
-                    self.first = Some(normal);
-                    1.0
-                }
-                (Some(Some(first)), Some(normal)) => first.dot(&normal),
-                (Some(_), _) => 0.0,
+            let cosine = if self.is_cut {
+                let both = self.normal.zip(filled.normal);
+                both.map_or(0.0, |(first, normal)| first.dot(&normal))
+            } else {
+                self.is_cut = true;
+                self.normal = filled.normal;
+                1.0
             };
             self.is_exact &= cosine.abs() > PARALLEL_COSINE;
             is_turned = cosine < 0.0;
