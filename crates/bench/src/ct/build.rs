@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
+use needlebench_geometry::mesh::extent_m;
 use needlebench_imaging::markers::{DetectedMarker, Found, MarkerModel, Options, find_markers};
 use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_labels};
 use needlebench_imaging::registration::{
@@ -11,12 +12,13 @@ use needlebench_imaging::registration::{
     match_markers, register_weighted,
 };
 use needlebench_imaging::{
-    ImagingError, LabelMap, LesionSeed, ReconstructOptions, Reconstruction, Remark, SurfaceSizes,
-    Volume, reconstruct, resample, structure_of,
+    ImagingError, LabelMap, LesionSeed, ReconstructOptions, Reconstruction, Remark, Surface,
+    SurfaceSizes, SurfaceTissue, Volume, reconstruct, resample, structure_of,
 };
 use serde::Serialize;
 
 use super::localisation::target_covariance_m2;
+use super::patient::part_tissue;
 use crate::Control;
 
 /// Markers whose places are known apart from the scan.
@@ -176,8 +178,10 @@ pub(super) fn see(
         )]
         progress.at((share.clamp(0.0, 1.0) * STEPS) as u64, STEPS as u64);
     };
-    let made = reconstruct(&volume, &wanted, threads, cancel, &step)?;
+    let mut made = reconstruct(&volume, &wanted, threads, cancel, &step)?;
+    let small = without_scraps(&mut made.surfaces);
     remarks.extend(made.remarks.iter().cloned());
+    remarks.extend(small);
     Ok(SeenScan {
         volume,
         source: read.description,
@@ -185,6 +189,29 @@ pub(super) fn see(
         markers,
         remarks,
     })
+}
+
+/// Leaves out surfaces that are smaller than their tissue is anywhere: a scenario would take them for parts in a wrong
+/// unit. What stays to be said of each.
+fn without_scraps(surfaces: &mut Vec<Surface>) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    surfaces.retain(|surface| {
+        let [low, high] = extent_m(&surface.mesh);
+        let size_mm = (high - low) * 1e3;
+        let [least_mm, ..] = part_tissue(surface.tissue).sizes_mm();
+        let is_part = surface.tissue == SurfaceTissue::Skin || size_mm.max() >= least_mm;
+        if !is_part {
+            remarks.push(
+                Remark::new(format!(
+                    "{:.1} x {:.1} x {:.1} mm, less than {least_mm} mm along every axis: left out",
+                    size_mm.x, size_mm.y, size_mm.z
+                ))
+                .at(format!("surface `{}`", surface.name)),
+            );
+        }
+        is_part
+    });
+    remarks
 }
 
 /// With what is known of the markers.

@@ -179,14 +179,7 @@ fn phantom(
     let parts = surfaces.map(|surface| PartSection {
         name: surface.name.clone(),
         file: format!("{SURFACES}/{}.stl", surface.name),
-        tissue: match surface.tissue {
-            SurfaceTissue::Skin => PartTissue::Skin,
-            SurfaceTissue::Bone => PartTissue::Bone,
-            SurfaceTissue::Vessel => PartTissue::Vessel,
-            SurfaceTissue::Organ => PartTissue::Organ,
-            SurfaceTissue::Lung => PartTissue::Lung,
-            SurfaceTissue::Lesion => PartTissue::Lesion,
-        },
+        tissue: part_tissue(surface.tissue),
         unit: needlebench_cell::scenario::LengthUnit::Mm,
         position_mm,
         rpy_deg: [0.0; 3],
@@ -215,6 +208,18 @@ fn phantom(
             parts,
             ..own
         },
+    }
+}
+
+/// What a scenario calls a surface of this tissue.
+pub(super) fn part_tissue(tissue: SurfaceTissue) -> PartTissue {
+    match tissue {
+        SurfaceTissue::Skin => PartTissue::Skin,
+        SurfaceTissue::Bone => PartTissue::Bone,
+        SurfaceTissue::Vessel => PartTissue::Vessel,
+        SurfaceTissue::Organ => PartTissue::Organ,
+        SurfaceTissue::Lung => PartTissue::Lung,
+        SurfaceTissue::Lesion => PartTissue::Lesion,
     }
 }
 

@@ -736,5 +736,46 @@ fn correlated(influence: &[([usize; 3], Vector3<f64>)], noise: &Noise) -> Matrix
         }
         sum += value * around.transpose();
     }
-    0.5 * (sum + sum.transpose())
+    at_least(
+        0.5 * (sum + sum.transpose()),
+        influence.iter().map(|(_, p)| p * p.transpose()).sum(),
+    )
+}
+
+/// A covariance under correlated noise, held above a share of that under `white` noise in every direction: estimates of a
+/// correlation may leave a direction less than nothing.
+fn at_least(covariance: Matrix3<f64>, white: Matrix3<f64>) -> Matrix3<f64> {
+    /// Kernels leave little noise in the lowest frequencies, but that of all is the same: a half is below what is seen.
+    const OF_WHITE: f64 = 0.5;
+    let Some(root) = white.cholesky().map(|factor| factor.l()) else {
+        return white;
+    };
+    let Some(inverse) = root.try_inverse() else {
+        return white;
+    };
+    let ratio = inverse * covariance * inverse.transpose();
+    let mut eigen = (0.5 * (ratio + ratio.transpose())).symmetric_eigen();
+    eigen
+        .eigenvalues
+        .apply(|value| *value = value.max(OF_WHITE));
+    root * eigen.recompose() * root.transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_direction_is_known_better_than_noise_allows() {
+        let white = Matrix3::new(2.0, 0.3, 0.0, 0.3, 1.0, 0.1, 0.0, 0.1, 0.5);
+        // Along the third axis less than nothing.
+        let estimated = Matrix3::new(6.0, 0.0, 0.1, 0.0, 4.0, 0.0, 0.1, 0.0, -0.4);
+        let held = at_least(estimated, white);
+        assert!((held - held.transpose()).amax() < 1e-12);
+        let above = (held - white * 0.5).symmetric_eigenvalues();
+        assert!(above.min() > -1e-12, "{above}");
+        // What was above it is left alone.
+        let fine = white * 3.0;
+        assert!((at_least(fine, white) - fine).amax() < 1e-12);
+    }
 }

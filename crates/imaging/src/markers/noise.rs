@@ -1,5 +1,7 @@
 //! Noise of a scan, and how it is correlated between voxels.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +24,9 @@ const LATTICE: [usize; 3] = [24, 24, 16];
 
 /// Most patches whose correlation is taken: hundreds of thousands of voxels.
 const MOST: usize = 160;
+
+/// Correlations between slices below so many of their standard deviations are chance: most slices share no noise.
+const SIGNIFICANT: f64 = 3.0;
 
 /// Fewest patches that say something.
 const FEWEST: usize = 6;
@@ -105,8 +110,11 @@ pub fn measure_noise(volume: &Volume) -> Option<Noise> {
     patches.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half = patches.len().div_ceil(2);
     let mut sums = [([[0.0; WIDTH]; WIDTH], 0); SLICES + 1];
+    // Of a small volume patches overlap: cells of the lattice without overlap that they are in are what they are worth.
+    let mut cells = BTreeSet::new();
     for (_, place) in patches[..half].iter().step_by(half.div_ceil(MOST)) {
         add_products(volume, *place, &mut sums);
+        cells.insert([place[0] / PATCH, place[1] / PATCH, place[2]]);
     }
     let mut correlation: Vec<_> = sums
         .iter()
@@ -119,6 +127,14 @@ pub fn measure_noise(volume: &Volume) -> Option<Noise> {
     }
     for value in correlation.iter_mut().flatten().flatten() {
         *value /= whole;
+    }
+    let squares: f64 = correlation[0].iter().flatten().map(|rho| rho * rho).sum();
+    // Variance of a correlation that is none (Bartlett 1946).
+    let variance = squares / (cells.len() * PATCH * PATCH) as f64;
+    for rho in correlation[1..].iter_mut().flatten().flatten() {
+        if *rho * *rho < SIGNIFICANT * SIGNIFICANT * variance {
+            *rho = 0.0;
+        }
     }
     let mut noise = Noise {
         sd_hu: median.sqrt(),
@@ -298,9 +314,13 @@ mod tests {
         .unwrap();
         let sd = 30.0 / 2.0_f64.sqrt();
         assert!((noise.sd_hu / sd - 1.0).abs() < 0.05, "{}", noise.sd_hu);
-        assert!((noise.between([1, 0, 0]) - 0.5).abs() < 0.06);
+        assert!((noise.between([1, 0, 0]) - 0.5).abs() < 0.03);
         assert!(noise.between([2, 0, 0]).abs() < 0.06 && noise.between([0, 1, 0]).abs() < 0.06);
         assert!(noise.between([0, 0, 1]).abs() < 0.06);
+        // Hardly any of the lags that have none seems to have some.
+        let none = noise.correlation[1..].iter().flatten().flatten();
+        let chance = none.filter(|rho| **rho != 0.0).count();
+        assert!(chance <= 2, "{chance}");
         assert_eq!(noise.between([-1, 2, -1]), noise.between([1, -2, 1]));
         assert_eq!(noise.between([9, 0, 0]), 0.0);
     }

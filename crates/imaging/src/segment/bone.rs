@@ -25,6 +25,9 @@ const CORTICAL_SHARE: f64 = 0.02;
 /// Less is noise, calcification or an artefact, mm^3.
 const LEAST_BONE_MM3: f64 = 50.0;
 
+/// Heart and great vessels with contrast medium have at least this; less is calcified, or bone that thick slices blur.
+const LEAST_CONTRAST_L: f64 = 1e-3;
+
 /// Gaps in the shell of a bone that are closed.
 const CLOSING_M: f64 = 1.2e-3;
 
@@ -66,7 +69,9 @@ pub(super) fn find(
                 Kind::Speck
             } else if facts.cortical as f64 >= CORTICAL_SHARE * part.voxels as f64 {
                 Kind::Bone
-            } else if is_between(scan, lungs, part) {
+            } else if part.voxels >= scan.voxels_of(LEAST_CONTRAST_L)
+                && is_between(scan, lungs, part)
+            {
                 Kind::Contrast
             } else {
                 Kind::Unsure

@@ -286,6 +286,25 @@ fn one_lung_and_none_are_said() {
 }
 
 #[test]
+fn what_is_dense_between_the_lungs_is_a_vessel_if_it_is_as_large_as_one() {
+    for (radius_mm, is_vessel) in [(12.0, true), (5.0, false)] {
+        let mut solids = chest();
+        // Blood with contrast medium, or something calcified.
+        solids.push(Solid(ellipsoid([0.0, -20.0, 0.0], [radius_mm; 3]), 350.0));
+        let made = run(&render(&solids, grid()), &options()).unwrap();
+        let has_vessel = made
+            .surfaces
+            .iter()
+            .any(|surface| surface.name == "contrast_vessels");
+        assert_eq!(has_vessel, is_vessel, "{radius_mm}: {}", remarks(&made));
+        // Whatever it is, the needle keeps away from it.
+        let bone = made.segmentation.bone.bone.count();
+        let vessel = made.segmentation.bone.contrast.count();
+        assert!(bone > 0 && (vessel > 0) == is_vessel);
+    }
+}
+
+#[test]
 fn merged_lungs_are_parted_at_their_connection() {
     let mut solids = chest();
     // A bridge of 8 mm: the anterior junction.

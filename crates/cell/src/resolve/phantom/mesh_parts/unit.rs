@@ -17,18 +17,20 @@ impl LengthUnit {
     }
 }
 
-/// Longest edge of the box around such a part: least, usual and most, mm. Wide, as parts may be cut
-/// off or joined; still, one in a wrong unit is mostly outside.
-fn sizes_mm(tissue: PartTissue) -> [f64; 3] {
-    match tissue {
-        // From half a chest of a child to a whole tall person.
-        PartTissue::Skin => [120.0, 400.0, 2200.0],
-        // From one piece of a rib to a spine with its ribs.
-        PartTissue::Bone => [8.0, 250.0, 1200.0],
-        PartTissue::Vessel => [5.0, 150.0, 1000.0],
-        PartTissue::Organ => [15.0, 150.0, 600.0],
-        PartTissue::Lung => [60.0, 250.0, 500.0],
-        PartTissue::Lesion => [1.0, 20.0, 250.0],
+impl PartTissue {
+    /// Longest edge of the box around such a part: least, usual and most, mm. Wide, as parts may be cut
+    /// off or joined; still, one in a wrong unit is mostly outside.
+    pub fn sizes_mm(self) -> [f64; 3] {
+        match self {
+            // From half a chest of a child to a whole tall person.
+            Self::Skin => [120.0, 400.0, 2200.0],
+            // From one piece of a rib to a spine with its ribs.
+            Self::Bone => [8.0, 250.0, 1200.0],
+            Self::Vessel => [5.0, 150.0, 1000.0],
+            Self::Organ => [15.0, 150.0, 600.0],
+            Self::Lung => [60.0, 250.0, 500.0],
+            Self::Lesion => [1.0, 20.0, 250.0],
+        }
     }
 }
 
@@ -50,7 +52,7 @@ pub(super) fn wrong_unit(
     stated: LengthUnit,
     size: &Vector3<f64>,
 ) -> Option<(String, String)> {
-    let [least_mm, usual_mm, most_mm] = sizes_mm(tissue);
+    let [least_mm, usual_mm, most_mm] = tissue.sizes_mm();
     let millimetres = |unit: LengthUnit| size.max() * unit.metres() * 1e3;
     let fits = |unit: &LengthUnit| (least_mm..=most_mm).contains(&millimetres(*unit));
     if fits(&stated) {
