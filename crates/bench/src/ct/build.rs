@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Point3};
+use needlebench_cell::scenario::PartTissue;
 use needlebench_geometry::mesh::extent_m;
 use needlebench_imaging::markers::{DetectedMarker, Found, MarkerModel, Options, find_markers};
 use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_labels};
@@ -18,7 +19,6 @@ use needlebench_imaging::{
 use serde::Serialize;
 
 use super::localisation::target_covariance_m2;
-use super::patient::part_tissue;
 use crate::Control;
 
 /// Markers whose places are known apart from the scan.
@@ -212,6 +212,18 @@ fn without_scraps(surfaces: &mut Vec<Surface>) -> Vec<Remark> {
         is_part
     });
     remarks
+}
+
+/// What a scenario calls a surface of this tissue.
+pub(super) fn part_tissue(tissue: SurfaceTissue) -> PartTissue {
+    match tissue {
+        SurfaceTissue::Skin => PartTissue::Skin,
+        SurfaceTissue::Bone => PartTissue::Bone,
+        SurfaceTissue::Vessel => PartTissue::Vessel,
+        SurfaceTissue::Organ => PartTissue::Organ,
+        SurfaceTissue::Lung => PartTissue::Lung,
+        SurfaceTissue::Lesion => PartTissue::Lesion,
+    }
 }
 
 /// With what is known of the markers.

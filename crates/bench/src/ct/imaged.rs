@@ -251,9 +251,6 @@ fn order(section: &CtSection, seed: u64, draws: &mut Draws) -> ScanOrder {
     let [thickness_m, increment_m] = preset.thickness_and_increment_m();
     let usual = Noise::of(kernel);
     let sd_hu = section.noise_hu.unwrap_or(usual.sd_hu);
-    // Pixels are 0.7 to 1 mm: more than a voxel of any scan.
-    let step_m = Vector3::new(1e-3, 1e-3, increment_m);
-    let within = draws.uniform().component_mul(&step_m);
     ScanOrder {
         scanner: Scanner {
             noise: (sd_hu > 0.0).then_some(Noise {
@@ -270,7 +267,8 @@ fn order(section: &CtSection, seed: u64, draws: &mut Draws) -> ScanOrder {
         range: ScanRange::Whole(5e-3),
         tilt_rad: section.tilt_deg.to_radians(),
         turn_rad: 0.0,
-        shift_m: Vector3::from(section.shift_mm) * 1e-3 + within,
+        shift_m: Vector3::from(section.shift_mm) * 1e-3,
+        off_middle: draws.uniform(),
         flipped: [false; 3],
         has_bed: true,
         materials: Materials {

@@ -6,14 +6,15 @@ use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use needlebench_cell::ResolvedScenario;
 use needlebench_cell::phantom::Tissue;
 use needlebench_cell::scenario::{
-    CovarianceMm2, GoalSection, ImagingBlock, PartSection, PartTissue, PhantomSection,
-    RegistrationBlock, Scenario,
+    CovarianceMm2, GoalSection, ImagingBlock, PartSection, PhantomSection, RegistrationBlock,
+    Scenario,
 };
 use needlebench_imaging::SurfaceTissue;
 use needlebench_imaging::registration::ReferenceFrame;
 use needlebench_kinematics::Pose;
 
 use super::ScanBuild;
+use super::build::part_tissue;
 
 /// Folder of the surfaces, beside the scenario.
 pub(super) const SURFACES: &str = "surfaces";
@@ -208,18 +209,6 @@ fn phantom(
             parts,
             ..own
         },
-    }
-}
-
-/// What a scenario calls a surface of this tissue.
-pub(super) fn part_tissue(tissue: SurfaceTissue) -> PartTissue {
-    match tissue {
-        SurfaceTissue::Skin => PartTissue::Skin,
-        SurfaceTissue::Bone => PartTissue::Bone,
-        SurfaceTissue::Vessel => PartTissue::Vessel,
-        SurfaceTissue::Organ => PartTissue::Organ,
-        SurfaceTissue::Lung => PartTissue::Lung,
-        SurfaceTissue::Lesion => PartTissue::Lesion,
     }
 }
 

@@ -88,6 +88,8 @@ pub struct ScanOrder {
     pub turn_rad: f64,
     /// Place of the phantom's origin in `ct`, m.
     pub shift_m: Vector3<f64>,
+    /// By how much of a voxel the slices lie off the middle of the patient, along columns, rows and slices.
+    pub off_middle: Vector3<f64>,
     /// Whether columns, rows and slices run along -x, -y, -z of `ct` and not along +x, +y, +z.
     pub flipped: [bool; 3],
     /// Whether a bed is under the patient.
@@ -248,7 +250,7 @@ impl ScanOrder {
         ]);
         let last = Vector3::new(self.size as f64, self.size as f64, slices as f64).add_scalar(-1.0);
         let middle = Vector3::new(middle.x, middle.y, 0.5 * (from_m + to_m));
-        let first_m = middle - steps_m * last * 0.5;
+        let first_m = middle + steps_m * (self.off_middle - last * 0.5);
         VoxelGrid::new(
             [self.size, self.size, slices],
             steps_m,

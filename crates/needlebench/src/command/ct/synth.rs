@@ -424,6 +424,7 @@ fn order(arguments: &SynthArguments) -> ScanOrder {
         },
         tilt_rad: arguments.tilt.to_radians(),
         turn_rad: arguments.turn.to_radians(),
+        off_middle: Vector3::zeros(),
         shift_m: arguments
             .shift_mm
             .map_or_else(Vector3::zeros, |Numbers(mm)| Vector3::from(mm) * 1e-3),
