@@ -176,8 +176,13 @@ fn an_edge_has_the_profile_of_the_gaussian_wherever_it_is_and_however_it_lies() 
     /// Share of the edge's height: straight pieces from cell to cell, at least two of them per standard deviation.
     const OF_EDGE: f64 = 5e-3;
     let grid = cube(21, [0.7e-3, 0.7e-3, 1e-3]);
-    // Against air, and against another part that touches there.
-    for (sigma_m, beyond_hu) in [(0.55e-3, -1000.0), (0.3e-3, -1000.0), (0.55e-3, 200.0)] {
+    // By itself in air, and against another part that touches there.
+    for (sigma_m, beyond) in [
+        (0.55e-3, None),
+        (0.3e-3, None),
+        (0.55e-3, Some(200.0)),
+        (0.3e-3, Some(-1000.0)),
+    ] {
         for (turn, shift_m) in [
             (0.0, 0.0),
             (0.0, 0.17e-3),
@@ -191,10 +196,10 @@ fn an_edge_has_the_profile_of_the_gaussian_wherever_it_is_and_however_it_lies() 
             };
             let normal = rotation * Vector3::x();
             let pose = |along_m: f64| Pose::from_parts((normal * along_m).into(), rotation);
-            let scene = with([
-                (solid(shape.clone(), pose(shift_m - half)), 1000.0),
-                (solid(shape, pose(shift_m + half)), beyond_hu),
-            ]);
+            let mut parts = vec![(solid(shape.clone(), pose(shift_m - half)), 1000.0)];
+            parts.extend(beyond.map(|hu| (solid(shape, pose(shift_m + half)), hu)));
+            let scene = with(parts);
+            let beyond_hu = beyond.unwrap_or(-1000.0);
             let volume = scan(&scene, &blurred(1e-3, sigma_m), &grid);
             for j in 6..15 {
                 for i in 0..21 {

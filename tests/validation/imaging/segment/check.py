@@ -28,13 +28,14 @@ import edt
 import numpy as np
 import phantom
 import SimpleITK as sitk
+from scipy.spatial import cKDTree
 from skimage import measure
 
 ROOT = Path(__file__).resolve().parents[4]
 PROGRAM = ROOT / "target/release/examples/segment_raw"
 
-# Half a step of 16 bits over 40 mm, and the single precision of edt, which is 0.000022 mm off the exact distance there.
-DISTANCE_MM = 0.5 * 40 / 32767 + 3e-5
+# Half a step of 16 bits over 40 mm, and single precision.
+DISTANCE_MM = 0.5 * 40 / 32767 + 1e-5
 # The goals of the design, mm: root mean square, 99 %.
 GOALS = {
     "thin": {"skin": (0.03, 0.1), "lung_left": (0.03, 0.1), "lung_right": (0.03, 0.1), "ribs": (0.2, 0.6)},
@@ -129,8 +130,14 @@ def check_exact(
     dense = np.asfortranarray((volume > 190).T)
     distance = timed("distance (edt)", times, lambda: edt.edt(~dense, anisotropy=spacing, parallel=1))
     mine = np.fromfile(folder / "distance.raw", np.float32).reshape(volume.shape).T
-    worst = float(np.abs(np.minimum(distance, 40.0) - mine).max())
-    print(f"  distances: at most {worst:.6f} mm from edt's (allowed {DISTANCE_MM:.6f})")
+    apart = np.abs(np.minimum(distance, 40.0) - mine)
+    # edt's own single precision is up to 0.00002 mm off: where that may be what is apart, the exact distance decides.
+    doubtful = np.argwhere(apart > DISTANCE_MM)
+    if len(doubtful):
+        exact, _ = cKDTree(np.argwhere(dense) * spacing).query(doubtful * spacing)
+        apart[tuple(doubtful.T)] = np.abs(np.minimum(exact, 40.0) - mine[tuple(doubtful.T)])
+    worst = float(apart.max())
+    print(f"  distances: at most {worst:.6f} mm from edt's or the exact ones (allowed {DISTANCE_MM:.6f})")
     if worst > DISTANCE_MM:
         wrong.append(f"distances: {worst} mm")
 
