@@ -89,6 +89,28 @@ fn key(x: f64, cube_m: f64) -> i64 {
     }
 }
 
+/// The same triangles with the vertices that they have, numbered as they come.
+fn in_order_of_use(mesh: &TriangleMesh) -> TriangleMesh {
+    let mut numbers: Vec<Option<u32>> = vec![None; mesh.vertices_m.len()];
+    let mut vertices_m = Vec::new();
+    let triangles = mesh
+        .triangles
+        .iter()
+        .map(|corners| {
+            corners.map(|corner| {
+                *numbers[corner as usize].get_or_insert_with(|| {
+                    vertices_m.push(mesh.vertices_m[corner as usize]);
+                    u32::try_from(vertices_m.len() - 1).expect("no more than vertices")
+                })
+            })
+        })
+        .collect();
+    TriangleMesh {
+        vertices_m,
+        triangles,
+    }
+}
+
 /// The document's part on a surface: corners in steps of 1 / 65535 of its box, and triangles.
 #[expect(
     clippy::cast_possible_truncation,
@@ -96,7 +118,7 @@ fn key(x: f64, cube_m: f64) -> i64 {
     reason = "within 0 and 65535"
 )]
 pub(super) fn surface(pack: &mut Pack, mesh: &TriangleMesh) -> Value {
-    let mesh = thinned(mesh, MOST_TRIANGLES);
+    let mesh = in_order_of_use(&thinned(mesh, MOST_TRIANGLES));
     let (mut low, mut high) = (Vector3::repeat(f64::MAX), Vector3::repeat(f64::MIN));
     for vertex in &mesh.vertices_m {
         low = low.inf(&vertex.coords);
@@ -115,7 +137,7 @@ pub(super) fn surface(pack: &mut Pack, mesh: &TriangleMesh) -> Value {
     json!({
         "low": [low.x, low.y, low.z],
         "step": [step.x, step.y, step.z],
-        "vertices": pack.u16s(&codes),
+        "vertices": pack.points(&codes),
         "triangles": pack.indices(&indices),
     })
 }

@@ -15,8 +15,10 @@ const NONE: u16 = u16::MAX;
 ///
 /// An array is referred to as `{"at": byte, "n": count, "t": "u8" | "u16" | "u32" | "f32" | "f64"}`, a
 /// quantised column also has `"low"` and `"step"`: value = low + step * code, and code 65535 stands
-/// for none. Columns with `"d": 1` hold differences of successive codes, modulo 2^16, which deflates
-/// better; those with `"p": 1` all low bytes first, then all high ones. Everything is little-endian and starts at a multiple of four bytes.
+/// for none. What deflates better: arrays with `"d": k` hold the differences of each code from that `k` places
+/// before, those with `"h": 1` how far each code lies below the least that is above all before it, both
+/// modulo 2^16; those with `"p": 1` hold all low bytes first, then all high ones. Everything is
+/// little-endian and starts at a multiple of four bytes.
 #[derive(Debug, Default)]
 pub(super) struct Pack {
     bytes: Vec<u8>,
@@ -40,15 +42,49 @@ impl Pack {
         reference
     }
 
-    /// Indices below 2^16 in two bytes each, others in four.
+    /// Indices: those below 2^16 - 1 in two bytes each, few once deflated where new ones come in
+    /// ascending order; others in four.
     pub fn indices(&mut self, values: &[u32]) -> Value {
-        let narrow: Option<Vec<u16>> = values.iter().map(|&v| u16::try_from(v).ok()).collect();
+        // The largest is left out: one more than it is a code, too.
+        let below_all = |&index: &u32| u16::try_from(index).ok().filter(|&code| code < u16::MAX);
+        let narrow: Option<Vec<u16>> = values.iter().map(below_all).collect();
         if let Some(narrow) = narrow {
-            return self.u16s(&narrow);
+            let mut next = 0_u16;
+            let below: Vec<u16> = narrow
+                .iter()
+                .map(|&index| {
+                    let below = next.wrapping_sub(index);
+                    next = next.max(index + 1);
+                    below
+                })
+                .collect();
+            let mut reference = self.place("u16", below.len());
+            self.low_then_high_bytes(&below);
+            reference["h"] = json!(1);
+            reference["p"] = json!(1);
+            return reference;
         }
         let reference = self.place("u32", values.len());
         let bytes = values.iter().flat_map(|value| value.to_le_bytes());
         self.bytes.extend(bytes);
+        reference
+    }
+
+    fn low_then_high_bytes(&mut self, codes: &[u16]) {
+        let [low, high] = [0, 1].map(|byte| codes.iter().map(move |code| code.to_le_bytes()[byte]));
+        self.bytes.extend(low.chain(high));
+    }
+
+    /// Codes of points, three each, as differences from one point to the next.
+    pub fn points(&mut self, values: &[u16]) -> Value {
+        let before = [0; 3].iter().chain(values);
+        let steps: Vec<u16> = values
+            .iter()
+            .zip(before)
+            .map(|(&here, &last)| here.wrapping_sub(last))
+            .collect();
+        let mut reference = self.u16s(&steps);
+        reference["d"] = json!(3);
         reference
     }
 
@@ -91,12 +127,12 @@ impl Pack {
         let (low, step, codes) = quantised(&wide, steps);
         let narrow = steps < 255;
         let mut reference = self.place(if narrow { "u8" } else { "u16" }, codes.len());
-        // None is the largest code of either width: its low byte is 255 too.
-        self.bytes
-            .extend(codes.iter().map(|code| code.to_le_bytes()[0]));
-        if !narrow {
-            self.bytes
-                .extend(codes.iter().map(|code| code.to_le_bytes()[1]));
+        if narrow {
+            // None is the largest code of either width: its low byte is 255 too.
+            let low_bytes = codes.iter().map(|code| code.to_le_bytes()[0]);
+            self.bytes.extend(low_bytes);
+        } else {
+            self.low_then_high_bytes(&codes);
             reference["p"] = json!(1);
         }
         reference["low"] = json!(low);
@@ -136,10 +172,15 @@ impl Pack {
         raw.extend_from_slice(text.as_bytes());
         raw.resize(raw.len().next_multiple_of(4), 0);
         raw.extend_from_slice(&self.bytes);
-        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(7));
-        let compressed = encoder.write_all(&raw).and_then(|()| encoder.finish());
-        base64(&compressed.expect("writing to memory does not fail"))
+        deflated(&raw)
     }
+}
+
+/// Base64 of zlib.
+pub(super) fn deflated(bytes: &[u8]) -> String {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
+    let compressed = encoder.write_all(bytes).and_then(|()| encoder.finish());
+    base64(&compressed.expect("writing to memory does not fail"))
 }
 
 /// Lowest value, step and codes; the code of what is not finite is [`NONE`].
@@ -213,7 +254,9 @@ pub(super) mod unpack {
             let count = usize::try_from(reference["n"].as_u64().unwrap()).unwrap();
             let bytes = &self.arrays[at..];
             let (low, step) = (&reference["low"], &reference["step"]);
-            let mut last = 0_u16;
+            let back = usize::try_from(reference["d"].as_u64().unwrap_or(0)).unwrap();
+            let mut codes: Vec<u16> = Vec::new();
+            let mut next = 0_u16;
             (0..count)
                 .map(|k| match reference["t"].as_str().unwrap() {
                     "u8" => match step.as_f64() {
@@ -234,10 +277,14 @@ pub(super) mod unpack {
                         } else {
                             u16::from_le_bytes(bytes[2 * k..2 * k + 2].try_into().unwrap())
                         };
-                        if reference["d"] == 1 {
-                            code = code.wrapping_add(last);
-                            last = code;
+                        if reference["h"] == 1 {
+                            code = next.wrapping_sub(code);
+                            next = next.max(code.wrapping_add(1));
                         }
+                        if back > 0 && k >= back {
+                            code = code.wrapping_add(codes[k - back]);
+                        }
+                        codes.push(code);
                         match step.as_f64() {
                             Some(_) if code == NONE => f64::NAN,
                             Some(step) => low.as_f64().unwrap() + step * f64::from(code),
@@ -280,8 +327,9 @@ mod tests {
             "bytes_of_values": pack.coarse_column(&single(&gaps), 254),
             "one": pack.column(&[5.25; 4], false),
             "none": pack.column(&[f64::NAN; 2], false),
-            "narrow": pack.indices(&[7, 65_535]),
-            "wide": pack.indices(&[7, 65_536]),
+            "narrow": pack.indices(&[0, 1, 2, 2, 1, 3, 7, 0, 65_534, 4]),
+            "wide": pack.indices(&[7, 65_535]),
+            "points": pack.points(&[1, 2, 65_535, 0, 2, 7]),
             "single": pack.f32s([0.5, -3.0]),
         });
         let back = unpack::of_payload(&pack.payload(&document));
@@ -313,8 +361,10 @@ mod tests {
         }
         assert_eq!(column("one"), [5.25; 4]);
         assert!(column("none").iter().all(|value| value.is_nan()));
-        assert_eq!(column("narrow"), [7.0, 65_535.0]);
-        assert_eq!(column("wide"), [7.0, 65_536.0]);
+        let narrow = [0.0, 1.0, 2.0, 2.0, 1.0, 3.0, 7.0, 0.0, 65_534.0, 4.0];
+        assert_eq!(column("narrow"), narrow);
+        assert_eq!(column("wide"), [7.0, 65_535.0]);
+        assert_eq!(column("points"), [1.0, 2.0, 65_535.0, 0.0, 2.0, 7.0]);
         assert_eq!(column("single"), [0.5, -3.0]);
     }
 }

@@ -31,43 +31,58 @@ NB.clear = function (element, ...children) {
   return element;
 };
 
-/** Reads the payload: the document, with `NB.array` for what it refers to. */
-NB.read = async function () {
-  const element = document.getElementById('payload');
+/** What an element holds as base64 of zlib, as bytes; takes the element out of the page. */
+NB.inflate = async function (id) {
+  const element = document.getElementById(id);
   const text = atob(element.textContent);
   element.remove();
   const compressed = new Uint8Array(text.length);
   for (let k = 0; k < text.length; k++) compressed[k] = text.charCodeAt(k);
   const stream = new Blob([compressed]).stream().pipeThrough(new DecompressionStream('deflate'));
-  const raw = await new Response(stream).arrayBuffer();
+  return new Response(stream).arrayBuffer();
+};
+
+/** Reads the payload: the document, with `NB.array` for what it refers to. */
+NB.read = async function () {
+  const raw = await NB.inflate('payload');
   const length = new DataView(raw).getUint32(0, true);
   NB.raw = raw;
   NB.arrays = Math.ceil((4 + length) / 4) * 4;
   return JSON.parse(new TextDecoder().decode(new Uint8Array(raw, 4, length)));
 };
 
+/** Runs a library that the page brings along deflated. */
+NB.load = async function (id) {
+  const text = new TextDecoder().decode(await NB.inflate(id));
+  document.head.append(NB.el('script', { text }));
+};
+
 /** The codes of a reference, or its values where it is quantised; NaN stands for none. */
 NB.array = function (reference) {
-  const { t, n, at, step, low } = reference;
+  const { t, n, at, step, low, d, h, p } = reference;
   const start = NB.arrays + at;
   if (t === 'f64') return new Float64Array(NB.raw.slice(start, start + 8 * n));
-  let codes;
-  if (reference.p) {
+  let codes = new { u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, f32: Float32Array }[t](NB.raw, start, n);
+  if (p) {
     const bytes = new Uint8Array(NB.raw, start, 2 * n);
     codes = new Uint16Array(n);
     for (let k = 0; k < n; k++) codes[k] = bytes[k] | bytes[n + k] << 8;
-  } else {
-    codes = new { u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, f32: Float32Array }[t](NB.raw, start, n);
+  } else if (d || h) {
+    codes = codes.slice();
+  }
+  // Arrays of 16 bits keep sums and differences modulo 2^16 by themselves.
+  if (d) for (let k = d; k < n; k++) codes[k] += codes[k - d];
+  if (h) {
+    let next = 0;
+    for (let k = 0; k < n; k++) {
+      codes[k] = next - codes[k];
+      next = Math.max(next, codes[k] + 1);
+    }
   }
   if (step === undefined) return codes;
   const none = t === 'u8' ? 255 : 65535;
   const values = new Float32Array(n);
-  let last = 0;
-  for (let k = 0; k < n; k++) {
-    const code = reference.d ? (codes[k] + last) & 65535 : codes[k];
-    last = code;
-    values[k] = code === none ? NaN : low + step * code;
-  }
+  for (let k = 0; k < n; k++) values[k] = codes[k] === none ? NaN : low + step * codes[k];
   return values;
 };
 
@@ -78,7 +93,7 @@ NB.start = async function (build) {
     if (typeof DecompressionStream === 'undefined') {
       throw new Error('this browser is too old: it has no DecompressionStream (from 2023 on, all have)');
     }
-    const page = await NB.read();
+    const [page] = await Promise.all([NB.read(), NB.load('three')]);
     app.replaceChildren();
     for (const [name, words] of Object.entries(page.words || {})) NB.dictionary.set(name, words);
     build(page, app);
