@@ -26,6 +26,7 @@ pub mod provenance;
 mod real_cell;
 pub mod record_plan;
 pub mod replay;
+pub mod routes;
 mod rtde;
 mod run;
 mod runnable;

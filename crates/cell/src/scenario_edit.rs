@@ -87,7 +87,7 @@ impl ScenarioEdit {
         self.checked(section)
     }
 
-    /// Takes a key away with its line, if it is there.
+    /// Takes a key away with its line, if it is there; a section with all its keys and the sections in it.
     ///
     /// # Errors
     /// As [`ScenarioEdit::set`].
@@ -98,7 +98,11 @@ impl ScenarioEdit {
         };
         let start = self.text[..span.start].rfind('\n').map_or(0, |at| at + 1);
         let rest = &self.text[span.end..];
-        let end = span.end + rest.find('\n').map_or(rest.len(), |at| at + 1);
+        let mut end = span.end + rest.find('\n').map_or(rest.len(), |at| at + 1);
+        let header = self.text[span].trim_matches(['[', ']']).to_owned();
+        if self.text[start..].trim_start().starts_with('[') {
+            end += self.text[end..].len() - after_section(&self.text[end..], &header).len();
+        }
         self.text.replace_range(start..end, "");
         self.checked(section)
     }
@@ -115,6 +119,27 @@ impl ScenarioEdit {
             .hint(format!("write it as [{section}], with a line for each key"))),
         }
     }
+}
+
+/// What follows a section and those in it: from the next header on, with the comments above that.
+fn after_section<'t>(text: &'t str, header: &str) -> &'t str {
+    let mut kept = text.len();
+    let mut at = 0;
+    for line in text.split_inclusive('\n') {
+        let start = line.trim_start();
+        let own = start.trim_start_matches('[').strip_prefix(header);
+        let is_within = own.is_some_and(|rest| rest.starts_with('.'));
+        if start.starts_with('[') && !is_within {
+            return &text[kept.min(at)..];
+        }
+        if start.is_empty() || start.starts_with('#') {
+            kept = kept.min(at);
+        } else {
+            kept = text.len();
+        }
+        at += line.len();
+    }
+    ""
 }
 
 #[cfg(test)]
@@ -138,6 +163,28 @@ mod tests {
                       # yaw\n\n[[goals]]\nentry_direction_deg = [4, 5]\nlesion = \"x\"\nstandoff_mm = 5\n\n[mount]\nkind = \
                       \"column\"\n\n[[goals]]\nlesion = \"y\"\n";
         assert_eq!(edit.text(), wanted);
+    }
+
+    #[test]
+    fn a_section_goes_with_its_keys_and_the_sections_in_it() {
+        let text = "[[goals]]\nlesion = \"x\"\n\n[goals.route] # planned\nsigmas = 3\n# why\nthrow_mm = 1\n\n\
+                    [goals.route.odds]\ndeep = 2\n\n# The other.\n[[goals]]\nlesion = \"y\"\n";
+        let mut edit = ScenarioEdit::new("s.toml", text).unwrap();
+        edit.remove("goals[0]", "route").unwrap();
+        let wanted = "[[goals]]\nlesion = \"x\"\n\n\n# The other.\n[[goals]]\nlesion = \"y\"\n";
+        assert_eq!(edit.text(), wanted);
+        let mut last =
+            ScenarioEdit::new("s.toml", "[[goals]]\nlesion = \"x\"\n[goals.route]\n").unwrap();
+        last.remove("goals[0]", "route").unwrap();
+        assert_eq!(last.text(), "[[goals]]\nlesion = \"x\"\n");
+        // As a value on its line.
+        let mut inline = ScenarioEdit::new(
+            "s.toml",
+            "[[goals]]\nroute = { sigmas = 3 }\nlesion = \"x\"\n",
+        )
+        .unwrap();
+        inline.remove("goals[0]", "route").unwrap();
+        assert_eq!(inline.text(), "[[goals]]\nlesion = \"x\"\n");
     }
 
     #[test]

@@ -19,6 +19,7 @@ use crate::spacing::{orthogonal, whole};
 #[derive(Debug, Clone)]
 pub struct DistanceField {
     grid: VoxelGrid,
+    spacing_m: [f64; 3],
     within: IndexBox,
     cap_m: f64,
     /// In steps of `cap_m / STEPS`.
@@ -39,6 +40,25 @@ pub struct DistanceOptions<'a> {
     pub cancel: &'a AtomicBool,
 }
 
+/// What of a voxel of the set a distance goes to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum To {
+    /// Its centre.
+    Centre,
+    /// The nearest point of its box.
+    Box,
+}
+
+impl To {
+    /// The way along an axis to a voxel that is so many steps away, m.
+    fn way_m(self, steps: f64, step_m: f64) -> f64 {
+        match self {
+            Self::Centre => steps * step_m,
+            Self::Box => (steps - 0.5).max(0.0) * step_m,
+        }
+    }
+}
+
 impl DistanceField {
     /// Distances to a set of voxels; zero in it.
     pub fn new(
@@ -47,18 +67,40 @@ impl DistanceField {
         within: IndexBox,
         options: &DistanceOptions<'_>,
     ) -> Result<Self, ImagingError> {
+        Self::to(To::Centre, grid, set, within, options)
+    }
+
+    /// Distances from voxels' centres to the space that the voxels of a set fill: to the nearest point of their boxes, not
+    /// to their centres.
+    pub fn to_boxes(
+        grid: &VoxelGrid,
+        set: &Mask,
+        within: IndexBox,
+        options: &DistanceOptions<'_>,
+    ) -> Result<Self, ImagingError> {
+        Self::to(To::Box, grid, set, within, options)
+    }
+
+    fn to(
+        to: To,
+        grid: &VoxelGrid,
+        set: &Mask,
+        within: IndexBox,
+        options: &DistanceOptions<'_>,
+    ) -> Result<Self, ImagingError> {
         let spacing_m = orthogonal(grid)?;
         // What is outside the box counts as far as the cap reaches.
-        let reach = [0, 1, 2].map(|axis| whole(options.cap_m / spacing_m[axis]));
+        let reach = [0, 1, 2].map(|axis| whole(options.cap_m / spacing_m[axis]) + 1);
         let around = within.widened(reach, grid.size());
         let wide = match set.bounds() {
             Some(bounds) => within.joined(&bounds).common(&around),
             None => within,
         };
         let part = set.cropped(&wide);
-        let steps = distances(&part, spacing_m, options)?;
+        let steps = distances(&part, to, spacing_m, options)?;
         let field = Self {
             grid: grid.clone(),
+            spacing_m,
             within: wide,
             cap_m: options.cap_m,
             steps,
@@ -97,6 +139,7 @@ impl DistanceField {
         }
         Self {
             grid: self.grid.clone(),
+            spacing_m: self.spacing_m,
             within,
             cap_m: self.cap_m,
             steps,
@@ -170,6 +213,56 @@ impl DistanceField {
         Some(sum * self.cap_m / f64::from(STEPS))
     }
 
+    /// A lower bound of the distance from a place in `ct` to the set, m.
+    ///
+    /// The square of the distance to a point, or to a box, less the square of the place itself is concave, and so is the
+    /// least over all of the set. Between the eight voxels around a place it is therefore at least what is
+    /// interpolated: `d^2 >= sum w d_i^2 - sum w |c_i - p|^2`, and the last sum is `s^2 f (1 - f)` along each axis, with
+    /// `f` the place between two voxels. It is exact but for the last sum across the way, half a voxel's diagonal squared
+    /// at most. Rounding is taken off; outside the box, the way to it is.
+    pub fn at_least(&self, point_m: &Point3<f64>) -> f64 {
+        self.at_least_of_index(&self.grid.index_from_ct(point_m))
+    }
+
+    /// The same of a place by its index, which need not be whole.
+    pub fn at_least_of_index(&self, index: &Point3<f64>) -> f64 {
+        let mut low = [0; 3];
+        let mut part = [0.0; 3];
+        let (mut spread_m2, mut outside_m2) = (0.0, 0.0);
+        for axis in 0..3 {
+            let [first, last] = [self.within.first[axis], self.within.last[axis]];
+            let inside = index[axis].clamp(first as f64, last as f64);
+            let step_m = self.spacing_m[axis];
+            outside_m2 += ((index[axis] - inside) * step_m).powi(2);
+            low[axis] = whole(inside).min(last.saturating_sub(1)).max(first);
+            part[axis] = inside - low[axis] as f64;
+            spread_m2 += step_m * step_m * part[axis] * (1.0 - part[axis]);
+        }
+        let [nx, ny, _] = self.within.size();
+        // The next voxel along each axis, where there is one.
+        let next = [1, nx, nx * ny];
+        let on = [0, 1, 2].map(|axis| {
+            if low[axis] < self.within.last[axis] {
+                next[axis]
+            } else {
+                0
+            }
+        });
+        let from = self.offset(low);
+        let rounding_m = self.rounding_m();
+        let square_m2 = |corner: usize| {
+            let at =
+                from + (corner & 1) * on[0] + (corner >> 1 & 1) * on[1] + (corner >> 2) * on[2];
+            (self.metres(self.steps[at]) - rounding_m).max(0.0).powi(2)
+        };
+        let mix = |share: f64, a: f64, b: f64| a + share * (b - a);
+        let [x, y, z] = part;
+        let along_x = |corner: usize| mix(x, square_m2(corner), square_m2(corner + 1));
+        let along_y = |corner: usize| mix(y, along_x(corner), along_x(corner + 2));
+        let mixed_m2 = mix(z, along_y(0), along_y(4));
+        (mixed_m2 - spread_m2).max(0.0).sqrt() - outside_m2.sqrt()
+    }
+
     /// All values in m, columns fastest, of the box.
     pub fn values_m(&self) -> impl Iterator<Item = f64> + '_ {
         self.steps.iter().map(|&steps| self.metres(steps))
@@ -179,16 +272,17 @@ impl DistanceField {
 /// Distances in steps to the voxels of a mask.
 fn distances(
     mask: &Mask,
+    to: To,
     spacing_m: [f64; 3],
     options: &DistanceOptions<'_>,
 ) -> Result<Vec<i16>, ImagingError> {
     let [nx, ny, nz] = mask.size();
-    let far = whole(options.cap_m / spacing_m[2]).min(i16::MAX as usize - 1) + 1;
+    let far = whole(options.cap_m / spacing_m[2]).min(i16::MAX as usize - 2) + 2;
     let far = i16::try_from(far).unwrap_or(i16::MAX);
     let mut steps = counts_along_k(mask, far);
     let slices_each = nz.div_ceil(options.threads.max(1));
     let part = |slices: &mut [i16]| -> Result<(), ImagingError> {
-        let mut work = InSlice::new([nx, ny], spacing_m, options.cap_m);
+        let mut work = InSlice::new([nx, ny], to, spacing_m, options.cap_m);
         for slice in slices.chunks_exact_mut(nx * ny) {
             if options.cancel.load(Ordering::Relaxed) {
                 return Err(ImagingError::Interrupted);
@@ -255,6 +349,8 @@ const AT_ONCE: usize = 4;
 /// What one slice needs.
 struct InSlice {
     size: [usize; 2],
+    /// What of a way a voxel's own half takes, in steps.
+    own_half: f32,
     step_k_squared: f32,
     cap_squared: f32,
     steps_per_m: f32,
@@ -269,12 +365,13 @@ struct InSlice {
 }
 
 impl InSlice {
-    fn new([nx, ny]: [usize; 2], spacing_m: [f64; 3], cap_m: f64) -> Self {
-        let [along_i, along_j] =
-            [(nx, spacing_m[0]), (ny, spacing_m[1])].map(|(n, step_m)| Ways::new(n, step_m, cap_m));
+    fn new([nx, ny]: [usize; 2], to: To, spacing_m: [f64; 3], cap_m: f64) -> Self {
+        let [along_i, along_j] = [(nx, spacing_m[0]), (ny, spacing_m[1])]
+            .map(|(n, step_m)| Ways::new(n, to, step_m, cap_m));
         let cap_squared = single(cap_m * cap_m);
         Self {
             size: [nx, ny],
+            own_half: single(1.0 - to.way_m(1.0, 1.0)),
             step_k_squared: single(spacing_m[2] * spacing_m[2]),
             cap_squared,
             steps_per_m: single(f64::from(STEPS) / cap_m),
@@ -291,8 +388,9 @@ impl InSlice {
     fn finish(&mut self, counts: &mut [i16]) {
         let [nx, _] = self.size;
         for (square, &count) in self.slice.iter_mut().zip(&*counts) {
-            let count = f32::from(count);
-            *square = lower(count * count * self.step_k_squared, self.cap_squared);
+            let way = f32::from(count) - self.own_half;
+            let way = if way > 0.0 { way } else { 0.0 };
+            *square = lower(way * way * self.step_k_squared, self.cap_squared);
         }
         self.lower_along_j();
         let reach = self.along_i.reach();
@@ -382,10 +480,12 @@ struct Ways {
 }
 
 impl Ways {
-    fn new(length: usize, step_m: f64, cap_m: f64) -> Self {
-        let reach = whole(cap_m / step_m).min(length - 1);
+    fn new(length: usize, to: To, step_m: f64, cap_m: f64) -> Self {
+        let reach = (whole(cap_m / step_m) + 1).min(length - 1);
         let squares = (0..reach.div_ceil(AT_ONCE)).map(|group| {
-            std::array::from_fn(|at| single(((AT_ONCE * group + at + 1) as f64 * step_m).powi(2)))
+            std::array::from_fn(|at| {
+                single(to.way_m((AT_ONCE * group + at + 1) as f64, step_m).powi(2))
+            })
         });
         Self {
             squares: squares.collect(),
@@ -475,11 +575,64 @@ mod tests {
                 let allowed = field.rounding_m() + RELATIVE * nearest;
                 assert!((told - nearest).abs() <= allowed, "{told} {nearest}");
             }
+            let whole = IndexBox::whole(size);
+            let boxes = DistanceField::to_boxes(&grid, &mask, whole, &options(cap_m, 1)).unwrap();
+            for voxel in Mask::empty(size).complement().voxels() {
+                let nearest = mask.voxels().map(|other| {
+                    let way = |axis: usize| {
+                        let steps = (voxel[axis] as f64 - other[axis] as f64).abs();
+                        (steps - 0.5).max(0.0) * spacing_m[axis]
+                    };
+                    way(0).hypot(way(1)).hypot(way(2))
+                });
+                let nearest = nearest.fold(cap_m, f64::min);
+                let told = boxes.at_voxel(voxel).unwrap();
+                let allowed = boxes.rounding_m() + RELATIVE * nearest;
+                assert!((told - nearest).abs() <= allowed, "{told} {nearest}");
+            }
             let threaded =
                 DistanceField::new(&grid, &mask, IndexBox::whole(size), &options(cap_m, 3))
                     .unwrap();
             assert_eq!(threaded.steps, field.steps);
         }
+    }
+
+    #[test]
+    fn lower_bounds_between_voxels_hold_and_are_close() {
+        let (size, spacing_m) = ([24, 20, 12], [0.7e-3, 0.7e-3, 2e-3]);
+        let grid = VoxelGrid::aligned(size, spacing_m, Point3::new(0.1, -0.2, 0.3)).unwrap();
+        let mask = random_mask(size, 400, 6);
+        let within = IndexBox {
+            first: [2, 1, 1],
+            last: [20, 18, 10],
+        };
+        let field = DistanceField::to_boxes(&grid, &mask, within, &options(40e-3, 1)).unwrap();
+        let half_diagonal_m = 0.5 * nalgebra::Vector3::from(spacing_m).norm();
+        let mut random = SplitMix64::new(7);
+        for _ in 0..2000 {
+            let index = [0, 1, 2].map(|axis| {
+                let [first, last] = [within.first[axis] as f64, within.last[axis] as f64];
+                first + (last - first) * random.open_unit()
+            });
+            let point = grid.ct_from_index(&index.into());
+            let exact_m = mask.voxels().map(|other| {
+                let way = |axis: usize| {
+                    let steps = (index[axis] - other[axis] as f64).abs();
+                    (steps - 0.5).max(0.0) * spacing_m[axis]
+                };
+                way(0).hypot(way(1)).hypot(way(2))
+            });
+            let exact_m = exact_m.fold(40e-3, f64::min);
+            let told_m = field.at_least(&point);
+            assert!(told_m <= exact_m + 1e-12, "{told_m} {exact_m}");
+            assert!(
+                exact_m - told_m <= 2.0 * half_diagonal_m,
+                "{told_m} {exact_m}"
+            );
+        }
+        // Outside its box, too.
+        let outside = grid.ct_from_index(&Point3::new(-30.0, 4.0, 4.0));
+        assert!(field.at_least(&outside) <= 40e-3 - 30.0 * 0.7e-3);
     }
 
     fn place([i, j, k]: [usize; 3]) -> Point3<f64> {

@@ -184,7 +184,8 @@ pub fn reconstruct(
     progress("surfaces", 0.4);
     let jobs = jobs(&found, &given, &lesions, options);
     let made = make_all(volume, &jobs, threads, cancel, progress)?;
-    let (surfaces, sizes) = sort(made, &jobs, lesions.len(), &mut remarks);
+    let (mut surfaces, sizes) = sort(made, &jobs, lesions.len(), &mut remarks);
+    keep_within_skin(&mut surfaces, &mut remarks);
     progress("label map", 0.95);
     let (labels, facts) = labels(volume, &found, &lesions, options);
     let lesions = lesions.into_iter().zip(sizes);
@@ -251,6 +252,9 @@ fn given_structures(
     }
     Ok(given)
 }
+
+/// First number of what was found beside a label map from elsewhere, unless that uses it.
+const FIRST_OWN: u16 = 1000;
 
 /// A hundredth of a voxel at the corners: what rounding of headers to single precision leaves.
 const SAME_PLACE: f64 = 0.01;
@@ -627,6 +631,52 @@ fn make(volume: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Ma
     }))
 }
 
+/// How far under the skin a corner is put that was outside, m.
+const UNDER_SKIN_M: f64 = 5e-5;
+
+/// Farthest that a corner is put back, m: what the skin's and its own reduction may be apart. More is not theirs.
+const FARTHEST_BACK_M: f64 = 3e-3;
+
+/// Puts corners of other surfaces that the reduced skin leaves outside back under it.
+fn keep_within_skin(surfaces: &mut [Surface], remarks: &mut Vec<Remark>) {
+    let skin = surfaces
+        .iter()
+        .find(|surface| surface.tissue == SurfaceTissue::Skin);
+    let Some(skin) = skin.map(|surface| SurfaceIndex::new(surface.mesh.clone())) else {
+        return;
+    };
+    for surface in surfaces {
+        if surface.tissue == SurfaceTissue::Skin {
+            continue;
+        }
+        let (mut moved, mut farthest_m) = (0_usize, 0.0_f64);
+        for corner in &mut surface.mesh.vertices_m {
+            if skin.contains(corner) {
+                continue;
+            }
+            let nearest = skin.nearest(corner);
+            let way = nearest - *corner;
+            let Some(inwards) = way.try_normalize(1e-9) else {
+                continue;
+            };
+            if way.norm() <= FARTHEST_BACK_M {
+                *corner = nearest + inwards * UNDER_SKIN_M;
+                moved += 1;
+                farthest_m = farthest_m.max(way.norm());
+            }
+        }
+        if farthest_m > SURFACE_ERROR_M {
+            remarks.push(
+                Remark::new(format!(
+                    "{moved} corners of its surface, up to {:.2} mm outside the reduced skin, were put back under it",
+                    1e3 * farthest_m
+                ))
+                .at(surface.name.clone()),
+            );
+        }
+    }
+}
+
 /// Surfaces, and the sizes of lesions in their order.
 fn sort(
     made: Vec<Option<Made>>,
@@ -729,7 +779,7 @@ fn size_of(mesh: &TriangleMesh, grid: &VoxelGrid) -> LesionSize {
     }
 }
 
-/// The label map that was given with the lesions in it, or one of what was found.
+/// The label map of what was found; one that was given stands before it, and lesions before both.
 fn labels(
     volume: &Volume,
     found: &Segmentation,
@@ -739,17 +789,32 @@ fn labels(
     let Some(given) = &options.labels else {
         return label_map(volume, found, lesions);
     };
+    let (own, _) = label_map(volume, found, &[]);
+    let mut is_used = vec![false; 1 << 16];
+    for &label in &given.labels {
+        is_used[usize::from(label)] = true;
+    }
+    for (label, _) in &given.names {
+        is_used[usize::from(*label)] = true;
+    }
     let mut map = given.clone();
-    let free = map
-        .names
-        .iter()
-        .map(|(label, _)| label + 1)
-        .max()
-        .unwrap_or(0);
-    for (label, lesion) in (free.max(FIRST_LESION)..).zip(lesions) {
+    let mut numbers: Vec<u16> = vec![0; 1 << 16];
+    let unused = (FIRST_OWN..=u16::MAX).filter(|&label| !is_used[usize::from(label)]);
+    for (number, (label, name)) in unused.zip(&own.names) {
+        numbers[usize::from(*label)] = number;
+        map.names.push((number, name.clone()));
+    }
+    for (label, own) in map.labels.iter_mut().zip(&own.labels) {
+        if *label == 0 {
+            *label = numbers[usize::from(*own)];
+        }
+    }
+    let unused = (FIRST_LESION..FIRST_OWN).filter(|&label| !is_used[usize::from(label)]);
+    for (label, lesion) in unused.zip(lesions) {
         paint(&mut map, &lesion.bounds, &lesion.mask, label);
         map.names.push((label, lesion.name.clone()));
     }
+    map.names.sort();
     let facts = label_facts(&map);
     (map, facts)
 }

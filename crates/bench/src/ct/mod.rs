@@ -2,6 +2,7 @@
 
 mod anatomy;
 mod build;
+mod built_folder;
 mod files;
 mod imaged;
 mod localisation;
@@ -17,6 +18,7 @@ pub use anatomy::{Materials, phantom_scene};
 pub use build::{
     BuildOptions, BuiltTarget, GivenLabels, KnownMarkers, Registered, ScanBuild, SeenScan, build,
 };
+pub use built_folder::BuiltFolder;
 pub use files::{BuildReport, write_build};
 pub use imaged::{BuildStop, Imaged, LastScan, imaged, scanned, write_patient};
 pub use patient::{PatientFrame, Room};

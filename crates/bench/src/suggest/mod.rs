@@ -72,7 +72,7 @@ impl Refused {
 }
 
 /// Counts of rules, the most frequent first.
-fn counted<'a>(rules: impl Iterator<Item = &'a str>) -> Vec<Refused> {
+pub(crate) fn counted<'a>(rules: impl Iterator<Item = &'a str>) -> Vec<Refused> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for rule in rules {
         *counts.entry(rule).or_default() += 1;

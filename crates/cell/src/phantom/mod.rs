@@ -242,6 +242,21 @@ impl Phantom {
         self.route_obstacles.of(&self.parts)
     }
 
+    /// The organ that contains a point (phantom frame): that of the lesion around it, else the one whose solid holds it.
+    pub fn organ_at(&self, point: &Point3<f64>) -> Option<String> {
+        self.lesions
+            .iter()
+            .filter(|lesion| (point - lesion.center_m).norm() <= 0.5 * lesion.diameter_m)
+            .find_map(|lesion| lesion.organ.clone())
+            .or_else(|| {
+                self.parts
+                    .iter()
+                    .filter(|part| part.tissue == Tissue::Organ)
+                    .find(|part| part.solid.contains(point))
+                    .and_then(|part| part.organ.clone())
+            })
+    }
+
     /// The outer surface: one closed mesh, phantom frame. The shipped ones are convex.
     pub fn skin(&self) -> &Solid {
         &self.parts[0].solid

@@ -282,10 +282,11 @@ impl<'a> Draft<'a> {
             match choose(&cell, goal) {
                 Ok(entry) => {
                     goal.entry_direction_deg = Some(entry.direction_deg);
-                    self.remarks.push(format!(
-                        "assumed, since goal `{}` has no entry: {}",
-                        goal.name, entry.in_words
-                    ));
+                    let why = match goal.route.take() {
+                        Some(_) => format!("route planned for goal `{}`", goal.name),
+                        None => format!("assumed, since goal `{}` has no entry", goal.name),
+                    };
+                    self.remarks.push(format!("{why}: {}", entry.in_words));
                 }
                 Err([message, hint]) => {
                     let key = format!("goals[{index}].{}", goal.target_key());
@@ -527,6 +528,7 @@ pub(crate) fn resolve(
         base,
         timestep_ms: scenario.engines.timestep_ms,
         gravity_m_s2: scenario.engines.gravity_m_s2,
+        has_no_goals: with_goals && scenario.goals.is_empty(),
     };
     let imperfections = scenario.imperfections.as_ref();
     let imperfections = imperfections.map(|section| real.resolve(section, &mut notes));

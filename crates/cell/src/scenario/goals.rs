@@ -7,6 +7,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use super::criteria::CriteriaSection;
+use super::route::RouteSection;
 use crate::Finding;
 use crate::schema::{LONGEST_NAME, NAME};
 use crate::toml_text::TomlText;
@@ -106,6 +107,9 @@ pub struct GoalSection {
     #[serde(default)]
     #[schemars(range(min = -720.0, max = 720.0))]
     pub roll_deg: Option<f64>,
+    /// Plans where the needle enters, by rules and risks, with the robot: instead of an entry.
+    #[serde(default)]
+    pub route: Option<RouteSection>,
     /// Outcome that is expected of a configuration: `ok`, `failed`, or the rule that rejects it.
     /// The key `every` stands for all that are not named.
     #[serde(default)]
@@ -147,6 +151,7 @@ impl GoalSection {
             standoff_mm: default_standoff_mm(),
             approach_mm: default_approach_mm(),
             roll_deg: None,
+            route: None,
             expected: BTreeMap::new(),
         }
     }
@@ -257,6 +262,26 @@ pub(super) fn check(
                     format!("two goals are named `{}`", goal.name),
                 )
                 .hint("give each its own name: results go to a folder of that name"),
+            );
+        }
+    }
+    for (i, goal) in goals.iter().enumerate() {
+        let given = goal.entry_key_given();
+        let given = given.or(goal.flange_pose.as_ref().map(|_| "flange_pose"));
+        if goal.route.is_some()
+            && let Some(given) = given
+        {
+            findings.push(
+                toml.finding(
+                    &format!("goals[{i}].{given}"),
+                    format!(
+                        "goal `{}` has an entry and a route to be planned",
+                        goal.name
+                    ),
+                )
+                .hint(format!(
+                    "leave out `{given}` for the planned route, or [goals.route] for this one"
+                )),
             );
         }
     }

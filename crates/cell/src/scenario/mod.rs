@@ -27,6 +27,7 @@ mod recording;
 mod replay;
 mod requirements;
 mod robot;
+mod route;
 mod switch;
 mod tool;
 
@@ -78,6 +79,7 @@ pub use ranking::RankingSection;
 pub use recording::RecordingSection;
 pub use replay::ReplaySection;
 pub use robot::RobotSection;
+pub use route::{OddsSection, RouteSection};
 pub(crate) use tool::NEEDLE_OUTER_DIAMETER_MM;
 pub use tool::ToolSection;
 

@@ -34,6 +34,13 @@ const CLOSING_M: f64 = 1.2e-3;
 /// Marrow that a shell encloses.
 const MOST_MARROW_L: f64 = 0.3;
 
+/// Larger parts are never things on the skin: markers, leads, wires.
+const MOST_ON_SKIN_L: f64 = 3e-3;
+/// What is nearer to the outside than this is on the skin, m: bones have more cover.
+const ON_SKIN_M: f64 = 2.5e-3;
+/// Share of a part that is so near if it lies on the skin.
+const ON_SKIN_SHARE: f64 = 0.2;
+
 /// A part that is not surely bone or contrast medium and is worth a remark.
 const UNSURE_L: f64 = 1e-3;
 
@@ -60,13 +67,16 @@ pub(super) fn find(
     let parts = Components::of(&dense, Connectivity::Faces);
     let facts = densities(scan, &parts, &bounds);
     let least = whole((1e-9 * LEAST_BONE_MM3 / scan.voxel_m3()).ceil()).max(1);
+    let near_outside = near_outside(scan, &parts, body);
     let kinds: Vec<Kind> = parts
         .parts()
         .iter()
-        .zip(&facts)
-        .map(|(part, facts)| {
+        .zip(facts.iter().zip(near_outside))
+        .map(|(part, (facts, near_outside))| {
             if part.voxels < least || facts.sure == 0 {
                 Kind::Speck
+            } else if near_outside as f64 >= ON_SKIN_SHARE * part.voxels as f64 {
+                Kind::OnSkin
             } else if facts.cortical as f64 >= CORTICAL_SHARE * part.voxels as f64 {
                 Kind::Bone
             } else if part.voxels >= scan.voxels_of(LEAST_CONTRAST_L)
@@ -98,6 +108,8 @@ pub(super) fn find(
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Speck,
+    /// A thing on the skin.
+    OnSkin,
     Bone,
     Contrast,
     Unsure,
@@ -119,6 +131,42 @@ fn densities(scan: &Scan<'_>, parts: &Components, bounds: &IndexBox) -> Vec<Dens
         }
     }
     facts
+}
+
+/// How many voxels of each small part have the outside next to them, along one of the axes.
+fn near_outside(scan: &Scan<'_>, parts: &Components, body: &Body) -> Vec<usize> {
+    let mut counts = vec![0; parts.parts().len()];
+    let most = scan.voxels_of(MOST_ON_SKIN_L);
+    let reach = scan
+        .spacing_m
+        .map(|step_m| whole(ON_SKIN_M / step_m).max(1));
+    let size = scan.size();
+    let is_near = |voxel: [usize; 3]| {
+        (0..3).any(|axis| {
+            (1..=reach[axis]).any(|steps| {
+                let beside = |at: Option<usize>| {
+                    let Some(at) = at.filter(|&at| at < size[axis]) else {
+                        // Beyond the volume nothing is known.
+                        return false;
+                    };
+                    let mut next = voxel;
+                    next[axis] = at;
+                    !body.mask.get(next)
+                };
+                beside(voxel[axis].checked_sub(steps)) || beside(Some(voxel[axis] + steps))
+            })
+        })
+    };
+    for (part, run, j, k) in parts.runs() {
+        if parts.parts()[part].voxels > most {
+            continue;
+        }
+        let [i0, j0, k0] = body.bounds.first;
+        for i in run {
+            counts[part] += usize::from(is_near([i + i0, j + j0, k + k0]));
+        }
+    }
+    counts
 }
 
 /// Whether a part lies between the lungs, where heart and great vessels are: its middle within the box of both, and

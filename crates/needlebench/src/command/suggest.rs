@@ -387,37 +387,13 @@ fn written(
         read_text(&arguments.scenario).map_err(|error| Finding::new(file, error.to_string()))?;
     let mut edit = ScenarioEdit::new(file, &text)?;
     let own = load_open_scenario(&arguments.scenario, overrides)?.goals;
-    let mut next = own.len();
-    for search in &found.entries {
-        let entry = &search.entries[0];
-        let index = own.iter().position(|goal| goal.name == search.goal);
-        let section = format!("goals[{}]", index.unwrap_or(next));
-        if index.is_none() {
-            next += 1;
-            let [x, y, z] = search.target_in_phantom_m.map(|m| (m * 1e4).round() / 10.0);
-            match &search.lesion {
-                Some(lesion) => edit.set(&section, "lesion", &format!("\"{lesion}\""))?,
-                None => edit.set(&section, "target_mm", &format!("[{x}, {y}, {z}]"))?,
-            }
-            // It was judged with these.
-            if let Some(like) = own.first().filter(|goal| goal.flange_pose.is_none()) {
-                edit.set(&section, "standoff_mm", &format!("{}", like.standoff_mm))?;
-                edit.set(&section, "approach_mm", &format!("{}", like.approach_mm))?;
-            }
-        }
-        let [azimuth, elevation] = entry.direction_deg;
-        // Comments on the lines of the former entry go with it; those elsewhere cannot be told.
-        let length = edit.text().len();
-        edit.remove(&section, "entry_mm")?;
-        edit.remove(&section, "entry_direction_deg")?;
-        let former = if edit.text().len() < length {
-            "; what comments here say of an entry is of the former one"
-        } else {
-            ""
-        };
-        let value = format!("[{azimuth}, {elevation}] # proposed by suggest{former}");
-        edit.set(&section, "entry_direction_deg", &value)?;
-    }
+    let chosen = found.entries.iter().map(|search| ChosenEntry {
+        goal: &search.goal,
+        lesion: search.lesion.as_deref(),
+        target_in_phantom_m: search.target_in_phantom_m,
+        direction_deg: search.entries[0].direction_deg,
+    });
+    set_entries(&mut edit, &own, chosen, "suggest")?;
     // A place that serves is kept, unless only places were asked for.
     let place = found
         .places
@@ -449,8 +425,57 @@ fn written(
     Ok(Some(path.clone()))
 }
 
+/// Where the needle for a target enters.
+pub(super) struct ChosenEntry<'a> {
+    pub goal: &'a str,
+    pub lesion: Option<&'a str>,
+    pub target_in_phantom_m: [f64; 3],
+    pub direction_deg: [f64; 2],
+}
+
+/// Gives goals of a scenario their entries, and those that it does not have their targets, too.
+pub(super) fn set_entries<'a>(
+    edit: &mut ScenarioEdit,
+    own: &[GoalSection],
+    chosen: impl Iterator<Item = ChosenEntry<'a>>,
+    by: &str,
+) -> Result<(), Finding> {
+    let mut next = own.len();
+    for entry in chosen {
+        let index = own.iter().position(|goal| goal.name == entry.goal);
+        let section = format!("goals[{}]", index.unwrap_or(next));
+        if index.is_none() {
+            next += 1;
+            let [x, y, z] = entry.target_in_phantom_m.map(|m| (m * 1e4).round() / 10.0);
+            match entry.lesion {
+                Some(lesion) => edit.set(&section, "lesion", &format!("\"{lesion}\""))?,
+                None => edit.set(&section, "target_mm", &format!("[{x}, {y}, {z}]"))?,
+            }
+            // It was judged with these.
+            if let Some(like) = own.first().filter(|goal| goal.flange_pose.is_none()) {
+                edit.set(&section, "standoff_mm", &format!("{}", like.standoff_mm))?;
+                edit.set(&section, "approach_mm", &format!("{}", like.approach_mm))?;
+            }
+        }
+        let [azimuth, elevation] = entry.direction_deg;
+        // Comments on the lines of the former entry go with it; those elsewhere cannot be told.
+        let length = edit.text().len();
+        edit.remove(&section, "entry_mm")?;
+        edit.remove(&section, "entry_direction_deg")?;
+        edit.remove(&section, "route")?;
+        let former = if edit.text().len() < length {
+            "; what comments here say of an entry is of the former one"
+        } else {
+            ""
+        };
+        let value = format!("[{azimuth}, {elevation}] # proposed by {by}{former}");
+        edit.set(&section, "entry_direction_deg", &value)?;
+    }
+    Ok(())
+}
+
 /// Without lines: they are those of a file that is not there.
-fn unplaced(findings: Vec<Finding>) -> Vec<Finding> {
+pub(super) fn unplaced(findings: Vec<Finding>) -> Vec<Finding> {
     let findings = findings.into_iter();
     findings
         .map(|finding| Finding {

@@ -29,7 +29,9 @@ pub mod iso9283;
 pub mod press;
 pub mod ranking;
 pub mod replay;
+pub mod routes;
 pub mod servo;
+mod skin_map;
 pub mod suggest;
 
 pub use axis::{Axis, Scale};

@@ -8,6 +8,7 @@ use super::drawing::{Anchor, Chart};
 use super::legend::{Sample, legend};
 use super::paint::{Paint, Rgb, Stroke};
 use super::panel::Panel;
+use super::skin_map::{HIGHEST_DEG, MARK_PX, numbered, skin_panel};
 
 /// Colours of rules, told apart by lightness too.
 const RULES: [(EntryRule, Rgb); 8] = [
@@ -24,10 +25,6 @@ const ALLOWED: Rgb = [0, 158, 115];
 
 /// Half a step of the grid of directions, deg.
 const HALF_DEG: f64 = 1.5;
-/// Elevations beyond this are along the body: no needle goes there, deg.
-const HIGHEST_DEG: f64 = 75.0;
-/// Radius of a numbered mark, px.
-const MARK_PX: f64 = 11.0;
 
 /// The skin as the target sees it: which directions are allowed, and what refuses the others.
 pub fn entries_chart(scenario: &str, found: &EntrySearch) -> Chart {
@@ -35,33 +32,7 @@ pub fn entries_chart(scenario: &str, found: &EntrySearch) -> Chart {
     let title = format!("{scenario}, {}: where a needle may enter", found.goal);
     let mut chart = Chart::new(SIZE, &*title);
     chart.write_large([20.0, 24.0], title);
-    let azimuths = [
-        (-180.0, "back"),
-        (-135.0, ""),
-        (-90.0, "patient's right"),
-        (-45.0, ""),
-        (0.0, "front"),
-        (45.0, ""),
-        (90.0, "patient's left"),
-        (135.0, ""),
-        (180.0, "back"),
-    ];
-    let named = |(deg, name): (f64, &str)| {
-        let text = if name.is_empty() {
-            format!("{deg:.0}")
-        } else {
-            format!("{deg:.0} {name}")
-        };
-        (deg, text)
-    };
-    let panel = Panel {
-        corner: [80.0, 50.0],
-        size: [880.0, 366.0],
-        title: String::new(),
-        x: Axis::linear("azimuth from the target (deg)", -180.0, 180.0)
-            .with_ticks(azimuths.map(named).to_vec()),
-        y: Axis::linear("elevation (deg): up is the head", -HIGHEST_DEG, HIGHEST_DEG),
-    };
+    let panel = skin_panel();
     panel.draw_paper(&mut chart);
     for sample in &found.samples {
         let [azimuth, elevation] = sample.direction_deg;
@@ -100,12 +71,6 @@ fn colour(refused: Option<EntryRule>) -> Rgb {
     };
     let found = RULES.iter().find(|(rule, _)| *rule == refused);
     found.map_or(ALLOWED, |(_, rgb)| *rgb)
-}
-
-fn numbered(chart: &mut Chart, at: [f64; 2], number: usize) {
-    chart.disc(at, MARK_PX, Paint::Page);
-    chart.circle(at, MARK_PX, Stroke::full(Paint::Ink, 2.0));
-    chart.write(Anchor::Middle, at, number.to_string());
 }
 
 /// The room from above: at how many configurations the worst goal is, at the best height of each place.

@@ -11,6 +11,7 @@ mod plain;
 pub(crate) mod ranking;
 mod referee;
 pub mod replay;
+pub mod routes;
 mod run;
 mod saturation;
 pub mod servo;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_kinematics::pose_from_rotation_vector;
 
-use super::checks::{organ_at, true_target};
+use super::checks::true_target;
 use super::{Goal, Roll, Surroundings};
 use crate::Finding;
 use crate::scenario::GoalSection;
@@ -78,7 +78,7 @@ pub(super) fn from_flange_pose(
             .hint("the skin has to be ahead of the guide's exit, and the needle has to end inside"));
         }
         standoff_m = Some(enters_m);
-        target_organ = organ_at(&placed.phantom, &(to_phantom * target_m));
+        target_organ = placed.phantom.organ_at(&(to_phantom * target_m));
         let found = true_target(
             text,
             key,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_kinematics::Pose;
 
-use super::checks::{organ_at, true_target};
+use super::checks::true_target;
 use super::{Goal, Roll, Surroundings};
 use crate::phantom::Phantom;
 use crate::scenario::GoalSection;
@@ -150,7 +150,7 @@ pub(super) fn from_entry_and_target(
         insertion_length_m,
         standoff_m: Some(standoff_m),
         approach_m: section.approach_mm * 1e-3,
-        target_organ: organ_at(phantom, &target),
+        target_organ: phantom.organ_at(&target),
         lesion,
         expected: BTreeMap::new(),
     };

@@ -9,23 +9,6 @@ use crate::resolve::phantom::Corners;
 use crate::scenario::GoalSection;
 use crate::toml_text::TomlText;
 
-/// Organ that contains a point of the phantom frame.
-pub(super) fn organ_at(phantom: &Phantom, point: &Point3<f64>) -> Option<String> {
-    phantom
-        .lesions
-        .iter()
-        .filter(|lesion| (point - lesion.center_m).norm() <= 0.5 * lesion.diameter_m)
-        .find_map(|lesion| lesion.organ.clone())
-        .or_else(|| {
-            phantom
-                .parts
-                .iter()
-                .filter(|part| part.tissue == Tissue::Organ)
-                .find(|part| part.solid.contains(point))
-                .and_then(|part| part.organ.clone())
-        })
-}
-
 /// Farthest that a lesion may be from where it was planned to be, m. Assumed: twenty times what needle robots are off by
 /// at most; beyond, it is another lesion, another frame or another unit.
 const FARTHEST_TRUE_TARGET_M: f64 = 0.05;

@@ -2,6 +2,7 @@
 
 mod build;
 mod info;
+mod routes;
 mod synth;
 
 use anyhow::Result;
@@ -11,6 +12,7 @@ use crate::exit::ExitStatus;
 
 use build::{BUILD_HELP, BuildArguments, build_scan};
 use info::{InfoArguments, info};
+use routes::{ROUTES_HELP, RoutesArguments, routes};
 use synth::{SYNTH_HELP, SynthArguments, synth};
 
 #[derive(Debug, Args)]
@@ -30,6 +32,12 @@ enum CtCommand {
         after_long_help = BUILD_HELP
     )]
     Build(Box<BuildArguments>),
+    /// Ways for a needle to a target without harm, and which of them the robot can serve.
+    #[command(
+        after_help = "Example: needlebench ct routes out/patient --lesion nodule --write out/patient/planned.toml",
+        after_long_help = ROUTES_HELP
+    )]
+    Routes(Box<RoutesArguments>),
     /// Synthetic CT of a phantom, with the truth beside it.
     #[command(
         after_help = "Example: needlebench ct synth scenarios/supine_suite.toml --out out/ct --preset biopsy --markers ct-sphere",
@@ -43,6 +51,7 @@ pub(crate) fn ct(arguments: &CtArguments) -> Result<ExitStatus> {
     match &arguments.command {
         CtCommand::Info(arguments) => info(arguments),
         CtCommand::Build(arguments) => build_scan(arguments),
+        CtCommand::Routes(arguments) => routes(arguments),
         CtCommand::Synth(arguments) => synth(arguments),
     }
 }

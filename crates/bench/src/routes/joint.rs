@@ -1,0 +1,334 @@
+//! Routes and the robot together.
+
+use needlebench_cell::scenario::GoalSection;
+use needlebench_cell::{Goal, GoalPlacer, ResolvedScenario};
+use needlebench_clearance::ClearanceModel;
+use needlebench_engine::Servo;
+use needlebench_evaluation::first_missed_by_posture;
+use needlebench_evaluation::report::ConfigurationReport;
+use needlebench_evaluation::room::RoomModel;
+use needlebench_kinematics::ik::Configuration;
+use needlebench_planning::{Candidate, Member, Merit, Planner, judge_route};
+use needlebench_routing::{Obstacle, RouteRules};
+use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
+
+use super::report::AxisError;
+use super::{Rounded, RouteTask};
+use crate::Control;
+use crate::parallel::in_parallel;
+use crate::real_cell::servo_of;
+use crate::study::set_clearances;
+use crate::suggest::SuggestError;
+
+/// Directions about the needle that are looked at for each configuration.
+pub(super) const ROLLS: u32 = 12;
+
+/// What the robot makes of a route.
+#[derive(Debug, Clone)]
+pub(super) struct Asked {
+    pub rounded: Rounded,
+    /// Why the goal cannot be there; none if it can, or nobody asked.
+    pub blocked: Option<String>,
+    /// The goal in the cell; none if it is blocked or nobody asked.
+    pub goal: Option<Goal>,
+    /// All eight, if the robot was asked.
+    pub configurations: Vec<Served>,
+}
+
+/// One configuration on a route.
+#[derive(Debug, Clone)]
+pub(super) struct Served {
+    pub configuration: Configuration,
+    /// The first rule or criterion that it breaks; none if it works.
+    pub reason: Option<String>,
+    /// The best posture, of those that work if any does.
+    pub candidate: Option<Candidate>,
+    /// How good it is by the scenario's aim.
+    pub value: Option<Merit>,
+    /// Least clearance of what a roll can change, m.
+    pub clearance_m: Option<f64>,
+    /// Expected error, if the scenario expects one.
+    pub error: Option<AxisError>,
+    /// What is left of each margin with this error, m; infinite where nothing is near.
+    pub spare_m: Option<[f64; 3]>,
+    /// Share of the space about the entry that is free.
+    pub room: Option<f64>,
+}
+
+impl Served {
+    pub fn works(&self) -> bool {
+        self.reason.is_none()
+    }
+
+    pub fn least_spare_m(&self) -> f64 {
+        let spare = self.spare_m.into_iter().flatten();
+        spare.fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Asked {
+    pub fn without_robot(rounded: Rounded) -> Self {
+        Self {
+            rounded,
+            blocked: None,
+            goal: None,
+            configurations: Vec::new(),
+        }
+    }
+
+    pub fn working(&self) -> usize {
+        self.configurations
+            .iter()
+            .filter(|each| each.works())
+            .count()
+    }
+
+    /// The configuration to choose: of those that work the best by the scenario's aim.
+    pub fn best(&self) -> Option<&Served> {
+        let works = self.configurations.iter().filter(|each| each.works());
+        works.fold(None, |best: Option<&Served>, each| match best {
+            Some(best)
+                if each.value.partial_cmp(&best.value) != Some(std::cmp::Ordering::Greater) =>
+            {
+                Some(best)
+            }
+            _ => Some(each),
+        })
+    }
+
+    /// What is left of the margins, with the error of the configuration to choose.
+    pub fn spare_m(&self) -> f64 {
+        match self.best() {
+            Some(best) => best.least_spare_m().min(self.rounded.route.spare_m),
+            None => self.rounded.route.spare_m,
+        }
+    }
+}
+
+/// Asks the robot of a scenario for routes.
+pub(super) fn ask(
+    task: &RouteTask<'_>,
+    rules: &RouteRules,
+    routes: &[Rounded],
+    control: &Control<'_>,
+) -> Result<Vec<Asked>, SuggestError> {
+    let placer = GoalPlacer::new(task.resolved);
+    let mut asked: Vec<Asked> = Vec::with_capacity(routes.len());
+    let mut sections: Vec<GoalSection> = Vec::new();
+    let mut goals: Vec<Goal> = Vec::new();
+    for rounded in routes {
+        let section = task.section_at(rounded.direction_deg);
+        let mut each = Asked::without_robot(rounded.clone());
+        match placer.place(&section) {
+            Ok(goal) => {
+                each.goal = Some(goal.clone());
+                sections.push(section);
+                goals.push(goal);
+            }
+            Err(finding) => each.blocked = Some(finding.message),
+        }
+        asked.push(each);
+    }
+    let mut resolved = task.resolved.clone();
+    resolved.goals = goals;
+    resolved.scenario.goals = sections;
+    let model = ClearanceModel::new(&resolved.cell);
+    let planner = Planner::new(&resolved, &model)
+        .map_err(|error| SuggestError::refused(error.to_string(), "only UR arms can be asked"))?;
+    let robot = Robot {
+        resolved: &resolved,
+        planner: &planner,
+        room: RoomModel::new(&resolved),
+        servo: servo_of(&resolved),
+        rules,
+    };
+    control.progress.message("configurations");
+    control.progress.expect(resolved.goals.len() as u64);
+    let placed: Vec<usize> = (0..asked.len())
+        .filter(|&index| asked[index].goal.is_some())
+        .collect();
+    let numbered: Vec<(usize, usize)> = placed.into_iter().enumerate().collect();
+    let answers = in_parallel(control.threads, &numbered, |&(goal, index)| {
+        let answer = (!control.is_cancelled()).then(|| robot.serve(goal, &asked[index].rounded));
+        control.progress.step();
+        answer
+    });
+    for ((_, index), answer) in numbered.into_iter().zip(answers) {
+        asked[index].configurations = answer.ok_or(SuggestError::Interrupted)?;
+    }
+    Ok(asked)
+}
+
+/// The first criterion on clearances that a posture misses.
+fn missed_criterion(resolved: &ResolvedScenario, candidate: &Candidate) -> Option<&'static str> {
+    let mut posture = ConfigurationReport::new("");
+    set_clearances(&mut posture, &candidate.clearance);
+    first_missed_by_posture(&posture, &resolved.scenario.criteria)
+}
+
+/// Whether a posture meets the scenario's criteria on clearances.
+pub(super) fn meets_criteria(resolved: &ResolvedScenario, member: &Member) -> bool {
+    let candidate = member.candidate.as_ref();
+    candidate.is_some_and(|candidate| missed_criterion(resolved, candidate).is_none())
+}
+
+struct Robot<'a> {
+    resolved: &'a ResolvedScenario,
+    planner: &'a Planner<'a>,
+    room: RoomModel<'a>,
+    servo: Servo,
+    rules: &'a RouteRules,
+}
+
+impl Robot<'_> {
+    /// All eight configurations of a goal.
+    fn serve(&self, index: usize, rounded: &Rounded) -> Vec<Served> {
+        let goal = &self.resolved.goals[index];
+        let rolls = self.planner.rolls(goal, ROLLS);
+        let at_rolls: Vec<[Member; 8]> = rolls
+            .iter()
+            .map(|&roll_rad| self.planner.members_at(goal, roll_rad))
+            .collect();
+        // The planned patient's own surfaces count, too: `run` holds the needle against them.
+        let refused = judge_route(self.resolved, goal).filter(|judged| !judged.is_kept());
+        Configuration::ALL
+            .into_iter()
+            .enumerate()
+            .map(|(number, configuration)| {
+                let members = at_rolls.iter().map(|members| &members[number]);
+                let mut served = self.best(goal, configuration, members);
+                if served.works() && refused.is_some() {
+                    served.reason = Some("needle_route".to_owned());
+                }
+                if served.works() {
+                    self.measure(index, rounded, &mut served);
+                }
+                served
+            })
+            .collect()
+    }
+
+    /// The best of a configuration's postures: one that works and meets the criteria, else the one nearest to it.
+    fn best<'m>(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        members: impl Iterator<Item = &'m Member>,
+    ) -> Served {
+        let mut nearest: Option<&Member> = None;
+        let mut works: Option<(Merit, &Member)> = None;
+        let mut missed: Option<&'static str> = None;
+        for member in members {
+            if nearest.is_none_or(|best| member.surplus > best.surplus) {
+                nearest = Some(member);
+            }
+            let Some(candidate) = member.candidate.as_ref().filter(|_| member.works()) else {
+                continue;
+            };
+            if let Some(first) = missed_criterion(self.resolved, candidate) {
+                missed = Some(first);
+                continue;
+            }
+            let aim = self.resolved.scenario.planning.roll_aim;
+            let merit = self.planner.merit(goal, aim, candidate);
+            if works.is_none_or(|(best, _)| merit > best) {
+                works = Some((merit, member));
+            }
+        }
+        let (value, member) = match works {
+            Some((merit, member)) => (Some(merit), Some(member)),
+            None => (None, nearest),
+        };
+        let reason = value.is_none().then(|| {
+            let rule = nearest.and_then(|member| member.rejections.first());
+            match (missed, rule) {
+                (Some(missed), _) => missed.to_owned(),
+                (None, Some(rule)) => rule.rule.name().to_owned(),
+                (None, None) => "unreachable".to_owned(),
+            }
+        });
+        Served {
+            configuration,
+            reason,
+            clearance_m: member
+                .and_then(Member::least_clearance)
+                .map(|pair| pair.separation.distance_m),
+            candidate: member.and_then(|member| member.candidate.clone()),
+            value,
+            error: None,
+            spare_m: None,
+            room: None,
+        }
+    }
+
+    /// Expected error, what it leaves of the margins, and the room.
+    fn measure(&self, index: usize, rounded: &Rounded, served: &mut Served) {
+        let Some(candidate) = &served.candidate else {
+            return;
+        };
+        let goal = &self.resolved.goals[index];
+        let taken = self.room.taken(index, &candidate.joints);
+        served.room = Some(self.room.sector(index).free_fraction(&taken));
+        let error = self.error(goal, candidate);
+        let (bias_m, sd_m) = match &error {
+            Some(Ok(error)) => (error.bias_m, error.sd_m),
+            Some(Err(())) => {
+                served.reason = Some("expected_error".to_owned());
+                return;
+            }
+            None => (0.0, 0.0),
+        };
+        served.error = error.and_then(Result::ok);
+        let distances_m = rounded.route.distances_m;
+        let spare_m = Obstacle::ALL.map(|obstacle| {
+            let margin_m = self.rules.margin_m(obstacle, bias_m, sd_m);
+            distances_m[obstacle as usize] - margin_m.max(self.rules.margins_m[obstacle as usize])
+        });
+        served.spare_m = Some(spare_m);
+        if served.least_spare_m() < 0.0 {
+            served.reason = Some("margin_with_error".to_owned());
+        }
+    }
+
+    /// The needle's expected error where the arm holds it, at the worse of skin and target: none if the scenario expects
+    /// none, an error if it cannot be told.
+    fn error(&self, goal: &Goal, candidate: &Candidate) -> Option<Result<AxisError, ()>> {
+        let expected = self.resolved.expected.as_ref()?;
+        let told = || {
+            let trajectory = self.planner.approach(goal, candidate)?;
+            let place = self.resolved.phantom.as_ref();
+            let case = BudgetCase {
+                cell: &self.resolved.cell,
+                goal,
+                place: place.map(|each| &each.world_from_phantom),
+                servo: &self.servo,
+                imperfections: &expected.imperfections,
+                trajectory: &trajectory,
+                timestep_s: self.resolved.scenario.engines.timestep_ms * 1e-3,
+            };
+            analytic_total(&case).ok()
+        };
+        let moments = told();
+        Some(moments.map(|both| AxisError::of(&both)).ok_or(()))
+    }
+}
+
+impl AxisError {
+    /// Of the moments at skin and target. In between, the needle being straight, neither is larger.
+    pub(super) fn of(both: &[Moments; 2]) -> Self {
+        let [skin, target] = both.each_ref().map(|moments| {
+            let bias_m = moments.bias().xy().norm();
+            let across = moments.covariance().fixed_view::<2, 2>(0, 0).into_owned();
+            let largest = across.symmetric_eigenvalues().max().max(0.0);
+            (bias_m, largest.sqrt())
+        });
+        Self {
+            bias_m: skin.0.max(target.0),
+            sd_m: skin.1.max(target.1),
+            target_lateral_rms_m: both[1].lateral_rms_m,
+            target_rms_m: both[1].rms_m,
+            target_bias_m: both[1].bias_m,
+            target_covariance_m2: both[1].covariance_m2,
+        }
+    }
+}

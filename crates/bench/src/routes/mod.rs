@@ -1,0 +1,222 @@
+//! Routes of needles, planned with the robot: which entries reach a target without harm, which of them the arm can serve,
+//! in which configuration, with what margin and expected error, and what room is left.
+//!
+//! # How they are found
+//!
+//! 1. Thousands of directions are judged by the rules and risks of [`needlebench_routing`], without the robot.
+//! 2. Of those that are free, the best ones at least 2 deg apart, at most 200, are moved to the best place near by and
+//!    asked for: each of the eight configurations at 12 rolls, by the code of `check`; what works has the expected
+//!    error of its own arm, registration and patient, and has to keep the margins with it.
+//! 3. The choice is the best of those in which as many configurations work as the scenario wants. The odds ratios are not
+//!    known to a tenth: routes whose odds differ by less are equal, and have the order of what they have to spare.
+//!    Beside it stands what nothing beats in risk, clearance, expected error and room at once.
+//! 4. If a safer route fails by the robot alone, the smallest change that would free it is looked for.
+
+mod freeing;
+mod joint;
+mod report;
+
+use needlebench_cell::scenario::{GoalSection, RouteSection};
+use needlebench_cell::{GoalPlacer, ResolvedScenario};
+use needlebench_routing::{
+    Anatomy, Route, RouteRules, Searched, SolidAnatomy, angles_rad, apart, judge, outwards,
+    refined, search,
+};
+
+use crate::Control;
+use crate::suggest::SuggestError;
+use joint::{Asked, ask};
+
+pub use freeing::{Freed, Freeing, free};
+pub use report::{
+    AxisError, ChosenRoute, ConfigurationAnswer, MapColumns, MarginReport, RouteAnswer, RoutePlan,
+    RuleCount, WhyNot,
+};
+
+/// Directions that are judged in voxels.
+pub const VOXEL_DIRECTIONS: usize = 20_000;
+/// Directions that are judged among solids, whose distances are exact and take longer.
+pub const SOLID_DIRECTIONS: usize = 4_000;
+/// Angle between directions that the robot is asked for, at least, rad: 2 deg.
+const APART_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
+/// Directions that the robot is asked for, at most.
+const MOST_ASKED: usize = 200;
+/// Smallest step of a direction that is moved to the best place near by, rad.
+const REFINED_RAD: f64 = 0.002;
+/// Logarithms of odds that differ by less are equal: a tenth, since no ratio is known better.
+const SAME_ODDS: f64 = 0.1;
+/// Steps that directions are rounded to, deg: what is written is what was judged.
+const ROUNDED: f64 = 100.0;
+
+/// Whether and why a robot is asked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum WithRobot {
+    /// The robot of the scenario.
+    Yes,
+    /// No robot can be asked: why.
+    No(String),
+}
+
+/// What is to be planned.
+#[derive(Debug)]
+pub struct RouteTask<'a> {
+    /// The cell, with any goals.
+    pub resolved: &'a ResolvedScenario,
+    /// The goal's target, guide and approach; an entry that it has does not count.
+    pub section: &'a GoalSection,
+    /// Rules and risks.
+    pub rules: &'a RouteSection,
+    /// Whether the robot is asked.
+    pub robot: WithRobot,
+    /// Directions to judge.
+    pub directions: usize,
+}
+
+impl RouteTask<'_> {
+    /// The rules in SI.
+    pub fn route_rules(&self) -> RouteRules {
+        RouteRules::new(
+            self.rules,
+            &self.resolved.scenario.planning.needle_route,
+            &self.resolved.cell.tool,
+            self.section.standoff_mm * 1e-3,
+            self.robot == WithRobot::Yes,
+        )
+    }
+
+    /// The goal with the entry in a direction from its target, deg.
+    fn section_at(&self, direction_deg: [f64; 2]) -> GoalSection {
+        GoalSection {
+            entry_mm: None,
+            entry_direction_deg: Some(direction_deg),
+            route: None,
+            expected: std::collections::BTreeMap::new(),
+            ..self.section.clone()
+        }
+    }
+
+    /// The phantom's solids about the target.
+    ///
+    /// # Errors
+    /// If there is no patient or the target is none.
+    pub fn solids(&self) -> Result<SolidAnatomy<'_>, SuggestError> {
+        let target = GoalPlacer::new(self.resolved).target(self.section)?;
+        let placed = self.resolved.phantom.as_ref();
+        let placed = placed.ok_or_else(|| {
+            SuggestError::refused("there is no patient", "add a [phantom] section")
+        })?;
+        Ok(SolidAnatomy::new(
+            &placed.phantom,
+            target,
+            self.section.lesion.is_some(),
+            &self.resolved.scenario.planning.needle_route,
+            self.route_rules().longest_m,
+        ))
+    }
+}
+
+/// A route with its direction as it is written.
+#[derive(Debug, Clone, PartialEq)]
+struct Rounded {
+    direction_deg: [f64; 2],
+    route: Route,
+}
+
+/// Plans the routes to a target. The same for any number of threads.
+///
+/// # Errors
+/// If there is no patient, the target is none, the robot is none that can be asked, or it was interrupted.
+pub fn plan_routes(
+    task: &RouteTask<'_>,
+    anatomy: &dyn Anatomy,
+    control: &Control<'_>,
+) -> Result<RoutePlan, SuggestError> {
+    let rules = task.route_rules();
+    control.progress.message("routes");
+    let stop = || control.is_cancelled();
+    let searched = search(anatomy, &rules, task.directions, control.threads, &stop);
+    if control.is_cancelled() {
+        return Err(SuggestError::Interrupted);
+    }
+    let asked_for = candidates(anatomy, &rules, &searched, task.directions);
+    let asked = match &task.robot {
+        WithRobot::Yes => ask(task, &rules, &asked_for, control)?,
+        WithRobot::No(_) => asked_for.into_iter().map(Asked::without_robot).collect(),
+    };
+    Ok(report::plan(
+        task,
+        anatomy,
+        &rules,
+        &searched,
+        ordered(asked),
+    ))
+}
+
+/// Directions that stand for those around them, each at the best place near by.
+fn candidates(
+    anatomy: &dyn Anatomy,
+    rules: &RouteRules,
+    searched: &Searched,
+    directions: usize,
+) -> Vec<Rounded> {
+    let mut free = searched.free();
+    let least = free.first().map_or(0.0, |route| route.risk.log_odds);
+    free.sort_by(|a, b| better_first(least, (a, a.spare_m), (b, b.spare_m)));
+    let picked = apart(&free, |route| route.outwards, APART_RAD, MOST_ASKED);
+    // Half of the distance between directions of an even grid.
+    let step_rad = 0.5 * (4.0 * std::f64::consts::PI / directions.max(1) as f64).sqrt();
+    let mut found: Vec<Rounded> = picked
+        .into_iter()
+        .filter_map(|index| {
+            let best = refined(anatomy, rules, free[index], step_rad, REFINED_RAD);
+            rounded(anatomy, rules, &best).or_else(|| rounded(anatomy, rules, free[index]))
+        })
+        .collect();
+    found.sort_by(|a, b| {
+        let (a, b) = (&a.route, &b.route);
+        better_first(least, (a, a.spare_m), (b, b.spare_m))
+    });
+    // Several may have come to the same place.
+    let kept = apart(&found, |each| each.route.outwards, APART_RAD, MOST_ASKED);
+    kept.into_iter().map(|index| found[index].clone()).collect()
+}
+
+/// The route in the direction as it is written, if that is free too.
+fn rounded(anatomy: &dyn Anatomy, rules: &RouteRules, route: &Route) -> Option<Rounded> {
+    let direction_deg = angles_rad(&route.outwards)
+        .map(|angle| (angle.to_degrees() * ROUNDED).round() / ROUNDED + 0.0);
+    let direction = outwards(direction_deg.map(f64::to_radians));
+    let route = judge(anatomy, rules, &direction).outcome.ok()?;
+    Some(Rounded {
+        direction_deg,
+        route,
+    })
+}
+
+/// Of two routes with what each has to spare the better one first: by odds in steps that can be told apart, then by room.
+fn better_first(
+    least_log_odds: f64,
+    (a, a_spare_m): (&Route, f64),
+    (b, b_spare_m): (&Route, f64),
+) -> std::cmp::Ordering {
+    let step = |route: &Route| ((route.risk.log_odds - least_log_odds) / SAME_ODDS + 1e-9).floor();
+    let by_odds = step(a).total_cmp(&step(b));
+    by_odds
+        .then(b_spare_m.total_cmp(&a_spare_m))
+        .then(a.risk.log_odds.total_cmp(&b.risk.log_odds))
+}
+
+fn ordered(mut asked: Vec<Asked>) -> Vec<Asked> {
+    let least = asked
+        .iter()
+        .map(|each| each.rounded.route.risk.log_odds)
+        .fold(f64::INFINITY, f64::min);
+    asked.sort_by(|a, b| {
+        better_first(
+            least,
+            (&a.rounded.route, a.spare_m()),
+            (&b.rounded.route, b.spare_m()),
+        )
+    });
+    asked
+}

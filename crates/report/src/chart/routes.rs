@@ -1,0 +1,119 @@
+//! The entry map: the skin as the target sees it, with what forbids a route and how the free ones compare.
+
+use needlebench_bench::routes::RoutePlan;
+
+use super::drawing::{Anchor, Chart};
+use super::legend::{Sample, legend};
+use super::paint::{Paint, Rgb};
+use super::skin_map::{HIGHEST_DEG, numbered, skin_panel};
+
+/// Colours of rules, told apart by lightness too.
+const RULES: [(&str, &str, Rgb); 12] = [
+    ("needle_too_short", "needle too short", [226, 226, 226]),
+    ("outside", "arm or fold outside", [120, 120, 120]),
+    ("end_of_body", "skin not known", [176, 190, 220]),
+    ("oblique", "too oblique", [206, 214, 235]),
+    ("bone", "bone", [150, 110, 60]),
+    ("vessel", "vessel", [196, 44, 52]),
+    ("organ", "organ", [238, 170, 150]),
+    ("pleura", "enters lungs twice", [150, 90, 160]),
+    ("fissure", "fissure", [200, 150, 210]),
+    ("bulla", "bulla", [225, 190, 235]),
+    ("throw", "throw not free", [240, 196, 70]),
+    ("no_skin", "no skin", [245, 245, 245]),
+];
+
+/// Colours of free directions: the least odds, and those of twice the least and more.
+const FREE: [Rgb; 2] = [[0, 96, 70], [170, 226, 205]];
+
+/// Routes that are numbered.
+const NUMBERED: usize = 8;
+
+/// The map of a plan; none if it has none.
+pub fn routes_chart(scenario: &str, plan: &RoutePlan) -> Option<Chart> {
+    const SIZE: [f64; 2] = [1000.0, 600.0];
+    let map = plan.map.as_ref()?;
+    let title = format!("{scenario}, {}: routes to the target", plan.goal);
+    let mut chart = Chart::new(SIZE, &*title);
+    chart.write_large([20.0, 24.0], title);
+    let panel = skin_panel();
+    panel.draw_paper(&mut chart);
+    let least = map
+        .odds_ratio
+        .iter()
+        .flatten()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    // Half the distance of directions on an even grid, and a little more so that no paper shows.
+    let half = 0.62 * (41_253.0 / map.azimuth_deg.len().max(1) as f64).sqrt();
+    let mut seen = [false; RULES.len()];
+    for index in 0..map.azimuth_deg.len() {
+        let [azimuth, elevation] = [map.azimuth_deg[index], map.elevation_deg[index]];
+        if elevation.abs() > HIGHEST_DEG - half {
+            continue;
+        }
+        let rgb = match map.rule[index] {
+            None => shade(map.odds_ratio[index].unwrap_or(least), least),
+            Some(rule) => {
+                let name = map.rules[rule];
+                let Some(known) = RULES.iter().position(|(each, ..)| *each == name) else {
+                    continue;
+                };
+                seen[known] = true;
+                RULES[known].2
+            }
+        };
+        let across = half / elevation.to_radians().cos();
+        let [left, top] = panel.at([(azimuth - across).max(-180.0), elevation + half]);
+        let [right, foot] = panel.at([(azimuth + across).min(180.0), elevation - half]);
+        chart.fill([left, top], [right - left, foot - top], Paint::Fixed(rgb));
+    }
+    panel.draw_axes(&mut chart);
+    let chosen = plan.chosen.as_ref().map(|chosen| chosen.route);
+    for (index, route) in plan.routes.iter().enumerate().rev() {
+        if index < NUMBERED || chosen == Some(index) {
+            numbered(&mut chart, panel.at(route.direction_deg), index + 1);
+        }
+    }
+    let chosen = chosen.map_or_else(
+        || "none is served as wanted".to_owned(),
+        |route| format!("{} is chosen", route + 1),
+    );
+    chart.write(
+        Anchor::Start,
+        [80.0, 486.0],
+        format!(
+            "numbers: routes, the best first; {chosen}; {} of {} directions are free before the robot is asked",
+            plan.free, plan.tried
+        ),
+    );
+    let free = [
+        (FREE[0], "free, least odds"),
+        (FREE[1], "free, twice the odds or more"),
+    ];
+    let free = free.map(|(rgb, name)| (Sample::Area(Paint::Fixed(rgb)), name));
+    let rules = RULES.iter().zip(seen).filter(|(_, seen)| *seen);
+    let rules = rules.map(|((_, name, rgb), _)| (Sample::Area(Paint::Fixed(*rgb)), *name));
+    legend(
+        &mut chart,
+        [80.0, 514.0],
+        880.0,
+        free.into_iter().chain(rules),
+    );
+    Some(chart)
+}
+
+/// Darker is better.
+fn shade(odds: f64, least: f64) -> Rgb {
+    let share = (odds / least).log2().clamp(0.0, 1.0);
+    std::array::from_fn(|channel| {
+        let (a, b) = (f64::from(FREE[0][channel]), f64::from(FREE[1][channel]));
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between two bytes"
+        )]
+        let mixed = (a + (b - a) * share).round() as u8;
+        mixed
+    })
+}

@@ -1,0 +1,259 @@
+//! Routes as tables, with what to paste.
+
+use std::fmt::Write;
+
+use needlebench_bench::routes::{ConfigurationAnswer, RouteAnswer, RoutePlan, WhyNot};
+use needlebench_cell::{part_in_words, reason_in_words};
+
+use super::plain_table;
+
+/// Routes of the table.
+const SHOWN: usize = 8;
+
+/// Routes to a target.
+pub fn routes_text(plan: &RoutePlan) -> String {
+    let mut text = head(plan);
+    if plan.routes.is_empty() {
+        text.push_str("none of them is free");
+        return text;
+    }
+    match &plan.chosen {
+        Some(chosen) => {
+            let _ = writeln!(
+                text,
+                "{}",
+                choice(plan, &plan.routes[chosen.route], chosen.route)
+            );
+        }
+        None => {
+            let _ = writeln!(
+                text,
+                "none of the {} routes that stand for the rest is served in {} of 8 configurations",
+                plan.routes.len(),
+                plan.wanted
+            );
+        }
+    }
+    if let Some(why) = &plan.robot_not_asked {
+        let _ = writeln!(text, "no robot was asked: {why}");
+    }
+    if let Some(why_not) = &plan.why_not {
+        let _ = writeln!(text, "{}", refused_route(plan, why_not));
+    }
+    let _ = writeln!(text, "\n{}", table(plan));
+    text.push_str(
+        "odds: of a pneumothorax against a route with none of the terms, by published ratios; an\n  order, no \
+         probability\nbone, vessel, organ: lower bounds of the needle's distance",
+    );
+    if let Some(chosen) = &plan.chosen {
+        let route = &plan.routes[chosen.route];
+        let _ = write!(text, "\n\n{}\n{}", terms(route), route.toml);
+    }
+    text
+}
+
+fn head(plan: &RoutePlan) -> String {
+    let [x, y, z] = plan.target_in_phantom_m.map(|m| m * 1e3);
+    let refused: Vec<String> = plan
+        .refused
+        .iter()
+        .map(|each| format!("{} {}", each.in_words, each.count))
+        .collect();
+    let scan = plan
+        .phantom_origin_in_ct_m
+        .map_or_else(String::new, |origin| {
+            let place = [0, 1, 2]
+                .map(|k| format!("{:.1}", (plan.target_in_phantom_m[k] + origin[k]) * 1e3));
+            format!(", in the scan [{}]", place.join(", "))
+        });
+    format!(
+        "routes to {}, target [{x:.1}, {y:.1}, {z:.1}] mm{scan}\n{} of {} directions are free by {}; refused: {}\n",
+        plan.goal,
+        plan.free,
+        plan.tried,
+        if plan.anatomy == "voxels" {
+            "the scan's voxels"
+        } else {
+            "the phantom's solids"
+        },
+        refused.join(", ")
+    )
+}
+
+fn best(route: &RouteAnswer) -> Option<&ConfigurationAnswer> {
+    let label = route.best?;
+    route.configurations.iter().find(|each| each.label == label)
+}
+
+fn choice(plan: &RoutePlan, route: &RouteAnswer, index: usize) -> String {
+    let mut text = format!("route {}, {:.0} mm deep", index + 1, route.depth_m * 1e3);
+    if let Some(best) = best(route) {
+        let _ = write!(text, ", in {}", best.label);
+        if let Some(clearance_m) = best.clearance_m {
+            let _ = write!(text, ": clearance {:.1} mm", clearance_m * 1e3);
+        }
+        if let Some(error) = &best.error {
+            let _ = write!(
+                text,
+                ", expected {:.1} mm rms across the needle",
+                error.target_lateral_rms_m * 1e3
+            );
+        }
+        if let Some(spare_m) = best.spare_m {
+            let _ = write!(
+                text,
+                ", with {:.1} mm to spare beyond its margins with {} standard deviations",
+                spare_m * 1e3,
+                plan.sigmas
+            );
+        }
+        let _ = write!(text, " (postures only, motions not planned)");
+    }
+    text
+}
+
+fn refused_route(plan: &RoutePlan, why_not: &WhyNot) -> String {
+    let reasons: Vec<String> = why_not
+        .reasons
+        .iter()
+        .map(|each| format!("{} ({})", words(&each.rule), each.count))
+        .collect();
+    let mut text = format!(
+        "route {} is better and not served: {}",
+        why_not.route + 1,
+        reasons.join(", ")
+    );
+    if let Some(odds) = why_not.odds_to_chosen {
+        let _ = write!(text, "; its odds are {odds:.2} of those of the chosen one");
+    }
+    if let Some(freeing) = &why_not.freeing {
+        let freed: Vec<String> = freeing
+            .freed
+            .iter()
+            .map(|each| {
+                let change = each.toml.replace('\n', " ");
+                format!("`{change}` ({} of 8 work)", each.working)
+            })
+            .collect();
+        if freed.is_empty() {
+            let _ = write!(
+                text,
+                "; nothing frees it of what was tried: {}",
+                freeing.tried
+            );
+        } else {
+            let _ = write!(text, "; what frees it: {}", freed.join(", or "));
+        }
+    }
+    let _ = plan;
+    text
+}
+
+fn words(rule: &str) -> String {
+    match rule {
+        "margin_with_error" => "margins with its own error".to_owned(),
+        "expected_error" => "its error cannot be told".to_owned(),
+        other => reason_in_words(other),
+    }
+}
+
+fn table(plan: &RoutePlan) -> String {
+    let mut header = vec![
+        "",
+        "direction\n(deg)",
+        "deep\n(mm)",
+        "in lung\n(mm)",
+        "odds",
+        "bone\n(mm)",
+        "vessel\n(mm)",
+        "organ\n(mm)",
+    ];
+    let with_robot = plan.robot_not_asked.is_none();
+    if with_robot {
+        header.extend(["works", "best", "clear\n(mm)", "rms\n(mm)"]);
+    }
+    let mut table = plain_table(&header);
+    let chosen = plan.chosen.as_ref().map(|chosen| chosen.route);
+    let shown = (0..plan.routes.len()).filter(|&index| index < SHOWN || chosen == Some(index));
+    for index in shown {
+        let route = &plan.routes[index];
+        let [azimuth, elevation] = route.direction_deg;
+        let mm = |m: f64| format!("{:.1}", m * 1e3);
+        let mut row = vec![
+            format!(
+                "{}{}",
+                index + 1,
+                if chosen == Some(index) { "*" } else { "" }
+            ),
+            format!("{azimuth:.0}, {elevation:.0}"),
+            format!("{:.0}", route.depth_m * 1e3),
+            format!("{:.0}", route.depth_in_lung_m * 1e3),
+            format!("{:.2}", route.risk.odds_ratio),
+        ];
+        for margin in &route.margins {
+            // Fields end at 20 mm: what is told there is no distance.
+            let told = margin.distance_m.filter(|_| margin.part.is_some());
+            row.push(told.map_or_else(|| "far".to_owned(), mm));
+        }
+        if with_robot {
+            let best = best(route);
+            row.push(format!("{} of 8", route.working));
+            row.push(best.map_or_else(|| "-".to_owned(), |best| best.label.to_owned()));
+            let clearance = best.and_then(|best| best.clearance_m);
+            row.push(clearance.map_or_else(|| "-".to_owned(), mm));
+            let error = best.and_then(|best| best.error);
+            row.push(error.map_or_else(|| "-".to_owned(), |error| mm(error.target_lateral_rms_m)));
+        }
+        table.add_row(row);
+    }
+    let rest = plan.routes.len().saturating_sub(SHOWN);
+    let mut text = table.to_string();
+    if rest > 0 {
+        let _ = write!(text, "\n{rest} more are in the file");
+    }
+    text
+}
+
+fn terms(route: &RouteAnswer) -> String {
+    let terms = route.risk.terms.iter().filter(|term| term.log_odds != 0.0);
+    let terms: Vec<String> = terms
+        .map(|term| {
+            let name = term.term.replace('_', " ");
+            if term.share < 1.0 {
+                format!(
+                    "{name} x{:.2} ({:.0} % of x{})",
+                    term.log_odds.exp(),
+                    100.0 * term.share,
+                    term.odds_ratio
+                )
+            } else {
+                format!("{name} x{}", term.odds_ratio)
+            }
+        })
+        .collect();
+    let nearest: Vec<String> = route
+        .margins
+        .iter()
+        .filter_map(|each| {
+            Some(format!(
+                "{} {:.1} mm",
+                part_in_words(each.part.as_ref()?),
+                each.distance_m? * 1e3
+            ))
+        })
+        .collect();
+    format!(
+        "# odds x{:.2}: {}\n# nearest: {}",
+        route.risk.odds_ratio,
+        if terms.is_empty() {
+            "no term".to_owned()
+        } else {
+            terms.join(", ")
+        },
+        if nearest.is_empty() {
+            "nothing".to_owned()
+        } else {
+            nearest.join(", ")
+        }
+    )
+}

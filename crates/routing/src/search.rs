@@ -1,0 +1,260 @@
+//! Directions judged by all rules that need no robot.
+
+use nalgebra::UnitVector3;
+
+use crate::anatomy::{Anatomy, Exit, LungPassage, Obstacle, Ray, angle_rad};
+use crate::directions::{around, evenly};
+use crate::risk::Risk;
+use crate::rules::{Refusal, RouteRule, RouteRules};
+
+/// A direction that harms nothing, before the robot is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Route {
+    /// From the target to the entry, frame `phantom`.
+    pub outwards: UnitVector3<f64>,
+    /// From the skin to the target, m.
+    pub depth_m: f64,
+    /// Lower bounds of the needle's distances from the skin to the target and behind it, as far as it is thrown, m, in
+    /// the order of [`Obstacle::ALL`]; infinite where there is nothing.
+    pub distances_m: [f64; 3],
+    /// Least distance beyond the margins of [`RouteRules::margins_m`], m.
+    pub spare_m: f64,
+    /// Angle between the needle and the skin's normal, rad.
+    pub skin_angle_rad: f64,
+    /// Lungs on the way.
+    pub lungs: LungPassage,
+    /// How it compares.
+    pub risk: Risk,
+}
+
+impl Route {
+    /// Of two routes the one of less risk first; of equals the one with more to spare.
+    pub fn better_first(&self, other: &Self) -> std::cmp::Ordering {
+        let risk = self.risk.log_odds.total_cmp(&other.risk.log_odds);
+        risk.then(other.spare_m.total_cmp(&self.spare_m))
+    }
+}
+
+/// A direction and what came of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// From the target, frame `phantom`.
+    pub outwards: UnitVector3<f64>,
+    /// The skin in that direction, m from the target, if there is any.
+    pub depth_m: Option<f64>,
+    /// A route, or the rule that it breaks.
+    pub outcome: Result<Route, Refusal>,
+}
+
+/// What was found of all directions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Searched {
+    /// In the order of [`evenly`].
+    pub candidates: Vec<Candidate>,
+}
+
+impl Searched {
+    /// Those that are free, the best first.
+    pub fn free(&self) -> Vec<&Route> {
+        let mut free: Vec<&Route> = self
+            .candidates
+            .iter()
+            .filter_map(|candidate| candidate.outcome.as_ref().ok())
+            .collect();
+        free.sort_by(|a, b| a.better_first(b));
+        free
+    }
+
+    /// How many directions each rule refuses, in the order of the rules; those that refuse none are left out.
+    pub fn refused(&self) -> Vec<(RouteRule, usize)> {
+        let refusals = self.candidates.iter();
+        let rules: Vec<RouteRule> = refusals
+            .filter_map(|candidate| Some(candidate.outcome.as_ref().err()?.rule))
+            .collect();
+        RouteRule::ALL
+            .into_iter()
+            .map(|rule| (rule, rules.iter().filter(|each| **each == rule).count()))
+            .filter(|(_, count)| *count > 0)
+            .collect()
+    }
+}
+
+/// Judges so many directions, evenly over the sphere; the same on any number of threads. Asks between directions
+/// whether to stop, and then leaves the rest out.
+pub fn search(
+    anatomy: &dyn Anatomy,
+    rules: &RouteRules,
+    count: usize,
+    threads: usize,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Searched {
+    let directions: Vec<UnitVector3<f64>> = evenly(count).collect();
+    let each = directions.len().div_ceil(threads.max(1)).max(1);
+    let candidates = std::thread::scope(|scope| {
+        let parts: Vec<_> = directions
+            .chunks(each)
+            .map(|part| {
+                scope.spawn(move || {
+                    let go_on = part.iter().take_while(|_| !stop());
+                    go_on
+                        .map(|outwards| judge(anatomy, rules, outwards))
+                        .collect::<Vec<_>>()
+                })
+            })
+            .collect();
+        parts
+            .into_iter()
+            .flat_map(|part| {
+                part.join()
+                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            })
+            .collect()
+    });
+    Searched { candidates }
+}
+
+/// Judges one direction.
+pub fn judge(anatomy: &dyn Anatomy, rules: &RouteRules, outwards: &UnitVector3<f64>) -> Candidate {
+    let ray = Ray {
+        target: anatomy.target(),
+        outwards: *outwards,
+    };
+    let exit = anatomy.exit(&ray);
+    Candidate {
+        outwards: *outwards,
+        depth_m: match exit {
+            Exit::Skin(depth_m) => Some(depth_m),
+            Exit::End(_) | Exit::Nowhere => None,
+        },
+        outcome: route(anatomy, rules, &ray, exit),
+    }
+}
+
+fn route(
+    anatomy: &dyn Anatomy,
+    rules: &RouteRules,
+    ray: &Ray,
+    exit: Exit,
+) -> Result<Route, Refusal> {
+    let refuse = |rule, value, limit| Refusal { rule, value, limit };
+    let longest_m = rules.longest_m;
+    let too_short = |depth_m| refuse(RouteRule::NeedleTooShort, depth_m, longest_m);
+    let depth_m = match exit {
+        Exit::Skin(depth_m) => depth_m,
+        // What the needle does not reach is not looked at any farther.
+        Exit::End(beyond_m) if beyond_m > longest_m => return Err(too_short(beyond_m)),
+        Exit::End(beyond_m) => return Err(refuse(RouteRule::End, beyond_m, 0.0)),
+        Exit::Nowhere => return Err(refuse(RouteRule::NoSkin, 0.0, 0.0)),
+    };
+    if depth_m > longest_m {
+        return Err(too_short(depth_m));
+    }
+    if anatomy.is_body_between(ray, [depth_m, depth_m + rules.outside_m]) {
+        return Err(refuse(RouteRule::Outside, 0.0, rules.outside_m));
+    }
+    let surface =
+        |from_to_m, obstacle| anatomy.distance_m(ray, from_to_m, obstacle) - rules.needle_radius_m;
+    let on_the_way_m = Obstacle::ALL.map(|obstacle| surface([0.0, depth_m], obstacle));
+    if let Some((obstacle, distance_m, margin_m)) = worst(rules, &on_the_way_m) {
+        return Err(refuse(RouteRule::of(obstacle), distance_m, margin_m));
+    }
+    let lungs = anatomy.lungs(ray, [0.0, depth_m]);
+    if lungs.entries > rules.max_pleural_crossings {
+        let (value, limit) = (lungs.entries, rules.max_pleural_crossings);
+        return Err(refuse(RouteRule::Pleura, value.into(), limit.into()));
+    }
+    for (rule, crossed, allowed) in [
+        (RouteRule::Fissure, &lungs.fissures, rules.cross_fissures),
+        (RouteRule::Bulla, &lungs.bullae, rules.cross_bullae),
+    ] {
+        if !allowed && !crossed.is_empty() {
+            return Err(refuse(rule, crossed.len() as f64, 0.0));
+        }
+    }
+    let behind_m = throw(anatomy, rules, ray)?;
+    let distances_m = [0, 1, 2].map(|index| f64::min(on_the_way_m[index], behind_m[index]));
+    let normal = anatomy.skin_normal(ray, depth_m);
+    let skin_angle_rad = angle_rad(&ray.outwards, &normal);
+    if skin_angle_rad > rules.max_skin_angle_rad {
+        let limit = rules.max_skin_angle_rad;
+        return Err(refuse(RouteRule::Oblique, skin_angle_rad, limit));
+    }
+    let diameter_m = 2.0 * rules.needle_radius_m;
+    let touches = anatomy.touches_pleura();
+    Ok(Route {
+        outwards: ray.outwards,
+        depth_m,
+        spare_m: spare_m(rules, &distances_m),
+        distances_m,
+        skin_angle_rad,
+        risk: Risk::new(&rules.odds, &ray.outwards, &lungs, touches, diameter_m),
+        lungs,
+    })
+}
+
+/// Distances behind the target, as far as the needle is thrown, where that is free.
+fn throw(anatomy: &dyn Anatomy, rules: &RouteRules, ray: &Ray) -> Result<[f64; 3], Refusal> {
+    let from_to_m = [-rules.throw_m, 0.0];
+    let refuse = |value, limit| Refusal {
+        rule: RouteRule::Throw,
+        value,
+        limit,
+    };
+    let distances_m = Obstacle::ALL
+        .map(|obstacle| anatomy.distance_m(ray, from_to_m, obstacle) - rules.needle_radius_m);
+    if let Some((_, distance_m, margin_m)) = worst(rules, &distances_m) {
+        return Err(refuse(distance_m, margin_m));
+    }
+    match anatomy.leaves_lung_m(ray, rules.throw_m) {
+        Some(behind_m) => Err(refuse(behind_m, rules.throw_m)),
+        None => Ok(distances_m),
+    }
+}
+
+/// The margin that is missed most.
+fn worst(rules: &RouteRules, distances_m: &[f64; 3]) -> Option<(Obstacle, f64, f64)> {
+    Obstacle::ALL
+        .into_iter()
+        .map(|obstacle| {
+            let index = obstacle as usize;
+            (obstacle, distances_m[index], rules.margins_m[index])
+        })
+        .filter(|(_, distance_m, margin_m)| distance_m < margin_m)
+        .min_by(|a, b| (a.1 - a.2).total_cmp(&(b.1 - b.2)))
+}
+
+fn spare_m(rules: &RouteRules, distances_m: &[f64; 3]) -> f64 {
+    let pairs = distances_m.iter().zip(&rules.margins_m);
+    pairs
+        .map(|(distance_m, margin_m)| distance_m - margin_m)
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The best route near one: in steps that become smaller, from ring to ring, to less risk or, at the same, to more room.
+pub fn refined(
+    anatomy: &dyn Anatomy,
+    rules: &RouteRules,
+    route: &Route,
+    from_rad: f64,
+    to_rad: f64,
+) -> Route {
+    const ON_A_RING: usize = 6;
+    /// Rings that are asked at most: the best one near by is sought, not one elsewhere.
+    const RINGS: usize = 12;
+    let mut best = route.clone();
+    let mut step_rad = from_rad;
+    for _ in 0..RINGS {
+        if step_rad < to_rad {
+            break;
+        }
+        let better = around(&best.outwards, step_rad, ON_A_RING)
+            .filter_map(|outwards| judge(anatomy, rules, &outwards).outcome.ok())
+            .filter(|found| found.better_first(&best).is_lt())
+            .min_by(Route::better_first);
+        match better {
+            Some(found) => best = found,
+            None => step_rad *= 0.5,
+        }
+    }
+    best
+}

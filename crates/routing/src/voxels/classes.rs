@@ -1,0 +1,172 @@
+//! What labels mean for a needle.
+
+use needlebench_imaging::{Label, LabelMap, SurfaceTissue, structure_of};
+
+use crate::Obstacle;
+
+/// What a voxel is to a needle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Not of the body.
+    Outside,
+    /// What it may pass.
+    Soft,
+    /// Of a lung, by number.
+    Lung(u8),
+    /// In a lung without being air: small vessels, fissures.
+    InLung,
+    /// The lesion, or another.
+    Lesion,
+    Bone,
+    Vessel,
+    Organ,
+}
+
+/// A label, and what is known of it.
+#[derive(Debug, Clone)]
+pub(super) struct Class {
+    pub name: String,
+    pub kind: Kind,
+    pub is_lung_vessel: bool,
+    pub is_bulla: bool,
+    pub is_fissure: bool,
+    pub is_gas: bool,
+}
+
+impl Class {
+    fn new(name: &str, kind: Kind) -> Self {
+        Self {
+            name: name.to_owned(),
+            kind,
+            is_lung_vessel: false,
+            is_bulla: false,
+            is_fissure: false,
+            is_gas: false,
+        }
+    }
+
+    /// Whether it counts as an obstacle for a target in a lung.
+    pub fn is(&self, obstacle: Obstacle, target_lung: Option<u8>) -> bool {
+        match self.kind {
+            Kind::Bone => obstacle == Obstacle::Bone,
+            Kind::Vessel => obstacle == Obstacle::Vessel,
+            Kind::InLung => obstacle == Obstacle::Vessel && self.is_lung_vessel,
+            Kind::Organ => obstacle == Obstacle::Organ,
+            Kind::Lung(lung) => obstacle == Obstacle::Organ && target_lung != Some(lung),
+            Kind::Outside | Kind::Soft | Kind::Lesion => false,
+        }
+    }
+}
+
+/// All labels as classes of one byte.
+#[derive(Debug)]
+pub(super) struct Classes {
+    all: Vec<Class>,
+    /// By label.
+    of_label: Vec<u8>,
+    lungs: Vec<String>,
+}
+
+impl Classes {
+    /// Of a label map whose lesions have these names.
+    pub fn of(labels: &LabelMap, lesions: &[String], off: &[String]) -> Self {
+        let mut made = Self {
+            all: vec![
+                Class::new("outside", Kind::Outside),
+                Class::new("soft tissue", Kind::Soft),
+            ],
+            of_label: vec![1; 1 << 16],
+            lungs: Vec::new(),
+        };
+        made.of_label[0] = 0;
+        for (label, name) in &labels.names {
+            if *label == 0 {
+                continue;
+            }
+            let class = made.class(name, lesions, off);
+            // More structures than a byte tells apart share the last number of their kind.
+            let number = match u8::try_from(made.all.len()) {
+                Ok(number) => {
+                    made.all.push(class);
+                    number
+                }
+                Err(_) => made.like(class.kind),
+            };
+            made.of_label[usize::from(*label)] = number;
+        }
+        made
+    }
+
+    fn like(&self, kind: Kind) -> u8 {
+        let last = self.all.iter().rposition(|class| class.kind == kind);
+        last.and_then(|index| u8::try_from(index).ok()).unwrap_or(1)
+    }
+
+    fn class(&mut self, name: &str, lesions: &[String], off: &[String]) -> Class {
+        let lower = name.to_lowercase();
+        if lesions.iter().any(|lesion| lesion == name) {
+            return Class::new(name, Kind::Lesion);
+        }
+        if off.iter().any(|each| each == name) {
+            return Class::new(name, Kind::Soft);
+        }
+        let is_bulla = ["bulla", "emphysema"]
+            .iter()
+            .any(|word| lower.contains(word));
+        let is_fissure = lower.contains("fissure");
+        if is_bulla || is_fissure {
+            return Class {
+                is_bulla,
+                is_fissure,
+                ..Class::new(name, Kind::InLung)
+            };
+        }
+        if name == Label::Gas.name() {
+            return Class {
+                is_gas: true,
+                ..Class::new(name, Kind::Organ)
+            };
+        }
+        let Some(structure) = structure_of(name) else {
+            return Class::new(name, Kind::Soft);
+        };
+        let kind = match structure.tissue {
+            SurfaceTissue::Skin => Kind::Soft,
+            SurfaceTissue::Bone => Kind::Bone,
+            SurfaceTissue::Vessel if structure.name == "lung_vessels" => Kind::InLung,
+            SurfaceTissue::Vessel => Kind::Vessel,
+            SurfaceTissue::Organ => Kind::Organ,
+            SurfaceTissue::Lesion => Kind::Lesion,
+            SurfaceTissue::Lung => Kind::Lung(self.lung(&structure.name)),
+        };
+        Class {
+            is_lung_vessel: kind == Kind::InLung,
+            ..Class::new(name, kind)
+        }
+    }
+
+    fn lung(&mut self, name: &str) -> u8 {
+        let index = self.lungs.iter().position(|lung| lung == name);
+        let index = index.unwrap_or_else(|| {
+            self.lungs.push(name.to_owned());
+            self.lungs.len() - 1
+        });
+        u8::try_from(index).unwrap_or(u8::MAX)
+    }
+
+    pub fn of_label(&self, label: u16) -> u8 {
+        self.of_label[usize::from(label)]
+    }
+
+    pub fn get(&self, class: u8) -> &Class {
+        &self.all[usize::from(class)]
+    }
+
+    pub fn all(&self) -> impl Iterator<Item = &Class> {
+        self.all.iter()
+    }
+
+    pub fn lung_name(&self, lung: u8) -> &str {
+        &self.lungs[usize::from(lung)]
+    }
+}

@@ -1,0 +1,4 @@
+//! Routes in voxels and among solids, against brute force.
+
+mod solids;
+mod voxels;

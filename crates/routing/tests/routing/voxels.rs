@@ -1,0 +1,371 @@
+//! Routes in label maps, against every voxel of them.
+
+use std::sync::atomic::AtomicBool;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use needlebench_cell::scenario::OddsSection;
+use needlebench_imaging::{LabelMap, VoxelGrid};
+use needlebench_routing::{
+    Anatomy, Obstacle, Ray, RouteRule, RouteRules, VoxelAnatomy, VoxelOptions, apart, evenly,
+    pareto, refined, search,
+};
+
+static GO: AtomicBool = AtomicBool::new(false);
+
+const SPACING_M: [f64; 3] = [1.5e-3, 1.5e-3, 2e-3];
+const SIZE: [usize; 3] = [110, 90, 70];
+
+const SOFT: u16 = 1;
+const LUNG: u16 = 2;
+const OTHER_LUNG: u16 = 3;
+const BONE: u16 = 6;
+const VESSEL: u16 = 7;
+const HEART: u16 = 20;
+const NODULE: u16 = 100;
+const UPPER: u16 = 30;
+
+/// A chest of ellipsoids, with ribs, a heart, vessels, and a nodule; optionally with the lung in two lobes.
+fn chest(with_lobes: bool) -> LabelMap {
+    let grid = VoxelGrid::aligned(SIZE, SPACING_M, Point3::new(-0.09, -0.07, 0.02)).unwrap();
+    let mut labels = vec![0_u16; grid.len()];
+    for k in 0..SIZE[2] {
+        for j in 0..SIZE[1] {
+            for i in 0..SIZE[0] {
+                let at = grid.ct_from_index(&Point3::new(i as f64, j as f64, k as f64));
+                labels[grid.offset([i, j, k])] = label_at(&at, with_lobes);
+            }
+        }
+    }
+    let mut names = vec![
+        (SOFT, "soft_tissue".to_owned()),
+        (LUNG, "lung_left".to_owned()),
+        (OTHER_LUNG, "lung_right".to_owned()),
+        (BONE, "bone".to_owned()),
+        (VESSEL, "contrast_vessels".to_owned()),
+        (HEART, "heart".to_owned()),
+        (NODULE, "nodule".to_owned()),
+    ];
+    if with_lobes {
+        names.push((UPPER, "lung_upper_lobe_left".to_owned()));
+    }
+    LabelMap {
+        grid,
+        labels,
+        names,
+    }
+}
+
+fn is_in(at: &Point3<f64>, centre: [f64; 3], radii: [f64; 3]) -> bool {
+    let way = at - Point3::from(centre);
+    way.component_div(&Vector3::from(radii)).norm() <= 1.0
+}
+
+const CENTRE: [f64; 3] = [-0.008, -0.003, 0.09];
+const TARGET: [f64; 3] = [0.03, 0.0, 0.09];
+
+fn label_at(at: &Point3<f64>, with_lobes: bool) -> u16 {
+    if !is_in(at, CENTRE, [0.07, 0.055, 0.4]) {
+        return 0;
+    }
+    if is_in(at, TARGET, [0.006; 3]) {
+        return NODULE;
+    }
+    if is_in(at, [-0.005, -0.015, 0.09], [0.012, 0.02, 0.03]) {
+        return HEART;
+    }
+    let vessel = (at.y - 0.012).hypot(at.z - 0.1) < 0.002 && at.x > 0.0;
+    if vessel {
+        return VESSEL;
+    }
+    // Ribs: rings of bone in the wall, open in front.
+    let wall = !is_in(at, CENTRE, [0.062, 0.047, 0.4]) && is_in(at, CENTRE, [0.067, 0.052, 0.4]);
+    if wall && (at.z / 0.025).fract() < 0.35 && at.y > -0.035 {
+        return BONE;
+    }
+    if is_in(at, [0.03, 0.0, 0.09], [0.025, 0.035, 0.06]) {
+        return if with_lobes && at.y + 0.5 * at.x < 0.02 {
+            UPPER
+        } else {
+            LUNG
+        };
+    }
+    if is_in(at, [-0.042, 0.0, 0.09], [0.018, 0.035, 0.06]) {
+        return OTHER_LUNG;
+    }
+    SOFT
+}
+
+fn rules() -> RouteRules {
+    RouteRules {
+        margins_m: [2e-3, 2.5e-3, 2.7e-3],
+        constant_m: 1e-3,
+        sigmas: 2.0,
+        floors_m: [2e-3; 3],
+        needle_radius_m: 0.6e-3,
+        longest_m: 0.08,
+        outside_m: 0.05,
+        max_skin_angle_rad: 1.1,
+        max_pleural_crossings: 1,
+        cross_fissures: false,
+        cross_bullae: false,
+        throw_m: 0.008,
+        odds: OddsSection::default(),
+    }
+}
+
+fn anatomy(labels: &LabelMap, threads: usize) -> VoxelAnatomy {
+    VoxelAnatomy::new(
+        labels,
+        Vector3::zeros(),
+        Point3::from(TARGET),
+        &VoxelOptions {
+            lesions: &["nodule".to_owned()],
+            off: &[],
+            needle_m: rules().longest_m,
+            behind_m: rules().throw_m,
+            outside_m: rules().outside_m,
+            lung_vessel_m: 3e-3,
+            below_rib_m: 0.0,
+            threads,
+            cancel: &GO,
+        },
+    )
+    .unwrap()
+}
+
+/// Least distance of a stretch of a ray's axis from the boxes of some labels: in steps of 0.2 mm, each with all voxels.
+fn brute_m(labels: &LabelMap, ray: &Ray, [from_m, to_m]: [f64; 2], of: &[u16]) -> f64 {
+    let grid = &labels.grid;
+    let mut boxes = Vec::new();
+    for k in 0..SIZE[2] {
+        for j in 0..SIZE[1] {
+            for i in 0..SIZE[0] {
+                if of.contains(&labels.labels[grid.offset([i, j, k])]) {
+                    boxes.push(grid.ct_from_index(&Point3::new(i as f64, j as f64, k as f64)));
+                }
+            }
+        }
+    }
+    let half = Vector3::from(SPACING_M) * 0.5;
+    let (count, mut least_m) = (((to_m - from_m) / 2e-4).ceil(), f64::INFINITY);
+    let mut step = 0.0;
+    while step <= count {
+        let at = ray.at(from_m + (to_m - from_m) * step / count);
+        for centre in &boxes {
+            let beyond = ((at - centre).abs() - half).sup(&Vector3::zeros());
+            least_m = least_m.min(beyond.norm());
+        }
+        step += 1.0;
+    }
+    least_m
+}
+
+fn labels_of(obstacle: Obstacle) -> &'static [u16] {
+    match obstacle {
+        Obstacle::Bone => &[BONE],
+        Obstacle::Vessel => &[VESSEL],
+        Obstacle::Organ => &[HEART, OTHER_LUNG],
+    }
+}
+
+/// By how much a bound of a distance may be too small: half a voxel's diagonal squared, half a step, the error of the mask,
+/// the brute force's own steps.
+fn slack_m(exact_m: f64) -> f64 {
+    let half = 0.5 * Vector3::from(SPACING_M).norm();
+    exact_m - (exact_m * exact_m - half * half).max(0.0).sqrt() + 0.125e-3 + 0.75e-3 + 0.1e-3
+}
+
+#[test]
+fn no_free_route_comes_nearer_to_any_voxel_than_it_says_and_no_refusal_is_far_off() {
+    let labels = chest(false);
+    let (anatomy, rules) = (anatomy(&labels, 2), rules());
+    assert_eq!(anatomy.target_lung(), Some("lung_left"));
+    let found = search(&anatomy, &rules, 2000, 2, &|| false);
+    let (mut free, mut refused) = (0, 0);
+    for candidate in found.candidates.iter().step_by(23) {
+        let ray = Ray {
+            target: anatomy.target(),
+            outwards: candidate.outwards,
+        };
+        match &candidate.outcome {
+            Ok(route) => {
+                free += 1;
+                for obstacle in Obstacle::ALL {
+                    let span = [-rules.throw_m, route.depth_m];
+                    let exact_m =
+                        brute_m(&labels, &ray, span, labels_of(obstacle)) - rules.needle_radius_m;
+                    let told_m = route.distances_m[obstacle as usize];
+                    assert!(told_m >= rules.margins_m[obstacle as usize]);
+                    assert!(told_m <= exact_m, "{obstacle:?}: {told_m} for {exact_m}");
+                    // Distances are told up to 20 mm.
+                    let near_m = exact_m.min(0.02 - rules.needle_radius_m);
+                    assert!(
+                        near_m - told_m <= slack_m(),
+                        "{obstacle:?}: {told_m} for {exact_m}"
+                    );
+                }
+            }
+            Err(refusal) => {
+                let obstacle = Obstacle::ALL
+                    .into_iter()
+                    .find(|&obstacle| RouteRule::of(obstacle) == refusal.rule);
+                if let (Some(obstacle), Some(depth_m)) = (obstacle, candidate.depth_m) {
+                    refused += 1;
+                    let exact_m = brute_m(&labels, &ray, [0.0, depth_m], labels_of(obstacle));
+                    assert!(refusal.value <= exact_m - rules.needle_radius_m);
+                    assert!(exact_m - rules.needle_radius_m < refusal.limit + slack_m(exact_m));
+                }
+            }
+        }
+    }
+    assert!(free > 5 && refused > 5, "{free} {refused}");
+}
+
+#[test]
+fn depth_and_lungs_are_those_of_the_shapes() {
+    let labels = chest(false);
+    let anatomy = anatomy(&labels, 1);
+    assert_eq!(anatomy.touches_pleura(), Some(false));
+    // Square to the wall, to the patient's left.
+    let ray = Ray {
+        target: anatomy.target(),
+        outwards: Vector3::x_axis(),
+    };
+    let skin_m = CENTRE[0] + 0.07 - TARGET[0];
+    let needlebench_routing::Exit::Skin(depth_m) = anatomy.exit(&ray) else {
+        panic!("no skin");
+    };
+    assert!(
+        (depth_m - skin_m).abs() < SPACING_M[0],
+        "{depth_m} {skin_m}"
+    );
+    let lungs = anatomy.lungs(&ray, [0.0, depth_m]);
+    assert_eq!(lungs.entries, 1);
+    assert!((lungs.within_m - 0.025).abs() < SPACING_M[0], "{lungs:?}");
+    assert!(lungs.pleura_angle_rad.unwrap() < 0.1);
+    assert!(anatomy.skin_normal(&ray, depth_m).dot(&Vector3::x_axis()) > 0.98);
+    // Behind the target, the lung ends after another 25 mm.
+    let left_m = anatomy.leaves_lung_m(&ray, 0.05).unwrap();
+    assert!((left_m - 0.025).abs() < SPACING_M[0]);
+    assert_eq!(anatomy.leaves_lung_m(&ray, 0.02), None);
+    assert!(!anatomy.is_body_between(&ray, [depth_m, depth_m + 0.05]));
+}
+
+#[test]
+fn lobes_make_a_fissure() {
+    let labels = chest(true);
+    let anatomy = anatomy(&labels, 1);
+    let found = search(&anatomy, &rules(), 3000, 1, &|| false);
+    let refused: Vec<_> = found
+        .candidates
+        .iter()
+        .filter(|each| {
+            each.outcome
+                .as_ref()
+                .is_err_and(|refusal| refusal.rule == RouteRule::Fissure)
+        })
+        .collect();
+    assert!(!refused.is_empty());
+    let may = RouteRules {
+        cross_fissures: true,
+        ..rules()
+    };
+    for candidate in refused {
+        if let Ok(route) = needlebench_routing::judge(&anatomy, &may, &candidate.outwards).outcome {
+            let term = |name| {
+                route
+                    .risk
+                    .terms
+                    .iter()
+                    .find(|term| term.term == name)
+                    .unwrap()
+            };
+            assert!((term("fissure").log_odds - 3.75_f64.ln()).abs() < 1e-12);
+            assert!(!route.lungs.fissures.is_empty(), "{:?}", route.lungs);
+        }
+    }
+}
+
+#[test]
+fn threads_change_nothing_and_stopping_leaves_out() {
+    let labels = chest(false);
+    let one = search(&anatomy(&labels, 1), &rules(), 500, 1, &|| false);
+    let three = search(&anatomy(&labels, 3), &rules(), 500, 3, &|| false);
+    assert_eq!(one, three);
+    assert!(
+        search(&anatomy(&labels, 1), &rules(), 500, 2, &|| true)
+            .candidates
+            .is_empty()
+    );
+}
+
+#[test]
+fn refinement_never_makes_a_route_worse() {
+    let labels = chest(false);
+    let (anatomy, rules) = (anatomy(&labels, 1), rules());
+    let found = search(&anatomy, &rules, 1000, 1, &|| false);
+    let free = found.free();
+    let mut better = 0;
+    for route in free.iter().step_by(5) {
+        let refined = refined(&anatomy, &rules, route, 0.03, 0.004);
+        assert!(refined.better_first(route).is_le());
+        better += usize::from(refined.better_first(route).is_lt());
+    }
+    assert!(better > 0);
+}
+
+#[test]
+fn targets_outside_are_refused() {
+    let labels = chest(false);
+    let options = VoxelOptions {
+        lesions: &[],
+        off: &[],
+        needle_m: 0.1,
+        behind_m: 0.0,
+        outside_m: 0.05,
+        lung_vessel_m: 0.0,
+        below_rib_m: 3e-3,
+        threads: 1,
+        cancel: &GO,
+    };
+    for (target, words) in [
+        (Point3::new(-0.089, -0.069, 0.09), "outside the body"),
+        (Point3::new(1.0, 0.0, 0.09), "outside the scan"),
+        (Point3::new(f64::NAN, 0.0, 0.09), "outside the scan"),
+    ] {
+        let error = VoxelAnatomy::new(&labels, Vector3::zeros(), target, &options).unwrap_err();
+        assert!(error.to_string().contains(words), "{error}");
+    }
+}
+
+#[test]
+fn directions_are_even_apart_and_turn_back() {
+    let all: Vec<UnitVector3<f64>> = evenly(4000).collect();
+    let mean: Vector3<f64> = all.iter().map(|each| each.into_inner()).sum();
+    assert!(mean.norm() < 2.0, "{mean}");
+    for each in all.iter().step_by(97) {
+        let back = needlebench_routing::outwards(needlebench_routing::angles_rad(each));
+        assert!((back.into_inner() - each.into_inner()).norm() < 1e-12);
+    }
+    let picked = apart(&all, |each| *each, 0.1, 300);
+    assert!((100..=300).contains(&picked.len()));
+    assert_eq!(picked[0], 0);
+    for (n, &a) in picked.iter().enumerate() {
+        for &b in &picked[..n] {
+            assert!(all[a].angle(&all[b]) > 0.1);
+        }
+    }
+}
+
+#[test]
+fn pareto_keeps_what_nothing_beats() {
+    let items = [
+        [1.0, 5.0],
+        [2.0, 4.0],
+        [2.0, 5.0],
+        [1.0, 5.0],
+        [3.0, 1.0],
+        [4.0, 1.0],
+    ];
+    assert_eq!(pareto(&items), [0, 1, 3, 4]);
+}
