@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/` and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 17] = [
+const LAYERS: [(&str, &[&str]); 18] = [
     ("kinematics", &[]),
     ("geometry", &["kinematics"]),
     ("cell", &["geometry", "kinematics"]),
@@ -24,6 +24,7 @@ const LAYERS: [(&str, &[&str]); 17] = [
     ("study", &["cell", "kinematics"]),
     ("recorded", &["cell", "kinematics"]),
     ("imaging", &["geometry", "kinematics"]),
+    ("routing", &["imaging", "cell", "geometry", "kinematics"]),
     (
         "evaluation",
         &[
@@ -38,6 +39,7 @@ const LAYERS: [(&str, &[&str]); 17] = [
     (
         "bench",
         &[
+            "routing",
             "imaging",
             "recorded",
             "study",

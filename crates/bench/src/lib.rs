@@ -15,6 +15,7 @@ mod budgets;
 mod control;
 pub mod credibility;
 pub mod ct;
+mod entry;
 mod events;
 pub mod excitation;
 mod iso9283;
@@ -40,6 +41,7 @@ pub mod suggest;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use control::Control;
+pub use entry::choose_entry;
 pub use events::{EngineEvents, EventRun, StagedStop};
 pub use preview::Preview;
 pub use real_cell::servo_of;

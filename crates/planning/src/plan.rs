@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use needlebench_cell::{Goal, Roll};
 use needlebench_kinematics::ik::{Configuration, wrap_angle};
 
-use crate::family::{Member, Merit};
+use crate::family::{Member, Merit, Sweep};
 use crate::limits::{ByClass, Shortfall};
 use crate::margin::SAME_M;
 use crate::motion_plan::{ConfigurationPlan, Required, Way};
@@ -77,6 +77,34 @@ impl Planner<'_> {
             self.first(goal, configuration, &rolls)
         };
         member.on_route(route_rejection(self.resolved, goal).as_ref())
+    }
+
+    /// Of postures of a configuration at these rolls the best for the scenario's `roll_aim` that breaks no rule; where all
+    /// break one, the first that there is. Nothing between the rolls is looked at, and the needle's route neither: it
+    /// is for asking many goals.
+    pub fn best_of_rolls(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        rolls_rad: &[f64],
+    ) -> Member {
+        let aim = self.planning().roll_aim;
+        let mut sweep = Sweep::new(self, goal, configuration);
+        let mut best: Option<(Merit, f64)> = None;
+        for &roll_rad in rolls_rad {
+            if !sweep.works(roll_rad) {
+                continue;
+            }
+            let merit = sweep.glance(aim, roll_rad).merit;
+            if best.is_none_or(|(other, _)| merit.better_first(&other) == Ordering::Less) {
+                best = Some((merit, roll_rad));
+            }
+        }
+        if let Some((_, roll_rad)) = best {
+            return sweep.member(roll_rad);
+        }
+        let reached = rolls_rad.iter().find(|&&roll_rad| sweep.reaches(roll_rad));
+        sweep.member(*reached.or(rolls_rad.first()).unwrap_or(&0.0))
     }
 
     fn first(&self, goal: &Goal, configuration: Configuration, rolls_rad: &[f64]) -> Member {

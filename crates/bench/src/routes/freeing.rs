@@ -5,6 +5,7 @@ use std::path::Path;
 use needlebench_cell::scenario::GoalSection;
 use needlebench_cell::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting};
 use needlebench_clearance::ClearanceModel;
+use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::Planner;
 use serde::Serialize;
 
@@ -205,11 +206,10 @@ fn working(family: &ScenarioFamily, each: &Try) -> usize {
     let Some(goal) = resolved.goals.first() else {
         return 0;
     };
-    let mut works = [false; 8];
-    for roll_rad in planner.rolls(goal, ROLLS) {
-        for (works, member) in works.iter_mut().zip(planner.members_at(goal, roll_rad)) {
-            *works |= member.works() && super::joint::meets_criteria(&resolved, &member);
-        }
-    }
-    works.into_iter().filter(|works| *works).count()
+    let rolls = planner.rolls(goal, ROLLS);
+    let works = Configuration::ALL.into_iter().filter(|configuration| {
+        let member = planner.best_of_rolls(goal, *configuration, &rolls);
+        member.works() && super::joint::meets_criteria(&resolved, &member)
+    });
+    works.count()
 }

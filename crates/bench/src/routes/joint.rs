@@ -185,18 +185,13 @@ impl Robot<'_> {
     fn serve(&self, index: usize, rounded: &Rounded) -> Vec<Served> {
         let goal = &self.resolved.goals[index];
         let rolls = self.planner.rolls(goal, ROLLS);
-        let at_rolls: Vec<[Member; 8]> = rolls
-            .iter()
-            .map(|&roll_rad| self.planner.members_at(goal, roll_rad))
-            .collect();
         // The planned patient's own surfaces count, too: `run` holds the needle against them.
         let refused = judge_route(self.resolved, goal).filter(|judged| !judged.is_kept());
         Configuration::ALL
             .into_iter()
-            .enumerate()
-            .map(|(number, configuration)| {
-                let members = at_rolls.iter().map(|members| &members[number]);
-                let mut served = self.best(goal, configuration, members);
+            .map(|configuration| {
+                let member = self.planner.best_of_rolls(goal, configuration, &rolls);
+                let mut served = self.served(goal, configuration, member);
                 if served.works() && refused.is_some() {
                     served.reason = Some("needle_route".to_owned());
                 }
@@ -208,53 +203,25 @@ impl Robot<'_> {
             .collect()
     }
 
-    /// The best of a configuration's postures: one that works and meets the criteria, else the one nearest to it.
-    fn best<'m>(
-        &self,
-        goal: &Goal,
-        configuration: Configuration,
-        members: impl Iterator<Item = &'m Member>,
-    ) -> Served {
-        let mut nearest: Option<&Member> = None;
-        let mut works: Option<(Merit, &Member)> = None;
-        let mut missed: Option<&'static str> = None;
-        for member in members {
-            if nearest.is_none_or(|best| member.surplus > best.surplus) {
-                nearest = Some(member);
-            }
-            let Some(candidate) = member.candidate.as_ref().filter(|_| member.works()) else {
-                continue;
-            };
-            if let Some(first) = missed_criterion(self.resolved, candidate) {
-                missed = Some(first);
-                continue;
-            }
-            let aim = self.resolved.scenario.planning.roll_aim;
-            let merit = self.planner.merit(goal, aim, candidate);
-            if works.is_none_or(|(best, _)| merit > best) {
-                works = Some((merit, member));
-            }
-        }
-        let (value, member) = match works {
-            Some((merit, member)) => (Some(merit), Some(member)),
-            None => (None, nearest),
+    /// What a posture is worth. The best one comes nearest to all criteria: where it misses one, all miss one.
+    fn served(&self, goal: &Goal, configuration: Configuration, member: Member) -> Served {
+        let candidate = member.candidate.as_ref();
+        let reason = match member.rejections.first() {
+            Some(rejection) => Some(rejection.rule.name().to_owned()),
+            None => candidate
+                .and_then(|candidate| missed_criterion(self.resolved, candidate))
+                .map(str::to_owned),
         };
-        let reason = value.is_none().then(|| {
-            let rule = nearest.and_then(|member| member.rejections.first());
-            match (missed, rule) {
-                (Some(missed), _) => missed.to_owned(),
-                (None, Some(rule)) => rule.rule.name().to_owned(),
-                (None, None) => "unreachable".to_owned(),
-            }
-        });
+        let aim = self.resolved.scenario.planning.roll_aim;
+        let clearance = member.least_clearance();
         Served {
             configuration,
+            value: candidate
+                .filter(|_| reason.is_none())
+                .map(|candidate| self.planner.merit(goal, aim, candidate)),
             reason,
-            clearance_m: member
-                .and_then(Member::least_clearance)
-                .map(|pair| pair.separation.distance_m),
-            candidate: member.and_then(|member| member.candidate.clone()),
-            value,
+            clearance_m: clearance.map(|pair| pair.separation.distance_m),
+            candidate: member.candidate,
             error: None,
             spare_m: None,
             room: None,

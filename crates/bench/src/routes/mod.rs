@@ -17,13 +17,15 @@ mod joint;
 mod report;
 
 use needlebench_cell::scenario::{GoalSection, RouteSection};
-use needlebench_cell::{GoalPlacer, ResolvedScenario};
+use needlebench_cell::{Finding, GoalPlacer, ResolvedScenario};
+use needlebench_imaging::ImagingError;
 use needlebench_routing::{
-    Anatomy, Route, RouteRules, Searched, SolidAnatomy, angles_rad, apart, judge, outwards,
-    refined, search,
+    Anatomy, Route, RouteRules, Searched, SolidAnatomy, VoxelAnatomy, VoxelOptions, angles_rad,
+    apart, judge, outwards, refined, search,
 };
 
 use crate::Control;
+use crate::ct::BuiltFolder;
 use crate::suggest::SuggestError;
 use joint::{Asked, ask};
 
@@ -55,6 +57,23 @@ pub enum WithRobot {
     Yes,
     /// No robot can be asked: why.
     No(String),
+}
+
+/// Why there are no voxels to plan in.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum VoxelsError {
+    /// The scan has no such place, or it was interrupted.
+    #[error(transparent)]
+    Scan(#[from] ImagingError),
+    /// The goal has no target.
+    #[error("{0}")]
+    Target(Finding),
+}
+
+impl From<Finding> for VoxelsError {
+    fn from(finding: Finding) -> Self {
+        Self::Target(finding)
+    }
 }
 
 /// What is to be planned.
@@ -93,6 +112,36 @@ impl RouteTask<'_> {
             expected: std::collections::BTreeMap::new(),
             ..self.section.clone()
         }
+    }
+
+    /// The voxels of a scan about the target.
+    ///
+    /// # Errors
+    /// If the target is none, or is not in the scan's body; interrupted.
+    pub fn voxels(
+        &self,
+        built: &BuiltFolder,
+        control: &Control<'_>,
+    ) -> Result<VoxelAnatomy, VoxelsError> {
+        let target = GoalPlacer::new(self.resolved).target(self.section)?;
+        let rules = self.route_rules();
+        let options = VoxelOptions {
+            lesions: &built.lesions,
+            off: &self.resolved.scenario.planning.needle_route.off,
+            needle_m: rules.longest_m,
+            behind_m: rules.throw_m,
+            outside_m: rules.outside_m,
+            lung_vessel_m: self.rules.lung_vessel_mm * 1e-3,
+            below_rib_m: self.rules.below_rib_mm * 1e-3,
+            threads: control.threads,
+            cancel: control.cancel,
+        };
+        Ok(VoxelAnatomy::new(
+            &built.labels,
+            built.origin_in_ct_m,
+            target,
+            &options,
+        )?)
     }
 
     /// The phantom's solids about the target.

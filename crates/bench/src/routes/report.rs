@@ -46,6 +46,8 @@ pub struct RoutePlan {
     pub base_position_m: Option<[f64; 3]>,
     /// Configurations that have to work.
     pub wanted: usize,
+    /// Why configurations do not work on all these routes, the most frequent reason first.
+    pub robot_refused: Vec<Refused>,
     /// Routes of which each stands for those around it, the best first.
     pub routes: Vec<RouteAnswer>,
     /// The best route in which as many configurations work as wanted; without a robot the first.
@@ -314,6 +316,7 @@ pub(super) fn plan(
         },
         base_position_m: with_robot.then(|| placed.into()),
         wanted,
+        robot_refused: reasons(&asked),
         pareto: unbeaten(&asked),
         chosen: chosen.map(|route| ChosenRoute {
             route,
@@ -322,7 +325,7 @@ pub(super) fn plan(
         why_not: why_not.map(|first| WhyNot {
             route: 0,
             odds_to_chosen: chosen.map(|chosen| odds(0) / odds(chosen)),
-            reasons: reasons(first),
+            reasons: reasons(std::slice::from_ref(first)),
             freeing: None,
         }),
         routes: asked
@@ -334,11 +337,13 @@ pub(super) fn plan(
 }
 
 /// Why configurations do not work, the most frequent reason first.
-pub(super) fn reasons(asked: &Asked) -> Vec<Refused> {
-    let blocked = asked.blocked.iter().map(String::as_str);
-    let broken = asked.configurations.iter();
-    let broken = broken.filter_map(|each| each.reason.as_deref());
-    crate::suggest::counted(blocked.chain(broken))
+fn reasons(asked: &[Asked]) -> Vec<Refused> {
+    let all = asked.iter().flat_map(|each| {
+        let blocked = each.blocked.iter().map(String::as_str);
+        let broken = each.configurations.iter();
+        blocked.chain(broken.filter_map(|served| served.reason.as_deref()))
+    });
+    crate::suggest::counted(all)
 }
 
 fn unbeaten(asked: &[Asked]) -> Vec<(usize, &'static str)> {

@@ -15,7 +15,7 @@ use std::f64::consts::FRAC_PI_3;
 
 use nalgebra::Point3;
 use needlebench_cell::scenario::GoalSection;
-use needlebench_cell::{ChosenEntry, Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
+use needlebench_cell::{Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
 use needlebench_clearance::ClearanceModel;
 use needlebench_planning::{Planner, crossed_fissures, judged_tissues};
 use needlebench_study::Outcome;
@@ -26,7 +26,6 @@ use super::{Refused, SuggestError, counted};
 use crate::control::Control;
 use crate::parallel::in_parallel;
 use crate::preview::{ConfigurationPreview, goal_preview};
-use crate::progress::Silent;
 use crate::study::planned_rows;
 
 /// Distance between proposed entries on the skin, m: entries nearer than that are the same to a hand.
@@ -679,56 +678,6 @@ pub fn plan_entry(
     let works = rows.iter().filter(|row| row.outcome == Outcome::Ok);
     entry.working_planned = Some(works.count());
     Ok(())
-}
-
-/// Chooses the first proposal: for scenarios that leave an entry open.
-///
-/// # Errors
-/// A message and a hint, where there is none.
-pub fn choose_entry(
-    resolved: &ResolvedScenario,
-    section: &GoalSection,
-) -> Result<ChosenEntry, [String; 2]> {
-    let control = Control {
-        threads: std::thread::available_parallelism().map_or(1, usize::from),
-        cancel: &std::sync::atomic::AtomicBool::new(false),
-        progress: &Silent,
-    };
-    let found = suggest_entries(resolved, section, 1, &control).map_err(|error| match error {
-        SuggestError::Interrupted => [error.to_string(), String::new()],
-        SuggestError::Refused { message, hint } => [message, hint],
-    })?;
-    let Some(entry) = found.entries.first() else {
-        return Err([
-            format!(
-                "goal `{}` has no entry, and none can be assumed: {}",
-                found.goal,
-                found.why_none()
-            ),
-            "`needlebench suggest` shows all that was tried; or give `entry_mm` or `entry_direction_deg`".to_owned(),
-        ]);
-    };
-    let nearest = entry
-        .margins
-        .iter()
-        .min_by(|a, b| (a.distance_m - a.margin_m).total_cmp(&(b.distance_m - b.margin_m)));
-    let nearest = nearest.map_or(String::new(), |each| {
-        format!(
-            ", {:.1} mm from {} ({})",
-            each.distance_m * 1e3,
-            each.part,
-            each.tissue
-        )
-    });
-    let [azimuth, elevation] = entry.direction_deg;
-    Ok(ChosenEntry {
-        direction_deg: entry.direction_deg,
-        in_words: format!(
-            "`entry_direction_deg = [{azimuth}, {elevation}]`, {:.0} mm deep{nearest}; the first of those that \
-             `needlebench suggest` proposes",
-            entry.depth_m * 1e3
-        ),
-    })
 }
 
 impl EntrySearch {

@@ -14,8 +14,8 @@ use needlebench_cell::reason_in_words;
 use serde::Serialize;
 
 pub use entries::{
-    ENTRY_TERMS, Entry, EntryRule, EntrySample, EntrySearch, EntryTerm, TissueMargin, choose_entry,
-    plan_entry, suggest_entries,
+    ENTRY_TERMS, Entry, EntryRule, EntrySample, EntrySearch, EntryTerm, TissueMargin, plan_entry,
+    suggest_entries,
 };
 pub use places::{
     Place, PlaceGoal, PlaceSample, PlaceSearch, at_place, plan_place, suggest_places,

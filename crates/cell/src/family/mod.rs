@@ -12,6 +12,7 @@ pub use moves::{MovedPhantom, PhantomMove, PhantomMoves, SHIFT_KEYS, TURN_KEYS};
 pub use setting::{Change, Setting};
 
 use crate::resolve::{ModelLibrary, resolve};
+use crate::scenario::{GoalSection, Scenario};
 use crate::schema::Misfit;
 use crate::toml_text::TomlText;
 use crate::{Finding, Overrides, ResolvedScenario, load_scenario, nearest_name};
@@ -106,16 +107,32 @@ impl ScenarioFamily {
             return Err(out_of_range.into_iter().map(finding).collect());
         }
         let toml = TomlText::without_text(file);
-        let source = self.base.source.clone();
-        resolve(
-            &toml,
-            scenario,
-            source,
-            &self.folder,
-            &self.overrides,
-            &self.library,
-            true,
-        )
+        let resolved = |scenario: Scenario, with_goals: bool| {
+            let source = self.base.source.clone();
+            resolve(
+                &toml,
+                scenario,
+                source,
+                &self.folder,
+                &self.overrides,
+                &self.library,
+                with_goals,
+            )
+        };
+        let mut scenario = scenario;
+        let Some(chooser) = self.overrides.choose_entry else {
+            return resolved(scenario, true);
+        };
+        if !scenario.goals.iter().any(GoalSection::is_open) {
+            return resolved(scenario, true);
+        }
+        // Routes are planned for each layout.
+        let empty = Scenario {
+            goals: Vec::new(),
+            ..scenario.clone()
+        };
+        let chosen = chooser.choose(&toml, &resolved(empty, false)?, &mut scenario.goals)?;
+        Ok(chosen.planned.put_back(resolved(scenario, true)?))
     }
 
     /// Whether the scenario has such a key, and the change fits its type, for every goal. A value out of

@@ -25,6 +25,78 @@ type Choose = fn(&ResolvedScenario, &GoalSection) -> Result<ChosenEntry, [String
 #[derive(Debug, Clone, Copy)]
 pub struct EntryChooser(pub Choose);
 
+/// Entries that were chosen for open goals.
+#[derive(Debug, Default)]
+pub(crate) struct ChosenEntries {
+    /// What was chosen and why, for people.
+    pub remarks: Vec<String>,
+    /// Sections of goals with planned routes.
+    pub planned: PlannedSections,
+}
+
+/// Sections of goals whose routes were planned, as they were before they had an entry.
+#[derive(Debug, Default)]
+pub(crate) struct PlannedSections(Vec<(usize, GoalSection)>);
+
+impl PlannedSections {
+    /// The scenario with these sections: it stays what its file says, and is planned anew where it is changed.
+    pub fn put_back(self, mut resolved: ResolvedScenario) -> ResolvedScenario {
+        for (index, section) in self.0 {
+            resolved.scenario.goals[index] = section;
+        }
+        resolved
+    }
+}
+
+impl EntryChooser {
+    /// Gives open goals their entries, in a cell without its goals.
+    ///
+    /// # Errors
+    /// Goals for which there is none to choose.
+    pub(crate) fn choose(
+        &self,
+        toml: &TomlText<'_>,
+        cell: &ResolvedScenario,
+        goals: &mut [GoalSection],
+    ) -> Result<ChosenEntries, Vec<Finding>> {
+        let Self(choose) = self;
+        let mut chosen = ChosenEntries::default();
+        let mut findings = Vec::new();
+        for (index, goal) in goals.iter_mut().enumerate() {
+            if !goal.is_open() {
+                continue;
+            }
+            match choose(cell, goal) {
+                Ok(entry) => {
+                    let section = goal.clone();
+                    goal.entry_direction_deg = Some(entry.direction_deg);
+                    let why = match goal.route.take() {
+                        Some(_) => {
+                            chosen.planned.0.push((index, section));
+                            format!("route planned for goal `{}`", goal.name)
+                        }
+                        None => format!("assumed, since goal `{}` has no entry", goal.name),
+                    };
+                    chosen.remarks.push(format!("{why}: {}", entry.in_words));
+                }
+                Err([message, hint]) => {
+                    let key = match goal.route {
+                        Some(_) => "route",
+                        None => goal.target_key(),
+                    };
+                    let key = format!("goals[{index}].{key}");
+                    findings.push(toml.finding(&key, message).hint(hint));
+                }
+            }
+        }
+        if findings.is_empty() {
+            Ok(chosen)
+        } else {
+            Err(findings)
+        }
+    }
+}
+
 /// Says nothing of what is resolved.
 impl PartialEq for EntryChooser {
     fn eq(&self, _: &Self) -> bool {

@@ -47,6 +47,7 @@ use crate::{Finding, Robot};
 use arm_values::check_brakes;
 use assumed::assume;
 pub use assumed::name_from_file;
+pub(crate) use entry::PlannedSections;
 pub use entry::{ChosenEntry, EntryChooser, GoalPlacer, OpenScenario};
 use excitation::{ExcitationProtocol, check_sweeps, resolve_excitation};
 pub use expected::Expected;
@@ -228,9 +229,10 @@ impl<'a> Draft<'a> {
     }
 
     fn resolve(mut self) -> Result<ResolvedScenario, Vec<Finding>> {
-        let resolved = self
-            .assume_entries()
-            .and_then(|()| self.resolved(self.scenario.clone(), true));
+        let resolved = self.assume_entries().and_then(|planned| {
+            let resolved = self.resolved(self.scenario.clone(), true)?;
+            Ok(planned.put_back(resolved))
+        });
         match resolved {
             Ok(resolved) => Ok(self.noted(resolved)),
             Err(found) => Err(self.remarked(found)),
@@ -261,44 +263,19 @@ impl<'a> Draft<'a> {
         resolve(toml, scenario, source, base, overrides, library, with_goals)
     }
 
-    /// Entries of goals that have a target and none, where somebody can choose them.
-    fn assume_entries(&mut self) -> Result<(), Vec<Finding>> {
-        let Some(EntryChooser(choose)) = self.overrides.choose_entry else {
-            return Ok(());
+    /// Entries of goals that have a target and none, where somebody can choose them; the sections of those whose routes
+    /// were planned, as they were.
+    fn assume_entries(&mut self) -> Result<PlannedSections, Vec<Finding>> {
+        let Some(chooser) = self.overrides.choose_entry else {
+            return Ok(PlannedSections::default());
         };
-        let is_open = |goal: &GoalSection| {
-            let has_target = goal.target_mm.is_some() || goal.lesion.is_some();
-            has_target && goal.entry_key_given().is_none() && goal.flange_pose.is_none()
-        };
-        if !self.scenario.goals.iter().any(is_open) {
-            return Ok(());
+        if !self.scenario.goals.iter().any(GoalSection::is_open) {
+            return Ok(PlannedSections::default());
         }
         let cell = self.without_goals()?;
-        let mut findings = Vec::new();
-        for (index, goal) in self.scenario.goals.iter_mut().enumerate() {
-            if !is_open(goal) {
-                continue;
-            }
-            match choose(&cell, goal) {
-                Ok(entry) => {
-                    goal.entry_direction_deg = Some(entry.direction_deg);
-                    let why = match goal.route.take() {
-                        Some(_) => format!("route planned for goal `{}`", goal.name),
-                        None => format!("assumed, since goal `{}` has no entry", goal.name),
-                    };
-                    self.remarks.push(format!("{why}: {}", entry.in_words));
-                }
-                Err([message, hint]) => {
-                    let key = format!("goals[{index}].{}", goal.target_key());
-                    findings.push(self.toml.finding(&key, message).hint(hint));
-                }
-            }
-        }
-        if findings.is_empty() {
-            Ok(())
-        } else {
-            Err(findings)
-        }
+        let mut chosen = chooser.choose(self.toml, &cell, &mut self.scenario.goals)?;
+        self.remarks.append(&mut chosen.remarks);
+        Ok(chosen.planned)
     }
 
     /// With the remarks before all other notes.

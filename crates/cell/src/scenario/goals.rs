@@ -132,6 +132,12 @@ impl GoalSection {
         }
     }
 
+    /// It has a target, and where the needle enters is left to be chosen.
+    pub(crate) fn is_open(&self) -> bool {
+        let has_target = self.target_mm.is_some() || self.lesion.is_some();
+        has_target && self.entry_key_given().is_none() && self.flange_pose.is_none()
+    }
+
     /// A goal for a target, with everything else left to its defaults.
     pub fn at(target: Target) -> Self {
         let (target_mm, lesion) = match target {

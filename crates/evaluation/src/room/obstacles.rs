@@ -184,6 +184,16 @@ impl PlacedObstacles<'_> {
         if ball_gap_m > beyond_m {
             return f64::INFINITY;
         }
+        // A point's depth in a surface is its distance from it: no direction has to be searched for.
+        if let Some(surface) = placed.solid.prepared.surface() {
+            let local = placed.shape_from_world * point;
+            let distance_m = (surface.nearest(&local) - local).norm();
+            return if surface.contains(&local) {
+                -distance_m
+            } else {
+                distance_m
+            };
+        }
         let at = Pose::translation(point.x, point.y, point.z);
         separation(
             self.point,

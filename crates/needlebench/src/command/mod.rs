@@ -50,7 +50,7 @@ pub(crate) use study::{MergeArguments, STUDY_HELP, StudyArguments, merge, study}
 pub(crate) use suggest::{SuggestArguments, suggest};
 
 use needlebench_bench::Runnable;
-use needlebench_bench::suggest::choose_entry;
+use needlebench_bench::choose_entry;
 
 use crate::arguments::{RobotArguments, UrdfArguments};
 use crate::exit::ExitStatus;

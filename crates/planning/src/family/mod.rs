@@ -286,6 +286,11 @@ impl<'p> Sweep<'p> {
         kinematics.branch(&pose, start, self.configuration)
     }
 
+    /// Whether the configuration reaches the pose at a roll.
+    pub fn reaches(&self, roll_rad: f64) -> bool {
+        self.solution(roll_rad).is_some()
+    }
+
     /// Whether the member at a roll works.
     pub fn works(&mut self, roll_rad: f64) -> bool {
         let found = self.solution(roll_rad);

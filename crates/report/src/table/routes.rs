@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use needlebench_bench::routes::{ConfigurationAnswer, RouteAnswer, RoutePlan, WhyNot};
+use needlebench_bench::suggest::Refused;
 use needlebench_cell::{part_in_words, reason_in_words};
 
 use super::plain_table;
@@ -28,9 +29,10 @@ pub fn routes_text(plan: &RoutePlan) -> String {
         None => {
             let _ = writeln!(
                 text,
-                "none of the {} routes that stand for the rest is served in {} of 8 configurations",
+                "none of the {} routes that stand for the rest is served in {} of 8 configurations, mostly because of {}",
                 plan.routes.len(),
-                plan.wanted
+                plan.wanted,
+                counts(&plan.robot_refused)
             );
         }
     }
@@ -38,7 +40,7 @@ pub fn routes_text(plan: &RoutePlan) -> String {
         let _ = writeln!(text, "no robot was asked: {why}");
     }
     if let Some(why_not) = &plan.why_not {
-        let _ = writeln!(text, "{}", refused_route(plan, why_not));
+        let _ = writeln!(text, "{}", refused_route(why_not));
     }
     let _ = writeln!(text, "\n{}", table(plan));
     text.push_str(
@@ -112,16 +114,11 @@ fn choice(plan: &RoutePlan, route: &RouteAnswer, index: usize) -> String {
     text
 }
 
-fn refused_route(plan: &RoutePlan, why_not: &WhyNot) -> String {
-    let reasons: Vec<String> = why_not
-        .reasons
-        .iter()
-        .map(|each| format!("{} ({})", words(&each.rule), each.count))
-        .collect();
+fn refused_route(why_not: &WhyNot) -> String {
     let mut text = format!(
         "route {} is better and not served: {}",
         why_not.route + 1,
-        reasons.join(", ")
+        counts(&why_not.reasons)
     );
     if let Some(odds) = why_not.odds_to_chosen {
         let _ = write!(text, "; its odds are {odds:.2} of those of the chosen one");
@@ -145,13 +142,20 @@ fn refused_route(plan: &RoutePlan, why_not: &WhyNot) -> String {
             let _ = write!(text, "; what frees it: {}", freed.join(", or "));
         }
     }
-    let _ = plan;
     text
+}
+
+fn counts(reasons: &[Refused]) -> String {
+    let reasons: Vec<String> = reasons
+        .iter()
+        .map(|each| format!("{} ({})", words(&each.rule), each.count))
+        .collect();
+    reasons.join(", ")
 }
 
 fn words(rule: &str) -> String {
     match rule {
-        "margin_with_error" => "margins with its own error".to_owned(),
+        "margin_with_error" => "margin less than its own error asks for".to_owned(),
         "expected_error" => "its error cannot be told".to_owned(),
         other => reason_in_words(other),
     }

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use needlebench_cell::phantom::{Phantom, PhantomPart, Tissue};
 use needlebench_cell::scenario::{NeedleRouteSection, OddsSection};
-use needlebench_routing::{Anatomy, Obstacle, Ray, RouteRule, RouteRules, SolidAnatomy, search};
+use needlebench_routing::{Obstacle, Ray, RouteRule, RouteRules, SolidAnatomy, search};
 
 fn rules() -> RouteRules {
     RouteRules {

@@ -6,23 +6,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use needlebench_bench::Control;
 use needlebench_bench::ct::BuiltFolder;
 use needlebench_bench::routes::{
-    RoutePlan, RouteTask, SOLID_DIRECTIONS, VOXEL_DIRECTIONS, WithRobot, free, plan_routes,
+    RoutePlan, RouteTask, SOLID_DIRECTIONS, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free,
+    plan_routes,
 };
 use needlebench_bench::suggest::SuggestError;
-use needlebench_cell::scenario::{GoalSection, RouteSection, Target};
+use needlebench_cell::scenario::{GoalSection, Target};
 use needlebench_cell::{
-    Finding, GoalPlacer, OpenScenario, Overrides, ResolvedScenario, ScenarioEdit,
-    load_open_scenario, read_text, resolve_scenario,
+    Finding, OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, load_open_scenario,
+    read_text, resolve_scenario,
 };
 use needlebench_imaging::{ImagingError, Remark};
 use needlebench_report::files::{Folder, write_route_maps};
 use needlebench_report::table::routes::routes_text;
 use needlebench_report::{layout, write_atomically};
-use needlebench_routing::{VoxelAnatomy, VoxelOptions};
 use serde::Serialize;
 
 use crate::arguments::{PicturesArguments, RobotArguments};
@@ -397,7 +397,11 @@ fn find(
         };
         let mut plan = match &patient.built {
             Some(built) => {
-                let anatomy = voxels(&task, &rules, built, control)?;
+                control.progress.message("distances");
+                let anatomy = task.voxels(built, control).map_err(|error| match error {
+                    VoxelsError::Scan(error) => stop_of(&patient.scenario, error),
+                    VoxelsError::Target(finding) => finding.into(),
+                })?;
                 remarks.extend_from_slice(anatomy.remarks());
                 let mut plan = plan_routes(&task, &anatomy, control).map_err(stop)?;
                 plan.phantom_origin_in_ct_m = Some(built.origin_in_ct_m.into());
@@ -421,32 +425,6 @@ fn find(
     Ok(found)
 }
 
-/// The voxels about a target.
-fn voxels(
-    task: &RouteTask<'_>,
-    rules: &RouteSection,
-    built: &BuiltFolder,
-    control: &Control<'_>,
-) -> Result<VoxelAnatomy, Stop> {
-    control.progress.message("distances");
-    let target: Point3<f64> = GoalPlacer::new(task.resolved).target(task.section)?;
-    let si = task.route_rules();
-    let options = VoxelOptions {
-        lesions: &built.lesions,
-        off: &task.resolved.scenario.planning.needle_route.off,
-        needle_m: si.longest_m,
-        behind_m: si.throw_m,
-        outside_m: si.outside_m,
-        lung_vessel_m: rules.lung_vessel_mm * 1e-3,
-        below_rib_m: rules.below_rib_mm * 1e-3,
-        threads: control.threads,
-        cancel: control.cancel,
-    };
-    let file = Path::new(&task.resolved.source.file);
-    VoxelAnatomy::new(&built.labels, built.origin_in_ct_m, target, &options)
-        .map_err(|error| stop_of(file, error))
-}
-
 fn refuse_existing(arguments: &RoutesArguments) -> Result<(), Finding> {
     match &arguments.write {
         Some(path) if path.exists() && !arguments.force => Err(Finding::new(
@@ -455,8 +433,32 @@ fn refuse_existing(arguments: &RoutesArguments) -> Result<(), Finding> {
         )
         .key("--write")
         .hint("choose another name, or replace it with --force")),
-        _ => Ok(()),
+        Some(path) => same_folder(&arguments.path, path),
+        None => Ok(()),
     }
+}
+
+/// Refuses to write a scenario elsewhere than beside the one that it is made of: its paths are relative to that.
+fn same_folder(from: &Path, to: &Path) -> Result<(), Finding> {
+    let own = if from.is_dir() {
+        Some(from)
+    } else {
+        from.parent()
+    };
+    let real = |folder: Option<&Path>| {
+        let folder = folder.filter(|each| !each.as_os_str().is_empty());
+        folder.unwrap_or(Path::new(".")).canonicalize().ok()
+    };
+    if real(own) == real(to.parent()) {
+        return Ok(());
+    }
+    let beside = own.unwrap_or(Path::new("")).join("planned.toml");
+    Err(Finding::new(
+        to.display().to_string(),
+        "it has to be beside the scenario, whose paths are relative to it",
+    )
+    .key("--write")
+    .hint(format!("write {}", shown(&beside))))
 }
 
 /// Writes the scenario with the chosen routes, if that is wanted and all targets have one.
