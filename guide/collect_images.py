@@ -26,6 +26,7 @@ FIGURES = {
     "replay.svg": "ur3e_rad_20211005/replay.svg",
     "servo.svg": "table3/servo/wrist_1.svg",
     "ct_slice.png": "patient/slices/lesion_nodule_axial.png",
+    "ct_routes.png": "patient/nodule.routes.png",
 }
 
 

@@ -89,7 +89,7 @@ pub trait Anatomy: Sync {
     /// Where a ray leaves the body for the first time.
     fn exit(&self, ray: &Ray) -> Exit;
 
-    /// Whether body is in the way outside the skin, between two distances from the target, m: an arm, a fold.
+    /// Whether body or a marker is in the way outside the skin, between two distances from the target, m: an arm, a fold.
     fn is_body_between(&self, ray: &Ray, from_to_m: [f64; 2]) -> bool;
 
     /// Lower bound of the distance of a stretch of a ray from an obstacle, m; infinite if there is none of it. Distances
@@ -111,13 +111,28 @@ pub trait Anatomy: Sync {
 
     /// Whether the target's lesion touches the pleura; none where it is in no lung.
     fn touches_pleura(&self) -> Option<bool>;
+}
 
-    /// How far from the target anything is known, m.
-    fn reach_m(&self) -> f64;
+/// What needle and guide take beside their axis where a marker is, m (assumed: half of a slim guide).
+const BESIDE_M: f64 = 5e-3;
+
+/// Whether a ray passes over a marker on the skin.
+pub(crate) fn is_marker_near(
+    markers: &[(Point3<f64>, f64)],
+    ray: &Ray,
+    [from_m, to_m]: [f64; 2],
+) -> bool {
+    markers.iter().any(|(middle, radius_m)| {
+        let reach_m = radius_m + BESIDE_M;
+        let along_m = (middle - ray.target).dot(&ray.outwards);
+        // Middles lie a little under or over the skin, by the marker's height.
+        let along_m = along_m.clamp(from_m - reach_m, to_m);
+        (middle - ray.at(along_m)).norm() < reach_m
+    })
 }
 
 /// Angle between a direction and a normal, whatever its sign, rad.
 pub(crate) fn angle_rad(direction: &UnitVector3<f64>, normal: &Vector3<f64>) -> f64 {
-    let cosine = direction.dot(normal).abs() / normal.norm();
-    cosine.clamp(0.0, 1.0).acos()
+    let along = direction.dot(normal).abs();
+    direction.cross(normal).norm().atan2(along)
 }

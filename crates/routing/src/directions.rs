@@ -20,7 +20,7 @@ pub fn evenly(count: usize) -> impl Iterator<Item = UnitVector3<f64>> {
 pub fn angles_rad(outwards: &UnitVector3<f64>) -> [f64; 2] {
     [
         outwards.x.atan2(-outwards.y),
-        outwards.z.clamp(-1.0, 1.0).asin(),
+        outwards.z.atan2(outwards.x.hypot(outwards.y)),
     ]
 }
 

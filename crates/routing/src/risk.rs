@@ -46,7 +46,8 @@ impl Risk {
     ) -> Self {
         let yes = |is: bool| f64::from(u8::from(is));
         let tilt_rad = odds.gantry_tilt_deg.to_radians();
-        let out_of_plane_rad = (outwards.z.clamp(-1.0, 1.0).asin().abs() - tilt_rad).max(0.0);
+        let [_, elevation_rad] = crate::angles_rad(outwards);
+        let out_of_plane_rad = (elevation_rad.abs() - tilt_rad).max(0.0);
         let along_pleura = lungs.pleura_angle_rad.unwrap_or(0.0) / FRAC_PI_2;
         let shares = [
             ("fissure", yes(!lungs.fissures.is_empty()), odds.fissure),

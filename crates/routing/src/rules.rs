@@ -83,7 +83,7 @@ impl RouteRule {
             Self::NoSkin => "no skin found",
             Self::End => "skin is not known there",
             Self::NeedleTooShort => "needle too short",
-            Self::Outside => "arm or fold outside the skin",
+            Self::Outside => "arm, fold or marker on the skin",
             Self::Oblique => "too oblique to the skin",
             Self::Bone => "bone in the way",
             Self::Vessel => "vessel in the way",

@@ -6,7 +6,9 @@ use needlebench_cell::scenario::NeedleRouteSection;
 use needlebench_geometry::mesh::SurfaceIndex;
 use needlebench_kinematics::Pose;
 
-use crate::anatomy::{Anatomy, Exit, LungPassage, Nearest, Obstacle, Ray, angle_rad};
+use crate::anatomy::{
+    Anatomy, Exit, LungPassage, Nearest, Obstacle, Ray, angle_rad, is_marker_near,
+};
 
 /// Part of the skin's normal along the body beyond which the skin is that of an end of the chest: neck, shoulders or
 /// waist begin there, which a phantom does not have (assumed: 45 deg).
@@ -35,7 +37,8 @@ pub struct SolidAnatomy<'a> {
     /// Radius of the lesion around the target, m.
     lesion_radius_m: f64,
     highest_m: f64,
-    reach_m: f64,
+    /// Middle and radius, m.
+    markers: Vec<(Point3<f64>, f64)>,
 }
 
 #[derive(Debug)]
@@ -82,14 +85,12 @@ fn is_called(part: &PhantomPart, word: &str) -> bool {
 
 impl<'a> SolidAnatomy<'a> {
     /// About a target (phantom frame) of a phantom, as a scenario's `[planning.needle_route]` has it. As in a run, the
-    /// needle may enter the organ that holds the target, and the bone whose lesion it is aimed at; `needle_m` is how
-    /// far it reaches.
+    /// needle may enter the organ that holds the target, and the bone whose lesion it is aimed at.
     pub fn new(
         phantom: &'a Phantom,
         target: Point3<f64>,
         aims_at_lesion: bool,
         section: &NeedleRouteSection,
-        needle_m: f64,
     ) -> Self {
         let organ = phantom.organ_at(&target);
         let mut entered: Vec<&str> = organ.as_deref().into_iter().collect();
@@ -118,6 +119,7 @@ impl<'a> SolidAnatomy<'a> {
         };
         let lungs = organs().filter(|part| is_called(part, "lung") && !is_called(part, "bulla"));
         let size = phantom.parameters.as_ref();
+        let marker_radius_m = size.map_or(0.0, |size| 0.5e-3 * size.marker_diameter_mm);
         let lesion = phantom
             .lesions
             .iter()
@@ -138,7 +140,11 @@ impl<'a> SolidAnatomy<'a> {
                 .collect(),
             lesion_radius_m: lesion.map_or(0.0, |lesion| 0.5 * lesion.diameter_m),
             highest_m: size.map_or(f64::INFINITY, |size| HIGHEST * 0.5e-3 * size.length_mm),
-            reach_m: needle_m,
+            markers: phantom
+                .markers
+                .iter()
+                .map(|marker| (marker.center_m, marker_radius_m))
+                .collect(),
         }
     }
 
@@ -189,6 +195,9 @@ impl Anatomy for SolidAnatomy<'_> {
     }
 
     fn is_body_between(&self, ray: &Ray, [from_m, to_m]: [f64; 2]) -> bool {
+        if is_marker_near(&self.markers, ray, [from_m, to_m]) {
+            return true;
+        }
         // Half a micrometre off the skin that it leaves.
         let outside = ray.at(from_m + 5e-7);
         let again = self.phantom.skin_intersection(&outside, &ray.outwards);
@@ -226,7 +235,7 @@ impl Anatomy for SolidAnatomy<'_> {
                 if far_m > outermost_m {
                     outermost_m = far_m;
                     let pleura = ray.at(far_m);
-                    let normal = self.pleura_normal(&lung.inside, &pleura);
+                    let normal = pleura_normal(&lung.inside, &pleura);
                     passage.pleura_angle_rad = Some(angle_rad(&ray.outwards, &normal));
                 }
             }
@@ -261,25 +270,19 @@ impl Anatomy for SolidAnatomy<'_> {
         let from_wall_m = lung.inside.surface.distance_m(&local);
         Some(from_wall_m - self.lesion_radius_m <= TOUCHES_M)
     }
-
-    fn reach_m(&self) -> f64 {
-        self.reach_m
-    }
 }
 
-impl SolidAnatomy<'_> {
-    /// Normal of a lung's surface at a point of it: across the nearest points of two places beside it.
-    fn pleura_normal(&self, lung: &Hollow, at: &Point3<f64>) -> Vector3<f64> {
-        const ASIDE_M: f64 = 2e-3;
-        let local = lung.pose.inverse() * at;
-        // The gradient of the signed distance.
-        let slope = |axis: usize| {
-            let mut step = Vector3::zeros();
-            step[axis] = ASIDE_M;
-            lung.surface.signed_distance_m(&(local + step))
-                - lung.surface.signed_distance_m(&(local - step))
-        };
-        let gradient = Vector3::new(slope(0), slope(1), slope(2));
-        lung.pose * gradient
-    }
+/// Normal of a lung's surface at a point of it: across the nearest points of two places beside it.
+fn pleura_normal(lung: &Hollow, at: &Point3<f64>) -> Vector3<f64> {
+    const ASIDE_M: f64 = 2e-3;
+    let local = lung.pose.inverse() * at;
+    // The gradient of the signed distance.
+    let slope = |axis: usize| {
+        let mut step = Vector3::zeros();
+        step[axis] = ASIDE_M;
+        lung.surface.signed_distance_m(&(local + step))
+            - lung.surface.signed_distance_m(&(local - step))
+    };
+    let gradient = Vector3::new(slope(0), slope(1), slope(2));
+    lung.pose * gradient
 }

@@ -18,6 +18,8 @@ pub struct BuiltFolder {
     pub origin_in_ct_m: Vector3<f64>,
     /// Labels that are lesions, by name.
     pub lesions: Vec<String>,
+    /// Markers on the skin: middle in `ct` and radius, m.
+    pub markers: Vec<(Point3<f64>, f64)>,
     /// Why it is not known where the robot is to the patient; none if it is.
     pub not_registered: Option<String>,
 }
@@ -30,12 +32,24 @@ struct Report {
     first_voxel_m: [f64; 3],
     phantom_origin_m: [f64; 3],
     lesions: Vec<Named>,
+    markers: Option<Markers>,
     registration: Option<Frame>,
 }
 
 #[derive(Deserialize)]
 struct Named {
     name: String,
+}
+
+#[derive(Deserialize)]
+struct Markers {
+    found: Vec<Marker>,
+}
+
+#[derive(Deserialize)]
+struct Marker {
+    center_m: [f64; 3],
+    diameter_m: f64,
 }
 
 #[derive(Deserialize)]
@@ -99,6 +113,12 @@ impl BuiltFolder {
                 .into_iter()
                 .map(|lesion| lesion.name)
                 .collect(),
+            markers: report.markers.map_or_else(Vec::new, |markers| {
+                let found = markers.found.into_iter();
+                found
+                    .map(|marker| (Point3::from(marker.center_m), 0.5 * marker.diameter_m))
+                    .collect()
+            }),
             not_registered,
         })
     }

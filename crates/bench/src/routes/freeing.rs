@@ -1,5 +1,6 @@
 //! What would let the robot serve a route that it does not.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use needlebench_cell::scenario::GoalSection;
@@ -7,10 +8,10 @@ use needlebench_cell::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFam
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::Planner;
-use serde::Serialize;
 
+use super::RouteTask;
 use super::joint::ROLLS;
-use super::{RoutePlan, RouteTask};
+use super::report::{Freed, Freeing, RoutePlan};
 use crate::Control;
 use crate::parallel::in_parallel;
 use crate::suggest::SuggestError;
@@ -19,29 +20,6 @@ use crate::suggest::SuggestError;
 const STEP_MM: f64 = 25.0;
 /// Steps in each direction: 300 mm.
 const STEPS: u32 = 12;
-
-/// What was tried to free a route, and what did.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Freeing {
-    /// What was tried, for people.
-    pub tried: String,
-    /// The smallest change of each kind that lets as many configurations work as wanted; of equals the one with more
-    /// that work.
-    pub freed: Vec<Freed>,
-}
-
-/// A change that frees a route. Postures only are judged, without expected errors.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Freed {
-    /// `base`, `table` or `tool`.
-    pub kind: &'static str,
-    /// Lines for the scenario.
-    pub toml: String,
-    /// By how much it is moved, m; none for a tool.
-    pub moved_m: Option<[f64; 3]>,
-    /// Configurations that then work.
-    pub working: usize,
-}
 
 struct Try {
     kind: &'static str,
@@ -181,7 +159,7 @@ fn moved_table(resolved: &ResolvedScenario, by_mm: f64) -> Option<Try> {
     if !phantom.rest_on_table {
         let [x, y, z] = phantom.position_mm;
         let at = [x, y, z + by_mm];
-        toml.push_str(&format!("\n[phantom]\nposition_mm = {at:?}"));
+        let _ = write!(toml, "\n[phantom]\nposition_mm = {at:?}");
         changes.extend(set("phantom.position_mm", Setting::from(at)));
     }
     Some(Try {

@@ -11,8 +11,8 @@ use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::{Candidate, Member, Merit, Planner, judge_route};
 use needlebench_routing::{Obstacle, RouteRules};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
+use serde::Serialize;
 
-use super::report::AxisError;
 use super::{Rounded, RouteTask};
 use crate::Control;
 use crate::parallel::in_parallel;
@@ -278,6 +278,23 @@ impl Robot<'_> {
         let moments = told();
         Some(moments.map(|both| AxisError::of(&both)).ok_or(()))
     }
+}
+
+/// The expected error across the needle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AxisError {
+    /// Mean error across it, at the worse of skin and target, m.
+    pub bias_m: f64,
+    /// Largest standard deviation across it, at the worse of skin and target, m.
+    pub sd_m: f64,
+    /// Root mean square across it at the target, m.
+    pub target_lateral_rms_m: f64,
+    /// Root mean square at the target, m.
+    pub target_rms_m: f64,
+    /// Mean at the target; x and y across the needle, z along it, m.
+    pub target_bias_m: [f64; 3],
+    /// Covariance at the target in these axes, m^2, row by row.
+    pub target_covariance_m2: [[f64; 3]; 3],
 }
 
 impl AxisError {

@@ -29,10 +29,11 @@ use crate::ct::BuiltFolder;
 use crate::suggest::SuggestError;
 use joint::{Asked, ask};
 
-pub use freeing::{Freed, Freeing, free};
+pub use freeing::free;
+pub use joint::AxisError;
 pub use report::{
-    AxisError, ChosenRoute, ConfigurationAnswer, MapColumns, MarginReport, RouteAnswer, RoutePlan,
-    RuleCount, WhyNot,
+    ChosenRoute, ConfigurationAnswer, Freed, Freeing, MapColumns, MarginReport, RouteAnswer,
+    RoutePlan, RuleCount, WhyNot,
 };
 
 /// Directions that are judged in voxels.
@@ -129,7 +130,7 @@ impl RouteTask<'_> {
             lesions: &built.lesions,
             off: &self.resolved.scenario.planning.needle_route.off,
             needle_m: rules.longest_m,
-            behind_m: rules.throw_m,
+            markers: &built.markers,
             outside_m: rules.outside_m,
             lung_vessel_m: self.rules.lung_vessel_mm * 1e-3,
             below_rib_m: self.rules.below_rib_mm * 1e-3,
@@ -159,7 +160,6 @@ impl RouteTask<'_> {
             target,
             self.section.lesion.is_some(),
             &self.resolved.scenario.planning.needle_route,
-            self.route_rules().longest_m,
         ))
     }
 }
@@ -197,7 +197,7 @@ pub fn plan_routes(
         anatomy,
         &rules,
         &searched,
-        ordered(asked),
+        &ordered(asked),
     ))
 }
 

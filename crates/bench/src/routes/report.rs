@@ -6,8 +6,7 @@ use needlebench_routing::{
 };
 use serde::Serialize;
 
-use super::freeing::Freeing;
-use super::joint::{Asked, ROLLS, Served};
+use super::joint::{Asked, AxisError, ROLLS, Served};
 use super::{RouteTask, WithRobot};
 use crate::suggest::Refused;
 
@@ -153,23 +152,6 @@ pub struct ConfigurationAnswer {
     pub error: Option<AxisError>,
 }
 
-/// The expected error across the needle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct AxisError {
-    /// Mean error across it, at the worse of skin and target, m.
-    pub bias_m: f64,
-    /// Largest standard deviation across it, at the worse of skin and target, m.
-    pub sd_m: f64,
-    /// Root mean square across it at the target, m.
-    pub target_lateral_rms_m: f64,
-    /// Root mean square at the target, m.
-    pub target_rms_m: f64,
-    /// Mean at the target; x and y across the needle, z along it, m.
-    pub target_bias_m: [f64; 3],
-    /// Covariance at the target in these axes, m^2, row by row.
-    pub target_covariance_m2: [[f64; 3]; 3],
-}
-
 /// The route to take.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChosenRoute {
@@ -190,6 +172,29 @@ pub struct WhyNot {
     pub reasons: Vec<Refused>,
     /// Changes that free it, the smallest of each kind; none if they were not looked for.
     pub freeing: Option<Freeing>,
+}
+
+/// What was tried to free a route, and what did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Freeing {
+    /// What was tried, for people.
+    pub tried: String,
+    /// The smallest change of each kind that lets as many configurations work as wanted; of equals the one with more
+    /// that work.
+    pub freed: Vec<Freed>,
+}
+
+/// A change that frees a route. Postures only are judged, without expected errors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Freed {
+    /// `base`, `table` or `tool`.
+    pub kind: &'static str,
+    /// Lines for the scenario.
+    pub toml: String,
+    /// By how much it is moved, m; none for a tool.
+    pub moved_m: Option<[f64; 3]>,
+    /// Configurations that then work.
+    pub working: usize,
 }
 
 /// All directions that were judged, column by column.
@@ -266,7 +271,7 @@ pub(super) fn plan(
     anatomy: &dyn Anatomy,
     rules: &RouteRules,
     searched: &Searched,
-    asked: Vec<Asked>,
+    asked: &[Asked],
 ) -> RoutePlan {
     let criteria = &task.resolved.scenario.criteria;
     let wanted = (criteria.min_working_configurations as usize).max(1);
@@ -316,8 +321,8 @@ pub(super) fn plan(
         },
         base_position_m: with_robot.then(|| placed.into()),
         wanted,
-        robot_refused: reasons(&asked),
-        pareto: unbeaten(&asked),
+        robot_refused: reasons(asked),
+        pareto: unbeaten(asked),
         chosen: chosen.map(|route| ChosenRoute {
             route,
             configuration: asked[route].best().map(|best| best.configuration.label()),
@@ -374,7 +379,6 @@ fn answer(anatomy: &dyn Anatomy, rules: &RouteRules, asked: &Asked) -> RouteAnsw
         target: anatomy.target(),
         outwards: route.outwards,
     };
-    // The phantom's own skin, where the goal is placed on it.
     let entry = ray.at(route.depth_m);
     let margins = Obstacle::ALL.into_iter().map(|obstacle| {
         let span = [-rules.throw_m, route.depth_m];

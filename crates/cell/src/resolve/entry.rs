@@ -54,7 +54,7 @@ impl EntryChooser {
     /// # Errors
     /// Goals for which there is none to choose.
     pub(crate) fn choose(
-        &self,
+        self,
         toml: &TomlText<'_>,
         cell: &ResolvedScenario,
         goals: &mut [GoalSection],

@@ -513,7 +513,83 @@ fn label_map_from_elsewhere_stands_for_what_it_has() {
         "{}",
         left.volume_m3
     );
-    assert_eq!(made.labels.names.last().unwrap().1, "nodule");
+    let named = |name: &str| {
+        made.labels
+            .names
+            .iter()
+            .find(|each| each.1 == name)
+            .unwrap()
+            .0
+    };
+    assert_eq!(named("nodule"), FIRST_LESION);
+    // What was given stays but where the lesion is, and the rest of the body is what was found here, under free numbers.
+    let soft = named("soft_tissue");
+    assert!(soft >= 1000 && named("wombat") == 12);
+    let given = &options.labels.as_ref().unwrap().labels;
+    for (given, label) in given.iter().zip(&made.labels.labels) {
+        assert!(label == given || *label == FIRST_LESION || (*given == 0 && *label >= 1000));
+    }
+    let count = |label: u16| {
+        made.labels
+            .labels
+            .iter()
+            .filter(|each| **each == label)
+            .count()
+    };
+    assert!(count(soft) > count(3) && count(FIRST_LESION) > 0);
+}
+
+/// A dense ball on the skin, of a millilitre at most, is a marker and no bone; the same ball under 8 mm of skin is bone.
+#[test]
+fn what_lies_on_the_skin_is_no_bone() {
+    let clear = run(&render(&chest(), grid()), &options()).unwrap();
+    let bones = |made: &Reconstruction| {
+        let bone = made
+            .labels
+            .names
+            .iter()
+            .find(|each| each.1 == "bone")
+            .unwrap()
+            .0;
+        made.labels
+            .labels
+            .iter()
+            .filter(|each| **each == bone)
+            .count()
+    };
+    let body = &clear.labels;
+    let middle = [SIZE[0] / 2, SIZE[1] / 2, SIZE[2] / 2];
+    // The skin to the front of the middle.
+    let skin_j = (0..SIZE[1])
+        .find(|&j| body.labels[body.grid.offset([middle[0], j, middle[2]])] != 0)
+        .unwrap();
+    let ball_mm = 4.5;
+    let with_ball = |deep_mm: f64| {
+        let mut volume = render(&chest(), grid());
+        let step_mm = SPACING_MM[1];
+        let centre_j = skin_j as f64 + deep_mm / step_mm;
+        for k in 0..SIZE[2] {
+            for j in 0..SIZE[1] {
+                for i in 0..SIZE[0] {
+                    let way = [
+                        (i as f64 - middle[0] as f64) * SPACING_MM[0],
+                        (j as f64 - centre_j) * step_mm,
+                        (k as f64 - middle[2] as f64) * SPACING_MM[2],
+                    ];
+                    if way.iter().map(|mm| mm * mm).sum::<f64>().sqrt() <= ball_mm {
+                        let at = volume.grid.offset([i, j, k]);
+                        volume.hu[at] = 1200;
+                    }
+                }
+            }
+        }
+        bones(&run(&volume, &options()).unwrap())
+    };
+    let ball = (4.0 / 3.0 * std::f64::consts::PI * ball_mm.powi(3)
+        / SPACING_MM.iter().product::<f64>()) as f64;
+    assert_eq!(with_ball(-3.0), bones(&clear));
+    let under = with_ball(8.0 + ball_mm) as f64 - bones(&clear) as f64;
+    assert!(under > 0.5 * ball, "{under} of {ball}");
 }
 
 #[test]

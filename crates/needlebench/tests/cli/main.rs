@@ -15,6 +15,7 @@ mod compare_studies;
 mod credibility;
 mod ct_build;
 mod ct_info;
+mod ct_routes;
 mod ct_synth;
 mod determinism;
 #[cfg(target_os = "linux")]

@@ -27,10 +27,17 @@ pub(super) enum Kind {
 pub(super) struct Class {
     pub name: String,
     pub kind: Kind,
-    pub is_lung_vessel: bool,
-    pub is_bulla: bool,
-    pub is_fissure: bool,
-    pub is_gas: bool,
+    pub mark: Mark,
+}
+
+/// What makes a label more than its kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mark {
+    None,
+    LungVessel,
+    Bulla,
+    Fissure,
+    Gas,
 }
 
 impl Class {
@@ -38,10 +45,7 @@ impl Class {
         Self {
             name: name.to_owned(),
             kind,
-            is_lung_vessel: false,
-            is_bulla: false,
-            is_fissure: false,
-            is_gas: false,
+            mark: Mark::None,
         }
     }
 
@@ -50,7 +54,7 @@ impl Class {
         match self.kind {
             Kind::Bone => obstacle == Obstacle::Bone,
             Kind::Vessel => obstacle == Obstacle::Vessel,
-            Kind::InLung => obstacle == Obstacle::Vessel && self.is_lung_vessel,
+            Kind::InLung => obstacle == Obstacle::Vessel && self.mark == Mark::LungVessel,
             Kind::Organ => obstacle == Obstacle::Organ,
             Kind::Lung(lung) => obstacle == Obstacle::Organ && target_lung != Some(lung),
             Kind::Outside | Kind::Soft | Kind::Lesion => false,
@@ -116,14 +120,13 @@ impl Classes {
         let is_fissure = lower.contains("fissure");
         if is_bulla || is_fissure {
             return Class {
-                is_bulla,
-                is_fissure,
+                mark: if is_bulla { Mark::Bulla } else { Mark::Fissure },
                 ..Class::new(name, Kind::InLung)
             };
         }
         if name == Label::Gas.name() {
             return Class {
-                is_gas: true,
+                mark: Mark::Gas,
                 ..Class::new(name, Kind::Organ)
             };
         }
@@ -140,7 +143,11 @@ impl Classes {
             SurfaceTissue::Lung => Kind::Lung(self.lung(&structure.name)),
         };
         Class {
-            is_lung_vessel: kind == Kind::InLung,
+            mark: if kind == Kind::InLung {
+                Mark::LungVessel
+            } else {
+                Mark::None
+            },
             ..Class::new(name, kind)
         }
     }

@@ -10,8 +10,10 @@ use needlebench_imaging::{
     Mask, Remark, VoxelGrid, opened,
 };
 
-use crate::anatomy::{Anatomy, Exit, LungPassage, Nearest, Obstacle, Ray, angle_rad};
-use classes::{Class, Classes, Kind};
+use crate::anatomy::{
+    Anatomy, Exit, LungPassage, Nearest, Obstacle, Ray, angle_rad, is_marker_near,
+};
+use classes::{Class, Classes, Kind, Mark};
 
 /// Distances beyond this are told as this, m: no margin asks for more.
 const CAP_M: f64 = 20e-3;
@@ -43,8 +45,8 @@ pub struct VoxelOptions<'a> {
     pub off: &'a [String],
     /// How far the needle reaches from its target to the skin, m.
     pub needle_m: f64,
-    /// How far behind the target something may matter, m.
-    pub behind_m: f64,
+    /// Markers on the skin: middle in `ct` and radius, m.
+    pub markers: &'a [(Point3<f64>, f64)],
     /// From the skin to the far end of the guide, m.
     pub outside_m: f64,
     /// Least thickness of vessels within a lung that count, m.
@@ -78,6 +80,8 @@ pub struct VoxelAnatomy {
     target_lung: Option<u8>,
     touches_pleura: Option<bool>,
     mask_error_m: f64,
+    /// Middle, frame `phantom`, and radius, m.
+    markers: Vec<(Point3<f64>, f64)>,
     needle_m: f64,
     remarks: Vec<Remark>,
 }
@@ -124,6 +128,11 @@ impl VoxelAnatomy {
             target_lung: None,
             touches_pleura: None,
             mask_error_m: 0.5 * spacing_m[0].min(spacing_m[1]),
+            markers: options
+                .markers
+                .iter()
+                .map(|(middle, radius_m)| (middle - origin_in_ct_m, *radius_m))
+                .collect(),
             needle_m: options.needle_m,
             remarks: Vec::new(),
         };
@@ -235,7 +244,7 @@ impl VoxelAnatomy {
         let is_off = |obstacle: Obstacle| options.off.iter().any(|name| name == obstacle.name());
         let bone = self.mask_of(|class| class.kind == Kind::Bone);
         let mut vessels = self.mask_of(|class| class.kind == Kind::Vessel);
-        let in_lung = self.mask_of(|class| class.is_lung_vessel);
+        let in_lung = self.mask_of(|class| class.mark == Mark::LungVessel);
         let spacing_m = self.spacing_m;
         if !in_lung.is_empty() && options.lung_vessel_m > 0.0 {
             vessels.unite(&opened(&in_lung, 0.5 * options.lung_vessel_m, spacing_m));
@@ -246,11 +255,11 @@ impl VoxelAnatomy {
             vessels.subtract(&bone);
         }
         let mut organs = self.mask_of(|class| match class.kind {
-            Kind::Organ => !class.is_gas,
+            Kind::Organ => class.mark != Mark::Gas,
             Kind::Lung(other) => lung != Some(other),
             _ => false,
         });
-        let gas = self.mask_of(|class| class.is_gas);
+        let gas = self.mask_of(|class| class.mark == Mark::Gas);
         let pockets = Components::of(&gas, Connectivity::Faces);
         let least = GAS_M3 / spacing_m.iter().product::<f64>();
         organs.unite(&pockets.mask_of(|part| pockets.parts()[part].voxels as f64 >= least));
@@ -553,6 +562,9 @@ impl Anatomy for VoxelAnatomy {
     }
 
     fn is_body_between(&self, ray: &Ray, [from_m, to_m]: [f64; 2]) -> bool {
+        if is_marker_near(&self.markers, ray, [from_m, to_m]) {
+            return true;
+        }
         // Past the voxel that the skin cuts.
         let past_m = from_m + self.diagonal_m();
         let mut is_there = false;
@@ -615,10 +627,10 @@ impl Anatomy for VoxelAnatomy {
                 }
                 lobe = Some(class);
             }
-            if found.is_bulla && passage.bullae.last() != Some(&found.name) {
+            if found.mark == Mark::Bulla && passage.bullae.last() != Some(&found.name) {
                 passage.bullae.push(found.name.clone());
             }
-            if found.is_fissure && passage.fissures.last() != Some(&found.name) {
+            if found.mark == Mark::Fissure && passage.fissures.last() != Some(&found.name) {
                 passage.fissures.push(found.name.clone());
             }
             inside = now;
@@ -658,9 +670,5 @@ impl Anatomy for VoxelAnatomy {
 
     fn touches_pleura(&self) -> Option<bool> {
         self.touches_pleura
-    }
-
-    fn reach_m(&self) -> f64 {
-        self.needle_m
     }
 }

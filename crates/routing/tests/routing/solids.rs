@@ -45,7 +45,7 @@ fn free_routes_keep_their_margins_point_by_point_and_enter_one_lung_once() {
     let rules = rules();
     for lesion in &phantom.lesions {
         let off = NeedleRouteSection::default();
-        let anatomy = SolidAnatomy::new(&phantom, lesion.center_m, true, &off, rules.longest_m);
+        let anatomy = SolidAnatomy::new(&phantom, lesion.center_m, true, &off);
         let found = search(&anatomy, &rules, 250, 2, &|| false);
         for route in found.free() {
             let ray = Ray {
@@ -112,7 +112,7 @@ fn every_refusal_has_a_rule_with_a_value_beyond_its_limit() {
     let rules = rules();
     let lesion = &phantom.lesions[0];
     let off = NeedleRouteSection::default();
-    let anatomy = SolidAnatomy::new(&phantom, lesion.center_m, true, &off, rules.longest_m);
+    let anatomy = SolidAnatomy::new(&phantom, lesion.center_m, true, &off);
     let found = search(&anatomy, &rules, 600, 1, &|| false);
     let mut seen = Vec::new();
     for candidate in &found.candidates {
@@ -144,7 +144,7 @@ fn every_refusal_has_a_rule_with_a_value_beyond_its_limit() {
 fn a_target_outside_has_no_route() {
     let phantom = phantom();
     let off = NeedleRouteSection::default();
-    let anatomy = SolidAnatomy::new(&phantom, Point3::new(1.0, 0.0, 0.0), false, &off, 0.1);
+    let anatomy = SolidAnatomy::new(&phantom, Point3::new(1.0, 0.0, 0.0), false, &off);
     let found = search(&anatomy, &rules(), 50, 1, &|| false);
     assert_eq!(found.refused(), [(RouteRule::NoSkin, 50)]);
 }

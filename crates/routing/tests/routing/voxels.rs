@@ -122,7 +122,7 @@ fn anatomy(labels: &LabelMap, threads: usize) -> VoxelAnatomy {
             lesions: &["nodule".to_owned()],
             off: &[],
             needle_m: rules().longest_m,
-            behind_m: rules().throw_m,
+            markers: &[],
             outside_m: rules().outside_m,
             lung_vessel_m: 3e-3,
             below_rib_m: 0.0,
@@ -252,6 +252,44 @@ fn depth_and_lungs_are_those_of_the_shapes() {
 }
 
 #[test]
+fn nothing_goes_through_a_marker_on_the_skin() {
+    let labels = chest(false);
+    let direction = Vector3::x_axis();
+    let skin_m = CENTRE[0] + 0.07 - TARGET[0];
+    let middle = Point3::from(TARGET) + direction.into_inner() * (skin_m + 3e-3);
+    let with = |markers: &[(Point3<f64>, f64)]| {
+        let options = VoxelOptions {
+            lesions: &["nodule".to_owned()],
+            off: &[],
+            needle_m: rules().longest_m,
+            markers,
+            outside_m: rules().outside_m,
+            lung_vessel_m: 3e-3,
+            below_rib_m: 0.0,
+            threads: 1,
+            cancel: &GO,
+        };
+        let anatomy = VoxelAnatomy::new(&labels, Vector3::zeros(), Point3::from(TARGET), &options);
+        search(&anatomy.unwrap(), &rules(), 4000, 1, &|| false)
+    };
+    let (free, kept) = (with(&[]), with(&[(middle, 4e-3)]));
+    let mut refused = 0;
+    for (before, after) in free.candidates.iter().zip(&kept.candidates) {
+        let at = Point3::from(TARGET) + before.outwards.into_inner() * skin_m;
+        let beside_m = (at - middle).norm();
+        match &after.outcome {
+            Err(refusal) if refusal.rule == RouteRule::Outside => {
+                refused += 1;
+                assert!(beside_m < 0.015, "{beside_m}");
+            }
+            // Within the marker's own radius nothing is left.
+            _ => assert!(beside_m > 4e-3),
+        }
+    }
+    assert!(refused > 5, "{refused}");
+}
+
+#[test]
 fn lobes_make_a_fissure() {
     let labels = chest(true);
     let anatomy = anatomy(&labels, 1);
@@ -321,7 +359,7 @@ fn targets_outside_are_refused() {
         lesions: &[],
         off: &[],
         needle_m: 0.1,
-        behind_m: 0.0,
+        markers: &[],
         outside_m: 0.05,
         lung_vessel_m: 0.0,
         below_rib_m: 3e-3,

@@ -49,6 +49,10 @@ Writes routes.json, with every direction that was judged and the rule that refus
 Exit status: 0 there is a route for every target, served in as many configurations as the scenario wants; 1 there is not.";
 
 #[derive(Debug, Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "switches that do not depend on each other"
+)]
 pub(crate) struct RoutesArguments {
     /// Folder that `ct build` has written, or a scenario.
     #[arg(value_name = "DIR|SCENARIO")]
@@ -395,22 +399,19 @@ fn find(
             robot: patient.with_robot(arguments),
             directions: arguments.directions.map_or(usual, |count| count as usize),
         };
-        let mut plan = match &patient.built {
-            Some(built) => {
-                control.progress.message("distances");
-                let anatomy = task.voxels(built, control).map_err(|error| match error {
-                    VoxelsError::Scan(error) => stop_of(&patient.scenario, error),
-                    VoxelsError::Target(finding) => finding.into(),
-                })?;
-                remarks.extend_from_slice(anatomy.remarks());
-                let mut plan = plan_routes(&task, &anatomy, control).map_err(stop)?;
-                plan.phantom_origin_in_ct_m = Some(built.origin_in_ct_m.into());
-                plan
-            }
-            None => {
-                let anatomy = task.solids().map_err(stop)?;
-                plan_routes(&task, &anatomy, control).map_err(stop)?
-            }
+        let mut plan = if let Some(built) = &patient.built {
+            control.progress.message("distances");
+            let anatomy = task.voxels(built, control).map_err(|error| match error {
+                VoxelsError::Scan(error) => stop_of(&patient.scenario, error),
+                VoxelsError::Target(finding) => finding.into(),
+            })?;
+            remarks.extend_from_slice(anatomy.remarks());
+            let mut plan = plan_routes(&task, &anatomy, control).map_err(stop)?;
+            plan.phantom_origin_in_ct_m = Some(built.origin_in_ct_m.into());
+            plan
+        } else {
+            let anatomy = task.solids().map_err(stop)?;
+            plan_routes(&task, &anatomy, control).map_err(stop)?
         };
         free(&task, &mut plan, folder, overrides, control).map_err(stop)?;
         plans.push(plan);
