@@ -24,6 +24,7 @@ mod room;
 mod run;
 mod scene;
 pub mod study;
+pub mod shared;
 mod viewer;
 mod words;
 
