@@ -1,6 +1,7 @@
 //! The folder of a patient that was built from a scan, read and checked.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
@@ -147,6 +148,7 @@ pub struct Case {
     facts: BuildFacts,
     goals: Vec<GoalSection>,
     desk: Desk,
+    run_desk: OnceLock<Desk>,
 }
 
 impl Case {
@@ -173,6 +175,7 @@ impl Case {
             goals,
             desk: Desk::new(resolved)
                 .map_err(|error| one(Finding::new(scenario_file, error.to_string())))?,
+            run_desk: OnceLock::new(),
         };
         case.check_patient().map_err(one)?;
         Ok(case)
@@ -216,6 +219,18 @@ impl Case {
     /// The room, for goals to be tried in.
     pub fn desk(&self) -> &Desk {
         &self.desk
+    }
+
+    /// The room as a run of a plan has it, made once.
+    ///
+    /// # Errors
+    /// What `make` says; it is asked again the next time.
+    pub fn run_desk<E>(&self, make: impl FnOnce() -> Result<Desk, E>) -> Result<&Desk, E> {
+        if let Some(known) = self.run_desk.get() {
+            return Ok(known);
+        }
+        let made = make()?;
+        Ok(self.run_desk.get_or_init(|| made))
     }
 
     /// Why nothing is said of the robot; none if the markers say where it is from the patient.
@@ -330,12 +345,13 @@ fn finding_of(file: &Path, error: ImagingError) -> Finding {
 }
 
 /// What to do about a folder that was not built, or not for this.
-const BUILD: &str = "`needlebench ct build SCAN --out DIR` makes such a folder, and with it what `view` shows";
+const BUILD: &str =
+    "`needlebench ct build SCAN --out DIR` makes such a folder, and with it what `view` shows";
 
 fn json<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, Finding> {
     let file = path.display().to_string();
-    let text = read_text(path)
-        .map_err(|error| Finding::new(&file, error.to_string()).hint(BUILD))?;
+    let text =
+        read_text(path).map_err(|error| Finding::new(&file, error.to_string()).hint(BUILD))?;
     serde_json::from_str(&text).map_err(|error| {
         Finding::new(&file, format!("it is not what `ct build` writes: {error}")).hint(BUILD)
     })
@@ -356,9 +372,8 @@ fn volume(folder: &Path, facts: &BuildFacts, grid: &VoxelGrid) -> Result<Volume,
     let path = folder.join(VOLUME_FILE);
     let file = path.display().to_string();
     if !path.is_file() {
-        return Err(Finding::new(file, "there is no volume to show").hint(
-            "build the folder without --no-volume: `needlebench ct build SCAN --out DIR`",
-        ));
+        return Err(Finding::new(file, "there is no volume to show")
+            .hint("build the folder without --no-volume: `needlebench ct build SCAN --out DIR`"));
     }
     let read = read_volume(&path, &ReadOptions::default(), 1, &AtomicBool::new(false))
         .map_err(|error| finding_of(&path, error))?;
@@ -384,13 +399,17 @@ fn labels(folder: &Path, facts: &BuildFacts, grid: &VoxelGrid) -> Result<LabelMa
     let path = folder.join(LABELS_FILE);
     let file = path.display().to_string();
     if !path.is_file() {
-        return Err(Finding::new(file, "there is no label map").hint(
-            "build the folder without --no-labels: `needlebench ct build SCAN --out DIR`",
-        ));
+        return Err(Finding::new(file, "there is no label map")
+            .hint("build the folder without --no-labels: `needlebench ct build SCAN --out DIR`"));
     }
     let named: NamedLabels = json(&folder.join(NAMES_FILE))?;
-    let read = read_labels(&path, grid, &ReadOptions::default(), &AtomicBool::new(false))
-        .map_err(|error| finding_of(&path, error))?;
+    let read = read_labels(
+        &path,
+        grid,
+        &ReadOptions::default(),
+        &AtomicBool::new(false),
+    )
+    .map_err(|error| finding_of(&path, error))?;
     let mut labels = read.labels;
     if facts.labels_sha256.as_deref() != Some(&voxels_sha256(&labels.labels, u16::to_le_bytes)) {
         return Err(

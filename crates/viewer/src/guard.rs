@@ -60,7 +60,10 @@ impl Hosts {
             return Err(forbidden("this server is asked by its own address alone"));
         }
         for origin in headers.get_all(header::ORIGIN) {
-            let origin = origin.to_str().ok().and_then(|text| text.strip_prefix("http://"));
+            let origin = origin
+                .to_str()
+                .ok()
+                .and_then(|text| text.strip_prefix("http://"));
             if !origin.is_some_and(is_own) {
                 return Err(forbidden("pages of other origins may not ask here"));
             }
@@ -88,8 +91,10 @@ pub fn check_token(headers: &HeaderMap, token: &Token) -> Result<(), Problem> {
     if given.is_some_and(|given| token.is(given)) {
         Ok(())
     } else {
-        Err(Problem::new(StatusCode::UNAUTHORIZED, "the token is missing or wrong")
-            .hint("open the address that `needlebench view` prints"))
+        Err(
+            Problem::new(StatusCode::UNAUTHORIZED, "the token is missing or wrong")
+                .hint("open the address that `needlebench view` prints"),
+        )
     }
 }
 
@@ -103,11 +108,16 @@ pub const COOKIE: &str = "needlebench_results";
 pub fn check_cookie(headers: &HeaderMap, token: &Token) -> Result<(), Problem> {
     let cookies = headers.get_all(header::COOKIE).iter();
     let cookies = cookies.filter_map(|value| value.to_str().ok());
-    let mut pairs = cookies.flat_map(|text| text.split(';')).filter_map(|pair| pair.trim().split_once('='));
+    let mut pairs = cookies
+        .flat_map(|text| text.split(';'))
+        .filter_map(|pair| pair.trim().split_once('='));
     if pairs.any(|(name, value)| name == COOKIE && token.is(value)) {
         Ok(())
     } else {
-        Err(Problem::new(StatusCode::UNAUTHORIZED, "open results from the planning page"))
+        Err(Problem::new(
+            StatusCode::UNAUTHORIZED,
+            "open results from the planning page",
+        ))
     }
 }
 
@@ -128,8 +138,14 @@ mod tests {
         let hosts = Hosts::new(4711);
         for right in [
             &[("host", "127.0.0.1:4711")][..],
-            &[("host", "localhost:4711"), ("origin", "http://localhost:4711")],
-            &[("host", "localhost:4711"), ("sec-fetch-site", "same-origin")],
+            &[
+                ("host", "localhost:4711"),
+                ("origin", "http://localhost:4711"),
+            ],
+            &[
+                ("host", "localhost:4711"),
+                ("sec-fetch-site", "same-origin"),
+            ],
         ] {
             assert!(hosts.check(&headers(right)).is_ok(), "{right:?}");
         }
@@ -139,9 +155,15 @@ mod tests {
             &[("host", "127.0.0.1")],
             &[("host", "127.0.0.1:4712")],
             &[("host", "127.0.0.1:4711"), ("host", "evil.example")],
-            &[("host", "127.0.0.1:4711"), ("origin", "http://evil.example")],
+            &[
+                ("host", "127.0.0.1:4711"),
+                ("origin", "http://evil.example"),
+            ],
             &[("host", "127.0.0.1:4711"), ("origin", "null")],
-            &[("host", "127.0.0.1:4711"), ("origin", "https://127.0.0.1:4711")],
+            &[
+                ("host", "127.0.0.1:4711"),
+                ("origin", "https://127.0.0.1:4711"),
+            ],
             &[("host", "127.0.0.1:4711"), ("sec-fetch-site", "cross-site")],
             &[("host", "127.0.0.1:4711"), ("sec-fetch-site", "same-site")],
         ] {

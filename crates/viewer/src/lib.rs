@@ -1,7 +1,8 @@
 //! The planning page on the CT of one patient: a server on this machine alone, and the page that it serves.
 //!
 //! [`Case::open`] reads the folder that `needlebench ct build` made and refuses one whose parts do not belong together;
-//! [`Server`] serves it. What a route is worth is answered by the functions of [`live`]; what a person decided is kept by
+//! [`Server`] serves it. What a route is worth is answered by the functions of [`live`] and
+//! [`motion`]; what a person decided is kept by
 //! [`session`].
 //!
 //! Voxels are told by index, places in millimetres of `ct` (patient LPS); the server alone turns one into the other.
@@ -10,6 +11,7 @@ mod answer;
 mod case;
 mod guard;
 pub mod live;
+pub mod motion;
 mod page;
 mod plan_file;
 mod server;

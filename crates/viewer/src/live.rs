@@ -1,17 +1,14 @@
 //! What a straight needle from the skin to a target is worth, while somebody drags its ends.
 //!
-//! Three questions, each a pure function of a case and an [`Aim`]: [`route`] is answered at once from voxels and surfaces,
-//! [`reach`] by the postures of all eight configurations, [`motion`] by the planned motion of one. Lengths in m, angles
-//! in rad; places in `ct` (patient LPS).
+//! Pure functions of a case and an [`Aim`]: [`route`] is answered at once from voxels and surfaces, [`reach`] by the
+//! postures of all eight configurations. Lengths in m, angles in rad; places in `ct` (patient LPS).
 
-use nalgebra::{Matrix3, Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3};
 use needlebench_bench::preview::GoalPreview;
 use needlebench_cell::scenario::GoalSection;
 use needlebench_cell::{Finding, Goal, part_in_words, reason_in_words};
 use needlebench_imaging::{SurfaceTissue, VoxelGrid, structure_of};
-use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::{crossed_fissures, judged_tissues};
-use needlebench_uncertainty::budget::Moments;
 use serde::{Deserialize, Serialize};
 
 use crate::case::Case;
@@ -61,7 +58,8 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    fn new(message: impl Into<String>, hint: &str) -> Self {
+    /// With what to do.
+    pub fn new(message: impl Into<String>, hint: &str) -> Self {
         Self {
             message: message.into(),
             hint: Some(hint.to_owned()),
@@ -82,8 +80,8 @@ impl From<Finding> for Refusal {
 /// A needle in the cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Needle {
-    /// The goal that it is.
-    pub goal: Goal,
+    /// The goal that it is, or why the robot's guide cannot be put there.
+    pub goal: Result<Goal, Refusal>,
     /// The goal as a scenario has it.
     pub section: GoalSection,
     /// Entry on the skin, `ct`.
@@ -139,8 +137,10 @@ pub struct RouteAnswer {
     pub entry_moved_m: f64,
     /// From entry to target.
     pub length_m: f64,
-    /// From the guide's exit to the needle's tip.
-    pub insertion_m: f64,
+    /// From the guide's exit to the needle's tip; none where the guide cannot be put there.
+    pub insertion_m: Option<f64>,
+    /// Why the guide cannot be put there: nothing is said of what the needle comes near to then.
+    pub not_placed: Option<Refusal>,
     /// How long the needle is.
     pub needle_m: f64,
     /// Between the needle and the skin's normal.
@@ -170,55 +170,6 @@ pub struct ReachAnswer {
     pub preview: Option<GoalPreview>,
     /// Why each does not work, in words, in their order; empty where it does.
     pub reasons: Vec<String>,
-}
-
-/// Bias and covariance of the needle's tip.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TipError {
-    /// Mean, along the axes of `ct`.
-    pub bias_m: [f64; 3],
-    /// Covariance, along the axes of `ct`, rows.
-    pub covariance_m2: [[f64; 3]; 3],
-    /// Root mean square distance.
-    pub rms_m: f64,
-    /// Root mean square distance across the needle.
-    pub lateral_rms_m: f64,
-}
-
-/// A planned motion.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MotionAnswer {
-    /// Label of the configuration.
-    pub configuration: &'static str,
-    /// What it breaks, the first failing one first; empty if it works.
-    pub rejections: Vec<MotionRejection>,
-    /// Times of the postures, s.
-    pub time_s: Vec<f64>,
-    /// Postures, rad.
-    pub joints_rad: Vec<[f64; 6]>,
-    /// Where it ends, rad.
-    pub end_joints_rad: Option<[f64; 6]>,
-    /// The expected error at the target; none where the arm's data do not say enough, or there is no motion.
-    pub tip: Option<TipError>,
-    /// Why it is not known.
-    pub tip_unknown: Option<String>,
-}
-
-/// A rule that a motion breaks.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MotionRejection {
-    /// The rule.
-    pub rule: &'static str,
-    /// In words.
-    pub words: String,
-    /// Details.
-    pub detail: String,
-    /// The value that it looks at.
-    pub value: f64,
-    /// The limit that it breaks.
-    pub limit: f64,
-    /// The unit of both.
-    pub unit: &'static str,
 }
 
 /// Lays a needle into the cell.
@@ -251,7 +202,7 @@ pub fn needle(case: &Case, aim: &Aim) -> Result<Needle, Refusal> {
     };
     let entry = target + outwards.into_inner() * leaves_m;
     section.entry_mm = Some((entry.coords * 1e3).into());
-    let goal = placer.place(&section)?;
+    let goal = placer.place(&section).map_err(Refusal::from);
     Ok(Needle {
         entry_m: case.in_ct(&entry),
         target_m: case.in_ct(&target),
@@ -325,7 +276,10 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
     let length_m = (needle.target_m - needle.entry_m).norm();
     let crossings = crossings(case, &needle.entry_m, &needle.target_m);
     let knows_lungs = case.labels().names.iter().any(|(_, name)| is_lung(name));
-    let in_lung: Vec<bool> = crossings.iter().map(|each| belongs_to_lung(case, &each.name)).collect();
+    let in_lung: Vec<bool> = crossings
+        .iter()
+        .map(|each| belongs_to_lung(case, &each.name))
+        .collect();
     let lung_m = crossings
         .iter()
         .zip(&in_lung)
@@ -335,7 +289,11 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
     let entries = (0..in_lung.len())
         .filter(|&at| in_lung[at] && (at == 0 || !in_lung[at - 1]))
         .count();
-    let tissues = judged_tissues(resolved, placed, &needle.goal)
+    let goal = needle.goal.as_ref().ok();
+    let judged = goal.map(|goal| judged_tissues(resolved, placed, goal));
+    let tissues = judged
+        .into_iter()
+        .flatten()
         .map(|judged| {
             let part = judged.nearest.part;
             TissueAnswer {
@@ -356,16 +314,22 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
         target_index: grid.index_from_ct(&needle.target_m).coords.into(),
         entry_moved_m: needle.entry_moved_m,
         length_m,
-        insertion_m: needle.goal.insertion_length_m,
+        insertion_m: goal.map(|goal| goal.insertion_length_m),
+        not_placed: needle.goal.as_ref().err().cloned(),
         needle_m: resolved.cell.tool.needle.length_m,
-        skin_angle_rad: placed.phantom.skin_normal(&entry).angle(&-inwards.into_inner()),
+        skin_angle_rad: placed
+            .phantom
+            .skin_normal(&entry)
+            .angle(&-inwards.into_inner()),
         axial_angle_rad: inwards.z.atan2(inwards.x.hypot(inwards.y)),
         crossing_within_m: half_voxel_m(grid, &inwards),
         crossings,
         in_lung_m: knows_lungs.then_some(lung_m),
         lung_entries: knows_lungs.then_some(entries),
         tissues,
-        fissures: crossed_fissures(resolved, &needle.goal),
+        fissures: goal
+            .map(|goal| crossed_fissures(resolved, goal))
+            .unwrap_or_default(),
     })
 }
 
@@ -383,7 +347,11 @@ fn is_lung(name: &str) -> bool {
 
 /// The lung itself, and what is labelled within it: its vessels, airways and lesions.
 fn belongs_to_lung(case: &Case, name: &str) -> bool {
-    let is_lesion = case.facts().lesions.iter().any(|lesion| lesion.name == name && lesion.in_lung);
+    let is_lesion = case
+        .facts()
+        .lesions
+        .iter()
+        .any(|lesion| lesion.name == name && lesion.in_lung);
     is_lung(name) || is_lesion || matches!(name, "lung_vessels" | "airways")
 }
 
@@ -414,7 +382,9 @@ fn crossings(case: &Case, from_m: &Point3<f64>, to_m: &Point3<f64>) -> Vec<Cross
     let mut found: Vec<(u16, Crossing)> = Vec::new();
     for pair in stops.windows(2) {
         let middle = from + along * (0.5 * (pair[0] + pair[1]));
-        let label = case.nearest_voxel(&middle).map_or(0, |offset| case.labels().labels[offset]);
+        let label = case
+            .nearest_voxel(&middle)
+            .map_or(0, |offset| case.labels().labels[offset]);
         match found.last_mut() {
             Some((last, crossing)) if *last == label => crossing.to_m = pair[1] * length_m,
             _ => found.push((
@@ -443,8 +413,8 @@ pub fn reach(case: &Case, aim: &Aim) -> Result<ReachAnswer, Refusal> {
             reasons: Vec::new(),
         });
     }
-    let needle = needle(case, aim)?;
-    let preview = case.desk().preview(&needle.goal);
+    let goal = needle(case, aim)?.goal?;
+    let preview = case.desk().preview(&goal);
     let preview = preview.map_err(|error| Refusal {
         message: error.to_string(),
         hint: None,
@@ -459,92 +429,4 @@ pub fn reach(case: &Case, aim: &Aim) -> Result<ReachAnswer, Refusal> {
         reasons: reasons.collect(),
         preview: Some(preview),
     })
-}
-
-/// The planned motion of one configuration, and the error that is expected at its end.
-///
-/// # Errors
-/// As [`needle`]; an unknown configuration; a robot of which nobody knows where it is.
-pub fn motion(case: &Case, aim: &Aim, configuration: &str) -> Result<MotionAnswer, Refusal> {
-    /// Between two postures, s: as in report pages.
-    const PERIOD_S: f64 = 0.04;
-    if let Some(unknown) = case.robot_is_unknown() {
-        return Err(Refusal::new(unknown, "planning on the slices works without"));
-    }
-    let known = Configuration::ALL.into_iter();
-    let known = known.clone().find(|each| each.label() == configuration);
-    let configuration = known.ok_or_else(|| {
-        Refusal::new(
-            "there is no such configuration",
-            "one of the eight of the table",
-        )
-    })?;
-    let needle = needle(case, aim)?;
-    let desk = case.desk();
-    let plan = desk.plan(&needle.goal, configuration).map_err(|error| Refusal {
-        message: error.to_string(),
-        hint: None,
-    })?;
-    let mut answer = MotionAnswer {
-        configuration: configuration.label(),
-        rejections: Vec::new(),
-        time_s: Vec::new(),
-        joints_rad: Vec::new(),
-        end_joints_rad: None,
-        tip: None,
-        tip_unknown: None,
-    };
-    for rejection in &plan.rejections {
-        answer.rejections.push(MotionRejection {
-            rule: rejection.rule.name(),
-            words: reason_in_words(rejection.rule.name()),
-            detail: rejection.detail.clone(),
-            value: rejection.value,
-            limit: rejection.limit,
-            unit: rejection.unit,
-        });
-    }
-    let Some(trajectory) = &plan.trajectory else {
-        return Ok(answer);
-    };
-    answer.end_joints_rad = Some(trajectory.end().into());
-    let duration_s = trajectory.duration_s();
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "some hundred postures"
-    )]
-    let count = (duration_s / PERIOD_S).ceil().max(1.0) as usize;
-    for step in 0..=count {
-        let time_s = (step as f64 * PERIOD_S).min(duration_s);
-        answer.time_s.push(time_s);
-        answer.joints_rad.push(trajectory.sample(time_s).position.into());
-    }
-    match desk.expected_error(&needle.goal, trajectory) {
-        None => {
-            answer.tip_unknown =
-                Some("the data of this arm do not say how accurate it is".to_owned());
-        }
-        Some(Err(finding)) => answer.tip_unknown = Some(finding.message),
-        Some(Ok([_, at_target])) => answer.tip = Some(tip(case, &needle.goal, &at_target)),
-    }
-    Ok(answer)
-}
-
-/// From the axes of the guide's exit to those of `ct`.
-fn tip(case: &Case, goal: &Goal, moments: &Moments) -> TipError {
-    let placed = case.desk().scenario().phantom.as_ref();
-    let place = placed.expect("a needle has a patient").world_from_phantom;
-    let turn = place.rotation.inverse() * goal.world_from_guide_exit.rotation;
-    let turn = turn.to_rotation_matrix();
-    let covariance: Matrix3<f64> = turn * moments.covariance() * turn.transpose();
-    let bias: Vector3<f64> = turn * moments.bias();
-    TipError {
-        bias_m: bias.into(),
-        covariance_m2: std::array::from_fn(|row| {
-            std::array::from_fn(|column| covariance[(row, column)])
-        }),
-        rms_m: moments.rms_m,
-        lateral_rms_m: moments.lateral_rms_m,
-    }
 }

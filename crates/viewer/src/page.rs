@@ -24,9 +24,15 @@ pub const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' 
 pub fn file(name: &str) -> Option<Response> {
     let (kind, text) = match name {
         "index.html" => ("text/html; charset=utf-8", HTML.to_owned()),
-        "view.css" => ("text/css; charset=utf-8", format!("{}{STYLE}", shared::STYLE)),
+        "view.css" => (
+            "text/css; charset=utf-8",
+            format!("{}{STYLE}", shared::STYLE),
+        ),
         "three.js" => (SCRIPT, shared::THREE.to_owned()),
-        "shared.js" => (SCRIPT, [shared::CORE, shared::NUMBER, shared::VIEW].join("\n")),
+        "shared.js" => (
+            SCRIPT,
+            [shared::CORE, shared::NUMBER, shared::VIEW].join("\n"),
+        ),
         "view.js" => (SCRIPT, [API, VOLUME, SLICES, ROOM, PLANNER].join("\n")),
         "icon.svg" => ("image/svg+xml", include_str!("assets/icon.svg").to_owned()),
         _ => return None,
@@ -40,14 +46,22 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 pub fn guarded(mut response: Response) -> Response {
     let headers = response.headers_mut();
     let mut put = |name, value| {
-        headers.entry(name).or_insert(HeaderValue::from_static(value));
+        headers
+            .entry(name)
+            .or_insert(HeaderValue::from_static(value));
     };
     put(header::CONTENT_SECURITY_POLICY, POLICY);
     put(header::X_CONTENT_TYPE_OPTIONS, "nosniff");
     put(header::REFERRER_POLICY, "no-referrer");
     put(header::CACHE_CONTROL, "no-store");
     put(header::X_FRAME_OPTIONS, "DENY");
-    put(header::HeaderName::from_static("cross-origin-resource-policy"), "same-origin");
-    put(header::HeaderName::from_static("cross-origin-opener-policy"), "same-origin");
+    put(
+        header::HeaderName::from_static("cross-origin-resource-policy"),
+        "same-origin",
+    );
+    put(
+        header::HeaderName::from_static("cross-origin-opener-policy"),
+        "same-origin",
+    );
     response
 }

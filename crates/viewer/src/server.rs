@@ -15,8 +15,8 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use nalgebra::Point3;
 use needlebench_report::page::shared;
-use serde::{Deserialize, Serialize};
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use tokio::sync::Notify;
 
@@ -24,6 +24,7 @@ use crate::answer::{Problem, json_response};
 use crate::case::Case;
 use crate::guard::{COOKIE, Hosts, Token, check_cookie, check_token};
 use crate::live::{self, Aim, Refusal};
+use crate::motion;
 use crate::page;
 use crate::plan_file::{PLAN_FILE, write_plan};
 use crate::session::{NotKept, SessionFile, State as SessionState};
@@ -169,7 +170,7 @@ fn router(app: Arc<App>) -> Router {
         .route("/place", post(place))
         .route("/route", post(route))
         .route("/reach", post(reach))
-        .route("/motion", post(motion))
+        .route("/motion", post(planned_motion))
         .route("/session", get(session).put(keep_session))
         .route("/plan", post(plan))
         .route("/simulation", get(simulated).post(simulate).delete(cancel))
@@ -192,7 +193,10 @@ async fn with_host(State(app): Shared, request: Request, next: Next) -> Response
         Err(problem) => problem.into_response(),
     };
     let answer = if answer.status() == StatusCode::METHOD_NOT_ALLOWED {
-        let problem = Problem::new(StatusCode::METHOD_NOT_ALLOWED, "this cannot be asked in this way");
+        let problem = Problem::new(
+            StatusCode::METHOD_NOT_ALLOWED,
+            "this cannot be asked in this way",
+        );
         let allow = answer.headers().get(header::ALLOW).cloned();
         let mut said = problem.into_response();
         if let Some(allow) = allow {
@@ -236,11 +240,17 @@ fn read<T: DeserializeOwned>(body: Result<Bytes, BytesRejection>) -> Result<T, P
                 format!("a question has at most {} KiB", MOST_BODY / 1024),
             )
         } else {
-            Problem::new(StatusCode::BAD_REQUEST, "the question ended before it was whole")
+            Problem::new(
+                StatusCode::BAD_REQUEST,
+                "the question ended before it was whole",
+            )
         }
     })?;
     serde_json::from_slice(&body).map_err(|error| {
-        Problem::new(StatusCode::BAD_REQUEST, format!("the question is not understood: {error}"))
+        Problem::new(
+            StatusCode::BAD_REQUEST,
+            format!("the question is not understood: {error}"),
+        )
     })
 }
 
@@ -252,11 +262,13 @@ async fn case(State(app): Shared) -> Response {
 fn description(case: &Case) -> Value {
     let grid = case.grid();
     let facts = case.facts();
-    let index = |place: [f64; 3]| -> [f64; 3] {
-        grid.index_from_ct(&Point3::from(place)).coords.into()
-    };
+    let index =
+        |place: [f64; 3]| -> [f64; 3] { grid.index_from_ct(&Point3::from(place)).coords.into() };
     let lesions = facts.targets.iter().map(|target| {
-        let known = facts.lesions.iter().find(|lesion| lesion.name == target.name);
+        let known = facts
+            .lesions
+            .iter()
+            .find(|lesion| lesion.name == target.name);
         let size = known.and_then(|lesion| lesion.size.as_ref());
         json!({
             "name": target.name,
@@ -267,22 +279,32 @@ fn description(case: &Case) -> Value {
             "registration_rms_m": target.registration.as_ref().map(|it| it.rms_m),
         })
     });
-    let found = facts.markers.as_ref().map(|markers| &markers.found[..]).unwrap_or_default();
+    let found = facts
+        .markers
+        .as_ref()
+        .map(|markers| &markers.found[..])
+        .unwrap_or_default();
     let registered = facts.registration.as_ref();
-    let markers = registered.into_iter().flat_map(|it| &it.markers).filter_map(|marker| {
-        let place = found.get(marker.detected)?;
-        Some(json!({
-            "name": marker.name,
-            "center_m": place.center_m,
-            "index": index(place.center_m),
-            "diameter_m": place.diameter_m,
-            "residual_m": marker.residual_m.norm(),
-            "expected_residual_m": marker.expected_residual_m,
-            "by_the_others_m": marker.leave_one_out.as_ref().map(|left| left.error_m.norm()),
-        }))
-    });
+    let markers = registered
+        .into_iter()
+        .flat_map(|it| &it.markers)
+        .filter_map(|marker| {
+            let place = found.get(marker.detected)?;
+            Some(json!({
+                "name": marker.name,
+                "center_m": place.center_m,
+                "index": index(place.center_m),
+                "diameter_m": place.diameter_m,
+                "residual_m": marker.residual_m.norm(),
+                "expected_residual_m": marker.expected_residual_m,
+                "by_the_others_m": marker.leave_one_out.as_ref().map(|left| left.error_m.norm()),
+            }))
+        });
     let resolved = case.desk().scenario();
-    let world_from_phantom = resolved.phantom.as_ref().map(|placed| placed.world_from_phantom);
+    let world_from_phantom = resolved
+        .phantom
+        .as_ref()
+        .map(|placed| placed.world_from_phantom);
     let pose = world_from_phantom.map(|pose| {
         let (t, q) = (pose.translation.vector, pose.rotation);
         [t.x, t.y, t.z, q.i, q.j, q.k, q.w]
@@ -316,7 +338,9 @@ fn description(case: &Case) -> Value {
 }
 
 fn ct_from_mm(case: &Case, mm: [f64; 3]) -> [f64; 3] {
-    case.in_ct(&Point3::from(mm.map(|number| number * 1e-3))).coords.into()
+    case.in_ct(&Point3::from(mm.map(|number| number * 1e-3)))
+        .coords
+        .into()
 }
 
 /// Values as two bytes each, little endian, slice after slice: nothing is in memory twice.
@@ -337,7 +361,11 @@ fn voxels<T: Copy + Send + Sync + 'static>(
         (header::CONTENT_TYPE, "application/octet-stream".to_owned()),
         (header::CONTENT_LENGTH, (2 * per_slice * slices).to_string()),
     ];
-    (headers, Body::from_stream(crate::turns::Blocks::new(blocks))).into_response()
+    (
+        headers,
+        Body::from_stream(crate::turns::Blocks::new(blocks)),
+    )
+        .into_response()
 }
 
 async fn volume(State(app): Shared) -> Response {
@@ -357,12 +385,20 @@ async fn scene(State(app): Shared) -> Response {
 #[serde(deny_unknown_fields)]
 struct PlaceQuestion {
     index: [f64; 3],
+    /// As of other questions; this one is answered at once.
+    #[serde(default, rename = "page")]
+    _page: Option<String>,
+    #[serde(default, rename = "turn")]
+    _turn: Option<u64>,
 }
 
 async fn place(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
-    let PlaceQuestion { index } = read(body)?;
+    let PlaceQuestion { index, .. } = read(body)?;
     if index.iter().any(|number| !(number.abs() < 1e6)) {
-        return Err(Problem::new(StatusCode::BAD_REQUEST, "an index has three finite numbers"));
+        return Err(Problem::new(
+            StatusCode::BAD_REQUEST,
+            "an index has three finite numbers",
+        ));
     }
     let place = app.case.place(&Point3::from(index));
     Ok(json_response(&json!({
@@ -406,7 +442,10 @@ async fn route(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answe
     let question: Question = read(body)?;
     let case = Arc::clone(&app.case);
     let turn = question.turn("route");
-    let found = app.quick.run(turn, move || live::route(&case, &question.aim)).await?;
+    let found = app
+        .quick
+        .run(turn, move || live::route(&case, &question.aim))
+        .await?;
     Ok(answered(&found))
 }
 
@@ -414,17 +453,20 @@ async fn reach(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answe
     let question: Question = read(body)?;
     let case = Arc::clone(&app.case);
     let turn = question.turn("reach");
-    let found = app.exact.run(turn, move || live::reach(&case, &question.aim)).await?;
+    let found = app
+        .exact
+        .run(turn, move || live::reach(&case, &question.aim))
+        .await?;
     Ok(answered(&found))
 }
 
-async fn motion(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
+async fn planned_motion(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
     let question: Question = read(body)?;
     let case = Arc::clone(&app.case);
     let turn = question.turn("motion");
     let work = move || {
         let configuration = question.configuration.as_deref().unwrap_or_default();
-        live::motion(&case, &question.aim, configuration)
+        motion::motion(&case, &question.aim, configuration)
     };
     Ok(answered(&app.exact.run(turn, work).await?))
 }
@@ -437,7 +479,10 @@ fn gone(message: String) -> Problem {
 }
 
 async fn session(State(app): Shared) -> Answer {
-    let session = app.session.read().map_err(|finding| gone(finding.message))?;
+    let session = app
+        .session
+        .read()
+        .map_err(|finding| gone(finding.message))?;
     Ok(json_response(&session))
 }
 
@@ -459,7 +504,9 @@ async fn keep_session(State(app): Shared, body: Result<Bytes, BytesRejection>) -
         )
         .hint("reload to have what it is there now; what is here can be brought back with undo")
         .with("session", &session)),
-        Err(NotKept::Wrong(problem)) => Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, problem)),
+        Err(NotKept::Wrong(problem)) => {
+            Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, problem))
+        }
         Err(NotKept::Folder(problem)) => Err(gone(problem)),
     }
 }
@@ -482,18 +529,28 @@ async fn written(app: &Arc<App>, question: PlanQuestion) -> Result<PathBuf, Prob
     let _one = app.writing.lock().await;
     let work = move || {
         let name = question.name.as_deref().unwrap_or(PLAN_FILE);
-        write_plan(&case, &question.aim, question.configuration.as_deref(), name)
+        write_plan(
+            &case,
+            &question.aim,
+            question.configuration.as_deref(),
+            name,
+        )
     };
     Ok(app.exact.run(None, work).await??)
 }
 
 fn file_name(path: &std::path::Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
 }
 
 async fn plan(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
     let path = written(&app, read(body)?).await?;
-    Ok(json_response(&json!({"file": file_name(&path), "path": path.display().to_string()})))
+    Ok(json_response(
+        &json!({"file": file_name(&path), "path": path.display().to_string()}),
+    ))
 }
 
 async fn simulate(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
@@ -529,6 +586,10 @@ async fn report(State(app): Shared, method: Method, headers: HeaderMap) -> Answe
         (header::CONTENT_TYPE, "text/html; charset=utf-8"),
         (header::CONTENT_SECURITY_POLICY, page::REPORT_POLICY),
     ];
-    let bytes = if method == Method::HEAD { Vec::new() } else { bytes };
+    let bytes = if method == Method::HEAD {
+        Vec::new()
+    } else {
+        bytes
+    };
     Ok((headers, bytes).into_response())
 }

@@ -105,7 +105,10 @@ impl NeedleChoice {
         let names = [&self.goal, &self.configuration].into_iter().flatten();
         let mut long = names.filter(|name| name.chars().count() > MOST_NAME);
         if let Some(name) = long.next() {
-            return Some(format!("a name has {} characters, {MOST_NAME} are allowed", name.chars().count()));
+            return Some(format!(
+                "a name has {} characters, {MOST_NAME} are allowed",
+                name.chars().count()
+            ));
         }
         let far = match &self.target {
             Some(TargetAim::PlaceM(place) | TargetAim::Index(place)) => is_far(place),
@@ -124,12 +127,20 @@ impl State {
     fn problem(&self) -> Option<String> {
         let count = self.notes.chars().count();
         if count > MOST_NOTES {
-            return Some(format!("the notes have {count} characters, {MOST_NOTES} are allowed"));
+            return Some(format!(
+                "the notes have {count} characters, {MOST_NOTES} are allowed"
+            ));
         }
         if self.routes.len() > MOST_ROUTES {
-            return Some(format!("{} routes are kept, {MOST_ROUTES} are allowed", self.routes.len()));
+            return Some(format!(
+                "{} routes are kept, {MOST_ROUTES} are allowed",
+                self.routes.len()
+            ));
         }
-        let named = self.hidden_markers.iter().chain(self.routes.iter().map(|route| &route.name));
+        let named = self
+            .hidden_markers
+            .iter()
+            .chain(self.routes.iter().map(|route| &route.name));
         if named.clone().any(|name| name.chars().count() > MOST_NAME) || named.count() > 256 {
             return Some(format!("names have at most {MOST_NAME} characters"));
         }
@@ -138,11 +149,16 @@ impl State {
         {
             return Some("a window is two ascending numbers of HU".to_owned());
         }
-        if self.crosshair.is_some_and(|place| place.iter().any(|number| !(number.abs() < FAR))) {
+        if self
+            .crosshair
+            .is_some_and(|place| place.iter().any(|number| !(number.abs() < FAR)))
+        {
             return Some("the crosshair has three finite numbers".to_owned());
         }
         let needles = self.routes.iter().map(|route| &route.needle);
-        needles.chain([&self.needle]).find_map(NeedleChoice::problem)
+        needles
+            .chain([&self.needle])
+            .find_map(NeedleChoice::problem)
     }
 }
 
@@ -193,9 +209,11 @@ impl SessionFile {
         let hint = "rename it, and a new session is begun";
         let session: Session = from_toml(&file, &text).map_err(|finding| finding.hint(hint))?;
         if session.schema_version != SCHEMA_VERSION {
-            return Err(Finding::new(file, format!("it is of version {}", session.schema_version))
-                .key("schema_version")
-                .hint(hint));
+            return Err(
+                Finding::new(file, format!("it is of version {}", session.schema_version))
+                    .key("schema_version")
+                    .hint(hint),
+            );
         }
         match session.state.problem() {
             Some(problem) => Err(Finding::new(file, problem).hint(hint)),
@@ -211,7 +229,9 @@ impl SessionFile {
         if let Some(problem) = state.problem() {
             return Err(NotKept::Wrong(problem));
         }
-        let known = self.read().map_err(|finding| NotKept::Folder(finding.message))?;
+        let known = self
+            .read()
+            .map_err(|finding| NotKept::Folder(finding.message))?;
         if known.version != version {
             return Err(NotKept::Changed(Box::new(known)));
         }
@@ -286,9 +306,18 @@ mod tests {
         fs::write(folder.path().join(SESSION_FILE), "version = \"x\"").unwrap();
         assert!(file.read().unwrap_err().hint.is_some());
         let wrong = [
-            State { window_hu: Some([5.0, 5.0]), ..State::default() },
-            State { crosshair: Some([f64::NAN, 0.0, 0.0]), ..State::default() },
-            State { notes: "x".repeat(MOST_NOTES + 1), ..State::default() },
+            State {
+                window_hu: Some([5.0, 5.0]),
+                ..State::default()
+            },
+            State {
+                crosshair: Some([f64::NAN, 0.0, 0.0]),
+                ..State::default()
+            },
+            State {
+                notes: "x".repeat(MOST_NOTES + 1),
+                ..State::default()
+            },
         ];
         for state in wrong {
             assert!(matches!(file.write(0, state), Err(NotKept::Wrong(_))));

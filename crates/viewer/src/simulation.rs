@@ -79,8 +79,10 @@ impl Simulation {
     pub fn start(&self, plan: &Path, engine: Engine) -> Result<Progress, Problem> {
         let mut inner = self.lock();
         if inner.progress.state == State::Running {
-            return Err(Problem::new(StatusCode::CONFLICT, "a simulation is running")
-                .hint("wait for it, or cancel it"));
+            return Err(
+                Problem::new(StatusCode::CONFLICT, "a simulation is running")
+                    .hint("wait for it, or cancel it"),
+            );
         }
         let stem = plan.file_stem().unwrap_or_default();
         let results = self.folder.join(RESULTS);
@@ -104,7 +106,9 @@ impl Simulation {
         let report = results.join(stem).join("report.html");
         inner.progress = Progress {
             state: State::Running,
-            plan: plan.file_name().map(|name| name.to_string_lossy().into_owned()),
+            plan: plan
+                .file_name()
+                .map(|name| name.to_string_lossy().into_owned()),
             message: "starting".to_owned(),
             ..Progress::default()
         };
@@ -176,7 +180,10 @@ impl Engine {
 fn watch(inner: &Mutex<Inner>, said: Option<impl std::io::Read>) {
     let lock = || inner.lock().unwrap_or_else(PoisonError::into_inner);
     let mut last: Vec<String> = Vec::new();
-    for line in said.into_iter().flat_map(|said| BufReader::new(said).lines()) {
+    for line in said
+        .into_iter()
+        .flat_map(|said| BufReader::new(said).lines())
+    {
         let Ok(line) = line else { break };
         if line.trim().is_empty() {
             continue;
@@ -199,9 +206,14 @@ fn watch(inner: &Mutex<Inner>, said: Option<impl std::io::Read>) {
     if inner.progress.state != State::Running {
         return;
     }
-    let has_report = matches!(code, Some(0 | 1)) && inner.report.as_ref().is_some_and(|path| path.is_file());
+    let has_report =
+        matches!(code, Some(0 | 1)) && inner.report.as_ref().is_some_and(|path| path.is_file());
     inner.progress.has_report = has_report;
-    inner.progress.state = if has_report { State::Finished } else { State::Failed };
+    inner.progress.state = if has_report {
+        State::Finished
+    } else {
+        State::Failed
+    };
     inner.progress.message = match code {
         Some(0) => "all criteria are met".to_owned(),
         Some(1) => "a criterion is not met, or was not judged".to_owned(),

@@ -234,8 +234,8 @@ PLAN.Planner = class {
     this.motion = null;
     this.showRoute();
     this.draw();
-    if (this.route) this.exact.ask({ aim: body.aim });
-    else { this.reach = null; this.showReach(); }
+    if (this.route && !this.route.not_placed && !this.facts.robot_is_unknown) this.exact.ask({ aim: body.aim });
+    else { this.exact.forget(); this.reach = null; this.showReach(); }
   }
 
   reached(answer) {
@@ -263,7 +263,7 @@ PLAN.Planner = class {
     this.motion = null;
     this.tip = null;
     this.room.stop();
-    this.reached(this.reach);
+    if (this.reach) this.reached(this.reach);
     this.showUndo();
     this.draw();
     this.keepSoon();
@@ -290,10 +290,10 @@ PLAN.Planner = class {
   showRoute() {
     const { target, entry } = this.state.needle;
     const lesion = this.facts.lesions.find((each) => each.name === target?.lesion);
-    this.targetText.textContent = target ? `${lesion ? `${NB.words(lesion.name)}, ` : ''}${this.route ? this.millimetres(this.route.target_m) : ''}` : 'not chosen';
+    this.targetText.textContent = target ? [lesion && NB.words(lesion.name), this.route && this.millimetres(this.route.target_m)].filter(Boolean).join(', ') : 'not chosen';
     this.entryText.textContent = entry ? (this.route ? this.millimetres(this.route.entry_m) : '') : 'not chosen';
-    this.saveButton.disabled = !this.route;
-    if (this.simulateButton) this.simulateButton.disabled = !this.route || this.running;
+    this.saveButton.disabled = !this.route || Boolean(this.route.not_placed);
+    if (this.simulateButton) this.simulateButton.disabled = this.saveButton.disabled || this.running;
     if (this.refused) {
       NB.clear(this.numbers, NB.el('p', { class: 'error', text: this.refused.message }), this.refused.hint ? NB.el('p', { text: this.refused.hint }) : null);
       return;
@@ -302,7 +302,9 @@ PLAN.Planner = class {
       NB.clear(this.numbers, NB.el('p', { text: target ? 'Click the entry, on the skin.' : 'Choose a lesion, or click the target.' }));
       return;
     }
-    NB.clear(this.numbers, PLAN.routeRows([{ name: 'value', route: this.route }], 'Straight needle from the skin to the target'),
+    const { not_placed: unplaced } = this.route;
+    NB.clear(this.numbers, unplaced ? [NB.el('p', { class: 'error', text: `${unplaced.message}.` }), unplaced.hint ? NB.el('p', { text: `Try ${unplaced.hint}.` }) : null] : null,
+      PLAN.routeRows([{ name: 'value', route: this.route }], 'Straight needle from the skin to the target'),
       Math.abs(this.route.entry_moved_m) > 5e-3
         ? NB.el('p', { text: `You pointed ${NB.mm(Math.abs(this.route.entry_moved_m))} mm ${this.route.entry_moved_m > 0 ? 'inside' : 'outside'} the skin: the entry is on the line from there to the target.` }) : null);
   }
@@ -317,7 +319,7 @@ PLAN.Planner = class {
     const chosen = this.state.needle.configuration;
     const list = NB.table(`${preview.working} of 8 can reach it, by their postures`, [
       { title: 'Configuration', cell: ({ each }) => each.label },
-      { title: 'Works', cell: ({ each }) => NB.el('span', { class: each.works ? 'good' : 'bad', text: each.works ? '\u2713 yes' : '\u2717 no' }) },
+      { title: 'Works', cell: ({ each }) => NB.el('span', { class: each.works ? 'good' : 'bad', text: each.works ? 'yes' : 'no' }) },
       { title: 'Nearest', unit: 'mm', numeric: true, cell: ({ each }) => NB.mm(each.nearest?.distance_m) },
       { title: 'Of what, or why not', text: true, cell: ({ each, reason }) => (each.works ? (each.nearest?.pair || []).map(NB.words).join(' \u2013 ') : reason) },
     ], preview.configurations.map((each, index) => ({ each, reason: this.reach.reasons[index] })), { class: 'choose small', row: ({ each }) => ({ 'aria-selected': String(each.label === chosen), tabindex: each.label === chosen || !chosen ? '0' : '-1' }) });
@@ -397,7 +399,7 @@ PLAN.Planner = class {
         this.showRoutes();
         this.showUndo();
         this.keepSoon();
-      } }, '\u2717')));
+      } }, '\u00d7')));
     NB.clear(this.comparison, PLAN.routeRows(answers, 'Routes that were kept'), NB.el('div', { class: 'tabs no-print' }, buttons));
   }
 
@@ -577,7 +579,7 @@ PLAN.Planner = class {
 
   simulated(progress, quiet = false) {
     this.running = progress.state === 'running';
-    this.simulateButton.disabled = this.running || !this.route;
+    this.simulateButton.disabled = this.running || this.saveButton.disabled;
     this.cancelButton.disabled = !this.running;
     // The cookie that opens the report is of the page that simulated.
     this.reportLink.hidden = quiet || !progress.has_report;
@@ -605,7 +607,7 @@ PLAN.routeRows = function (columns, caption) {
   const rows = [];
   const row = (title, unit, cell) => rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route, column) : '\u2013')) });
   row('Skin to target', 'mm', (route) => NB.mm(route.length_m));
-  row('Guide to tip', 'mm', (route) => NB.el('span', { class: route.insertion_m > route.needle_m ? 'bad' : null, text: `${NB.mm(route.insertion_m)} of ${NB.mm(route.needle_m)}` }));
+  row('Guide\u2019s exit to tip', 'mm', (route) => (route.insertion_m === null ? '\u2013' : `${NB.mm(route.insertion_m)}; the needle has ${NB.mm(route.needle_m)}`));
   row('To the skin\u2019s normal', '\u00b0', (route) => NB.deg(route.skin_angle_rad));
   row('Out of the axial plane', '\u00b0', (route) => NB.deg(route.axial_angle_rad));
   row('In lung', 'mm', (route) => (route.in_lung_m === null ? 'no lung in the label map' : `${NB.mm(route.in_lung_m)} \u00b1 ${NB.mm(route.crossing_within_m)}`));
@@ -616,7 +618,7 @@ PLAN.routeRows = function (columns, caption) {
       const known = route.tissues.find((each) => each.tissue === tissue);
       if (!known) return '\u2013';
       const off = known.surface_p99_m === null ? '' : ` \u00b1 ${NB.mm(known.surface_p99_m, 2)}`;
-      return NB.el('span', { class: known.kept ? 'good' : 'bad', text: `${known.kept ? '\u2713' : '\u2717'} ${NB.mm(known.distance_m)}${off} to ${known.words}; ${NB.mm(known.margin_m)} wanted` });
+      return NB.el('span', { class: known.kept ? 'good' : 'bad', text: `${NB.mm(known.distance_m)}${off} to ${known.words}, ${known.kept ? '' : 'too near: '}${NB.mm(known.margin_m)} wanted` });
     });
   }
   if (columns.some(({ route }) => route?.fissures.length)) row('Fissures crossed', '', (route) => route.fissures.map(NB.words).join(', ') || 'none');
