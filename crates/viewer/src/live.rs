@@ -3,8 +3,11 @@
 //! Pure functions of a case and an [`Aim`]: [`route`] is answered at once from voxels and surfaces, [`reach`] by the
 //! postures of all eight configurations. Lengths in m, angles in rad; places in `ct` (patient LPS).
 
-use nalgebra::{Point3, UnitVector3};
+use std::f64::consts::TAU;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_bench::preview::GoalPreview;
+use needlebench_cell::phantom::Phantom;
 use needlebench_cell::scenario::GoalSection;
 use needlebench_cell::{Finding, Goal, part_in_words, reason_in_words};
 use needlebench_imaging::{SurfaceTissue, VoxelGrid, structure_of};
@@ -143,7 +146,7 @@ pub struct RouteAnswer {
     pub not_placed: Option<Refusal>,
     /// How long the needle is.
     pub needle_m: f64,
-    /// Between the needle and the skin's normal.
+    /// Between the needle and the skin's normal, which is the mean over 8 mm about the entry.
     pub skin_angle_rad: f64,
     /// Between the needle and the axial plane; positive where it runs towards the head.
     pub axial_angle_rad: f64,
@@ -317,9 +320,7 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
         insertion_m: goal.map(|goal| goal.insertion_length_m),
         not_placed: needle.goal.as_ref().err().cloned(),
         needle_m: resolved.cell.tool.needle.length_m,
-        skin_angle_rad: placed
-            .phantom
-            .skin_normal(&entry)
+        skin_angle_rad: skin_normal(&placed.phantom, &entry, &-inwards)
             .angle(&-inwards.into_inner()),
         axial_angle_rad: inwards.z.atan2(inwards.x.hypot(inwards.y)),
         crossing_within_m: half_voxel_m(grid, &inwards),
@@ -331,6 +332,40 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
             .map(|goal| crossed_fissures(resolved, goal))
             .unwrap_or_default(),
     })
+}
+
+/// Mean outward normal of the skin about an entry: a facet's own is as rough as the voxels.
+fn skin_normal(
+    phantom: &Phantom,
+    entry: &Point3<f64>,
+    outwards: &UnitVector3<f64>,
+) -> Vector3<f64> {
+    /// Radius of what counts, and how far under the skin it is looked from, m.
+    const ABOUT_M: f64 = 8e-3;
+    const BELOW_M: f64 = 20e-3;
+    const AROUND: u32 = 12;
+    let across = outwards.cross(&least_axis(outwards)).normalize();
+    let third = outwards.cross(&across);
+    let from = entry - outwards.into_inner() * BELOW_M;
+    let ring = (0..AROUND).filter_map(|step| {
+        let (sine, cosine) = (TAU * f64::from(step) / f64::from(AROUND)).sin_cos();
+        let aside = (across * cosine + third * sine) * ABOUT_M;
+        let (_, leaves_m) = phantom.skin_intersection(&(from + aside), outwards)?;
+        // A fold or an arm beside it is not the skin there.
+        let is_beside = (leaves_m - BELOW_M).abs() < 2.0 * ABOUT_M;
+        let point = from + aside + outwards.into_inner() * leaves_m;
+        is_beside.then(|| phantom.skin_normal(&point).into_inner())
+    });
+    ring.fold(phantom.skin_normal(entry).into_inner(), |sum, normal| {
+        sum + normal
+    })
+}
+
+/// The axis that a direction has least of.
+fn least_axis(direction: &UnitVector3<f64>) -> Vector3<f64> {
+    let mut axis = Vector3::zeros();
+    axis[direction.iamin()] = 1.0;
+    axis
 }
 
 fn surface_p99_m(case: &Case, part: &str) -> Option<f64> {

@@ -4,7 +4,7 @@ mod support;
 
 use serde_json::{Value, json};
 
-use support::{Asked, Running};
+use support::Running;
 
 #[test]
 fn who_knows_the_token_sees_the_patient_and_nobody_else_does() {
@@ -39,11 +39,9 @@ fn who_knows_the_token_sees_the_patient_and_nobody_else_does() {
         "/assets/three.js",
         "/assets/shared.js",
     ] {
-        let page = Asked {
-            token: None,
-            ..server.asked("GET", path)
-        }
-        .send();
+        let mut asked = server.asked("GET", path);
+        asked.token = None;
+        let page = asked.send();
         assert_eq!(page.status, 200, "{path}");
         assert!(!page.text().contains(support::NAME) && !page.text().contains(&server.token));
     }
@@ -461,7 +459,7 @@ fn folders_that_do_not_belong_together_are_refused() {
         "lung_left",
     );
     refused(
-        &replace("scenario.toml", "position_mm = [", "position_mm = [1"),
+        &replace("scenario.toml", "name = \"skin\"", "name = \"hide\""),
         "skin",
     );
 }
