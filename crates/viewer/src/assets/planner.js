@@ -280,7 +280,8 @@ PLAN.Planner = class {
   draw() {
     if (!this.volume) return;
     for (const picture of [...this.slices, ...this.probes]) picture.draw();
-    this.room.needle(this.route);
+    // Of a drag the slices follow at once, the room when it ends.
+    if (!this.dragging) this.room.needle(this.route);
   }
 
   // ---- numbers

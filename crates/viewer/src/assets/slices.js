@@ -257,8 +257,10 @@ PLAN.Slice = class extends PLAN.Picture {
       canvas.setPointerCapture(event.pointerId);
       canvas.focus();
       this.held = this.handleAt(event);
-      if (this.held) planner.beginDrag();
-      else if (planner.tool !== 'crosshair') planner.put(planner.tool, this.voxel(event));
+      this.from = [event.clientX, event.clientY];
+      this.moved = false;
+      if (this.held) return;
+      if (planner.tool !== 'crosshair') planner.put(planner.tool, this.voxel(event));
       else { this.held = 'crosshair'; planner.look(this.voxel(event)); }
     });
     canvas.addEventListener('pointermove', (event) => {
@@ -267,12 +269,21 @@ PLAN.Slice = class extends PLAN.Picture {
         return;
       }
       if (this.held === 'crosshair') { planner.look(this.voxel(event)); return; }
+      if (!this.moved) {
+        // A click on it brings the crosshair there.
+        if (Math.hypot(event.clientX - this.from[0], event.clientY - this.from[1]) < 3) return;
+        this.moved = true;
+        planner.beginDrag();
+      }
       // In the plane; its depth stays.
       const depth = planner.shown[this.held][this.plane.w];
       planner.drag(this.held, planner.within(this.index(this.inPicture(event), depth)));
     });
     const end = () => {
-      if (this.held && this.held !== 'crosshair') planner.endDrag();
+      if (this.held && this.held !== 'crosshair') {
+        if (this.moved) planner.endDrag();
+        else planner.look(planner.within(planner.shown[this.held].map(Math.round)));
+      }
       this.held = null;
     };
     canvas.addEventListener('pointerup', end);

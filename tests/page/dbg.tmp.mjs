@@ -1,0 +1,18 @@
+import { SOFTWARE_GL, launch } from './browser.mjs';
+import { spawn } from 'node:child_process';
+const server = spawn('target/debug/needlebench', ['view', '/tmp/view_patient', '--no-open'], { stdio: ['ignore', 'pipe', 'inherit'] });
+process.on('exit', () => server.kill());
+let said = '';
+const url = await new Promise((found) => server.stdout.on('data', (d) => { said += d; const m = said.match(/http:\/\/\S+/); if (m) found(m[0]); }));
+console.log(url);
+const running = await launch(SOFTWARE_GL);
+console.log('launched');
+const page = await running.newPage({ viewport: { width: 1600, height: 1000 } });
+page.on('console', (m) => console.log(m.type(), m.text()));
+page.on('pageerror', (m) => console.log('PE', m.message));
+page.on('request', (r) => console.log(r.method(), r.url().slice(0, 60)));
+await page.goto(url);
+console.log('went');
+await page.waitForSelector('html[data-ready]', { timeout: 20000 }).catch((e) => console.log(String(e).slice(0, 200)));
+console.log((await page.innerText('body')).slice(0, 300));
+process.exit(0);
