@@ -1,9 +1,9 @@
 // A planning session in headless Chromium, as a doctor would have it, on the folder that `ct build` made:
 //
-//   npm ci && node view.mjs --out SCREENSHOTS --program NEEDLEBENCH [--marks] FOLDER LESION ENTRY_VOXEL
+//   npm ci && node view.mjs --out SCREENSHOTS --program NEEDLEBENCH [--marks] FOLDER LESION ENTRY
 //
-// FOLDER is changed: a session and a plan are written into it. LESION is a goal of it, ENTRY_VOXEL (`40,60,60`) a voxel at the
-// skin from which a needle reaches it. With --marks times are held against what a machine of its own attains.
+// FOLDER is changed: a session and a plan are written into it. LESION is a goal of it, ENTRY (`-111,-83,-58`, mm of
+// the scan) a place at the skin from which a needle reaches it. With --marks times are held against what a machine of its own attains.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { existsSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
@@ -25,8 +25,7 @@ const has = (name) => { const at = words.indexOf(name); if (at >= 0) words.splic
 const marks = has('--marks');
 const out = resolve(option('--out', 'screenshots'));
 const program = resolve(option('--program'));
-const [folder, lesion, entryVoxel] = words;
-const entry = entryVoxel.split(',').map(Number);
+const [folder, lesion, entryMm] = words;
 mkdirSync(out, { recursive: true });
 for (const file of ['session.toml', 'planned.toml']) rmSync(join(folder, file), { force: true });
 
@@ -65,6 +64,7 @@ async function open(url, browser = running, size = { width: 1600, height: 1000 }
 const settled = (page) => page.waitForFunction(() => document.querySelector('.bar > .soft').textContent === 'kept' && !PLAN.planner.quick.busy && !PLAN.planner.exact.busy && !PLAN.planner.planned.busy && !PLAN.planner.where.busy);
 const report = JSON.parse(readFileSync(join(folder, 'report.json'), 'utf8'));
 const millimetres = (index) => index.map((value, axis) => 1e3 * (report.first_voxel_m[axis] + report.spacing_m[axis] * value));
+const entry = entryMm.split(',').map((mm, axis) => Math.round((1e-3 * mm - report.first_voxel_m[axis]) / report.spacing_m[axis]));
 const canvas = (page, title) => page.locator(`canvas[aria-label^="${title} slice"]`);
 
 /** Where a voxel is on a slice's canvas. */
@@ -246,7 +246,9 @@ await settled(page);
 assert.equal(await page.inputValue('textarea'), 'by the other tab');
 await other.close();
 
-// The plan is what `check` and `run` take.
+// The route that was kept first, as a plan: what `check` and `run` take.
+await page.getByRole('button', { name: 'Take route 1' }).click();
+await settled(page);
 await page.getByRole('button', { name: 'Save plan' }).click();
 await page.waitForFunction(() => /Saved as planned.toml/.test(document.body.innerText));
 const checked = JSON.parse(execFileSync(program, ['check', join(folder, 'planned.toml'), '--json'], { encoding: 'utf8' }));

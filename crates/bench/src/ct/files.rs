@@ -1,5 +1,6 @@
 //! The folder of what was built from a scan.
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -188,10 +189,11 @@ pub fn voxels_sha256<T: Copy>(values: &[T], bytes: impl Fn(T) -> [u8; 2]) -> Str
         buffer.extend(block.iter().flat_map(|value| bytes(*value)));
         hash.update(&buffer);
     }
-    hash.finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    let mut text = String::with_capacity(64);
+    for byte in hash.finalize() {
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
 }
 
 fn surface_file(name: &str) -> String {
