@@ -265,6 +265,7 @@ for (const [width, height] of WIDTHS) {
 await page.setViewportSize({ width: 1600, height: 1000 });
 const nameless = await page.evaluate(() => [...document.querySelectorAll('button, input, select, textarea, canvas[tabindex]')].filter((each) => !(each.getAttribute('aria-label') || each.textContent.trim() || each.labels?.length)).map((each) => each.outerHTML));
 assert.deepEqual(nameless, []);
+await page.evaluate(() => PLAN.planner.look([30, 40, 50]));
 await canvas(page, 'Axial').focus();
 const stood = await page.evaluate(() => PLAN.planner.state.crosshair);
 for (const key of ['ArrowLeft', 'ArrowDown', 'PageDown']) await page.keyboard.press(key);

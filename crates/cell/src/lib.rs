@@ -86,7 +86,7 @@ pub use robot::{
 pub use scenario::{REJECTION_RULES, envelope, ranking};
 pub use scenario_edit::ScenarioEdit;
 pub use scenario_text::{relative, scenario_text};
-pub use toml_value::{from_toml, to_toml};
 pub use study::criteria as study_criteria;
 pub use thresholds::ThresholdsFile;
+pub use toml_value::{from_toml, to_toml};
 pub use words::{pair_in_words, part_in_words, reason_in_words, rule_in_words};

@@ -248,11 +248,7 @@ pub fn write_build(
         files.push(file);
     }
     if wanted.labels {
-        write_label_nifti(
-            &folder.join(LABELS_FILE),
-            &build.seen.made.labels,
-            cancel,
-        )?;
+        write_label_nifti(&folder.join(LABELS_FILE), &build.seen.made.labels, cancel)?;
         let names = build.seen.made.labels.names.iter();
         let names = LabelNames {
             schema_version: 1,

@@ -233,8 +233,7 @@ pub fn write_patient(
     let path = folder.join("scenario.toml");
     let name = path.display().to_string();
     control.progress.message("writing");
-    write_build(folder, build, files, control.cancel)
-        .map_err(|error| stopped(&name, error))?;
+    write_build(folder, build, files, control.cancel).map_err(|error| stopped(&name, error))?;
     let scenario = patient_scenario(room, build, goals, folder);
     write_scenario(&path, &scenario, first).map_err(|error| stopped(&name, error))?;
     Ok(path)

@@ -84,13 +84,18 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus> {
     let server = match Server::new(case, arguments.port, program) {
         Ok(server) => server,
         Err(error) => {
-            complain(&format!("error: {error}\nhint: without --port any free one is taken"));
+            complain(&format!(
+                "error: {error}\nhint: without --port any free one is taken"
+            ));
             return Ok(ExitStatus::EnvironmentFailed);
         }
     };
     let _ = stopper.set(server.stopper());
     let url = server.url();
-    print_text(&format!("{url}\nthe planning page of {}; Ctrl-C ends it", shown(&folder)))?;
+    print_text(&format!(
+        "{url}\nthe planning page of {}; Ctrl-C ends it",
+        shown(&folder)
+    ))?;
     if !arguments.no_open {
         open(&url);
     }

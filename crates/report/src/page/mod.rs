@@ -23,8 +23,8 @@ mod replay;
 mod room;
 mod run;
 mod scene;
-pub mod study;
 pub mod shared;
+pub mod study;
 mod viewer;
 mod words;
 

@@ -11,8 +11,8 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_bench::Control;
 use needlebench_bench::ct::{
-    BuildFiles, BuildOptions, BuildReport, BuildStop, GivenLabels, KnownMarkers, PatientFrame, Room, ScanBuild,
-    build, write_patient,
+    BuildFiles, BuildOptions, BuildReport, BuildStop, GivenLabels, KnownMarkers, PatientFrame,
+    Room, ScanBuild, build, write_patient,
 };
 use needlebench_cell::scenario::{GoalSection, Posture, Target};
 use needlebench_cell::{
