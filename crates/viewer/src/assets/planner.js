@@ -244,7 +244,7 @@ PLAN.Planner = class {
     this.showReach();
     const label = this.state.needle.configuration;
     const known = this.reach?.preview?.configurations.find((each) => each.label === label);
-    if (known?.joints_rad) this.room.pose(known.joints_rad);
+    if (known?.joints_rad && !this.dragging) this.room.pose(known.joints_rad);
     if (label && !this.dragging && this.aim() && this.reach?.preview) this.planned.ask({ aim: this.aim(), configuration: label });
   }
 
