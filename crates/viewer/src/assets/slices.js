@@ -385,7 +385,7 @@ PLAN.Probe = class extends PLAN.Picture {
     // All of the canvas, with at most as many pixels as it has.
     const [w, h] = this.box;
     const [columns, rows] = [Math.min(Math.round(w), 420), Math.min(Math.round(h), 420)];
-    const key = `${columns} ${rows} ${right} ${down} ${middle} ${state.window_hu}`;
+    const key = `${w} ${h} ${this.scale} ${right} ${down} ${middle} ${state.window_hu}`;
     if (this.drawn !== key) {
       this.sample(right, down, middle, [w / this.scale, h / this.scale], [columns, rows]);
       this.drawn = key;
