@@ -45,3 +45,4 @@ mod screen;
 mod study;
 mod suggest;
 mod support;
+mod view;
