@@ -43,6 +43,7 @@ async function serve() {
 
 const running = await launch(SOFTWARE_GL);
 process.on('exit', () => running.close());
+for (const signal of ['SIGINT', 'SIGTERM']) process.on(signal, () => process.exit(1));
 const allowed = new Set();
 
 async function open(url, browser = running, size = { width: 1600, height: 1000 }) {
