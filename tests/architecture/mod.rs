@@ -11,7 +11,7 @@ use serde_json::Value;
 /// Every crate under `crates/` and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 18] = [
+const LAYERS: [(&str, &[&str]); 19] = [
     ("kinematics", &[]),
     ("geometry", &["kinematics"]),
     ("cell", &["geometry", "kinematics"]),
@@ -73,6 +73,18 @@ const LAYERS: [(&str, &[&str]); 18] = [
         ],
     ),
     (
+        "viewer",
+        &[
+            "report",
+            "bench",
+            "imaging",
+            "uncertainty",
+            "planning",
+            "cell",
+            "kinematics",
+        ],
+    ),
+    (
         "paper",
         &[
             "report",
@@ -89,6 +101,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
     (
         "needlebench",
         &[
+            "viewer",
             "paper",
             "report",
             "bench",
@@ -106,7 +119,7 @@ const LAYERS: [(&str, &[&str]); 18] = [
 ];
 
 /// Dependencies that one crate alone has, hidden behind its own types.
-const OWNERS: [(&str, &str); 16] = [
+const OWNERS: [(&str, &str); 17] = [
     ("rapier3d-f64", "engine"),
     ("parry3d-f64", "geometry"),
     ("toml", "cell"),
@@ -119,6 +132,7 @@ const OWNERS: [(&str, &str); 16] = [
     ("crc32fast", "study"),
     ("mcap", "recorded"),
     ("dicom-transfer-syntax-registry", "imaging"),
+    ("axum", "viewer"),
     ("png", "render"),
     ("quick-junit", "report"),
     ("indicatif", "needlebench"),

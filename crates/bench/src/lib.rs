@@ -15,6 +15,7 @@ mod budgets;
 mod control;
 pub mod credibility;
 pub mod ct;
+mod desk;
 mod entry;
 mod events;
 pub mod excitation;
@@ -41,6 +42,7 @@ pub mod suggest;
 
 pub use atlas::{GoalAtlas, goal_atlas};
 pub use control::Control;
+pub use desk::Desk;
 pub use entry::choose_entry;
 pub use events::{EngineEvents, EventRun, StagedStop};
 pub use preview::Preview;

@@ -6,9 +6,9 @@
 //! here fails in every run.
 
 use needlebench_cell::{
-    ClearanceClass, Finding, Goal, ResolvedScenario, part_in_words, reason_in_words,
+    Cell, ClearanceClass, Finding, Goal, ResolvedScenario, part_in_words, reason_in_words,
 };
-use needlebench_clearance::ClearanceModel;
+use needlebench_clearance::{ClassMinima, ClearanceModel};
 use needlebench_evaluation::report::{ConfigurationReport, RejectionReport, RouteReport};
 use needlebench_evaluation::{first_missed_by_posture, route_is_expected};
 use needlebench_kinematics::NotUrGeometry;
@@ -73,6 +73,36 @@ pub struct ConfigurationPreview {
     pub missed: Option<&'static str>,
     /// The posture that was looked at, if the pose is in reach.
     pub joints_rad: Option<[f64; 6]>,
+    /// What arm and tool come nearest to in it; none out of reach, or if there is nothing to be near to.
+    pub nearest: Option<NearestPair>,
+}
+
+/// Two solids that come nearest to each other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NearestPair {
+    /// Signed distance, m.
+    pub distance_m: f64,
+    /// Class of the two.
+    pub class: ClearanceClass,
+    /// The two solids.
+    pub pair: [String; 2],
+}
+
+impl NearestPair {
+    /// Of arm and tool; the needle corridor is no body.
+    fn of(minima: &ClassMinima, cell: &Cell) -> Option<Self> {
+        let bodies = minima
+            .iter()
+            .filter(|pair| pair.class != ClearanceClass::NeedleCorridor);
+        let nearest =
+            bodies.min_by(|a, b| a.separation.distance_m.total_cmp(&b.separation.distance_m))?;
+        let (a, b) = nearest.solid_names(cell);
+        Some(Self {
+            distance_m: nearest.separation.distance_m,
+            class: nearest.class,
+            pair: [a.to_owned(), b.to_owned()],
+        })
+    }
 }
 
 impl ConfigurationPreview {
@@ -111,16 +141,10 @@ impl Preview {
             goals.push(preview);
         }
         let (minima, _) = planner.clearance_rules(&resolved.start);
-        let nearest = minima
-            .iter()
-            .filter(|pair| pair.class != ClearanceClass::NeedleCorridor)
-            .min_by(|a, b| a.separation.distance_m.total_cmp(&b.separation.distance_m));
+        let nearest = NearestPair::of(&minima, &resolved.cell);
         let start = StartPreview {
-            least_clearance_m: nearest.map(|pair| pair.separation.distance_m),
-            pair: nearest.map(|pair| {
-                let (a, b) = pair.solid_names(&resolved.cell);
-                [a.to_owned(), b.to_owned()]
-            }),
+            least_clearance_m: nearest.as_ref().map(|nearest| nearest.distance_m),
+            pair: nearest.map(|nearest| nearest.pair),
         };
         let preview = Self {
             basis: BASIS,
@@ -176,6 +200,10 @@ fn configuration_preview(
         rejections: member.rejections.iter().map(rejection_report).collect(),
         missed,
         joints_rad: member.candidate.as_ref().map(|each| each.joints.into()),
+        nearest: member
+            .candidate
+            .as_ref()
+            .and_then(|each| NearestPair::of(&each.clearance, &resolved.cell)),
     }
 }
 

@@ -50,6 +50,7 @@ mod schema;
 pub mod study;
 mod thresholds;
 mod toml_text;
+mod toml_value;
 mod words;
 
 pub use arm::{Arm, Recognition};
@@ -87,4 +88,5 @@ pub use scenario_edit::ScenarioEdit;
 pub use scenario_text::{relative, scenario_text};
 pub use study::criteria as study_criteria;
 pub use thresholds::ThresholdsFile;
+pub use toml_value::{from_toml, to_toml};
 pub use words::{pair_in_words, part_in_words, reason_in_words, rule_in_words};

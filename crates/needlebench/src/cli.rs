@@ -11,7 +11,7 @@ use crate::command::{
     FkArguments, ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, MergeArguments,
     PairsArguments, PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
     ReportArguments, RunArguments, STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
-    SuggestArguments,
+    SuggestArguments, VIEW_HELP, ViewArguments,
 };
 use crate::exit::ExitStatus;
 use crate::output::{complain, keep_to_width};
@@ -76,6 +76,12 @@ enum Command {
     /// CT volumes: what one is, and synthetic ones of phantoms.
     #[command(after_help = "Example: needlebench ct info scan.nii.gz")]
     Ct(CtArguments),
+    /// The planning page on a patient's CT, served on this machine: lesion, target, entry, and which configurations reach it.
+    #[command(
+        after_help = "Example: needlebench view out/patient",
+        after_long_help = VIEW_HELP
+    )]
+    View(ViewArguments),
     /// Many cases of one scenario: a table of results, statistics, and a page to look at them.
     #[command(
         after_help = "Example: needlebench study scenarios/studies/layouts.toml",
@@ -175,6 +181,7 @@ fn run() -> ExitCode {
         Command::Atlas(arguments) => command::atlas(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
         Command::Ct(arguments) => command::ct(&arguments),
+        Command::View(arguments) => command::view(&arguments),
         Command::Study(arguments) => command::study(&arguments),
         Command::Merge(arguments) => command::merge(&arguments),
         Command::Iso9283(arguments) => command::iso9283(&arguments),

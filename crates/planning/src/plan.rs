@@ -38,18 +38,30 @@ impl Planner<'_> {
     /// worth knowing, but none works.
     pub fn plan(&self, goal: &Goal) -> GoalPlan {
         let route = route_rejection(self.resolved, goal);
-        let configurations = Configuration::ALL
-            .into_iter()
-            .map(|configuration| {
-                let mut plan = self.plan_configuration(goal, configuration);
-                plan.rejections.splice(0..0, route.clone());
-                if route.is_some() {
-                    plan.retreat = None;
-                }
-                plan
-            })
-            .collect();
-        GoalPlan { configurations }
+        let plan = |configuration| self.plan_on_route(goal, configuration, route.as_ref());
+        GoalPlan {
+            configurations: Configuration::ALL.into_iter().map(plan).collect(),
+        }
+    }
+
+    /// One of [`Planner::plan`].
+    pub fn plan_one(&self, goal: &Goal, configuration: Configuration) -> ConfigurationPlan {
+        let route = route_rejection(self.resolved, goal);
+        self.plan_on_route(goal, configuration, route.as_ref())
+    }
+
+    fn plan_on_route(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+        route: Option<&Rejection>,
+    ) -> ConfigurationPlan {
+        let mut plan = self.plan_configuration(goal, configuration);
+        plan.rejections.splice(0..0, route.cloned());
+        if route.is_some() {
+            plan.retreat = None;
+        }
+        plan
     }
 
     /// For each of the eight configurations the posture that a plan tries first: of those that break

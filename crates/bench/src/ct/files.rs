@@ -1,5 +1,6 @@
 //! The folder of what was built from a scan.
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -8,11 +9,12 @@ use needlebench_cell::scenario_text;
 use needlebench_imaging::markers::{DetectedMarker, Rejected};
 use needlebench_imaging::read::Description;
 use needlebench_imaging::registration::{MarkerMatch, Registration};
-use needlebench_imaging::write::{write_bytes, write_label_nifti, write_stl};
+use needlebench_imaging::write::{write_bytes, write_label_nifti, write_nifti, write_stl};
 use needlebench_imaging::{
     ImagingError, LabelFacts, LesionSize, Remark, SurfaceError, SurfaceTissue,
 };
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use super::patient::{PatientFrame, SURFACES};
 use super::{BuiltTarget, ScanBuild};
@@ -34,6 +36,10 @@ pub struct BuildReport<'b> {
     pub slice_thickness_m: Option<f64>,
     /// Origin of the scenario's phantom frame; its axes are those of `ct`.
     pub phantom_origin_m: [f64; 3],
+    /// SHA-256 of the Hounsfield units, each as two bytes, little endian: whether `volume.nii.gz` is that of this report.
+    pub voxels_sha256: String,
+    /// The same of the labels.
+    pub labels_sha256: String,
     /// Closed surfaces.
     pub surfaces: Vec<SurfaceReport<'b>>,
     /// Lesions that were asked for, in that order.
@@ -122,6 +128,8 @@ impl<'b> BuildReport<'b> {
             first_voxel_m: grid.first_m().coords.into(),
             slice_thickness_m: build.seen.volume.slice_thickness_m,
             phantom_origin_m: PatientFrame::of(build).origin_in_ct_m.into(),
+            voxels_sha256: voxels_sha256(&build.seen.volume.hu, i16::to_le_bytes),
+            labels_sha256: voxels_sha256(&made.labels.labels, u16::to_le_bytes),
             surfaces: made
                 .surfaces
                 .iter()
@@ -170,6 +178,24 @@ impl<'b> BuildReport<'b> {
     }
 }
 
+/// Digest of voxels as their file has them.
+pub fn voxels_sha256<T: Copy>(values: &[T], bytes: impl Fn(T) -> [u8; 2]) -> String {
+    /// Values that are hashed at a time.
+    const BLOCK: usize = 1 << 15;
+    let mut hash = Sha256::new();
+    let mut buffer = Vec::with_capacity(2 * BLOCK);
+    for block in values.chunks(BLOCK) {
+        buffer.clear();
+        buffer.extend(block.iter().flat_map(|value| bytes(*value)));
+        hash.update(&buffer);
+    }
+    let mut text = String::with_capacity(64);
+    for byte in hash.finalize() {
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
 fn surface_file(name: &str) -> String {
     format!("{SURFACES}/{name}.stl")
 }
@@ -186,14 +212,28 @@ struct LabelNames<'b> {
     labels: Vec<LabelName<'b>>,
 }
 
-/// Writes surfaces and report, and the label map if it is wanted; the names of the files, in that order.
+/// What of a build is written besides surfaces, report and scenario.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BuildFiles {
+    /// The label map with its names.
+    pub labels: bool,
+    /// The volume along the patient's axes: what everything was found in.
+    pub volume: bool,
+}
+
+/// Name of the volume in a folder that was built.
+pub const VOLUME_FILE: &str = "volume.nii.gz";
+/// Name of the label map there.
+pub const LABELS_FILE: &str = "labels.nii.gz";
+
+/// Writes surfaces and report, and what else is wanted; the names of the files.
 ///
 /// # Errors
 /// What cannot be written; interrupted.
 pub fn write_build(
     folder: &Path,
     build: &ScanBuild,
-    with_labels: bool,
+    wanted: BuildFiles,
     cancel: &AtomicBool,
 ) -> Result<Vec<String>, ImagingError> {
     let mut files = Vec::new();
@@ -207,12 +247,8 @@ pub fn write_build(
         write_stl(&folder.join(&file), &surface.mesh)?;
         files.push(file);
     }
-    if with_labels {
-        write_label_nifti(
-            &folder.join("labels.nii.gz"),
-            &build.seen.made.labels,
-            cancel,
-        )?;
+    if wanted.labels {
+        write_label_nifti(&folder.join(LABELS_FILE), &build.seen.made.labels, cancel)?;
         let names = build.seen.made.labels.names.iter();
         let names = LabelNames {
             schema_version: 1,
@@ -224,7 +260,11 @@ pub fn write_build(
                 .collect(),
         };
         write_json(&folder.join("labels.json"), &names)?;
-        files.extend(["labels.nii.gz".to_owned(), "labels.json".to_owned()]);
+        files.extend([LABELS_FILE.to_owned(), "labels.json".to_owned()]);
+    }
+    if wanted.volume {
+        write_nifti(&folder.join(VOLUME_FILE), &build.seen.volume, cancel)?;
+        files.push(VOLUME_FILE.to_owned());
     }
     write_json(&folder.join("report.json"), &BuildReport::of(build))?;
     files.push("report.json".to_owned());

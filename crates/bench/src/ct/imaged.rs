@@ -16,7 +16,7 @@ use needlebench_imaging::{ImagingError, LesionSeed};
 use needlebench_kinematics::Pose;
 
 use super::build::{BuildOptions, KnownMarkers, ScanBuild, SeenScan, register, see};
-use super::files::{write_build, write_json, write_scenario};
+use super::files::{BuildFiles, write_build, write_json, write_scenario};
 use super::patient::{PatientFrame, Room, patient_scenario};
 use super::touched::Draws;
 use super::{CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan};
@@ -130,7 +130,7 @@ pub fn imaged(
     resolved: &ResolvedScenario,
     folder: &Path,
     overrides: &Overrides,
-    with_labels: bool,
+    files: BuildFiles,
     last: Option<&mut LastScan>,
     control: &Control<'_>,
 ) -> Result<Imaged, BuildStop> {
@@ -168,7 +168,7 @@ pub fn imaged(
         "{}, as it was built from a synthetic scan of its phantom",
         resolved.scenario.name
     );
-    let path = write_patient(folder, &room, &build, goals, with_labels, &first, control)?;
+    let path = write_patient(folder, &room, &build, goals, files, &first, control)?;
     write_json(&folder.join("truth.json"), &scan.truth).map_err(|error| stopped(file, error))?;
     let scenario = load_scenario(&path, overrides)?;
     Ok(Imaged {
@@ -204,7 +204,10 @@ pub fn scanned(
         &resolved,
         folder.path(),
         overrides,
-        false,
+        BuildFiles {
+            labels: false,
+            volume: false,
+        },
         Some(last),
         &control,
     ) {
@@ -223,15 +226,14 @@ pub fn write_patient(
     room: &Room<'_>,
     build: &ScanBuild,
     goals: Vec<GoalSection>,
-    with_labels: bool,
+    files: BuildFiles,
     first: &str,
     control: &Control<'_>,
 ) -> Result<PathBuf, BuildStop> {
     let path = folder.join("scenario.toml");
     let name = path.display().to_string();
     control.progress.message("writing");
-    write_build(folder, build, with_labels, control.cancel)
-        .map_err(|error| stopped(&name, error))?;
+    write_build(folder, build, files, control.cancel).map_err(|error| stopped(&name, error))?;
     let scenario = patient_scenario(room, build, goals, folder);
     write_scenario(&path, &scenario, first).map_err(|error| stopped(&name, error))?;
     Ok(path)

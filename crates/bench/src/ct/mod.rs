@@ -19,7 +19,7 @@ pub use build::{
     BuildOptions, BuiltTarget, GivenLabels, KnownMarkers, Registered, ScanBuild, SeenScan, build,
 };
 pub use built_folder::BuiltFolder;
-pub use files::{BuildReport, write_build};
+pub use files::{BuildFiles, BuildReport, LABELS_FILE, VOLUME_FILE, voxels_sha256, write_build};
 pub use imaged::{BuildStop, Imaged, LastScan, imaged, scanned, write_patient};
 pub use patient::{PatientFrame, Room};
 pub use scan_order::{CtSubject, ScanOrder, ScanRange, SyntheticScan};

@@ -19,6 +19,7 @@ mod schema;
 mod servo;
 mod study;
 mod suggest;
+mod view;
 
 use std::path::Path;
 
@@ -48,6 +49,7 @@ pub(crate) use schema::{SchemaFormat, schema};
 pub(crate) use servo::{ServoArguments, servo};
 pub(crate) use study::{MergeArguments, STUDY_HELP, StudyArguments, merge, study};
 pub(crate) use suggest::{SuggestArguments, suggest};
+pub(crate) use view::{VIEW_HELP, ViewArguments, view};
 
 use needlebench_bench::Runnable;
 use needlebench_bench::choose_entry;

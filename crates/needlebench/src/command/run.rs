@@ -22,7 +22,7 @@ use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::progress::TerminalProgress;
 use needlebench_bench::accuracy::{accuracy_of_run, check_run};
-use needlebench_bench::ct::{BuildStop, imaged};
+use needlebench_bench::ct::{BuildFiles, BuildStop, imaged};
 use needlebench_bench::{Control, RunOptions, Runnable, ScenarioRun};
 use needlebench_report::files::{Folder, RunFiles, write_run};
 use needlebench_report::{junit, markdown, report_screen, report_text, write_atomically};
@@ -235,7 +235,10 @@ fn scanned(
             scenario.scenario(),
             &folder,
             scan.overrides,
-            true,
+            BuildFiles {
+                labels: true,
+                volume: false,
+            },
             None,
             &control,
         ),

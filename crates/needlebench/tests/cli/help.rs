@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 20] = [
     "init",
     "suggest",
     "run",
@@ -13,6 +13,7 @@ const COMMANDS: [&str; 19] = [
     "atlas",
     "compare",
     "ct",
+    "view",
     "iso9283",
     "record-plan",
     "replay",

@@ -46,3 +46,4 @@ mod screen;
 mod study;
 mod suggest;
 mod support;
+mod view;

@@ -23,6 +23,7 @@ mod replay;
 mod room;
 mod run;
 mod scene;
+pub mod shared;
 pub mod study;
 mod viewer;
 mod words;

@@ -164,6 +164,11 @@ impl Pack {
     /// The document and its arrays: base64 of zlib of the document's length (four bytes,
     /// little-endian), the document, zeros up to a multiple of four bytes, the arrays.
     pub fn payload(self, document: &Value) -> String {
+        deflated(&self.bytes(document))
+    }
+
+    /// The same without zlib and base64.
+    pub fn bytes(self, document: &Value) -> Vec<u8> {
         let text = document.to_string();
         let mut raw = u32::try_from(text.len())
             .expect("documents are far below 4 GiB")
@@ -172,7 +177,7 @@ impl Pack {
         raw.extend_from_slice(text.as_bytes());
         raw.resize(raw.len().next_multiple_of(4), 0);
         raw.extend_from_slice(&self.bytes);
-        deflated(&raw)
+        raw
     }
 }
 

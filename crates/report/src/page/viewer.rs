@@ -5,15 +5,12 @@ use serde_json::Value;
 
 use super::document::Document;
 use super::pack::{Pack, deflated};
+use super::shared::{CORE, NUMBER, THREE, VIEW};
 
 const STYLE: &str = concat!(
     include_str!("assets/page.css"),
     include_str!("assets/explore.css")
 );
-const THREE: &str = include_str!("assets/three.bundle.js");
-const CORE: &str = include_str!("assets/core.js");
-const NUMBER: &str = include_str!("assets/number.js");
-const VIEW: &str = include_str!("assets/view.js");
 const PLOT: &str = include_str!("assets/plot.js");
 const SVG: &str = include_str!("assets/svg.js");
 

@@ -11,8 +11,8 @@ use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_bench::Control;
 use needlebench_bench::ct::{
-    BuildOptions, BuildReport, BuildStop, GivenLabels, KnownMarkers, PatientFrame, Room, ScanBuild,
-    build, write_patient,
+    BuildFiles, BuildOptions, BuildReport, BuildStop, GivenLabels, KnownMarkers, PatientFrame,
+    Room, ScanBuild, build, write_patient,
 };
 use needlebench_cell::scenario::{GoalSection, Posture, Target};
 use needlebench_cell::{
@@ -45,6 +45,7 @@ Writes into DIR:
   scenario.toml       what `run`, `check`, `suggest` and all else take as it is
   surfaces/           closed surfaces as STL, mm, LPS
   labels.nii.gz       what each voxel is; its names are in labels.json
+  volume.nii.gz       the volume along the patient's axes, for `view`
   slices/             pictures of slices with the surfaces' outlines on them
   report.json         surfaces with their distance from the voxels, lesions, markers, registration, errors; m and rad
 
@@ -96,6 +97,9 @@ pub(crate) struct BuildArguments {
     /// Write no label map.
     #[arg(long)]
     no_labels: bool,
+    /// Write no volume: `view` cannot show the folder then.
+    #[arg(long)]
+    no_volume: bool,
     /// Print what was built as one JSON document.
     #[arg(long)]
     json: bool,
@@ -306,7 +310,10 @@ fn make(arguments: &BuildArguments, control: &Control<'_>) -> Result<(ScanBuild,
         &room,
         &built,
         goals,
-        !arguments.no_labels,
+        BuildFiles {
+            labels: !arguments.no_labels,
+            volume: !arguments.no_volume,
+        },
         first,
         control,
     )?;

@@ -43,8 +43,8 @@ NB.inflate = async function (id) {
 };
 
 /** Reads the payload: the document, with `NB.array` for what it refers to. */
-NB.read = async function () {
-  const raw = await NB.inflate('payload');
+NB.read = async () => NB.unpack(await NB.inflate('payload'));
+NB.unpack = function (raw) {
   const length = new DataView(raw).getUint32(0, true);
   NB.raw = raw;
   NB.arrays = Math.ceil((4 + length) / 4) * 4;

@@ -1,0 +1,94 @@
+//! A scenario in whose cell goals are tried as fast as somebody moves them.
+//!
+//! What does not depend on the goal is prepared once; everything else is what [`Preview`](crate::Preview) and a run have.
+
+use needlebench_cell::{Expected, Finding, Goal, GoalPlacer, ResolvedScenario};
+use needlebench_clearance::ClearanceModel;
+use needlebench_engine::Servo;
+use needlebench_kinematics::NotUrGeometry;
+use needlebench_kinematics::ik::{Configuration, Kinematics};
+use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_planning::{ConfigurationPlan, Planner};
+use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
+
+use crate::preview::{GoalPreview, goal_preview};
+use crate::servo_of;
+
+/// A scenario's cell, ready for goals that are not its own.
+pub struct Desk {
+    resolved: ResolvedScenario,
+    model: ClearanceModel,
+    kinematics: Kinematics,
+    servo: Servo,
+}
+
+impl Desk {
+    /// Prepares the cell of a scenario; its goals do not count.
+    ///
+    /// # Errors
+    /// [`NotUrGeometry`] if the robot is not a UR arm.
+    pub fn new(resolved: ResolvedScenario) -> Result<Self, NotUrGeometry> {
+        Ok(Self {
+            model: ClearanceModel::new(&resolved.cell),
+            kinematics: Kinematics::new(resolved.cell.robot.chain)?,
+            servo: servo_of(&resolved),
+            resolved,
+        })
+    }
+
+    /// The scenario.
+    pub fn scenario(&self) -> &ResolvedScenario {
+        &self.resolved
+    }
+
+    /// Places goals in the cell.
+    pub fn placer(&self) -> GoalPlacer<'_> {
+        GoalPlacer::new(&self.resolved)
+    }
+
+    /// Which configurations can reach a goal, by their postures.
+    ///
+    /// # Errors
+    /// [`NotUrGeometry`]: never of a robot that [`Desk::new`] took.
+    pub fn preview(&self, goal: &Goal) -> Result<GoalPreview, NotUrGeometry> {
+        Ok(goal_preview(&self.planner()?, &self.resolved, goal))
+    }
+
+    /// The whole motion of one configuration, with what is proven of its clearances.
+    ///
+    /// # Errors
+    /// As [`Desk::preview`].
+    pub fn plan(
+        &self,
+        goal: &Goal,
+        configuration: Configuration,
+    ) -> Result<ConfigurationPlan, NotUrGeometry> {
+        Ok(self.planner()?.plan_one(goal, configuration))
+    }
+
+    /// Bias and covariance of the needle at skin and target, over the arms and patients that the scenario's expected tip
+    /// error is of; axes as those of [`Moments`]. None where the arm's data do not say enough.
+    pub fn expected_error(
+        &self,
+        goal: &Goal,
+        trajectory: &JointTrajectory,
+    ) -> Option<Result<[Moments; 2], Finding>> {
+        let Expected { imperfections, .. } = self.resolved.expected.as_ref()?;
+        let place = self.resolved.phantom.as_ref();
+        let case = BudgetCase {
+            cell: &self.resolved.cell,
+            goal,
+            place: place.map(|placed| &placed.world_from_phantom),
+            servo: &self.servo,
+            imperfections,
+            trajectory,
+            timestep_s: self.resolved.scenario.engines.timestep_ms * 1e-3,
+        };
+        let file = &self.resolved.source.file;
+        Some(analytic_total(&case).map_err(|error| Finding::new(file, error.to_string())))
+    }
+
+    fn planner(&self) -> Result<Planner<'_>, NotUrGeometry> {
+        Planner::like(&self.resolved, &self.model, &self.kinematics)
+    }
+}

@@ -1,0 +1,158 @@
+//! `needlebench view`.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use needlebench_bench::Control;
+use needlebench_bench::ct::{BuildFiles, BuildStop, VOLUME_FILE, imaged};
+use needlebench_cell::{Finding, Overrides, load_scenario};
+use needlebench_viewer::{Case, Server, Stopper};
+
+use crate::arguments::RobotArguments;
+use crate::command::run::prepare_folder;
+use crate::command::{overrides, print_text};
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::output::{complain, shown};
+use crate::progress::TerminalProgress;
+
+/// What `view --help` says after the options.
+pub(crate) const VIEW_HELP: &str = "\
+Example: needlebench view out/patient
+
+DIR is what `needlebench ct build SCAN --out DIR` made. A SCENARIO with a section [ct] is scanned and built first, into
+out/NAME/view. The address that is printed has a secret in it: who has it can see the patient, nobody else on this
+machine can. Nothing leaves the machine, and nothing is written outside the folder: session.toml (what was decided; it is
+there again the next time), planned.toml (the plan, for `run`) and runs/ (what was simulated from the page).
+
+Ctrl-C ends it. Not a medical device.";
+
+#[derive(Debug, Args)]
+pub(crate) struct ViewArguments {
+    /// Folder that `ct build` made, or a scenario that begins with a scan.
+    #[arg(value_name = "DIR|SCENARIO")]
+    path: PathBuf,
+    /// Port of 127.0.0.1; any that is free if left out.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    port: u16,
+    /// Print the address without opening it in a browser.
+    #[arg(long)]
+    no_open: bool,
+    #[command(flatten)]
+    robot: RobotArguments,
+}
+
+/// Serves the planning page until it is interrupted.
+pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus> {
+    let overrides = match overrides(&arguments.robot) {
+        Ok(overrides) => overrides,
+        Err(finding) => {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let cancel = Arc::new(AtomicBool::new(false));
+    let stopper: Arc<std::sync::OnceLock<Stopper>> = Arc::default();
+    let (requested, stops) = (Arc::clone(&cancel), Arc::clone(&stopper));
+    ctrlc::set_handler(move || {
+        requested.store(true, Ordering::Relaxed);
+        if let Some(stopper) = stops.get() {
+            stopper.stop();
+        }
+    })
+    .context("cannot watch for interrupts")?;
+    let opened = folder(&arguments.path, &overrides, &cancel).and_then(|folder| {
+        let case = Case::open(&folder, &overrides)?;
+        Ok((folder, case))
+    });
+    let (folder, case) = match opened {
+        Ok(opened) => opened,
+        Err(BuildStop::Interrupted) => {
+            complain("interrupted while the scan was made");
+            return Ok(ExitStatus::Interrupted);
+        }
+        Err(BuildStop::Refused(findings)) => {
+            print_findings(&findings);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let program = std::env::current_exe().context("this program does not find itself")?;
+    let server = match Server::new(case, arguments.port, program) {
+        Ok(server) => server,
+        Err(error) => {
+            complain(&format!(
+                "error: {error}\nhint: without --port any free one is taken"
+            ));
+            return Ok(ExitStatus::EnvironmentFailed);
+        }
+    };
+    let _ = stopper.set(server.stopper());
+    let url = server.url();
+    print_text(&format!(
+        "{url}\nthe planning page of {}; Ctrl-C ends it",
+        shown(&folder)
+    ))?;
+    if !arguments.no_open {
+        open(&url);
+    }
+    server.run()?;
+    Ok(ExitStatus::Success)
+}
+
+/// The folder of a patient, built if need be.
+fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<PathBuf, BuildStop> {
+    if path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let beside = path.parent().unwrap_or(Path::new(""));
+    if path.is_file() && beside.join(VOLUME_FILE).is_file() {
+        return Ok(beside.to_owned());
+    }
+    let resolved = load_scenario(path, overrides)?;
+    let name = path.display().to_string();
+    if resolved.scenario.ct.is_none() {
+        let finding = Finding::new(&name, "it has a patient, but no scan to show").hint(format!(
+            "add a section [ct], or make a scan of it: `needlebench ct synth {name} --markers ct-sphere --out out/ct`, then \
+             `needlebench ct build out/ct/ct.nii.gz --room {name} --markers out/ct/marker_list.toml --lesion NAME=X,Y,Z \
+             --out out/patient`, then `needlebench view out/patient`"
+        ));
+        return Err(BuildStop::Refused(vec![finding]));
+    }
+    let folder = Path::new("out").join(&resolved.scenario.name).join("view");
+    prepare_folder(&folder).map_err(|finding| BuildStop::Refused(vec![finding]))?;
+    let progress = TerminalProgress::new(false);
+    let control = Control {
+        threads: std::thread::available_parallelism().map_or(1, usize::from),
+        cancel,
+        progress: &progress,
+    };
+    let files = BuildFiles {
+        labels: true,
+        volume: true,
+    };
+    let made = imaged(&resolved, &folder, overrides, files, None, &control);
+    progress.finish();
+    made.map(|_| folder)
+}
+
+/// Opens an address in the browser; where there is none the printed address is enough.
+fn open(url: &str) {
+    let (program, before): (&str, &[&str]) = if cfg!(target_os = "macos") {
+        ("open", &[])
+    } else if cfg!(windows) {
+        ("cmd", &["/C", "start", ""])
+    } else {
+        ("xdg-open", &[])
+    };
+    let _ = Command::new(program)
+        .args(before)
+        .arg(url)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
+}

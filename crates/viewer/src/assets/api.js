@@ -1,0 +1,80 @@
+// What the page asks of its server, and how it waits for answers.
+'use strict';
+
+const PLAN = {};
+
+/** The secret of the address, which browsers send to nobody. */
+PLAN.token = location.hash.slice(1);
+
+/** An answer that is none: what is wrong, and what to do. */
+PLAN.Problem = class extends Error {
+  constructor(status, body) {
+    super(body.error || `the server answered with status ${status}`);
+    this.status = status;
+    this.hint = body.hint || '';
+    this.body = body;
+  }
+};
+
+PLAN.fetch = async function (path, options = {}) {
+  const headers = { authorization: `Bearer ${PLAN.token}` };
+  if (options.body !== undefined) headers['content-type'] = 'application/json';
+  let response;
+  try {
+    response = await fetch(`/api/${path}`, {
+      method: options.method || (options.body === undefined ? 'GET' : 'POST'),
+      headers, body: options.body === undefined ? undefined : JSON.stringify(options.body), cache: 'no-store',
+    });
+  } catch {
+    throw new PLAN.Problem(0, {
+      error: 'the server does not answer',
+      hint: 'start `needlebench view` again and open the address that it prints; what was kept is there again',
+    });
+  }
+  if (!response.ok) {
+    let body = {};
+    try { body = await response.json(); } catch { /* no sentence */ }
+    throw new PLAN.Problem(response.status, body);
+  }
+  return response;
+};
+
+PLAN.ask = async (path, options) => (await PLAN.fetch(path, options)).json();
+
+/** Asks for the latest question alone: while one is answered, only the newest that came since waits. */
+PLAN.Latest = class {
+  constructor(path, answered) {
+    this.path = path;
+    this.answered = answered;
+    this.turn = 0;
+  }
+
+  ask(body) {
+    this.turn++;
+    this.next = { ...body, page: PLAN.page, turn: this.turn };
+    this.asked = performance.now();
+    if (!this.busy) this.work();
+  }
+
+  /** What is on its way does not count any more. */
+  forget() { this.turn++; this.next = null; }
+
+  async work() {
+    this.busy = true;
+    while (this.next) {
+      const body = this.next;
+      const asked = this.asked;
+      this.next = null;
+      let answer;
+      try {
+        answer = await PLAN.ask(this.path, { body });
+      } catch (error) {
+        answer = { refused: { message: error.message, hint: error.hint }, problem: error };
+      }
+      // A newer question may wait: what is shown follows the drag all the same.
+      if (body.turn === this.turn || this.next) this.answered(answer, body, performance.now() - asked);
+    }
+    this.busy = false;
+  }
+};
+PLAN.page = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte.toString(16).padStart(2, '0')).join('');

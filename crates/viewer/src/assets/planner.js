@@ -1,0 +1,659 @@
+// The planner: what is chosen, what is shown of it, and what is kept.
+'use strict';
+
+PLAN.WINDOWS = { lung: [-1350, 150], soft: [-160, 240], bone: [-500, 1300] };
+PLAN.WINDOW_NAMES = { lung: 'Lung (\u2212600/1500)', soft: 'Soft (40/400)', bone: 'Bone (400/1800)' };
+
+PLAN.Planner = class {
+  constructor(facts, session, page, app) {
+    this.facts = facts;
+    this.page = page;
+    this.app = app;
+    this.version = session.version;
+    this.undone = [];
+    this.done = [];
+    this.tool = 'crosshair';
+    this.shown = { target: null, entry: null };
+    this.probe = { turn: 0, depth: 0 };
+    const middle = facts.size.map((count) => Math.floor(count / 2));
+    this.state = {
+      notes: '', window_hu: PLAN.WINDOWS.lung, crosshair: middle, hidden_markers: [], needle: {}, routes: [],
+      ...Object.fromEntries(Object.entries(PLAN.taken(session)).filter(([, value]) => value !== null)),
+    };
+    if (session.version === 0) this.state.needle = this.firstNeedle();
+    this.greys = PLAN.greys(this.state.window_hu);
+    this.quick = new PLAN.Latest('route', (answer, body, took) => this.routed(answer, body, took));
+    this.exact = new PLAN.Latest('reach', (answer) => this.reached(answer));
+    this.planned = new PLAN.Latest('motion', (answer, body) => this.moved(answer, body));
+    this.where = new PLAN.Latest('place', (answer) => this.placed(answer));
+    this.latencies = [];
+    this.build();
+  }
+
+  /** The scenario's own first goal. */
+  firstNeedle() {
+    const goal = this.facts.goals[0];
+    if (!goal) return this.facts.lesions[0] ? { target: { lesion: this.facts.lesions[0].name } } : {};
+    const needle = { goal: goal.name };
+    if (goal.lesion) needle.target = { lesion: goal.lesion };
+    else if (goal.target_m) needle.target = { place_m: goal.target_m };
+    if (goal.entry_m) needle.entry = { place_m: goal.entry_m };
+    return needle;
+  }
+
+  within(index) { return index.map((value, axis) => Math.min(Math.max(value, 0), this.facts.size[axis] - 1)); }
+
+  indexOf(place) { return place.map((metres, axis) => (metres - this.facts.first_voxel_m[axis]) / this.facts.spacing_m[axis]); }
+
+  // ---- the page
+
+  build() {
+    this.status = NB.el('p', { class: 'status', role: 'status', 'aria-live': 'polite' });
+    this.banner = NB.el('div', { class: 'banner', role: 'alert' });
+    this.slices = Object.values(PLAN.PLANES).map((plane) => new PLAN.Slice(plane, this));
+    this.probes = ['along', 'across'].map((kind) => new PLAN.Probe(kind, this));
+    this.readout = NB.el('p', { class: 'readout', role: 'status', 'aria-live': 'polite' });
+    this.room = new PLAN.Room(this.page, this.facts);
+    const heading = NB.el('header', { class: 'top' },
+      NB.el('h1', { text: `Plan: ${this.facts.name}` }),
+      NB.el('p', null, 'Research software: ', NB.el('strong', { text: 'not a medical device.' }), ' Slices as radiologists see them: the patient\u2019s right is on the left of the picture.'));
+    const panes = NB.el('div', { class: 'panes' },
+      this.slices.map((slice) => slice.element),
+      NB.el('figure', { class: 'slice' }, this.room.view.element, NB.el('figcaption', null, NB.el('span', { class: 'slice-title', text: 'Room' }), this.playButtons())),
+      this.probes.map((probe) => probe.element));
+    this.numbers = NB.el('div');
+    this.configurations = NB.el('div');
+    this.comparison = NB.el('div');
+    const side = NB.el('aside', { class: 'side', 'aria-label': 'Plan' },
+      this.needlePanel(),
+      NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Needle' }), this.numbers),
+      NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Configurations' }), this.configurations),
+      this.routesPanel(), this.markersPanel(), this.notesPanel(), this.simulationPanel());
+    NB.clear(this.app, heading, this.banner, this.toolbar(), NB.el('div', { class: 'planner' }, NB.el('div', { class: 'pictures' }, panes, this.readout), side), this.signature());
+    this.showTool();
+    this.showWindow();
+    this.showMarkers();
+    this.showRoutes();
+    this.needleChanged();
+    this.look(this.state.crosshair, false);
+    window.addEventListener('keydown', (event) => this.key(event));
+    window.addEventListener('beforeprint', () => { this.printed.textContent = new Date().toLocaleString(); });
+  }
+
+  toolbar() {
+    this.tools = Object.fromEntries(Object.entries({ crosshair: 'Crosshair', target: 'Click the target', entry: 'Click the entry' }).map(([name, words]) => [name, NB.el('button', {
+      type: 'button', role: 'radio', 'aria-checked': 'false', onclick: () => { this.tool = name; this.showTool(); },
+    }, words)]));
+    this.windows = Object.fromEntries(Object.entries(PLAN.WINDOW_NAMES).map(([name, words]) => [name, NB.el('button', {
+      type: 'button', role: 'radio', 'aria-checked': 'false', onclick: () => this.setWindow(PLAN.WINDOWS[name]),
+    }, words)]));
+    this.undoButton = NB.el('button', { type: 'button', onclick: () => this.undo(), title: 'Ctrl+Z' }, 'Undo');
+    this.redoButton = NB.el('button', { type: 'button', onclick: () => this.redo(), title: 'Ctrl+Shift+Z' }, 'Redo');
+    this.kept = NB.el('span', { class: 'soft', role: 'status' });
+    return NB.el('div', { class: 'bar no-print' },
+      NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'What a click does' }, Object.values(this.tools)),
+      NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Window: centre and width, HU' }, Object.values(this.windows)),
+      NB.el('div', { class: 'tabs' }, this.undoButton, this.redoButton, NB.el('button', { type: 'button', onclick: () => window.print() }, 'Print')),
+      this.kept);
+  }
+
+  showTool() { for (const [name, button] of Object.entries(this.tools)) button.setAttribute('aria-checked', String(name === this.tool)); }
+
+  showWindow() {
+    for (const [name, button] of Object.entries(this.windows)) button.setAttribute('aria-checked', String(String(PLAN.WINDOWS[name]) === String(this.state.window_hu)));
+  }
+
+  setWindow(window_hu) {
+    this.state.window_hu = window_hu;
+    this.greys = PLAN.greys(window_hu);
+    this.showWindow();
+    this.draw();
+    this.keepSoon();
+  }
+
+  needlePanel() {
+    this.targetText = NB.el('dd');
+    this.entryText = NB.el('dd');
+    const lesions = this.facts.lesions.map((lesion) => NB.el('button', { type: 'button', onclick: () => {
+      this.change({ target: { lesion: lesion.name } });
+      this.look(this.within(lesion.index.map(Math.round)));
+    } }, `Target: ${NB.words(lesion.name)}`));
+    const goals = this.facts.goals.length > 1
+      ? [this.goalSelect = NB.select('Goal of the scenario', this.facts.goals.map(({ name }) => [name, NB.words(name)]), this.state.needle.goal, (goal) => this.change({ goal }))] : [];
+    this.planName = NB.el('input', { type: 'text', value: this.facts.plan_file, size: '18', 'aria-label': 'File name of the plan', maxlength: '64', spellcheck: 'false' });
+    this.saveButton = NB.el('button', { type: 'button', onclick: () => this.savePlan() }, 'Save plan');
+    this.saved = NB.el('p', { class: 'soft', role: 'status' });
+    return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Target and entry' }), goals,
+      NB.el('div', { class: 'tabs no-print' }, lesions,
+        NB.el('button', { type: 'button', onclick: () => this.put('target', this.state.crosshair) }, 'Target at crosshair (T)'),
+        NB.el('button', { type: 'button', onclick: () => this.put('entry', this.state.crosshair) }, 'Entry at crosshair (E)')),
+      NB.el('dl', null, NB.el('dt', { text: 'Target' }), this.targetText, NB.el('dt', { text: 'Entry' }), this.entryText),
+      NB.el('p', { class: 'soft' }, 'mm of the scan: left, posterior, superior (LPS). The entry is where the line from the target through your click leaves the skin.'),
+      NB.el('div', { class: 'bar no-print' }, this.planName, this.saveButton), this.saved);
+  }
+
+  // ---- the crosshair
+
+  /** Moves the crosshair to a voxel. */
+  look(index, keep = true) {
+    this.state.crosshair = index;
+    this.where.ask({ index });
+    this.draw();
+    if (keep) this.keepSoon();
+  }
+
+  step(axis, by) {
+    if (!this.volume) return;
+    const index = this.state.crosshair.slice();
+    index[axis] += by;
+    this.look(this.within(index));
+  }
+
+  placed(answer) {
+    if (answer.problem) { this.complain(answer.problem); return; }
+    const [x, y, z] = answer.ct_mm;
+    const names = [x < 0 ? 'right' : 'left', y < 0 ? 'anterior' : 'posterior', z < 0 ? 'inferior' : 'superior'];
+    const place = [x, y, z].map((value) => NB.fixed(value, 2)).join(', ');
+    this.place = answer;
+    this.readout.textContent = `Crosshair: voxel ${this.state.crosshair.join(', ')}; (${place}) mm LPS, ${names.join(', ')} of the scan\u2019s origin; ${NB.minus(String(answer.hu))} HU; ${answer.label ? NB.words(answer.label) : 'outside the body'}`;
+  }
+
+  // ---- the needle
+
+  put(what, index) {
+    if (!this.volume) return;
+    this.change({ [what]: { index: index.slice() } });
+    this.tool = 'crosshair';
+    this.showTool();
+    this.look(this.within(index.map(Math.round)));
+  }
+
+  change(needle) {
+    this.remember();
+    this.state.needle = { ...this.state.needle, ...needle };
+    this.needleChanged();
+    this.keepSoon();
+  }
+
+  beginDrag() { this.remember(); this.dragging = true; this.latencies = []; }
+
+  drag(what, index) {
+    this.state.needle = { ...this.state.needle, [what]: { index } };
+    this.shown = { ...this.shown, [what]: index };
+    this.draw();
+    this.askRoute();
+  }
+
+  endDrag() {
+    this.dragging = false;
+    this.needleChanged();
+    this.keepSoon();
+  }
+
+  aim() {
+    const { goal, target, entry } = this.state.needle;
+    return target && entry ? { goal, target, entry } : null;
+  }
+
+  pointOf(aim) {
+    if (!aim) return null;
+    if (aim.index) return aim.index;
+    if (aim.place_m) return this.indexOf(aim.place_m);
+    return this.facts.lesions.find((lesion) => lesion.name === aim.lesion)?.index || null;
+  }
+
+  needleChanged() {
+    const { target, entry } = this.state.needle;
+    this.shown = { target: this.pointOf(target), entry: this.pointOf(entry) };
+    this.motion = null;
+    this.tip = null;
+    this.planned.forget();
+    this.room.stop();
+    if (this.goalSelect) this.goalSelect.querySelector('select').value = this.state.needle.goal || this.facts.goals[0].name;
+    if (this.aim()) this.askRoute();
+    else { this.route = null; this.reach = null; this.refused = null; this.showRoute(); this.showReach(); }
+    this.showUndo();
+    this.draw();
+  }
+
+  askRoute() {
+    const aim = this.aim();
+    if (aim) this.quick.ask({ aim });
+  }
+
+  routed(answer, body, took) {
+    if (this.dragging) this.latencies.push(took);
+    if (!this.aim()) return;
+    if (answer.problem) this.complain(answer.problem);
+    this.refused = answer.refused || null;
+    this.route = answer.refused ? null : answer;
+    if (this.route && !this.dragging) this.shown = { target: this.route.target_index, entry: this.route.entry_index };
+    if (this.route) this.probe.depth = Math.min(this.probe.depth || 1e3 * this.route.length_m, 1e3 * this.route.length_m);
+    if (this.route && !this.probe.set) { this.probe.depth = 1e3 * this.route.length_m; }
+    this.tip = null;
+    this.motion = null;
+    this.showRoute();
+    this.draw();
+    if (this.route && !this.route.not_placed && !this.facts.robot_is_unknown) this.exact.ask({ aim: body.aim });
+    else { this.exact.forget(); this.reach = null; this.showReach(); }
+  }
+
+  reached(answer) {
+    if (answer.problem) { this.complain(answer.problem); return; }
+    this.reach = answer.refused ? null : answer;
+    this.showReach();
+    const label = this.state.needle.configuration;
+    const known = this.reach?.preview?.configurations.find((each) => each.label === label);
+    if (known?.joints_rad && !this.dragging) this.room.pose(known.joints_rad);
+    if (label && !this.dragging && this.aim() && this.reach?.preview) this.planned.ask({ aim: this.aim(), configuration: label });
+  }
+
+  moved(answer, body) {
+    if (answer.problem) { this.complain(answer.problem); return; }
+    if (body.configuration !== this.state.needle.configuration || this.dragging) return;
+    this.motion = answer.refused ? { refused: answer.refused } : answer;
+    this.tip = answer.tip || null;
+    this.showReach();
+    this.draw();
+  }
+
+  choose(configuration) {
+    this.remember();
+    this.state.needle = { ...this.state.needle, configuration };
+    this.motion = null;
+    this.tip = null;
+    this.room.stop();
+    if (this.reach) this.reached(this.reach);
+    this.showUndo();
+    this.draw();
+    this.keepSoon();
+  }
+
+  turnProbe(kind, step) {
+    if (!this.route) return;
+    this.probe.set = true;
+    if (kind === 'along') this.probe.turn = (this.probe.turn + step * Math.PI / 36) % (2 * Math.PI);
+    else this.probe.depth = Math.min(Math.max(this.probe.depth + step, 0), 1e3 * this.route.length_m);
+    this.draw();
+  }
+
+  draw() {
+    if (!this.volume) return;
+    for (const picture of [...this.slices, ...this.probes]) picture.draw();
+    // Of a drag the slices follow at once, the room when it ends.
+    if (!this.dragging) this.room.needle(this.route);
+  }
+
+  // ---- numbers
+
+  millimetres(place) { return `(${place.map((metres) => NB.mm(metres, 2)).join(', ')}) mm`; }
+
+  showRoute() {
+    const { target, entry } = this.state.needle;
+    const lesion = this.facts.lesions.find((each) => each.name === target?.lesion);
+    this.targetText.textContent = target ? [lesion && NB.words(lesion.name), this.route && this.millimetres(this.route.target_m)].filter(Boolean).join(', ') : 'not chosen';
+    this.entryText.textContent = entry ? (this.route ? this.millimetres(this.route.entry_m) : '') : 'not chosen';
+    this.saveButton.disabled = !this.route || Boolean(this.route.not_placed);
+    if (this.simulateButton) this.simulateButton.disabled = this.saveButton.disabled || this.running;
+    if (this.refused) {
+      NB.clear(this.numbers, NB.el('p', { class: 'error', text: this.refused.message }), this.refused.hint ? NB.el('p', { text: this.refused.hint }) : null);
+      return;
+    }
+    if (!this.route) {
+      NB.clear(this.numbers, NB.el('p', { text: target ? 'Click the entry, on the skin.' : 'Choose a lesion, or click the target.' }));
+      return;
+    }
+    const { not_placed: unplaced } = this.route;
+    NB.clear(this.numbers, unplaced ? [NB.el('p', { class: 'error', text: `${unplaced.message}.` }), unplaced.hint ? NB.el('p', { text: `Try ${unplaced.hint}.` }) : null] : null,
+      PLAN.routeRows([{ name: 'value', route: this.route }], 'Straight needle from the skin to the target'),
+      Math.abs(this.route.entry_moved_m) > 5e-3
+        ? NB.el('p', { text: `You pointed ${NB.mm(Math.abs(this.route.entry_moved_m))} mm ${this.route.entry_moved_m > 0 ? 'inside' : 'outside'} the skin: the entry is on the line from there to the target.` }) : null);
+  }
+
+  showReach() {
+    if (this.facts.robot_is_unknown) {
+      NB.clear(this.configurations, NB.el('p', { text: `Nothing is said of the robot: ${this.facts.robot_is_unknown}.` }));
+      return;
+    }
+    const { preview } = this.reach || {};
+    if (!preview) { NB.clear(this.configurations, NB.el('p', { class: 'soft', text: 'They follow once target and entry are chosen.' })); return; }
+    const chosen = this.state.needle.configuration;
+    const list = NB.table(`${preview.working} of 8 can reach it, by their postures`, [
+      { title: 'Configuration', cell: ({ each }) => each.label },
+      { title: 'Works', cell: ({ each }) => NB.el('span', { class: each.works ? 'good' : 'bad', text: each.works ? 'yes' : 'no' }) },
+      { title: 'Nearest', unit: 'mm', numeric: true, cell: ({ each }) => NB.mm(each.nearest?.distance_m) },
+      { title: 'Of what, or why not', text: true, cell: ({ each, reason }) => (each.works ? (each.nearest?.pair || []).map(NB.words).join(' \u2013 ') : reason) },
+    ], preview.configurations.map((each, index) => ({ each, reason: this.reach.reasons[index] })), { class: 'choose small', row: ({ each }) => ({ 'aria-selected': String(each.label === chosen), tabindex: each.label === chosen || !chosen ? '0' : '-1' }) });
+    const rows = [...list.querySelectorAll('tbody tr')];
+    NB.rows(rows, (index) => this.choose(preview.configurations[index].label));
+    const focused = [...this.configurations.querySelectorAll('tbody tr')].indexOf(document.activeElement);
+    NB.clear(this.configurations, list, this.chosenText());
+    if (focused >= 0) rows[focused].focus();
+  }
+
+  chosenText() {
+    const { motion } = this;
+    const chosen = this.state.needle.configuration;
+    this.playButton.disabled = !motion?.time_s?.length;
+    if (!chosen) return NB.el('p', { class: 'soft', text: 'Choose one to see its motion and the error that is to be expected.' });
+    if (!motion) return NB.el('p', { class: 'soft', text: `Planning the motion of ${chosen} ...` });
+    if (motion.refused) return NB.el('p', { class: 'error', text: motion.refused.message });
+    const first = motion.rejections[0];
+    const how = first
+      ? NB.el('p', { class: 'bad', text: `${chosen}: ${first.words}. ${first.detail}.` })
+      : NB.el('p', { class: 'good', text: `${chosen}: a motion of ${NB.fixed(motion.time_s.at(-1), 1)} s is planned and keeps all clearances.` });
+    const tip = motion.tip
+      ? NB.el('p', { text: `Expected tip error at the target: ${NB.mm(motion.tip.rms_m, 2)} mm rms, ${NB.mm(motion.tip.lateral_rms_m, 2)} mm rms across the needle. The outline on the slices holds 95 % of tips, to scale.` })
+      : NB.el('p', { class: 'soft', text: motion.tip_unknown ? `Expected tip error: not known, ${motion.tip_unknown}.` : 'Expected tip error: not known without a motion.' });
+    return NB.el('div', null, how, tip);
+  }
+
+  playButtons() {
+    this.playButton = NB.el('button', { type: 'button', disabled: true, onclick: () => {
+      this.room.play(this.motion, (time, whole) => { this.clock.textContent = `${NB.fixed(time, 1)} of ${NB.fixed(whole, 1)} s`; });
+    } }, 'Play motion');
+    this.clock = NB.el('span', { class: 'soft' });
+    return NB.el('span', { class: 'no-print' }, this.playButton, ' ', NB.el('button', { type: 'button', onclick: () => this.room.home(this.route) }, 'Show the needle'), ' ', this.clock);
+  }
+
+  // ---- routes side by side
+
+  routesPanel() {
+    this.routeName = NB.el('input', { type: 'text', size: '16', maxlength: '64', 'aria-label': 'Name of the route', value: '' });
+    return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Routes side by side' }),
+      NB.el('div', { class: 'bar no-print' }, this.routeName, NB.el('button', { type: 'button', onclick: () => this.keepRoute() }, 'Keep this route')), this.comparison);
+  }
+
+  keepRoute() {
+    if (!this.route) return;
+    this.remember();
+    const taken = new Set(this.state.routes.map(({ name }) => name));
+    let name = this.routeName.value.trim() || `route ${this.state.routes.length + 1}`;
+    for (let n = 2; taken.has(name); n++) name = `${name.replace(/ \d+$/, '')} ${n}`;
+    this.state.routes = [...this.state.routes, { name, needle: structuredClone(this.state.needle) }].slice(-20);
+    this.routeName.value = '';
+    this.showRoutes();
+    this.showUndo();
+    this.keepSoon();
+  }
+
+  async showRoutes() {
+    const { routes } = this.state;
+    if (!routes.length) { NB.clear(this.comparison, NB.el('p', { class: 'soft', text: 'Keep a route to compare others with it.' })); return; }
+    const asked = this.comparing = {};
+    const answers = await Promise.all(routes.map(async ({ name, needle }) => {
+      const { goal, target, entry } = needle;
+      try {
+        const [route, reach] = await Promise.all(['route', 'reach'].map((path) => PLAN.ask(path, { body: { aim: { goal, target, entry } } })));
+        return { name, needle, route: route.refused ? null : route, reach: reach.refused ? null : reach };
+      } catch (error) {
+        this.complain(error);
+        return { name, needle, route: null, reach: null };
+      }
+    }));
+    if (asked !== this.comparing) return;
+    const buttons = answers.map((each, index) => NB.el('span', { class: 'pick' },
+      NB.el('button', { type: 'button', onclick: () => { this.change(structuredClone(each.needle)); } }, `Take ${each.name}`),
+      NB.el('button', { type: 'button', 'aria-label': `Forget ${each.name}`, onclick: () => {
+        this.remember();
+        this.state.routes = this.state.routes.filter((_, at) => at !== index);
+        this.showRoutes();
+        this.showUndo();
+        this.keepSoon();
+      } }, '\u00d7')));
+    NB.clear(this.comparison, PLAN.routeRows(answers, 'Routes that were kept'), NB.el('div', { class: 'tabs no-print' }, buttons));
+  }
+
+  // ---- markers, notes
+
+  markersPanel() {
+    const { markers, registration } = this.facts;
+    if (!markers.length) return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Markers' }), NB.el('p', { text: 'None are registered.' }));
+    this.markerBoxes = new Map(markers.map(({ name }) => [name, NB.checkbox('', true, (checked) => {
+      this.remember();
+      const hidden = this.state.hidden_markers.filter((each) => each !== name);
+      this.state.hidden_markers = checked ? hidden : [...hidden, name];
+      this.showMarkers();
+      this.showUndo();
+      this.keepSoon();
+    })]));
+    for (const [name, box] of this.markerBoxes) box.querySelector('input').setAttribute('aria-label', `Show ${NB.words(name)}`);
+    const table = NB.table('Residuals of the registration', [
+      { title: 'Marker', cell: ({ name }) => NB.words(name) },
+      { title: 'Shown', cell: ({ name }) => this.markerBoxes.get(name) },
+      { title: 'Residual', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.residual_m, 2) },
+      { title: 'Expected', unit: 'mm rms', numeric: true, cell: (each) => NB.mm(each.expected_residual_m, 2) },
+      { title: 'By the others', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.by_the_others_m, 2) },
+    ], markers, { class: 'small' });
+    const suspects = registration.suspects.length ? NB.el('p', { class: 'bad', text: `May have moved: ${registration.suspects.map(NB.words).join(', ')}.` }) : null;
+    const errors = this.facts.lesions.filter((lesion) => lesion.registration_rms_m !== null)
+      .map((lesion) => NB.el('p', { text: `At ${NB.words(lesion.name)} the registration is off by ${NB.mm(lesion.registration_rms_m, 2)} mm rms (TRE).` }));
+    return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Markers' }), table,
+      NB.el('p', { text: `They agree to ${NB.mm(registration.fre_rms_m, 2)} mm rms (FRE; ${NB.mm(registration.expected_fre_rms_m, 2)} expected), which does not tell the error at the target.` }), errors, suspects);
+  }
+
+  showMarkers() {
+    for (const { name } of this.facts.markers) {
+      const visible = !this.state.hidden_markers.includes(name);
+      this.markerBoxes.get(name).querySelector('input').checked = visible;
+      this.room.marker(name, visible);
+    }
+    this.draw();
+  }
+
+  notesPanel() {
+    this.notes = NB.el('textarea', { rows: '3', maxlength: '20000', 'aria-label': 'Notes', oninput: () => { this.state.notes = this.notes.value; this.notesOnPaper.textContent = this.notes.value; this.keepSoon(); } });
+    this.notes.value = this.state.notes;
+    this.notesOnPaper = NB.el('p', { class: 'print-only', text: this.state.notes });
+    return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Notes' }), this.notes, this.notesOnPaper);
+  }
+
+  signature() {
+    this.printed = NB.el('span');
+    return NB.el('p', { class: 'print-only signature' }, 'Printed ', this.printed, '. Research software, not a medical device. Planned by: ______________________  Date: ______________  Signature: ______________________');
+  }
+
+  // ---- what is kept
+
+  /** What undo brings back. */
+  remember() {
+    this.done.push(this.undoable());
+    if (this.done.length > 200) this.done.shift();
+    this.undone = [];
+  }
+
+  undoable() { return structuredClone({ needle: this.state.needle, hidden_markers: this.state.hidden_markers, routes: this.state.routes }); }
+
+  undo() { this.back(this.done, this.undone); }
+
+  redo() { this.back(this.undone, this.done); }
+
+  back(from, to) {
+    if (!from.length) return;
+    to.push(this.undoable());
+    Object.assign(this.state, from.pop());
+    this.everything();
+    this.keepSoon();
+  }
+
+  everything() {
+    this.needleChanged();
+    this.showMarkers();
+    this.showRoutes();
+    this.showUndo();
+  }
+
+  showUndo() {
+    this.undoButton.disabled = !this.done.length;
+    this.redoButton.disabled = !this.undone.length;
+  }
+
+  keepSoon() {
+    if (!this.volume) return;
+    this.kept.textContent = 'not kept yet';
+    clearTimeout(this.keeping);
+    this.keeping = setTimeout(() => this.keep(), 400);
+  }
+
+  async keep() {
+    if (this.conflict) return;
+    if (this.writing) { this.again = true; return; }
+    this.writing = true;
+    try {
+      const { version } = await PLAN.ask('session', { method: 'PUT', body: { version: this.version, state: this.state } });
+      this.version = version;
+      this.kept.textContent = this.again ? 'not kept yet' : 'kept';
+      if (this.complaint === 'keeping') this.calm();
+    } catch (error) {
+      this.kept.textContent = 'not kept';
+      if (error.status === 409) this.meet(error);
+      else this.complain(error, 'keeping', NB.el('button', { type: 'button', onclick: () => this.keep() }, 'Try again'));
+    }
+    this.writing = false;
+    if (this.again) { this.again = false; this.keep(); }
+  }
+
+  /** Another tab was first: nothing is lost either way. */
+  meet(error) {
+    const theirs = error.body.session;
+    this.conflict = true;
+    this.complain(error, 'conflict',
+      NB.el('button', { type: 'button', onclick: () => {
+        this.remember();
+        Object.assign(this.state, Object.fromEntries(Object.entries(PLAN.taken(theirs)).filter(([, value]) => value !== null)));
+        this.version = theirs.version;
+        this.conflict = false;
+        this.calm();
+        this.notes.value = this.state.notes;
+        this.setWindow(this.state.window_hu);
+        this.everything();
+        this.look(this.state.crosshair);
+      } }, 'Reload what the other tab has'),
+      NB.el('button', { type: 'button', onclick: () => { this.version = theirs.version; this.conflict = false; this.calm(); this.keep(); } }, 'Keep what is here'));
+  }
+
+  complain(error, about = 'other', ...buttons) {
+    this.complaint = about;
+    NB.clear(this.banner, NB.el('p', null, NB.el('strong', { text: `${error.message}. ` }), error.hint || ''), buttons);
+    this.banner.classList.add('shown');
+  }
+
+  calm() { this.complaint = null; this.banner.classList.remove('shown'); NB.clear(this.banner); }
+
+  async savePlan() {
+    try {
+      const { file } = await PLAN.ask('plan', { body: { aim: this.aim(), configuration: this.state.needle.configuration, name: this.planName.value.trim() } });
+      this.saved.textContent = `Saved as ${file}; needlebench run takes it as it is.`;
+      this.saved.className = 'good';
+    } catch (error) {
+      this.saved.textContent = `Not saved: ${error.message}${error.hint ? ` (${error.hint})` : ''}`;
+      this.saved.className = 'bad';
+    }
+  }
+
+  // ---- simulation
+
+  simulationPanel() {
+    if (this.facts.robot_is_unknown) return NB.el('section', { class: 'panel no-print' }, NB.el('h2', { text: 'Simulation' }), NB.el('p', { text: 'Needs to know where the robot is.' }));
+    this.engine = 'rapier';
+    this.simulateButton = NB.el('button', { type: 'button', disabled: true, onclick: () => this.simulate() }, 'Save and simulate');
+    this.cancelButton = NB.el('button', { type: 'button', disabled: true, onclick: async () => this.simulated(await PLAN.ask('simulation', { method: 'DELETE' })) }, 'Cancel');
+    this.reportLink = NB.el('a', { href: '/results/report.html', target: '_blank', rel: 'noopener', hidden: true }, 'Open the report');
+    this.simulation = NB.el('p', { role: 'status', class: 'break' });
+    PLAN.ask('simulation').then((progress) => this.simulated(progress, true), () => {});
+    return NB.el('section', { class: 'panel no-print' }, NB.el('h2', { text: 'Simulation' }),
+      NB.select('Engines', [['rapier', 'rapier (quick)'], ['both', 'rapier and MuJoCo']], this.engine, (value) => { this.engine = value; }),
+      NB.el('div', { class: 'tabs' }, this.simulateButton, this.cancelButton), this.simulation, this.reportLink);
+  }
+
+  async simulate() {
+    this.simulateButton.disabled = true;
+    try {
+      const body = { aim: this.aim(), configuration: this.state.needle.configuration, name: this.planName.value.trim(), engine: this.engine };
+      this.simulated(await PLAN.ask('simulation', { body }));
+    } catch (error) {
+      this.simulation.textContent = `${error.message}${error.hint ? ` (${error.hint})` : ''}`;
+      this.simulation.className = 'bad break';
+      this.simulateButton.disabled = false;
+    }
+  }
+
+  simulated(progress, quiet = false) {
+    this.running = progress.state === 'running';
+    this.simulateButton.disabled = this.running || this.saveButton.disabled;
+    this.cancelButton.disabled = !this.running;
+    // The cookie that opens the report is of the page that simulated.
+    this.reportLink.hidden = quiet || !progress.has_report;
+    if (progress.state !== 'none') {
+      const words = { running: 'running', finished: 'finished', failed: 'failed', cancelled: 'cancelled' }[progress.state];
+      this.simulation.textContent = `${progress.plan} ${words}: ${progress.message}`;
+      this.simulation.className = progress.state === 'failed' ? 'bad break' : 'break';
+    }
+    if (this.running) setTimeout(async () => { try { this.simulated(await PLAN.ask('simulation')); } catch (error) { this.complain(error); } }, 500);
+  }
+
+  key(event) {
+    if (!(event.ctrlKey || event.metaKey) || event.target.closest('input, textarea')) return;
+    const name = event.key.toLowerCase();
+    if (name === 'z') { event.preventDefault(); if (event.shiftKey) this.redo(); else this.undo(); }
+    if (name === 'y') { event.preventDefault(); this.redo(); }
+  }
+};
+
+/** What of a session is the page's own. */
+PLAN.taken = ({ schema_version, version, ...state }) => state;
+
+/** Routes as columns, what is known of them as rows. */
+PLAN.routeRows = function (columns, caption) {
+  const rows = [];
+  const row = (title, unit, cell) => rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route, column) : '\u2013')) });
+  row('Skin to target', 'mm', (route) => NB.mm(route.length_m));
+  row('Guide\u2019s exit to tip', 'mm', (route) => (route.insertion_m === null ? '\u2013' : `${NB.mm(route.insertion_m)}; the needle has ${NB.mm(route.needle_m)}`));
+  row('To the skin\u2019s normal', '\u00b0', (route) => NB.deg(route.skin_angle_rad));
+  row('Out of the axial plane', '\u00b0', (route) => NB.deg(route.axial_angle_rad));
+  row('In lung', 'mm', (route) => (route.in_lung_m === null ? 'no lung in the label map' : `${NB.mm(route.in_lung_m)} \u00b1 ${NB.mm(route.crossing_within_m)}`));
+  row('Enters lung', 'times', (route) => (route.lung_entries === null ? '\u2013' : String(route.lung_entries)));
+  for (const tissue of ['bone', 'vessel', 'organ']) {
+    if (!columns.some(({ route }) => route?.tissues.some((each) => each.tissue === tissue))) continue;
+    row(`To ${tissue}`, 'mm', (route) => {
+      const known = route.tissues.find((each) => each.tissue === tissue);
+      if (!known) return '\u2013';
+      const off = known.surface_p99_m === null ? '' : ` \u00b1 ${NB.mm(known.surface_p99_m, 2)}`;
+      return NB.el('span', { class: known.kept ? 'good' : 'bad', text: `${NB.mm(known.distance_m)}${off} to ${known.words}, ${known.kept ? '' : 'too near: '}${NB.mm(known.margin_m)} wanted` });
+    });
+  }
+  if (columns.some(({ route }) => route?.fissures.length)) row('Fissures crossed', '', (route) => route.fissures.map(NB.words).join(', ') || 'none');
+  row('Passes', 'mm from the skin', (route) => route.crossings.map((each) => `${NB.words(each.name)} ${NB.mm(each.from_m, 0)}\u2013${NB.mm(each.to_m, 0)}`).join(', '));
+  if (columns.some(({ reach }) => reach?.preview)) rows.push({ title: 'Configurations', unit: 'of 8', cells: columns.map(({ reach }) => (reach?.preview ? String(reach.preview.working) : '\u2013')) });
+  const heads = [{ title: 'Quantity', cell: ({ title, unit }) => [title, NB.el('span', { class: 'unit', text: unit ? ` ${unit}` : '' })] },
+    ...columns.map(({ name }, index) => ({ title: name, cell: ({ cells }) => cells[index] }))];
+  return NB.table(caption, heads, rows, { class: 'small route' });
+};
+
+/** Opens the case. */
+PLAN.open = async function () {
+  const app = document.getElementById('app');
+  const loading = document.getElementById('loading');
+  try {
+    if (!/^[0-9a-f]{32}$/.test(PLAN.token)) throw new PLAN.Problem(401, { error: 'the address lacks its token', hint: 'open the whole address that `needlebench view` prints' });
+    loading.textContent = 'Reading the patient ...';
+    const [facts, session, scene] = await Promise.all([PLAN.ask('case'), PLAN.ask('session'), PLAN.fetch('scene').then((response) => response.arrayBuffer())]);
+    const page = NB.unpack(scene);
+    for (const [name, words] of Object.entries(page.words || {})) NB.dictionary.set(name, words);
+    document.title = `needlebench: plan of ${facts.name}`;
+    const coming = PLAN.Volume.load(facts.size, facts.spacing_m, (share) => { loading.textContent = `Reading the volume: ${Math.round(100 * share)} %`; });
+    const volume = await coming;
+    const planner = new PLAN.Planner(facts, session, page, app);
+    PLAN.planner = planner;
+    planner.volume = volume;
+    planner.draw();
+    requestAnimationFrame(() => requestAnimationFrame(() => {
+      NB.timing.firstView = performance.now();
+      document.documentElement.dataset.ready = 'true';
+    }));
+  } catch (error) {
+    NB.clear(app, NB.el('h1', { text: 'needlebench' }), NB.el('p', { class: 'error', role: 'alert', text: `This patient cannot be shown: ${error.message}.` }), error.hint ? NB.el('p', { text: error.hint }) : null);
+    if (!(error instanceof PLAN.Problem)) throw error;
+  }
+};
+document.addEventListener('DOMContentLoaded', PLAN.open);

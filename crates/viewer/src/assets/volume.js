@@ -1,0 +1,86 @@
+// The voxels in the page: Hounsfield units on a grid along the patient's axes. i runs to the patient's left, j to the back,
+// k to the head; an index means a voxel's centre.
+'use strict';
+
+PLAN.Volume = class {
+  constructor(size, spacing, hu) {
+    this.size = size;
+    this.spacing = spacing.map((metres) => metres * 1e3); // mm
+    this.hu = hu;
+  }
+
+  /** As it comes in; `progress(share)` is told how far it is. */
+  static async load(size, spacing, progress) {
+    const bytes = new Uint8Array(2 * size[0] * size[1] * size[2]);
+    const response = await PLAN.fetch('volume');
+    const reader = response.body.getReader();
+    let at = 0;
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) break;
+      if (at + value.length > bytes.length) throw new Error('the volume is longer than it should be');
+      bytes.set(value, at);
+      at += value.length;
+      progress(at / bytes.length);
+    }
+    if (at !== bytes.length) throw new Error('the volume ended before it was whole');
+    return new PLAN.Volume(size, spacing, new Int16Array(bytes.buffer));
+  }
+
+  holds(index) { return index.every((value, axis) => value >= -0.5 && value < this.size[axis] - 0.5); }
+
+  /** Voxel by voxel: the nearest one's value, or nothing outside. */
+  at(index) {
+    const [i, j, k] = index.map(Math.round);
+    const [n, m, l] = this.size;
+    if (i < 0 || j < 0 || k < 0 || i >= n || j >= m || k >= l) return undefined;
+    return this.hu[(k * m + j) * n + i];
+  }
+
+  /** Between the eight voxels around; -1000 outside. */
+  between(x, y, z) {
+    const [n, m, l] = this.size;
+    if (!(x >= 0 && y >= 0 && z >= 0 && x <= n - 1 && y <= m - 1 && z <= l - 1)) return -1000;
+    const i = Math.min(Math.floor(x), n - 2 < 0 ? 0 : n - 2), j = Math.min(Math.floor(y), m - 2 < 0 ? 0 : m - 2), k = Math.min(Math.floor(z), l - 2 < 0 ? 0 : l - 2);
+    const di = n > 1 ? 1 : 0, dj = m > 1 ? n : 0, dk = l > 1 ? n * m : 0;
+    const u = x - i, v = y - j, w = z - k;
+    const at = (k * m + j) * n + i;
+    const { hu } = this;
+    const low = (hu[at] * (1 - u) + hu[at + di] * u) * (1 - v) + (hu[at + dj] * (1 - u) + hu[at + dj + di] * u) * v;
+    const high = (hu[at + dk] * (1 - u) + hu[at + dk + di] * u) * (1 - v) + (hu[at + dk + dj] * (1 - u) + hu[at + dk + dj + di] * u) * v;
+    return low * (1 - w) + high * w;
+  }
+};
+
+/** Greys of Hounsfield units, as pixels: from -32768 on. */
+PLAN.greys = function ([low, high]) {
+  const table = new Uint32Array(65536);
+  for (let code = 0; code < 65536; code++) {
+    const share = (code - 32768 - low) / (high - low);
+    const grey = Math.round(255 * Math.min(Math.max(share, 0), 1));
+    table[code] = 0xff000000 | grey << 16 | grey << 8 | grey;
+  }
+  return table;
+};
+
+/** A plane of the volume as a picture, one pixel a voxel: `u` to the right, `v` down, or up where it is flipped. */
+PLAN.plane = function (volume, { u, v, w, flip }, slice, greys, canvas) {
+  const { size, hu } = volume;
+  const stride = [1, size[0], size[0] * size[1]];
+  if (canvas.width !== size[u] || canvas.height !== size[v]) [canvas.width, canvas.height] = [size[u], size[v]];
+  const context = canvas.getContext('2d');
+  const image = context.createImageData(size[u], size[v]);
+  const pixels = new Uint32Array(image.data.buffer);
+  let to = 0;
+  for (let row = 0; row < size[v]; row++) {
+    let at = slice * stride[w] + (flip ? size[v] - 1 - row : row) * stride[v];
+    for (let column = 0; column < size[u]; column++, at += stride[u]) pixels[to++] = greys[hu[at] + 32768];
+  }
+  context.putImageData(image, 0, 0);
+};
+
+/** Small vectors. */
+PLAN.add = (a, b, by = 1) => a.map((value, axis) => value + by * b[axis]);
+PLAN.dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+PLAN.cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+PLAN.unit = (a) => { const size = Math.hypot(...a) || 1; return a.map((value) => value / size); };

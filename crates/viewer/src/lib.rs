@@ -1,0 +1,23 @@
+//! The planning page on the CT of one patient: a server on this machine alone, and the page that it serves.
+//!
+//! [`Case::open`] reads the folder that `needlebench ct build` made and refuses one whose parts do not belong together;
+//! [`Server`] serves it. What a route is worth is answered by the functions of [`live`] and
+//! [`motion`]; what a person decided is kept by
+//! [`session`].
+//!
+//! Voxels are told by index, places in millimetres of `ct` (patient LPS); the server alone turns one into the other.
+
+mod answer;
+mod case;
+mod guard;
+pub mod live;
+pub mod motion;
+mod page;
+mod plan_file;
+mod server;
+pub mod session;
+mod simulation;
+mod turns;
+
+pub use case::{Case, Place};
+pub use server::{Server, ServerError, Stopper};

@@ -1,0 +1,467 @@
+//! What a straight needle from the skin to a target is worth, while somebody drags its ends.
+//!
+//! Pure functions of a case and an [`Aim`]: [`route`] is answered at once from voxels and surfaces, [`reach`] by the
+//! postures of all eight configurations. Lengths in m, angles in rad; places in `ct` (patient LPS).
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use needlebench_bench::preview::GoalPreview;
+use needlebench_cell::phantom::Phantom;
+use needlebench_cell::scenario::GoalSection;
+use needlebench_cell::{Finding, Goal, part_in_words, reason_in_words};
+use needlebench_imaging::{SurfaceTissue, VoxelGrid, structure_of};
+use needlebench_planning::{crossed_fissures, judged_tissues};
+use serde::{Deserialize, Serialize};
+
+use crate::case::Case;
+
+/// What the needle is for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum TargetAim {
+    /// The middle of a lesion of the scenario.
+    Lesion(String),
+    /// A place in `ct`, m.
+    PlaceM([f64; 3]),
+    /// An index, which may lie between voxels.
+    Index([f64; 3]),
+}
+
+/// Where the needle comes from: the entry is where the line from the target through here leaves the skin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum EntryAim {
+    /// A place in `ct`, m.
+    PlaceM([f64; 3]),
+    /// An index, which may lie between voxels.
+    Index([f64; 3]),
+}
+
+/// A needle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Aim {
+    /// The goal of the scenario that it is for: what the guide keeps from the skin is that goal's.
+    #[serde(default)]
+    pub goal: Option<String>,
+    /// Where it is to end.
+    pub target: TargetAim,
+    /// Where it is to come from.
+    pub entry: EntryAim,
+}
+
+/// Why there is no answer, and what to do.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Refusal {
+    /// What is wrong.
+    pub message: String,
+    /// How to mend it.
+    pub hint: Option<String>,
+}
+
+impl Refusal {
+    /// With what to do.
+    pub fn new(message: impl Into<String>, hint: &str) -> Self {
+        Self {
+            message: message.into(),
+            hint: Some(hint.to_owned()),
+        }
+    }
+}
+
+impl From<Finding> for Refusal {
+    fn from(finding: Finding) -> Self {
+        // File and key are those of a text that nobody has written yet.
+        Self {
+            message: finding.message,
+            hint: finding.hint,
+        }
+    }
+}
+
+/// A needle in the cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Needle {
+    /// The goal that it is, or why the robot's guide cannot be put there.
+    pub goal: Result<Goal, Refusal>,
+    /// The goal as a scenario has it.
+    pub section: GoalSection,
+    /// Entry on the skin, `ct`.
+    pub entry_m: Point3<f64>,
+    /// Target, `ct`.
+    pub target_m: Point3<f64>,
+    /// From where somebody pointed to the entry, along the needle.
+    pub entry_moved_m: f64,
+}
+
+/// A stretch of the needle within one label.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Crossing {
+    /// What it is called.
+    pub name: String,
+    /// Where it begins, from the entry.
+    pub from_m: f64,
+    /// Where it ends.
+    pub to_m: f64,
+}
+
+/// How a margin is kept.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TissueAnswer {
+    /// Bone, vessel or organ.
+    pub tissue: String,
+    /// The part.
+    pub part: String,
+    /// The part in words.
+    pub words: String,
+    /// Signed distance of the needle's surface.
+    pub distance_m: f64,
+    /// The least that it has to be.
+    pub margin_m: f64,
+    /// It is.
+    pub kept: bool,
+    /// How far 99 % of the part's surface are from that of the voxels at most; none where that is not known.
+    pub surface_p99_m: Option<f64>,
+}
+
+/// What is known of a needle at once.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RouteAnswer {
+    /// Entry on the skin.
+    pub entry_m: [f64; 3],
+    /// The same by index.
+    pub entry_index: [f64; 3],
+    /// Target.
+    pub target_m: [f64; 3],
+    /// The same by index.
+    pub target_index: [f64; 3],
+    /// From where somebody pointed to the entry, along the needle: positive outwards.
+    pub entry_moved_m: f64,
+    /// From entry to target.
+    pub length_m: f64,
+    /// From the guide's exit to the needle's tip; none where the guide cannot be put there.
+    pub insertion_m: Option<f64>,
+    /// Why the guide cannot be put there: nothing is said of what the needle comes near to then.
+    pub not_placed: Option<Refusal>,
+    /// How long the needle is.
+    pub needle_m: f64,
+    /// Between the needle and the skin's normal, which is the mean over 8 mm about the entry.
+    pub skin_angle_rad: f64,
+    /// Between the needle and the axial plane; positive where it runs towards the head.
+    pub axial_angle_rad: f64,
+    /// What it passes, by the label map.
+    pub crossings: Vec<Crossing>,
+    /// Half a voxel along the needle: how far off the ends of crossings may be.
+    pub crossing_within_m: f64,
+    /// Within the lungs, with what they enclose; none where the label map knows no lung.
+    pub in_lung_m: Option<f64>,
+    /// How often it enters a lung.
+    pub lung_entries: Option<usize>,
+    /// Least distances to bone, vessels and organs that are to be kept clear of.
+    pub tissues: Vec<TissueAnswer>,
+    /// Fissures that it crosses.
+    pub fissures: Vec<String>,
+}
+
+/// Which configurations serve.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReachAnswer {
+    /// Why nothing is said of the robot.
+    pub unknown: Option<&'static str>,
+    /// The configurations.
+    pub preview: Option<GoalPreview>,
+    /// Why each does not work, in words, in their order; empty where it does.
+    pub reasons: Vec<String>,
+}
+
+/// Lays a needle into the cell.
+///
+/// # Errors
+/// A target outside the patient; an entry from which no line runs to it.
+pub fn needle(case: &Case, aim: &Aim) -> Result<Needle, Refusal> {
+    let grid = case.grid();
+    let mut section = section(case, aim)?;
+    let placer = case.desk().placer();
+    let target = placer.target(&section).map_err(outside)?;
+    let towards = case.in_phantom(&match &aim.entry {
+        EntryAim::PlaceM(place) => finite(place)?,
+        EntryAim::Index(index) => grid.ct_from_index(&finite(index)?),
+    });
+    let outwards = UnitVector3::try_new(towards - target, 1e-3).ok_or_else(|| {
+        Refusal::new(
+            "entry and target are less than a millimetre apart",
+            "click the entry on the skin",
+        )
+    })?;
+    let placed = case.desk().scenario().phantom.as_ref();
+    let placed = placed.ok_or_else(|| Refusal::new("there is no patient", "build it anew"))?;
+    let leaves = placed.phantom.skin_intersection(&target, &outwards);
+    let Some((_, leaves_m)) = leaves else {
+        return Err(Refusal::new(
+            "the line from the target through the entry does not meet the skin",
+            "the volume may end there: choose another direction",
+        ));
+    };
+    let entry = target + outwards.into_inner() * leaves_m;
+    section.entry_mm = Some((entry.coords * 1e3).into());
+    let goal = placer.place(&section).map_err(Refusal::from);
+    Ok(Needle {
+        entry_m: case.in_ct(&entry),
+        target_m: case.in_ct(&target),
+        entry_moved_m: leaves_m - (towards - target).norm(),
+        goal,
+        section,
+    })
+}
+
+/// The goal that an aim is for, with its target and without an entry.
+fn section(case: &Case, aim: &Aim) -> Result<GoalSection, Refusal> {
+    use needlebench_cell::scenario::Target;
+    let target = match &aim.target {
+        TargetAim::Lesion(name) => Target::Lesion(name.clone()),
+        TargetAim::PlaceM(place) => Target::Point(phantom_mm(case, &finite(place)?)),
+        TargetAim::Index(index) => {
+            let place = case.grid().ct_from_index(&finite(index)?);
+            Target::Point(phantom_mm(case, &place))
+        }
+    };
+    let mut section = GoalSection::at(target);
+    let named = aim.goal.as_ref();
+    let own = named.and_then(|name| case.goals().iter().find(|goal| goal.name == *name));
+    if let Some(own) = own.or(case.goals().first()) {
+        section.name.clone_from(&own.name);
+        if own.flange_pose.is_none() {
+            section.standoff_mm = own.standoff_mm;
+            section.approach_mm = own.approach_mm;
+            section.roll_deg = own.roll_deg;
+        }
+    }
+    Ok(section)
+}
+
+fn phantom_mm(case: &Case, ct_m: &Point3<f64>) -> [f64; 3] {
+    (case.in_phantom(ct_m).coords * 1e3).into()
+}
+
+fn finite(numbers: &[f64; 3]) -> Result<Point3<f64>, Refusal> {
+    /// Beyond what any volume has, m or voxels.
+    const FAR: f64 = 1e5;
+    if numbers.iter().all(|number| number.abs() < FAR) {
+        Ok(Point3::from(*numbers))
+    } else {
+        Err(Refusal {
+            message: "a place has three finite numbers".to_owned(),
+            hint: None,
+        })
+    }
+}
+
+/// A target that is not in the patient, in words of the page.
+fn outside(finding: Finding) -> Refusal {
+    Refusal {
+        message: finding.message,
+        hint: Some("choose a lesion, or click a target inside the body".to_owned()),
+    }
+}
+
+/// What is known of a needle at once.
+///
+/// # Errors
+/// As [`needle`].
+pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
+    let needle = needle(case, aim)?;
+    let resolved = case.desk().scenario();
+    let grid = case.grid();
+    let placed = resolved.phantom.as_ref().expect("a needle has a patient");
+    let entry = case.in_phantom(&needle.entry_m);
+    let inwards = UnitVector3::new_normalize(needle.target_m - needle.entry_m);
+    let length_m = (needle.target_m - needle.entry_m).norm();
+    let crossings = crossings(case, &needle.entry_m, &needle.target_m);
+    let knows_lungs = case.labels().names.iter().any(|(_, name)| is_lung(name));
+    let in_lung: Vec<bool> = crossings
+        .iter()
+        .map(|each| belongs_to_lung(case, &each.name))
+        .collect();
+    let lung_m = crossings
+        .iter()
+        .zip(&in_lung)
+        .filter(|(_, lung)| **lung)
+        .map(|(each, _)| each.to_m - each.from_m)
+        .sum();
+    let entries = (0..in_lung.len())
+        .filter(|&at| in_lung[at] && (at == 0 || !in_lung[at - 1]))
+        .count();
+    let goal = needle.goal.as_ref().ok();
+    let judged = goal.map(|goal| judged_tissues(resolved, placed, goal));
+    let tissues = judged
+        .into_iter()
+        .flatten()
+        .map(|judged| {
+            let part = judged.nearest.part;
+            TissueAnswer {
+                tissue: part.tissue.to_string(),
+                part: part.name.clone(),
+                words: part_in_words(&part.name).into_owned(),
+                distance_m: judged.distance_m,
+                margin_m: judged.margin_m,
+                kept: judged.is_kept(),
+                surface_p99_m: surface_p99_m(case, &part.name),
+            }
+        })
+        .collect();
+    Ok(RouteAnswer {
+        entry_m: needle.entry_m.coords.into(),
+        entry_index: grid.index_from_ct(&needle.entry_m).coords.into(),
+        target_m: needle.target_m.coords.into(),
+        target_index: grid.index_from_ct(&needle.target_m).coords.into(),
+        entry_moved_m: needle.entry_moved_m,
+        length_m,
+        insertion_m: goal.map(|goal| goal.insertion_length_m),
+        not_placed: needle.goal.as_ref().err().cloned(),
+        needle_m: resolved.cell.tool.needle.length_m,
+        skin_angle_rad: skin_normal(&placed.phantom, &entry, &-inwards)
+            .angle(&-inwards.into_inner()),
+        axial_angle_rad: inwards.z.atan2(inwards.x.hypot(inwards.y)),
+        crossing_within_m: half_voxel_m(grid, &inwards),
+        crossings,
+        in_lung_m: knows_lungs.then_some(lung_m),
+        lung_entries: knows_lungs.then_some(entries),
+        tissues,
+        fissures: goal
+            .map(|goal| crossed_fissures(resolved, goal))
+            .unwrap_or_default(),
+    })
+}
+
+/// Mean outward normal of the skin about an entry: a facet's own is as rough as the voxels.
+fn skin_normal(
+    phantom: &Phantom,
+    entry: &Point3<f64>,
+    outwards: &UnitVector3<f64>,
+) -> Vector3<f64> {
+    /// Radius of what counts, and how far under the skin it is looked from, m.
+    const ABOUT_M: f64 = 8e-3;
+    const BELOW_M: f64 = 20e-3;
+    const AROUND: u32 = 12;
+    let across = outwards.cross(&least_axis(outwards)).normalize();
+    let third = outwards.cross(&across);
+    let from = entry - outwards.into_inner() * BELOW_M;
+    let ring = (0..AROUND).filter_map(|step| {
+        let (sine, cosine) = (TAU * f64::from(step) / f64::from(AROUND)).sin_cos();
+        let aside = (across * cosine + third * sine) * ABOUT_M;
+        let (_, leaves_m) = phantom.skin_intersection(&(from + aside), outwards)?;
+        // A fold or an arm beside it is not the skin there.
+        let is_beside = (leaves_m - BELOW_M).abs() < 2.0 * ABOUT_M;
+        let point = from + aside + outwards.into_inner() * leaves_m;
+        is_beside.then(|| phantom.skin_normal(&point).into_inner())
+    });
+    ring.fold(phantom.skin_normal(entry).into_inner(), |sum, normal| {
+        sum + normal
+    })
+}
+
+/// The axis that a direction has least of.
+fn least_axis(direction: &UnitVector3<f64>) -> Vector3<f64> {
+    let mut axis = Vector3::zeros();
+    axis[direction.iamin()] = 1.0;
+    axis
+}
+
+fn surface_p99_m(case: &Case, part: &str) -> Option<f64> {
+    // Solids of one surface are numbered: `bone.3`.
+    let name = part.split_once('.').map_or(part, |(name, _)| name);
+    let surfaces = &case.facts().surfaces;
+    let surface = surfaces.iter().find(|surface| surface.name == name)?;
+    Some(surface.distance_from_voxels.p99_m)
+}
+
+fn is_lung(name: &str) -> bool {
+    structure_of(name).is_some_and(|structure| structure.tissue == SurfaceTissue::Lung)
+}
+
+/// The lung itself, and what is labelled within it: its vessels, airways and lesions.
+fn belongs_to_lung(case: &Case, name: &str) -> bool {
+    let is_lesion = case
+        .facts()
+        .lesions
+        .iter()
+        .any(|lesion| lesion.name == name && lesion.in_lung);
+    is_lung(name) || is_lesion || matches!(name, "lung_vessels" | "airways")
+}
+
+/// Half of what a voxel spans along a direction.
+fn half_voxel_m(grid: &VoxelGrid, along: &UnitVector3<f64>) -> f64 {
+    let spacing_m = grid.spacing_m();
+    let reach = (0..3).map(|axis| spacing_m[axis] / along[axis].abs().max(1e-12));
+    0.5 * reach.fold(f64::INFINITY, f64::min)
+}
+
+/// Stretches of a line by label, voxel by voxel, from its start; what is outside of everything counts as none.
+fn crossings(case: &Case, from_m: &Point3<f64>, to_m: &Point3<f64>) -> Vec<Crossing> {
+    let grid = case.grid();
+    let [from, to] = [from_m, to_m].map(|place| grid.index_from_ct(place));
+    let along = to - from;
+    let length_m = (to_m - from_m).norm();
+    let mut stops = vec![0.0, 1.0];
+    for axis in 0..3 {
+        let [low, high] = [from[axis].min(to[axis]), from[axis].max(to[axis])];
+        let mut wall = (low - 0.5).ceil() + 0.5;
+        while wall < high {
+            stops.push((wall - from[axis]) / along[axis]);
+            wall += 1.0;
+        }
+    }
+    stops.retain(|stop| (0.0..=1.0).contains(stop));
+    stops.sort_by(f64::total_cmp);
+    let mut found: Vec<(u16, Crossing)> = Vec::new();
+    for pair in stops.windows(2) {
+        let middle = from + along * (0.5 * (pair[0] + pair[1]));
+        let label = case
+            .nearest_voxel(&middle)
+            .map_or(0, |offset| case.labels().labels[offset]);
+        match found.last_mut() {
+            Some((last, crossing)) if *last == label => crossing.to_m = pair[1] * length_m,
+            _ => found.push((
+                label,
+                Crossing {
+                    name: case.label_name(label).unwrap_or_default(),
+                    from_m: pair[0] * length_m,
+                    to_m: pair[1] * length_m,
+                },
+            )),
+        }
+    }
+    let named = found.into_iter().filter(|(label, _)| *label != 0);
+    named.map(|(_, crossing)| crossing).collect()
+}
+
+/// Which of the eight configurations reach a needle, by their postures.
+///
+/// # Errors
+/// As [`needle`].
+pub fn reach(case: &Case, aim: &Aim) -> Result<ReachAnswer, Refusal> {
+    if let Some(unknown) = case.robot_is_unknown() {
+        return Ok(ReachAnswer {
+            unknown: Some(unknown),
+            preview: None,
+            reasons: Vec::new(),
+        });
+    }
+    let goal = needle(case, aim)?.goal?;
+    let preview = case.desk().preview(&goal);
+    let preview = preview.map_err(|error| Refusal {
+        message: error.to_string(),
+        hint: None,
+    })?;
+    let reasons = preview.configurations.iter();
+    let reasons = reasons.map(|each| match each.reason() {
+        "" => String::new(),
+        reason => reason_in_words(reason),
+    });
+    Ok(ReachAnswer {
+        unknown: None,
+        reasons: reasons.collect(),
+        preview: Some(preview),
+    })
+}

@@ -1,0 +1,186 @@
+//! The plan as a scenario: the folder's own with the goal that was chosen, in the text that a person wrote.
+
+use std::path::{Path, PathBuf};
+
+use needlebench_bench::Runnable;
+use needlebench_cell::scenario::GoalSection;
+use needlebench_cell::{Finding, ResolvedScenario, ScenarioEdit, read_text, resolve_scenario};
+use needlebench_report::write_atomically;
+
+use crate::case::{Case, SCENARIO_FILE};
+use crate::live::{Aim, Refusal, needle};
+
+/// Its name, unless somebody gives it another.
+pub const PLAN_FILE: &str = "planned.toml";
+
+/// Decimals of places, mm.
+const DECIMALS: usize = 6;
+
+/// Writes the plan into the case's folder as `NAME.toml`; the path.
+///
+/// What is written is what [`needlebench run`] takes: it is resolved and checked before.
+///
+/// # Errors
+/// A name that is none; what keeps the plan from being run; a file that cannot be written.
+pub fn write_plan(
+    case: &Case,
+    aim: &Aim,
+    configuration: Option<&str>,
+    name: &str,
+) -> Result<PathBuf, Refusal> {
+    let path = case.folder().join(file_name(name)?);
+    let (text, resolved) = planned(case, aim, configuration, &path)?;
+    Runnable::checked(resolved)?;
+    write_atomically(&path, text.as_bytes()).map_err(|error| Refusal {
+        message: format!("the plan cannot be written: {error}"),
+        hint: Some(
+            "the folder may have been moved or deleted since the page was opened".to_owned(),
+        ),
+    })?;
+    Ok(path)
+}
+
+/// The text of the plan for a file, and what it is as a scenario.
+///
+/// # Errors
+/// What keeps it from being a scenario.
+pub fn planned(
+    case: &Case,
+    aim: &Aim,
+    configuration: Option<&str>,
+    path: &Path,
+) -> Result<(String, ResolvedScenario), Refusal> {
+    let needle = needle(case, aim)?;
+    // The words of a goal that cannot be placed are those of the page, not of a file's line.
+    needle.goal?;
+    let source = case.folder().join(SCENARIO_FILE);
+    let file = source.display().to_string();
+    let text = read_text(&source).map_err(|error| Refusal {
+        message: format!("{SCENARIO_FILE} cannot be read: {error}"),
+        hint: Some(
+            "the folder may have been moved or deleted since the page was opened".to_owned(),
+        ),
+    })?;
+    let mut edit = ScenarioEdit::new(&file, &text)?;
+    edit_goal(&mut edit, case, &needle.section, configuration)?;
+    edit.name_after(path)?;
+    let to = path.display().to_string();
+    let resolved =
+        resolve_scenario(&to, edit.text(), case.folder(), case.overrides()).map_err(first)?;
+    Ok((edit.text().to_owned(), resolved))
+}
+
+/// The file of a name within the folder: never another folder's, and none that something else is kept in.
+fn file_name(name: &str) -> Result<String, Refusal> {
+    let stem = name.strip_suffix(".toml").unwrap_or(name);
+    let is_plain = stem
+        .chars()
+        .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+    if stem.is_empty() || stem.len() > 64 || !is_plain {
+        return Err(Refusal {
+            message: "that is no name for a plan".to_owned(),
+            hint: Some("letters, digits, `-` and `_`, at most 64".to_owned()),
+        });
+    }
+    if ["scenario", "session"].contains(&stem.to_ascii_lowercase().as_str()) {
+        return Err(Refusal {
+            message: format!("{stem}.toml is kept for something else"),
+            hint: Some("choose another name".to_owned()),
+        });
+    }
+    Ok(format!("{stem}.toml"))
+}
+
+fn edit_goal(
+    edit: &mut ScenarioEdit,
+    case: &Case,
+    section: &GoalSection,
+    configuration: Option<&str>,
+) -> Result<(), Finding> {
+    let own = case
+        .goals()
+        .iter()
+        .position(|goal| goal.name == section.name);
+    let index = own.unwrap_or(case.goals().len());
+    let at = format!("goals[{index}]");
+    let former = own.map(|index| &case.goals()[index]);
+    let same_target = former.is_some_and(|former| {
+        former.lesion.is_some()
+            && former.lesion == section.lesion
+            && former.target_offset_mm.is_none()
+    });
+    if former.is_none() {
+        edit.set(&at, "name", &format!("\"{}\"", section.name))?;
+    }
+    if !same_target {
+        // What was said of the former target does not hold for another one.
+        for key in ["lesion", "target_mm", "target_offset_mm", "true_target_mm"] {
+            edit.remove(&at, key)?;
+        }
+        match (&section.lesion, section.target_mm) {
+            (Some(lesion), _) => edit.set(&at, "lesion", &format!("\"{lesion}\""))?,
+            (None, Some(target)) => edit.set(&at, "target_mm", &in_mm(target))?,
+            (None, None) => {}
+        }
+    }
+    for key in [
+        "entry_mm",
+        "entry_direction_deg",
+        "insertion_length_mm",
+        "expected",
+    ] {
+        edit.remove(&at, key)?;
+    }
+    let chosen = configuration.map_or(String::new(), |label| format!(", for {label}"));
+    let entry = in_mm(section.entry_mm.unwrap_or_default());
+    edit.set(
+        &at,
+        "entry_mm",
+        &format!("{entry} # chosen on the planning page{chosen}"),
+    )?;
+    if former.is_none() {
+        edit.set(&at, "standoff_mm", &format!("{:?}", section.standoff_mm))?;
+    }
+    Ok(())
+}
+
+fn in_mm(place: [f64; 3]) -> String {
+    let [x, y, z] = place.map(|number| format!("{:.DECIMALS$}", number + 0.0));
+    format!("[{x}, {y}, {z}]")
+}
+
+fn first(findings: Vec<Finding>) -> Refusal {
+    let first = findings.into_iter().next();
+    first.map_or_else(
+        || Refusal {
+            message: "the plan cannot be resolved".to_owned(),
+            hint: None,
+        },
+        Refusal::from,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_stay_within_the_folder() {
+        assert_eq!(file_name("planned").unwrap(), "planned.toml");
+        assert_eq!(file_name("left-2.toml").unwrap(), "left-2.toml");
+        for wrong in [
+            "",
+            "../x",
+            "a/b",
+            "a\\b",
+            "..",
+            "scenario",
+            "Session.toml",
+            ".toml",
+            "a b",
+            "x\0",
+        ] {
+            assert!(file_name(wrong).is_err(), "{wrong:?}");
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! What a person decided, kept in the folder from one run of the program to the next.
+//!
+//! A session has a version. Who writes says which one was read: the second of two pages that change the same version is
+//! refused, and loses nothing.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use needlebench_cell::{Finding, from_toml, to_toml};
+use needlebench_report::write_atomically;
+use serde::{Deserialize, Serialize};
+
+use crate::live::{Aim, EntryAim, TargetAim};
+
+/// Its file.
+pub const SESSION_FILE: &str = "session.toml";
+
+/// Version of the file's layout.
+const SCHEMA_VERSION: u32 = 1;
+/// Most characters of notes.
+const MOST_NOTES: usize = 20_000;
+/// Most characters of a name.
+const MOST_NAME: usize = 64;
+/// Most routes that are kept.
+const MOST_ROUTES: usize = 20;
+/// Farthest place, m or voxels.
+const FAR: f64 = 1e5;
+
+/// What a person decided.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Session {
+    /// Of the layout.
+    schema_version: u32,
+    /// Counts the changes.
+    pub version: u64,
+    /// Everything else.
+    #[serde(flatten)]
+    pub state: State,
+}
+
+/// What a session is about.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+pub struct State {
+    /// Notes.
+    #[serde(default)]
+    pub notes: String,
+    /// Least and most Hounsfield units of what is shown.
+    #[serde(default)]
+    pub window_hu: Option<[f64; 2]>,
+    /// Voxel of the crosshair.
+    #[serde(default)]
+    pub crosshair: Option<[f64; 3]>,
+    /// Markers that are not shown.
+    #[serde(default)]
+    pub hidden_markers: Vec<String>,
+    /// The needle.
+    #[serde(default)]
+    pub needle: NeedleChoice,
+    /// Routes that are kept, to be compared.
+    #[serde(default)]
+    pub routes: Vec<KeptRoute>,
+}
+
+/// A needle, as far as it is chosen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+pub struct NeedleChoice {
+    /// The scenario's goal that it is for.
+    #[serde(default)]
+    pub goal: Option<String>,
+    /// Where it is to end.
+    #[serde(default)]
+    pub target: Option<TargetAim>,
+    /// Where it comes from.
+    #[serde(default)]
+    pub entry: Option<EntryAim>,
+    /// Label of the configuration.
+    #[serde(default)]
+    pub configuration: Option<String>,
+}
+
+/// A route that is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeptRoute {
+    /// What somebody calls it.
+    pub name: String,
+    /// Its needle.
+    pub needle: NeedleChoice,
+}
+
+impl NeedleChoice {
+    /// The needle, if both its ends are chosen.
+    pub fn aim(&self) -> Option<Aim> {
+        Some(Aim {
+            goal: self.goal.clone(),
+            target: self.target.clone()?,
+            entry: self.entry.clone()?,
+        })
+    }
+
+    fn problem(&self) -> Option<String> {
+        let is_far = |place: &[f64; 3]| place.iter().any(|number| !(number.abs() < FAR));
+        let names = [&self.goal, &self.configuration].into_iter().flatten();
+        let mut long = names.filter(|name| name.chars().count() > MOST_NAME);
+        if let Some(name) = long.next() {
+            return Some(format!(
+                "a name has {} characters, {MOST_NAME} are allowed",
+                name.chars().count()
+            ));
+        }
+        let far = match &self.target {
+            Some(TargetAim::PlaceM(place) | TargetAim::Index(place)) => is_far(place),
+            Some(TargetAim::Lesion(name)) => name.chars().count() > MOST_NAME,
+            None => false,
+        } || match &self.entry {
+            Some(EntryAim::PlaceM(place) | EntryAim::Index(place)) => is_far(place),
+            None => false,
+        };
+        far.then(|| "a place has three finite numbers".to_owned())
+    }
+}
+
+impl State {
+    /// What is wrong with it, if anything is.
+    fn problem(&self) -> Option<String> {
+        let count = self.notes.chars().count();
+        if count > MOST_NOTES {
+            return Some(format!(
+                "the notes have {count} characters, {MOST_NOTES} are allowed"
+            ));
+        }
+        if self.routes.len() > MOST_ROUTES {
+            return Some(format!(
+                "{} routes are kept, {MOST_ROUTES} are allowed",
+                self.routes.len()
+            ));
+        }
+        let named = self
+            .hidden_markers
+            .iter()
+            .chain(self.routes.iter().map(|route| &route.name));
+        if named.clone().any(|name| name.chars().count() > MOST_NAME) || named.count() > 256 {
+            return Some(format!("names have at most {MOST_NAME} characters"));
+        }
+        if let Some([low, high]) = self.window_hu
+            && !(low < high && low > -40_000.0 && high < 40_000.0)
+        {
+            return Some("a window is two ascending numbers of HU".to_owned());
+        }
+        if self
+            .crosshair
+            .is_some_and(|place| place.iter().any(|number| !(number.abs() < FAR)))
+        {
+            return Some("the crosshair has three finite numbers".to_owned());
+        }
+        let needles = self.routes.iter().map(|route| &route.needle);
+        needles
+            .chain([&self.needle])
+            .find_map(NeedleChoice::problem)
+    }
+}
+
+/// Why a session was not kept.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NotKept {
+    /// Somebody else changed it: what it is now.
+    Changed(Box<Session>),
+    /// What is wrong with it.
+    Wrong(String),
+    /// It cannot be read or written.
+    Folder(String),
+}
+
+/// The session of a folder.
+#[derive(Debug)]
+pub struct SessionFile {
+    path: PathBuf,
+}
+
+impl SessionFile {
+    /// Of a folder; a new one if there is none.
+    pub fn new(folder: &Path) -> Self {
+        Self {
+            path: folder.join(SESSION_FILE),
+        }
+    }
+
+    /// As the folder has it.
+    ///
+    /// # Errors
+    /// A file that is no session, or cannot be read.
+    pub fn read(&self) -> Result<Session, Finding> {
+        let file = self.path.display().to_string();
+        let text = match fs::read_to_string(&self.path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == ErrorKind::NotFound && self.folder_is_there() => {
+                return Ok(Session {
+                    schema_version: SCHEMA_VERSION,
+                    version: 0,
+                    state: State::default(),
+                });
+            }
+            Err(error) => {
+                return Err(Finding::new(file, format!("it cannot be read: {error}")));
+            }
+        };
+        let hint = "rename it, and a new session is begun";
+        let session: Session = from_toml(&file, &text).map_err(|finding| finding.hint(hint))?;
+        if session.schema_version != SCHEMA_VERSION {
+            return Err(
+                Finding::new(file, format!("it is of version {}", session.schema_version))
+                    .key("schema_version")
+                    .hint(hint),
+            );
+        }
+        match session.state.problem() {
+            Some(problem) => Err(Finding::new(file, problem).hint(hint)),
+            None => Ok(session),
+        }
+    }
+
+    /// Keeps a new state, if `version` is that of the folder's.
+    ///
+    /// # Errors
+    /// Somebody else was first; a state that is none; a folder that is gone.
+    pub fn write(&self, version: u64, state: State) -> Result<Session, NotKept> {
+        if let Some(problem) = state.problem() {
+            return Err(NotKept::Wrong(problem));
+        }
+        let known = self
+            .read()
+            .map_err(|finding| NotKept::Folder(finding.message))?;
+        if known.version != version {
+            return Err(NotKept::Changed(Box::new(known)));
+        }
+        let session = Session {
+            schema_version: SCHEMA_VERSION,
+            version: version + 1,
+            state,
+        };
+        let text = to_toml(&session).map_err(NotKept::Wrong)?;
+        let head = "# What was decided on the planning page; `needlebench view` reads it.\n";
+        write_atomically(&self.path, format!("{head}{text}").as_bytes())
+            .map_err(|error| NotKept::Folder(format!("the session cannot be written: {error}")))?;
+        Ok(session)
+    }
+
+    fn folder_is_there(&self) -> bool {
+        self.path.parent().is_some_and(Path::is_dir)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state() -> State {
+        State {
+            notes: "breath held\n\"quoted\" \u{e4}".to_owned(),
+            window_hu: Some([-1350.0, 150.0]),
+            crosshair: Some([1.0, 2.0, 3.0]),
+            hidden_markers: vec!["m1".to_owned()],
+            needle: NeedleChoice {
+                goal: Some("nodule".to_owned()),
+                target: Some(TargetAim::Lesion("nodule".to_owned())),
+                entry: Some(EntryAim::PlaceM([0.1, -0.1234567890123, 1e-9])),
+                configuration: Some("Right-Up-Fold".to_owned()),
+            },
+            routes: vec![KeptRoute {
+                name: "steep".to_owned(),
+                needle: NeedleChoice {
+                    target: Some(TargetAim::Index([1.0, 2.0, 3.5])),
+                    ..NeedleChoice::default()
+                },
+            }],
+        }
+    }
+
+    #[test]
+    fn what_is_kept_is_read_again_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = SessionFile::new(folder.path());
+        assert_eq!(file.read().unwrap().version, 0);
+        let kept = file.write(0, state()).unwrap();
+        assert_eq!(kept.version, 1);
+        assert_eq!(SessionFile::new(folder.path()).read().unwrap(), kept);
+        assert_eq!(kept.state, state());
+    }
+
+    #[test]
+    fn the_second_of_two_writers_is_refused_and_nothing_is_lost() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = SessionFile::new(folder.path());
+        let first = file.write(0, state()).unwrap();
+        let refused = file.write(0, State::default()).unwrap_err();
+        assert_eq!(refused, NotKept::Changed(Box::new(first.clone())));
+        assert_eq!(file.read().unwrap(), first);
+    }
+
+    #[test]
+    fn what_is_no_session_is_refused_with_what_is_wrong() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = SessionFile::new(folder.path());
+        fs::write(folder.path().join(SESSION_FILE), "version = \"x\"").unwrap();
+        assert!(file.read().unwrap_err().hint.is_some());
+        let wrong = [
+            State {
+                window_hu: Some([5.0, 5.0]),
+                ..State::default()
+            },
+            State {
+                crosshair: Some([f64::NAN, 0.0, 0.0]),
+                ..State::default()
+            },
+            State {
+                notes: "x".repeat(MOST_NOTES + 1),
+                ..State::default()
+            },
+        ];
+        for state in wrong {
+            assert!(matches!(file.write(0, state), Err(NotKept::Wrong(_))));
+        }
+    }
+
+    #[test]
+    fn a_folder_that_is_gone_is_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = SessionFile::new(folder.path());
+        folder.close().unwrap();
+        assert!(matches!(file.write(0, state()), Err(NotKept::Folder(_))));
+    }
+}

@@ -1,0 +1,108 @@
+//! Who is answered when: few at a time, and of a drag the latest.
+
+use std::collections::HashMap;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll};
+
+use axum::http::StatusCode;
+use tokio::sync::Semaphore;
+
+use crate::answer::Problem;
+
+/// Most questions that wait.
+const MOST_WAITING: usize = 64;
+/// Most pages whose turns are remembered.
+const MOST_PAGES: usize = 64;
+
+/// Runs work that takes long beside the server's own threads.
+#[derive(Debug)]
+pub struct Turns {
+    permits: Arc<Semaphore>,
+    waiting: Semaphore,
+    latest: Mutex<HashMap<String, u64>>,
+}
+
+impl Turns {
+    /// So many at a time.
+    pub fn new(at_a_time: usize) -> Self {
+        Self {
+            permits: Arc::new(Semaphore::new(at_a_time)),
+            waiting: Semaphore::new(MOST_WAITING),
+            latest: Mutex::new(HashMap::new()),
+        }
+    }
+
+    /// Works once there is room. Of one page's questions of a kind the latest `turn` is answered; earlier ones that still
+    /// wait are not.
+    ///
+    /// # Errors
+    /// Overtaken by a later turn (409); too many questions (503); a bug in the work (500).
+    pub async fn run<T: Send + 'static>(
+        &self,
+        turn: Option<(String, u64)>,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Problem> {
+        if let Some((page, number)) = &turn {
+            self.remember(page, *number);
+        }
+        let Ok(_place) = self.waiting.try_acquire() else {
+            return Err(Problem::new(
+                StatusCode::SERVICE_UNAVAILABLE,
+                "too many questions at once",
+            )
+            .hint("ask again in a moment"));
+        };
+        let permit = Arc::clone(&self.permits).acquire_owned().await;
+        if turn.is_some_and(|(page, number)| self.is_overtaken(&page, number)) {
+            return Err(Problem::new(
+                StatusCode::CONFLICT,
+                "a later question took the place of this one",
+            )
+            .with("overtaken", &true));
+        }
+        let done = tokio::task::spawn_blocking(move || {
+            // Given back when the work is done, whether anybody still waits for it or not.
+            let _permit = permit;
+            work()
+        });
+        done.await.map_err(|_| {
+            Problem::new(
+                StatusCode::INTERNAL_SERVER_ERROR,
+                "this is a bug of needlebench, not of your input",
+            )
+        })
+    }
+
+    fn remember(&self, page: &str, number: u64) {
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        if latest.len() >= MOST_PAGES && !latest.contains_key(page) {
+            latest.clear();
+        }
+        let known = latest.entry(page.to_owned()).or_default();
+        *known = number.max(*known);
+    }
+
+    fn is_overtaken(&self, page: &str, number: u64) -> bool {
+        let latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        latest.get(page).is_some_and(|known| *known > number)
+    }
+}
+
+/// Blocks of a body, each made when it is asked for.
+pub struct Blocks<I>(I);
+
+impl<I> Blocks<I> {
+    /// In their order.
+    pub fn new(blocks: I) -> Self {
+        Self(blocks)
+    }
+}
+
+impl<I: Iterator + Unpin> futures_core::Stream for Blocks<I> {
+    type Item = I::Item;
+
+    fn poll_next(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<I::Item>> {
+        Poll::Ready(self.0.next())
+    }
+}

@@ -1,0 +1,465 @@
+//! The server as those meet it who are let in, and those who are not.
+
+mod support;
+
+use serde_json::{Value, json};
+
+use support::Running;
+
+#[test]
+fn who_knows_the_token_sees_the_patient_and_nobody_else_does() {
+    let server = Running::start();
+    let case = server.get("/api/case").json();
+    assert_eq!(case["size"], json!(support::SIZE));
+    for token in [
+        None,
+        Some("0".repeat(32)),
+        Some(server.token[1..].to_owned()),
+    ] {
+        for path in [
+            "/api/case",
+            "/api/volume",
+            "/api/labels",
+            "/api/scene",
+            "/api/session",
+            "/api/nothing",
+        ] {
+            let mut asked = server.asked("GET", path);
+            asked.token.clone_from(&token);
+            let answer = asked.send();
+            assert_eq!(answer.status, 401, "{path}");
+            assert!(answer.json()["hint"].is_string());
+        }
+    }
+    // The page itself has nothing of a patient in it.
+    for path in [
+        "/",
+        "/assets/view.js",
+        "/assets/view.css",
+        "/assets/three.js",
+        "/assets/shared.js",
+    ] {
+        let mut asked = server.asked("GET", path);
+        asked.token = None;
+        let page = asked.send();
+        assert_eq!(page.status, 200, "{path}");
+        assert!(!page.text().contains(support::NAME) && !page.text().contains(&server.token));
+    }
+}
+
+#[test]
+fn other_names_and_origins_are_refused_whatever_they_know() {
+    let server = Running::start();
+    let attacks: [&[(&str, &str)]; 6] = [
+        &[("host", "evil.example")],
+        &[("host", "127.0.0.1:1")],
+        &[("origin", "http://evil.example")],
+        &[("origin", "null")],
+        &[("sec-fetch-site", "cross-site")],
+        &[
+            ("host", "127.0.0.1.evil.example"),
+            ("origin", "http://127.0.0.1.evil.example"),
+        ],
+    ];
+    for attack in attacks {
+        for (method, path) in [
+            ("GET", "/"),
+            ("GET", "/api/case"),
+            ("PUT", "/api/session"),
+            ("POST", "/api/plan"),
+            ("DELETE", "/api/simulation"),
+        ] {
+            let mut asked = server.asked(method, path);
+            for (name, value) in attack {
+                if *name == "host" {
+                    (*value).clone_into(&mut asked.host);
+                } else {
+                    asked
+                        .headers
+                        .push(((*name).to_owned(), (*value).to_owned()));
+                }
+            }
+            let answer = asked.send();
+            assert_eq!(answer.status, 403, "{attack:?} {method} {path}");
+            assert!(answer.header("access-control-allow-origin").is_none());
+        }
+    }
+    let preflight = server
+        .asked("OPTIONS", "/api/case")
+        .header("origin", "http://evil.example")
+        .send();
+    assert_eq!(preflight.status, 403);
+}
+
+#[test]
+fn every_answer_says_what_a_browser_may_do_with_it() {
+    let server = Running::start();
+    for path in ["/", "/api/case", "/nothing", "/assets/../api/case"] {
+        let answer = server.get(path);
+        let policy = answer.header("content-security-policy").unwrap();
+        assert!(
+            policy.contains("default-src 'none'") && !policy.contains("unsafe"),
+            "{path}"
+        );
+        assert_eq!(
+            answer.header("x-content-type-options").as_deref(),
+            Some("nosniff")
+        );
+        assert_eq!(
+            answer.header("referrer-policy").as_deref(),
+            Some("no-referrer")
+        );
+        assert_eq!(answer.header("cache-control").as_deref(), Some("no-store"));
+    }
+}
+
+#[test]
+fn methods_bodies_and_paths_that_are_none_are_answered_with_a_sentence() {
+    let server = Running::start();
+    let sentence =
+        |answer: &Value| assert!(answer["error"].as_str().unwrap().contains(' '), "{answer}");
+    for (method, path, body, status) in [
+        ("POST", "/api/case", "", 405),
+        ("DELETE", "/api/session", "", 405),
+        ("PUT", "/", "", 405),
+        ("POST", "/api/place", "", 400),
+        ("POST", "/api/place", "{", 400),
+        ("POST", "/api/place", "{\"index\":[1,2]}", 400),
+        ("POST", "/api/place", "{\"index\":[1,2,1e999]}", 400),
+        ("POST", "/api/place", "{\"index\":[1,2,1e7]}", 400),
+        ("POST", "/api/place", "{\"index\":[1,2,3],\"more\":1}", 400),
+        (
+            "POST",
+            "/api/route",
+            "{\"aim\":{\"target\":{\"file\":\"/etc/passwd\"},\"entry\":{\"index\":[1,2,3]}}}",
+            400,
+        ),
+        ("PUT", "/api/session", "{\"version\":-1,\"state\":{}}", 400),
+        (
+            "PUT",
+            "/api/session",
+            "{\"version\":0,\"state\":{\"window_hu\":[9,1]}}",
+            422,
+        ),
+        ("GET", "/../../etc/passwd", "", 404),
+        ("GET", "/assets/..%2f..%2fCargo.toml", "", 404),
+        ("GET", "/results/../session.toml", "", 404),
+        ("GET", "/results/report.html", "", 401),
+    ] {
+        let answer = server.asked(method, path).body(body).send();
+        assert_eq!(
+            answer.status,
+            status,
+            "{method} {path} {body}: {}",
+            answer.text()
+        );
+        sentence(&answer.json());
+    }
+    let large = server
+        .asked("PUT", "/api/session")
+        .body(&" ".repeat(300 * 1024))
+        .send();
+    assert_eq!(large.status, 413);
+    sentence(&large.json());
+    assert!(large.json()["error"].as_str().unwrap().contains("256 KiB"));
+    // It is none the worse for it.
+    assert_eq!(server.get("/api/case").status, 200);
+}
+
+#[test]
+fn voxels_and_their_places_are_those_of_the_scan() {
+    let server = Running::start();
+    let hu = server.get("/api/volume").body;
+    let labels = server.get("/api/labels").body;
+    let [columns, rows, slices] = support::SIZE;
+    assert_eq!([hu.len(), labels.len()], [2 * columns * rows * slices; 2]);
+    let case = server.get("/api/case").json();
+    for index in [
+        [0, 0, 0],
+        [columns / 2, rows / 2, slices / 2],
+        [columns - 1, 3, slices - 1],
+    ] {
+        let place = server.post("/api/place", &json!({"index": index})).json();
+        for axis in 0..3 {
+            let expected_mm =
+                (support::FIRST_M[axis] + support::SPACING_M[axis] * index[axis] as f64) * 1e3;
+            let mm = place["ct_mm"][axis].as_f64().unwrap();
+            assert!((mm - expected_mm).abs() < 1e-9, "{mm} {expected_mm}");
+        }
+        let at = 2 * ((index[2] * rows + index[1]) * columns + index[0]);
+        let value = i64::from(i16::from_le_bytes([hu[at], hu[at + 1]]));
+        assert_eq!(place["hu"], json!(value));
+        assert_eq!(value, i64::from(support::hu(index)));
+        let label = u16::from_le_bytes([labels[at], labels[at + 1]]);
+        let names = case["labels"].as_array().unwrap();
+        let name = names
+            .iter()
+            .find(|each| each["label"] == json!(label))
+            .map(|each| &each["name"]);
+        assert_eq!(&place["label"], name.unwrap_or(&Value::Null));
+    }
+    let outside = server
+        .post("/api/place", &json!({"index": [-5, 0, 0]}))
+        .json();
+    assert_eq!(outside["hu"], Value::Null);
+}
+
+#[test]
+fn a_route_is_what_geometry_says() {
+    /// Of surfaces of voxels of 4 mm, and labels on them.
+    const VOXEL_M: f64 = 4e-3;
+    let server = Running::start();
+    // From the front, straight to the middle of the nodule.
+    let [x, y, z] = support::NODULE_M;
+    let aim = json!({"target": {"lesion": "nodule"}, "entry": {"place_m": [x, y - 0.2, z]}});
+    let route = server.post("/api/route", &json!({"aim": aim})).json();
+    let number = |key: &str| {
+        route[key]
+            .as_f64()
+            .unwrap_or_else(|| panic!("{key}: {route}"))
+    };
+    let skin_y = -support::BODY_M[1] * (1.0 - (x / support::BODY_M[0]).powi(2)).sqrt();
+    assert!(
+        (number("length_m") - (y - skin_y)).abs() < VOXEL_M,
+        "{route}"
+    );
+    let [half_x, half_y, half_z] = support::LUNG_M;
+    let aside = ((x - support::LUNG_AT_M) / half_x).powi(2) + (z / half_z).powi(2);
+    let lung_m = y + half_y * (1.0 - aside).sqrt();
+    assert!(
+        (number("in_lung_m") - lung_m).abs() < VOXEL_M,
+        "{} {lung_m}",
+        number("in_lung_m")
+    );
+    assert_eq!(route["lung_entries"], json!(1));
+    // The normal of an ellipse.
+    let normal = (x / support::BODY_M[0].powi(2))
+        .atan2(-skin_y / support::BODY_M[1].powi(2))
+        .abs();
+    assert!(
+        (number("skin_angle_rad") - normal).abs() < 0.1,
+        "{} {normal}",
+        number("skin_angle_rad")
+    );
+    assert!(number("axial_angle_rad").abs() < 0.02);
+    let crossed: Vec<&str> = route["crossings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|each| each["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(crossed, ["soft_tissue", "lung_left", "nodule"]);
+    // Without a registration nothing is said of the robot, and why.
+    let reach = server.post("/api/reach", &json!({"aim": aim})).json();
+    assert!(
+        reach["unknown"]
+            .as_str()
+            .unwrap()
+            .contains("no registration"),
+        "{reach}"
+    );
+    let motion = server
+        .post(
+            "/api/motion",
+            &json!({"aim": aim, "configuration": "Right-Up-Fold"}),
+        )
+        .json();
+    assert!(
+        motion["refused"]["message"]
+            .as_str()
+            .unwrap()
+            .contains("no registration")
+    );
+    // What is no needle is told so.
+    for (aim, word) in [
+        (
+            json!({"target": {"place_m": [0.5, 0.0, 0.0]}, "entry": {"place_m": [0.0, -0.2, 0.0]}}),
+            "target",
+        ),
+        (
+            json!({"target": {"lesion": "none"}, "entry": {"place_m": [0.0, -0.2, 0.0]}}),
+            "none",
+        ),
+        (
+            json!({"target": {"lesion": "nodule"}, "entry": {"place_m": [x, y, z]}}),
+            "apart",
+        ),
+    ] {
+        let refused = server.post("/api/route", &json!({"aim": aim})).json();
+        let message = refused["refused"]["message"].as_str().unwrap_or_default();
+        assert!(message.contains(word), "{refused}");
+    }
+}
+
+#[test]
+fn the_second_tab_is_told_and_nothing_is_lost() {
+    let server = Running::start();
+    let fresh = server.get("/api/session").json();
+    assert_eq!(fresh["version"], json!(0));
+    let keep = |version: u64, notes: &str| {
+        server
+            .asked("PUT", "/api/session")
+            .body(&json!({"version": version, "state": {"notes": notes}}).to_string())
+            .send()
+    };
+    assert_eq!(keep(0, "first").json()["version"], json!(1));
+    let refused = keep(0, "second");
+    assert_eq!(refused.status, 409);
+    assert_eq!(refused.json()["session"]["notes"], json!("first"));
+    assert_eq!(keep(1, "second").json()["version"], json!(2));
+    // Killed and started again.
+    let folder = server.stop();
+    let again = Running::open(folder);
+    let session = again.get("/api/session").json();
+    assert_eq!(
+        [&session["version"], &session["notes"]],
+        [&json!(2), &json!("second")]
+    );
+}
+
+#[test]
+fn a_plan_is_the_scenario_with_another_goal_and_stays_in_its_folder() {
+    let server = Running::start();
+    let [x, y, z] = support::NODULE_M;
+    let aim = json!({"goal": "nodule", "target": {"lesion": "nodule"}, "entry": {"place_m": [x, y - 0.2, z]}});
+    for name in ["../escaped", "scenario", "a/b", "session.toml", ""] {
+        let refused = server.post("/api/plan", &json!({"aim": aim, "name": name}));
+        assert_eq!(refused.status, 422, "{name}");
+    }
+    let source = std::fs::read_to_string(server.folder().join("scenario.toml")).unwrap();
+    let saved = server.post(
+        "/api/plan",
+        &json!({"aim": aim, "name": "mine", "configuration": "Right-Up-Fold"}),
+    );
+    assert_eq!(saved.json()["file"], json!("mine.toml"), "{}", saved.text());
+    let text = std::fs::read_to_string(server.folder().join("mine.toml")).unwrap();
+    let first = source.lines().next().unwrap();
+    assert!(text.starts_with(first), "comments stay");
+    assert!(
+        text.contains("entry_mm = [") && text.contains("for Right-Up-Fold"),
+        "{text}"
+    );
+    let overrides = needlebench_cell::Overrides::default();
+    let resolved =
+        needlebench_cell::load_scenario(&server.folder().join("mine.toml"), &overrides).unwrap();
+    let route = server.post("/api/route", &json!({"aim": aim})).json();
+    let length_m = resolved.goals[0].entry_to_target_m().unwrap();
+    assert!((length_m - route["length_m"].as_f64().unwrap()).abs() < 1e-6);
+    assert_eq!(
+        source,
+        std::fs::read_to_string(server.folder().join("scenario.toml")).unwrap()
+    );
+}
+
+#[test]
+fn a_folder_that_disappears_is_said_and_what_is_shown_stays() {
+    let server = Running::start();
+    std::fs::remove_dir_all(server.folder()).unwrap();
+    let body = json!({"version": 0, "state": {"notes": "mine"}}).to_string();
+    let refused = server.asked("PUT", "/api/session").body(&body).send();
+    assert_eq!(refused.status, 410);
+    assert!(refused.json()["hint"].as_str().unwrap().contains("folder"));
+    assert_eq!(server.get("/api/session").status, 410);
+    assert!(!server.folder().exists(), "nothing makes it anew");
+    assert_eq!(server.get("/api/volume").status, 200);
+}
+
+#[test]
+fn ten_at_once_are_all_answered() {
+    let server = Running::start();
+    let [x, y, z] = support::NODULE_M;
+    std::thread::scope(|scope| {
+        for client in 0..10 {
+            let server = &server;
+            scope.spawn(move || {
+                for turn in 0..20 {
+                    let entry = [
+                        x + 1e-3 * f64::from(client),
+                        y - 0.2,
+                        z + 1e-3 * f64::from(turn),
+                    ];
+                    let aim = json!({"target": {"lesion": "nodule"}, "entry": {"place_m": entry}});
+                    let answer = server.post(
+                        "/api/route",
+                        &json!({"aim": aim, "page": client.to_string(), "turn": turn}),
+                    );
+                    assert_eq!(answer.status, 200, "{}", answer.text());
+                    if turn % 10 == 0 {
+                        assert_eq!(server.get("/api/volume").status, 200);
+                    }
+                }
+            });
+        }
+    });
+    assert_eq!(server.get("/api/case").status, 200);
+}
+
+#[test]
+fn folders_that_do_not_belong_together_are_refused() {
+    let made = support::patient();
+    let refused = |change: &dyn Fn(&std::path::Path), word: &str| {
+        let folder = support::copy_of(&made);
+        change(folder.path());
+        let findings = match needlebench_viewer::Case::open(
+            folder.path(),
+            &needlebench_cell::Overrides::default(),
+        ) {
+            Ok(_) => panic!("it was taken: {word}"),
+            Err(findings) => findings,
+        };
+        let said = findings[0].to_string();
+        assert!(said.contains(word), "{said}");
+        assert!(findings[0].hint.is_some(), "{said}");
+    };
+    let replace = |file: &str, from: &str, to: &str| {
+        let (file, from, to) = (file.to_owned(), from.to_owned(), to.to_owned());
+        move |folder: &std::path::Path| {
+            let text = std::fs::read_to_string(folder.join(&file)).unwrap();
+            assert!(text.contains(&from), "{from}");
+            std::fs::write(folder.join(&file), text.replacen(&from, &to, 1)).unwrap();
+        }
+    };
+    refused(
+        &|folder| std::fs::remove_file(folder.join("volume.nii.gz")).unwrap(),
+        "no volume",
+    );
+    refused(
+        &|folder| std::fs::remove_file(folder.join("labels.nii.gz")).unwrap(),
+        "no label map",
+    );
+    refused(
+        &|folder| std::fs::remove_file(folder.join("report.json")).unwrap(),
+        "report.json",
+    );
+    refused(
+        &replace(
+            "report.json",
+            "\"voxels_sha256\": \"",
+            "\"voxels_sha256\": \"00",
+        ),
+        "other Hounsfield units",
+    );
+    refused(
+        &replace(
+            "report.json",
+            "\"labels_sha256\": \"",
+            "\"labels_sha256\": \"00",
+        ),
+        "label map",
+    );
+    refused(
+        &|folder| {
+            std::fs::copy(
+                folder.join("surfaces/skin.stl"),
+                folder.join("surfaces/lung_left.stl"),
+            )
+            .map(|_| ())
+            .unwrap()
+        },
+        "lung_left",
+    );
+    refused(
+        &replace("scenario.toml", "name = \"skin\"", "name = \"hide\""),
+        "skin",
+    );
+}

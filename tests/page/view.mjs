@@ -1,0 +1,324 @@
+// A planning session in headless Chromium, as a doctor would have it, on the folder that `ct build` made:
+//
+//   npm ci && node view.mjs --out SCREENSHOTS --program NEEDLEBENCH [--marks] FOLDER LESION ENTRY
+//
+// FOLDER is changed: a session and a plan are written into it. LESION is a goal of it, ENTRY (`-111,-83,-58`, mm of
+// the scan) a place at the skin from which a needle reaches it. With --marks times are held against what a machine of its own attains.
+import assert from 'node:assert/strict';
+import { execFileSync, spawn } from 'node:child_process';
+import { existsSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
+import { join, resolve } from 'node:path';
+import { NO_GL, SOFTWARE_GL, launch } from './browser.mjs';
+
+/** Of places, mm: what they are known to in the report. */
+const SAME_MM = 1e-6;
+/** Median and 95 % of what a drag waits for its numbers, ms, and the first view. */
+const MARKS = { median: 50, p95: 100, first: 3000 };
+const WIDTHS = [[1024, 768], [1600, 1000], [2560, 1440], [820, 1180]];
+
+const words = process.argv.slice(2);
+const option = (name, otherwise = null) => {
+  const at = words.indexOf(name);
+  return at >= 0 ? words.splice(at, 2)[1] : otherwise;
+};
+const has = (name) => { const at = words.indexOf(name); if (at >= 0) words.splice(at, 1); return at >= 0; };
+const marks = has('--marks');
+const out = resolve(option('--out', 'screenshots'));
+const program = resolve(option('--program'));
+const [folder, lesion, entryMm] = words;
+mkdirSync(out, { recursive: true });
+for (const file of ['session.toml', 'planned.toml']) rmSync(join(folder, file), { force: true });
+
+/** The server, and its address. */
+async function serve() {
+  const server = spawn(program, ['view', folder, '--no-open'], { stdio: ['ignore', 'pipe', 'inherit'] });
+  process.on('exit', () => server.kill());
+  let said = '';
+  const url = await new Promise((found, failed) => {
+    server.stdout.on('data', (data) => { said += data; const match = said.match(/(http:\/\/\S+)\n/); if (match) found(match[1]); });
+    server.on('exit', (code) => failed(new Error(`view ended with ${code}: ${said}`)));
+  });
+  return { server, url, stop: () => new Promise((done) => { server.removeAllListeners('exit'); server.on('exit', done); server.kill('SIGINT'); }) };
+}
+
+const running = await launch(SOFTWARE_GL);
+process.on('exit', () => running.close());
+for (const signal of ['SIGINT', 'SIGTERM']) process.on(signal, () => process.exit(1));
+const allowed = new Set();
+
+async function open(url, browser = running, size = { width: 1600, height: 1000 }) {
+  const page = await browser.newPage({ viewport: size });
+  page.setDefaultTimeout(60_000);
+  const problems = [];
+  page.on('console', (message) => {
+    const text = `${message.type()}: ${message.text()}`;
+    if (['error', 'warning'].includes(message.type()) && ![...allowed].some((each) => text.includes(each))) problems.push(text);
+  });
+  page.on('pageerror', (error) => problems.push(error.message));
+  page.on('request', (request) => { if (!request.url().startsWith(url.split('#')[0]) && !/^(data|blob):/.test(request.url())) problems.push(`asked for ${request.url()}`); });
+  page.on('request', (request) => { if (request.url().includes(url.split('#')[1]) && !request.isNavigationRequest()) problems.push(`the token is in ${request.url()}`); });
+  await page.goto(url);
+  await page.waitForSelector('html[data-ready]', { timeout: 60_000 });
+  return { page, problems };
+}
+
+const settled = (page) => page.waitForFunction(() => document.querySelector('.bar > .soft').textContent === 'kept' && !PLAN.planner.quick.busy && !PLAN.planner.exact.busy && !PLAN.planner.planned.busy && !PLAN.planner.where.busy);
+const report = JSON.parse(readFileSync(join(folder, 'report.json'), 'utf8'));
+const millimetres = (index) => index.map((value, axis) => 1e3 * (report.first_voxel_m[axis] + report.spacing_m[axis] * value));
+const entry = entryMm.split(',').map((mm, axis) => Math.round((1e-3 * mm - report.first_voxel_m[axis]) / report.spacing_m[axis]));
+const canvas = (page, title) => page.locator(`canvas[aria-label^="${title} slice"]`);
+
+/** Where a voxel is on a slice's canvas. */
+const spot = (page, plane, index) => page.evaluate(([plane, index]) => {
+  const slice = PLAN.planner.slices[plane];
+  return slice.onCanvas(slice.place(index));
+}, [plane, index]);
+
+/** Clicks a voxel of a slice that shows it. */
+async function click(page, plane, index) {
+  const title = ['Axial', 'Coronal', 'Sagittal'][plane];
+  const [x, y] = await spot(page, plane, index);
+  await canvas(page, title).click({ position: { x, y } });
+}
+
+/** Brings the crosshair to a voxel by clicks: a sagittal slice shows every height, an axial one the rest. */
+async function pointTo(page, index) {
+  const now = await page.evaluate(() => PLAN.planner.state.crosshair);
+  await click(page, 1, [index[0], now[1], index[2]]);
+  await click(page, 0, index);
+  assert.deepEqual(await page.evaluate(() => PLAN.planner.state.crosshair), index, 'a click is on its voxel');
+}
+
+async function pixel(page, plane, index) {
+  const [x, y] = await spot(page, plane, index);
+  return page.evaluate(([plane, x, y]) => {
+    const { canvas } = PLAN.planner.slices[plane];
+    const ratio = canvas.width / canvas.clientWidth;
+    return [...canvas.getContext('2d').getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data.slice(0, 3)];
+  }, [plane, x, y]);
+}
+
+const frames = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
+
+const { url, stop } = await serve();
+const { page, problems } = await open(url);
+const first = await page.evaluate(() => NB.timing.firstView);
+console.log(`first view after ${Math.round(first)} ms`);
+if (marks) assert.ok(first < MARKS.first, `first view after ${first} ms`);
+
+// What it says of itself.
+const text = await page.innerText('body');
+assert.match(text, /not a medical device/);
+assert.match(text, /patient\u2019s right is on the left/);
+
+// Known voxels have their millimetres, to the last digit, and their greys.
+const size = report.size;
+for (const index of [size.map((count) => Math.floor(count / 2)), size.map((count) => Math.floor(count / 3)), [5, 7, 3]]) {
+  await pointTo(page, index);
+  await page.waitForFunction((index) => PLAN.planner.place && !PLAN.planner.where.busy && PLAN.planner.readout.textContent.includes(`voxel ${index.join(', ')};`), index);
+  const answer = await page.evaluate(() => PLAN.planner.place);
+  millimetres(index).forEach((mm, axis) => assert.ok(Math.abs(answer.ct_mm[axis] - mm) < SAME_MM, `${answer.ct_mm} is not ${mm}`));
+  assert.equal(answer.hu, await page.evaluate((index) => PLAN.planner.volume.at(index), index));
+}
+await frames(page);
+for (const [name, [low, high]] of Object.entries({ 'Soft (40/400)': [-160, 240], 'Bone (400/1800)': [-500, 1300], 'Lung (\u2212600/1500)': [-1350, 150] })) {
+  await page.getByRole('radio', { name }).click();
+  await frames(page);
+  // Nothing is drawn over a voxel a tenth of the volume off the crosshair.
+  const at = size.map((count, axis) => (axis === 2 ? 3 : Math.floor(0.45 * count)));
+  const hus = await page.evaluate((at) => [-1, 0, 1].flatMap((i) => [-1, 0, 1].map((j) => PLAN.planner.volume.at([at[0] + i, at[1] + j, at[2]]))), at);
+  const grey = (hu) => 255 * Math.min(Math.max((hu - low) / (high - low), 0), 1);
+  const seen = (await pixel(page, 0, at))[0];
+  assert.ok(seen >= Math.min(...hus.map(grey)) - 3 && seen <= Math.max(...hus.map(grey)) + 3, `${name}: grey ${seen} of ${hus} HU`);
+}
+
+// The needle: lesion by its button, entry by a click.
+await page.getByRole('button', { name: `Target: ${lesion.replaceAll('_', ' ')}` }).click();
+await pointTo(page, entry);
+await page.getByRole('radio', { name: 'Click the entry' }).click();
+await click(page, 0, entry);
+await settled(page);
+const route = await page.evaluate(() => PLAN.planner.route);
+assert.ok(route && !route.not_placed, JSON.stringify(route));
+const target = report.targets.find((each) => each.name === lesion).center_m;
+target.forEach((metres, axis) => assert.ok(Math.abs(route.target_m[axis] - metres) < 2e-6, 'the target is the lesion\u2019s middle'));
+assert.ok(Math.abs(route.length_m - Math.hypot(...route.entry_m.map((metres, axis) => metres - route.target_m[axis]))) < 1e-12);
+assert.match(await page.innerText('.side'), /Skin to target mm\s+\d+\.\d/);
+// It is on the slice that holds its end, in its colour.
+await pointTo(page, route.target_index.map(Math.round));
+await canvas(page, 'Axial').focus();
+for (let step = 0; step < 9; step++) await page.keyboard.press('+');
+await frames(page);
+const near = await page.evaluate(([x, y]) => {
+  const { canvas } = PLAN.planner.slices[0];
+  const ratio = canvas.width / canvas.clientWidth;
+  const box = canvas.getContext('2d').getImageData(Math.round(x * ratio) - 12, Math.round(y * ratio) - 12, 24, 24).data;
+  let count = 0;
+  for (let at = 0; at < box.length; at += 4) if (box[at] > 200 && box[at + 1] > 190 && box[at + 2] < 120) count++;
+  return count;
+}, await spot(page, 0, route.target_index));
+assert.ok(near > 20, `${near} pixels of the needle at its target`);
+await page.screenshot({ path: join(out, 'view-zoomed.png') });
+await page.keyboard.press('0');
+await frames(page);
+
+// Configurations: one that works is chosen with the keyboard, its motion planned and played.
+const working = await page.evaluate(() => PLAN.planner.reach.preview.configurations.findIndex((each) => each.works));
+assert.ok(working >= 0, 'no configuration works');
+const rows = page.locator('table.choose tbody tr');
+assert.equal(await rows.count(), 8);
+await rows.nth(0).focus();
+for (let row = 0; row < working; row++) { await page.keyboard.press('ArrowDown'); await settled(page); }
+if (working === 0) await page.keyboard.press('Enter');
+await page.waitForFunction(() => PLAN.planner.motion?.time_s?.length > 2);
+await settled(page);
+const motion = await page.evaluate(() => ({ ...PLAN.planner.motion, label: PLAN.planner.state.needle.configuration }));
+assert.equal(motion.configuration, motion.label);
+assert.ok(motion.tip, `no expected error: ${motion.tip_unknown}`);
+assert.match(await page.innerText('.side'), /Expected tip error at the target: \d+\.\d\d mm rms/);
+const before = await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL());
+await page.getByRole('button', { name: 'Play motion' }).click();
+await page.waitForFunction(() => /^[0-9.]+ of/.test(PLAN.planner.clock.textContent) && PLAN.planner.room.playing);
+await frames(page);
+assert.notEqual(before, await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL()), 'the arm moves');
+await page.evaluate(() => PLAN.planner.room.stop());
+
+// Two routes side by side; taken back and brought back.
+await page.getByRole('button', { name: 'Keep this route' }).click();
+const moved = await page.evaluate(() => PLAN.planner.shown.entry);
+const [x, y] = await spot(page, 1, moved);
+await pointTo(page, moved.map(Math.round));
+await frames(page);
+const box = await canvas(page, 'Coronal').boundingBox();
+await page.mouse.move(box.x + x, box.y + y);
+await page.mouse.down();
+for (let step = 1; step <= 60; step++) {
+  await page.mouse.move(box.x + x + 6 * Math.sin(step / 6), box.y + y + 6 * (1 - Math.cos(step / 6)));
+  await page.waitForTimeout(16);
+}
+await page.mouse.up();
+const waits = await page.evaluate(() => [...PLAN.planner.latencies].sort((a, b) => a - b));
+await settled(page);
+assert.ok(waits.length > 10, `${waits.length} answers to a drag`);
+const [median, p95] = [waits[Math.floor(waits.length / 2)], waits[Math.floor(0.95 * waits.length)]];
+console.log(`drag to numbers: median ${median.toFixed(1)} ms, 95 % ${p95.toFixed(1)} ms, of ${waits.length}`);
+if (marks) assert.ok(median < MARKS.median && p95 < MARKS.p95, 'numbers come late');
+await page.getByRole('button', { name: 'Keep this route' }).click();
+await page.waitForFunction(() => document.querySelectorAll('table.route thead th').length >= 5);
+const length = await page.evaluate(() => PLAN.planner.route.length_m);
+const state = () => page.evaluate(() => JSON.stringify([PLAN.planner.state.needle, PLAN.planner.state.routes]));
+const last = await state();
+await page.keyboard.press('Control+z');
+await page.keyboard.press('Control+z');
+await settled(page);
+assert.notEqual(await state(), last);
+await page.keyboard.press('Control+Shift+z');
+await page.keyboard.press('Control+Shift+z');
+await settled(page);
+assert.equal(await state(), last);
+assert.equal(await page.evaluate(() => PLAN.planner.route.length_m), length);
+
+// Markers go and come.
+const marker = page.locator('input[aria-label^="Show marker"]').first();
+await marker.uncheck();
+await settled(page);
+assert.equal(await page.evaluate(() => PLAN.planner.state.hidden_markers.length), 1);
+
+// A target outside, an entry in air: said, and nothing breaks.
+await page.evaluate(() => PLAN.planner.put('target', [0, 0, 0]));
+await page.waitForFunction(() => /target/.test(document.querySelector('.side .error')?.textContent));
+assert.ok(await page.getByRole('button', { name: 'Save plan' }).isDisabled());
+await page.keyboard.press('Control+z');
+await settled(page);
+
+// Notes; a second tab that changes the same session is told.
+await page.getByRole('textbox', { name: 'Notes' }).fill('breath held');
+await settled(page);
+const { page: other } = await open(url);
+assert.equal(await other.inputValue('textarea'), 'breath held');
+await other.getByRole('textbox', { name: 'Notes' }).fill('by the other tab');
+await settled(other);
+allowed.add('409');
+await page.getByRole('textbox', { name: 'Notes' }).fill('by this tab');
+await page.waitForSelector('.banner.shown');
+assert.match(await page.innerText('.banner'), /changed in another tab/);
+await page.getByRole('button', { name: 'Reload what the other tab has' }).click();
+await settled(page);
+assert.equal(await page.inputValue('textarea'), 'by the other tab');
+await other.close();
+
+// The route that was kept first, as a plan: what `check` and `run` take.
+await page.getByRole('button', { name: 'Take route 1' }).click();
+await settled(page);
+await page.getByRole('button', { name: 'Save plan' }).click();
+await page.waitForFunction(() => /Saved as planned.toml/.test(document.body.innerText));
+const checked = JSON.parse(execFileSync(program, ['check', join(folder, 'planned.toml'), '--json'], { encoding: 'utf8' }));
+assert.ok(checked.ok, JSON.stringify(checked.findings));
+
+// At every width nothing hangs out, and everything is reached by the keyboard.
+for (const [width, height] of WIDTHS) {
+  await page.setViewportSize({ width, height });
+  await frames(page);
+  await page.screenshot({ path: join(out, `view-${width}.png`) });
+  const beyond = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  assert.ok(beyond <= 0, `${beyond} pixels too wide at ${width}`);
+}
+await page.setViewportSize({ width: 1600, height: 1000 });
+const nameless = await page.evaluate(() => [...document.querySelectorAll('button, input, select, textarea, canvas[tabindex]')].filter((each) => !(each.getAttribute('aria-label') || each.textContent.trim() || each.labels?.length)).map((each) => each.outerHTML));
+assert.deepEqual(nameless, []);
+await page.evaluate(() => PLAN.planner.look([30, 40, 50]));
+await canvas(page, 'Axial').focus();
+const stood = await page.evaluate(() => PLAN.planner.state.crosshair);
+for (const key of ['ArrowLeft', 'ArrowDown', 'PageDown']) await page.keyboard.press(key);
+assert.deepEqual(await page.evaluate(() => PLAN.planner.state.crosshair), [stood[0] - 1, stood[1] + 1, stood[2] - 1]);
+
+// On paper: one sheet, with a line to sign.
+const sheet = (await page.pdf({ printBackground: true, preferCSSPageSize: true })).toString('latin1');
+const sheets = (sheet.match(/\/Type\s*\/Page[^s]/g) || []).length;
+assert.equal(sheets, 1, `${sheets} sheets`);
+await page.emulateMedia({ media: 'print' });
+assert.match(await page.innerText('.signature'), /Signature/);
+await page.screenshot({ path: join(out, 'view-print.png'), fullPage: true });
+await page.emulateMedia({ media: 'screen' });
+
+// Simulated from the page, and the report opened.
+await page.getByRole('button', { name: 'Save and simulate' }).click();
+await page.waitForFunction(() => /finished|failed/.test(PLAN.planner.simulation.textContent), null, { timeout: 300_000 });
+assert.match(await page.evaluate(() => PLAN.planner.simulation.textContent), /finished/);
+const [opened] = await Promise.all([page.context().waitForEvent('page'), page.getByRole('link', { name: 'Open the report' }).click()]);
+await opened.waitForSelector('html[data-ready]', { timeout: 60_000 });
+assert.match(await opened.title(), /planned/);
+await opened.close();
+// One that is begun can be stopped.
+await page.getByRole('button', { name: 'Save and simulate' }).click();
+await page.waitForFunction(() => PLAN.planner.running);
+await page.getByRole('button', { name: 'Cancel' }).click();
+await page.waitForFunction(() => /cancelled/.test(PLAN.planner.simulation.textContent));
+
+const heap = await page.evaluate(() => performance.memory?.usedJSHeapSize ?? 0);
+console.log(`heap ${Math.round(heap / 1e6)} MB`);
+await settled(page);
+assert.deepEqual(problems, []);
+const decided = await state();
+await page.close();
+await stop();
+
+// Killed and started again: it is all there. Without WebGL, too.
+const again = await serve();
+const flat = await launch(NO_GL);
+const { page: later } = await open(again.url, flat);
+assert.equal(await later.evaluate(() => JSON.stringify([PLAN.planner.state.needle, PLAN.planner.state.routes])), decided);
+assert.equal(await later.inputValue('textarea'), 'by the other tab');
+assert.match(await later.innerText('body'), /No 3D view/);
+
+// A folder that disappears, and a server that ends: said.
+allowed.add('410');
+allowed.add('ERR_CONNECTION_REFUSED');
+await again.stop();
+await later.getByRole('textbox', { name: 'Notes' }).fill('nobody listens');
+await later.waitForSelector('.banner.shown');
+assert.match(await later.innerText('.banner'), /does not answer/);
+await flat.close();
+assert.ok(existsSync(join(folder, 'session.toml')));
+console.log('planning page: a session by clicks works');
+process.exit(0);
