@@ -91,6 +91,10 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus> {
         }
     };
     let _ = stopper.set(server.stopper());
+    // Interrupted while the folder was read: nobody was there to be stopped.
+    if cancel.load(Ordering::Relaxed) {
+        return Ok(ExitStatus::Interrupted);
+    }
     let url = server.url();
     print_text(&format!(
         "{url}\nthe planning page of {}; Ctrl-C ends it",
