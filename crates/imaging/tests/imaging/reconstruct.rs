@@ -585,8 +585,8 @@ fn what_lies_on_the_skin_is_no_bone() {
         }
         bones(&run(&volume, &options()).unwrap())
     };
-    let ball = (4.0 / 3.0 * std::f64::consts::PI * ball_mm.powi(3)
-        / SPACING_MM.iter().product::<f64>()) as f64;
+    let ball = 4.0 / 3.0 * std::f64::consts::PI * f64::powi(ball_mm, 3)
+        / SPACING_MM.iter().product::<f64>();
     assert_eq!(with_ball(-3.0), bones(&clear));
     let under = with_ball(8.0 + ball_mm) as f64 - bones(&clear) as f64;
     assert!(under > 0.5 * ball, "{under} of {ball}");
