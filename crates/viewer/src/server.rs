@@ -394,7 +394,10 @@ struct PlaceQuestion {
 
 async fn place(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
     let PlaceQuestion { index, .. } = read(body)?;
-    if index.iter().any(|number| !(number.abs() < 1e6)) {
+    if index
+        .iter()
+        .any(|number| number.is_nan() || number.abs() >= 1e6)
+    {
         return Err(Problem::new(
             StatusCode::BAD_REQUEST,
             "an index has three finite numbers",

@@ -101,7 +101,6 @@ impl NeedleChoice {
     }
 
     fn problem(&self) -> Option<String> {
-        let is_far = |place: &[f64; 3]| place.iter().any(|number| !(number.abs() < FAR));
         let names = [&self.goal, &self.configuration].into_iter().flatten();
         let mut long = names.filter(|name| name.chars().count() > MOST_NAME);
         if let Some(name) = long.next() {
@@ -149,10 +148,7 @@ impl State {
         {
             return Some("a window is two ascending numbers of HU".to_owned());
         }
-        if self
-            .crosshair
-            .is_some_and(|place| place.iter().any(|number| !(number.abs() < FAR)))
-        {
+        if self.crosshair.is_some_and(|place| is_far(&place)) {
             return Some("the crosshair has three finite numbers".to_owned());
         }
         let needles = self.routes.iter().map(|route| &route.needle);
@@ -250,6 +246,13 @@ impl SessionFile {
     fn folder_is_there(&self) -> bool {
         self.path.parent().is_some_and(Path::is_dir)
     }
+}
+
+/// A place that no scan holds.
+fn is_far(place: &[f64; 3]) -> bool {
+    place
+        .iter()
+        .any(|number| number.is_nan() || number.abs() >= FAR)
 }
 
 #[cfg(test)]
