@@ -631,13 +631,14 @@ fn make(volume: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Ma
     }))
 }
 
-/// How far under the skin a corner is put that was outside, m.
-const UNDER_SKIN_M: f64 = 5e-5;
+/// Farthest that a corner may be outside the reduced skin, m: within what `[[phantom.parts]]` takes for roughness.
+const OUTSIDE_SKIN_M: f64 = 0.8e-3;
 
-/// Farthest that a corner is put back, m: what the skin's and its own reduction may be apart. More is not theirs.
+/// Farthest that a corner is moved, m: what the skin's and its own reduction may be apart. More is not theirs.
 const FARTHEST_BACK_M: f64 = 3e-3;
 
-/// Puts corners of other surfaces that the reduced skin leaves outside back under it.
+/// Moves corners of other surfaces that the reduced skin leaves far outside back towards it. A surface that would not stay
+/// sound is left as it is.
 fn keep_within_skin(surfaces: &mut [Surface], remarks: &mut Vec<Remark>) {
     let skin = surfaces
         .iter()
@@ -649,26 +650,25 @@ fn keep_within_skin(surfaces: &mut [Surface], remarks: &mut Vec<Remark>) {
         if surface.tissue == SurfaceTissue::Skin {
             continue;
         }
+        let mut mesh = surface.mesh.clone();
         let (mut moved, mut farthest_m) = (0_usize, 0.0_f64);
-        for corner in &mut surface.mesh.vertices_m {
+        for corner in &mut mesh.vertices_m {
             if skin.contains(corner) {
                 continue;
             }
-            let nearest = skin.nearest(corner);
-            let way = nearest - *corner;
-            let Some(inwards) = way.try_normalize(1e-9) else {
-                continue;
-            };
-            if way.norm() <= FARTHEST_BACK_M {
-                *corner = nearest + inwards * UNDER_SKIN_M;
+            let way = skin.nearest(corner) - *corner;
+            let outside_m = way.norm();
+            if outside_m > OUTSIDE_SKIN_M && outside_m <= FARTHEST_BACK_M {
+                *corner += way * (1.0 - OUTSIDE_SKIN_M / outside_m);
                 moved += 1;
-                farthest_m = farthest_m.max(way.norm());
+                farthest_m = farthest_m.max(outside_m);
             }
         }
-        if farthest_m > SURFACE_ERROR_M {
+        if moved > 0 && check_closed(&mesh).is_ok() {
+            surface.mesh = mesh;
             remarks.push(
                 Remark::new(format!(
-                    "{moved} corners of its surface, up to {:.2} mm outside the reduced skin, were put back under it",
+                    "{moved} corners of its surface, up to {:.2} mm outside the reduced skin, were moved back towards it",
                     1e3 * farthest_m
                 ))
                 .at(surface.name.clone()),
