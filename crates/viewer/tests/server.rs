@@ -400,12 +400,10 @@ fn folders_that_do_not_belong_together_are_refused() {
     let refused = |change: &dyn Fn(&std::path::Path), word: &str| {
         let folder = support::copy_of(&made);
         change(folder.path());
-        let findings = match needlebench_viewer::Case::open(
-            folder.path(),
-            &needlebench_cell::Overrides::default(),
-        ) {
-            Ok(_) => panic!("it was taken: {word}"),
-            Err(findings) => findings,
+        let Err(findings) =
+            needlebench_viewer::Case::open(folder.path(), &needlebench_cell::Overrides::default())
+        else {
+            panic!("it was taken: {word}");
         };
         let said = findings[0].to_string();
         assert!(said.contains(word), "{said}");
@@ -454,7 +452,7 @@ fn folders_that_do_not_belong_together_are_refused() {
                 folder.join("surfaces/lung_left.stl"),
             )
             .map(|_| ())
-            .unwrap()
+            .unwrap();
         },
         "lung_left",
     );

@@ -1,5 +1,6 @@
 //! A patient of a few thousand voxels, a server for it, and a client that sends what no browser would.
 
+use std::fmt::Write as _;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
@@ -109,7 +110,7 @@ fn make(folder: &Path) {
     )
     .unwrap();
     let mut scenario = open.resolved.scenario.clone();
-    scenario.name = NAME.to_owned();
+    NAME.clone_into(&mut scenario.name);
     let room = Room {
         scenario: &scenario,
         resolved: &open.resolved,
@@ -264,12 +265,17 @@ impl Asked {
             self.method, self.path, self.host
         );
         if let Some(token) = &self.token {
-            text += &format!("authorization: Bearer {token}\r\n");
+            let _ = write!(text, "authorization: Bearer {token}\r\n");
         }
         for (name, value) in &self.headers {
-            text += &format!("{name}: {value}\r\n");
+            let _ = write!(text, "{name}: {value}\r\n");
         }
-        text += &format!("content-length: {}\r\n\r\n{}", self.body.len(), self.body);
+        let _ = write!(
+            text,
+            "content-length: {}\r\n\r\n{}",
+            self.body.len(),
+            self.body
+        );
         // A server that has said no may hang up before it was sent all of it.
         let _ = stream.write_all(text.as_bytes());
         let mut raw = Vec::new();
