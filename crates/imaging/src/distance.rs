@@ -218,8 +218,10 @@ impl DistanceField {
     /// The square of the distance to a point, or to a box, less the square of the place itself is concave, and so is the
     /// least over all of the set. Between the eight voxels around a place it is therefore at least what is
     /// interpolated: `d^2 >= sum w d_i^2 - sum w |c_i - p|^2`, and the last sum is `s^2 f (1 - f)` along each axis, with
-    /// `f` the place between two voxels. It is exact but for the last sum across the way, half a voxel's diagonal squared
-    /// at most. Rounding is taken off; outside the box, the way to it is.
+    /// `f` the place between two voxels. What is lost: that last sum across the way, half a voxel's diagonal squared
+    /// at most, where one thing is nearest to all eight voxels; up to `2 d` times its root, thus half a diagonal, where
+    /// they have different things nearest, as in the middle between two ribs. Rounding is taken off; outside the box, the
+    /// way to it.
     pub fn at_least(&self, point_m: &Point3<f64>) -> f64 {
         self.at_least_of_index(&self.grid.index_from_ct(point_m))
     }

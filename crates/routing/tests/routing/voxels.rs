@@ -168,11 +168,19 @@ fn labels_of(obstacle: Obstacle) -> &'static [u16] {
     }
 }
 
-/// By how much a bound of a distance may be too small: half a voxel's diagonal squared, half a step, the error of the mask,
-/// the brute force's own steps.
-fn slack_m(exact_m: f64) -> f64 {
-    let half = 0.5 * Vector3::from(SPACING_M).norm();
-    exact_m - (exact_m * exact_m - half * half).max(0.0).sqrt() + 0.125e-3 + 0.75e-3 + 0.1e-3
+/// By how much a bound of a distance may be too small, m: near one thing, and in the middle between two.
+///
+/// The field interpolates squares of distances at the eight voxels around and takes `s^2 = sum w_i r_i^2` off, with `r_i` the
+/// way to them; `s` is half a voxel's diagonal at most. To one box, `s^2` off the square is the most that is lost. As no
+/// distance changes by more than the way, `d_i >= d - r_i`, `d^2 - 2 d s` is left whatever there is: that much is lost where
+/// the voxels on either side have different things nearest, as between two ribs. Half a step, the error of the mask, and
+/// the brute force's own steps come with both.
+fn slacks_m(exact_m: f64) -> [f64; 2] {
+    let s = 0.5 * Vector3::from(SPACING_M).norm();
+    [s * s, 2.0 * exact_m * s].map(|lost_m2| {
+        let left_m = (exact_m * exact_m - lost_m2).max(0.0).sqrt();
+        exact_m - left_m + 0.125e-3 + 0.75e-3 + 0.1e-3
+    })
 }
 
 #[test]
@@ -182,7 +190,8 @@ fn no_free_route_comes_nearer_to_any_voxel_than_it_says_and_no_refusal_is_far_of
     assert_eq!(anatomy.target_lung(), Some("lung_left"));
     let found = search(&anatomy, &rules, 2000, 2, &|| false);
     let (mut free, mut refused) = (0, 0);
-    for candidate in found.candidates.iter().step_by(23) {
+    let (mut told, mut between) = (0, 0);
+    for candidate in found.candidates.iter().step_by(17) {
         let ray = Ray {
             target: anatomy.target(),
             outwards: candidate.outwards,
@@ -199,10 +208,11 @@ fn no_free_route_comes_nearer_to_any_voxel_than_it_says_and_no_refusal_is_far_of
                     assert!(told_m <= exact_m, "{obstacle:?}: {told_m} for {exact_m}");
                     // Distances are told up to 20 mm.
                     let near_m = exact_m.min(0.02 - rules.needle_radius_m);
-                    assert!(
-                        near_m - told_m <= slack_m(near_m + rules.needle_radius_m),
-                        "{obstacle:?}: {told_m} for {exact_m}"
-                    );
+                    let [one_m, between_m] = slacks_m(near_m + rules.needle_radius_m);
+                    let short_m = near_m - told_m;
+                    assert!(short_m <= between_m, "{obstacle:?}: {told_m} for {exact_m}");
+                    told += 1;
+                    between += usize::from(short_m > one_m);
                 }
             }
             Err(refusal) => {
@@ -213,12 +223,14 @@ fn no_free_route_comes_nearer_to_any_voxel_than_it_says_and_no_refusal_is_far_of
                     refused += 1;
                     let exact_m = brute_m(&labels, &ray, [0.0, depth_m], labels_of(obstacle));
                     assert!(refusal.value <= exact_m - rules.needle_radius_m);
-                    assert!(exact_m - rules.needle_radius_m < refusal.limit + slack_m(exact_m));
+                    assert!(exact_m - rules.needle_radius_m < refusal.limit + slacks_m(exact_m)[0]);
                 }
             }
         }
     }
     assert!(free > 5 && refused > 5, "{free} {refused}");
+    // Few lie so even between two things that the second counts.
+    assert!(10 * between <= told, "{between} of {told}");
 }
 
 #[test]
