@@ -37,6 +37,7 @@ pub mod servo;
 mod setup;
 mod simulate;
 mod starter;
+mod stop;
 pub mod study;
 pub mod suggest;
 
@@ -56,3 +57,4 @@ pub use scenario_run::{
 pub use setup::SetupError;
 pub use simulate::EngineRun;
 pub use starter::{Starter, StarterOptions, Template, starter, starter_study};
+pub use stop::Stop;

@@ -8,6 +8,7 @@ mod clock;
 mod command;
 pub mod exit;
 mod findings;
+mod interrupts;
 mod output;
 mod progress;
 

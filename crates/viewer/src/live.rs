@@ -371,7 +371,7 @@ fn least_axis(direction: &UnitVector3<f64>) -> Vector3<f64> {
 fn surface_p99_m(case: &Case, part: &str) -> Option<f64> {
     // Solids of one surface are numbered: `bone.3`.
     let name = part.split_once('.').map_or(part, |(name, _)| name);
-    let surfaces = &case.facts().surfaces;
+    let surfaces = &case.built().facts().surfaces;
     let surface = surfaces.iter().find(|surface| surface.name == name)?;
     Some(surface.distance_from_voxels.p99_m)
 }
@@ -383,6 +383,7 @@ fn is_lung(name: &str) -> bool {
 /// The lung itself, and what is labelled within it: its vessels, airways and lesions.
 fn belongs_to_lung(case: &Case, name: &str) -> bool {
     let is_lesion = case
+        .built()
         .facts()
         .lesions
         .iter()
@@ -441,7 +442,7 @@ fn crossings(case: &Case, from_m: &Point3<f64>, to_m: &Point3<f64>) -> Vec<Cross
 /// # Errors
 /// As [`needle`].
 pub fn reach(case: &Case, aim: &Aim) -> Result<ReachAnswer, Refusal> {
-    if let Some(unknown) = case.robot_is_unknown() {
+    if let Some(unknown) = case.built().not_registered() {
         return Ok(ReachAnswer {
             unknown: Some(unknown),
             preview: None,

@@ -67,7 +67,7 @@ pub struct MotionRejection {
 pub fn motion(case: &Case, aim: &Aim, configuration: &str) -> Result<MotionAnswer, Refusal> {
     /// Between two postures, s: as in report pages.
     const PERIOD_S: f64 = 0.04;
-    if let Some(unknown) = case.robot_is_unknown() {
+    if let Some(unknown) = case.built().not_registered() {
         return Err(Refusal::new(
             unknown,
             "planning on the slices works without",

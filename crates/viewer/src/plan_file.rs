@@ -7,8 +7,9 @@ use needlebench_cell::scenario::GoalSection;
 use needlebench_cell::{Finding, ResolvedScenario, ScenarioEdit, read_text, resolve_scenario};
 use needlebench_report::write_atomically;
 
-use crate::case::{Case, SCENARIO_FILE};
+use crate::case::Case;
 use crate::live::{Aim, Refusal, needle};
+use needlebench_bench::ct::SCENARIO_FILE;
 
 /// Its name, unless somebody gives it another.
 pub const PLAN_FILE: &str = "planned.toml";

@@ -261,7 +261,7 @@ async fn case(State(app): Shared) -> Response {
 /// What the page has to know of a case at its start.
 fn description(case: &Case) -> Value {
     let grid = case.grid();
-    let facts = case.facts();
+    let facts = case.built().facts();
     let index =
         |place: [f64; 3]| -> [f64; 3] { grid.index_from_ct(&Point3::from(place)).coords.into() };
     let lesions = facts.targets.iter().map(|target| {
@@ -326,7 +326,7 @@ fn description(case: &Case) -> Value {
             "expected_fre_rms_m": it.expected_fre_rms_m,
             "suspects": it.suspects,
         })),
-        "robot_is_unknown": case.robot_is_unknown(),
+        "robot_is_unknown": case.built().not_registered(),
         "goals": case.goals().iter().map(|goal| json!({
             "name": goal.name,
             "lesion": goal.lesion,

@@ -400,9 +400,11 @@ fn folders_that_do_not_belong_together_are_refused() {
     let refused = |change: &dyn Fn(&std::path::Path), word: &str| {
         let folder = support::copy_of(&made);
         change(folder.path());
-        let Err(findings) =
-            needlebench_viewer::Case::open(folder.path(), &needlebench_cell::Overrides::default())
-        else {
+        let Err(needlebench_bench::Stop::Refused(findings)) = needlebench_viewer::Case::open(
+            folder.path(),
+            &needlebench_cell::Overrides::default(),
+            &std::sync::atomic::AtomicBool::new(false),
+        ) else {
             panic!("it was taken: {word}");
         };
         let said = findings[0].to_string();

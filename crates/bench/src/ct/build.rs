@@ -1,7 +1,7 @@
 //! From a volume to surfaces, markers, registration and targets.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Matrix3, Point3};
 use needlebench_cell::scenario::PartTissue;
@@ -18,6 +18,7 @@ use needlebench_imaging::{
 };
 use serde::Serialize;
 
+use super::digest::voxels_sha256;
 use super::localisation::target_covariance_m2;
 use crate::Control;
 
@@ -99,6 +100,22 @@ pub struct SeenScan {
     pub markers: Option<Found>,
     /// What is worth knowing: of reading, of markers, of tissues.
     pub remarks: Vec<Remark>,
+    voxels_sha256: OnceLock<String>,
+    labels_sha256: OnceLock<String>,
+}
+
+impl SeenScan {
+    /// Digest of the Hounsfield units, made once.
+    pub(super) fn voxels_sha256(&self) -> &str {
+        let of = || voxels_sha256(&self.volume.hu, i16::to_le_bytes);
+        self.voxels_sha256.get_or_init(of)
+    }
+
+    /// Digest of the labels, made once.
+    pub(super) fn labels_sha256(&self) -> &str {
+        let of = || voxels_sha256(&self.made.labels.labels, u16::to_le_bytes);
+        self.labels_sha256.get_or_init(of)
+    }
 }
 
 /// What was made of a scan.
@@ -188,6 +205,8 @@ pub(super) fn see(
         made,
         markers,
         remarks,
+        voxels_sha256: OnceLock::new(),
+        labels_sha256: OnceLock::new(),
     })
 }
 

@@ -1,148 +1,324 @@
-//! The folder of a patient that was built, read again.
+//! The folder of a patient that was built, read again and checked.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
-use needlebench_imaging::read::{ReadOptions, read_label_names, read_labels};
-use needlebench_imaging::registration::ReferenceFrame;
-use needlebench_imaging::{ImagingError, LabelMap, VoxelGrid};
+use needlebench_cell::scenario::Scenario;
+use needlebench_cell::{Finding, read_text};
+use needlebench_imaging::read::{ReadOptions, read_label_names, read_labels, read_volume};
+use needlebench_imaging::registration::{ReferenceFrame, Registration};
+use needlebench_imaging::{ImagingError, LabelMap, Volume, VoxelGrid};
 use serde::Deserialize;
 
-/// What was built from a scan, as far as routes need it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BuiltFolder {
-    /// What each voxel is.
-    pub labels: LabelMap,
-    /// Origin of frame `phantom` in `ct`, m; the axes are the same.
-    pub origin_in_ct_m: Vector3<f64>,
-    /// Labels that are lesions, by name.
-    pub lesions: Vec<String>,
-    /// Markers on the skin: middle in `ct` and radius, m.
-    pub markers: Vec<(Point3<f64>, f64)>,
-    /// Why it is not known where the robot is to the patient; none if it is.
-    pub not_registered: Option<String>,
-}
+use super::digest::voxels_sha256;
+use super::files::{LABELS_FILE, NAMES_FILE, REPORT_FILE, VOLUME_FILE};
+use crate::Stop;
 
-#[derive(Deserialize)]
-struct Report {
+/// Farthest that a corner of the volume may be from where the report has it, m: a file has single precision.
+const SAME_PLACE_M: f64 = 1e-5;
+/// The version of `report.json` that is read.
+const VERSION: u32 = 1;
+/// What to do about a folder that was not built, or not for this.
+const BUILD: &str = "`needlebench ct build SCAN --out DIR` makes such a folder";
+const BUILD_ANEW: &str = "volume, labels, surfaces and scenario have to come from one `needlebench ct build`: build the folder \
+     anew";
+
+/// What of `report.json` is used again. Lengths in m, places in `ct`.
+#[derive(Debug, Clone, Deserialize)]
+pub struct BuildFacts {
     schema_version: u32,
     size: [usize; 3],
     spacing_m: [f64; 3],
     first_voxel_m: [f64; 3],
     phantom_origin_m: [f64; 3],
-    lesions: Vec<Named>,
-    markers: Option<Markers>,
-    registration: Option<Frame>,
+    #[serde(default)]
+    voxels_sha256: Option<String>,
+    #[serde(default)]
+    labels_sha256: Option<String>,
+    /// Closed surfaces.
+    pub surfaces: Vec<SurfaceFacts>,
+    /// Markers, if they were looked for.
+    pub markers: Option<MarkersFacts>,
+    /// Where the patient is, if markers say it.
+    pub registration: Option<Registration>,
+    /// Centres of lesions.
+    pub targets: Vec<TargetFacts>,
+    /// Lesions with their sizes.
+    pub lesions: Vec<LesionFacts>,
 }
 
-#[derive(Deserialize)]
-struct Named {
-    name: String,
+/// A closed surface.
+#[derive(Debug, Clone, Deserialize)]
+pub struct SurfaceFacts {
+    /// Its name, as in `[[phantom.parts]]`.
+    pub name: String,
+    file: String,
+    triangles: u64,
+    /// From the surface of the voxels to this one.
+    pub distance_from_voxels: SurfaceDistance,
 }
 
-#[derive(Deserialize)]
-struct Markers {
-    found: Vec<Marker>,
+/// How far a surface is from that of the voxels.
+#[derive(Debug, Clone, Deserialize)]
+pub struct SurfaceDistance {
+    /// Of 99 % of it, m.
+    pub p99_m: f64,
 }
 
-#[derive(Deserialize)]
-struct Marker {
-    center_m: [f64; 3],
-    diameter_m: f64,
+/// Markers of a scan.
+#[derive(Debug, Clone, Deserialize)]
+pub struct MarkersFacts {
+    /// Those that were found.
+    pub found: Vec<MarkerFacts>,
 }
 
-#[derive(Deserialize)]
-struct Frame {
-    frame: ReferenceFrame,
+/// A marker.
+#[derive(Debug, Clone, Deserialize)]
+pub struct MarkerFacts {
+    /// Its centre in `ct`.
+    pub center_m: [f64; 3],
+    /// Its diameter.
+    pub diameter_m: f64,
 }
 
-/// The version of `report.json` that is read.
-const VERSION: u32 = 1;
+/// A lesion as a target.
+#[derive(Debug, Clone, Deserialize)]
+pub struct TargetFacts {
+    /// Its name.
+    pub name: String,
+    /// Its centroid in `ct`.
+    pub center_m: [f64; 3],
+    /// Covariance of how well it is localised in the scan, rows.
+    pub covariance_m2: [[f64; 3]; 3],
+    /// The registration's error there.
+    pub registration: Option<TargetErrorFacts>,
+}
+
+/// A registration's error at a target.
+#[derive(Debug, Clone, Deserialize)]
+pub struct TargetErrorFacts {
+    /// Root mean square, m.
+    pub rms_m: f64,
+}
+
+/// A lesion.
+#[derive(Debug, Clone, Deserialize)]
+pub struct LesionFacts {
+    /// Its name.
+    pub name: String,
+    /// Whether it is in the lung.
+    pub in_lung: bool,
+    /// How large it is.
+    pub size: Option<SizeFacts>,
+}
+
+/// Size of a lesion.
+#[derive(Debug, Clone, Deserialize)]
+pub struct SizeFacts {
+    /// Diameter of the ball of its volume.
+    pub equivalent_diameter_m: f64,
+}
+
+/// A patient that was built from a scan: report and label map, which belong together.
+#[derive(Debug, Clone)]
+pub struct BuiltFolder {
+    folder: PathBuf,
+    facts: BuildFacts,
+    labels: LabelMap,
+}
 
 impl BuiltFolder {
     /// Reads the report and the label map of a folder of `ct build`.
     ///
     /// # Errors
-    /// A folder that `ct build` did not write, files that are missing or do not belong together, interrupted.
-    pub fn read(folder: &Path, cancel: &AtomicBool) -> Result<Self, ImagingError> {
-        let report = report(folder)?;
-        let grid = VoxelGrid::aligned(
-            report.size,
-            report.spacing_m,
-            Point3::from(report.first_voxel_m),
-        )
-        .map_err(|error| {
-            ImagingError::refused(error.to_string())
-                .at(folder.join("report.json").display().to_string())
-        })?;
-        let at =
-            |name: &str, error: ImagingError| error.at(folder.join(name).display().to_string());
-        let path = folder.join("labels.nii.gz");
-        if !path.exists() {
-            return Err(ImagingError::refused(
-                "there is no label map, by which routes are planned",
-            )
-            .hint("build the patient again without --no-labels")
-            .at(path.display().to_string()));
-        }
-        let options = ReadOptions::default();
-        let read = read_labels(&path, &grid, &options, cancel)
-            .map_err(|error| at("labels.nii.gz", error))?;
-        let names = folder.join("labels.json");
-        let names = read_label_names(&names).map_err(|error| at("labels.json", error))?;
-        let not_registered = match report.registration.map(|registration| registration.frame) {
-            Some(ReferenceFrame::Robot) => None,
-            Some(ReferenceFrame::Phantom) => Some(
-                "the markers are those of a drawing, which does not say where the robot is"
-                    .to_owned(),
-            ),
-            None => Some(
-                "the scan was built without markers, so it is not known where the robot is"
-                    .to_owned(),
-            ),
-        };
+    /// A folder that `ct build` did not write, files that are missing or do not belong together; interrupted.
+    pub fn read(folder: &Path, cancel: &AtomicBool) -> Result<Self, Stop> {
+        let path = folder.join(REPORT_FILE);
+        let facts = read_facts(&path).map_err(|error| Stop::of_scan(&path, error.hint(BUILD)))?;
+        let grid = VoxelGrid::aligned(facts.size, facts.spacing_m, facts.first_voxel_m.into())
+            .map_err(|error| {
+                Stop::of_scan(&path, ImagingError::refused(error.to_string()).at("size"))
+            })?;
+        check_surfaces(folder, &facts)?;
         Ok(Self {
-            labels: LabelMap {
-                names,
-                ..read.labels
-            },
-            origin_in_ct_m: Vector3::from(report.phantom_origin_m),
-            lesions: report
-                .lesions
-                .into_iter()
-                .map(|lesion| lesion.name)
-                .collect(),
-            markers: report.markers.map_or_else(Vec::new, |markers| {
-                let found = markers.found.into_iter();
-                found
-                    .map(|marker| (Point3::from(marker.center_m), 0.5 * marker.diameter_m))
-                    .collect()
-            }),
-            not_registered,
+            labels: labels(folder, &facts, &grid, cancel)?,
+            facts,
+            folder: folder.to_owned(),
         })
+    }
+
+    /// Where it is.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What the report says.
+    pub fn facts(&self) -> &BuildFacts {
+        &self.facts
+    }
+
+    /// What each voxel is. Its grid is the report's, to the last digit, not that of a file of single precision.
+    pub fn labels(&self) -> &LabelMap {
+        &self.labels
+    }
+
+    /// Origin of frame `phantom` in `ct`, m; the axes are the same.
+    pub fn origin_in_ct_m(&self) -> Vector3<f64> {
+        self.facts.phantom_origin_m.into()
+    }
+
+    /// Names of labels that are lesions.
+    pub fn lesions(&self) -> Vec<String> {
+        let lesions = self.facts.lesions.iter();
+        lesions.map(|lesion| lesion.name.clone()).collect()
+    }
+
+    /// Markers on the skin: middle in `ct` and radius, m.
+    pub fn markers(&self) -> Vec<(Point3<f64>, f64)> {
+        let markers = self.facts.markers.iter().flat_map(|it| &it.found);
+        markers
+            .map(|marker| (Point3::from(marker.center_m), 0.5 * marker.diameter_m))
+            .collect()
+    }
+
+    /// Why it is not known where the robot is to the patient; none if it is.
+    pub fn not_registered(&self) -> Option<&'static str> {
+        match self.facts.registration.as_ref().map(|it| it.frame) {
+            None => Some(
+                "no registration: nothing says where the robot is from this patient; build it with --markers, touched by \
+                 the robot",
+            ),
+            Some(ReferenceFrame::Phantom) => Some(
+                "the markers are those of a drawing, which says nothing of the robot; build it with markers that the robot \
+                 has touched",
+            ),
+            Some(ReferenceFrame::Robot) => None,
+        }
+    }
+
+    /// The volume, if it is that of the report.
+    ///
+    /// # Errors
+    /// If there is none, or another; interrupted.
+    pub fn volume(&self, cancel: &AtomicBool) -> Result<Volume, Stop> {
+        let path = self.folder.join(VOLUME_FILE);
+        if !path.is_file() {
+            let error = ImagingError::refused("there is no volume to show").hint(
+                "build the folder without --no-volume: `needlebench ct build SCAN --out DIR`",
+            );
+            return Err(Stop::of_scan(&path, error));
+        }
+        let read = read_volume(&path, &ReadOptions::default(), 1, cancel)
+            .map_err(|error| Stop::of_scan(&path, error))?;
+        let mut volume = read.volume;
+        let sha256 = self.facts.voxels_sha256.as_deref();
+        let other = if volume.grid.size() != self.facts.size {
+            Some("another number of voxels")
+        } else if volume.grid.farthest_corners_m(&self.labels.grid) > SAME_PLACE_M {
+            Some("voxels at other places")
+        } else if sha256 != Some(&voxels_sha256(&volume.hu, i16::to_le_bytes)) {
+            Some("other Hounsfield units")
+        } else {
+            None
+        };
+        if let Some(other) = other {
+            let message = format!("it is not the volume of {REPORT_FILE}: {other}");
+            let error = ImagingError::refused(message).hint(BUILD_ANEW);
+            return Err(Stop::of_scan(&path, error));
+        }
+        volume.grid = self.labels.grid.clone();
+        Ok(volume)
+    }
+
+    /// Whether a scenario is that of this patient.
+    ///
+    /// # Errors
+    /// What it lacks, or has elsewhere.
+    pub fn check_scenario(&self, file: &str, scenario: &Scenario) -> Result<(), Stop> {
+        let other = |message: String| {
+            let finding = Finding::new(file, message);
+            Stop::from(finding.key("phantom.parts").hint(BUILD_ANEW))
+        };
+        let parts = scenario.phantom.as_ref().map(|it| &it.parts[..]);
+        for surface in &self.facts.surfaces {
+            let mut parts = parts.unwrap_or_default().iter();
+            let Some(part) = parts.find(|it| it.name == surface.name && it.file == surface.file)
+            else {
+                return Err(other(format!(
+                    "it has no part `{}` of the file {}, which {REPORT_FILE} has",
+                    surface.name, surface.file
+                )));
+            };
+            let off_m = (Vector3::from(part.position_mm) * 1e-3 + self.origin_in_ct_m()).norm();
+            if off_m > SAME_PLACE_M {
+                return Err(other(format!(
+                    "part `{}` is {:.2} mm from where {REPORT_FILE} has it",
+                    part.name,
+                    off_m * 1e3
+                )));
+            }
+        }
+        Ok(())
     }
 }
 
-fn report(folder: &Path) -> Result<Report, ImagingError> {
-    let path = folder.join("report.json");
-    let refused = |message: String| {
-        ImagingError::refused(message)
-            .hint("give a folder that `needlebench ct build` has written")
-            .at(path.display().to_string())
-    };
-    let text = std::fs::read_to_string(&path)
-        .map_err(|error| refused(format!("cannot be read: {error}")))?;
-    let report: Report = serde_json::from_str(&text).map_err(|error| {
-        refused(format!(
-            "it is no report of a patient that was built: {error}"
-        ))
+fn read_facts(path: &Path) -> Result<BuildFacts, ImagingError> {
+    let text = read_text(path).map_err(|error| ImagingError::refused(error.to_string()))?;
+    let facts: BuildFacts = serde_json::from_str(&text).map_err(|error| {
+        ImagingError::refused(format!("it is not what `ct build` writes: {error}"))
     })?;
-    if report.schema_version != VERSION {
-        return Err(refused(format!(
-            "its schema_version is {}, and {VERSION} is known",
-            report.schema_version
-        )));
+    if facts.schema_version == VERSION {
+        return Ok(facts);
     }
-    Ok(report)
+    let version = facts.schema_version;
+    Err(
+        ImagingError::refused(format!("it is {version}, and {VERSION} is known"))
+            .at("schema_version"),
+    )
+}
+
+/// The label map, if it is that of the report.
+fn labels(
+    folder: &Path,
+    facts: &BuildFacts,
+    grid: &VoxelGrid,
+    cancel: &AtomicBool,
+) -> Result<LabelMap, Stop> {
+    let path = folder.join(LABELS_FILE);
+    if !path.is_file() {
+        let error = ImagingError::refused("there is no label map")
+            .hint("build the folder without --no-labels: `needlebench ct build SCAN --out DIR`");
+        return Err(Stop::of_scan(&path, error));
+    }
+    let read = read_labels(&path, grid, &ReadOptions::default(), cancel)
+        .map_err(|error| Stop::of_scan(&path, error))?;
+    let labels = read.labels.labels;
+    if facts.labels_sha256.as_deref() != Some(&voxels_sha256(&labels, u16::to_le_bytes)) {
+        let error = ImagingError::refused(format!("it is not the label map of {REPORT_FILE}"));
+        return Err(Stop::of_scan(&path, error.hint(BUILD_ANEW)));
+    }
+    let names = folder.join(NAMES_FILE);
+    Ok(LabelMap {
+        grid: grid.clone(),
+        labels,
+        names: read_label_names(&names).map_err(|error| Stop::of_scan(&names, error))?,
+    })
+}
+
+/// Surfaces have to be those of the report, by the number of their triangles.
+fn check_surfaces(folder: &Path, facts: &BuildFacts) -> Result<(), Stop> {
+    /// Bytes of a binary STL before its triangles, and of one.
+    const HEAD: u64 = 84;
+    const TRIANGLE: u64 = 50;
+    for surface in &facts.surfaces {
+        let path = folder.join(&surface.file);
+        let size = path.metadata().map(|metadata| metadata.len());
+        if size.ok() != Some(HEAD + TRIANGLE * surface.triangles) {
+            let message = format!("it is not the surface `{}` of {REPORT_FILE}", surface.name);
+            let error = ImagingError::refused(message).hint(BUILD_ANEW);
+            return Err(Stop::of_scan(&path, error));
+        }
+    }
+    Ok(())
 }

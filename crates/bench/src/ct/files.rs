@@ -1,6 +1,5 @@
 //! The folder of what was built from a scan.
 
-use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -14,7 +13,6 @@ use needlebench_imaging::{
     ImagingError, LabelFacts, LesionSize, Remark, SurfaceError, SurfaceTissue,
 };
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use super::patient::{PatientFrame, SURFACES};
 use super::{BuiltTarget, ScanBuild};
@@ -37,9 +35,10 @@ pub struct BuildReport<'b> {
     /// Origin of the scenario's phantom frame; its axes are those of `ct`.
     pub phantom_origin_m: [f64; 3],
     /// SHA-256 of the Hounsfield units, each as two bytes, little endian: whether `volume.nii.gz` is that of this report.
-    pub voxels_sha256: String,
-    /// The same of the labels.
-    pub labels_sha256: String,
+    /// None where that is not written.
+    pub voxels_sha256: Option<String>,
+    /// The same of the labels, for `labels.nii.gz`.
+    pub labels_sha256: Option<String>,
     /// Closed surfaces.
     pub surfaces: Vec<SurfaceReport<'b>>,
     /// Lesions that were asked for, in that order.
@@ -116,8 +115,8 @@ pub struct MarkersReport<'b> {
 }
 
 impl<'b> BuildReport<'b> {
-    /// Of what was built.
-    pub fn of(build: &'b ScanBuild) -> Self {
+    /// Of what was built, of which some files are written.
+    pub fn of(build: &'b ScanBuild, files: BuildFiles) -> Self {
         let grid = &build.seen.volume.grid;
         let made = &build.seen.made;
         Self {
@@ -128,8 +127,8 @@ impl<'b> BuildReport<'b> {
             first_voxel_m: grid.first_m().coords.into(),
             slice_thickness_m: build.seen.volume.slice_thickness_m,
             phantom_origin_m: PatientFrame::of(build).origin_in_ct_m.into(),
-            voxels_sha256: voxels_sha256(&build.seen.volume.hu, i16::to_le_bytes),
-            labels_sha256: voxels_sha256(&made.labels.labels, u16::to_le_bytes),
+            voxels_sha256: files.volume.then(|| build.seen.voxels_sha256().to_owned()),
+            labels_sha256: files.labels.then(|| build.seen.labels_sha256().to_owned()),
             surfaces: made
                 .surfaces
                 .iter()
@@ -178,24 +177,6 @@ impl<'b> BuildReport<'b> {
     }
 }
 
-/// Digest of voxels as their file has them.
-pub fn voxels_sha256<T: Copy>(values: &[T], bytes: impl Fn(T) -> [u8; 2]) -> String {
-    /// Values that are hashed at a time.
-    const BLOCK: usize = 1 << 15;
-    let mut hash = Sha256::new();
-    let mut buffer = Vec::with_capacity(2 * BLOCK);
-    for block in values.chunks(BLOCK) {
-        buffer.clear();
-        buffer.extend(block.iter().flat_map(|value| bytes(*value)));
-        hash.update(&buffer);
-    }
-    let mut text = String::with_capacity(64);
-    for byte in hash.finalize() {
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
-}
-
 fn surface_file(name: &str) -> String {
     format!("{SURFACES}/{name}.stl")
 }
@@ -221,10 +202,16 @@ pub struct BuildFiles {
     pub volume: bool,
 }
 
-/// Name of the volume in a folder that was built.
+/// Name of the scenario in a folder that was built.
+pub const SCENARIO_FILE: &str = "scenario.toml";
+/// Name of the volume there.
 pub const VOLUME_FILE: &str = "volume.nii.gz";
 /// Name of the label map there.
-pub const LABELS_FILE: &str = "labels.nii.gz";
+pub(super) const LABELS_FILE: &str = "labels.nii.gz";
+/// Names of its labels.
+pub(super) const NAMES_FILE: &str = "labels.json";
+/// What was built.
+pub(super) const REPORT_FILE: &str = "report.json";
 
 /// Writes surfaces and report, and what else is wanted; the names of the files.
 ///
@@ -259,15 +246,15 @@ pub fn write_build(
                 })
                 .collect(),
         };
-        write_json(&folder.join("labels.json"), &names)?;
-        files.extend([LABELS_FILE.to_owned(), "labels.json".to_owned()]);
+        write_json(&folder.join(NAMES_FILE), &names)?;
+        files.extend([LABELS_FILE.to_owned(), NAMES_FILE.to_owned()]);
     }
     if wanted.volume {
         write_nifti(&folder.join(VOLUME_FILE), &build.seen.volume, cancel)?;
         files.push(VOLUME_FILE.to_owned());
     }
-    write_json(&folder.join("report.json"), &BuildReport::of(build))?;
-    files.push("report.json".to_owned());
+    write_json(&folder.join(REPORT_FILE), &BuildReport::of(build, wanted))?;
+    files.push(REPORT_FILE.to_owned());
     Ok(files)
 }
 

@@ -16,44 +16,13 @@ use needlebench_imaging::{ImagingError, LesionSeed};
 use needlebench_kinematics::Pose;
 
 use super::build::{BuildOptions, KnownMarkers, ScanBuild, SeenScan, register, see};
-use super::files::{BuildFiles, write_build, write_json, write_scenario};
+use super::files::{BuildFiles, SCENARIO_FILE, write_build, write_json, write_scenario};
 use super::patient::{PatientFrame, Room, patient_scenario};
 use super::touched::Draws;
 use super::{CtSubject, Materials, ScanOrder, ScanRange, SyntheticScan};
 use crate::Control;
+use crate::Stop;
 use crate::progress::Silent;
-
-/// Why there is no scenario.
-#[derive(Debug, Clone, PartialEq)]
-pub enum BuildStop {
-    /// What is wrong, and what to do.
-    Refused(Vec<Finding>),
-    /// It was told to stop.
-    Interrupted,
-}
-
-impl From<Vec<Finding>> for BuildStop {
-    fn from(findings: Vec<Finding>) -> Self {
-        Self::Refused(findings)
-    }
-}
-
-/// Of a scan, with the file that it is about.
-fn stopped(file: &str, error: ImagingError) -> BuildStop {
-    match error {
-        ImagingError::Interrupted => BuildStop::Interrupted,
-        ImagingError::Refused {
-            place,
-            message,
-            hint,
-        } => {
-            let mut finding = Finding::new(file, message);
-            finding.key = place;
-            finding.hint = hint;
-            BuildStop::Refused(vec![finding])
-        }
-    }
-}
 
 /// A scenario whose phantom was scanned.
 #[derive(Debug)]
@@ -133,10 +102,10 @@ pub fn imaged(
     files: BuildFiles,
     last: Option<&mut LastScan>,
     control: &Control<'_>,
-) -> Result<Imaged, BuildStop> {
+) -> Result<Imaged, Stop> {
     let file = resolved.source.file.as_str();
     let refused = |message: &str, key: &str| {
-        BuildStop::Refused(vec![Finding::new(file, message.to_owned()).key(key)])
+        Stop::Refused(vec![Finding::new(file, message.to_owned()).key(key)])
     };
     let Some(section) = &resolved.scenario.ct else {
         return Err(refused("it has no scan to make", "ct"));
@@ -146,19 +115,24 @@ pub fn imaged(
     let Some(subject) = CtSubject::of_scenario(Path::new(file), resolved) else {
         return Err(refused("there is nobody to scan", "phantom"));
     };
-    let scan = SyntheticScan::new(&subject, &order).map_err(|error| stopped(file, error))?;
+    let scan = SyntheticScan::new(&subject, &order)
+        .map_err(|error| Stop::of_scan(Path::new(file), error))?;
     let options = wanted(resolved, section, subject.phantom, &scan, &mut draws)?;
     let key = last.as_ref().map(|_| key(resolved, section));
     let known = last.as_ref().and_then(|last| last.of(key.as_deref()));
     let seen = match known {
         Some(seen) => seen,
-        None => Arc::new(seen(&scan, &options, control).map_err(|error| stopped(file, error))?),
+        None => Arc::new(
+            seen(&scan, &options, control)
+                .map_err(|error| Stop::of_scan(Path::new(file), error))?,
+        ),
     };
     if let (Some(last), Some(key)) = (last, key) {
         last.0 = Some((key, Arc::clone(&seen)));
     }
-    let build = register(seen, &options).map_err(|error| stopped(file, error))?;
-    let goals = goals(resolved, &scan, &build).map_err(|error| stopped(file, error))?;
+    let build = register(seen, &options).map_err(|error| Stop::of_scan(Path::new(file), error))?;
+    let goals =
+        goals(resolved, &scan, &build).map_err(|error| Stop::of_scan(Path::new(file), error))?;
     let room = Room {
         scenario: &resolved.scenario,
         resolved,
@@ -169,7 +143,8 @@ pub fn imaged(
         resolved.scenario.name
     );
     let path = write_patient(folder, &room, &build, goals, files, &first, control)?;
-    write_json(&folder.join("truth.json"), &scan.truth).map_err(|error| stopped(file, error))?;
+    write_json(&folder.join("truth.json"), &scan.truth)
+        .map_err(|error| Stop::of_scan(Path::new(file), error))?;
     let scenario = load_scenario(&path, overrides)?;
     Ok(Imaged {
         build,
@@ -212,8 +187,8 @@ pub fn scanned(
         &control,
     ) {
         Ok(made) => Ok(made.scenario),
-        Err(BuildStop::Refused(findings)) => Err(findings),
-        Err(BuildStop::Interrupted) => Err(one("interrupted".to_owned())),
+        Err(Stop::Refused(findings)) => Err(findings),
+        Err(Stop::Interrupted) => Err(one("interrupted".to_owned())),
     }
 }
 
@@ -229,13 +204,13 @@ pub fn write_patient(
     files: BuildFiles,
     first: &str,
     control: &Control<'_>,
-) -> Result<PathBuf, BuildStop> {
-    let path = folder.join("scenario.toml");
-    let name = path.display().to_string();
+) -> Result<PathBuf, Stop> {
+    let path = folder.join(SCENARIO_FILE);
     control.progress.message("writing");
-    write_build(folder, build, files, control.cancel).map_err(|error| stopped(&name, error))?;
+    write_build(folder, build, files, control.cancel)
+        .map_err(|error| Stop::of_scan(&path, error))?;
     let scenario = patient_scenario(room, build, goals, folder);
-    write_scenario(&path, &scenario, first).map_err(|error| stopped(&name, error))?;
+    write_scenario(&path, &scenario, first).map_err(|error| Stop::of_scan(&path, error))?;
     Ok(path)
 }
 
@@ -288,9 +263,9 @@ fn wanted(
     phantom: &Phantom,
     scan: &SyntheticScan,
     draws: &mut Draws,
-) -> Result<BuildOptions, BuildStop> {
+) -> Result<BuildOptions, Stop> {
     let file = resolved.source.file.as_str();
-    let one = |finding: Finding| BuildStop::Refused(vec![finding]);
+    let one = |finding: Finding| Stop::Refused(vec![finding]);
     let parameters = phantom.parameters.as_ref();
     let sphere_mm = parameters
         .filter(|parameters| parameters.marker_kind == MarkerKind::CtSphere)

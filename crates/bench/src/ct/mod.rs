@@ -3,6 +3,7 @@
 mod anatomy;
 mod build;
 mod built_folder;
+mod digest;
 mod files;
 mod imaged;
 mod localisation;
@@ -18,9 +19,11 @@ pub use anatomy::{Materials, phantom_scene};
 pub use build::{
     BuildOptions, BuiltTarget, GivenLabels, KnownMarkers, Registered, ScanBuild, SeenScan, build,
 };
-pub use built_folder::BuiltFolder;
-pub use files::{BuildFiles, BuildReport, LABELS_FILE, VOLUME_FILE, voxels_sha256, write_build};
-pub use imaged::{BuildStop, Imaged, LastScan, imaged, scanned, write_patient};
+pub use built_folder::{
+    BuildFacts, BuiltFolder, LesionFacts, MarkerFacts, SurfaceFacts, TargetFacts,
+};
+pub use files::{BuildFiles, BuildReport, SCENARIO_FILE, VOLUME_FILE, write_build};
+pub use imaged::{Imaged, LastScan, imaged, scanned, write_patient};
 pub use patient::{PatientFrame, Room};
 pub use scan_order::{CtSubject, ScanOrder, ScanRange, SyntheticScan};
 pub use touched::marker_list;

@@ -127,10 +127,10 @@ impl RouteTask<'_> {
         let target = GoalPlacer::new(self.resolved).target(self.section)?;
         let rules = self.route_rules();
         let options = VoxelOptions {
-            lesions: &built.lesions,
+            lesions: &built.lesions(),
             off: &self.resolved.scenario.planning.needle_route.off,
             needle_m: rules.longest_m,
-            markers: &built.markers,
+            markers: &built.markers(),
             outside_m: rules.outside_m,
             lung_vessel_m: self.rules.lung_vessel_mm * 1e-3,
             below_rib_m: self.rules.below_rib_mm * 1e-3,
@@ -138,8 +138,8 @@ impl RouteTask<'_> {
             cancel: control.cancel,
         };
         Ok(VoxelAnatomy::new(
-            &built.labels,
-            built.origin_in_ct_m,
+            built.labels(),
+            built.origin_in_ct_m(),
             target,
             &options,
         )?)

@@ -10,8 +10,10 @@ mod places;
 
 use std::collections::BTreeMap;
 
-use needlebench_cell::reason_in_words;
+use needlebench_cell::{Finding, reason_in_words};
 use serde::Serialize;
+
+use crate::Stop;
 
 pub use entries::{
     ENTRY_TERMS, Entry, EntryRule, EntrySample, EntrySearch, EntryTerm, TissueMargin, plan_entry,
@@ -37,13 +39,21 @@ pub enum SuggestError {
     },
 }
 
-impl From<needlebench_cell::Finding> for SuggestError {
-    fn from(finding: needlebench_cell::Finding) -> Self {
+impl From<Finding> for SuggestError {
+    fn from(finding: Finding) -> Self {
         Self::refused(finding.message, finding.hint.unwrap_or_default())
     }
 }
 
 impl SuggestError {
+    /// With the scenario that it is in.
+    pub fn in_file(self, file: &str) -> Stop {
+        match self {
+            Self::Interrupted => Stop::Interrupted,
+            Self::Refused { message, hint } => Finding::new(file, message).hint(hint).into(),
+        }
+    }
+
     pub(crate) fn refused(message: impl Into<String>, hint: impl Into<String>) -> Self {
         Self::Refused {
             message: message.into(),

@@ -2,8 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
@@ -20,6 +18,7 @@ use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::watch_interrupts;
 use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
@@ -124,10 +123,7 @@ pub(crate) fn init(arguments: &InitArguments) -> Result<ExitStatus> {
             return Ok(ExitStatus::BadInput);
         }
     };
-    let cancel = Arc::new(AtomicBool::new(false));
-    let requested = Arc::clone(&cancel);
-    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
+    let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(false);
     let control = Control {
         threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),

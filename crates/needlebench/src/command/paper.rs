@@ -2,8 +2,6 @@
 
 use clap::Args;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 
@@ -14,6 +12,7 @@ use crate::output::{complain, shown};
 use crate::arguments::PicturesArguments;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::watch_interrupts;
 use crate::progress::TerminalProgress;
 use needlebench_paper::{PaperError, Watch, reproduce, text, write_paper};
 use needlebench_report::files::Folder;
@@ -35,10 +34,7 @@ pub(crate) struct PaperArguments {
 
 /// Reproduces the paper, writes the results and prints them.
 pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let requested = Arc::clone(&cancel);
-    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
+    let cancel = watch_interrupts()?;
     if let Err(finding) = prepare_folder(&arguments.out) {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);

@@ -8,8 +8,7 @@ use clap::Args;
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use needlebench_cell::{Finding, Overrides};
@@ -20,9 +19,11 @@ use serde::Serialize;
 use super::{load_runnable, overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::{threads, watch_interrupts};
 use crate::progress::TerminalProgress;
+use needlebench_bench::Stop;
 use needlebench_bench::accuracy::{accuracy_of_run, check_run};
-use needlebench_bench::ct::{BuildFiles, BuildStop, imaged};
+use needlebench_bench::ct::{BuildFiles, imaged};
 use needlebench_bench::{Control, RunOptions, Runnable, ScenarioRun};
 use needlebench_report::files::{Folder, RunFiles, write_run};
 use needlebench_report::{junit, markdown, report_screen, report_text, write_atomically};
@@ -126,14 +127,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
-    let cancel = Arc::new(AtomicBool::new(false));
-    let requested = Arc::clone(&cancel);
-    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
-    let jobs = arguments.jobs.map_or_else(
-        || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        usize::from,
-    );
+    let cancel = watch_interrupts()?;
+    let jobs = threads(arguments.jobs);
     let options = RunOptions {
         engines: arguments.engine.as_ref().map(EngineArgument::names),
         jobs,
@@ -242,20 +237,20 @@ fn scanned(
             None,
             &control,
         ),
-        Err(finding) => Err(BuildStop::Refused(vec![finding])),
+        Err(finding) => Err(Stop::Refused(vec![finding])),
     };
     progress.finish();
     let checked = made.and_then(|made| {
         let runnable = Runnable::checked(made.scenario);
-        runnable.map_err(|finding| BuildStop::Refused(vec![finding]))
+        runnable.map_err(|finding| Stop::Refused(vec![finding]))
     });
     match checked {
         Ok(runnable) => Ok(Some(runnable)),
-        Err(BuildStop::Interrupted) => {
+        Err(Stop::Interrupted) => {
             complain("interrupted while the scan was made: there are no results");
             Err(ExitStatus::Interrupted)
         }
-        Err(BuildStop::Refused(findings)) => {
+        Err(Stop::Refused(findings)) => {
             print_findings(&findings);
             Err(ExitStatus::BadInput)
         }

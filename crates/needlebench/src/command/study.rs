@@ -3,8 +3,7 @@
 mod arguments;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
@@ -21,6 +20,7 @@ use crate::arguments::{RobotArguments, leave};
 use crate::clock::elapsed;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::watch_interrupts;
 use crate::output::{complain, print_wide, shown};
 use crate::progress::TerminalProgress;
 use arguments::StudyResultArguments;
@@ -183,14 +183,6 @@ fn threads(jobs: Option<u16>) -> usize {
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         usize::from,
     )
-}
-
-fn watch_interrupts() -> Result<Arc<AtomicBool>> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let requested = Arc::clone(&cancel);
-    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
-    Ok(cancel)
 }
 
 /// A finding if the study will take long, or an error if its cases cannot be computed.

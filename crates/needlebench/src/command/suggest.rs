@@ -1,11 +1,10 @@
 //! `needlebench suggest`.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
+use needlebench_bench::Stop;
 use needlebench_bench::suggest::{
     EntrySearch, PlaceSearch, SuggestError, at_place, plan_entry, plan_place, suggest_entries,
     suggest_places,
@@ -27,6 +26,7 @@ use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::{threads, watch_interrupts};
 use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
@@ -104,36 +104,12 @@ impl Found {
     }
 }
 
-/// Why there is no answer.
-enum Stop {
-    Refused(Vec<Finding>),
-    Interrupted,
-}
-
-impl From<Vec<Finding>> for Stop {
-    fn from(findings: Vec<Finding>) -> Self {
-        Self::Refused(findings)
-    }
-}
-
-impl From<Finding> for Stop {
-    fn from(finding: Finding) -> Self {
-        Self::Refused(vec![finding])
-    }
-}
-
 /// Proposes entries and places for a scenario.
 pub(crate) fn suggest(arguments: &SuggestArguments) -> Result<ExitStatus> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let requested = Arc::clone(&cancel);
-    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
+    let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(false);
     let control = Control {
-        threads: arguments.jobs.map_or_else(
-            || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-            usize::from,
-        ),
+        threads: threads(arguments.jobs),
         cancel: &cancel,
         progress: &progress,
     };
@@ -224,10 +200,7 @@ fn find(
         goals,
     } = load_open_scenario(&arguments.scenario, overrides)?;
     let file = resolved.source.file.clone();
-    let stop = |error: SuggestError| match error {
-        SuggestError::Interrupted => Stop::Interrupted,
-        SuggestError::Refused { message, hint } => Finding::new(&file, message).hint(hint).into(),
-    };
+    let stop = |error: SuggestError| error.in_file(&file);
     let mut sections = sections(arguments, &file, goals.clone())?;
     // What is written has to serve the other goals of the scenario too.
     let rest: Vec<GoalSection> = goals

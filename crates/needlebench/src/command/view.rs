@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, Result};
 use clap::Args;
 use needlebench_bench::Control;
-use needlebench_bench::ct::{BuildFiles, BuildStop, VOLUME_FILE, imaged};
+use needlebench_bench::Stop;
+use needlebench_bench::ct::{BuildFiles, VOLUME_FILE, imaged};
 use needlebench_cell::{Finding, Overrides, load_scenario};
 use needlebench_viewer::{Case, Server, Stopper};
 
@@ -66,16 +67,16 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus> {
     })
     .context("cannot watch for interrupts")?;
     let opened = folder(&arguments.path, &overrides, &cancel).and_then(|folder| {
-        let case = Case::open(&folder, &overrides)?;
+        let case = Case::open(&folder, &overrides, &cancel)?;
         Ok((folder, case))
     });
     let (folder, case) = match opened {
         Ok(opened) => opened,
-        Err(BuildStop::Interrupted) => {
+        Err(Stop::Interrupted) => {
             complain("interrupted while the scan was made");
             return Ok(ExitStatus::Interrupted);
         }
-        Err(BuildStop::Refused(findings)) => {
+        Err(Stop::Refused(findings)) => {
             print_findings(&findings);
             return Ok(ExitStatus::BadInput);
         }
@@ -108,7 +109,7 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus> {
 }
 
 /// The folder of a patient, built if need be.
-fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<PathBuf, BuildStop> {
+fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<PathBuf, Stop> {
     if path.is_dir() {
         return Ok(path.to_owned());
     }
@@ -124,10 +125,10 @@ fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<Pat
              `needlebench ct build out/ct/ct.nii.gz --room {name} --markers out/ct/marker_list.toml --lesion NAME=X,Y,Z \
              --out out/patient`, then `needlebench view out/patient`"
         ));
-        return Err(BuildStop::Refused(vec![finding]));
+        return Err(Stop::Refused(vec![finding]));
     }
     let folder = Path::new("out").join(&resolved.scenario.name).join("view");
-    prepare_folder(&folder).map_err(|finding| BuildStop::Refused(vec![finding]))?;
+    prepare_folder(&folder).map_err(|finding| Stop::Refused(vec![finding]))?;
     let progress = TerminalProgress::new(false);
     let control = Control {
         threads: std::thread::available_parallelism().map_or(1, usize::from),

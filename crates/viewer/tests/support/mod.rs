@@ -172,7 +172,11 @@ impl Running {
     }
 
     pub fn open(folder: TempDir) -> Self {
-        let case = match Case::open(folder.path(), &Overrides::default()) {
+        let case = match Case::open(
+            folder.path(),
+            &Overrides::default(),
+            &AtomicBool::new(false),
+        ) {
             Ok(case) => case,
             Err(findings) => panic!("{findings:?}"),
         };

@@ -3,16 +3,15 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point3, Vector3};
 use needlebench_bench::Control;
+use needlebench_bench::Stop;
 use needlebench_bench::ct::{
-    BuildFiles, BuildOptions, BuildReport, BuildStop, GivenLabels, KnownMarkers, PatientFrame,
-    Room, ScanBuild, build, write_patient,
+    BuildFiles, BuildOptions, BuildReport, GivenLabels, KnownMarkers, PatientFrame, Room,
+    ScanBuild, build, write_patient,
 };
 use needlebench_cell::scenario::{GoalSection, Posture, Target};
 use needlebench_cell::{
@@ -22,18 +21,19 @@ use needlebench_cell::{
 use needlebench_imaging::markers::MarkerModel;
 use needlebench_imaging::read::{ReadVolume, read_label_names};
 use needlebench_imaging::registration::{ReferenceFrame, ReferenceMarker, Registration};
-use needlebench_imaging::{ImagingError, LesionSeed, SurfaceSizes};
+use needlebench_imaging::{LesionSeed, SurfaceSizes};
 use needlebench_report::layout;
 use needlebench_report::picture::{SlicePicture, slice_pictures};
 use needlebench_report::write_atomically;
 use serde::Serialize;
 
-use super::info::{ReadArguments, finding_of};
+use super::info::ReadArguments;
 use crate::arguments::{PicturesArguments, RobotArguments};
 use crate::command::run::prepare_folder;
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::watch_interrupts;
 use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
@@ -154,37 +154,13 @@ fn named_place(text: &str) -> Result<NamedPlace, String> {
     })
 }
 
-/// Why nothing was built.
-enum Stop {
-    Refused(Vec<Finding>),
-    Interrupted,
-}
-
-impl From<BuildStop> for Stop {
-    fn from(stop: BuildStop) -> Self {
-        match stop {
-            BuildStop::Refused(findings) => Self::Refused(findings),
-            BuildStop::Interrupted => Self::Interrupted,
+impl BuildArguments {
+    /// What is written besides surfaces, report and scenario.
+    fn files(&self) -> BuildFiles {
+        BuildFiles {
+            labels: !self.no_labels,
+            volume: !self.no_volume,
         }
-    }
-}
-
-impl From<Vec<Finding>> for Stop {
-    fn from(findings: Vec<Finding>) -> Self {
-        Self::Refused(findings)
-    }
-}
-
-impl From<Finding> for Stop {
-    fn from(finding: Finding) -> Self {
-        Self::Refused(vec![finding])
-    }
-}
-
-fn stop_of(path: &Path, problem: ImagingError) -> Stop {
-    match problem {
-        ImagingError::Interrupted => Stop::Interrupted,
-        problem @ ImagingError::Refused { .. } => finding_of(path, problem).into(),
     }
 }
 
@@ -200,10 +176,7 @@ struct BuildAnswer<'a> {
 
 /// Builds a patient from a CT.
 pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let requested = Arc::clone(&cancel);
-    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
+    let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.json);
     let control = Control {
         threads: arguments.reading.threads(),
@@ -221,10 +194,10 @@ pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus> {
                     findings: Vec::new(),
                     folder: arguments.out.display().to_string(),
                     scenario: Some(file.display().to_string()),
-                    report: Some(BuildReport::of(&built)),
+                    report: Some(BuildReport::of(&built, arguments.files())),
                 })?;
             } else {
-                let text = in_words(&built, &arguments.out, &file)?;
+                let text = in_words(&built, arguments, &file)?;
                 print_text(&layout::wrapped(&text))?;
             }
             Ok(ExitStatus::Success)
@@ -263,7 +236,7 @@ fn make(arguments: &BuildArguments, control: &Control<'_>) -> Result<(ScanBuild,
         .as_deref()
         .map(read_label_names)
         .transpose();
-    let names = names.map_err(|error| stop_of(&arguments.path, error))?;
+    let names = names.map_err(|error| Stop::of_scan(&arguments.path, error))?;
     let room = room(arguments, &overrides)?;
     prepare_folder(&arguments.out)?;
     control.progress.message("reading");
@@ -271,7 +244,7 @@ fn make(arguments: &BuildArguments, control: &Control<'_>) -> Result<(ScanBuild,
     let mut read = arguments
         .reading
         .read(path, control.cancel)
-        .map_err(|error| stop_of(path, error))?;
+        .map_err(|error| Stop::of_scan(path, error))?;
     if let Some(thickness_mm) = arguments.thickness_mm {
         read.volume.slice_thickness_m = Some(1e-3 * thickness_mm);
     }
@@ -293,7 +266,7 @@ fn make(arguments: &BuildArguments, control: &Control<'_>) -> Result<(ScanBuild,
         },
         max_bytes: arguments.reading.max_bytes(),
     };
-    let built = build(read, &options, control).map_err(|error| stop_of(path, error))?;
+    let built = build(read, &options, control).map_err(|error| Stop::of_scan(path, error))?;
     if arguments.pictures.are_wanted(arguments.json) {
         control.progress.message("pictures");
         draw(&built, &arguments.out)?;
@@ -310,10 +283,7 @@ fn make(arguments: &BuildArguments, control: &Control<'_>) -> Result<(ScanBuild,
         &room,
         &built,
         goals,
-        BuildFiles {
-            labels: !arguments.no_labels,
-            volume: !arguments.no_volume,
-        },
+        arguments.files(),
         first,
         control,
     )?;
@@ -483,9 +453,14 @@ fn draw(built: &ScanBuild, out: &Path) -> Result<(), Stop> {
     Ok(())
 }
 
-fn in_words(built: &ScanBuild, out: &Path, file: &Path) -> Result<String, std::fmt::Error> {
+fn in_words(
+    built: &ScanBuild,
+    arguments: &BuildArguments,
+    file: &Path,
+) -> Result<String, std::fmt::Error> {
     let mut text = String::new();
-    let report = BuildReport::of(built);
+    let report = BuildReport::of(built, arguments.files());
+    let out = &arguments.out;
     let [columns, rows, slices] = report.size;
     let [x, y, z] = report.spacing_m.map(|metres| metres * 1e3);
     write!(

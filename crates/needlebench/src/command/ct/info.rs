@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
+use needlebench_bench::Stop;
 use needlebench_cell::Finding;
 use needlebench_imaging::read::{Description, ReadOptions, ReadVolume, read_volume};
 use needlebench_imaging::{HuHistogram, ImagingError, Orientation, Remark};
@@ -16,6 +16,7 @@ use serde::Serialize;
 use crate::command::{print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::{threads, watch_interrupts};
 use crate::output::{complain, shown};
 
 /// Shares of the voxels whose Hounsfield units are printed.
@@ -67,10 +68,7 @@ impl ReadArguments {
 
     /// Threads.
     pub(crate) fn threads(&self) -> usize {
-        self.jobs.map_or_else(
-            || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-            usize::from,
-        )
+        threads(self.jobs)
     }
 }
 
@@ -132,28 +130,25 @@ struct Quantile {
 
 /// Reads a CT, and says what it is.
 pub(crate) fn info(arguments: &InfoArguments) -> Result<ExitStatus> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let requested = Arc::clone(&cancel);
-    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
-    let read = match arguments.reading.read(&arguments.path, &cancel) {
+    let cancel = watch_interrupts()?;
+    let read = arguments.reading.read(&arguments.path, &cancel);
+    let read = match read.map_err(|error| Stop::of_scan(&arguments.path, error)) {
         Ok(read) => read,
-        Err(ImagingError::Interrupted) => {
+        Err(Stop::Interrupted) => {
             complain("interrupted");
             return Ok(ExitStatus::Interrupted);
         }
-        Err(problem) => {
-            let finding = finding_of(&arguments.path, problem);
+        Err(Stop::Refused(findings)) => {
             if arguments.json {
                 print_json(&InfoAnswer {
                     schema_version: 1,
                     ok: false,
-                    findings: vec![finding],
+                    findings,
                     remarks: Vec::new(),
                     volume: None,
                 })?;
             } else {
-                print_findings(&[finding]);
+                print_findings(&findings);
             }
             return Ok(ExitStatus::BadInput);
         }
@@ -172,16 +167,6 @@ pub(crate) fn info(arguments: &InfoArguments) -> Result<ExitStatus> {
         print_text(&layout::wrapped(&text))?;
     }
     Ok(ExitStatus::Success)
-}
-
-/// Why a CT cannot be used.
-pub(crate) fn finding_of(path: &Path, problem: ImagingError) -> Finding {
-    let mut finding = Finding::new(path.display().to_string(), problem.to_string());
-    if let ImagingError::Refused { place, hint, .. } = problem {
-        finding.key = place;
-        finding.hint = hint;
-    }
-    finding
 }
 
 fn answer(read: &ReadVolume) -> VolumeAnswer {

@@ -1,14 +1,14 @@
 //! `needlebench ct routes`.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use clap::Args;
 use nalgebra::Vector3;
 use needlebench_bench::Control;
-use needlebench_bench::ct::BuiltFolder;
+use needlebench_bench::Stop;
+use needlebench_bench::ct::{BuiltFolder, SCENARIO_FILE};
 use needlebench_bench::routes::{
     RoutePlan, RouteTask, SOLID_DIRECTIONS, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free,
     plan_routes,
@@ -19,7 +19,7 @@ use needlebench_cell::{
     Finding, OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, load_open_scenario,
     read_text, resolve_scenario,
 };
-use needlebench_imaging::{ImagingError, Remark};
+use needlebench_imaging::Remark;
 use needlebench_report::files::{Folder, write_route_maps};
 use needlebench_report::table::routes::routes_text;
 use needlebench_report::{layout, write_atomically};
@@ -32,6 +32,7 @@ use crate::command::suggest::{ChosenEntry, set_entries, unplaced};
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::{threads, watch_interrupts};
 use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
@@ -109,24 +110,6 @@ struct RoutesAnswer<'a> {
     written: Option<String>,
 }
 
-/// Why there is no answer.
-enum Stop {
-    Refused(Vec<Finding>),
-    Interrupted,
-}
-
-impl From<Vec<Finding>> for Stop {
-    fn from(findings: Vec<Finding>) -> Self {
-        Self::Refused(findings)
-    }
-}
-
-impl From<Finding> for Stop {
-    fn from(finding: Finding) -> Self {
-        Self::Refused(vec![finding])
-    }
-}
-
 struct Found {
     name: String,
     plans: Vec<RoutePlan>,
@@ -135,6 +118,18 @@ struct Found {
 }
 
 impl Found {
+    fn answer(&self) -> RoutesAnswer<'_> {
+        RoutesAnswer {
+            schema_version: 1,
+            ok: self.is_complete(),
+            findings: &[],
+            scenario: Some(&self.name),
+            targets: &self.plans,
+            remarks: &self.remarks,
+            written: self.written.as_deref().map(shown),
+        }
+    }
+
     fn is_complete(&self) -> bool {
         self.plans.iter().all(|plan| plan.chosen.is_some())
     }
@@ -142,16 +137,10 @@ impl Found {
 
 /// Plans routes.
 pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let requested = Arc::clone(&cancel);
-    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
+    let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.json);
     let control = Control {
-        threads: arguments.jobs.map_or_else(
-            || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-            usize::from,
-        ),
+        threads: threads(arguments.jobs),
         cancel: &cancel,
         progress: &progress,
     };
@@ -193,15 +182,7 @@ pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus> {
         for plan in &mut found.plans {
             plan.map = None;
         }
-        print_json(&RoutesAnswer {
-            schema_version: 1,
-            ok: found.is_complete(),
-            findings: &[],
-            scenario: Some(&found.name),
-            targets: &found.plans,
-            remarks: &found.remarks,
-            written: found.written.as_deref().map(shown),
-        })?;
+        print_json(&found.answer())?;
     } else {
         print_text(&in_words(arguments, &found, files.as_deref()))?;
     }
@@ -224,15 +205,7 @@ fn written_files(
     if let Err(finding) = prepare_folder(&folder) {
         return Ok(Err(finding));
     }
-    let text = serde_json::to_string(&RoutesAnswer {
-        schema_version: 1,
-        ok: found.is_complete(),
-        findings: &[],
-        scenario: Some(&found.name),
-        targets: &found.plans,
-        remarks: &found.remarks,
-        written: found.written.as_deref().map(shown),
-    })?;
+    let text = serde_json::to_string(&found.answer())?;
     let path = folder.join("routes.json");
     write_atomically(&path, format!("{text}\n").as_bytes())
         .with_context(|| format!("cannot write {}", path.display()))?;
@@ -291,12 +264,15 @@ impl Patient {
     ) -> Result<Self, Stop> {
         let path = &arguments.path;
         let (scenario, built) = if path.is_dir() {
-            let built = BuiltFolder::read(path, cancel).map_err(|error| stop_of(path, error))?;
-            (path.join("scenario.toml"), Some(built))
+            let built = BuiltFolder::read(path, cancel)?;
+            (path.join(SCENARIO_FILE), Some(built))
         } else {
             (path.clone(), None)
         };
         let OpenScenario { resolved, goals } = load_open_scenario(&scenario, overrides)?;
+        if let Some(built) = &built {
+            built.check_scenario(&resolved.source.file, &resolved.scenario)?;
+        }
         Ok(Self {
             scenario,
             resolved,
@@ -314,7 +290,7 @@ impl Patient {
                 let origin_m = self
                     .built
                     .as_ref()
-                    .map_or_else(Vector3::zeros, |built| built.origin_in_ct_m);
+                    .map_or_else(Vector3::zeros, BuiltFolder::origin_in_ct_m);
                 Target::Point(std::array::from_fn(|k| point[k] - origin_m[k] * 1e3))
             }
             (None, None) => {
@@ -349,23 +325,12 @@ impl Patient {
         if arguments.no_robot {
             return WithRobot::No("by --no-robot".to_owned());
         }
-        match self
-            .built
-            .as_ref()
-            .and_then(|built| built.not_registered.as_ref())
-        {
+        match self.built.as_ref().and_then(BuiltFolder::not_registered) {
             Some(why) if !arguments.assume_room => WithRobot::No(format!(
                 "{why}; --assume-room asks the robot where the room has it"
             )),
             _ => WithRobot::Yes,
         }
-    }
-}
-
-fn stop_of(path: &Path, problem: ImagingError) -> Stop {
-    match problem {
-        ImagingError::Interrupted => Stop::Interrupted,
-        problem @ ImagingError::Refused { .. } => super::info::finding_of(path, problem).into(),
     }
 }
 
@@ -378,10 +343,7 @@ fn find(
     control.progress.message("reading");
     let patient = Patient::read(arguments, overrides, control.cancel)?;
     let file = patient.resolved.source.file.clone();
-    let stop = |error: SuggestError| match error {
-        SuggestError::Interrupted => Stop::Interrupted,
-        SuggestError::Refused { message, hint } => Finding::new(&file, message).hint(hint).into(),
-    };
+    let stop = |error: SuggestError| error.in_file(&file);
     let folder = patient.scenario.parent().unwrap_or(Path::new(""));
     let (mut plans, mut remarks) = (Vec::new(), Vec::new());
     for section in patient.sections(arguments)? {
@@ -402,12 +364,12 @@ fn find(
         let mut plan = if let Some(built) = &patient.built {
             control.progress.message("distances");
             let anatomy = task.voxels(built, control).map_err(|error| match error {
-                VoxelsError::Scan(error) => stop_of(&patient.scenario, error),
+                VoxelsError::Scan(error) => Stop::of_scan(&patient.scenario, error),
                 VoxelsError::Target(finding) => finding.into(),
             })?;
             remarks.extend_from_slice(anatomy.remarks());
             let mut plan = plan_routes(&task, &anatomy, control).map_err(stop)?;
-            plan.phantom_origin_in_ct_m = Some(built.origin_in_ct_m.into());
+            plan.phantom_origin_in_ct_m = Some(built.origin_in_ct_m().into());
             plan
         } else {
             let anatomy = task.solids().map_err(stop)?;

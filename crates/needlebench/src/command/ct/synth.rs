@@ -1,8 +1,7 @@
 //! `needlebench ct synth`.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
@@ -27,6 +26,7 @@ use crate::command::run::prepare_folder;
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::watch_interrupts;
 use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
@@ -285,10 +285,7 @@ pub(crate) fn synth(arguments: &SynthArguments) -> Result<ExitStatus> {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
-    let cancel = Arc::new(AtomicBool::new(false));
-    let requested = Arc::clone(&cancel);
-    ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))
-        .context("cannot watch for interrupts")?;
+    let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.json);
     let made = make(arguments, &scan, &cancel, &progress);
     progress.finish();
