@@ -78,6 +78,7 @@ const LAYERS: [(&str, &[&str]); 19] = [
             "report",
             "bench",
             "imaging",
+            "routing",
             "uncertainty",
             "planning",
             "cell",

@@ -11,8 +11,11 @@ use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_planning::{ConfigurationPlan, Planner};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
 
-use crate::preview::{GoalPreview, goal_preview};
+use crate::preview::{GoalPreview, goal_preview, preview_of};
 use crate::servo_of;
+
+/// Directions about the needle of a quick answer, as of planned routes.
+const QUICK_ROLLS: u32 = 12;
 
 /// A scenario's cell, ready for goals that are not its own.
 pub struct Desk {
@@ -52,6 +55,19 @@ impl Desk {
     /// [`NotUrGeometry`]: never of a robot that [`Desk::new`] took.
     pub fn preview(&self, goal: &Goal) -> Result<GoalPreview, NotUrGeometry> {
         Ok(goal_preview(&self.planner()?, &self.resolved, goal))
+    }
+
+    /// The same of a few directions about the needle, without what would free the others: what works here works, what does
+    /// not may at another direction.
+    ///
+    /// # Errors
+    /// As [`Desk::preview`].
+    pub fn quick_preview(&self, goal: &Goal) -> Result<GoalPreview, NotUrGeometry> {
+        let planner = self.planner()?;
+        let rolls = planner.rolls(goal, QUICK_ROLLS);
+        let members = Configuration::ALL
+            .map(|configuration| planner.best_of_rolls(goal, configuration, &rolls));
+        Ok(preview_of(&self.resolved, goal, members))
     }
 
     /// The whole motion of one configuration, with what is proven of its clearances.

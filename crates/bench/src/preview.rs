@@ -161,8 +161,17 @@ pub(crate) fn goal_preview(
     resolved: &ResolvedScenario,
     goal: &Goal,
 ) -> GoalPreview {
+    preview_of(resolved, goal, planner.postures(goal))
+}
+
+/// The same of the best posture of each configuration.
+pub(crate) fn preview_of(
+    resolved: &ResolvedScenario,
+    goal: &Goal,
+    members: [Member; 8],
+) -> GoalPreview {
     // What a refused route says of all alike is said once.
-    let members = planner.postures(goal).map(|mut member| {
+    let members = members.map(|mut member| {
         member
             .rejections
             .retain(|each| each.rule != Rule::NeedleRoute);

@@ -92,6 +92,9 @@ pub trait Anatomy: Sync {
     /// Whether body or a marker is in the way outside the skin, between two distances from the target, m: an arm, a fold.
     fn is_body_between(&self, ray: &Ray, from_to_m: [f64; 2]) -> bool;
 
+    /// Whether the patient has anything of an obstacle, near or far: distances from what nobody has seen are no distances.
+    fn knows(&self, obstacle: Obstacle) -> bool;
+
     /// Lower bound of the distance of a stretch of a ray from an obstacle, m; infinite if there is none of it. Distances
     /// beyond what can matter are told as some that is less.
     fn distance_m(&self, ray: &Ray, from_to_m: [f64; 2], obstacle: Obstacle) -> f64;

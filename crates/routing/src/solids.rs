@@ -194,6 +194,10 @@ impl Anatomy for SolidAnatomy<'_> {
         }
     }
 
+    fn knows(&self, obstacle: Obstacle) -> bool {
+        self.counts.contains(&Some(obstacle))
+    }
+
     fn is_body_between(&self, ray: &Ray, [from_m, to_m]: [f64; 2]) -> bool {
         if is_marker_near(&self.markers, ray, [from_m, to_m]) {
             return true;

@@ -11,6 +11,8 @@ use needlebench_cell::scenario::GoalSection;
 use needlebench_cell::{Finding, OpenScenario, Overrides, load_open_scenario};
 use needlebench_imaging::{LabelMap, VoxelGrid};
 
+use crate::around::LastTarget;
+
 /// A voxel, and what is there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
@@ -30,6 +32,7 @@ pub struct Case {
     goals: Vec<GoalSection>,
     desk: Desk,
     run_desk: OnceLock<Desk>,
+    last_target: LastTarget,
 }
 
 impl Case {
@@ -51,6 +54,7 @@ impl Case {
             goals,
             desk: Desk::new(resolved).map_err(|error| Finding::new(file, error.to_string()))?,
             run_desk: OnceLock::new(),
+            last_target: LastTarget::default(),
         })
     }
 
@@ -92,6 +96,11 @@ impl Case {
     /// The room, for goals to be tried in.
     pub fn desk(&self) -> &Desk {
         &self.desk
+    }
+
+    /// The voxels around the target that was asked about last.
+    pub(crate) fn last_target(&self) -> &LastTarget {
+        &self.last_target
     }
 
     /// The room as a run of a plan has it, made once.

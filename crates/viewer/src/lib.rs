@@ -8,7 +8,9 @@
 //! Voxels are told by index, places in millimetres of `ct` (patient LPS); the server alone turns one into the other.
 
 mod answer;
+mod around;
 mod case;
+pub mod entries;
 mod guard;
 pub mod live;
 pub mod motion;

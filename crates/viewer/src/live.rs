@@ -8,12 +8,13 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_bench::preview::GoalPreview;
 use needlebench_cell::phantom::Phantom;
-use needlebench_cell::scenario::GoalSection;
+use needlebench_cell::scenario::{GoalSection, Target};
 use needlebench_cell::{Finding, Goal, part_in_words, reason_in_words};
 use needlebench_imaging::{SurfaceTissue, VoxelGrid, structure_of};
 use needlebench_planning::{crossed_fissures, judged_tissues};
 use serde::{Deserialize, Serialize};
 
+use crate::around::Judged;
 use crate::case::Case;
 
 /// What the needle is for.
@@ -49,6 +50,17 @@ pub struct Aim {
     pub target: TargetAim,
     /// Where it is to come from.
     pub entry: EntryAim,
+}
+
+/// What a needle is for, wherever it comes from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GoalAim {
+    /// The goal of the scenario that it is for: what the guide keeps from the skin is that goal's.
+    #[serde(default)]
+    pub goal: Option<String>,
+    /// Where it is to end.
+    pub target: TargetAim,
 }
 
 /// Why there is no answer, and what to do.
@@ -162,6 +174,8 @@ pub struct RouteAnswer {
     pub tissues: Vec<TissueAnswer>,
     /// Fissures that it crosses.
     pub fissures: Vec<String>,
+    /// How the rules of routes judge it; none until they were asked about its target.
+    pub judged: Option<Judged>,
 }
 
 /// Which configurations serve.
@@ -169,6 +183,8 @@ pub struct RouteAnswer {
 pub struct ReachAnswer {
     /// Why nothing is said of the robot.
     pub unknown: Option<&'static str>,
+    /// Of twelve directions about the needle only: a configuration that works here works, one that does not may.
+    pub quick: bool,
     /// The configurations.
     pub preview: Option<GoalPreview>,
     /// Why each does not work, in words, in their order; empty where it does.
@@ -181,7 +197,7 @@ pub struct ReachAnswer {
 /// A target outside the patient; an entry from which no line runs to it.
 pub fn needle(case: &Case, aim: &Aim) -> Result<Needle, Refusal> {
     let grid = case.grid();
-    let mut section = section(case, aim)?;
+    let mut section = aim.goal_aim().section(case)?;
     let placer = case.desk().placer();
     let target = placer.target(&section).map_err(outside)?;
     let towards = case.in_phantom(&match &aim.entry {
@@ -215,29 +231,42 @@ pub fn needle(case: &Case, aim: &Aim) -> Result<Needle, Refusal> {
     })
 }
 
-/// The goal that an aim is for, with its target and without an entry.
-fn section(case: &Case, aim: &Aim) -> Result<GoalSection, Refusal> {
-    use needlebench_cell::scenario::Target;
-    let target = match &aim.target {
-        TargetAim::Lesion(name) => Target::Lesion(name.clone()),
-        TargetAim::PlaceM(place) => Target::Point(phantom_mm(case, &finite(place)?)),
-        TargetAim::Index(index) => {
-            let place = case.grid().ct_from_index(&finite(index)?);
-            Target::Point(phantom_mm(case, &place))
-        }
-    };
-    let mut section = GoalSection::at(target);
-    let named = aim.goal.as_ref();
-    let own = named.and_then(|name| case.goals().iter().find(|goal| goal.name == *name));
-    if let Some(own) = own.or(case.goals().first()) {
-        section.name.clone_from(&own.name);
-        if own.flange_pose.is_none() {
-            section.standoff_mm = own.standoff_mm;
-            section.approach_mm = own.approach_mm;
-            section.roll_deg = own.roll_deg;
+impl Aim {
+    fn goal_aim(&self) -> GoalAim {
+        GoalAim {
+            goal: self.goal.clone(),
+            target: self.target.clone(),
         }
     }
-    Ok(section)
+}
+
+impl GoalAim {
+    /// The goal, with its target and without an entry.
+    ///
+    /// # Errors
+    /// A target that is no place.
+    pub(crate) fn section(&self, case: &Case) -> Result<GoalSection, Refusal> {
+        let target = match &self.target {
+            TargetAim::Lesion(name) => Target::Lesion(name.clone()),
+            TargetAim::PlaceM(place) => Target::Point(phantom_mm(case, &finite(place)?)),
+            TargetAim::Index(index) => {
+                let place = case.grid().ct_from_index(&finite(index)?);
+                Target::Point(phantom_mm(case, &place))
+            }
+        };
+        let mut section = GoalSection::at(target);
+        let named = self.goal.as_ref();
+        let own = named.and_then(|name| case.goals().iter().find(|goal| goal.name == *name));
+        if let Some(own) = own.or(case.goals().first()) {
+            section.name.clone_from(&own.name);
+            if own.flange_pose.is_none() {
+                section.standoff_mm = own.standoff_mm;
+                section.approach_mm = own.approach_mm;
+                section.roll_deg = own.roll_deg;
+            }
+        }
+        Ok(section)
+    }
 }
 
 fn phantom_mm(case: &Case, ct_m: &Point3<f64>) -> [f64; 3] {
@@ -331,6 +360,11 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
         fissures: goal
             .map(|goal| crossed_fissures(resolved, goal))
             .unwrap_or_default(),
+        judged: case.last_target().judged(
+            &needle.section.name,
+            &case.in_phantom(&needle.target_m),
+            &-inwards,
+        ),
     })
 }
 
@@ -437,20 +471,25 @@ fn crossings(case: &Case, from_m: &Point3<f64>, to_m: &Point3<f64>) -> Vec<Cross
     named.map(|(_, crossing)| crossing).collect()
 }
 
-/// Which of the eight configurations reach a needle, by their postures.
+/// Which of the eight configurations reach a needle, by their postures; `quick` looks at few directions about the needle.
 ///
 /// # Errors
 /// As [`needle`].
-pub fn reach(case: &Case, aim: &Aim) -> Result<ReachAnswer, Refusal> {
+pub fn reach(case: &Case, aim: &Aim, quick: bool) -> Result<ReachAnswer, Refusal> {
     if let Some(unknown) = case.built().not_registered() {
         return Ok(ReachAnswer {
             unknown: Some(unknown),
+            quick,
             preview: None,
             reasons: Vec::new(),
         });
     }
     let goal = needle(case, aim)?.goal?;
-    let preview = case.desk().preview(&goal);
+    let preview = if quick {
+        case.desk().quick_preview(&goal)
+    } else {
+        case.desk().preview(&goal)
+    };
     let preview = preview.map_err(|error| Refusal {
         message: error.to_string(),
         hint: None,
@@ -462,6 +501,7 @@ pub fn reach(case: &Case, aim: &Aim) -> Result<ReachAnswer, Refusal> {
     });
     Ok(ReachAnswer {
         unknown: None,
+        quick,
         reasons: reasons.collect(),
         preview: Some(preview),
     })

@@ -10,6 +10,7 @@ const API: &str = include_str!("assets/api.js");
 const VOLUME: &str = include_str!("assets/volume.js");
 const SLICES: &str = include_str!("assets/slices.js");
 const ROOM: &str = include_str!("assets/room.js");
+const ENTRIES: &str = include_str!("assets/entries.js");
 const PLANNER: &str = include_str!("assets/planner.js");
 
 /// The page asks nobody but this server, runs no script but its own, and is in nobody's frame.
@@ -33,7 +34,10 @@ pub fn file(name: &str) -> Option<Response> {
             SCRIPT,
             [shared::CORE, shared::NUMBER, shared::VIEW].join("\n"),
         ),
-        "view.js" => (SCRIPT, [API, VOLUME, SLICES, ROOM, PLANNER].join("\n")),
+        "view.js" => (
+            SCRIPT,
+            [API, VOLUME, SLICES, ROOM, ENTRIES, PLANNER].join("\n"),
+        ),
         "icon.svg" => ("image/svg+xml", include_str!("assets/icon.svg").to_owned()),
         _ => return None,
     };

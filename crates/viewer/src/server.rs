@@ -4,6 +4,7 @@ use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use axum::Router;
 use axum::body::{Body, Bytes};
@@ -14,6 +15,9 @@ use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use nalgebra::Point3;
+use needlebench_bench::Control;
+use needlebench_bench::progress::Silent;
+use needlebench_report::chart::routes::route_colours;
 use needlebench_report::page::shared;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -22,8 +26,9 @@ use tokio::sync::Notify;
 
 use crate::answer::{Problem, json_response};
 use crate::case::Case;
+use crate::entries;
 use crate::guard::{COOKIE, Hosts, Token, check_cookie, check_token};
-use crate::live::{self, Aim, Refusal};
+use crate::live::{self, Aim, GoalAim, Refusal};
 use crate::motion;
 use crate::page;
 use crate::plan_file::{PLAN_FILE, write_plan};
@@ -170,6 +175,7 @@ fn router(app: Arc<App>) -> Router {
         .route("/place", post(place))
         .route("/route", post(route))
         .route("/reach", post(reach))
+        .route("/entries", post(planned_entries))
         .route("/motion", post(planned_motion))
         .route("/session", get(session).put(keep_session))
         .route("/plan", post(plan))
@@ -334,6 +340,7 @@ fn description(case: &Case) -> Value {
             "entry_m": goal.entry_mm.map(|mm| ct_from_mm(case, mm)),
         })).collect::<Vec<_>>(),
         "plan_file": PLAN_FILE,
+        "route_colours": route_colours(),
     })
 }
 
@@ -423,14 +430,21 @@ struct Question {
     turn: Option<u64>,
     #[serde(default)]
     configuration: Option<String>,
+    /// Of reach: an answer at once, from few directions about the needle.
+    #[serde(default)]
+    quick: bool,
 }
 
 impl Question {
     fn turn(&self, kind: &str) -> Option<(String, u64)> {
-        let page = self.page.as_ref()?;
-        let page: String = page.chars().take(32).collect();
-        Some((format!("{kind} {page}"), self.turn?))
+        turn_of(kind, self.page.as_ref(), self.turn)
     }
+}
+
+/// Whose turn of a kind of question it is.
+fn turn_of(kind: &str, page: Option<&String>, turn: Option<u64>) -> Option<(String, u64)> {
+    let page: String = page?.chars().take(32).collect();
+    Some((format!("{kind} {page}"), turn?))
 }
 
 /// That there is no such needle is an answer too.
@@ -455,12 +469,50 @@ async fn route(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answe
 async fn reach(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
     let question: Question = read(body)?;
     let case = Arc::clone(&app.case);
-    let turn = question.turn("reach");
-    let found = app
-        .exact
-        .run(turn, move || live::reach(&case, &question.aim))
-        .await?;
+    let (turns, kind) = if question.quick {
+        (&app.quick, "quick reach")
+    } else {
+        (&app.exact, "reach")
+    };
+    let turn = question.turn(kind);
+    let work = move || live::reach(&case, &question.aim, question.quick);
+    let found = turns.run(turn, work).await?;
     Ok(answered(&found))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EntriesQuestion {
+    aim: GoalAim,
+    #[serde(default)]
+    robot: bool,
+    #[serde(default)]
+    page: Option<String>,
+    #[serde(default)]
+    turn: Option<u64>,
+}
+
+async fn planned_entries(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
+    let question: EntriesQuestion = read(body)?;
+    let case = Arc::clone(&app.case);
+    let turn = turn_of("entries", question.page.as_ref(), question.turn);
+    let work = move |cancel: &AtomicBool| {
+        let control = Control {
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            cancel,
+            progress: &Silent,
+        };
+        entries::entries(&case, &question.aim, question.robot, &control)
+    };
+    let found = app.exact.run_until(turn, work).await?;
+    match found.transpose() {
+        Some(found) => Ok(answered(&found)),
+        None => Err(Problem::new(
+            StatusCode::CONFLICT,
+            "a later question took the place of this one",
+        )
+        .with("overtaken", &true)),
+    }
 }
 
 async fn planned_motion(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::pin::Pin;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll};
 
@@ -20,7 +21,14 @@ const MOST_PAGES: usize = 64;
 pub struct Turns {
     permits: Arc<Semaphore>,
     waiting: Semaphore,
-    latest: Mutex<HashMap<String, u64>>,
+    latest: Mutex<HashMap<String, Turn>>,
+}
+
+/// The newest question of a page of a kind, and what ends the work on it.
+#[derive(Debug, Default)]
+struct Turn {
+    number: u64,
+    cancel: Arc<AtomicBool>,
 }
 
 impl Turns {
@@ -43,9 +51,22 @@ impl Turns {
         turn: Option<(String, u64)>,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Problem> {
-        if let Some((page, number)) = &turn {
-            self.remember(page, *number);
-        }
+        self.run_until(turn, |_| work()).await
+    }
+
+    /// The same of work that looks whether a later turn has come.
+    ///
+    /// # Errors
+    /// As [`Turns::run`].
+    pub async fn run_until<T: Send + 'static>(
+        &self,
+        turn: Option<(String, u64)>,
+        work: impl FnOnce(&AtomicBool) -> T + Send + 'static,
+    ) -> Result<T, Problem> {
+        let cancel = turn
+            .as_ref()
+            .map(|(page, number)| self.remember(page, *number))
+            .unwrap_or_default();
         let Ok(_place) = self.waiting.try_acquire() else {
             return Err(Problem::new(
                 StatusCode::SERVICE_UNAVAILABLE,
@@ -64,7 +85,7 @@ impl Turns {
         let done = tokio::task::spawn_blocking(move || {
             // Given back when the work is done, whether anybody still waits for it or not.
             let _permit = permit;
-            work()
+            work(&cancel)
         });
         done.await.map_err(|_| {
             Problem::new(
@@ -74,18 +95,25 @@ impl Turns {
         })
     }
 
-    fn remember(&self, page: &str, number: u64) {
+    fn remember(&self, page: &str, number: u64) -> Arc<AtomicBool> {
         let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
         if latest.len() >= MOST_PAGES && !latest.contains_key(page) {
             latest.clear();
         }
         let known = latest.entry(page.to_owned()).or_default();
-        *known = number.max(*known);
+        if number > known.number {
+            known.cancel.store(true, Ordering::Relaxed);
+            *known = Turn {
+                number,
+                cancel: Arc::default(),
+            };
+        }
+        Arc::clone(&known.cancel)
     }
 
     fn is_overtaken(&self, page: &str, number: u64) -> bool {
         let latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
-        latest.get(page).is_some_and(|known| *known > number)
+        latest.get(page).is_some_and(|known| known.number > number)
     }
 }
 

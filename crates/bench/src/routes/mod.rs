@@ -100,7 +100,8 @@ impl RouteTask<'_> {
             &self.resolved.scenario.planning.needle_route,
             &self.resolved.cell.tool,
             self.section.standoff_mm * 1e-3,
-            self.robot == WithRobot::Yes,
+            // A robot whose error nobody tells has the usual one.
+            self.robot == WithRobot::Yes && self.resolved.expected.is_some(),
         )
     }
 

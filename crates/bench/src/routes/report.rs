@@ -67,6 +67,8 @@ pub struct BaseMargin {
     pub obstacle: &'static str,
     /// The least distance, m.
     pub margin_m: f64,
+    /// Whether the patient has anything of it, near or far. What nobody has seen is at no distance.
+    pub known: bool,
 }
 
 /// How many directions a rule refuses.
@@ -299,6 +301,7 @@ pub(super) fn plan(
             .map(|obstacle| BaseMargin {
                 obstacle: obstacle.name(),
                 margin_m: rules.margins_m[obstacle as usize],
+                known: anatomy.knows(obstacle),
             })
             .collect(),
         margin_constant_m: rules.constant_m,

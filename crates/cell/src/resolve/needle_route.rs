@@ -22,7 +22,8 @@ pub(super) fn check_needle_route(
     let parts: Vec<&RouteObstacle> = parts.collect();
     for (index, name) in section.off.iter().enumerate() {
         let is_tissue = tissues.iter().any(|tissue| tissue.to_string() == *name);
-        if is_tissue || parts.iter().any(|part| part.is_called(name)) {
+        let is_known = is_tissue || name == NeedleRouteSection::MEDIASTINUM;
+        if is_known || parts.iter().any(|part| part.is_called(name)) {
             continue;
         }
         let words = tissues.map(|tissue| tissue.to_string());
@@ -31,6 +32,7 @@ pub(super) fn check_needle_route(
             .filter_map(|part| part.organ.as_deref())
             .collect();
         let known = words.iter().map(String::as_str);
+        let known = known.chain([NeedleRouteSection::MEDIASTINUM]);
         let known: Vec<&str> = known.chain(structures).collect();
         let near = nearest_name(
             name,

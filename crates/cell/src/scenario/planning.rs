@@ -76,8 +76,14 @@ pub struct NeedleRouteSection {
     #[schemars(range(min = 0.0, max = 50.0))]
     pub organ_mm: f64,
     /// What the needle may pass through or near all the same, by name: `bone`, `vessel` or `organ` for
-    /// all of a tissue, a structure such as `rib_right_5`, or a part. Reports say what was switched off.
+    /// all of a tissue, a structure such as `rib_right_5`, a part, or the `mediastinum`, which `ct routes` takes in a
+    /// scan for whatever is between the lungs. Reports say what was switched off.
     pub off: Vec<String>,
+}
+
+impl NeedleRouteSection {
+    /// Name of the soft tissue between the lungs of a scan.
+    pub const MEDIASTINUM: &str = "mediastinum";
 }
 
 impl Default for NeedleRouteSection {

@@ -1,6 +1,9 @@
 //! The entry map: the skin as the target sees it, with what forbids a route and how the free ones compare.
 
+use std::collections::BTreeMap;
+
 use needlebench_bench::routes::RoutePlan;
+use serde::Serialize;
 
 use super::drawing::{Anchor, Chart};
 use super::legend::{Sample, legend};
@@ -25,6 +28,26 @@ const RULES: [(&str, &str, Rgb); 12] = [
 
 /// Colours of free directions: the least odds, and those of twice the least and more.
 const FREE: [Rgb; 2] = [[0, 96, 70], [170, 226, 205]];
+
+/// Colours of an entry map, for pages that draw their own.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RouteColours {
+    /// By the name of a rule: in words, red, green, blue.
+    pub rules: BTreeMap<&'static str, (&'static str, Rgb)>,
+    /// Free directions: of the least odds, and of twice the least and more.
+    pub free: [Rgb; 2],
+}
+
+/// The colours of [`routes_chart`].
+pub fn route_colours() -> RouteColours {
+    let rules = RULES.into_iter();
+    RouteColours {
+        rules: rules
+            .map(|(rule, words, rgb)| (rule, (words, rgb)))
+            .collect(),
+        free: FREE,
+    }
+}
 
 /// Routes that are numbered.
 const NUMBERED: usize = 8;

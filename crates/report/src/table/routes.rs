@@ -47,6 +47,9 @@ pub fn routes_text(plan: &RoutePlan) -> String {
         "odds: of a pneumothorax against a route with none of the terms, by published ratios; an\n  order, no \
          probability\nbone, vessel, organ: lower bounds of the needle's distance",
     );
+    if plan.margins.iter().any(|margin| !margin.known) {
+        text.push_str("\n?: the patient has nothing of it that anybody has seen");
+    }
     if let Some(chosen) = &plan.chosen {
         let route = &plan.routes[chosen.route];
         let _ = write!(text, "\n\n{}\n{}", terms(route), route.toml);
@@ -194,7 +197,11 @@ fn table(plan: &RoutePlan) -> String {
             format!("{:.0}", route.depth_in_lung_m * 1e3),
             format!("{:.2}", route.risk.odds_ratio),
         ];
-        for margin in &route.margins {
+        for (margin, base) in route.margins.iter().zip(&plan.margins) {
+            if !base.known {
+                row.push("?".to_owned());
+                continue;
+            }
             // Fields end at 20 mm: what is told there is no distance.
             let told = margin.distance_m.filter(|_| margin.part.is_some());
             row.push(told.map_or_else(|| "far".to_owned(), mm));

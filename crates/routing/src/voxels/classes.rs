@@ -173,6 +173,19 @@ impl Classes {
         self.all.iter()
     }
 
+    /// Adds a class that has no label; none if there is no number left.
+    pub fn add(&mut self, name: &str, kind: Kind) -> Option<u8> {
+        let number = u8::try_from(self.all.len()).ok()?;
+        self.all.push(Class::new(name, kind));
+        Some(number)
+    }
+
+    /// Number of a lung.
+    pub fn lung_called(&self, name: &str) -> Option<u8> {
+        let index = self.lungs.iter().position(|lung| lung == name)?;
+        u8::try_from(index).ok()
+    }
+
     pub fn lung_name(&self, lung: u8) -> &str {
         &self.lungs[usize::from(lung)]
     }

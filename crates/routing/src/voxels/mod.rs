@@ -1,19 +1,22 @@
 //! Voxels of a label map as anatomy.
 
 mod classes;
+mod mediastinum;
 
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, UnitVector3, Vector3};
+use needlebench_cell::scenario::NeedleRouteSection;
 use needlebench_imaging::{
     Components, Connectivity, DistanceField, DistanceOptions, ImagingError, IndexBox, LabelMap,
-    Mask, Remark, VoxelGrid, opened,
+    Mask, Remark, VoxelGrid, opened, structure_of,
 };
 
 use crate::anatomy::{
     Anatomy, Exit, LungPassage, Nearest, Obstacle, Ray, angle_rad, is_marker_near,
 };
 use classes::{Class, Classes, Kind, Mark};
+use mediastinum::Mediastinum;
 
 /// Distances beyond this are told as this, m: no margin asks for more.
 const CAP_M: f64 = 20e-3;
@@ -35,6 +38,26 @@ const IN_LUNG: f64 = 0.3;
 
 /// Share of a lesion's surface against anything but lung from which on it touches the pleura: partial volume makes less.
 const TOUCHES: f64 = 0.02;
+
+/// Structures that a needle to the lung may meet, by their names in label maps, whose absence is said.
+const IN_THE_WAY: [&str; 5] = ["heart", "aorta", "liver", "spleen", "stomach"];
+
+/// Words of what needles may go through.
+const SOFT: [&str; 8] = [
+    "soft",
+    "muscle",
+    "fat",
+    "autochthon",
+    "iliopsoas",
+    "gluteus",
+    "tissue",
+    "breast",
+];
+
+fn is_soft(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    SOFT.iter().any(|word| lower.contains(word))
+}
 
 /// What is asked of the voxels.
 #[derive(Debug, Clone, Copy)]
@@ -82,7 +105,10 @@ pub struct VoxelAnatomy {
     mask_error_m: f64,
     /// Middle, frame `phantom`, and radius, m.
     markers: Vec<(Point3<f64>, f64)>,
-    needle_m: f64,
+    /// How far from the target the skin is looked for, m.
+    reach_m: f64,
+    /// Obstacles of which the label map has anything.
+    knows: [bool; 3],
     remarks: Vec<Remark>,
 }
 
@@ -133,14 +159,17 @@ impl VoxelAnatomy {
                 .iter()
                 .map(|(middle, radius_m)| (middle - origin_in_ct_m, *radius_m))
                 .collect(),
-            needle_m: options.needle_m,
+            reach_m,
+            knows: [false; 3],
             remarks: Vec::new(),
         };
         if anatomy.kind_at(centre) == Kind::Outside {
             return Err(ImagingError::refused("the target is outside the body")
                 .hint("places are in mm of the scan (left, posterior, superior)"));
         }
+        anatomy.look_over(labels);
         anatomy.find_lung(centre);
+        anatomy.mark_mediastinum(labels, centre, options.off);
         if anatomy.target_lung.is_none() {
             anatomy.remarks.push(Remark::new(
                 "the target is in no lung: needles keep clear of both lungs",
@@ -201,6 +230,86 @@ impl VoxelAnatomy {
                 self.touches_pleura = self.target_lung.map(|_| share(soft) > TOUCHES);
             }
             _ => {}
+        }
+    }
+
+    /// What the label map has, and what it has not and a user has to know of.
+    fn look_over(&mut self, labels: &LabelMap) {
+        let mut seen = vec![false; 1 << 16];
+        for &label in &labels.labels {
+            seen[usize::from(label)] = true;
+        }
+        let mut unknown = Vec::new();
+        let mut missing = IN_THE_WAY.to_vec();
+        for (label, name) in &labels.names {
+            if !seen[usize::from(*label)] {
+                continue;
+            }
+            let class = self.classes.get(self.classes.of_label(*label));
+            for obstacle in Obstacle::ALL {
+                self.knows[obstacle as usize] |= class.is(obstacle, None);
+            }
+            let structure = structure_of(name);
+            if class.kind == Kind::Soft && structure.is_none() && !is_soft(name) {
+                unknown.push(format!("`{name}`"));
+            }
+            missing.retain(|each| structure.as_ref().is_none_or(|it| it.name != *each));
+        }
+        if !unknown.is_empty() {
+            self.remarks.push(Remark::new(format!(
+                "taken for soft tissue, through which needles may go, since nothing is known of structures of these names: {}",
+                unknown.join(", ")
+            )));
+        }
+        if !missing.is_empty() {
+            self.remarks.push(Remark::new(format!(
+                "the label map has no {}: nothing keeps needles out of these but the space between the lungs, where both \
+                 lungs are labelled; give a label map that has them (`ct build --labels`)",
+                missing.join(", ")
+            )));
+        }
+        if !self.knows[Obstacle::Bone as usize] {
+            self.remarks.push(Remark::new(
+                "the label map has no bone: nothing is known of distances from it",
+            ));
+        }
+    }
+
+    /// Makes an organ of the soft tissue between the lungs: heart and large vessels, seen or not. A target that is in it
+    /// has to be reached through it.
+    fn mark_mediastinum(&mut self, labels: &LabelMap, centre: [usize; 3], off: &[String]) {
+        const NAME: &str = NeedleRouteSection::MEDIASTINUM;
+        if off.iter().any(|name| name == NAME) {
+            return;
+        }
+        let Some(between) = Mediastinum::of(labels, &self.classes, &self.within) else {
+            self.remarks.push(Remark::new(
+                "the label map has not both lungs: the space between them, with heart and large vessels, is not known",
+            ));
+            return;
+        };
+        if self.target_lung.is_none() && between.contains(centre) {
+            self.remarks.push(Remark::new(
+                "the target is between the lungs: needles may go through the soft tissue there, and keep clear of what has \
+                 a label of its own",
+            ));
+            return;
+        }
+        let Some(class) = self.classes.add(NAME, Kind::Organ) else {
+            return;
+        };
+        let [nx, ny, _] = self.within.size();
+        let first = self.within.first;
+        for (offset, voxel) in self.voxels.iter_mut().enumerate() {
+            let at = [
+                first[0] + offset % nx,
+                first[1] + offset / nx % ny,
+                first[2] + offset / (nx * ny),
+            ];
+            if self.classes.get(*voxel).kind == Kind::Soft && between.contains(at) {
+                *voxel = class;
+                self.knows[Obstacle::Organ as usize] = true;
+            }
         }
     }
 
@@ -535,7 +644,7 @@ impl Anatomy for VoxelAnatomy {
         let mut found = None;
         self.walk(
             ray,
-            [0.0, self.needle_m],
+            [0.0, self.reach_m],
             |class, [enters_m, leaves_m], voxel| {
                 depth_m = leaves_m;
                 if self.classes.get(class).kind == Kind::Outside {
@@ -545,12 +654,8 @@ impl Anatomy for VoxelAnatomy {
             },
         );
         let Some((skin_m, voxel)) = found else {
-            // It ends within the body: where the needle does, or the scan.
-            return Exit::End(if depth_m >= self.needle_m {
-                f64::INFINITY
-            } else {
-                depth_m
-            });
+            // It ends within the body: far beyond the needle, or where the scan does.
+            return Exit::End(depth_m);
         };
         let last = self.grid.size()[2] - 1;
         let from_end = voxel[2].min(last - voxel[2]) as f64 * self.spacing_m[2];
@@ -573,6 +678,10 @@ impl Anatomy for VoxelAnatomy {
             !is_there
         });
         is_there
+    }
+
+    fn knows(&self, obstacle: Obstacle) -> bool {
+        self.knows[obstacle as usize]
     }
 
     fn distance_m(&self, ray: &Ray, from_to_m: [f64; 2], obstacle: Obstacle) -> f64 {

@@ -133,25 +133,30 @@ fn anatomy(labels: &LabelMap, threads: usize) -> VoxelAnatomy {
     .unwrap()
 }
 
-/// Least distance of a stretch of a ray's axis from the boxes of some labels: in steps of 0.2 mm, each with all voxels.
-fn brute_m(labels: &LabelMap, ray: &Ray, [from_m, to_m]: [f64; 2], of: &[u16]) -> f64 {
-    let grid = &labels.grid;
+/// Middles of the voxels of an obstacle.
+fn boxes_of(labels: &LabelMap, obstacle: Obstacle) -> Vec<Point3<f64>> {
     let mut boxes = Vec::new();
     for k in 0..SIZE[2] {
         for j in 0..SIZE[1] {
             for i in 0..SIZE[0] {
-                if of.contains(&labels.labels[grid.offset([i, j, k])]) {
-                    boxes.push(grid.ct_from_index(&Point3::new(i as f64, j as f64, k as f64)));
+                if is_obstacle(labels, [i, j, k], obstacle) {
+                    let index = Point3::new(i as f64, j as f64, k as f64);
+                    boxes.push(labels.grid.ct_from_index(&index));
                 }
             }
         }
     }
+    boxes
+}
+
+/// Least distance of a stretch of a ray's axis from boxes of voxels: in steps of 0.2 mm, each with all of them.
+fn brute_m(boxes: &[Point3<f64>], ray: &Ray, [from_m, to_m]: [f64; 2]) -> f64 {
     let half = Vector3::from(SPACING_M) * 0.5;
     let (count, mut least_m) = (((to_m - from_m) / 2e-4).ceil(), f64::INFINITY);
     let mut step = 0.0;
     while step <= count {
         let at = ray.at(from_m + (to_m - from_m) * step / count);
-        for centre in &boxes {
+        for centre in boxes {
             let beyond = ((at - centre).abs() - half).sup(&Vector3::zeros());
             least_m = least_m.min(beyond.norm());
         }
@@ -160,11 +165,22 @@ fn brute_m(labels: &LabelMap, ray: &Ray, [from_m, to_m]: [f64; 2], of: &[u16]) -
     least_m
 }
 
-fn labels_of(obstacle: Obstacle) -> &'static [u16] {
+fn is_obstacle(labels: &LabelMap, [i, j, k]: [usize; 3], obstacle: Obstacle) -> bool {
+    let label = |i: usize| labels.labels[labels.grid.offset([i, j, k])];
     match obstacle {
-        Obstacle::Bone => &[BONE],
-        Obstacle::Vessel => &[VESSEL],
-        Obstacle::Organ => &[HEART, OTHER_LUNG],
+        Obstacle::Bone => label(i) == BONE,
+        Obstacle::Vessel => label(i) == VESSEL,
+        Obstacle::Organ if label(i) == SOFT => {
+            let sides = |lung: u16| {
+                let all = (0..SIZE[0]).filter(move |&other| label(other) == lung);
+                all.fold([false; 2], |sides, other| {
+                    [sides[0] || other < i, sides[1] || other > i]
+                })
+            };
+            // Between the lungs: nothing in this chest lies behind its spine and between them.
+            sides(OTHER_LUNG) == [true, false] && sides(LUNG) == [false, true]
+        }
+        Obstacle::Organ => [HEART, OTHER_LUNG].contains(&label(i)),
     }
 }
 
@@ -189,6 +205,7 @@ fn no_free_route_comes_nearer_to_any_voxel_than_it_says_and_no_refusal_is_far_of
     let (anatomy, rules) = (anatomy(&labels, 2), rules());
     assert_eq!(anatomy.target_lung(), Some("lung_left"));
     let found = search(&anatomy, &rules, 2000, 2, &|| false);
+    let boxes = Obstacle::ALL.map(|obstacle| boxes_of(&labels, obstacle));
     let (mut free, mut refused) = (0, 0);
     let (mut told, mut between) = (0, 0);
     for candidate in found.candidates.iter().step_by(17) {
@@ -202,7 +219,7 @@ fn no_free_route_comes_nearer_to_any_voxel_than_it_says_and_no_refusal_is_far_of
                 for obstacle in Obstacle::ALL {
                     let span = [-rules.throw_m, route.depth_m];
                     let exact_m =
-                        brute_m(&labels, &ray, span, labels_of(obstacle)) - rules.needle_radius_m;
+                        brute_m(&boxes[obstacle as usize], &ray, span) - rules.needle_radius_m;
                     let told_m = route.distances_m[obstacle as usize];
                     assert!(told_m >= rules.margins_m[obstacle as usize]);
                     assert!(told_m <= exact_m, "{obstacle:?}: {told_m} for {exact_m}");
@@ -221,7 +238,7 @@ fn no_free_route_comes_nearer_to_any_voxel_than_it_says_and_no_refusal_is_far_of
                     .find(|&obstacle| RouteRule::of(obstacle) == refusal.rule);
                 if let (Some(obstacle), Some(depth_m)) = (obstacle, candidate.depth_m) {
                     refused += 1;
-                    let exact_m = brute_m(&labels, &ray, [0.0, depth_m], labels_of(obstacle));
+                    let exact_m = brute_m(&boxes[obstacle as usize], &ray, [0.0, depth_m]);
                     assert!(refusal.value <= exact_m - rules.needle_radius_m);
                     assert!(exact_m - rules.needle_radius_m < refusal.limit + slacks_m(exact_m)[0]);
                 }
@@ -299,6 +316,104 @@ fn nothing_goes_through_a_marker_on_the_skin() {
         }
     }
     assert!(refused > 5, "{refused}");
+}
+
+/// Two lungs, a vertebra between their backs, and soft tissue, in voxels of 2 mm.
+fn two_lungs(names: &[(u16, &str)]) -> LabelMap {
+    let size = [90, 70, 10];
+    let grid = VoxelGrid::aligned(size, [2e-3; 3], Point3::origin()).unwrap();
+    let mut labels = vec![0_u16; grid.len()];
+    for k in 0..size[2] {
+        for j in 2..68_usize {
+            for i in 2..88_usize {
+                let label = match (i, j) {
+                    (10..30, 10..50) => OTHER_LUNG,
+                    (60..80, 10..50) => LUNG,
+                    (37..53, 35..48) => BONE,
+                    _ => SOFT,
+                };
+                labels[grid.offset([i, j, k])] = label;
+            }
+        }
+    }
+    LabelMap {
+        grid,
+        labels,
+        names: names
+            .iter()
+            .map(|(label, name)| (*label, (*name).to_owned()))
+            .collect(),
+    }
+}
+
+#[test]
+fn what_lies_between_the_lungs_is_an_organ_but_not_the_muscles_of_the_back() {
+    let names = [
+        (SOFT, "soft_tissue"),
+        (LUNG, "lung_left"),
+        (OTHER_LUNG, "lung_right"),
+        (BONE, "bone"),
+    ];
+    let at = |labels: &LabelMap, target: [f64; 3], off: &[String]| {
+        let options = VoxelOptions {
+            lesions: &[],
+            off,
+            needle_m: 0.15,
+            markers: &[],
+            outside_m: 0.05,
+            lung_vessel_m: 0.0,
+            below_rib_m: 0.0,
+            threads: 1,
+            cancel: &GO,
+        };
+        VoxelAnatomy::new(labels, Vector3::zeros(), Point3::from(target), &options).unwrap()
+    };
+    // Along x through the middle slice at some row, from the left lung's first columns to the right one's last.
+    let across = |anatomy: &VoxelAnatomy, row: f64| {
+        let ray = Ray {
+            target: Point3::new(65.0 * 2e-3, row * 2e-3, 0.01),
+            outwards: -Vector3::x_axis(),
+        };
+        let nearest = anatomy.nearest(&ray, [12.0 * 2e-3, 15.0 * 2e-3], Obstacle::Organ);
+        nearest.map(|nearest| nearest.name)
+    };
+    let labels = two_lungs(&names);
+    let in_lung = [65.0 * 2e-3, 30.0 * 2e-3, 0.01];
+    let anatomy = at(&labels, in_lung, &[]);
+    assert!(anatomy.knows(Obstacle::Organ) && !anatomy.knows(Obstacle::Vessel));
+    for row in [12.0, 30.0, 41.0] {
+        assert_eq!(across(&anatomy, row).as_deref(), Some("mediastinum"));
+    }
+    // The vertebra begins at row 35, 69 mm deep; the space ends 15 mm behind that. Rows 55 are behind both lungs, too.
+    assert_eq!(across(&anatomy, 55.0), None);
+    let off = ["mediastinum".to_owned()];
+    assert_ne!(
+        across(&at(&labels, in_lung, &off), 30.0).as_deref(),
+        Some("mediastinum")
+    );
+    // A target in it has to be reached through it.
+    let between = at(&labels, [45.0 * 2e-3, 20.0 * 2e-3, 0.01], &[]);
+    assert_ne!(across(&between, 30.0).as_deref(), Some("mediastinum"));
+    let said = |anatomy: &VoxelAnatomy, word: &str| {
+        let mut remarks = anatomy.remarks().iter();
+        remarks.any(|remark| remark.message.contains(word))
+    };
+    assert!(said(&between, "between the lungs"));
+    assert!(said(&anatomy, "no heart, aorta, liver"));
+    assert!(!said(&anatomy, "no bone"));
+    // What has no name that means anything is said, not passed over.
+    let odd = [
+        (SOFT, "soft_tissue"),
+        (LUNG, "lung_left"),
+        (OTHER_LUNG, "gizmo"),
+        (BONE, "structure_7"),
+    ];
+    let labels = two_lungs(&odd);
+    let anatomy = at(&labels, in_lung, &[]);
+    for word in ["`gizmo`, `structure_7`", "no bone", "both lungs"] {
+        assert!(said(&anatomy, word), "{word}");
+    }
+    assert!(!anatomy.knows(Obstacle::Bone));
 }
 
 #[test]

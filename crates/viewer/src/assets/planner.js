@@ -23,7 +23,9 @@ PLAN.Planner = class {
     if (session.version === 0) this.state.needle = this.firstNeedle();
     this.greys = PLAN.greys(this.state.window_hu);
     this.quick = new PLAN.Latest('route', (answer, body, took) => this.routed(answer, body, took));
+    this.bounds = new PLAN.Latest('reach', (answer, body) => this.bounded(answer, body));
     this.exact = new PLAN.Latest('reach', (answer) => this.reached(answer));
+    this.entryMap = new PLAN.EntryMap(this);
     this.planned = new PLAN.Latest('motion', (answer, body) => this.moved(answer, body));
     this.where = new PLAN.Latest('place', (answer) => this.placed(answer));
     this.latencies = [];
@@ -65,7 +67,7 @@ PLAN.Planner = class {
     this.configurations = NB.el('div');
     this.comparison = NB.el('div');
     const side = NB.el('aside', { class: 'side', 'aria-label': 'Plan' },
-      this.needlePanel(),
+      this.needlePanel(), this.entryMap.element,
       NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Needle' }), this.numbers),
       NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Configurations' }), this.configurations),
       this.routesPanel(), this.markersPanel(), this.notesPanel(), this.simulationPanel());
@@ -212,6 +214,7 @@ PLAN.Planner = class {
     if (this.goalSelect) this.goalSelect.querySelector('select').value = this.state.needle.goal || this.facts.goals[0].name;
     if (this.aim()) this.askRoute();
     else { this.route = null; this.reach = null; this.refused = null; this.showRoute(); this.showReach(); }
+    this.entryMap.needleChanged();
     this.showUndo();
     this.draw();
   }
@@ -234,8 +237,17 @@ PLAN.Planner = class {
     this.motion = null;
     this.showRoute();
     this.draw();
-    if (this.route && !this.route.not_placed && !this.facts.robot_is_unknown) this.exact.ask({ aim: body.aim });
-    else { this.exact.forget(); this.reach = null; this.showReach(); }
+    this.entryMap.draw();
+    if (this.route && !this.route.not_placed && !this.facts.robot_is_unknown) {
+      // Few directions about the needle at once; all of them, which takes longer, once the needle rests.
+      this.exact.forget();
+      this.bounds.ask({ aim: body.aim, quick: true });
+    } else { this.bounds.forget(); this.exact.forget(); this.reach = null; this.showReach(); }
+  }
+
+  bounded(answer, body) {
+    this.reached(answer);
+    if (!this.dragging && this.aim() && !answer.problem) this.exact.ask({ aim: body.aim });
   }
 
   reached(answer) {
@@ -245,7 +257,7 @@ PLAN.Planner = class {
     const label = this.state.needle.configuration;
     const known = this.reach?.preview?.configurations.find((each) => each.label === label);
     if (known?.joints_rad && !this.dragging) this.room.pose(known.joints_rad);
-    if (label && !this.dragging && this.aim() && this.reach?.preview) this.planned.ask({ aim: this.aim(), configuration: label });
+    if (label && !this.dragging && this.aim() && this.reach?.preview && !this.reach.quick) this.planned.ask({ aim: this.aim(), configuration: label });
   }
 
   moved(answer, body) {
@@ -318,9 +330,10 @@ PLAN.Planner = class {
     const { preview } = this.reach || {};
     if (!preview) { NB.clear(this.configurations, NB.el('p', { class: 'soft', text: 'They follow once target and entry are chosen.' })); return; }
     const chosen = this.state.needle.configuration;
-    const list = NB.table(`${preview.working} of 8 can reach it, by their postures`, [
+    const counted = this.reach.quick ? `At least ${preview.working} of 8 can reach it: 12 directions about the needle each; all of them follow` : `${preview.working} of 8 can reach it, by their postures`;
+    const list = NB.table(counted, [
       { title: 'Configuration', cell: ({ each }) => each.label },
-      { title: 'Works', cell: ({ each }) => NB.el('span', { class: each.works ? 'good' : 'bad', text: each.works ? 'yes' : 'no' }) },
+      { title: 'Works', cell: ({ each }) => NB.el('span', { class: each.works ? 'good' : 'bad', text: each.works ? 'yes' : this.reach.quick ? 'not yet' : 'no' }) },
       { title: 'Nearest', unit: 'mm', numeric: true, cell: ({ each }) => NB.mm(each.nearest?.distance_m) },
       { title: 'Of what, or why not', text: true, cell: ({ each, reason }) => (each.works ? (each.nearest?.pair || []).map(NB.words).join(' \u2013 ') : reason) },
     ], preview.configurations.map((each, index) => ({ each, reason: this.reach.reasons[index] })), { class: 'choose small', row: ({ each }) => ({ 'aria-selected': String(each.label === chosen), tabindex: each.label === chosen || !chosen ? '0' : '-1' }) });
@@ -607,6 +620,15 @@ PLAN.taken = ({ schema_version, version, ...state }) => state;
 PLAN.routeRows = function (columns, caption) {
   const rows = [];
   const row = (title, unit, cell) => rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route, column) : '\u2013')) });
+  if (columns.some(({ route }) => route?.judged)) {
+    row('By the rules of routes', '', (route) => {
+      const { judged } = route;
+      if (!judged) return 'not asked: find routes';
+      if (judged.free) return NB.el('span', { class: 'good', text: `free, odds \u00d7${NB.fixed(judged.odds_ratio, 2)}` });
+      const value = (number) => (judged.unit === 'm' ? `${NB.mm(number)} mm` : judged.unit === 'rad' ? `${NB.deg(number)}\u00b0` : NB.fixed(number, 0));
+      return NB.el('span', { class: 'bad', text: `${judged.broken}: ${value(judged.value)}, ${value(judged.limit)} ${/way|throw/.test(judged.broken) ? 'wanted' : 'allowed'}` });
+    });
+  }
   row('Skin to target', 'mm', (route) => NB.mm(route.length_m));
   row('Guide\u2019s exit to tip', 'mm', (route) => (route.insertion_m === null ? '\u2013' : `${NB.mm(route.insertion_m)}; the needle has ${NB.mm(route.needle_m)}`));
   row('To the skin\u2019s normal', '\u00b0', (route) => NB.deg(route.skin_angle_rad));

@@ -181,6 +181,7 @@ PLAN.Slice = class extends PLAN.Picture {
     context.imageSmoothingQuality = 'high';
     context.drawImage(this.image, ...this.onCanvas([0, 0]), extent[0] * this.scale, extent[1] * this.scale);
     this.balls(context, slice);
+    this.entries(context, slice);
     this.crosshair(context);
     if (route) this.needle(context, route, slice);
     const handle = (index, color, label) => {
@@ -195,6 +196,22 @@ PLAN.Slice = class extends PLAN.Picture {
     this.letters(context, this.plane.letters);
     this.ruler(context);
     this.caption.textContent = `${this.title} ${slice + 1} of ${size[w]}`;
+  }
+
+  /** Free entries of the map that are within 2 mm of the slice. */
+  entries(context, slice) {
+    const { entryMap, facts } = this.planner;
+    const { free } = facts.route_colours;
+    entryMap.entriesNear(this.plane.w, slice, 2, (index, worse) => {
+      const [x, y] = this.onCanvas(this.place(index));
+      context.fillStyle = `rgb(${free[0].map((value, channel) => Math.round(value + (free[1][channel] - value) * worse)).join()})`;
+      context.strokeStyle = '#fff';
+      context.lineWidth = 1;
+      context.beginPath();
+      context.arc(x, y, 2.5, 0, 2 * Math.PI);
+      context.fill();
+      context.stroke();
+    });
   }
 
   /** Lesions and markers where the slice cuts them. */

@@ -47,7 +47,8 @@ Rules and odds ratios are those of the goal's [goals.route], with the defaults o
 
 Writes routes.json, with every direction that was judged and the rule that refuses it, and an entry map for each target.
 
-Exit status: 0 there is a route for every target, served in as many configurations as the scenario wants; 1 there is not.";
+Exit status: 0 there is a route for every target, served in as many configurations as the scenario wants, or, where no robot
+is asked (robot_not_asked says why), free by the patient alone; 1 there is not.";
 
 #[derive(Debug, Args)]
 #[expect(
@@ -367,7 +368,11 @@ fn find(
                 VoxelsError::Scan(error) => Stop::of_scan(&patient.scenario, error),
                 VoxelsError::Target(finding) => finding.into(),
             })?;
-            remarks.extend_from_slice(anatomy.remarks());
+            for remark in anatomy.remarks() {
+                if !remarks.contains(remark) {
+                    remarks.push(remark.clone());
+                }
+            }
             let mut plan = plan_routes(&task, &anatomy, control).map_err(stop)?;
             plan.phantom_origin_in_ct_m = Some(built.origin_in_ct_m().into());
             plan

@@ -1,0 +1,109 @@
+//! The space between the lungs, which no label map has to name.
+
+use needlebench_imaging::{IndexBox, LabelMap};
+
+use super::classes::{Classes, Kind};
+
+/// How far behind the front of the spine the space reaches, m: to the middle of a vertebral body, whose depth is 23 to
+/// 31 mm (Panjabi et al., Spine 16:888, 1991). The descending aorta lies there; behind it the muscles of the back begin,
+/// through which needles go.
+const BESIDE_SPINE_M: f64 = 15e-3;
+
+/// Half of the width in which the front of the spine is looked for, m (assumed: a vertebral body is 25 to 40 mm wide).
+const SPINE_M: f64 = 10e-3;
+
+/// Columns between the two lungs, row by row, of slices of a box.
+pub(super) struct Mediastinum {
+    first_slice: usize,
+    /// By slice and row: first and last column.
+    columns: Vec<Vec<Option<[usize; 2]>>>,
+}
+
+impl Mediastinum {
+    /// Of a label map along the patient's axes (columns to the left, rows to the back) with both lungs; none without.
+    ///
+    /// In a row of a slice it is what lies between the last voxel of the right lung and the first of the left one.
+    pub fn of(labels: &LabelMap, classes: &Classes, within: &IndexBox) -> Option<Self> {
+        let [right, left] =
+            ["lung_right", "lung_left"].map(|name| classes.lung_called(name).map(Kind::Lung));
+        let (right, left) = (right?, left?);
+        let kind = |label: u16| classes.get(classes.of_label(label)).kind;
+        // Tables of a byte per label: every voxel is asked.
+        let table = |wanted: Kind| -> Vec<bool> {
+            (0..=u16::MAX).map(|label| kind(label) == wanted).collect()
+        };
+        let (is_right, is_left, is_bone) = (table(right), table(left), table(Kind::Bone));
+        let [nx, ny, _] = labels.grid.size();
+        let spacing_m = labels.grid.spacing_m();
+        let (mut columns, mut fronts) = (Vec::new(), Vec::new());
+        for k in within.first[2]..=within.last[2] {
+            let slice = &labels.labels[k * nx * ny..(k + 1) * nx * ny];
+            let rows: Vec<Option<[usize; 2]>> = slice
+                .chunks_exact(nx)
+                .map(|row| {
+                    let last = row
+                        .iter()
+                        .rposition(|&label| is_right[usize::from(label)])?;
+                    let next = row.iter().position(|&label| is_left[usize::from(label)])?;
+                    (last + 1 < next).then(|| [last + 1, next - 1])
+                })
+                .collect();
+            let bone = |i: usize, j: usize| is_bone[usize::from(slice[j * nx + i])];
+            fronts.push(front_of_spine(&rows, bone, SPINE_M / spacing_m[0], nx));
+            columns.push(rows);
+        }
+        let known: Vec<(usize, usize)> = fronts
+            .iter()
+            .enumerate()
+            .filter_map(|(slice, front)| Some((slice, (*front)?)))
+            .collect();
+        for (slice, rows) in columns.iter_mut().enumerate() {
+            let nearest = known.iter().min_by_key(|(other, _)| other.abs_diff(slice));
+            let Some((_, front)) = nearest else { continue };
+            let last_m = *front as f64 * spacing_m[1] + BESIDE_SPINE_M;
+            for (j, row) in rows.iter_mut().enumerate() {
+                if j as f64 * spacing_m[1] > last_m {
+                    *row = None;
+                }
+            }
+        }
+        Some(Self {
+            first_slice: within.first[2],
+            columns,
+        })
+    }
+
+    /// Whether a voxel of the box is in it.
+    pub fn contains(&self, [i, j, k]: [usize; 3]) -> bool {
+        let rows = &self.columns[k - self.first_slice];
+        rows[j].is_some_and(|[first, last]| (first..=last).contains(&i))
+    }
+}
+
+/// The row where bone begins behind the middle of the space, in the median of the columns there; none where most have none.
+fn front_of_spine(
+    rows: &[Option<[usize; 2]>],
+    bone: impl Fn(usize, usize) -> bool,
+    half_columns: f64,
+    nx: usize,
+) -> Option<usize> {
+    let (mut count, mut across, mut deep) = (0.0, 0.0, 0.0);
+    for (j, row) in rows.iter().enumerate() {
+        if let Some([first, last]) = row {
+            count += 1.0;
+            across += 0.5 * (first + last) as f64;
+            deep += j as f64;
+        }
+    }
+    if count == 0.0 {
+        return None;
+    }
+    let (middle, from) = (across / count, super::steps(deep / count));
+    let first = super::steps((middle - half_columns).max(0.0));
+    let last = super::steps(middle + half_columns).min(nx - 1);
+    let mut found: Vec<usize> = (first..=last)
+        .filter_map(|i| (from..rows.len()).find(|&j| bone(i, j)))
+        .collect();
+    found.sort_unstable();
+    (2 * found.len() > last - first).then(|| found[found.len() / 2])
+}

@@ -1,0 +1,86 @@
+//! The voxels around the target that somebody plans for: they take a second to prepare, and are asked at every drag.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nalgebra::{Point3, UnitVector3};
+use needlebench_routing::{RouteRules, VoxelAnatomy, judge};
+use serde::Serialize;
+
+/// The voxels around the target that was asked about last.
+#[derive(Default)]
+pub(crate) struct LastTarget(Mutex<Option<Arc<Around>>>);
+
+/// What is known around a target.
+pub(crate) struct Around {
+    /// Name of the goal.
+    pub goal: String,
+    /// The target, frame `phantom`, m.
+    pub target: Point3<f64>,
+    /// The voxels.
+    pub anatomy: VoxelAnatomy,
+    /// What they are judged by.
+    pub rules: RouteRules,
+}
+
+/// How the rules of routes judge a needle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Judged {
+    /// It breaks none.
+    pub free: bool,
+    /// The first rule that it breaks, in words.
+    pub broken: Option<&'static str>,
+    /// What that rule finds and wants, in `unit`.
+    pub value: Option<f64>,
+    /// What it may have at most, or has to have at least.
+    pub limit: Option<f64>,
+    /// `m`, `rad` or `1`.
+    pub unit: Option<&'static str>,
+    /// Odds of a pneumothorax against a route with none of the terms.
+    pub odds_ratio: Option<f64>,
+}
+
+impl LastTarget {
+    pub(crate) fn get(&self) -> Option<Arc<Around>> {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+
+    pub(crate) fn keep(&self, around: &Arc<Around>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(around));
+    }
+
+    /// How a needle is judged, if its target is the one that was asked about last.
+    pub(crate) fn judged(
+        &self,
+        goal: &str,
+        target: &Point3<f64>,
+        outwards: &UnitVector3<f64>,
+    ) -> Option<Judged> {
+        let around = self.get()?;
+        if around.goal != goal || (around.target - target).norm() > 1e-9 {
+            return None;
+        }
+        Some(
+            match judge(&around.anatomy, &around.rules, outwards).outcome {
+                Ok(route) => Judged {
+                    free: true,
+                    broken: None,
+                    value: None,
+                    limit: None,
+                    unit: None,
+                    odds_ratio: Some(route.risk.odds_ratio),
+                },
+                Err(refusal) => Judged {
+                    free: false,
+                    broken: Some(refusal.rule.in_words()),
+                    value: Some(refusal.value),
+                    limit: Some(refusal.limit),
+                    unit: Some(refusal.rule.unit()),
+                    odds_ratio: None,
+                },
+            },
+        )
+    }
+}

@@ -1,0 +1,320 @@
+// The entry map: the skin as the target sees it, what forbids a route, how free ones compare, and who serves the best of them.
+'use strict';
+
+PLAN.EntryMap = class {
+  /** `planner` has the needle and is told of entries that are picked. */
+  constructor(planner) {
+    this.planner = planner;
+    this.canvas = NB.el('canvas', {
+      class: 'entry-map', tabindex: '0', role: 'application', hidden: true,
+      'aria-label': 'Entry map: directions from the target to the skin. Arrow keys move a mark over it, Enter takes the entry there.',
+      onclick: (event) => this.clicked(event), onkeydown: (event) => this.key(event),
+      onpointermove: (event) => this.say(this.near(this.pointed(event))),
+    });
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    this.button = NB.el('button', { type: 'button', onclick: () => this.find() }, 'Find routes to the target');
+    this.status = NB.el('p', { class: 'soft', role: 'status', text: 'Judges 20\u202f000 directions by the rules of routes, and asks the robot for the best.' });
+    this.said = NB.el('p', { class: 'entry-said', 'aria-live': 'polite' });
+    this.legend = NB.el('p', { class: 'entry-legend' });
+    this.table = NB.el('div');
+    this.remarks = NB.el('div');
+    this.latest = new PLAN.Latest('entries', (answer, body) => this.answered(answer, body));
+    this.element = NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Entry map' }), NB.el('div', { class: 'tabs no-print' }, this.button), this.status, this.canvas, this.said, this.legend, this.table, this.remarks);
+  }
+
+  /** What the map is of. */
+  static key({ goal, target }) { return JSON.stringify([goal, target]); }
+
+  /** Another needle: a map of another target is no map of this one. */
+  needleChanged() {
+    const { needle } = this.planner.state;
+    this.button.disabled = !needle.target;
+    if (this.of !== undefined && this.of !== PLAN.EntryMap.key(needle)) {
+      this.latest.forget();
+      this.of = undefined;
+      this.plan = null;
+      this.show('The target is another one now.');
+    }
+    this.draw();
+  }
+
+  find() {
+    const { goal, target } = this.planner.state.needle;
+    if (!target) return;
+    this.of = PLAN.EntryMap.key({ goal, target });
+    this.plan = null;
+    this.show('Judging directions ...');
+    this.latest.ask({ aim: { goal, target }, robot: false });
+  }
+
+  answered(answer, body) {
+    if (this.of !== PLAN.EntryMap.key(body.aim)) return;
+    if (answer.problem) this.planner.complain(answer.problem);
+    if (answer.refused) { this.plan = null; this.of = undefined; this.show(`${answer.refused.message}${answer.refused.hint ? ` (${answer.refused.hint})` : ''}`, 'error'); return; }
+    const { plan } = answer;
+    this.plan = plan;
+    this.notes = answer.remarks;
+    const unknown = this.planner.facts.robot_is_unknown;
+    const free = `${plan.free.toLocaleString('en')} of ${plan.tried.toLocaleString('en')} directions are free by the scan\u2019s voxels`;
+    if (!body.robot && !unknown && plan.routes.length) {
+      this.show(`${free}; asking the robot for the best ${plan.routes.length} ...`);
+      this.latest.ask({ aim: body.aim, robot: true });
+    } else if (!plan.routes.length) this.show(`${free}.`);
+    else if (unknown) this.show(`${free}. The robot is not asked: ${unknown}.`);
+    else if (plan.chosen) this.show(`${free}. Route ${plan.chosen.route + 1} is the best that the robot serves in ${plan.wanted} of 8 configurations.`);
+    else this.show(`${free}; none of the best is served by the robot in ${plan.wanted} of 8 configurations.`);
+    // How the needle that is shown is judged is known now.
+    this.planner.askRoute();
+  }
+
+  /** Everything anew. */
+  show(status, kind = 'soft') {
+    this.status.textContent = status;
+    this.status.className = kind;
+    this.canvas.hidden = !this.plan;
+    this.at = null;
+    this.said.textContent = '';
+    this.directions = this.plan ? this.plan.map.azimuth_deg.map((azimuth, index) => [azimuth, this.plan.map.elevation_deg[index]]) : [];
+    this.showLegend();
+    this.showTable();
+    NB.clear(this.remarks, ((this.plan && this.notes) || []).map((remark) => NB.el('p', { class: 'soft', text: `Note: ${remark.message}.` })));
+    this.image = null;
+    this.draw();
+  }
+
+  showLegend() {
+    if (!this.plan) { NB.clear(this.legend); return; }
+    const { rules, free } = this.planner.facts.route_colours;
+    const swatch = (rgb, words) => NB.el('span', { class: 'swatch' }, NB.el('i', { 'data-rgb': rgb.join() }), words);
+    const parts = [swatch(free[0], 'free, least odds'), swatch(free[1], 'twice the odds or more'),
+      ...this.plan.refused.map(({ rule, count }) => swatch(rules[rule]?.[0] ? rules[rule][1] : [0, 0, 0], `${rules[rule]?.[0] || rule} ${count.toLocaleString('en')}`))];
+    NB.clear(this.legend, parts);
+    // Style attributes are not allowed here; the page's own script may set them.
+    for (const mark of this.legend.querySelectorAll('i')) mark.style.background = `rgb(${mark.dataset.rgb})`;
+  }
+
+  // ---- the picture: azimuth to the right, the sine of the elevation up, so that equal areas are equal solid angles
+
+  place([azimuth, elevation]) {
+    const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    return [w * (azimuth + 180) / 360, h * (1 - Math.sin(elevation * Math.PI / 180)) / 2];
+  }
+
+  pointed(event) {
+    const box = this.canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  /** The free direction next to a place of the picture, or else any. */
+  near([x, y]) {
+    if (!this.plan) return null;
+    const { rule } = this.plan.map;
+    let best = null;
+    for (let index = 0; index < this.directions.length; index++) {
+      const [u, v] = this.place(this.directions[index]);
+      const off = Math.hypot(u - x, v - y);
+      // A free one a few pixels away is meant.
+      const worth = rule[index] === null ? off - 3 : off;
+      if (!best || worth < best.worth) best = { index, worth };
+    }
+    return best.index;
+  }
+
+  say(index) {
+    if (index === null || index === undefined) return;
+    const { map } = this.plan;
+    const { rules } = this.planner.facts.route_colours;
+    const [azimuth, elevation] = this.directions[index];
+    const where = `${NB.fixed(Math.abs(azimuth), 0)}\u00b0 to the ${azimuth < 0 ? 'right' : 'left'} of the front, ${NB.fixed(Math.abs(elevation), 0)}\u00b0 ${elevation < 0 ? 'downwards' : 'upwards'}`;
+    const depth = map.depth_m[index] === null ? '' : `, ${NB.mm(map.depth_m[index], 0)} mm deep`;
+    const rule = map.rule[index] === null ? null : map.rules[map.rule[index]];
+    const how = rule === null ? `free, odds \u00d7${NB.fixed(map.odds_ratio[index], 2)}` : `${rules[rule]?.[0] || rule}${this.found(rule, map.value[index], map.limit[index])}`;
+    this.said.textContent = `${where}${depth}: ${how}`;
+  }
+
+  found(rule, value, limit) {
+    if (value === null || !['bone', 'vessel', 'organ', 'throw', 'needle_too_short'].includes(rule)) return '';
+    return rule === 'needle_too_short' ? `, ${NB.mm(value)} mm, the needle reaches ${NB.mm(limit)} mm` : `, ${NB.mm(value)} mm of ${NB.mm(limit)} mm wanted`;
+  }
+
+  clicked(event) { this.take(this.near(this.pointed(event))); }
+
+  key(event) {
+    if (!this.plan) return;
+    const steps = { ArrowLeft: [-2, 0], ArrowRight: [2, 0], ArrowUp: [0, 2], ArrowDown: [0, -2] }[event.key];
+    if (steps) {
+      event.preventDefault();
+      const [azimuth, elevation] = this.at || [0, 0];
+      this.at = [(azimuth + steps[0] + 540) % 360 - 180, Math.min(Math.max(elevation + steps[1], -88), 88)];
+      this.say(this.near(this.place(this.at)));
+      this.draw();
+    } else if ((event.key === 'Enter' || event.key === ' ') && this.at) {
+      event.preventDefault();
+      this.take(this.near(this.place(this.at)));
+    }
+  }
+
+  /** Takes the entry in a direction of the map. */
+  take(index) {
+    if (index === null) return;
+    this.say(index);
+    const depth = this.plan.map.depth_m[index];
+    if (depth === null) return;
+    this.enter(this.directions[index], depth);
+  }
+
+  enter([azimuth, elevation], depth, configuration) {
+    const [a, e] = [azimuth, elevation].map((degrees) => degrees * Math.PI / 180);
+    const outwards = [Math.cos(e) * Math.sin(a), -Math.cos(e) * Math.cos(a), Math.sin(e)];
+    const target = this.plan.target_in_phantom_m.map((value, axis) => value + this.plan.phantom_origin_in_ct_m[axis]);
+    const place_m = target.map((value, axis) => value + depth * outwards[axis]);
+    this.planner.change({ entry: { place_m }, ...(configuration ? { configuration } : {}) });
+    this.planner.look(this.planner.within(this.planner.indexOf(place_m).map(Math.round)));
+  }
+
+  render() {
+    const { map } = this.plan;
+    const { rules, free } = this.planner.facts.route_colours;
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const image = document.createElement('canvas');
+    [image.width, image.height] = [Math.round(w * ratio), Math.round(h * ratio)];
+    const context = image.getContext('2d');
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.fillStyle = '#f7f7f7';
+    context.fillRect(0, 0, w, h);
+    // An even grid: each has the same area, and a little more so that no paper shows.
+    const [across, up] = [1.25 * Math.sqrt(w * h / this.directions.length), 1.25 * Math.sqrt(w * h / this.directions.length)];
+    const least = Math.min(...map.odds_ratio.filter((odds) => odds !== null));
+    const color = (index) => {
+      const rule = map.rule[index];
+      if (rule !== null) return rules[map.rules[rule]]?.[1] || [0, 0, 0];
+      const share = Math.min(Math.max(Math.log2(map.odds_ratio[index] / least), 0), 1);
+      return free[0].map((value, channel) => Math.round(value + (free[1][channel] - value) * share));
+    };
+    // Free ones last: none of them is to be hidden.
+    for (const freeOnes of [false, true]) {
+      this.directions.forEach((direction, index) => {
+        if ((map.rule[index] === null) !== freeOnes) return;
+        const [x, y] = this.place(direction);
+        context.fillStyle = `rgb(${color(index).join()})`;
+        context.fillRect(x - across / 2, y - up / 2, across, up);
+      });
+    }
+    return image;
+  }
+
+  draw() {
+    const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (!this.plan || !w || !h) return;
+    const size = `${w} ${h}`;
+    if (!this.image || this.drawn !== size) { this.image = this.render(); this.drawn = size; }
+    [this.canvas.width, this.canvas.height] = [this.image.width, this.image.height];
+    const context = this.canvas.getContext('2d');
+    context.drawImage(this.image, 0, 0);
+    const ratio = this.image.width / w;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.font = '12px system-ui, sans-serif';
+    const write = (words, x, y, align = 'center') => {
+      context.textAlign = align;
+      context.textBaseline = 'middle';
+      context.lineWidth = 3;
+      context.strokeStyle = 'rgba(255, 255, 255, 0.9)';
+      context.strokeText(words, x, y);
+      context.fillStyle = '#000';
+      context.fillText(words, x, y);
+    };
+    for (const [azimuth, letter] of [[-90, 'R'], [0, 'A'], [90, 'L']]) write(letter, this.place([azimuth, 0])[0], h - 9);
+    write('P', 7, h - 9);
+    write('P', w - 7, h - 9);
+    write('S', 7, 10);
+    write('I', 7, h - 24);
+    this.plan.routes.slice(0, 8).map((route, index) => [route, index]).reverse().forEach(([route, index]) => this.ring(context, this.place(route.direction_deg), String(index + 1), write));
+    const { chosen } = this.plan;
+    if (chosen && chosen.route >= 8) this.ring(context, this.place(this.plan.routes[chosen.route].direction_deg), String(chosen.route + 1), write);
+    const { route } = this.planner;
+    if (route) {
+      const way = route.entry_m.map((value, axis) => value - route.target_m[axis]);
+      const at = this.place([Math.atan2(way[0], -way[1]) * 180 / Math.PI, Math.atan2(way[2], Math.hypot(way[0], way[1])) * 180 / Math.PI]);
+      this.cross(context, at, '#000', PLAN.COLORS.needle);
+    }
+    if (this.at) this.cross(context, this.place(this.at), '#fff', '#000');
+  }
+
+  ring(context, [x, y], words, write) {
+    context.strokeStyle = '#000';
+    context.lineWidth = 1.5;
+    context.beginPath();
+    context.arc(x, y, 4, 0, 2 * Math.PI);
+    context.stroke();
+    write(words, x + 10, y - 6);
+  }
+
+  cross(context, [x, y], outer, inner) {
+    for (const [style, width] of [[outer, 5], [inner, 2.5]]) {
+      context.strokeStyle = style;
+      context.lineWidth = width;
+      context.beginPath();
+      context.moveTo(x - 7, y);
+      context.lineTo(x + 7, y);
+      context.moveTo(x, y - 7);
+      context.lineTo(x, y + 7);
+      context.stroke();
+    }
+  }
+
+  /** Free entries near a slice, as dots: `draw(index, best)`. */
+  entriesNear(axis, slice, within_mm, draw) {
+    if (!this.plan) return;
+    const { map } = this.plan;
+    if (!this.free) {
+      const target = this.plan.target_in_phantom_m.map((value, k) => value + this.plan.phantom_origin_in_ct_m[k]);
+      const least = Math.min(...map.odds_ratio.filter((odds) => odds !== null));
+      this.free = [];
+      this.directions.forEach(([azimuth, elevation], index) => {
+        if (map.rule[index] !== null) return;
+        const [a, e] = [azimuth, elevation].map((degrees) => degrees * Math.PI / 180);
+        const outwards = [Math.cos(e) * Math.sin(a), -Math.cos(e) * Math.cos(a), Math.sin(e)];
+        const place = target.map((value, k) => value + map.depth_m[index] * outwards[k]);
+        this.free.push({ index: this.planner.indexOf(place), worse: Math.min(Math.max(Math.log2(map.odds_ratio[index] / least), 0), 1) });
+      });
+    }
+    const spacing = 1e3 * this.planner.facts.spacing_m[axis];
+    for (const entry of this.free) if (Math.abs(entry.index[axis] - slice) * spacing <= within_mm) draw(entry.index, entry.worse);
+  }
+
+  // ---- the best routes
+
+  showTable() {
+    this.free = null;
+    const { plan } = this;
+    if (!plan || !plan.routes.length) { NB.clear(this.table); return; }
+    const chosen = plan.chosen?.route;
+    const shown = plan.routes.map((route, index) => ({ route, index })).filter(({ index }) => index < 8 || index === chosen);
+    const best = ({ route }) => route.configurations.find(({ label }) => label === route.best);
+    const asked = plan.routes.some(({ configurations }) => configurations.length);
+    const margin = (route, obstacle) => {
+      const at = route.margins.findIndex((each) => each.obstacle === obstacle);
+      if (!plan.margins[at].known) return 'not labelled';
+      const { part, distance_m } = route.margins[at];
+      return part === null || distance_m === null ? 'far' : NB.mm(distance_m);
+    };
+    const columns = [
+      { title: 'Route', cell: ({ route, index }) => NB.el('button', { type: 'button', onclick: () => this.enter(route.direction_deg, route.depth_m, route.best) }, `Take ${index + 1}${index === chosen ? ' (chosen)' : ''}`) },
+      { title: 'Deep', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(route.depth_m, 0) },
+      { title: 'In lung', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(route.depth_in_lung_m, 0) },
+      { title: 'Odds', numeric: true, cell: ({ route }) => `\u00d7${NB.fixed(route.risk.odds_ratio, 2)}` },
+      ...['bone', 'vessel', 'organ'].map((obstacle) => ({ title: NB.words(obstacle), unit: 'mm', numeric: true, cell: ({ route }) => margin(route, obstacle) })),
+    ];
+    if (asked) {
+      columns.push(
+        { title: 'Works', unit: 'of 8', numeric: true, cell: ({ route }) => String(route.working) },
+        { title: 'Best', cell: (row) => row.route.best || '\u2013' },
+        { title: 'Clear', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.clearance_m) },
+        { title: 'Error across', unit: 'mm rms', numeric: true, cell: (row) => NB.mm(best(row)?.error?.target_lateral_rms_m) },
+        { title: 'Room', unit: '%', numeric: true, cell: (row) => (best(row)?.free_fraction === undefined || best(row)?.free_fraction === null ? '\u2013' : NB.fixed(100 * best(row).free_fraction, 0)) });
+    }
+    NB.clear(this.table, NB.table('Routes that stand for those around them, the best first', columns, shown, { class: 'small' }),
+      NB.el('p', { class: 'soft', text: 'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Bone, vessel, organ: lower bounds of the needle\u2019s distance. Postures only, motions are not planned. Room: what arm and tool leave free of the half ball of 0.35 m about the entry.' }));
+  }
+};

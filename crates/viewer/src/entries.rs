@@ -1,0 +1,106 @@
+//! Entries for a target: every direction judged by the rules of routes, and the best of them with the robot.
+//!
+//! The same code as `needlebench ct routes`, with the same numbers.
+
+use std::sync::Arc;
+
+use needlebench_bench::Control;
+use needlebench_bench::routes::{
+    RoutePlan, RouteTask, VOXEL_DIRECTIONS, VoxelsError, WithRobot, plan_routes,
+};
+use needlebench_bench::suggest::SuggestError;
+use needlebench_cell::scenario::{GoalSection, RouteSection};
+use needlebench_imaging::{ImagingError, Remark};
+use serde::Serialize;
+
+use crate::around::Around;
+use crate::case::Case;
+use crate::live::{GoalAim, Refusal};
+
+/// Routes to a target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Entries {
+    /// As in `routes.json`.
+    pub plan: RoutePlan,
+    /// What is worth knowing of the label map.
+    pub remarks: Vec<Remark>,
+}
+
+fn rules_of<'a>(
+    case: &'a Case,
+    section: &GoalSection,
+    usual: &'a RouteSection,
+) -> &'a RouteSection {
+    let own = case.goals().iter().find(|goal| goal.name == section.name);
+    own.and_then(|goal| goal.route.as_ref()).unwrap_or(usual)
+}
+
+/// Plans the routes to a target, with the robot or without.
+///
+/// # Errors
+/// A target that is none, or is not in the body; `None` if it was interrupted.
+pub fn entries(
+    case: &Case,
+    aim: &GoalAim,
+    with_robot: bool,
+    control: &Control<'_>,
+) -> Result<Option<Entries>, Refusal> {
+    let section = aim.section(case)?;
+    let usual = RouteSection::default();
+    let task = RouteTask {
+        resolved: case.desk().scenario(),
+        section: &section,
+        rules: rules_of(case, &section, &usual),
+        robot: match case.built().not_registered() {
+            _ if !with_robot => WithRobot::No("not asked yet".to_owned()),
+            Some(why) => WithRobot::No(why.to_owned()),
+            None => WithRobot::Yes,
+        },
+        directions: VOXEL_DIRECTIONS,
+    };
+    let around = match around(case, &task, &section, control) {
+        Ok(around) => around,
+        Err(VoxelsError::Scan(ImagingError::Interrupted)) => return Ok(None),
+        Err(VoxelsError::Scan(ImagingError::Refused { message, hint, .. })) => {
+            return Err(Refusal { message, hint });
+        }
+        Err(VoxelsError::Target(finding)) => return Err(finding.into()),
+    };
+    match plan_routes(&task, &around.anatomy, control) {
+        Ok(mut plan) => {
+            plan.phantom_origin_in_ct_m = Some(case.built().origin_in_ct_m().into());
+            Ok(Some(Entries {
+                plan,
+                remarks: around.anatomy.remarks().to_vec(),
+            }))
+        }
+        Err(SuggestError::Interrupted) => Ok(None),
+        Err(SuggestError::Refused { message, hint }) => Err(Refusal::new(message, &hint)),
+    }
+}
+
+/// The voxels around a target: those of the last question if it was about the same.
+fn around(
+    case: &Case,
+    task: &RouteTask<'_>,
+    section: &GoalSection,
+    control: &Control<'_>,
+) -> Result<Arc<Around>, VoxelsError> {
+    let target = case.desk().placer().target(section)?;
+    let rules = task.route_rules();
+    let known = case.last_target().get();
+    let known = known.filter(|it| {
+        it.goal == section.name && (it.target - target).norm() < 1e-9 && it.rules == rules
+    });
+    if let Some(known) = known {
+        return Ok(known);
+    }
+    let made = Arc::new(Around {
+        goal: section.name.clone(),
+        target,
+        anatomy: task.voxels(case.built(), control)?,
+        rules,
+    });
+    case.last_target().keep(&made);
+    Ok(made)
+}
