@@ -62,7 +62,7 @@ async function open(url, browser = running, size = { width: 1600, height: 1000 }
   return { page, problems };
 }
 
-const settled = (page) => page.waitForFunction(() => document.querySelector('.bar > .soft').textContent === 'kept' && !PLAN.planner.quick.busy && !PLAN.planner.exact.busy && !PLAN.planner.planned.busy && !PLAN.planner.where.busy);
+const settled = (page) => page.waitForFunction(() => document.querySelector('.bar > .soft').textContent === 'kept' && !PLAN.planner.quick.busy && !PLAN.planner.bounds.busy && !PLAN.planner.exact.busy && !PLAN.planner.entryMap.latest.busy && !PLAN.planner.planned.busy && !PLAN.planner.where.busy);
 const report = JSON.parse(readFileSync(join(folder, 'report.json'), 'utf8'));
 const millimetres = (index) => index.map((value, axis) => 1e3 * (report.first_voxel_m[axis] + report.spacing_m[axis] * value));
 const entry = entryMm.split(',').map((mm, axis) => Math.round((1e-3 * mm - report.first_voxel_m[axis]) / report.spacing_m[axis]));
@@ -207,6 +207,9 @@ await settled(page);
 assert.ok(waits.length > 10, `${waits.length} answers to a drag`);
 const [median, p95] = [waits[Math.floor(waits.length / 2)], waits[Math.floor(0.95 * waits.length)]];
 console.log(`drag to numbers: median ${median.toFixed(1)} ms, 95 % ${p95.toFixed(1)} ms, of ${waits.length}`);
+const reach = await page.evaluate(() => [...PLAN.planner.reachWaits].sort((a, b) => a - b));
+assert.ok(reach.length > 2, `${reach.length} answers of the robot to a drag`);
+console.log(`drag to configurations: median ${reach[Math.floor(reach.length / 2)].toFixed(1)} ms, 95 % ${reach[Math.floor(0.95 * reach.length)].toFixed(1)} ms, of ${reach.length}`);
 if (marks) assert.ok(median < MARKS.median && p95 < MARKS.p95, 'numbers come late');
 await page.getByRole('button', { name: 'Keep this route' }).click();
 await page.waitForFunction(() => document.querySelectorAll('table.route thead th').length >= 5);
@@ -235,6 +238,73 @@ await page.waitForFunction(() => /target/.test(document.querySelector('.side .er
 assert.ok(await page.getByRole('button', { name: 'Save plan' }).isDisabled());
 await page.keyboard.press('Control+z');
 await settled(page);
+
+// The entry map: what it says is free is free voxel by voxel, and a click on it is an entry.
+const find = page.getByRole('button', { name: 'Find routes to the target' });
+const asked = Date.now();
+await find.click();
+await page.waitForFunction(() => PLAN.planner.entryMap.plan?.map, null, { timeout: 120_000 });
+console.log(`entry map after ${Date.now() - asked} ms`);
+await page.waitForFunction(() => PLAN.planner.entryMap.plan?.routes.some(({ configurations }) => configurations.length), null, { timeout: 120_000 });
+console.log(`routes with the robot after ${Date.now() - asked} ms`);
+await settled(page);
+const labels = new Uint16Array(await page.evaluate(async () => [...new Uint16Array(await (await PLAN.fetch('labels')).arrayBuffer())]));
+const plan = await page.evaluate(() => PLAN.planner.entryMap.plan);
+const names = Object.fromEntries(JSON.parse(readFileSync(join(folder, 'labels.json'), 'utf8')).labels.map(({ label, name }) => [label, name]));
+const outwards = ([azimuth, elevation]) => {
+  const [a, e] = [azimuth, elevation].map((degrees) => degrees * Math.PI / 180);
+  return [Math.cos(e) * Math.sin(a), -Math.cos(e) * Math.cos(a), Math.sin(e)];
+};
+/** What a needle passes, in steps of a tenth of a millimetre, from the skin to the target. */
+function passed(direction, depth_m) {
+  const found = [];
+  const way = outwards(direction);
+  for (let along = depth_m - 1e-3; along >= 0; along -= 1e-4) {
+    const index = plan.target_in_phantom_m.map((value, axis) => Math.round((value + plan.phantom_origin_in_ct_m[axis] + along * way[axis] - report.first_voxel_m[axis]) / report.spacing_m[axis]));
+    const label = labels[(index[2] * size[1] + index[1]) * size[0] + index[0]];
+    const name = label ? names[label] : 'outside';
+    if (found.at(-1) !== name) found.push(name);
+  }
+  return found;
+}
+const passable = new Set(['soft_tissue', 'lung_left', 'lung_right', 'lung_vessels', 'outside', ...report.lesions.map(({ name }) => name)]);
+const isFree = plan.map.rule.map((rule) => rule === null);
+const freeOnes = isFree.flatMap((is, index) => (is ? [index] : []));
+assert.ok(freeOnes.length === plan.free && plan.free > 20, `${freeOnes.length} free, ${plan.free} said`);
+for (const index of freeOnes) {
+  const way = passed([plan.map.azimuth_deg[index], plan.map.elevation_deg[index]], plan.map.depth_m[index]);
+  for (const name of way) assert.ok(passable.has(name), `direction ${index} goes through ${name}: ${way}`);
+  // Lung and what is in it, from the first lung on.
+  const inside = way.map((name) => name !== 'soft_tissue' && name !== 'outside');
+  assert.ok(inside.filter((is, at) => is && !inside[at - 1]).length <= 1, `direction ${index} enters lungs more than once: ${way}`);
+}
+const picked = freeOnes[Math.floor(freeOnes.length / 2)];
+const map = page.locator('canvas.entry-map');
+await map.scrollIntoViewIfNeeded();
+const [mapX, mapY] = await page.evaluate((index) => PLAN.planner.entryMap.place(PLAN.planner.entryMap.directions[index]), picked);
+await map.click({ position: { x: mapX, y: mapY } });
+await settled(page);
+const fromMap = await page.evaluate(() => PLAN.planner.route);
+assert.equal(fromMap.judged?.free, true, JSON.stringify(fromMap.judged));
+const turned = outwards([plan.map.azimuth_deg[picked], plan.map.elevation_deg[picked]]).reduce((sum, value, axis) => sum + value * (fromMap.entry_m[axis] - fromMap.target_m[axis]) / fromMap.length_m, 0);
+assert.ok(turned > Math.cos(3 * Math.PI / 180), 'the entry is where the map was clicked');
+assert.match(await page.innerText('.side'), /By the rules of routes\s+free, odds/);
+await page.screenshot({ path: join(out, 'view-entry-map.png') });
+// Without a mouse.
+await map.focus();
+await page.keyboard.press('ArrowRight');
+assert.match(await page.innerText('.entry-said'), /of the front/);
+// The route that the plan chooses, with its configuration; it is the one of `ct routes`.
+assert.ok(plan.chosen, 'no route is chosen');
+await page.getByRole('button', { name: '(chosen)' }).click();
+await settled(page);
+const best = plan.routes[plan.chosen.route];
+assert.equal(await page.evaluate(() => PLAN.planner.state.needle.configuration), best.best);
+const reached = await page.evaluate(() => PLAN.planner.reach.preview.configurations);
+for (const each of best.configurations.filter(({ works }) => works)) assert.ok(reached.find(({ label }) => label === each.label).works, `${each.label} works on the route and not here`);
+const chosenRoute = await page.evaluate(() => PLAN.planner.route);
+assert.ok(Math.abs(chosenRoute.in_lung_m - best.depth_in_lung_m) < 2e-3 && chosenRoute.lung_entries === best.pleural_crossings, `in lung ${chosenRoute.in_lung_m} here, ${best.depth_in_lung_m} there`);
+assert.ok(Math.abs(chosenRoute.length_m - best.depth_m) < 3e-3, `${chosenRoute.length_m} deep to the surface, ${best.depth_m} to the voxels`);
 
 // Notes; a second tab that changes the same session is told.
 await page.getByRole('textbox', { name: 'Notes' }).fill('breath held');

@@ -89,15 +89,17 @@ pub fn search(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Searched {
     let directions: Vec<UnitVector3<f64>> = evenly(count).collect();
+    let order = neighbours_together(&directions);
     let each = directions.len().div_ceil(threads.max(1)).max(1);
-    let candidates = std::thread::scope(|scope| {
-        let parts: Vec<_> = directions
+    let mut judged: Vec<(usize, Candidate)> = std::thread::scope(|scope| {
+        let directions = &directions;
+        let parts: Vec<_> = order
             .chunks(each)
             .map(|part| {
                 scope.spawn(move || {
                     let go_on = part.iter().take_while(|_| !stop());
                     go_on
-                        .map(|outwards| judge(anatomy, rules, outwards))
+                        .map(|&index| (index, judge(anatomy, rules, &directions[index])))
                         .collect::<Vec<_>>()
                 })
             })
@@ -110,7 +112,31 @@ pub fn search(
             })
             .collect()
     });
-    Searched { candidates }
+    judged.sort_by_key(|(index, _)| *index);
+    Searched {
+        candidates: judged.into_iter().map(|(_, candidate)| candidate).collect(),
+    }
+}
+
+/// Indices of directions so that each stands beside its neighbours: rays that are close by look at the same voxels, which
+/// are in the cache then.
+fn neighbours_together(directions: &[UnitVector3<f64>]) -> Vec<usize> {
+    /// Bands from pole to pole: some 3 deg wide.
+    const BANDS: f64 = 60.0;
+    let mut keyed: Vec<(i64, f64, usize)> = directions
+        .iter()
+        .enumerate()
+        .map(|(index, direction)| {
+            let [azimuth, elevation] = crate::angles_rad(direction);
+            #[expect(clippy::cast_possible_truncation, reason = "a few dozen")]
+            let band = (elevation / std::f64::consts::PI * BANDS).floor() as i64;
+            // To and fro, so that a band begins where the last one ended.
+            let along = if band % 2 == 0 { azimuth } else { -azimuth };
+            (band, along, index)
+        })
+        .collect();
+    keyed.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+    keyed.into_iter().map(|(.., index)| index).collect()
 }
 
 /// Judges one direction.

@@ -89,6 +89,8 @@ struct App {
     token: Token,
     results: Token,
     quick: Turns,
+    /// Of the robot while somebody drags: beside the needle's own numbers, never before them.
+    quick_reach: Turns,
     exact: Turns,
 }
 
@@ -117,6 +119,7 @@ impl Server {
             token: Token::new()?,
             results: Token::new()?,
             quick: Turns::new(threads),
+            quick_reach: Turns::new(1),
             exact: Turns::new(threads),
             case: Arc::new(case),
         };
@@ -470,7 +473,7 @@ async fn reach(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answe
     let question: Question = read(body)?;
     let case = Arc::clone(&app.case);
     let (turns, kind) = if question.quick {
-        (&app.quick, "quick reach")
+        (&app.quick_reach, "quick reach")
     } else {
         (&app.exact, "reach")
     };

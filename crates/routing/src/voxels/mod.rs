@@ -21,8 +21,11 @@ use mediastinum::Mediastinum;
 /// Distances beyond this are told as this, m: no margin asks for more.
 const CAP_M: f64 = 20e-3;
 
-/// Least step along a ray, m: half of it is taken off what is found between two places.
+/// Places on a ray that are nearer than this are not told apart, m: half of it is taken off what is found.
 const STEP_M: f64 = 0.25e-3;
+
+/// Distance of places on a ray that are looked at in any case, m.
+const COARSE_M: f64 = 4e-3;
 
 /// Radius about a place of a surface within which its normal is found, m.
 const NORMAL_RADIUS_M: f64 = 6e-3;
@@ -53,6 +56,11 @@ const SOFT: [&str; 8] = [
     "tissue",
     "breast",
 ];
+
+/// Of two places with their distances the nearer one.
+fn nearer(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+    if b.1 < a.1 { b } else { a }
+}
 
 fn is_soft(name: &str) -> bool {
     let lower = name.to_lowercase();
@@ -373,6 +381,15 @@ impl VoxelAnatomy {
         let least = GAS_M3 / spacing_m.iter().product::<f64>();
         organs.unite(&pockets.mask_of(|part| pockets.parts()[part].voxels as f64 >= least));
         let part_grid = self.part_grid()?;
+        // Distances are asked for as far as the needle reaches; beyond, where the guide is, labels are enough.
+        let at = self.index_of(&self.target);
+        let at = [0, 1, 2].map(|axis| steps(at[axis]).saturating_sub(self.within.first[axis]));
+        let reach = [0, 1, 2].map(|axis| steps(options.needle_m / spacing_m[axis]) + 2);
+        let near = IndexBox {
+            first: at,
+            last: at,
+        }
+        .widened(reach, self.within.size());
         let distance = DistanceOptions {
             cap_m: CAP_M,
             threads: options.threads,
@@ -380,8 +397,7 @@ impl VoxelAnatomy {
         };
         for (obstacle, mask) in Obstacle::ALL.into_iter().zip([bone, vessels, organs]) {
             if !mask.is_empty() && !is_off(obstacle) {
-                let whole = IndexBox::whole(mask.size());
-                let field = DistanceField::to_boxes(&part_grid, &mask, whole, &distance)?;
+                let field = DistanceField::to_boxes(&part_grid, &mask, near, &distance)?;
                 self.fields[obstacle as usize] = Some(field);
             }
         }
@@ -439,6 +455,9 @@ impl VoxelAnatomy {
                 pace_m[axis] = 1.0 / rate.abs();
             }
         }
+        let [nx, ny, _] = self.within.size();
+        let strides = [1, nx, nx * ny];
+        let mut offset = self.offset(voxel);
         let mut here_m = from_m;
         loop {
             let axis = (0..3).fold(0, |best, axis| {
@@ -449,9 +468,7 @@ impl VoxelAnatomy {
                 }
             });
             let leaves_m = next_m[axis].min(to_m);
-            if !visit(self.voxels[self.offset(voxel)], [here_m, leaves_m], voxel)
-                || leaves_m >= to_m
-            {
+            if !visit(self.voxels[offset], [here_m, leaves_m], voxel) || leaves_m >= to_m {
                 return true;
             }
             here_m = leaves_m;
@@ -462,17 +479,24 @@ impl VoxelAnatomy {
                     return false;
                 }
                 voxel[axis] += 1;
+                offset += strides[axis];
             } else {
                 if voxel[axis] == ends[0] {
                     return false;
                 }
                 voxel[axis] -= 1;
+                offset -= strides[axis];
             }
         }
     }
 
     /// Outward normal of a set of voxels near a place: away from where it is around it.
     fn normal_near(&self, at: &Point3<f64>, is_inside: impl Fn(Kind) -> bool) -> UnitVector3<f64> {
+        let inside: Vec<bool> = self
+            .classes
+            .all()
+            .map(|class| is_inside(class.kind))
+            .collect();
         let centre = self.index_of(at);
         let mut sum = Vector3::zeros();
         let range = |axis: usize| {
@@ -480,20 +504,22 @@ impl VoxelAnatomy {
             let [first, last] = [self.within.first[axis], self.within.last[axis]];
             steps(centre[axis] - reach).max(first)..=steps(centre[axis] + reach + 1.0).min(last)
         };
+        let step = self.grid.steps_m();
+        let along = |axis: usize, index: usize| (index as f64 - centre[axis]) * step.column(axis);
         for k in range(2) {
+            let slice = along(2, k);
             for j in range(1) {
-                for i in range(0) {
-                    let place = self
-                        .grid
-                        .ct_from_index(&Point3::new(i as f64, j as f64, k as f64));
-                    let away = place - (at + self.origin_in_ct_m);
-                    if away.norm() <= NORMAL_RADIUS_M {
-                        let side = if is_inside(self.kind_at([i, j, k])) {
-                            -1.0
-                        } else {
-                            1.0
-                        };
-                        sum += side * away;
+                let row = slice + along(1, j);
+                let (columns, from) = (range(0), *range(0).start());
+                if columns.is_empty() {
+                    continue;
+                }
+                let offset = self.offset([from, j, k]);
+                for i in columns {
+                    let away = row + along(0, i);
+                    if away.norm_squared() <= NORMAL_RADIUS_M * NORMAL_RADIUS_M {
+                        let is_inside = inside[usize::from(self.voxels[offset + i - from])];
+                        sum += if is_inside { -away } else { away };
                     }
                 }
             }
@@ -502,6 +528,10 @@ impl VoxelAnatomy {
     }
 
     /// Least value of a field along a stretch, and where: a lower bound.
+    ///
+    /// No distance changes by more than the way. Between two places so far apart as `l` none is therefore less than half of
+    /// what their distances have together beyond `l`; where that could be less than what is known, it is looked at in
+    /// the middle, down to [`STEP_M`], half of which is taken off.
     fn least_along(
         &self,
         field: &DistanceField,
@@ -510,19 +540,38 @@ impl VoxelAnatomy {
     ) -> (f64, f64) {
         let line = self.line(ray);
         let first = Vector3::from(self.within.first.map(|index| index as f64));
-        let (mut least_m, mut where_m) = (f64::INFINITY, from_m);
-        let mut along_m = from_m;
-        loop {
-            let here_m = field.at_least_of_index(&(line.at(along_m) - first));
-            if here_m < least_m {
-                (least_m, where_m) = (here_m, along_m);
-            }
-            if along_m >= to_m {
-                return (least_m - 0.5 * STEP_M - self.mask_error_m, where_m);
-            }
-            // Nothing nearer than what is known can come within the difference.
-            along_m = (along_m + (here_m - least_m).max(STEP_M)).min(to_m);
+        let at = |along_m: f64| {
+            (
+                along_m,
+                field.at_least_of_index(&(line.at(along_m) - first)),
+            )
+        };
+        let count = ((to_m - from_m) / COARSE_M).ceil().max(1.0);
+        let mut places = Vec::with_capacity(steps(count) + 1);
+        let mut step = 0.0;
+        while step <= count {
+            places.push(at(from_m + (to_m - from_m) * step / count));
+            step += 1.0;
         }
+        let mut least = places.iter().copied().fold((from_m, f64::INFINITY), nearer);
+        // The last ones first.
+        let mut left: Vec<[(f64, f64); 2]> =
+            places.windows(2).map(|two| [two[0], two[1]]).collect();
+        while let Some([a, b]) = left.pop() {
+            let apart_m = b.0 - a.0;
+            if apart_m <= STEP_M || 0.5 * (a.1 + b.1 - apart_m) >= least.1 {
+                continue;
+            }
+            let middle = at(0.5 * (a.0 + b.0));
+            least = nearer(least, middle);
+            left.push([a, middle]);
+            left.push([middle, b]);
+            if a.1 < b.1 {
+                let last = left.len() - 1;
+                left.swap(last - 1, last);
+            }
+        }
+        (least.1 - 0.5 * STEP_M - self.mask_error_m, least.0)
     }
 
     /// Name of the structure of an obstacle that is nearest to a place.

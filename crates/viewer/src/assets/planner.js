@@ -23,12 +23,13 @@ PLAN.Planner = class {
     if (session.version === 0) this.state.needle = this.firstNeedle();
     this.greys = PLAN.greys(this.state.window_hu);
     this.quick = new PLAN.Latest('route', (answer, body, took) => this.routed(answer, body, took));
-    this.bounds = new PLAN.Latest('reach', (answer, body) => this.bounded(answer, body));
+    this.bounds = new PLAN.Latest('reach', (answer, body, took) => this.bounded(answer, body, took));
     this.exact = new PLAN.Latest('reach', (answer) => this.reached(answer));
     this.entryMap = new PLAN.EntryMap(this);
     this.planned = new PLAN.Latest('motion', (answer, body) => this.moved(answer, body));
     this.where = new PLAN.Latest('place', (answer) => this.placed(answer));
     this.latencies = [];
+    this.reachWaits = [];
     this.build();
   }
 
@@ -177,7 +178,7 @@ PLAN.Planner = class {
     this.keepSoon();
   }
 
-  beginDrag() { this.remember(); this.dragging = true; this.latencies = []; }
+  beginDrag() { this.remember(); this.dragging = true; this.latencies = []; this.reachWaits = []; }
 
   drag(what, index) {
     this.state.needle = { ...this.state.needle, [what]: { index } };
@@ -245,7 +246,8 @@ PLAN.Planner = class {
     } else { this.bounds.forget(); this.exact.forget(); this.reach = null; this.showReach(); }
   }
 
-  bounded(answer, body) {
+  bounded(answer, body, took) {
+    if (this.dragging) this.reachWaits.push(took);
     this.reached(answer);
     if (!this.dragging && this.aim() && !answer.problem) this.exact.ask({ aim: body.aim });
   }
