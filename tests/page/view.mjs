@@ -238,12 +238,13 @@ await page.waitForFunction(() => /target/.test(document.querySelector('.side .er
 assert.ok(await page.getByRole('button', { name: 'Save plan' }).isDisabled());
 await page.keyboard.press('Control+z');
 await settled(page);
+assert.ok(await page.evaluate((name) => PLAN.planner.state.needle.target.lesion === name && PLAN.planner.route, lesion), 'undo brings the target back, with a checkbox in focus, too');
 
 // The entry map: what it says is free is free voxel by voxel, and a click on it is an entry.
 const find = page.getByRole('button', { name: 'Find routes to the target' });
 const asked = Date.now();
 await find.click();
-await page.waitForFunction(() => PLAN.planner.entryMap.plan?.map, null, { timeout: 120_000 });
+await page.waitForFunction(() => PLAN.planner.entryMap.plan?.map, null, { timeout: 60_000 });
 console.log(`entry map after ${Date.now() - asked} ms`);
 await page.waitForFunction(() => PLAN.planner.entryMap.plan?.routes.some(({ configurations }) => configurations.length), null, { timeout: 120_000 });
 console.log(`routes with the robot after ${Date.now() - asked} ms`);
@@ -273,9 +274,10 @@ const freeOnes = isFree.flatMap((is, index) => (is ? [index] : []));
 assert.ok(freeOnes.length === plan.free && plan.free > 20, `${freeOnes.length} free, ${plan.free} said`);
 for (const index of freeOnes) {
   const way = passed([plan.map.azimuth_deg[index], plan.map.elevation_deg[index]], plan.map.depth_m[index]);
-  for (const name of way) assert.ok(passable.has(name), `direction ${index} goes through ${name}: ${way}`);
+  // Noise at the skin makes pockets of a few voxels.
+  for (const name of way[0] === 'gas' ? way.slice(1) : way) assert.ok(passable.has(name), `direction ${index} goes through ${name}: ${way}`);
   // Lung and what is in it, from the first lung on.
-  const inside = way.map((name) => name !== 'soft_tissue' && name !== 'outside');
+  const inside = way.map((name) => !['soft_tissue', 'outside', 'gas'].includes(name));
   assert.ok(inside.filter((is, at) => is && !inside[at - 1]).length <= 1, `direction ${index} enters lungs more than once: ${way}`);
 }
 const picked = freeOnes[Math.floor(freeOnes.length / 2)];

@@ -3,5 +3,6 @@
 mod further_engine;
 #[path = "../../../engine/tests/engine/common/replay.rs"]
 mod replay;
+mod routes;
 mod study_cases;
 mod suggest;

@@ -14,10 +14,10 @@ PLAN.EntryMap = class {
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.button = NB.el('button', { type: 'button', onclick: () => this.find() }, 'Find routes to the target');
     this.status = NB.el('p', { class: 'soft', role: 'status', text: 'Judges 20\u202f000 directions by the rules of routes, and asks the robot for the best.' });
-    this.said = NB.el('p', { class: 'entry-said', 'aria-live': 'polite' });
+    this.said = NB.el('p', { class: 'entry-said no-print', 'aria-live': 'polite' });
     this.legend = NB.el('p', { class: 'entry-legend' });
-    this.table = NB.el('div');
-    this.remarks = NB.el('div');
+    this.table = NB.el('div', { class: 'no-print' });
+    this.remarks = NB.el('div', { class: 'no-print' });
     this.latest = new PLAN.Latest('entries', (answer, body) => this.answered(answer, body));
     this.element = NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Entry map' }), NB.el('div', { class: 'tabs no-print' }, this.button), this.status, this.canvas, this.said, this.legend, this.table, this.remarks);
   }
@@ -85,7 +85,7 @@ PLAN.EntryMap = class {
   showLegend() {
     if (!this.plan) { NB.clear(this.legend); return; }
     const { rules, free } = this.planner.facts.route_colours;
-    const swatch = (rgb, words) => NB.el('span', { class: 'swatch' }, NB.el('i', { 'data-rgb': rgb.join() }), words);
+    const swatch = (rgb, words) => NB.el('span', { class: 'entry-swatch' }, NB.el('i', { 'data-rgb': rgb.join() }), words);
     const parts = [swatch(free[0], 'free, least odds'), swatch(free[1], 'twice the odds or more'),
       ...this.plan.refused.map(({ rule, count }) => swatch(rules[rule]?.[0] ? rules[rule][1] : [0, 0, 0], `${rules[rule]?.[0] || rule} ${count.toLocaleString('en')}`))];
     NB.clear(this.legend, parts);
@@ -293,28 +293,27 @@ PLAN.EntryMap = class {
     const shown = plan.routes.map((route, index) => ({ route, index })).filter(({ index }) => index < 8 || index === chosen);
     const best = ({ route }) => route.configurations.find(({ label }) => label === route.best);
     const asked = plan.routes.some(({ configurations }) => configurations.length);
-    const margin = (route, obstacle) => {
-      const at = route.margins.findIndex((each) => each.obstacle === obstacle);
-      if (!plan.margins[at].known) return 'not labelled';
-      const { part, distance_m } = route.margins[at];
-      return part === null || distance_m === null ? 'far' : NB.mm(distance_m);
+    const nearest = (route) => {
+      const known = route.margins.filter(({ part, distance_m }) => part !== null && distance_m !== null);
+      const least = known.reduce((best, each) => (!best || each.distance_m < best.distance_m ? each : best), null);
+      return least ? `${NB.mm(least.distance_m)} ${NB.words(least.obstacle)}` : 'far';
     };
     const columns = [
-      { title: 'Route', cell: ({ route, index }) => NB.el('button', { type: 'button', onclick: () => this.enter(route.direction_deg, route.depth_m, route.best) }, `Take ${index + 1}${index === chosen ? ' (chosen)' : ''}`) },
+      { title: 'Route', cell: ({ route, index }) => NB.el('button', { type: 'button', title: route.best || '', onclick: () => this.enter(route.direction_deg, route.depth_m, route.best) }, `Take ${index + 1}${index === chosen ? ' (chosen)' : ''}`) },
       { title: 'Deep', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(route.depth_m, 0) },
-      { title: 'In lung', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(route.depth_in_lung_m, 0) },
       { title: 'Odds', numeric: true, cell: ({ route }) => `\u00d7${NB.fixed(route.risk.odds_ratio, 2)}` },
-      ...['bone', 'vessel', 'organ'].map((obstacle) => ({ title: NB.words(obstacle), unit: 'mm', numeric: true, cell: ({ route }) => margin(route, obstacle) })),
+      { title: 'Nearest', unit: 'mm', text: true, cell: ({ route }) => nearest(route) },
     ];
     if (asked) {
       columns.push(
         { title: 'Works', unit: 'of 8', numeric: true, cell: ({ route }) => String(route.working) },
-        { title: 'Best', cell: (row) => row.route.best || '\u2013' },
         { title: 'Clear', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.clearance_m) },
-        { title: 'Error across', unit: 'mm rms', numeric: true, cell: (row) => NB.mm(best(row)?.error?.target_lateral_rms_m) },
-        { title: 'Room', unit: '%', numeric: true, cell: (row) => (best(row)?.free_fraction === undefined || best(row)?.free_fraction === null ? '\u2013' : NB.fixed(100 * best(row).free_fraction, 0)) });
+        { title: 'Error', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.error?.target_lateral_rms_m) },
+        { title: 'Room', unit: '%', numeric: true, cell: (row) => NB.fixed(100 * (best(row)?.free_fraction ?? NaN), 0) });
     }
+    const unseen = plan.margins.filter(({ known }) => !known).map(({ obstacle }) => NB.words(obstacle));
     NB.clear(this.table, NB.table('Routes that stand for those around them, the best first', columns, shown, { class: 'small' }),
-      NB.el('p', { class: 'soft', text: 'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Bone, vessel, organ: lower bounds of the needle\u2019s distance. Postures only, motions are not planned. Room: what arm and tool leave free of the half ball of 0.35 m about the entry.' }));
+      NB.el('p', { class: 'soft', text: 'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Nearest: lower bound of the needle\u2019s distance from bone, vessels and organs. Clear, error across the needle (rms) and room are of the best configuration; postures only, motions are not planned. Room: what arm and tool leave free of the half ball of 0.35 m about the entry.' }),
+      unseen.length ? NB.el('p', { class: 'bad', text: `The label map has nothing of: ${unseen.join(', ')}. Distances from it are not known.` }) : null);
   }
 };

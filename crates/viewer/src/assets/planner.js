@@ -608,7 +608,7 @@ PLAN.Planner = class {
   }
 
   key(event) {
-    if (!(event.ctrlKey || event.metaKey) || event.target.closest('input, textarea')) return;
+    if (!(event.ctrlKey || event.metaKey) || event.target.closest('input[type="text"], textarea')) return;
     const name = event.key.toLowerCase();
     if (name === 'z') { event.preventDefault(); if (event.shiftKey) this.redo(); else this.undo(); }
     if (name === 'y') { event.preventDefault(); this.redo(); }
