@@ -14,12 +14,13 @@ PLAN.EntryMap = class {
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.button = NB.el('button', { type: 'button', onclick: () => this.find() }, 'Find routes to the target');
     this.status = NB.el('p', { class: 'soft', role: 'status', text: 'Judges 20\u202f000 directions by the rules of routes, and asks the robot for the best.' });
-    this.said = NB.el('p', { class: 'entry-said no-print', 'aria-live': 'polite' });
+    this.said = NB.el('p', { class: 'entry-said', 'aria-live': 'polite' });
     this.legend = NB.el('p', { class: 'entry-legend' });
-    this.table = NB.el('div', { class: 'no-print' });
-    this.remarks = NB.el('div', { class: 'no-print' });
+    this.table = NB.el('div');
+    this.remarks = NB.el('div');
     this.latest = new PLAN.Latest('entries', (answer, body) => this.answered(answer, body));
-    this.element = NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Entry map' }), NB.el('div', { class: 'tabs no-print' }, this.button), this.status, this.canvas, this.said, this.legend, this.table, this.remarks);
+    // On paper the needle's own row says how the rules judge it.
+    this.element = NB.el('section', { class: 'panel no-print' }, NB.el('h2', { text: 'Entry map' }), NB.el('div', { class: 'tabs' }, this.button), this.status, this.canvas, this.said, this.legend, this.table, this.remarks);
   }
 
   /** What the map is of. */
