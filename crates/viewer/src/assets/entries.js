@@ -303,7 +303,7 @@ PLAN.EntryMap = class {
       { title: 'Route', cell: ({ route, index }) => NB.el('button', { type: 'button', title: route.best || '', onclick: () => this.enter(route.direction_deg, route.depth_m, route.best) }, `Take ${index + 1}${index === chosen ? ' (chosen)' : ''}`) },
       { title: 'Deep', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(route.depth_m, 0) },
       { title: 'Odds', numeric: true, cell: ({ route }) => `\u00d7${NB.fixed(route.risk.odds_ratio, 2)}` },
-      { title: 'Nearest', unit: 'mm', text: true, cell: ({ route }) => nearest(route) },
+      { title: 'Nearest', unit: 'mm', cell: ({ route }) => nearest(route) },
     ];
     if (asked) {
       columns.push(
