@@ -135,6 +135,17 @@ for (const [name, [low, high]] of Object.entries({ 'Soft (40/400)': [-160, 240],
   assert.ok(seen >= Math.min(...hus.map(grey)) - 3 && seen <= Math.max(...hus.map(grey)) + 3, `${name}: grey ${seen} of ${hus} HU`);
 }
 
+// What voxels were taken for, as outlines in colours.
+const labelsBox = page.getByLabel('Label outlines');
+const plain = await page.evaluate(() => PLAN.planner.slices[0].canvas.toDataURL());
+await labelsBox.check();
+await page.waitForFunction(() => PLAN.planner.labels && /lung left|left lung/i.test(PLAN.planner.labelLegend.textContent));
+await frames(page);
+assert.notEqual(await page.evaluate(() => PLAN.planner.slices[0].canvas.toDataURL()), plain, 'outlines are drawn');
+await page.screenshot({ path: join(out, 'view-labels.png') });
+await labelsBox.uncheck();
+await frames(page);
+
 // The needle: lesion by its button, entry by a click.
 await page.getByRole('button', { name: `Target: ${lesion.replaceAll('_', ' ')}` }).click();
 await pointTo(page, entry);

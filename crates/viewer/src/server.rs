@@ -1,8 +1,9 @@
 //! The server: on this machine alone, for who knows its token.
 
+use std::fs::{File, TryLockError};
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -50,6 +51,9 @@ pub enum ServerError {
         /// What the system says.
         error: io::Error,
     },
+    /// Somebody else writes the session.
+    #[error("another `needlebench view` shows this folder")]
+    Shown,
     /// No random numbers for a token.
     #[error("this machine gives no random numbers: {0}")]
     Random(#[from] getrandom::Error),
@@ -58,8 +62,35 @@ pub enum ServerError {
     Runtime(io::Error),
 }
 
+impl ServerError {
+    /// What to do about it.
+    pub fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::Port { .. } => Some("without --port any free one is taken"),
+            Self::Shown => Some("open the address that it printed, or end it first"),
+            Self::Random(_) | Self::Runtime(_) => None,
+        }
+    }
+}
+
+/// Held while a folder is shown; the system lets go of it however the program ends.
+const LOCK_FILE: &str = "session.lock";
+
+/// Nothing where locks or files cannot be had: the session says so when it cannot be kept.
+fn locked(folder: &Path) -> Result<Option<File>, ServerError> {
+    let Ok(file) = File::create(folder.join(LOCK_FILE)) else {
+        return Ok(None);
+    };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Err(ServerError::Shown),
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
+}
+
 /// A server that listens, and answers once it runs.
 pub struct Server {
+    _lock: Option<File>,
     runtime: tokio::runtime::Runtime,
     listener: tokio::net::TcpListener,
     address: SocketAddr,
@@ -98,8 +129,9 @@ impl Server {
     /// Listens on 127.0.0.1, at any free port if it is 0. `program` simulates plans.
     ///
     /// # Errors
-    /// What keeps it from listening.
+    /// What keeps it from listening; another server that shows the folder.
     pub fn new(case: Case, port: u16, program: PathBuf) -> Result<Self, ServerError> {
+        let lock = locked(case.folder())?;
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
@@ -124,6 +156,7 @@ impl Server {
             case: Arc::new(case),
         };
         Ok(Self {
+            _lock: lock,
             runtime,
             listener,
             address,

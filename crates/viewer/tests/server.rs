@@ -463,3 +463,99 @@ fn folders_that_do_not_belong_together_are_refused() {
         "skin",
     );
 }
+
+#[test]
+fn a_folder_is_shown_once_at_a_time() {
+    let folder = support::copy_of(&support::patient());
+    let server = || {
+        let go = std::sync::atomic::AtomicBool::new(false);
+        let overrides = needlebench_cell::Overrides::default();
+        let case = needlebench_viewer::Case::open(folder.path(), &overrides, &go).unwrap();
+        needlebench_viewer::Server::new(case, 0, std::path::PathBuf::from("false"))
+    };
+    let first = server().unwrap();
+    let Err(second) = server() else {
+        panic!("two servers write one session");
+    };
+    assert!(matches!(second, needlebench_viewer::ServerError::Shown));
+    assert!(second.hint().is_some());
+    drop(first);
+    server().unwrap();
+}
+
+#[test]
+fn entries_are_those_of_the_rules_and_needles_to_them_are_judged_alike() {
+    let server = Running::start();
+    let aim = json!({"target": {"lesion": "nodule"}});
+    let answer = server
+        .post("/api/entries", &json!({"aim": aim, "robot": false}))
+        .json();
+    let plan = &answer["plan"];
+    let map = &plan["map"];
+    let tried = map["azimuth_deg"].as_array().unwrap().len();
+    let free: Vec<usize> = (0..tried)
+        .filter(|&index| map["rule"][index].is_null())
+        .collect();
+    assert!(
+        tried == 20_000 && plan["free"] == free.len(),
+        "{} {}",
+        plan["free"],
+        free.len()
+    );
+    assert!(!free.is_empty());
+    assert!(
+        answer["remarks"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|it| it["message"].as_str().unwrap().contains("heart"))
+    );
+    // Needles in directions of the map, one that is free and one of each rule.
+    let mut seen = std::collections::BTreeSet::new();
+    let (mut judged, target) = (0, &plan["target_in_phantom_m"]);
+    for index in (0..tried).filter(|index| map["depth_m"][*index].is_number()) {
+        if !seen.insert(map["rule"][index].to_string()) {
+            continue;
+        }
+        let [azimuth, elevation] = ["azimuth_deg", "elevation_deg"]
+            .map(|key| map[key][index].as_f64().unwrap().to_radians());
+        let way = [
+            elevation.cos() * azimuth.sin(),
+            -elevation.cos() * azimuth.cos(),
+            elevation.sin(),
+        ];
+        let place: Vec<f64> = (0..3)
+            .map(|axis| {
+                target[axis].as_f64().unwrap()
+                    + plan["phantom_origin_in_ct_m"][axis].as_f64().unwrap()
+                    + 0.1 * way[axis]
+            })
+            .collect();
+        let aim = json!({"target": {"lesion": "nodule"}, "entry": {"place_m": place}});
+        let route = server.post("/api/route", &json!({"aim": aim})).json();
+        let told = &route["judged"];
+        assert_eq!(
+            told["free"],
+            map["rule"][index].is_null(),
+            "{told} {}",
+            map["rule"][index]
+        );
+        judged += 1;
+    }
+    assert!(judged >= 3, "{judged}");
+    // Of another target nobody has asked.
+    let aim =
+        json!({"target": {"index": [30.0, 30.0, 30.0]}, "entry": {"index": [30.0, 0.0, 30.0]}});
+    let route = server.post("/api/route", &json!({"aim": aim})).json();
+    assert!(
+        route["judged"].is_null() || route["refused"].is_object(),
+        "{route}"
+    );
+    // A target that is none.
+    let aim = json!({"target": {"index": [0.0, 0.0, 0.0]}});
+    let refused = server.post("/api/entries", &json!({"aim": aim})).json();
+    assert!(
+        refused["refused"]["message"].is_string() && refused["refused"]["hint"].is_string(),
+        "{refused}"
+    );
+}

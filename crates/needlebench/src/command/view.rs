@@ -28,7 +28,8 @@ Example: needlebench view out/patient
 DIR is what `needlebench ct build SCAN --out DIR` made. A SCENARIO with a section [ct] is scanned and built first, into
 out/NAME/view. The address that is printed has a secret in it: who has it can see the patient, nobody else on this
 machine can. Nothing leaves the machine, and nothing is written outside the folder: session.toml (what was decided; it is
-there again the next time), planned.toml (the plan, for `run`) and runs/ (what was simulated from the page).
+there again the next time), session.lock (one program at a time), planned.toml (the plan, for `run`) and runs/ (what was
+simulated from the page).
 
 Ctrl-C ends it. Not a medical device.";
 
@@ -85,8 +86,10 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus> {
     let server = match Server::new(case, arguments.port, program) {
         Ok(server) => server,
         Err(error) => {
+            let hint = error.hint();
             complain(&format!(
-                "error: {error}\nhint: without --port any free one is taken"
+                "error: {error}{}",
+                hint.map_or_else(String::new, |hint| format!("\nhint: {hint}"))
             ));
             return Ok(ExitStatus::EnvironmentFailed);
         }

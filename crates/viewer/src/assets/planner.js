@@ -92,11 +92,14 @@ PLAN.Planner = class {
     }, words)]));
     this.undoButton = NB.el('button', { type: 'button', onclick: () => this.undo(), title: 'Ctrl+Z' }, 'Undo');
     this.redoButton = NB.el('button', { type: 'button', onclick: () => this.redo(), title: 'Ctrl+Shift+Z' }, 'Redo');
+    this.labelsBox = NB.checkbox('Label outlines', false, (checked) => this.showLabels(checked));
+    this.labelLegend = NB.el('span', { class: 'entry-legend' });
     this.kept = NB.el('span', { class: 'soft', role: 'status' });
     return NB.el('div', { class: 'bar no-print' },
       NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'What a click does' }, Object.values(this.tools)),
       NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Window: centre and width, HU' }, Object.values(this.windows)),
       NB.el('div', { class: 'tabs' }, this.undoButton, this.redoButton, NB.el('button', { type: 'button', onclick: () => window.print() }, 'Print')),
+      this.labelsBox, this.labelLegend,
       this.kept);
   }
 
@@ -104,6 +107,33 @@ PLAN.Planner = class {
 
   showWindow() {
     for (const [name, button] of Object.entries(this.windows)) button.setAttribute('aria-checked', String(String(PLAN.WINDOWS[name]) === String(this.state.window_hu)));
+  }
+
+  /** Outlines of what each voxel was taken for; the labels come when they are first wanted. */
+  async showLabels(wanted) {
+    this.showsLabels = wanted;
+    const { labels } = this.facts;
+    const palette = ['sky', 'green', 'orange', 'purple', 'yellow', 'vermillion', 'blue', 'grey'].map((name) => NB.palette[name]);
+    const color = (at) => palette[at % palette.length];
+    if (wanted && !this.labels) {
+      this.labelLegend.textContent = 'Reading labels ...';
+      try {
+        const [n, m, l] = this.facts.size;
+        this.labels = new Uint16Array((await PLAN.bytes('labels', 2 * n * m * l, (share) => { this.labelLegend.textContent = `Reading labels: ${Math.round(100 * share)} %`; })).buffer);
+      } catch (error) {
+        this.complain(error);
+        this.labelsBox.querySelector('input').checked = false;
+        NB.clear(this.labelLegend);
+        return;
+      }
+      this.labelColors = new Map(labels.map(({ label }, at) => {
+        const [red, green, blue] = [1, 3, 5].map((from) => parseInt(color(at).slice(from, from + 2), 16));
+        return [label, (0xff000000 | blue << 16 | green << 8 | red) >>> 0];
+      }));
+    }
+    NB.clear(this.labelLegend, this.showsLabels ? labels.map(({ name }, at) => NB.el('span', { class: 'entry-swatch' }, NB.el('i', { 'data-color': color(at) }), NB.words(name))) : []);
+    for (const mark of this.labelLegend.querySelectorAll('i')) mark.style.background = mark.dataset.color;
+    this.draw();
   }
 
   setWindow(window_hu) {

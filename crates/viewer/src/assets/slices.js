@@ -180,6 +180,7 @@ PLAN.Slice = class extends PLAN.Picture {
     context.imageSmoothingEnabled = true;
     context.imageSmoothingQuality = 'high';
     context.drawImage(this.image, ...this.onCanvas([0, 0]), extent[0] * this.scale, extent[1] * this.scale);
+    this.outlines(context, slice, extent);
     this.balls(context, slice);
     this.entries(context, slice);
     this.crosshair(context);
@@ -196,6 +197,20 @@ PLAN.Slice = class extends PLAN.Picture {
     this.letters(context, this.plane.letters);
     this.ruler(context);
     this.caption.textContent = `${this.title} ${slice + 1} of ${size[w]}`;
+  }
+
+  /** What each voxel was taken for, where somebody wants to see it. */
+  outlines(context, slice, extent) {
+    const { labels, labelColors, volume, showsLabels } = this.planner;
+    if (!labels || !showsLabels) return;
+    this.outline ??= document.createElement('canvas');
+    if (this.outlined !== slice) {
+      PLAN.outlines(volume.size, labels, this.plane, slice, labelColors, this.outline);
+      this.outlined = slice;
+    }
+    context.imageSmoothingEnabled = false;
+    context.drawImage(this.outline, ...this.onCanvas([0, 0]), extent[0] * this.scale, extent[1] * this.scale);
+    context.imageSmoothingEnabled = true;
   }
 
   /** Free entries of the map that are within 2 mm of the slice. */

@@ -2,6 +2,24 @@
 // k to the head; an index means a voxel's centre.
 'use strict';
 
+/** So many bytes from the server, as they come in; `progress(share)` is told how far it is. */
+PLAN.bytes = async function (path, count, progress) {
+  const bytes = new Uint8Array(count);
+  const response = await PLAN.fetch(path);
+  const reader = response.body.getReader();
+  let at = 0;
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    if (at + value.length > count) throw new Error(`the ${path} are longer than they should be`);
+    bytes.set(value, at);
+    at += value.length;
+    progress(at / count);
+  }
+  if (at !== count) throw new Error(`the ${path} ended before they were whole`);
+  return bytes;
+};
+
 PLAN.Volume = class {
   constructor(size, spacing, hu) {
     this.size = size;
@@ -11,19 +29,7 @@ PLAN.Volume = class {
 
   /** As it comes in; `progress(share)` is told how far it is. */
   static async load(size, spacing, progress) {
-    const bytes = new Uint8Array(2 * size[0] * size[1] * size[2]);
-    const response = await PLAN.fetch('volume');
-    const reader = response.body.getReader();
-    let at = 0;
-    for (;;) {
-      const { done, value } = await reader.read();
-      if (done) break;
-      if (at + value.length > bytes.length) throw new Error('the volume is longer than it should be');
-      bytes.set(value, at);
-      at += value.length;
-      progress(at / bytes.length);
-    }
-    if (at !== bytes.length) throw new Error('the volume ended before it was whole');
+    const bytes = await PLAN.bytes('volume', 2 * size[0] * size[1] * size[2], progress);
     return new PLAN.Volume(size, spacing, new Int16Array(bytes.buffer));
   }
 
@@ -75,6 +81,28 @@ PLAN.plane = function (volume, { u, v, w, flip }, slice, greys, canvas) {
   for (let row = 0; row < size[v]; row++) {
     let at = slice * stride[w] + (flip ? size[v] - 1 - row : row) * stride[v];
     for (let column = 0; column < size[u]; column++, at += stride[u]) pixels[to++] = greys[hu[at] + 32768];
+  }
+  context.putImageData(image, 0, 0);
+};
+
+/** The outlines of labels in a slice: a voxel that has another beside it, in its label's colour. */
+PLAN.outlines = function (size, labels, { u, v, w, flip }, slice, colors, canvas) {
+  const stride = [1, size[0], size[0] * size[1]];
+  if (canvas.width !== size[u] || canvas.height !== size[v]) [canvas.width, canvas.height] = [size[u], size[v]];
+  const context = canvas.getContext('2d');
+  const image = context.createImageData(size[u], size[v]);
+  const pixels = new Uint32Array(image.data.buffer);
+  let to = 0;
+  for (let row = 0; row < size[v]; row++) {
+    const line = flip ? size[v] - 1 - row : row;
+    let at = slice * stride[w] + line * stride[v];
+    for (let column = 0; column < size[u]; column++, at += stride[u], to++) {
+      const label = labels[at];
+      if (!label) continue;
+      const inside = (column === 0 || labels[at - stride[u]] === label) && (column === size[u] - 1 || labels[at + stride[u]] === label)
+        && (line === 0 || labels[at - stride[v]] === label) && (line === size[v] - 1 || labels[at + stride[v]] === label);
+      if (!inside) pixels[to] = colors.get(label) ?? 0xffffffff;
+    }
   }
   context.putImageData(image, 0, 0);
 };
