@@ -137,6 +137,8 @@ for (const [name, [low, high]] of Object.entries({ 'Soft (40/400)': [-160, 240],
 
 // What voxels were taken for, as outlines in colours.
 const labelsBox = page.getByLabel('Label outlines');
+await pointTo(page, size.map((count) => Math.floor(count / 2)));
+await frames(page);
 const plain = await page.evaluate(() => PLAN.planner.slices[0].canvas.toDataURL());
 await labelsBox.check();
 await page.waitForFunction(() => PLAN.planner.labels && /lung left|left lung/i.test(PLAN.planner.labelLegend.textContent));
