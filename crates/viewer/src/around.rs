@@ -51,6 +51,10 @@ impl LastTarget {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(around));
     }
 
+    pub(crate) fn forget(&self) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
     /// How a needle is judged, if its target is the one that was asked about last.
     pub(crate) fn judged(
         &self,

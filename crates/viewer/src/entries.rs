@@ -95,6 +95,8 @@ fn around(
     if let Some(known) = known {
         return Ok(known);
     }
+    // Hundreds of megabytes: those of the last target are not kept beside them.
+    case.last_target().forget();
     let made = Arc::new(Around {
         goal: section.name.clone(),
         target,
