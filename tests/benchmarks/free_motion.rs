@@ -64,7 +64,7 @@ fn a_pendulum_swings_as_the_elliptic_functions_say() {
     // runs half a step early: first order. Apart from that it is leapfrog: its frequency is off by
     // (rate h)^2 / 24, and its first position by a h^2 / 8, of which the largest swing remembers no
     // more than the product of rate and time.
-    let fastest_rad_s = 2.0 * rate_rad_s * (0.5 * START_RAD).sin();
+    let fastest_rad_s = 2.0 * rate_rad_s * libm::sin(0.5 * START_RAD);
     let phase = rate_rad_s * f64::from(STEPS) * TIMESTEP_S;
     let second_order = (rate_rad_s * TIMESTEP_S).powi(2) * (1.0 + phase) * START_RAD;
     let first_order = 0.5 * TIMESTEP_S * fastest_rad_s + second_order;
@@ -89,7 +89,7 @@ fn a_ball_on_a_long_lever_falls_freely() {
     const STEPS: u32 = STEPS_PER_S;
     let mechanism = lever(LEVER_M);
     let cell = mechanism.cell();
-    let drop = |angle_rad: f64| LEVER_M * angle_rad.sin();
+    let drop = |angle_rad: f64| LEVER_M * libm::sin(angle_rad);
     let free_fall = |t: f64| 0.5 * GRAVITY_M_S2 * t * t;
     // The arc differs from the straight line by the angle squared, 2.4e-5 after 1 s; the small
     // bodies in the pivot hold the ball up by their share of the moment of inertia, 1e-8.

@@ -33,8 +33,8 @@ fn continuous(moment_kgm2: f64, t: f64) -> Vector2<f64> {
     let rate = (KP_NM_RAD / moment_kgm2).sqrt();
     let damping = 0.5 * KD_NMS_RAD / (moment_kgm2 * KP_NM_RAD).sqrt();
     let damped = rate * (1.0 - damping * damping).sqrt();
-    let (sine, cosine) = (damped * t).sin_cos();
-    let envelope = STEP_RAD * (-damping * rate * t).exp();
+    let (sine, cosine) = libm::sincos(damped * t);
+    let envelope = STEP_RAD * libm::exp(-damping * rate * t);
     Vector2::new(
         STEP_RAD - envelope * (cosine + damping * rate / damped * sine),
         envelope * rate * rate / damped * sine,
@@ -47,10 +47,10 @@ fn power(matrix: &Matrix2<f64>, n: f64) -> Matrix2<f64> {
     let modulus = matrix.determinant().sqrt();
     let phi = {
         let cosine = 0.5 * matrix.trace() / modulus;
-        (1.0 - cosine * cosine).sqrt().atan2(cosine)
+        libm::atan2((1.0 - cosine * cosine).sqrt(), cosine)
     };
-    (matrix * (n * phi).sin() - Matrix2::identity() * (modulus * ((n - 1.0) * phi).sin()))
-        * (modulus.powf(n - 1.0) / phi.sin())
+    (matrix * libm::sin(n * phi) - Matrix2::identity() * (modulus * libm::sin((n - 1.0) * phi)))
+        * (libm::pow(modulus, n - 1.0) / libm::sin(phi))
 }
 
 /// Largest differences of the position from `discrete^n (-step, 0)` and from the continuous answer.
@@ -96,7 +96,7 @@ fn a_servo_step_is_the_closed_form_of_its_sampling() {
         continuous_errors[which] = error;
     }
     // Holding a torque delays it by half a step: first order.
-    let order = (continuous_errors[0] / continuous_errors[1]).log2();
+    let order = libm::log2(continuous_errors[0] / continuous_errors[1]);
     assert!((order - 1.0).abs() < 0.05, "{order}");
     with_engines(&cell, TIMESTEP_S, 0.0, |name, plant| {
         let [sampled, error] = worst(plant, moment, &matrices(TIMESTEP_S).0);

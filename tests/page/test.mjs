@@ -17,8 +17,8 @@ import { MOST_SHEETS, sheets, testAddress, testCharts, testEvents, testGhosts, t
 import { testStudy } from './study.mjs';
 
 // A study's hundred thousand cases take a moment to unpack.
-const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000, replay: 2000 };
-const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6, replay: 3e6 };
+const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000, search: 2000, replay: 2000 };
+const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6, search: 3e6, replay: 3e6 };
 const SIZE = { width: 1280, height: 900 };
 
 const words = process.argv.slice(2);
@@ -228,12 +228,37 @@ async function testAtlas(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-strips.png` });
 }
 
-const tests = { run: testRun, atlas: testAtlas, study: (page, judge, name) => testStudy(page, judge, name, { notBlank, settle, out }), replay: async () => {} };
+/** The answer stands first with its interval, every choice has its figure, and placements are pictures. */
+async function testSearch(page, judge, name) {
+  const found = await page.evaluate(() => ({
+    sentence: document.querySelector('#app .answer .sentence')?.textContent, stray: document.querySelector('#app').innerText.includes('null'),
+    figures: [...document.querySelectorAll('#app .points h3')].map((each) => each.textContent), factors: NB.current.page.factors.map((each) => each.words),
+    pictures: document.querySelectorAll('.placements img').length, wanted: NB.current.page.pictures.length,
+    winner: NB.current.answer.winner, equals: NB.current.answer.equals, fresh: NB.current.answer.figures[0].cases,
+  }));
+  assert.match(found.sentence, /(interval|sure) .*on \d+ layouts that nothing was compared by/, 'the answer has no figure with an interval');
+  assert.ok(found.sentence.includes(`${found.fresh} layouts`));
+  assert.ok(!found.stray, 'something says null');
+  for (const words of found.factors) assert.ok(found.figures.includes(words), `no figure of ${words}`);
+  assert.ok(found.equals.includes(found.winner));
+  assert.equal(found.pictures, found.wanted);
+  const plots = page.locator('#app .points .plot canvas');
+  for (let at = 0; at < await plots.count(); at++) {
+    await plots.nth(at).scrollIntoViewIfNeeded();
+    await settle(page);
+    await notBlank(judge, plots.nth(at), `figure ${at}`);
+  }
+  for (const heading of await page.locator('details.section > summary').all()) await heading.click();
+  await page.evaluate(() => window.scrollTo(0, 0));
+  await page.screenshot({ path: `${out}/${name}-all.png`, fullPage: true });
+}
+
+const tests = { run: testRun, search: testSearch, atlas: testAtlas, study: (page, judge, name) => testStudy(page, judge, name, { notBlank, settle, out }), replay: async () => {} };
 
 for (const given of words) {
   const file = resolve(given);
   const html = readFileSync(file, 'utf8');
-  const kind = html.match(/<title>(run|atlas|study): /)?.[1] || 'replay';
+  const kind = html.match(/<title>(run|atlas|study|search): /)?.[1] || 'replay';
   const name = `${kind}-${words.indexOf(given)}`;
   const bytes = statSync(file).size;
   assert.ok(bytes <= MOST_BYTES[kind], `${given} has ${bytes} bytes`);

@@ -62,7 +62,7 @@ async function open(url, browser = running, size = { width: 1600, height: 1000 }
   return { page, problems };
 }
 
-const settled = (page) => page.waitForFunction(() => document.querySelector('.bar > .soft').textContent === 'kept' && !PLAN.planner.quick.busy && !PLAN.planner.bounds.busy && !PLAN.planner.exact.busy && !PLAN.planner.entryMap.latest.busy && !PLAN.planner.planned.busy && !PLAN.planner.where.busy);
+const settled = (page) => page.waitForFunction(() => document.querySelector('.bar > .soft').textContent === 'kept' && !PLAN.planner.quick.busy && !PLAN.planner.bounds.busy && !PLAN.planner.exact.busy && !PLAN.planner.entryMap.latest.busy && !PLAN.planner.planned.busy && !PLAN.planner.people.latest.busy && !PLAN.planner.where.busy);
 const report = JSON.parse(readFileSync(join(folder, 'report.json'), 'utf8'));
 const millimetres = (index) => index.map((value, axis) => 1e3 * (report.first_voxel_m[axis] + report.spacing_m[axis] * value));
 const entry = entryMm.split(',').map((mm, axis) => Math.round((1e-3 * mm - report.first_voxel_m[axis]) / report.spacing_m[axis]));
@@ -194,6 +194,24 @@ const motion = await page.evaluate(() => ({ ...PLAN.planner.motion, label: PLAN.
 assert.equal(motion.configuration, motion.label);
 assert.ok(motion.tip, `no expected error: ${motion.tip_unknown}`);
 assert.match(await page.innerText('.side'), /Expected tip error at the target: \d+\.\d\d mm rms/);
+
+// What it leaves to people, in numbers and in the room.
+await page.waitForFunction(() => PLAN.planner.people.answer);
+const { room } = await page.evaluate(() => PLAN.planner.people.answer);
+assert.ok(room.free_fraction > 0 && room.free_fraction <= 1 && room.sight.length > 0);
+assert.match(await page.innerText('.side'), /Space for people: \d+ % of the half ball[^]*What people see/);
+const empty = await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL());
+for (const layer of ['people and sight', 'cone for the hand']) {
+  const without = await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL());
+  await page.getByLabel(layer).check();
+  await frames(page);
+  assert.notEqual(without, await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL()), `${layer} is drawn`);
+}
+await page.screenshot({ path: join(out, 'view-people.png') });
+for (const layer of ['people and sight', 'cone for the hand']) await page.getByLabel(layer).uncheck();
+await frames(page);
+assert.equal(empty, await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL()), 'and goes again');
+
 const before = await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL());
 await page.getByRole('button', { name: 'Play motion' }).click();
 await page.waitForFunction(() => /^[0-9.]+ of/.test(PLAN.planner.clock.textContent) && PLAN.planner.room.playing);
@@ -368,22 +386,23 @@ const sheets = (sheet.match(/\/Type\s*\/Page[^s]/g) || []).length;
 assert.equal(sheets, 1, `${sheets} sheets`);
 await page.emulateMedia({ media: 'print' });
 assert.match(await page.innerText('.signature'), /Signature/);
+assert.match(await page.innerText('.side'), /by the other tab/, 'notes on paper are those of the page');
 await page.screenshot({ path: join(out, 'view-print.png'), fullPage: true });
 await page.emulateMedia({ media: 'screen' });
 
 // Simulated from the page, and the report opened.
 await page.getByRole('button', { name: 'Save and simulate' }).click();
-await page.waitForFunction(() => /finished|failed/.test(PLAN.planner.simulation.textContent), null, { timeout: 300_000 });
-assert.match(await page.evaluate(() => PLAN.planner.simulation.textContent), /finished/);
+await page.waitForFunction(() => /finished|failed/.test(PLAN.planner.simulation.said.textContent), null, { timeout: 300_000 });
+assert.match(await page.evaluate(() => PLAN.planner.simulation.said.textContent), /finished/);
 const [opened] = await Promise.all([page.context().waitForEvent('page'), page.getByRole('link', { name: 'Open the report' }).click()]);
 await opened.waitForSelector('html[data-ready]', { timeout: 60_000 });
 assert.match(await opened.title(), /planned/);
 await opened.close();
 // One that is begun can be stopped.
 await page.getByRole('button', { name: 'Save and simulate' }).click();
-await page.waitForFunction(() => PLAN.planner.running);
+await page.waitForFunction(() => PLAN.planner.simulation.running);
 await page.getByRole('button', { name: 'Cancel' }).click();
-await page.waitForFunction(() => /cancelled/.test(PLAN.planner.simulation.textContent));
+await page.waitForFunction(() => /cancelled/.test(PLAN.planner.simulation.said.textContent));
 
 const heap = await page.evaluate(() => performance.memory?.usedJSHeapSize ?? 0);
 console.log(`heap ${Math.round(heap / 1e6)} MB`);

@@ -85,18 +85,9 @@ fn of_each(
         .flat_map(|(goal, plan)| plan.configurations.iter().map(move |each| (goal, each)))
         .collect();
     let mut found = in_parallel(threads, &all, |(goal, plan)| {
-        let case = BudgetCase {
-            cell: &resolved.cell,
-            goal: &resolved.goals[*goal],
-            place: resolved
-                .phantom
-                .as_ref()
-                .map(|each| &each.world_from_phantom),
-            servo: &setup.servo,
-            imperfections,
-            trajectory: plan.trajectory.as_ref()?,
-            timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
-        };
+        let trajectory = plan.trajectory.as_ref()?;
+        let goal = &resolved.goals[*goal];
+        let case = BudgetCase::of(resolved, goal, &setup.servo, imperfections, trajectory);
         Some(budget(&case))
     })
     .into_iter();

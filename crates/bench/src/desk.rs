@@ -8,10 +8,11 @@ use needlebench_engine::Servo;
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::ik::{Configuration, Kinematics};
 use needlebench_kinematics::trajectory::JointTrajectory;
-use needlebench_planning::{ConfigurationPlan, Planner};
+use needlebench_planning::{ConfigurationPlan, Member, Planner};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
 
-use crate::preview::{GoalPreview, goal_preview, preview_of};
+use crate::parallel::in_parallel;
+use crate::preview::{GoalPreview, preview_of};
 use crate::servo_of;
 
 /// Directions about the needle of a quick answer, as of planned routes.
@@ -49,12 +50,14 @@ impl Desk {
         GoalPlacer::new(&self.resolved)
     }
 
-    /// Which configurations can reach a goal, by their postures.
+    /// Which configurations can reach a goal, by their postures; the same on any number of threads.
     ///
     /// # Errors
     /// [`NotUrGeometry`]: never of a robot that [`Desk::new`] took.
-    pub fn preview(&self, goal: &Goal) -> Result<GoalPreview, NotUrGeometry> {
-        Ok(goal_preview(&self.planner()?, &self.resolved, goal))
+    pub fn preview(&self, goal: &Goal, threads: usize) -> Result<GoalPreview, NotUrGeometry> {
+        let planner = self.planner()?;
+        let posture = |configuration| planner.posture_off_route(goal, configuration);
+        Ok(self.preview_by(goal, threads, posture))
     }
 
     /// The same of a few directions about the needle, without what would free the others: what works here works, what does
@@ -62,12 +65,22 @@ impl Desk {
     ///
     /// # Errors
     /// As [`Desk::preview`].
-    pub fn quick_preview(&self, goal: &Goal) -> Result<GoalPreview, NotUrGeometry> {
+    pub fn quick_preview(&self, goal: &Goal, threads: usize) -> Result<GoalPreview, NotUrGeometry> {
         let planner = self.planner()?;
         let rolls = planner.rolls(goal, QUICK_ROLLS);
-        let members = Configuration::ALL
-            .map(|configuration| planner.best_of_rolls(goal, configuration, &rolls));
-        Ok(preview_of(&self.resolved, goal, members))
+        let posture = |configuration| planner.best_of_rolls(goal, configuration, &rolls);
+        Ok(self.preview_by(goal, threads, posture))
+    }
+
+    fn preview_by(
+        &self,
+        goal: &Goal,
+        threads: usize,
+        posture: impl Fn(Configuration) -> Member + Sync,
+    ) -> GoalPreview {
+        let members = in_parallel(threads, &Configuration::ALL, |each| posture(*each));
+        let members: [Member; 8] = members.try_into().expect("one of each");
+        preview_of(&self.resolved, goal, members)
     }
 
     /// The whole motion of one configuration, with what is proven of its clearances.
@@ -90,16 +103,7 @@ impl Desk {
         trajectory: &JointTrajectory,
     ) -> Option<Result<[Moments; 2], Finding>> {
         let Expected { imperfections, .. } = self.resolved.expected.as_ref()?;
-        let place = self.resolved.phantom.as_ref();
-        let case = BudgetCase {
-            cell: &self.resolved.cell,
-            goal,
-            place: place.map(|placed| &placed.world_from_phantom),
-            servo: &self.servo,
-            imperfections,
-            trajectory,
-            timestep_s: self.resolved.scenario.engines.timestep_ms * 1e-3,
-        };
+        let case = BudgetCase::of(&self.resolved, goal, &self.servo, imperfections, trajectory);
         let file = &self.resolved.source.file;
         Some(analytic_total(&case).map_err(|error| Finding::new(file, error.to_string())))
     }

@@ -10,7 +10,7 @@ use crate::progress::Silent;
 use crate::routes::{RoutePlan, RouteTask, SOLID_DIRECTIONS, WithRobot, plan_routes};
 use crate::suggest::{SuggestError, suggest_entries};
 
-/// Chooses the entry of a goal that has none.
+/// Chooses the entry of a goal that has none. The choice does not depend on the number of threads.
 ///
 /// # Errors
 /// A message and a hint, where there is none.
@@ -18,21 +18,8 @@ pub fn choose_entry(
     resolved: &ResolvedScenario,
     section: &GoalSection,
 ) -> Result<ChosenEntry, [String; 2]> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    choose_entry_on(resolved, section, threads)
-}
-
-/// The same on so many threads; the choice does not depend on them.
-///
-/// # Errors
-/// As [`choose_entry`].
-pub fn choose_entry_on(
-    resolved: &ResolvedScenario,
-    section: &GoalSection,
-    threads: usize,
-) -> Result<ChosenEntry, [String; 2]> {
     let control = Control {
-        threads,
+        threads: std::thread::available_parallelism().map_or(1, usize::from),
         cancel: &AtomicBool::new(false),
         progress: &Silent,
     };

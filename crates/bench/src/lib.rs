@@ -7,6 +7,9 @@
 //! A run is a row of stages, each of which takes what those before it made: `plan`, `simulate`,
 //! `events`, `adjudication`, `budgets`, `assemble`. A case of a study goes through the same ones.
 
+// Its functions are called by name, from wherever the C library's would be.
+use needlebench_elementary as _;
+
 pub mod accuracy;
 mod adjudication;
 mod assemble;
@@ -20,6 +23,7 @@ mod entry;
 mod events;
 pub mod excitation;
 mod iso9283;
+pub mod motion;
 mod parallel;
 mod plan;
 pub mod preview;
@@ -33,6 +37,7 @@ mod rtde;
 mod run;
 mod runnable;
 mod scenario_run;
+pub mod search;
 pub mod servo;
 mod setup;
 mod simulate;

@@ -4,8 +4,8 @@ use needlebench_cell::{ModelSource, ResolvedScenario, sha256_hex};
 use needlebench_engine::EngineIdentity;
 use needlebench_evaluation::report::{InputFile, Provenance};
 
-/// Lock file of the build.
-const CARGO_LOCK: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.lock"));
+/// Lock file of the build; empty where it was not built in its workspace, and nobody knows.
+const CARGO_LOCK: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/Cargo.lock"));
 
 /// Version of the program with its git revision.
 pub const PROGRAM_VERSION: &str = concat!(
@@ -15,8 +15,24 @@ pub const PROGRAM_VERSION: &str = concat!(
     ")"
 );
 
-/// Git revision of the build.
+/// Git revision of the build, with `-dirty` where it was changed; `unknown` outside git. For people: what tells programs
+/// apart is [`SOURCE_SHA256`].
 pub const GIT_REVISION: &str = env!("NEEDLEBENCH_GIT_REVISION");
+
+/// SHA-256 of all sources that results depend on, with the versions of all libraries and the compiler. Programs of the
+/// same hash compute the same bytes, whatever revision they were built from.
+pub const SOURCE_SHA256: &str = env!("NEEDLEBENCH_SOURCE_SHA256");
+
+/// How numbers are rounded: what the bytes of results depend on beside the program. No instruction of one CPU and not of
+/// another does anything else: elementary functions are those of `libm`, products are fused where vectors of any width
+/// fuse them, and on machines that cannot, the same is computed in software.
+pub fn arithmetic() -> String {
+    format!(
+        "{}, binary64, libm {}",
+        std::env::consts::ARCH,
+        env!("NEEDLEBENCH_LIBM")
+    )
+}
 
 /// Everything that went into a result: the program, its engines, all files.
 pub fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentity>) -> Provenance {
@@ -51,7 +67,13 @@ pub fn provenance(resolved: &ResolvedScenario, engines: Vec<EngineIdentity>) -> 
     Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         git_revision: GIT_REVISION.to_owned(),
-        cargo_lock_sha256: sha256_hex(CARGO_LOCK),
+        source_sha256: SOURCE_SHA256.to_owned(),
+        arithmetic: arithmetic(),
+        cargo_lock_sha256: if CARGO_LOCK.is_empty() {
+            "unknown".to_owned()
+        } else {
+            sha256_hex(CARGO_LOCK)
+        },
         engines,
         inputs,
         seed: resolved.scenario.seed,

@@ -124,6 +124,8 @@ pub struct RealArm {
     pub world_from_base_link: Pose,
     /// Its links.
     pub chain: Chain,
+    /// Where the needle enters the guide of its tool, and where it leaves it, in the flange frame.
+    pub flange_from_guide: [Pose; 2],
 }
 
 impl RealArm {
@@ -131,6 +133,10 @@ impl RealArm {
         Self {
             world_from_base_link: cell.robot.world_from_base_link,
             chain: cell.robot.chain,
+            flange_from_guide: [
+                cell.tool.flange_from_guide_entry,
+                cell.tool.flange_from_guide_exit,
+            ],
         }
     }
 }

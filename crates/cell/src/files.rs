@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use crate::finding::Finding;
 use crate::input::read_data;
 
-static BUILTIN: Dir<'static> = include_dir!("$CARGO_MANIFEST_DIR/../../models");
+static BUILTIN: Dir<'static> = include_dir!("$OUT_DIR/models");
 
 /// Prefix of shipped models in scenario files and reports.
 const BUILTIN_PREFIX: &str = "builtin:";

@@ -228,11 +228,11 @@ pub(crate) fn gantry(parameters: &GantrySection) -> Result<Fixture, FixtureError
         .enumerate()
         .map(|(number, angles)| {
             let ring = |angle_rad: f64| {
-                let (sine, cosine) = angle_rad.sin_cos();
+                let (sine, cosine) = libm::sincos(angle_rad);
                 Point2::new(radius_m * cosine, radius_m * sine)
             };
             let housing = |angle_rad: f64| {
-                let (sine, cosine) = angle_rad.sin_cos();
+                let (sine, cosine) = libm::sincos(angle_rad);
                 let reach_m = (half_m.x / cosine.abs()).min(half_m.y / sine.abs());
                 Point2::new(reach_m * cosine, reach_m * sine)
             };
@@ -262,7 +262,7 @@ pub(crate) fn gantry(parameters: &GantrySection) -> Result<Fixture, FixtureError
 ///
 /// Between two corners all sectors are equally wide, and none is wider than one piece may be.
 fn sector_boundaries_rad(half_width_m: f64, half_height_m: f64) -> Vec<f64> {
-    let corner_rad = half_height_m.atan2(half_width_m);
+    let corner_rad = libm::atan2(half_height_m, half_width_m);
     let mut boundaries_rad = vec![-corner_rad];
     for side in 0..4_u32 {
         let span_rad = if side % 2 == 0 {

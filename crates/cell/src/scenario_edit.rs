@@ -92,16 +92,38 @@ impl ScenarioEdit {
     /// # Errors
     /// As [`ScenarioEdit::set`].
     pub fn remove(&mut self, section: &str, key: &str) -> Result<(), Finding> {
+        self.take_away(&format!("{section}.{key}"), section, key)
+    }
+
+    /// Takes a section away with all its keys and the sections in it, such as `goals[1]`, if it is there; those after it
+    /// in a list count one less then.
+    ///
+    /// # Errors
+    /// As [`ScenarioEdit::set`].
+    pub fn remove_section(&mut self, section: &str) -> Result<(), Finding> {
+        self.take_away(section, section, "")
+    }
+
+    /// Takes away what stands at `path`: a section from its header on, or the line of `key`. Refused where it shares its
+    /// line with others.
+    fn take_away(&mut self, path: &str, section: &str, key: &str) -> Result<(), Finding> {
         let toml = TomlText::parse(&self.file, &self.text)?;
-        let Some(span) = toml.span_of(&format!("{section}.{key}")) else {
+        let Some(span) = toml.span_of(path) else {
             return Ok(());
         };
         let start = self.text[..span.start].rfind('\n').map_or(0, |at| at + 1);
         let rest = &self.text[span.end..];
         let mut end = span.end + rest.find('\n').map_or(rest.len(), |at| at + 1);
-        let header = self.text[span].trim_matches(['[', ']']).to_owned();
-        if self.text[start..].trim_start().starts_with('[') {
+        let header = self.text[span.clone()].trim_matches(['[', ']']).to_owned();
+        let before = self.text[start..span.start].trim();
+        let is_header = before.is_empty() && self.text[span].starts_with('[');
+        let is_own_line = before
+            .strip_suffix('=')
+            .is_some_and(|name| !key.is_empty() && name.trim_end() == key);
+        if is_header {
             end += self.text[end..].len() - after_section(&self.text[end..], &header).len();
+        } else if !is_own_line {
+            return Err(self.unchangeable(section));
         }
         self.text.replace_range(start..end, "");
         self.checked(section)
@@ -111,13 +133,17 @@ impl ScenarioEdit {
     fn checked(&self, section: &str) -> Result<(), Finding> {
         match TomlText::parse(&self.file, &self.text) {
             Ok(_) => Ok(()),
-            Err(_) => Err(Finding::new(
-                &self.file,
-                format!("`{section}` is written so that it cannot be changed here"),
-            )
-            .key(section)
-            .hint(format!("write it as [{section}], with a line for each key"))),
+            Err(_) => Err(self.unchangeable(section)),
         }
+    }
+
+    fn unchangeable(&self, section: &str) -> Finding {
+        Finding::new(
+            &self.file,
+            format!("`{section}` is written so that it cannot be changed here"),
+        )
+        .key(section)
+        .hint(format!("write it as [{section}], with a line for each key"))
     }
 }
 
@@ -185,6 +211,34 @@ mod tests {
         .unwrap();
         inline.remove("goals[0]", "route").unwrap();
         assert_eq!(inline.text(), "[[goals]]\nlesion = \"x\"\n");
+        // With others on its line.
+        let text = "goals = [{ lesion = \"x\", route = { sigmas = 3 } }]\n";
+        let mut shared = ScenarioEdit::new("s.toml", text).unwrap();
+        assert!(shared.remove("goals[0]", "route").is_err());
+        assert_eq!(shared.text(), text);
+    }
+
+    #[test]
+    fn one_of_several_goals_goes_and_the_others_stay() {
+        let text = "[[goals]]\nlesion = \"x\"\n\n# The middle one.\n[[goals]]\nlesion = \"y\"\n[goals.route]\nsigmas = 3\n\n# The last \
+                    one.\n[[goals]]\nlesion = \"z\"\n\n[criteria]\n";
+        let mut edit = ScenarioEdit::new("s.toml", text).unwrap();
+        edit.remove_section("goals[1]").unwrap();
+        let wanted = "[[goals]]\nlesion = \"x\"\n\n# The middle one.\n\n# The last one.\n[[goals]]\nlesion = \
+                      \"z\"\n\n[criteria]\n";
+        assert_eq!(edit.text(), wanted);
+        edit.remove_section("goals[7]").unwrap();
+        assert_eq!(edit.text(), wanted);
+        let mut inline = ScenarioEdit::new(
+            "s.toml",
+            "goals = [{ lesion = \"x\" }, { lesion = \"y\" }]\n",
+        )
+        .unwrap();
+        assert!(
+            inline.remove_section("goals[1]").is_err(),
+            "{}",
+            inline.text()
+        );
     }
 
     #[test]

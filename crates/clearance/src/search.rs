@@ -16,7 +16,7 @@ use std::cmp::Ordering;
 
 use needlebench_cell::{ClearanceClass, Frame};
 use needlebench_geometry::{
-    BoundingCapsule, PRUNING_MARGIN_M, Placement, Separation, separation_within,
+    BoundingCapsule, PRUNING_MARGIN_M, Placement, Separation, is_nearer, separation_within,
 };
 
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
@@ -131,6 +131,27 @@ impl ClearanceModel {
         let (couple, separation) = below.found?;
         Some(look.clearance(couple, &separation))
     }
+
+    /// Whether any pair is closer than the limit of its class, m: whether [`ClearanceModel::below_near`] finds one, without
+    /// how deep it is.
+    pub fn is_below_near(
+        &self,
+        q: &Joints,
+        nearby: &mut Nearby,
+        limit_m: impl Fn(ClearanceClass) -> f64,
+    ) -> bool {
+        let links = self.world_from_links(q).each_ref().map(Placement::new);
+        let look = Look {
+            model: self,
+            links: &links,
+        };
+        let mut any = AnyBelow {
+            limits_m: ClearanceClass::ALL.map(limit_m),
+            found: false,
+        };
+        look.search(nearby, &mut any);
+        any.found
+    }
 }
 
 /// Two solids of a pair: indices of the pair and of the solids of its bodies.
@@ -186,6 +207,14 @@ pub(crate) trait Wanted {
 
     /// A couple within the cutoff; false ends the search.
     fn take(&mut self, class: ClearanceClass, couple: Couple, found: &Separation) -> bool;
+
+    /// What a couple has to be nearer than for the search to end, where nothing else is asked of it, m.
+    fn ends_below_m(&self, _class: ClearanceClass) -> Option<f64> {
+        None
+    }
+
+    /// A couple that ends the search.
+    fn end(&mut self) {}
 }
 
 /// Travel that the bounds of a reference are to last for, of the way to it: a bisection's further
@@ -428,6 +457,14 @@ impl Look<'_> {
         let [place_a, place_b] =
             [(body_a, a), (body_b, b)].map(|(body, solid)| self.place(body, &solid.seen));
         let solid_b_from_solid_a = place_b.inverse_after(&place_a);
+        if let Some(limit_m) = wanted.ends_below_m(pair.class) {
+            let ends = is_nearer(&a.shape, &b.shape, &solid_b_from_solid_a, limit_m);
+            if ends {
+                nearby.nearest[pair.class as usize] = Some(couple);
+                wanted.end();
+            }
+            return !ends;
+        }
         let Some(found) = separation_within(&a.shape, &b.shape, &solid_b_from_solid_a, cutoff_m)
         else {
             return true;
@@ -639,5 +676,31 @@ impl Wanted for Below<'_> {
             return false;
         }
         true
+    }
+}
+
+/// Whether any couple is nearer than the limit of its class, m.
+struct AnyBelow {
+    limits_m: [f64; CLASS_COUNT],
+    found: bool,
+}
+
+impl Wanted for AnyBelow {
+    #[inline]
+    fn cutoff_m(&self, class: ClearanceClass) -> f64 {
+        self.limits_m[class as usize] + PRUNING_MARGIN_M
+    }
+
+    fn take(&mut self, _: ClearanceClass, _: Couple, _: &Separation) -> bool {
+        unreachable!("nothing is handed over")
+    }
+
+    #[inline]
+    fn ends_below_m(&self, class: ClearanceClass) -> Option<f64> {
+        Some(self.limits_m[class as usize])
+    }
+
+    fn end(&mut self) {
+        self.found = true;
     }
 }

@@ -112,7 +112,7 @@ impl JointFriction {
     pub fn stribeck_nm(&self, joint: usize, speed_rad_s: f64) -> f64 {
         let (coulomb, stiction) = (self.coulomb_nm[joint], self.stiction_nm[joint]);
         let ratio = speed_rad_s / self.stribeck_rad_s[joint];
-        coulomb + (stiction - coulomb) * (-ratio * ratio).exp()
+        coulomb + (stiction - coulomb) * libm::exp(-ratio * ratio)
     }
 
     /// What the controller adds for a reference of this speed, N m.

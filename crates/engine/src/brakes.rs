@@ -77,7 +77,7 @@ impl Brakes {
             };
             let speed = figures.speed_rad_s;
             let x = viscous_share(distance_rad / (speed * time_s));
-            let slowing = if x > 0.0 { x.ln_1p() / x } else { 1.0 };
+            let slowing = if x > 0.0 { libm::log1p(x) / x } else { 1.0 };
             let net_nm = mass[(joint, joint)] * speed / time_s * slowing;
             brakes.viscous_nms_per_rad[joint] = x * net_nm / speed;
             // Half way down: it falls off by a few percent over a stop.
@@ -178,7 +178,7 @@ pub fn stretched() -> Joints {
 
 /// The `x` with `(x - ln(1 + x)) / (x ln(1 + x)) = ratio`; 0 for a half and more.
 fn viscous_share(ratio: f64) -> f64 {
-    let of = |x: f64| (x - x.ln_1p()) / (x * x.ln_1p());
+    let of = |x: f64| (x - libm::log1p(x)) / (x * libm::log1p(x));
     if ratio >= 0.5 {
         return 0.0;
     }
@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn a_ratio_of_distance_gives_its_share() {
         for x in [0.1_f64, 1.0, 5.2, 40.0] {
-            let ratio = (x - x.ln_1p()) / (x * x.ln_1p());
+            let ratio = (x - libm::log1p(x)) / (x * libm::log1p(x));
             assert!((viscous_share(ratio) / x - 1.0).abs() < 1e-7, "{x}");
         }
         assert!(viscous_share(0.51).abs() < 1e-12);

@@ -122,13 +122,13 @@ impl ClosedLoop {
             if !size.is_finite() {
                 return f64::INFINITY;
             }
-            logarithm += size.ln() / 2.0_f64.powi(k);
+            logarithm += libm::log(size) / 2.0_f64.powi(k);
             power /= size;
             if k < SQUARINGS {
                 power = &power * &power;
             }
         }
-        logarithm.exp()
+        libm::exp(logarithm)
     }
 
     /// Covariance of the joints at rest under independent errors of the encoders, rad^2;
@@ -231,7 +231,7 @@ impl ClosedLoop {
 mod tests {
     use super::*;
     use crate::{JointFriction, ServoGains};
-    use nalgebra::Complex;
+    use nalgebra::{Complex, ComplexField as _};
     use needlebench_kinematics::random::SplitMix64;
 
     const POSTURE: Joints = Joints::new(0.3, -1.2, 1.4, -0.3, 0.7, 0.2);
@@ -257,7 +257,7 @@ mod tests {
             let (a, b) = (kp * h * h / inertia, kd * h / inertia);
             let half = Complex::from(0.5 * (2.0 - a - b));
             let root = (half * half - (1.0 - b)).sqrt();
-            f64::max((half + root).norm(), (half - root).norm())
+            f64::max((half + root).modulus(), (half - root).modulus())
         });
         let expected = largest.fold(0.0, f64::max);
         assert!((radius - expected).abs() < 1e-8, "{radius} {expected}");

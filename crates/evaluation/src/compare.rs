@@ -65,6 +65,8 @@ pub struct Side {
     pub version: Option<String>,
     /// Git revision of the program.
     pub git_revision: Option<String>,
+    /// SHA-256 of all sources that its results depend on.
+    pub source_sha256: Option<String>,
 }
 
 /// What a failed comparison lost.
@@ -316,6 +318,7 @@ fn side(report: &StoredReport) -> Side {
         verdict: text("/verdict"),
         version: text("/provenance/version"),
         git_revision: text("/provenance/git_revision"),
+        source_sha256: text("/provenance/source_sha256"),
     }
 }
 

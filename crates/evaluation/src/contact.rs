@@ -281,7 +281,7 @@ pub fn force_balance(
     let force = (columns.transpose() * columns).try_inverse()? * columns.transpose() * held;
     Some(ForceBalance {
         normal_force_n: force.x,
-        tangential_force_n: force.y.hypot(force.z),
+        tangential_force_n: libm::hypot(force.y, force.z),
         unexplained: (held - columns * force).norm() / held.norm(),
     })
 }

@@ -5,7 +5,7 @@ use needlebench_cell::scenario::CriteriaSection;
 use needlebench_cell::study::StudyMode;
 
 use crate::adjudication::{WITHOUT_CONTACT, sentence};
-use crate::metric::{Better, Criterion, Metric, Missing, Source, metrics};
+use crate::metric::{Better, Criterion, Metric, Missing, Quantity, Source, metrics};
 use crate::report::{ConfigurationReport, CriterionResult, EngineReport, Judged, NotJudged};
 use crate::verdict::{UNCOMPARED, unmeasured_by};
 
@@ -261,4 +261,25 @@ pub fn first_missed_by_posture(
     let mut all = of_configuration(posture, criteria, StudyMode::Static);
     let missed = all.find(|checked| checked.value.is_some() && !checked.is_met());
     missed.map(|checked| checked.criterion.key)
+}
+
+/// What a radian or a plain number counts in metres, where unlike criteria are compared: about the lever of the wrist.
+const METRES_PER_UNIT: f64 = 0.1;
+
+/// By how much a static case's posture misses the criterion that it misses most, m, negative; none where it
+/// misses none that it is known of. Radians and plain numbers count 100 mm.
+pub fn worst_miss_by_posture_m(
+    posture: &ConfigurationReport,
+    criteria: &CriteriaSection,
+) -> Option<f64> {
+    of_configuration(posture, criteria, StudyMode::Static)
+        .filter(|checked| !checked.is_met())
+        .filter_map(|checked| {
+            let by = -(checked.value? - checked.limit.value).abs();
+            Some(match checked.metric.quantity {
+                Quantity::Length => by,
+                _ => by * METRES_PER_UNIT,
+            })
+        })
+        .reduce(f64::min)
 }

@@ -54,10 +54,10 @@ fn angle_of_shadows(
     axes: [usize; 2],
 ) -> Option<f64> {
     let [u, v] = [planned, actual].map(|each| [each[axes[0]], each[axes[1]]]);
-    if u[0].hypot(u[1]) < LEAST_SHADOW {
+    if libm::hypot(u[0], u[1]) < LEAST_SHADOW {
         return None;
     }
-    let turned = (u[0] * v[1] - u[1] * v[0]).atan2(u[0] * v[0] + u[1] * v[1]);
+    let turned = libm::atan2(u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1]);
     Some(turned.abs())
 }
 
@@ -109,7 +109,7 @@ pub fn measure_guide(
         tip_position_error_m: miss.norm(),
         depth_error_m: miss.dot(&planned),
         lateral_error_m: off_axis_m(to_target),
-        needle_angle_error_rad: planned.cross(&actual).norm().atan2(planned.dot(&actual)),
+        needle_angle_error_rad: libm::atan2(planned.cross(&actual).norm(), planned.dot(&actual)),
         guide_position_error_m: (exit_point.coords - goal.world_from_guide_exit.translation.vector)
             .norm(),
         entry_point_error_m,

@@ -55,6 +55,8 @@ fn provenance(report: &StoredReport) -> BTreeMap<String, Origin> {
     for key in [
         "version",
         "git_revision",
+        "source_sha256",
+        "arithmetic",
         "cargo_lock_sha256",
         "seed",
         "truth",

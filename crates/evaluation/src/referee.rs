@@ -198,7 +198,8 @@ pub fn measured_order(convergence: &[StepDifference]) -> Option<f64> {
         return None;
     };
     (fine.peak_tip_m > ROUNDING_M).then(|| {
-        (coarse.peak_tip_m / fine.peak_tip_m).ln() / (coarse.timestep_s / fine.timestep_s).ln()
+        libm::log(coarse.peak_tip_m / fine.peak_tip_m)
+            / libm::log(coarse.timestep_s / fine.timestep_s)
     })
 }
 

@@ -445,6 +445,10 @@ pub struct Provenance {
     pub version: String,
     /// Git revision of the program, with `-dirty` where it was changed; `unknown` outside git.
     pub git_revision: String,
+    /// SHA-256 of all sources that results depend on, with the versions of all libraries and the compiler.
+    pub source_sha256: String,
+    /// How numbers are rounded; engines that round otherwise say so themselves.
+    pub arithmetic: String,
     /// SHA-256 of the lock file of the build.
     pub cargo_lock_sha256: String,
     /// Engines with their settings.

@@ -43,8 +43,8 @@ impl StoredReport {
         }
     }
 
-    /// A case of a study, as a report with its goal alone. `program` is version and revision of what
-    /// computed it.
+    /// A case of a study, as a report with its goal alone. `program` is the version of what computed it, and
+    /// the hash of its sources.
     pub fn of_case(
         source: impl Into<String>,
         study: &str,
@@ -72,7 +72,7 @@ impl StoredReport {
             report: json!({
                 "schema_version": SCHEMA_VERSION,
                 "scenario": { "name": study },
-                "provenance": { "version": program[0], "git_revision": program[1] },
+                "provenance": { "version": program[0], "source_sha256": program[1] },
                 "goals": [{ "name": goal, "configurations": configurations }],
             }),
             is_case: true,

@@ -183,8 +183,8 @@ fn scaling() {
 
 /// Both axes logarithmic, with a dashed line for a cost in proportion to the triangles.
 fn plot(rows: &[(f64, [f64; 2])]) -> String {
-    let x = |count: f64| 70.0 + 140.0 * (count.log10() - 2.9);
-    let y = |us: f64| 330.0 - 100.0 * us.log10();
+    let x = |count: f64| 70.0 + 140.0 * (libm::log10(count) - 2.9);
+    let y = |us: f64| 330.0 - 100.0 * libm::log10(us);
     let line = |points: Vec<(f64, f64)>, style: &str| {
         let points: Vec<String> = points
             .into_iter()

@@ -9,9 +9,9 @@ use std::time::Instant;
 fn torus(n: u32, m: u32) -> TriangleMesh {
     let (mut vertices_m, mut triangles) = (Vec::new(), Vec::new());
     for i in 0..n {
-        let (su, cu) = (TAU * f64::from(i) / f64::from(n)).sin_cos();
+        let (su, cu) = libm::sincos(TAU * f64::from(i) / f64::from(n));
         for j in 0..m {
-            let (sv, cv) = (TAU * f64::from(j) / f64::from(m)).sin_cos();
+            let (sv, cv) = libm::sincos(TAU * f64::from(j) / f64::from(m));
             let r = 0.2 + 0.07 * cv;
             vertices_m.push(Point3::new(r * cu, r * su, 0.07 * sv));
             let at = |i: u32, j: u32| (i % n) * m + j % m;
@@ -28,12 +28,12 @@ fn torus(n: u32, m: u32) -> TriangleMesh {
 fn ellipsoid(rings: u32, sectors: u32, half: Vector3<f64>) -> TriangleMesh {
     let mut vertices_m = vec![Point3::new(0.0, 0.0, half.z)];
     for ring in 1..rings {
-        let (sin, cos) = (PI * f64::from(ring) / f64::from(rings)).sin_cos();
+        let (sin, cos) = libm::sincos(PI * f64::from(ring) / f64::from(rings));
         for sector in 0..sectors {
             let turn = TAU * f64::from(sector) / f64::from(sectors);
             vertices_m.push(Point3::new(
-                half.x * sin * turn.cos(),
-                half.y * sin * turn.sin(),
+                half.x * sin * libm::cos(turn),
+                half.y * sin * libm::sin(turn),
                 half.z * cos,
             ));
         }

@@ -63,6 +63,44 @@ pub fn separation_within(
     })
 }
 
+/// Whether the signed distance is less than a limit, or is not a number: what [`separation_within`] says, without the
+/// depth where shapes penetrate and any gap would do.
+pub fn is_nearer(a: &PreparedShape, b: &PreparedShape, b_from_a: &Placement, limit_m: f64) -> bool {
+    let is_below = |distance_m: f64| distance_m < limit_m || distance_m.is_nan();
+    if limit_m <= 0.0 {
+        let found = separation_within(a, b, b_from_a, limit_m);
+        return found.is_some_and(|found| is_below(found.distance_m));
+    }
+    if a.is_surface() || b.is_surface() {
+        return surface::is_nearer(a, b, b_from_a, limit_m);
+    }
+    let radius_m = a.radius_m + b.radius_m;
+    match core_gap(a, b, b_from_a, limit_m + radius_m) {
+        Gap::Apart(core) => is_below(core.distance_m - radius_m),
+        Gap::BeyondCutoff => false,
+        Gap::Overlap => true,
+    }
+}
+
+fn core_gap(a: &PreparedShape, b: &PreparedShape, b_from_a: &Placement, cutoff_m: f64) -> Gap {
+    match closed_form(&a.core, &b.core, b_from_a) {
+        Some(exact) => Gap::Apart(exact),
+        None => gap(a, b, b_from_a, cutoff_m).1,
+    }
+}
+
+fn gap<'s>(
+    a: &'s PreparedShape,
+    b: &'s PreparedShape,
+    b_from_a: &Placement,
+    cutoff_m: f64,
+) -> (Difference<'s>, Gap) {
+    let mut difference = Difference::new(&a.core, &b.core, *b_from_a);
+    let towards_b = a.bound.placed(b_from_a).towards(&b.bound);
+    let gap = gjk::distance(&mut difference, &towards_b, cutoff_m);
+    (difference, gap)
+}
+
 fn core_separation(
     a: &PreparedShape,
     b: &PreparedShape,
@@ -72,12 +110,10 @@ fn core_separation(
     if let Some(exact) = closed_form(&a.core, &b.core, b_from_a) {
         return Some(exact);
     }
-    let mut difference = Difference::new(&a.core, &b.core, *b_from_a);
-    let towards_b = a.bound.placed(b_from_a).towards(&b.bound);
-    match gjk::distance(&mut difference, &towards_b, cutoff_m) {
-        Gap::Apart(separation) => Some(separation),
-        Gap::BeyondCutoff => None,
-        Gap::Overlap => epa::depth(&mut difference, cutoff_m),
+    match gap(a, b, b_from_a, cutoff_m) {
+        (_, Gap::Apart(separation)) => Some(separation),
+        (_, Gap::BeyondCutoff) => None,
+        (mut difference, Gap::Overlap) => epa::depth(&mut difference, cutoff_m),
     }
 }
 

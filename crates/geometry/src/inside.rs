@@ -14,7 +14,7 @@ impl Solid {
             Shape::Cylinder {
                 radius_m,
                 half_length_m,
-            } => local.z.abs() <= *half_length_m && local.x.hypot(local.y) <= *radius_m,
+            } => local.z.abs() <= *half_length_m && libm::hypot(local.x, local.y) <= *radius_m,
             Shape::Capsule {
                 radius_m,
                 half_length_m,

@@ -119,7 +119,7 @@ mod tree;
 mod triangle_mesh;
 
 pub use bounds::{BoundingCapsule, OrientedBox};
-pub use distance::{PRUNING_MARGIN_M, separation, separation_within};
+pub use distance::{PRUNING_MARGIN_M, is_nearer, separation, separation_within};
 pub use mesh::SolidMesh;
 pub use placement::Placement;
 pub use prepared::PreparedShape;

@@ -268,7 +268,7 @@ mod tests {
             Shape::Cylinder {
                 radius_m,
                 half_length_m,
-            } => p.z.abs() < *half_length_m && p.x.hypot(p.y) < *radius_m,
+            } => p.z.abs() < *half_length_m && libm::hypot(p.x, p.y) < *radius_m,
             Shape::Capsule {
                 radius_m,
                 half_length_m,

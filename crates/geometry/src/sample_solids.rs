@@ -65,7 +65,7 @@ pub fn revolved(profile: &[[f64; 2]], around: u32) -> TriangleMesh {
     ];
     for [radius, z] in inner {
         for k in 0..around {
-            let (sine, cosine) = (TAU * f64::from(k) / f64::from(around)).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * f64::from(k) / f64::from(around));
             vertices_m.push(Point3::new(radius * cosine, radius * sine, *z));
         }
     }
@@ -104,9 +104,9 @@ pub fn bowl() -> TriangleMesh {
 pub fn torus(around: u32, about: u32) -> TriangleMesh {
     let mut vertices_m = Vec::new();
     for i in 0..around {
-        let (s, c) = (TAU * f64::from(i) / f64::from(around)).sin_cos();
+        let (s, c) = libm::sincos(TAU * f64::from(i) / f64::from(around));
         for j in 0..about {
-            let (t, d) = (TAU * f64::from(j) / f64::from(about)).sin_cos();
+            let (t, d) = libm::sincos(TAU * f64::from(j) / f64::from(about));
             let radius = 0.05 + 0.02 * d;
             vertices_m.push(Point3::new(radius * c, radius * s, 0.02 * t));
         }
@@ -129,12 +129,12 @@ pub fn torus(around: u32, about: u32) -> TriangleMesh {
 pub fn ellipsoid(rings: u32, sectors: u32, half_m: Vector3<f64>) -> TriangleMesh {
     let mut vertices_m = vec![Point3::new(0.0, 0.0, half_m.z)];
     for ring in 1..rings {
-        let (sin, cos) = (PI * f64::from(ring) / f64::from(rings)).sin_cos();
+        let (sin, cos) = libm::sincos(PI * f64::from(ring) / f64::from(rings));
         for sector in 0..sectors {
             let turn = TAU * f64::from(sector) / f64::from(sectors);
             vertices_m.push(Point3::new(
-                half_m.x * sin * turn.cos(),
-                half_m.y * sin * turn.sin(),
+                half_m.x * sin * libm::cos(turn),
+                half_m.y * sin * libm::sin(turn),
                 half_m.z * cos,
             ));
         }

@@ -78,6 +78,17 @@ impl PreparedSolids {
         in_frame_of_b(&segment.shape, other, &solid_from_segment).placed(&world_from_solid)
     }
 
+    /// Whether a point of the parent's frame is in one of them, its surface included: what [`Solid::contains`] says, for
+    /// meshes by their search tree.
+    pub fn contains(&self, index: usize, point: &Point3<f64>) -> bool {
+        let (shape, parent_from_shape) = &self.0[index];
+        if let Some(tree) = shape.surface() {
+            return tree.contains(&(parent_from_shape.inverse() * point));
+        }
+        let here = Segment::new(point, point, 0.0);
+        self.to(index, &here, &Pose::identity()).distance_m <= 0.0
+    }
+
     /// [`segment_clearance`] from these solids.
     pub fn segment_clearance(
         &self,

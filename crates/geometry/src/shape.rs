@@ -62,7 +62,7 @@ impl Shape {
             Self::Cylinder {
                 radius_m,
                 half_length_m,
-            } => radius_m.hypot(*half_length_m),
+            } => libm::hypot(*radius_m, *half_length_m),
             Self::Capsule {
                 radius_m,
                 half_length_m,

@@ -65,7 +65,7 @@ fn segments(radius_m: f64, chord_error_m: f64) -> u32 {
     // The sagitta of a chord over the half angle h is r (1 - cos h) = 2 r sin^2(h / 2).
     // NaN from a negative error passes through `clamp`.
     let sine = (chord_error_m / (2.0 * radius_m)).sqrt().clamp(0.0, 1.0);
-    let half_angle_rad = 2.0 * sine.atan2((1.0 - sine * sine).sqrt());
+    let half_angle_rad = 2.0 * libm::atan2(sine, (1.0 - sine * sine).sqrt());
     let wanted = (TAU / (2.0 * half_angle_rad)).ceil();
     let bounded = if wanted < f64::from(MIN_SEGMENTS) {
         MIN_SEGMENTS
@@ -98,8 +98,8 @@ fn capsule(radius_m: f64, half_length_m: f64, chord_error_m: f64) -> TriangleMes
             1.0
         };
         Ring {
-            radius_m: radius_m * latitude_rad.cos(),
-            z_m: centre_z_m + sign * radius_m * latitude_rad.sin(),
+            radius_m: radius_m * libm::cos(latitude_rad),
+            z_m: centre_z_m + sign * radius_m * libm::sin(latitude_rad),
         }
     };
     let mut rings: Vec<Ring> = (0..per_quadrant)
@@ -124,7 +124,7 @@ fn revolve(bottom_z_m: f64, rings: &[Ring], top_z_m: f64, around: u32) -> Triang
     let mut triangles = Vec::new();
     for ring in rings {
         vertices_m.extend((0..around).map(|step| {
-            let (sine, cosine) = (TAU * f64::from(step) / f64::from(around)).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * f64::from(step) / f64::from(around));
             Point3::new(ring.radius_m * cosine, ring.radius_m * sine, ring.z_m)
         }));
     }
@@ -247,7 +247,7 @@ mod tests {
     }
 
     fn distance_to_surface_m(shape: &Shape, p: &Point3<f64>) -> f64 {
-        let across_m = p.x.hypot(p.y);
+        let across_m = libm::hypot(p.x, p.y);
         match shape {
             Shape::Sphere { radius_m } => (p.coords.norm() - radius_m).abs(),
             Shape::Cylinder {
@@ -257,7 +257,7 @@ mod tests {
             Shape::Capsule {
                 radius_m,
                 half_length_m,
-            } => (across_m.hypot((p.z.abs() - half_length_m).max(0.0)) - radius_m).abs(),
+            } => (libm::hypot(across_m, (p.z.abs() - half_length_m).max(0.0)) - radius_m).abs(),
             Shape::Cuboid { .. } | Shape::Convex(_) | Shape::Mesh(_) => {
                 (p.coords.abs() - half_extents_m()).max().abs()
             }

@@ -35,7 +35,7 @@ fn centers_mm() -> Vec<Vector3<f64>> {
     MARKERS
         .iter()
         .map(|[azimuth, height]| {
-            let (x, y) = azimuth.to_radians().sin_cos();
+            let (x, y) = libm::sincos(azimuth.to_radians());
             let on_skin = Vector3::new(BODY_MM[0] * x, -BODY_MM[1] * y, *height);
             let normal = Vector3::new(x / BODY_MM[0], -y / BODY_MM[1], 0.0).normalize();
             on_skin + normal * 4.0
@@ -50,16 +50,16 @@ fn scan() -> Volume {
     let centers = centers_mm();
     let mut random = SplitMix64::new(1);
     let mut hu = Vec::with_capacity(SIZE.iter().product());
-    let soft = |depth_mm: f64| 0.5 * (1.0 + (depth_mm / 0.5).tanh());
+    let soft = |depth_mm: f64| 0.5 * (1.0 + libm::tanh(depth_mm / 0.5));
     for k in 0..SIZE[2] {
         for j in 0..SIZE[1] {
             for i in 0..SIZE[0] {
                 let index = [i, j, k];
                 let p =
                     Vector3::from_fn(|axis, _| first[axis] + spacing[axis] * index[axis] as f64);
-                let radius = (p.x / BODY_MM[0]).hypot(p.y / BODY_MM[1]);
+                let radius = libm::hypot(p.x / BODY_MM[0], p.y / BODY_MM[1]);
                 let mut value = -1000.0 + 1040.0 * soft((1.0 - radius) * BODY_MM[1]);
-                let lung = ((p.x.abs() - 60.0) / 45.0).hypot(p.y / 60.0);
+                let lung = libm::hypot((p.x.abs() - 60.0) / 45.0, p.y / 60.0);
                 value -= 890.0 * soft((1.0 - lung) * 45.0);
                 if (0.95..1.2).contains(&radius) {
                     for center in &centers {

@@ -47,7 +47,8 @@ fn chest() -> Scene {
             for piece in 0..8 {
                 let turn = 0.6 * f64::from(piece) - 2.1;
                 let height_m = -0.13 + 0.023 * f64::from(rib) - 0.004 * f64::from(piece);
-                let place = Vector3::new(0.118 * turn.cos(), 0.118 * turn.sin(), height_m);
+                let place =
+                    Vector3::new(0.118 * libm::cos(turn), 0.118 * libm::sin(turn), height_m);
                 let along = UnitQuaternion::from_euler_angles(1.5, 0.0, turn);
                 add(
                     capsule(5e-3 - shell_m, 0.036),
@@ -70,7 +71,11 @@ fn chest() -> Scene {
     }
     for vessel in 0..70 {
         let turn = f64::from(vessel);
-        let place = Vector3::new(0.05 * turn.cos(), 0.04 * turn.sin(), 0.004 * turn - 0.14);
+        let place = Vector3::new(
+            0.05 * libm::cos(turn),
+            0.04 * libm::sin(turn),
+            0.004 * turn - 0.14,
+        );
         let along = UnitQuaternion::from_euler_angles(turn, 0.7 * turn, 0.0);
         add(
             capsule(2e-3, 0.02),
@@ -80,7 +85,11 @@ fn chest() -> Scene {
     }
     for marker in 0..8 {
         let turn = f64::from(marker) - 4.5;
-        let place = [0.149 * turn.cos(), 0.149 * turn.sin(), 0.01 * turn];
+        let place = [
+            0.149 * libm::cos(turn),
+            0.149 * libm::sin(turn),
+            0.01 * turn,
+        ];
         add(
             Shape::Sphere { radius_m: 4e-3 },
             at(place[0], place[1], place[2]),

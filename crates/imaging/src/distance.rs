@@ -585,7 +585,7 @@ mod tests {
                         let steps = (voxel[axis] as f64 - other[axis] as f64).abs();
                         (steps - 0.5).max(0.0) * spacing_m[axis]
                     };
-                    way(0).hypot(way(1)).hypot(way(2))
+                    libm::hypot(libm::hypot(way(0), way(1)), way(2))
                 });
                 let nearest = nearest.fold(cap_m, f64::min);
                 let told = boxes.at_voxel(voxel).unwrap();
@@ -622,7 +622,7 @@ mod tests {
                     let steps = (index[axis] - other[axis] as f64).abs();
                     (steps - 0.5).max(0.0) * spacing_m[axis]
                 };
-                way(0).hypot(way(1)).hypot(way(2))
+                libm::hypot(libm::hypot(way(0), way(1)), way(2))
             });
             let exact_m = exact_m.fold(40e-3, f64::min);
             let told_m = field.at_least(&point);

@@ -151,7 +151,7 @@ impl VoxelGrid {
         let [i, j, k] = [0, 1, 2].map(|axis| self.ct_from_index.column(axis).into_owned());
         let normal = i.cross(&j);
         let along = normal.dot(&k).abs();
-        normal.cross(&k).norm().atan2(along)
+        libm::atan2(normal.cross(&k).norm(), along)
     }
 
     /// Offset of a voxel in the data: columns run fastest, slices slowest.

@@ -771,7 +771,7 @@ fn size_of(mesh: &TriangleMesh, grid: &VoxelGrid) -> LesionSize {
         });
     LesionSize {
         volume_m3,
-        equivalent_diameter_m: (6.0 * volume_m3.max(0.0) / std::f64::consts::PI).cbrt(),
+        equivalent_diameter_m: libm::cbrt(6.0 * volume_m3.max(0.0) / std::f64::consts::PI),
         longest_m: longest(&mesh.vertices_m).0,
         axial_longest_m,
         axial_width_m,

@@ -15,10 +15,7 @@ pub(crate) fn orthogonal(grid: &VoxelGrid) -> Result<[f64; 3], ImagingError> {
         if cosine > PERPENDICULAR {
             return Err(ImagingError::refused(format!(
                 "the voxels' axes {a} and {b} are {:.2} degrees from perpendicular",
-                cosine
-                    .min(1.0)
-                    .atan2((1.0 - cosine * cosine).max(0.0).sqrt())
-                    .to_degrees()
+                libm::atan2(cosine.min(1.0), (1.0 - cosine * cosine).max(0.0).sqrt()).to_degrees()
             ))
             .hint("resample the volume to a perpendicular grid first"));
         }

@@ -18,7 +18,7 @@ pub fn probability_above(x: f64, degrees_of_freedom: f64) -> f64 {
         return 0.0;
     }
     let (a, x) = (degrees_of_freedom / 2.0, x / 2.0);
-    let scale = (a * x.ln() - x - libm::lgamma(a)).exp();
+    let scale = libm::exp(a * libm::log(x) - x - libm::lgamma(a));
     if x < a + 1.0 {
         (1.0 - scale * series(a, x)).clamp(0.0, 1.0)
     } else {

@@ -400,7 +400,7 @@ mod tests {
         let free = imbalance(&arm(&mut random, 0.05), |_, _, _| Joints::zeros());
         let bare = arm(&mut random, 0.0);
         let driven = imbalance(&bare, |k, q, qd| {
-            let turn = Joints::from_fn(|i, _| (f64::from(k) * 0.02 + i as f64).sin());
+            let turn = Joints::from_fn(|i, _| libm::sin(f64::from(k) * 0.02 + i as f64));
             bare.gravity_torque(q) + turn * 0.5 - qd * 0.1
         });
         println!("energy, work, momentum: free {free:?}, driven {driven:?}");

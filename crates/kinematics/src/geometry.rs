@@ -112,7 +112,9 @@ impl UrGeometry {
     /// Positive with a right shoulder, negative with a left one; its magnitude is
     /// `sqrt(rho^2 - d4^2)`, which is 0 where the two meet.
     pub fn wrist_forward_m(&self, q: &Joints) -> f64 {
-        self.a2 * q[1].cos() + self.a3 * (q[1] + q[2]).cos() + self.d5 * (q[1] + q[2] + q[3]).sin()
+        self.a2 * libm::cos(q[1])
+            + self.a3 * libm::cos(q[1] + q[2])
+            + self.d5 * libm::sin(q[1] + q[2] + q[3])
     }
 
     /// `q2` and `q3` that bring wrist 1 to `(ahead, up)` of the shoulder in the arm's plane, with
@@ -126,8 +128,8 @@ impl UrGeometry {
         let c3 = (0.5 * (one_plus - one_minus)).clamp(-1.0, 1.0);
         let s3 = sign * (one_minus * one_plus).max(0.0).sqrt();
         let (bx, by) = (a2 + a3 * c3, a3 * s3);
-        let q2 = (up_m * bx - ahead_m * by).atan2(ahead_m * bx + up_m * by);
-        (q2, s3.atan2(c3))
+        let q2 = libm::atan2(up_m * bx - ahead_m * by, ahead_m * bx + up_m * by);
+        (q2, libm::atan2(s3, c3))
     }
 
     /// Nearest UR geometry of a chain, read off its joint axes at `q = 0`.

@@ -1,13 +1,8 @@
-//! Kinematics and rigid-body dynamics of the six-joint UR arms.
-//!
-//! Metres, radians, kilograms and seconds throughout. Joint vectors are ordered
-//! `shoulder_pan, shoulder_lift, elbow, wrist_1, wrist_2, wrist_3`.
-//!
-//! Frames: `base_link` is ROS's; `base` is the UR controller's, `base_link` turned by 180 degrees
-//! about z, and the frame of the DH chain; `flange` here always means DH frame 6, which ROS calls
-//! `tool0` and the controller shows at a zero TCP.
+#![doc = include_str!("../README.md")]
 
 mod chain;
+// Numerics that the testbench shares, hidden from the documentation: no part of what this crate promises.
+#[doc(hidden)]
 pub mod chi_square;
 mod dynamics;
 mod forward_dynamics;
@@ -17,8 +12,11 @@ mod integrate;
 mod limits;
 mod manipulability;
 mod models;
+#[doc(hidden)]
 pub mod normal;
+#[doc(hidden)]
 pub mod pose_sets;
+#[doc(hidden)]
 pub mod random;
 pub mod registration;
 mod rotation;
@@ -54,6 +52,16 @@ pub const JOINT_NAMES: [&str; JOINT_COUNT] = [
     "wrist_1_joint",
     "wrist_2_joint",
     "wrist_3_joint",
+];
+
+/// ROS names of the links that the joints move, in order.
+pub const LINK_NAMES: [&str; JOINT_COUNT] = [
+    "shoulder_link",
+    "upper_arm_link",
+    "forearm_link",
+    "wrist_1_link",
+    "wrist_2_link",
+    "wrist_3_link",
 ];
 
 /// Short joint names, in order, as reports print them.

@@ -122,10 +122,10 @@ impl SingularityDistances {
     pub fn of(geometry: &UrGeometry, q: &Joints) -> Self {
         let (a2, a3, d4) = (geometry.a2, geometry.a3, geometry.d4.abs());
         let product = 4.0 * a2 * a3;
-        let (sine, cosine) = (0.5 * q[2]).sin_cos();
+        let (sine, cosine) = libm::sincos(0.5 * q[2]);
         // Differences of squares as products: the plain differences lose half the digits.
         let (stretched, folded) = (a2 + a3, a2 - a3);
-        let reach_m = (stretched * cosine).hypot(folded * sine);
+        let reach_m = libm::hypot(stretched * cosine, folded * sine);
         let forward_m = geometry.wrist_forward_m(q).abs();
         Self {
             wrist_rad: from_half_turns(q[4]),
@@ -133,8 +133,8 @@ impl SingularityDistances {
             stretch_left_m: product * sine * sine / (stretched.abs() + reach_m),
             fold_left_m: left(product * cosine * cosine, reach_m + folded.abs()),
             shoulder_forward_m: forward_m,
-            shoulder_approach_m: left(forward_m * forward_m, forward_m.hypot(d4) + d4),
-            shoulder_rad: forward_m.atan2(d4),
+            shoulder_approach_m: left(forward_m * forward_m, libm::hypot(forward_m, d4) + d4),
+            shoulder_rad: libm::atan2(forward_m, d4),
         }
     }
 }
@@ -147,7 +147,7 @@ impl UrGeometry {
     /// `chain().jacobian(q).determinant()` to 1e-15 for a UR3
     /// (`the_determinant_is_the_product_of_the_three_singularities`).
     pub fn jacobian_determinant_m3(&self, q: &Joints) -> f64 {
-        self.a2 * self.a3 * q[2].sin() * q[4].sin() * self.wrist_forward_m(q)
+        self.a2 * self.a3 * libm::sin(q[2]) * libm::sin(q[4]) * self.wrist_forward_m(q)
     }
 }
 
@@ -253,8 +253,10 @@ mod tests {
             for _ in 0..10 {
                 let qd = Joints::from_fn(|_, _| random.uniform(-1.0, 1.0)).normalize();
                 let twist = jacobian * qd;
-                let speed = (twist.fixed_rows::<3>(0).norm() / length_m)
-                    .hypot(twist.fixed_rows::<3>(3).norm());
+                let speed = libm::hypot(
+                    twist.fixed_rows::<3>(0).norm() / length_m,
+                    twist.fixed_rows::<3>(3).norm(),
+                );
                 assert!(speed >= measures.min_singular_value && speed <= largest * (1.0 + 1e-14));
             }
         }
@@ -279,11 +281,13 @@ mod tests {
             let (longest, shortest) = (ur3.a2 + ur3.a3, ur3.a2 - ur3.a3);
             assert!((of.stretch_left_m - (longest.abs() - reach_m)).abs() < LENGTH_M);
             assert!((of.fold_left_m - (reach_m - shortest.abs())).abs() < 10.0 * LENGTH_M);
-            let rho_m = origin(4).x.hypot(origin(4).y);
+            let rho_m = libm::hypot(origin(4).x, origin(4).y);
             assert!((of.shoulder_approach_m - (rho_m - ur3.d4)).abs() < 2.0 * LENGTH_M);
-            assert!((of.shoulder_rad - (of.shoulder_forward_m / ur3.d4).atan()).abs() < LENGTH_M);
-            assert!((of.wrist_rad.sin() - q[4].sin().abs()).abs() < LENGTH_M);
-            assert!((of.elbow_rad.sin() - q[2].sin().abs()).abs() < LENGTH_M);
+            assert!(
+                (of.shoulder_rad - libm::atan(of.shoulder_forward_m / ur3.d4)).abs() < LENGTH_M
+            );
+            assert!((libm::sin(of.wrist_rad) - libm::sin(q[4]).abs()).abs() < LENGTH_M);
+            assert!((libm::sin(of.elbow_rad) - libm::sin(q[2]).abs()).abs() < LENGTH_M);
         }
     }
 

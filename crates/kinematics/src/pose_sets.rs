@@ -100,14 +100,14 @@ impl PoseSet {
             ) {
                 // Wrist 4 places the wrist centre on the plane through the shoulder axis:
                 // a2 c2 + a3 c23 + d5 s234 = 0.
-                let forward = geometry.a2 * q[1].cos() + geometry.a3 * (q[1] + q[2]).cos();
+                let forward = geometry.a2 * libm::cos(q[1]) + geometry.a3 * libm::cos(q[1] + q[2]);
                 let s234 = -forward / geometry.d5;
                 if s234.abs() > 1.0 {
                     continue;
                 }
                 let c234 = (1.0 - s234 * s234).sqrt();
                 let c234 = if random.below(2) == 0 { c234 } else { -c234 };
-                q[3] = s234.atan2(c234) - q[1] - q[2];
+                q[3] = libm::atan2(s234, c234) - q[1] - q[2];
             }
             return q;
         }
@@ -149,9 +149,9 @@ mod tests {
         for _ in 0..1000 {
             let q = PoseSet::WristElbowShoulder.sample(&ur3, &mut random, 0.0);
             assert!(ur3.wrist_forward_m(&q).abs() < FORWARD_M);
-            assert!(q[2].sin().abs() < 1e-15 && q[4].sin().abs() < 1e-15);
+            assert!(libm::sin(q[2]).abs() < 1e-15 && libm::sin(q[4]).abs() < 1e-15);
             let near = PoseSet::Wrist.sample(&ur3, &mut random, 1e-6);
-            assert!(near[4].sin().abs() <= 1e-6 && near[4].sin() != 0.0);
+            assert!(libm::sin(near[4]).abs() <= 1e-6 && libm::sin(near[4]) != 0.0);
         }
     }
 }

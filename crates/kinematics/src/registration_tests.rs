@@ -102,7 +102,7 @@ fn trace_of_the_covariance_is_the_closed_form() {
 fn textbook_layouts_have_their_textbook_error() {
     let triangle: Vec<Point3<f64>> = (0..3)
         .map(|k| {
-            let (sine, cosine) = (TAU * f64::from(k) / 3.0).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * f64::from(k) / 3.0);
             Point3::new(0.05 * cosine, 0.05 * sine, 0.2)
         })
         .collect();

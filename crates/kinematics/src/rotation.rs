@@ -26,7 +26,7 @@ pub fn rotation_vector(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     if sine < 1e-150 {
         return imaginary * 2.0;
     }
-    imaginary * (2.0 * sine.atan2(real) / sine)
+    imaginary * (2.0 * libm::atan2(sine, real) / sine)
 }
 
 /// Angle between two rotations, rad, in `[0, pi]`.

@@ -186,7 +186,7 @@ impl Live {
         };
         let (over_floor_m, below_floor) = beyond(&limits.floor_m);
         let (over_judged_m, nearest) = beyond(&limits.judged_m);
-        let sines = [joints[4], joints[2]].map(|q| q.sin().abs());
+        let sines = [joints[4], joints[2]].map(|q| libm::sin(q).abs());
         let is_singular = sines.iter().any(|sine| *sine < limits.singularity_sine)
             || kinematics.geometry.wrist_forward_m(&joints).abs() < limits.shoulder_m;
         let (outcome, surplus_m, nearest) = if is_singular {

@@ -1,20 +1,26 @@
 //! The commands, and what each ends with.
 
+use std::ffi::OsString;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use needlebench_bench::progress::Progress;
 use needlebench_bench::provenance::PROGRAM_VERSION;
 
-use crate::clock::elapsed;
+use crate::clock;
 use crate::command::{
     self, AtlasArguments, CheckArguments, ClearanceArguments, CompareArguments, CtArguments,
-    FkArguments, ISO9283_HELP, IkArguments, InitArguments, Iso9283Arguments, MergeArguments,
-    PairsArguments, PaperArguments, REPLAY_HELP, REPORT_HELP, RecordPlanArguments, ReplayArguments,
-    ReportArguments, RunArguments, STUDY_HELP, SchemaFormat, ServoArguments, StudyArguments,
-    SuggestArguments, VIEW_HELP, ViewArguments,
+    DOCTOR_HELP, DoctorArguments, ExportArguments, FkArguments, ISO9283_HELP, IkArguments,
+    InitArguments, Iso9283Arguments, MergeArguments, PairsArguments, PaperArguments, REPLAY_HELP,
+    REPORT_HELP, RecordPlanArguments, ReplayArguments, ReportArguments, RunArguments, SEARCH_HELP,
+    STUDY_HELP, SchemaFormat, SearchArguments, ServoArguments, StudyArguments, SuggestArguments,
+    VIEW_HELP, ViewArguments,
 };
 use crate::exit::ExitStatus;
-use crate::output::{complain, keep_to_width};
+use crate::host::{Invocation, hosted};
+use crate::output::{complain, keep_to_width, print_as_it_is};
 
 /// Testbench for needle-guide robots: which of the eight arm configurations put the needle guide
 /// on its place, how far off the needle's tip is, and how close anything comes to anything.
@@ -67,6 +73,10 @@ enum Command {
         after_help = "Example: needlebench atlas scenarios/supine_suite.toml --goal right_upper_anterior"
     )]
     Atlas(AtlasArguments),
+    /// A scenario in the format of another tool: the whole cell for MuJoCo, for ROS, or as glTF; one of its motions for
+    /// ROS 2 or for a controller.
+    #[command(after_help = "Example: needlebench export scenarios/table3.toml --as mjcf")]
+    Export(Box<ExportArguments>),
     /// Two results side by side: what changed, and whether more was lost than is allowed.
     #[command(
         after_help = "Example: needlebench compare out/before/table3 out/after/table3 --max-loss clearance=0.5mm",
@@ -88,6 +98,12 @@ enum Command {
         after_long_help = STUDY_HELP
     )]
     Study(Box<StudyArguments>),
+    /// The best of a study's choices, looked for instead of listed: where the base should stand, which tool.
+    #[command(
+        after_help = "Example: needlebench search scenarios/studies/search_base.toml",
+        after_long_help = SEARCH_HELP
+    )]
+    Search(Box<SearchArguments>),
     /// Join the shards of a study.
     #[command(
         after_help = "Example: needlebench merge scenarios/studies/layouts.toml shard1/layouts shard2/layouts"
@@ -136,13 +152,18 @@ enum Command {
         #[arg(long)]
         markdown: bool,
     },
-    /// What this machine has and lacks for running both engines.
-    #[command(after_help = "Example: needlebench doctor")]
-    Doctor {
-        /// Print one JSON document.
-        #[arg(long)]
-        json: bool,
-    },
+    /// What this machine has and lacks for running both engines; sets MuJoCo up ahead, with and without a network.
+    #[command(
+        after_help = "Example: needlebench doctor --prepare",
+        after_long_help = DOCTOR_HELP
+    )]
+    Doctor(DoctorArguments),
+    /// Licences of everything of others that is inside the program.
+    #[command(
+        alias = "licenses",
+        after_help = "Example: needlebench licences | less"
+    )]
+    Licences,
     /// Completions for a shell.
     #[command(after_help = "Example: needlebench completions bash > needlebench.bash")]
     Completions {
@@ -159,16 +180,54 @@ pub fn command_line() -> clap::Command {
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    // What is wrong is on standard error by then; a bug of ours has a status as everything else.
-    std::panic::catch_unwind(run).unwrap_or_else(|_| {
-        complain("error: this is a bug of needlebench, not of your input");
-        ExitStatus::EnvironmentFailed.into()
+    main_with(std::env::args_os().collect()).into()
+}
+
+/// The same with arguments from elsewhere, the program's name first.
+pub fn main_with(arguments: Vec<OsString>) -> ExitStatus {
+    caught(|| {
+        let cli = Cli::parse_from(arguments);
+        run(cli)
     })
 }
 
-fn run() -> ExitCode {
-    elapsed();
-    let cli = Cli::parse();
+/// Runs a command as part of another program, on this thread. The arguments begin with the command; nothing is printed, and
+/// signals and the process are left alone.
+///
+/// Setting `cancel` is an interrupt. A panic is a bug, and is told as one.
+pub fn invoke(
+    arguments: Vec<OsString>,
+    cancel: Arc<AtomicBool>,
+    progress: Arc<dyn Progress + Send + Sync>,
+) -> Invocation {
+    let program = std::iter::once(OsString::from("needlebench"));
+    hosted(cancel, progress, || {
+        caught(|| match Cli::try_parse_from(program.chain(arguments)) {
+            Ok(cli) => run(cli),
+            Err(error) => {
+                let text = error.render().to_string();
+                if error.use_stderr() {
+                    complain(text.trim_end());
+                    return ExitStatus::BadInput;
+                }
+                // Nobody but the host reads it.
+                let _ = print_as_it_is(text.trim_end());
+                ExitStatus::Success
+            }
+        })
+    })
+}
+
+/// What is wrong is on standard error by then; a bug of ours has a status as everything else.
+fn caught(run: impl FnOnce() -> ExitStatus) -> ExitStatus {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).unwrap_or_else(|_| {
+        complain("error: this is a bug of needlebench, not of your input");
+        ExitStatus::EnvironmentFailed
+    })
+}
+
+fn run(cli: Cli) -> ExitStatus {
+    clock::start();
     keep_to_width();
     let result = match cli.command {
         Command::Init(arguments) => command::init(&arguments),
@@ -179,10 +238,12 @@ fn run() -> ExitCode {
         Command::Fk(arguments) => command::fk(&arguments),
         Command::Clearance(arguments) => command::clearance(&arguments),
         Command::Atlas(arguments) => command::atlas(&arguments),
+        Command::Export(arguments) => command::export(&arguments),
         Command::Compare(arguments) => command::compare(&arguments),
         Command::Ct(arguments) => command::ct(&arguments),
         Command::View(arguments) => command::view(&arguments),
         Command::Study(arguments) => command::study(&arguments),
+        Command::Search(arguments) => command::search(&arguments),
         Command::Merge(arguments) => command::merge(&arguments),
         Command::Iso9283(arguments) => command::iso9283(&arguments),
         Command::RecordPlan(arguments) => command::record_plan(&arguments),
@@ -192,21 +253,69 @@ fn run() -> ExitCode {
         Command::Report(arguments) => command::report(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),
         Command::Schema { format, markdown } => command::schema(format, markdown),
-        Command::Doctor { json } => command::doctor(json),
+        Command::Doctor(arguments) => command::doctor(&arguments),
+        Command::Licences => command::licences(),
         Command::Completions { shell } => command::completions(shell, &mut command_line()),
     };
     match result {
-        Ok(status) => status.into(),
+        Ok(status) => status,
         Err(error) => {
             // A closed pipe (`needlebench ... | head`) is the reader's choice.
             let closed = error
                 .downcast_ref::<std::io::Error>()
                 .is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe);
             if closed {
-                return ExitStatus::Success.into();
+                return ExitStatus::Success;
             }
             complain(&format!("error: {error:#}"));
-            ExitStatus::EnvironmentFailed.into()
+            ExitStatus::EnvironmentFailed
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use needlebench_bench::progress::Silent;
+
+    use super::*;
+
+    fn command(arguments: &[&str]) -> Invocation {
+        let arguments = arguments.iter().map(OsString::from).collect();
+        invoke(
+            arguments,
+            Arc::new(AtomicBool::new(false)),
+            Arc::new(Silent),
+        )
+    }
+
+    #[test]
+    fn answers_are_handed_over_and_not_printed() {
+        let made = command(&["fk", "--arm", "UR3", "--joints", "0,0,0,0,0,0", "--json"]);
+        assert_eq!(made.status, ExitStatus::Success);
+        assert!(
+            made.output.starts_with("{\n") && made.output.ends_with("}\n"),
+            "{made:?}"
+        );
+        assert!(made.messages.is_empty() && made.findings.is_empty());
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_as_lines_and_as_values() {
+        let made = command(&["check", "there_is_no_such.toml"]);
+        assert_eq!(made.status, ExitStatus::BadInput);
+        assert_eq!(made.findings.len(), 1);
+        assert_eq!(made.findings[0].file, "there_is_no_such.toml");
+        assert!(made.messages.contains("there_is_no_such.toml"));
+        assert!(!made.messages.contains('\u{1b}'), "{}", made.messages);
+    }
+
+    #[test]
+    fn wrong_arguments_end_the_command_and_nothing_else() {
+        let made = command(&["check", "--no-such"]);
+        assert_eq!(made.status, ExitStatus::BadInput);
+        assert!(made.messages.contains("--no-such"), "{made:?}");
+        let help = command(&["--help"]);
+        assert_eq!(help.status, ExitStatus::Success);
+        assert!(help.output.contains("Usage:"));
     }
 }

@@ -1,11 +1,20 @@
-//! How long the program has been running.
+//! How long a command has been running.
 
-use std::sync::OnceLock;
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-static STARTED: OnceLock<Instant> = OnceLock::new();
+thread_local! {
+    static STARTED: Cell<Option<Instant>> = const { Cell::new(None) };
+}
 
-/// Time since the first call, which is the program's first step.
+/// The command of this thread begins now.
+pub(crate) fn start() {
+    STARTED.set(Some(Instant::now()));
+}
+
+/// Time since the command of this thread began.
 pub(crate) fn elapsed() -> Duration {
-    STARTED.get_or_init(Instant::now).elapsed()
+    STARTED
+        .get()
+        .map_or(Duration::ZERO, |start| start.elapsed())
 }

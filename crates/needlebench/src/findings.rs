@@ -5,13 +5,23 @@ use std::path::Path;
 
 use needlebench_cell::{Finding, printable, printable_line, read_text};
 
+use crate::host::take_findings;
 use crate::output::complain_styled;
 
 /// Prints findings to standard error.
 pub(crate) fn print_findings(findings: &[Finding]) {
+    take_findings(findings);
     for finding in findings {
         complain_styled(&format!("{}\n", rendered(finding)));
     }
+}
+
+/// Findings as the command line tells them, without colours.
+pub fn findings_text(findings: &[Finding]) -> String {
+    let each = findings
+        .iter()
+        .map(|finding| format!("{}\n\n", rendered(finding)));
+    anstream::adapter::strip_str(&each.collect::<String>()).to_string()
 }
 
 fn rendered(finding: &Finding) -> String {

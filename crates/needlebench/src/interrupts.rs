@@ -5,8 +5,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 
-/// Set when the user interrupts the program.
+use crate::host;
+
+/// Set when the user interrupts the program, or the program that has this one inside interrupts it.
 pub(crate) fn watch_interrupts() -> Result<Arc<AtomicBool>> {
+    if let Some(cancel) = host::cancel() {
+        return Ok(cancel);
+    }
     let cancel = Arc::new(AtomicBool::new(false));
     let requested = Arc::clone(&cancel);
     ctrlc::set_handler(move || requested.store(true, Ordering::Relaxed))

@@ -1,4 +1,4 @@
-//! The command line of the testbench.
+//! The command line of the testbench, for a terminal and for programs that have it inside ([`invoke`]).
 //!
 //! Data goes to standard output, logs and progress to standard error.
 
@@ -8,8 +8,12 @@ mod clock;
 mod command;
 pub mod exit;
 mod findings;
+mod host;
 mod interrupts;
 mod output;
 mod progress;
 
-pub use cli::{command_line, main};
+pub use cli::{command_line, invoke, main, main_with};
+pub use command::KinematicArm;
+pub use findings::findings_text;
+pub use host::Invocation;

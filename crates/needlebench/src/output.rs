@@ -10,8 +10,14 @@ use anyhow::{Context, Result};
 use needlebench_cell::{printable, printable_line};
 use needlebench_report::layout;
 
+use crate::host;
+
 /// Tells tables and sentences how wide they may be: `COLUMNS`, else the terminal's width, else that of a log.
 pub(crate) fn keep_to_width() {
+    // Nobody looks, or it is not ours.
+    if host::is_hosted() {
+        return;
+    }
     let terminal = || terminal_size::terminal_size_of(std::io::stdout());
     let of_terminal = || terminal().map(|(terminal_size::Width(width), _)| usize::from(width));
     let width = columns().or_else(of_terminal);
@@ -26,13 +32,15 @@ fn columns() -> Option<usize> {
 
 /// Breaks nothing from now on: tables are as wide as they are.
 pub(crate) fn print_wide() {
-    layout::set_width(None);
+    if !host::is_hosted() {
+        layout::set_width(None);
+    }
 }
 
 /// Writes text for people and a line end to standard output; on a terminal, and where `COLUMNS` says how wide it
 /// may be, lines are broken at spaces.
 pub(crate) fn print_text(text: &str) -> Result<()> {
-    if std::io::stdout().is_terminal() || columns().is_some() {
+    if !host::is_hosted() && (std::io::stdout().is_terminal() || columns().is_some()) {
         print_as_it_is(&layout::wrapped(text))
     } else {
         print_as_it_is(text)
@@ -43,8 +51,11 @@ pub(crate) fn print_text(text: &str) -> Result<()> {
 ///
 /// A reader that stops reading is no error: what the command found decides its exit status.
 pub(crate) fn print_as_it_is(text: &str) -> Result<()> {
-    let mut out = anstream::stdout().lock();
     let text = without_commands(text);
+    if host::take_output(&text) {
+        return Ok(());
+    }
+    let mut out = anstream::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other.context("cannot write to standard output"),
@@ -58,6 +69,9 @@ pub(crate) fn complain(text: &str) {
 
 /// The same of a text with colours of ours.
 pub(crate) fn complain_styled(text: &str) {
+    if host::take_message(text) {
+        return;
+    }
     let mut error = anstream::stderr().lock();
     // There is nobody left to tell.
     let _ = writeln!(error, "{text}").and_then(|()| error.flush());

@@ -1,30 +1,47 @@
 //! Progress: a bar on a terminal, lines of a log elsewhere.
 
-use std::sync::{Mutex, PoisonError};
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use needlebench_bench::progress::Progress;
 
+use crate::host;
 use crate::output::complain;
 
 /// Environment variable that switches it off, for whole jobs.
 const SWITCH: &str = "NEEDLEBENCH_PROGRESS";
 
 /// Progress on standard error.
-#[derive(Debug)]
 pub(crate) enum TerminalProgress {
     /// A bar, on a terminal.
     Bar(ProgressBar),
     /// Lines, in a log.
     Log(Mutex<Log>),
+    /// Told to the program that has this one inside.
+    Told(Arc<dyn Progress + Send + Sync>),
     /// Nothing at all.
     Hidden,
+}
+
+impl fmt::Debug for TerminalProgress {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Bar(_) => "Bar",
+            Self::Log(_) => "Log",
+            Self::Told(_) => "Told",
+            Self::Hidden => "Hidden",
+        })
+    }
 }
 
 impl TerminalProgress {
     /// `quiet` hides it everywhere, as `NEEDLEBENCH_PROGRESS=off` does.
     pub(crate) fn new(quiet: bool) -> Self {
+        if let Some(progress) = host::progress() {
+            return Self::Told(progress);
+        }
         let off = std::env::var_os(SWITCH).is_some_and(|value| value == "off");
         if quiet || off {
             return Self::Hidden;
@@ -63,6 +80,9 @@ impl TerminalProgress {
 
 impl Progress for TerminalProgress {
     fn message(&self, text: &str) {
+        if let Self::Told(told) = self {
+            told.message(text);
+        }
         if let Self::Bar(bar) = self {
             bar.set_message(text.to_owned());
         }
@@ -73,11 +93,15 @@ impl Progress for TerminalProgress {
         match self {
             Self::Bar(bar) => bar.suspend(|| complain(text)),
             Self::Log(_) => complain(text),
+            Self::Told(told) => told.notice(text),
             Self::Hidden => {}
         }
     }
 
     fn expect(&self, steps: u64) {
+        if let Self::Told(told) = self {
+            told.expect(steps);
+        }
         if let Self::Bar(bar) = self {
             bar.inc_length(steps);
         }
@@ -85,6 +109,9 @@ impl Progress for TerminalProgress {
     }
 
     fn at(&self, done: u64, total: u64) {
+        if let Self::Told(told) = self {
+            told.at(done, total);
+        }
         if let Self::Bar(bar) = self {
             bar.set_length(total);
             bar.set_position(done);
@@ -93,6 +120,9 @@ impl Progress for TerminalProgress {
     }
 
     fn step(&self) {
+        if let Self::Told(told) = self {
+            told.step();
+        }
         if let Self::Bar(bar) = self {
             bar.inc(1);
         }

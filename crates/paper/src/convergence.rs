@@ -321,7 +321,7 @@ fn order(bench: &Bench, postures: &[Joints]) -> Order {
             .take_while(|error| *error > ROUNDING_RAD)
             .collect();
         if let [.., first, second, third] = above[..] {
-            orders.push((third / second).ln() / (second / first).ln());
+            orders.push(libm::log(third / second) / libm::log(second / first));
         }
     }
     Order {

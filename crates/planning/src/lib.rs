@@ -14,6 +14,7 @@ mod motion_plan;
 mod plan;
 mod planner;
 mod press;
+mod reach;
 mod rejection;
 mod route;
 mod transfer;
@@ -26,6 +27,7 @@ pub use motion_plan::{ConfigurationPlan, SearchEffort};
 pub use plan::GoalPlan;
 pub use planner::{Candidate, Planner, PostureMargins};
 pub use press::{PressError, PressPlan, stage_press};
+pub use reach::out_of_reach_m;
 pub use rejection::{Rejection, Rule};
 pub use route::{
     RouteClearance, RouteJudgement, crossed_fissures, judge_route, judge_route_beside,

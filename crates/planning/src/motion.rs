@@ -80,7 +80,7 @@ impl<'a> MotionChecker<'a> {
         nearby: &mut Nearby,
         limit_m: impl Fn(ClearanceClass) -> f64,
     ) -> bool {
-        self.model.below_near(q, nearby, limit_m).is_none()
+        !self.model.is_below_near(q, nearby, limit_m)
     }
 
     /// Limits of a motion, m: of what is no body nothing is asked.

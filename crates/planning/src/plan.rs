@@ -82,13 +82,17 @@ impl Planner<'_> {
 
     /// One of [`Planner::postures`].
     pub fn posture(&self, goal: &Goal, configuration: Configuration) -> Member {
-        let member = if let Roll::Fixed(roll_rad) = goal.roll {
-            self.member_at(goal, configuration, roll_rad)
-        } else {
-            let rolls = self.rolls(goal, self.planning().roll_samples);
-            self.first(goal, configuration, &rolls)
-        };
+        let member = self.posture_off_route(goal, configuration);
         member.on_route(route_rejection(self.resolved, goal).as_ref())
+    }
+
+    /// The same without a look at the needle's route, which all configurations share.
+    pub fn posture_off_route(&self, goal: &Goal, configuration: Configuration) -> Member {
+        if let Roll::Fixed(roll_rad) = goal.roll {
+            return self.member_at(goal, configuration, roll_rad);
+        }
+        let rolls = self.rolls(goal, self.planning().roll_samples);
+        self.first(goal, configuration, &rolls)
     }
 
     /// Of postures of a configuration at these rolls the best for the scenario's `roll_aim` that breaks no rule; where all

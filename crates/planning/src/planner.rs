@@ -1,10 +1,9 @@
 //! What plans are made with: the solver, the checker, and one posture with what can be said of it.
 
-use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 use needlebench_cell::scenario::PlanningSection;
-use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, Roll, part_in_words};
+use needlebench_cell::{Cell, ClearanceClass, Goal, ResolvedScenario, part_in_words};
 use needlebench_clearance::{ClassMinima, ClearanceModel, Nearby};
 use needlebench_kinematics::ik::{Configuration, Kinematics, Solution, SolutionKind, Solutions};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_LABELS, Joints, NotUrGeometry, Pose};
@@ -152,21 +151,14 @@ impl<'a> Planner<'a> {
 
     /// Pose of the flange in `base_link` that brings the guide to a goal.
     pub fn base_link_from_flange(&self, goal: &Goal, roll_rad: f64) -> Pose {
-        let cell = &self.resolved.cell;
-        cell.robot.world_from_base_link.inverse()
-            * goal.world_from_guide_exit_at(roll_rad)
-            * cell.tool.flange_from_guide_exit.inverse()
+        crate::reach::base_link_from_flange(self.resolved, goal, roll_rad)
     }
 
     /// Rolls that are looked at: all round where it is free, else the one.
     pub fn rolls(&self, goal: &Goal, count: u32) -> Vec<f64> {
-        match goal.roll {
-            Roll::Fixed(roll_rad) => vec![roll_rad],
-            Roll::Free => (0..count)
-                .map(|k| TAU * f64::from(k) / f64::from(count))
-                .collect(),
-        }
+        crate::reach::rolls(goal, count)
     }
+
     /// Margins, clearances and broken rules of one posture. `nearby` is of the posture before.
     pub(crate) fn candidate(
         &self,
@@ -343,8 +335,8 @@ impl<'a> Planner<'a> {
 
     fn singularity(&self, q: &Joints) -> Singularity {
         Singularity {
-            wrist_sine: q[4].sin().abs(),
-            elbow_sine: q[2].sin().abs(),
+            wrist_sine: libm::sin(q[4]).abs(),
+            elbow_sine: libm::sin(q[2]).abs(),
             shoulder_m: self.kinematics.geometry.wrist_forward_m(q).abs(),
         }
     }

@@ -1,7 +1,7 @@
 //! What the planned needle passes on its way from the skin to its end.
 
 use nalgebra::Point3;
-use needlebench_cell::phantom::{PhantomPart, RouteObstacle, Tissue};
+use needlebench_cell::phantom::{RouteObstacle, Tissue};
 use needlebench_cell::scenario::NeedleRouteSection;
 use needlebench_cell::{
     Cell, ClearanceClass, Goal, PlacedPhantom, ResolvedScenario, part_in_words,
@@ -84,10 +84,11 @@ fn entered<'a>(placed: &'a PlacedPhantom, goal: &'a Goal) -> Vec<&'a str> {
     let mut entered: Vec<&str> = goal.target_organ.as_deref().into_iter().collect();
     if goal.lesion.is_some() {
         let target = placed.world_from_phantom.inverse() * goal.target_m;
-        let is_bone = |part: &&PhantomPart| part.tissue == Tissue::Bone;
-        let bones = placed.phantom.parts.iter().filter(is_bone);
-        let holding = bones.filter(|part| part.solid.contains(&target));
-        entered.extend(holding.map(|part| part.organ.as_deref().unwrap_or(&part.name)));
+        let obstacles = placed.phantom.route_obstacles();
+        let holding = obstacles.parts.iter().enumerate().filter(|(index, part)| {
+            part.tissue == Tissue::Bone && obstacles.solids.contains(*index, &target)
+        });
+        entered.extend(holding.map(|(_, part)| part.organ.as_deref().unwrap_or(&part.name)));
     }
     entered
 }

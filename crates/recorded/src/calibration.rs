@@ -199,7 +199,16 @@ impl Fit {
         let (mut error_m, mut error_rad) = (FIRST_ERROR_M, FIRST_ERROR_RAD);
         for _ in 0..WEIGHTS {
             for _ in 0..STEPS {
-                let change = fit.step(nominal, samples, origins_are_free, error_m, error_rad);
+                // Of poses that are so exact the prior of what they leave open is lost in the rounding of the
+                // equations: they are then taken for less exact.
+                let change = loop {
+                    let step = fit.step(nominal, samples, origins_are_free, error_m, error_rad);
+                    if let Some(change) = step {
+                        break change;
+                    }
+                    error_m *= 2.0;
+                    error_rad *= 2.0;
+                };
                 if change < 1e-12 {
                     break;
                 }
@@ -211,7 +220,8 @@ impl Fit {
         fit
     }
 
-    /// One step of Gauss and Newton; the largest change of any number, m or rad.
+    /// One step of Gauss and Newton; the largest change of any number, m or rad. None where rounding leaves the
+    /// equations without a solution.
     fn step(
         &mut self,
         nominal: &Chain,
@@ -219,7 +229,7 @@ impl Fit {
         origins_are_free: bool,
         error_m: f64,
         error_rad: f64,
-    ) -> f64 {
+    ) -> Option<f64> {
         let mut normal = DMatrix::<f64>::zeros(ALL, ALL);
         let mut right = DVector::<f64>::zeros(ALL);
         for sample in samples {
@@ -261,9 +271,7 @@ impl Fit {
         for place in ORIGINS..ALL {
             normal[(place, place)] += 1.0;
         }
-        let Some(factor) = normal.cholesky() else {
-            return 0.0;
-        };
+        let factor = normal.cholesky()?;
         let change = factor.solve(&right);
         let inverse = factor.inverse();
         for (place, deviation) in self.deviations.iter_mut().enumerate() {
@@ -279,7 +287,7 @@ impl Fit {
         }
         self.tool *= small(ORIGINS);
         self.tool.rotation.renormalize();
-        change.amax()
+        Some(change.amax())
     }
 
     /// How position and orientation change with each number, in `base`, and what they are short of.

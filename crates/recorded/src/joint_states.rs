@@ -4,57 +4,17 @@ use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use mcap::io::MessageReader;
 use needlebench_cell::{Finding, open_input};
 use needlebench_kinematics::{JOINT_COUNT, JOINT_NAMES};
-use serde::Deserialize;
+use needlebench_ros::{JointState, messages};
 use sha2::{Digest, Sha256};
 
 use crate::raw::RawLog;
 use crate::{EffortMeaning, Quantity, ReadOptions};
 
-/// First bytes of an MCAP file.
-const MAGIC: &[u8] = &[0x89, b'M', b'C', b'A', b'P'];
-
-/// Names in one message; no robot has more joints.
-const MOST_JOINTS: usize = 1000;
-
 /// Whether a file is one of MCAP, by its first bytes.
 pub(crate) fn is_mcap(path: &Path) -> bool {
-    let mut first = [0; MAGIC.len()];
-    open_input(path).is_ok_and(|mut file| file.read_exact(&mut first).is_ok() && first == MAGIC)
-}
-
-/// A message, as ROS 2 and JSON writers have it.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-struct JointState {
-    header: Header,
-    name: Vec<String>,
-    position: Vec<f64>,
-    velocity: Vec<f64>,
-    effort: Vec<f64>,
-}
-
-#[derive(Debug, Default, Deserialize)]
-#[serde(default)]
-struct Header {
-    stamp: Stamp,
-}
-
-#[derive(Debug, Default, Clone, Copy, Deserialize)]
-#[serde(default)]
-struct Stamp {
-    sec: i64,
-    #[serde(alias = "nsec")]
-    nanosec: u32,
-}
-
-impl Stamp {
-    fn seconds(self) -> Option<f64> {
-        let zero = self.sec == 0 && self.nanosec == 0;
-        (!zero).then(|| self.sec as f64 + f64::from(self.nanosec) * 1e-9)
-    }
+    open_input(path).is_ok_and(needlebench_ros::is_mcap)
 }
 
 /// Reads all joint states of one topic; with them the SHA-256 of the file.
@@ -68,8 +28,9 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
         })
     };
     let hash = hash_of(open()?).map_err(|error| refuse(error.to_string(), "is it still there?"))?;
-    let topic = choose_topic(&file, BufReader::new(open()?), options.topic.as_deref())?;
+    let (topic, others) = choose_topic(&file, BufReader::new(open()?), options.topic.as_deref())?;
     let mut raw = RawLog::default();
+    raw.notes.extend(others);
     let quantities = [
         Quantity::Time,
         Quantity::ActualQ,
@@ -78,7 +39,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
     ];
     raw.expect(quantities, 0);
     let (mut broken, mut without_stamp, mut others) = (None, 0, 0);
-    for message in MessageReader::new(BufReader::with_capacity(1 << 20, open()?)) {
+    for message in messages(BufReader::with_capacity(1 << 20, open()?)) {
         let message = match message {
             Ok(message) => message,
             Err(error) => {
@@ -86,16 +47,13 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
                 break;
             }
         };
-        if message.channel.topic != topic {
+        if message.topic() != topic {
             continue;
         }
         raw.rows_in_file += 1;
         let number = raw.rows_in_file;
-        let parsed = match message.channel.message_encoding.as_str() {
-            "json" => serde_json::from_slice(&message.data).map_err(|error| error.to_string()),
-            _ => from_cdr(&message.data).ok_or_else(|| "it is cut off".to_owned()),
-        };
-        let state: JointState = parsed.map_err(|error| {
+        let parsed = JointState::decode(message.encoding(), message.data());
+        let state = parsed.map_err(|error| {
             let message = format!("message {number} of {topic} is no joint state: {error}");
             refuse(message, "joint states are read as CDR and as JSON")
         })?;
@@ -111,8 +69,10 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<(RawLog, String
             continue;
         };
         let stamp_s = state.header.stamp.seconds();
-        without_stamp += usize::from(stamp_s.is_none());
-        let time_s = stamp_s.unwrap_or(message.log_time as f64 * 1e-9);
+        let logged_s = message.log_time_ns() as f64 * 1e-9;
+        let time_s = stamp_s.unwrap_or(logged_s);
+        // A clock that starts at zero was zero once.
+        without_stamp += usize::from(stamp_s.is_none() && logged_s > 0.0);
         let of = |values: &[f64]| places.map(|at| values.get(at).copied().unwrap_or(f64::NAN));
         let mut cut = None;
         raw.add(Quantity::Time, &[time_s], &mut cut);
@@ -203,18 +163,22 @@ fn hash_of(file: std::fs::File) -> std::io::Result<String> {
     }
 }
 
-/// The topic of joint states: the only one, or the one that is named.
+/// Topic on which ROS has the states of an arm's joints.
+const ROS_TOPIC: &str = "/joint_states";
+
+/// The topic of joint states: the only one, the one that is named, or that of ROS; with what else there is, where nobody
+/// chose.
 fn choose_topic(
     file: &str,
     input: impl Read,
     wanted: Option<&str>,
-) -> Result<String, Vec<Finding>> {
+) -> Result<(String, Option<String>), Vec<Finding>> {
     let mut topics: BTreeMap<String, usize> = BTreeMap::new();
-    for message in MessageReader::new(input) {
+    for message in messages(input) {
         let Ok(message) = message else { break };
-        let schema = message.channel.schema.as_ref();
-        if schema.is_some_and(|schema| schema.name.ends_with("JointState")) {
-            *topics.entry(message.channel.topic.clone()).or_default() += 1;
+        let kind = message.message_type();
+        if kind.is_some_and(|kind| kind.ends_with("JointState")) {
+            *topics.entry(message.topic().to_owned()).or_default() += 1;
         }
     }
     let names: Vec<&str> = topics.keys().map(String::as_str).collect();
@@ -228,8 +192,15 @@ fn choose_topic(
             format!("the log has no joint states on `{wanted}`"),
             format!("there are: {}", names.join(", ")),
         ),
-        (Some(wanted), _) => Ok(wanted.to_owned()),
-        (None, [only]) => Ok((*only).to_owned()),
+        (Some(wanted), _) => Ok((wanted.to_owned(), None)),
+        (None, [only]) => Ok(((*only).to_owned(), None)),
+        (None, several) if several.contains(&ROS_TOPIC) => {
+            let note = format!(
+                "joint states are read from {ROS_TOPIC}; there are others, which --topic chooses: {}",
+                several.join(", ")
+            );
+            Ok((ROS_TOPIC.to_owned(), Some(note)))
+        }
         (None, several) => refuse(
             format!("the log has joint states on {} topics", several.len()),
             format!("choose one with --topic: {}", several.join(", ")),
@@ -259,78 +230,4 @@ fn places(names: &[String]) -> Result<Option<[usize; JOINT_COUNT]>, &'static str
         *place = found;
     }
     Ok(Some(whole))
-}
-
-/// A message in OMG's common data representation (plain CDR, version 1), little or big endian.
-fn from_cdr(data: &[u8]) -> Option<JointState> {
-    let (head, body) = data.split_at_checked(4)?;
-    let mut cdr = Cdr {
-        body,
-        at: 0,
-        little: head[1] & 1 == 1,
-    };
-    let sec = i64::from(cdr.u32()?.cast_signed());
-    let nanosec = cdr.u32()?;
-    cdr.string()?;
-    let count = cdr.count()?;
-    let name = (0..count).map(|_| cdr.string()).collect::<Option<_>>()?;
-    Some(JointState {
-        header: Header {
-            stamp: Stamp { sec, nanosec },
-        },
-        name,
-        position: cdr.doubles()?,
-        velocity: cdr.doubles()?,
-        effort: cdr.doubles()?,
-    })
-}
-
-struct Cdr<'a> {
-    body: &'a [u8],
-    at: usize,
-    little: bool,
-}
-
-impl<'a> Cdr<'a> {
-    fn take(&mut self, count: usize, alignment: usize) -> Option<&'a [u8]> {
-        let start = self.at.next_multiple_of(alignment);
-        let bytes = self.body.get(start..start.checked_add(count)?)?;
-        self.at = start + count;
-        Some(bytes)
-    }
-
-    fn u32(&mut self) -> Option<u32> {
-        let bytes = self.take(4, 4)?.try_into().ok()?;
-        Some(if self.little {
-            u32::from_le_bytes(bytes)
-        } else {
-            u32::from_be_bytes(bytes)
-        })
-    }
-
-    fn count(&mut self) -> Option<usize> {
-        let count = usize::try_from(self.u32()?).ok()?;
-        (count <= MOST_JOINTS).then_some(count)
-    }
-
-    fn string(&mut self) -> Option<String> {
-        let count = usize::try_from(self.u32()?).ok()?;
-        let bytes = self.take(count, 1)?;
-        let text = bytes.strip_suffix(&[0]).unwrap_or(bytes);
-        String::from_utf8(text.to_vec()).ok()
-    }
-
-    fn doubles(&mut self) -> Option<Vec<f64>> {
-        let count = self.count()?;
-        let mut found = Vec::with_capacity(count);
-        for _ in 0..count {
-            let bytes = self.take(8, 8)?.try_into().ok()?;
-            found.push(if self.little {
-                f64::from_le_bytes(bytes)
-            } else {
-                f64::from_be_bytes(bytes)
-            });
-        }
-        Some(found)
-    }
 }

@@ -165,7 +165,7 @@ fn slopes(vertical_fov_rad: f64, width_px: u32, height_px: u32) -> Vector2<f64> 
     } else {
         FRAMING_FOV_RAD
     };
-    let vertical = (fov_rad.clamp(1e-3, 3.0) / 2.0).tan();
+    let vertical = libm::tan(fov_rad.clamp(1e-3, 3.0) / 2.0);
     let aspect = f64::from(width_px.max(1)) / f64::from(height_px.max(1));
     Vector2::new(vertical * aspect, vertical)
 }
@@ -328,7 +328,7 @@ mod tests {
     const ROUNDING_PX: f64 = 1e-9;
 
     fn cloud() -> Vec<Point3<f64>> {
-        let spread = |index: u32, step: f64| (f64::from(index) * step).sin();
+        let spread = |index: u32, step: f64| libm::sin(f64::from(index) * step);
         (0..50)
             .map(|i| {
                 Point3::new(

@@ -14,7 +14,7 @@ fn decoded(value: f32) -> f32 {
     if value <= 0.04045 {
         value / 12.92
     } else {
-        ((value + 0.055) / 1.055).powf(2.4)
+        libm::powf((value + 0.055) / 1.055, 2.4)
     }
 }
 
@@ -36,7 +36,7 @@ impl Encoder {
             let value = if light <= 0.0031308 {
                 light * 12.92
             } else {
-                1.055 * light.powf(1.0 / 2.4) - 0.055
+                1.055 * libm::powf(light, 1.0 / 2.4) - 0.055
             };
             byte(value * 255.0)
         };

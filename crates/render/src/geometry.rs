@@ -186,7 +186,7 @@ impl<'a> Assembler<'a> {
             }
         });
         let (along_x, along_y) = (to.x_px - from.x_px, to.y_px - from.y_px);
-        let length_px = along_x.hypot(along_y);
+        let length_px = libm::hypot(along_x, along_y);
         if length_px < 1e-6 {
             return;
         }

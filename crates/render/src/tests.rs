@@ -170,7 +170,7 @@ fn bench() -> Scene {
         let x = 0.055 * f64::from(rib);
         let breadth = (1.0 - (x / 0.30).powi(2)).sqrt();
         let around = |step: i32| {
-            let (sine, cosine) = (0.45 + 0.24 * f64::from(step)).sin_cos();
+            let (sine, cosine) = libm::sincos(0.45 + 0.24 * f64::from(step));
             Point3::new(x, 0.155 * breadth * sine, 0.23 + 0.115 * breadth * cosine)
         };
         for step in (0..10).chain(-14..-4) {

@@ -16,7 +16,6 @@ pub mod picture;
 #[path = "../../engine/tests/engine/common/replay.rs"]
 mod replay;
 pub mod table;
-mod urscript;
 
 pub use files::write_atomically;
 pub use junit::{
@@ -27,4 +26,3 @@ pub use markdown::{
     schema_markdown, study_comparison_markdown,
 };
 pub use table::{Table, plain_table, report_screen, report_text};
-pub use urscript::excitation_script;

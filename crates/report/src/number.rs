@@ -129,7 +129,7 @@ pub fn tick(value: f64, step: f64) -> String {
         clippy::cast_sign_loss,
         reason = "0 to 6: the step's decade is bounded above"
     )]
-    let decimals = (-(step * 1.000_001).log10().floor()).max(0.0) as usize;
+    let decimals = (-libm::log10(step * 1.000_001).floor()).max(0.0) as usize;
     format!("{value:.decimals$}")
 }
 

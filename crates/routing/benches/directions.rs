@@ -24,20 +24,20 @@ static GO: AtomicBool = AtomicBool::new(false);
 fn chest() -> LabelMap {
     let first = Point3::new(-255.5 * 0.7e-3, -255.5 * 0.7e-3, -149.5e-3);
     let grid = VoxelGrid::aligned(SIZE, SPACING_M, first).unwrap();
-    let is_in = |x: f64, y: f64, [a, b]: [f64; 2]| (x / a).hypot(y / b) <= 1.0;
+    let is_in = |x: f64, y: f64, [a, b]: [f64; 2]| libm::hypot(x / a, y / b) <= 1.0;
     let is_bone = |x: f64, y: f64, z: f64| {
         let wall = is_in(x, y, [0.148, 0.1]) && !is_in(x, y, [0.141, 0.094]);
         let rib = ((z + 0.2 * x.abs()) / 0.026).rem_euclid(1.0) < 0.4;
-        (wall && rib) || (y - 0.075).hypot(x) < 0.018
+        (wall && rib) || libm::hypot(y - 0.075, x) < 0.018
     };
     let label = |x: f64, y: f64, z: f64| -> u16 {
         if !is_in(x, y, [0.165, 0.115]) {
             0
         } else if is_bone(x, y, z) {
             BONE
-        } else if (x - 0.01).hypot(y + 0.01).hypot(0.7 * z) < 0.045 {
+        } else if libm::hypot(libm::hypot(x - 0.01, y + 0.01), 0.7 * z) < 0.045 {
             6
-        } else if (x.abs() - 0.075).hypot(y) < 0.003 {
+        } else if libm::hypot(x.abs() - 0.075, y) < 0.003 {
             5
         } else if is_in(x.abs() - 0.078, y, [0.055, 0.085]) {
             if x > 0.0 { 2 } else { 3 }

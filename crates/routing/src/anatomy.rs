@@ -137,5 +137,5 @@ pub(crate) fn is_marker_near(
 /// Angle between a direction and a normal, whatever its sign, rad.
 pub(crate) fn angle_rad(direction: &UnitVector3<f64>, normal: &Vector3<f64>) -> f64 {
     let along = direction.dot(normal).abs();
-    direction.cross(normal).norm().atan2(along)
+    libm::atan2(direction.cross(normal).norm(), along)
 }

@@ -10,7 +10,7 @@ pub fn evenly(count: usize) -> impl Iterator<Item = UnitVector3<f64>> {
     (0..count).map(move |index| {
         let z = 1.0 - (2 * index + 1) as f64 / count as f64;
         let across = (1.0 - z * z).max(0.0).sqrt();
-        let (sin, cos) = (golden * index as f64 % TAU).sin_cos();
+        let (sin, cos) = libm::sincos(golden * index as f64 % TAU);
         UnitVector3::new_normalize(Vector3::new(across * sin, across * cos, z))
     })
 }
@@ -19,8 +19,8 @@ pub fn evenly(count: usize) -> impl Iterator<Item = UnitVector3<f64>> {
 /// `entry_direction_deg` has them.
 pub fn angles_rad(outwards: &UnitVector3<f64>) -> [f64; 2] {
     [
-        outwards.x.atan2(-outwards.y),
-        outwards.z.atan2(outwards.x.hypot(outwards.y)),
+        libm::atan2(outwards.x, -outwards.y),
+        libm::atan2(outwards.z, libm::hypot(outwards.x, outwards.y)),
     ]
 }
 
@@ -59,7 +59,7 @@ pub fn apart<T>(
 ) -> Vec<usize> {
     let mut angle_rad = least_rad;
     loop {
-        let cosine = angle_rad.cos();
+        let cosine = libm::cos(angle_rad);
         let mut picked: Vec<(usize, UnitVector3<f64>)> = Vec::new();
         for (index, item) in items.iter().enumerate() {
             let here = direction(item);

@@ -25,4 +25,4 @@ pub use risk::{Risk, RiskTerm};
 pub use rules::{Refusal, RouteRule, RouteRules};
 pub use search::{Candidate, Route, Searched, judge, refined, search};
 pub use solids::SolidAnatomy;
-pub use voxels::{VoxelAnatomy, VoxelOptions};
+pub use voxels::{VoxelAnatomy, VoxelOptions, body_normal};

@@ -80,12 +80,12 @@ impl Risk {
             term,
             share,
             odds_ratio,
-            log_odds: share * odds_ratio.ln(),
+            log_odds: share * libm::log(odds_ratio),
         });
         let log_odds = terms.iter().map(|each| each.log_odds).sum::<f64>();
         Self {
             log_odds,
-            odds_ratio: log_odds.exp(),
+            odds_ratio: libm::exp(log_odds),
             terms: terms.into(),
         }
     }

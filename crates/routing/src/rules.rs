@@ -106,6 +106,11 @@ impl RouteRule {
         }
     }
 
+    /// Whether its limit is the least that there has to be; else it is the most that there may be.
+    pub fn is_least(self) -> bool {
+        matches!(self, Self::Bone | Self::Vessel | Self::Organ | Self::Throw)
+    }
+
     /// The rule about an obstacle.
     pub fn of(obstacle: Obstacle) -> Self {
         match obstacle {

@@ -1,5 +1,7 @@
 //! Directions judged by all rules that need no robot.
 
+use std::cmp::Ordering;
+
 use nalgebra::UnitVector3;
 
 use crate::anatomy::{Anatomy, Exit, LungPassage, Obstacle, Ray, angle_rad};
@@ -29,7 +31,7 @@ pub struct Route {
 
 impl Route {
     /// Of two routes the one of less risk first; of equals the one with more to spare.
-    pub fn better_first(&self, other: &Self) -> std::cmp::Ordering {
+    pub fn better_first(&self, other: &Self) -> Ordering {
         let risk = self.risk.log_odds.total_cmp(&other.risk.log_odds);
         risk.then(other.spare_m.total_cmp(&self.spare_m))
     }
@@ -256,13 +258,13 @@ fn spare_m(rules: &RouteRules, distances_m: &[f64; 3]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// The best route near one: in steps that become smaller, from ring to ring, to less risk or, at the same, to more room.
+/// The best route near one: in steps that become smaller, from ring to ring, to what is better first.
 pub fn refined(
     anatomy: &dyn Anatomy,
     rules: &RouteRules,
     route: &Route,
-    from_rad: f64,
-    to_rad: f64,
+    [from_rad, to_rad]: [f64; 2],
+    better_first: impl Fn(&Route, &Route) -> Ordering,
 ) -> Route {
     const ON_A_RING: usize = 6;
     /// Rings that are asked at most: the best one near by is sought, not one elsewhere.
@@ -275,8 +277,8 @@ pub fn refined(
         }
         let better = around(&best.outwards, step_rad, ON_A_RING)
             .filter_map(|outwards| judge(anatomy, rules, &outwards).outcome.ok())
-            .filter(|found| found.better_first(&best).is_lt())
-            .min_by(Route::better_first);
+            .filter(|found| better_first(found, &best).is_lt())
+            .min_by(&better_first);
         match better {
             Some(found) => best = found,
             None => step_rad *= 0.5,

@@ -155,21 +155,7 @@ impl Design {
             });
         }
         let samples = samples.filter(|_| sampled > 0).unwrap_or(1);
-        let goal = Factor {
-            name: "goal".to_owned(),
-            unit: String::new(),
-            role: Role::Circumstance,
-            sampled: false,
-            kind: FactorKind::Levels(
-                goals
-                    .iter()
-                    .map(|name| Level {
-                        label: name.clone(),
-                        number: None,
-                    })
-                    .collect(),
-            ),
-        };
+        let goal = goal_factor(goals);
         let described = factors.iter().map(|factor| described(factor, sampled > 0));
         let descriptions: Vec<Factor> = std::iter::once(goal).chain(described).collect();
         let mut next_dimension = 0;
@@ -270,7 +256,22 @@ fn index(number: u64) -> usize {
 /// Key of the scenario's seed.
 const SEED: &str = "seed";
 
-fn described(factor: &StudyFactor, any_sampled: bool) -> Factor {
+/// The first factor of all studies.
+pub(crate) fn goal_factor(goals: &[String]) -> Factor {
+    let level = |name: &String| Level {
+        label: name.clone(),
+        number: None,
+    };
+    Factor {
+        name: "goal".to_owned(),
+        unit: String::new(),
+        role: Role::Circumstance,
+        sampled: false,
+        kind: FactorKind::Levels(goals.iter().map(level).collect()),
+    }
+}
+
+pub(crate) fn described(factor: &StudyFactor, any_sampled: bool) -> Factor {
     // Crossed seeds are draws too. Beside a sampling they are crossed with its points: those count.
     let sets_seed = match &factor.values {
         FactorValues::Levels(levels) => levels

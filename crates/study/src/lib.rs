@@ -13,6 +13,7 @@ mod distribution;
 mod results;
 mod row;
 mod sampling;
+pub mod search;
 mod sobol;
 pub mod statistics;
 mod store;
@@ -24,5 +25,6 @@ pub use results::{Results, ResultsError};
 pub use row::{CaseResult, Outcome, Row};
 pub use store::{
     CSV_FILE, CaseDesign, JOURNAL_FILE, MANIFEST_FILE, Manifest, ParquetResults, Progress,
-    RESULTS_FILE, RunEnd, SCHEMA_VERSION, Shard, Status, StudyError, StudyRun, merge, write_csv,
+    RESULTS_FILE, RunEnd, SCHEMA_VERSION, Shard, ShardState, ShardSurvey, Status, StudyError,
+    StudyRun, Survey, merge, ranges, survey, write_csv,
 };

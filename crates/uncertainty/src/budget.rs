@@ -6,7 +6,7 @@ mod monte_carlo;
 
 use nalgebra::{Matrix3, Point3, Rotation3, SymmetricEigen, Vector3};
 use needlebench_cell::imperfections::{Breathing, Imperfections, SkinMarkers};
-use needlebench_cell::{Cell, Goal};
+use needlebench_cell::{Cell, Goal, ResolvedScenario};
 use needlebench_engine::Servo;
 use needlebench_kinematics::registration::RegistrationError;
 use needlebench_kinematics::trajectory::JointTrajectory;
@@ -34,6 +34,28 @@ pub struct BudgetCase<'a> {
     pub trajectory: &'a JointTrajectory,
     /// Step of the servo, s.
     pub timestep_s: f64,
+}
+
+impl<'a> BudgetCase<'a> {
+    /// Of a scenario's cell, its patient where it is planned, and its step.
+    pub fn of(
+        resolved: &'a ResolvedScenario,
+        goal: &'a Goal,
+        servo: &'a Servo,
+        imperfections: &'a Imperfections,
+        trajectory: &'a JointTrajectory,
+    ) -> Self {
+        let place = resolved.phantom.as_ref();
+        Self {
+            cell: &resolved.cell,
+            goal,
+            place: place.map(|placed| &placed.world_from_phantom),
+            servo,
+            imperfections,
+            trajectory,
+            timestep_s: resolved.scenario.engines.timestep_ms * 1e-3,
+        }
+    }
 }
 
 impl BudgetCase<'_> {

@@ -88,7 +88,7 @@ fn spring_back_rad(held_nm: f64, compensated_nm: f64, kp: f64, stiffness: f64) -
     let slip_rad = held / stiffness;
     let mut way = 0.0;
     for _ in 0..STEPS {
-        let left = (-way / slip_rad).exp();
+        let left = libm::exp(-way / slip_rad);
         let torque = 2.0 * held * (1.0 - left) + kp * way - compensated;
         way -= torque / (2.0 * stiffness * left + kp);
     }

@@ -562,7 +562,7 @@ pub(crate) fn joint_friction(
 
 /// Share of the breath's amplitude at a phase.
 pub(crate) fn breath(phase: f64) -> f64 {
-    (std::f64::consts::PI * phase).sin().powi(4)
+    libm::sin(std::f64::consts::PI * phase).powi(4)
 }
 
 /// Phase from a normal value, one that says whether the hold fails, and one for the phase if it does.
@@ -621,7 +621,7 @@ fn disc(x: f64, y: f64) -> Vector2<f64> {
     } else {
         (y, FRAC_PI_2 - FRAC_PI_4 * x / y)
     };
-    Vector2::new(radius * angle.cos(), radius * angle.sin())
+    Vector2::new(radius * libm::cos(angle), radius * libm::sin(angle))
 }
 
 /// Deviation of a joint's origin as a displacement of a point beyond it.

@@ -1,9 +1,10 @@
 //! The voxels around the target that somebody plans for: they take a second to prepare, and are asked at every drag.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{Point3, UnitVector3};
-use needlebench_routing::{RouteRules, VoxelAnatomy, judge};
+use needlebench_bench::routes::FreeRoutes;
+use needlebench_routing::{Anatomy, Obstacle, RouteRules, VoxelAnatomy, judge};
 use serde::Serialize;
 
 /// The voxels around the target that was asked about last.
@@ -20,6 +21,8 @@ pub(crate) struct Around {
     pub anatomy: VoxelAnatomy,
     /// What they are judged by.
     pub rules: RouteRules,
+    /// Directions that were judged, once they are.
+    pub free: OnceLock<FreeRoutes>,
 }
 
 /// How the rules of routes judge a needle.
@@ -33,10 +36,14 @@ pub struct Judged {
     pub value: Option<f64>,
     /// What it may have at most, or has to have at least.
     pub limit: Option<f64>,
+    /// The limit is the least.
+    pub is_least: bool,
     /// `m`, `rad` or `1`.
     pub unit: Option<&'static str>,
     /// Odds of a pneumothorax against a route with none of the terms.
     pub odds_ratio: Option<f64>,
+    /// What of bone, vessels and organs nobody has seen: nothing is said of distances from it.
+    pub unknown: Vec<&'static str>,
 }
 
 impl LastTarget {
@@ -66,25 +73,22 @@ impl LastTarget {
         if around.goal != goal || (around.target - target).norm() > 1e-9 {
             return None;
         }
-        Some(
-            match judge(&around.anatomy, &around.rules, outwards).outcome {
-                Ok(route) => Judged {
-                    free: true,
-                    broken: None,
-                    value: None,
-                    limit: None,
-                    unit: None,
-                    odds_ratio: Some(route.risk.odds_ratio),
-                },
-                Err(refusal) => Judged {
-                    free: false,
-                    broken: Some(refusal.rule.in_words()),
-                    value: Some(refusal.value),
-                    limit: Some(refusal.limit),
-                    unit: Some(refusal.rule.unit()),
-                    odds_ratio: None,
-                },
-            },
-        )
+        let outcome = judge(&around.anatomy, &around.rules, outwards).outcome;
+        let (route, refusal) = (outcome.as_ref().ok(), outcome.as_ref().err());
+        let unseen = |obstacle: &Obstacle| !around.anatomy.knows(*obstacle);
+        Some(Judged {
+            free: route.is_some(),
+            broken: refusal.map(|refusal| refusal.rule.in_words()),
+            value: refusal.map(|refusal| refusal.value),
+            limit: refusal.map(|refusal| refusal.limit),
+            is_least: refusal.is_some_and(|refusal| refusal.rule.is_least()),
+            unit: refusal.map(|refusal| refusal.rule.unit()),
+            odds_ratio: route.map(|route| route.risk.odds_ratio),
+            unknown: Obstacle::ALL
+                .into_iter()
+                .filter(unseen)
+                .map(Obstacle::name)
+                .collect(),
+        })
     }
 }

@@ -2,11 +2,11 @@
 //!
 //! The same code as `needlebench ct routes`, with the same numbers.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use needlebench_bench::Control;
 use needlebench_bench::routes::{
-    RoutePlan, RouteTask, VOXEL_DIRECTIONS, VoxelsError, WithRobot, plan_routes,
+    RoutePlan, RouteTask, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free_routes,
 };
 use needlebench_bench::suggest::SuggestError;
 use needlebench_cell::scenario::{GoalSection, RouteSection};
@@ -35,7 +35,7 @@ fn rules_of<'a>(
     own.and_then(|goal| goal.route.as_ref()).unwrap_or(usual)
 }
 
-/// Plans the routes to a target, with the robot or without.
+/// Plans the routes to a target: at first by the patient alone, then with the robot. Directions are judged once.
 ///
 /// # Errors
 /// A target that is none, or is not in the body; `None` if it was interrupted.
@@ -51,8 +51,8 @@ pub fn entries(
         resolved: case.desk().scenario(),
         section: &section,
         rules: rules_of(case, &section, &usual),
+        // Asked now or later: the rules are the same.
         robot: match case.built().not_registered() {
-            _ if !with_robot => WithRobot::No("not asked yet".to_owned()),
             Some(why) => WithRobot::No(why.to_owned()),
             None => WithRobot::Yes,
         },
@@ -66,7 +66,21 @@ pub fn entries(
         }
         Err(VoxelsError::Target(finding)) => return Err(finding.into()),
     };
-    match plan_routes(&task, &around.anatomy, control) {
+    let plan = || {
+        let anatomy = &around.anatomy;
+        let free = if let Some(known) = around.free.get() {
+            known
+        } else {
+            let found = free_routes(&task, anatomy, control)?;
+            around.free.get_or_init(|| found)
+        };
+        if with_robot && task.robot == WithRobot::Yes {
+            free.plan_with_robot(&task, anatomy, control)
+        } else {
+            Ok(free.plan(&task, anatomy))
+        }
+    };
+    match plan() {
         Ok(mut plan) => {
             plan.phantom_origin_in_ct_m = Some(case.built().origin_in_ct_m().into());
             Ok(Some(Entries {
@@ -102,6 +116,7 @@ fn around(
         target,
         anatomy: task.voxels(case.built(), control)?,
         rules,
+        free: OnceLock::new(),
     });
     case.last_target().keep(&made);
     Ok(made)

@@ -15,6 +15,7 @@ mod guard;
 pub mod live;
 pub mod motion;
 mod page;
+mod people;
 mod plan_file;
 mod server;
 pub mod session;

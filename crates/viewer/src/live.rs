@@ -3,15 +3,13 @@
 //! Pure functions of a case and an [`Aim`]: [`route`] is answered at once from voxels and surfaces, [`reach`] by the
 //! postures of all eight configurations. Lengths in m, angles in rad; places in `ct` (patient LPS).
 
-use std::f64::consts::TAU;
-
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, UnitVector3};
 use needlebench_bench::preview::GoalPreview;
-use needlebench_cell::phantom::Phantom;
 use needlebench_cell::scenario::{GoalSection, Target};
 use needlebench_cell::{Finding, Goal, part_in_words, reason_in_words};
 use needlebench_imaging::{SurfaceTissue, VoxelGrid, structure_of};
 use needlebench_planning::{crossed_fissures, judged_tissues};
+use needlebench_routing::body_normal;
 use serde::{Deserialize, Serialize};
 
 use crate::around::Judged;
@@ -158,7 +156,7 @@ pub struct RouteAnswer {
     pub not_placed: Option<Refusal>,
     /// How long the needle is.
     pub needle_m: f64,
-    /// Between the needle and the skin's normal, which is the mean over 8 mm about the entry.
+    /// Between the needle and the skin's normal, [`body_normal`] of the entry.
     pub skin_angle_rad: f64,
     /// Between the needle and the axial plane; positive where it runs towards the head.
     pub axial_angle_rad: f64,
@@ -189,6 +187,20 @@ pub struct ReachAnswer {
     pub preview: Option<GoalPreview>,
     /// Why each does not work, in words, in their order; empty where it does.
     pub reasons: Vec<String>,
+}
+
+/// Refuses what is asked of a robot of which nobody knows where it is.
+///
+/// # Errors
+/// Why nobody knows.
+pub(crate) fn registered(case: &Case) -> Result<(), Refusal> {
+    match case.built().not_registered() {
+        Some(unknown) => Err(Refusal::new(
+            unknown,
+            "planning on the slices works without",
+        )),
+        None => Ok(()),
+    }
 }
 
 /// Lays a needle into the cell.
@@ -303,7 +315,6 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
     let resolved = case.desk().scenario();
     let grid = case.grid();
     let placed = resolved.phantom.as_ref().expect("a needle has a patient");
-    let entry = case.in_phantom(&needle.entry_m);
     let inwards = UnitVector3::new_normalize(needle.target_m - needle.entry_m);
     let length_m = (needle.target_m - needle.entry_m).norm();
     let crossings = crossings(case, &needle.entry_m, &needle.target_m);
@@ -349,9 +360,8 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
         insertion_m: goal.map(|goal| goal.insertion_length_m),
         not_placed: needle.goal.as_ref().err().cloned(),
         needle_m: resolved.cell.tool.needle.length_m,
-        skin_angle_rad: skin_normal(&placed.phantom, &entry, &-inwards)
-            .angle(&-inwards.into_inner()),
-        axial_angle_rad: inwards.z.atan2(inwards.x.hypot(inwards.y)),
+        skin_angle_rad: body_normal(case.labels(), &needle.entry_m).angle(&-inwards.into_inner()),
+        axial_angle_rad: libm::atan2(inwards.z, libm::hypot(inwards.x, inwards.y)),
         crossing_within_m: half_voxel_m(grid, &inwards),
         crossings,
         in_lung_m: knows_lungs.then_some(lung_m),
@@ -366,40 +376,6 @@ pub fn route(case: &Case, aim: &Aim) -> Result<RouteAnswer, Refusal> {
             &-inwards,
         ),
     })
-}
-
-/// Mean outward normal of the skin about an entry: a facet's own is as rough as the voxels.
-fn skin_normal(
-    phantom: &Phantom,
-    entry: &Point3<f64>,
-    outwards: &UnitVector3<f64>,
-) -> Vector3<f64> {
-    /// Radius of what counts, and how far under the skin it is looked from, m.
-    const ABOUT_M: f64 = 8e-3;
-    const BELOW_M: f64 = 20e-3;
-    const AROUND: u32 = 12;
-    let across = outwards.cross(&least_axis(outwards)).normalize();
-    let third = outwards.cross(&across);
-    let from = entry - outwards.into_inner() * BELOW_M;
-    let ring = (0..AROUND).filter_map(|step| {
-        let (sine, cosine) = (TAU * f64::from(step) / f64::from(AROUND)).sin_cos();
-        let aside = (across * cosine + third * sine) * ABOUT_M;
-        let (_, leaves_m) = phantom.skin_intersection(&(from + aside), outwards)?;
-        // A fold or an arm beside it is not the skin there.
-        let is_beside = (leaves_m - BELOW_M).abs() < 2.0 * ABOUT_M;
-        let point = from + aside + outwards.into_inner() * leaves_m;
-        is_beside.then(|| phantom.skin_normal(&point).into_inner())
-    });
-    ring.fold(phantom.skin_normal(entry).into_inner(), |sum, normal| {
-        sum + normal
-    })
-}
-
-/// The axis that a direction has least of.
-fn least_axis(direction: &UnitVector3<f64>) -> Vector3<f64> {
-    let mut axis = Vector3::zeros();
-    axis[direction.iamin()] = 1.0;
-    axis
 }
 
 fn surface_p99_m(case: &Case, part: &str) -> Option<f64> {
@@ -472,10 +448,11 @@ fn crossings(case: &Case, from_m: &Point3<f64>, to_m: &Point3<f64>) -> Vec<Cross
 }
 
 /// Which of the eight configurations reach a needle, by their postures; `quick` looks at few directions about the needle.
+/// The same on any number of threads.
 ///
 /// # Errors
 /// As [`needle`].
-pub fn reach(case: &Case, aim: &Aim, quick: bool) -> Result<ReachAnswer, Refusal> {
+pub fn reach(case: &Case, aim: &Aim, quick: bool, threads: usize) -> Result<ReachAnswer, Refusal> {
     if let Some(unknown) = case.built().not_registered() {
         return Ok(ReachAnswer {
             unknown: Some(unknown),
@@ -486,9 +463,9 @@ pub fn reach(case: &Case, aim: &Aim, quick: bool) -> Result<ReachAnswer, Refusal
     }
     let goal = needle(case, aim)?.goal?;
     let preview = if quick {
-        case.desk().quick_preview(&goal)
+        case.desk().quick_preview(&goal, threads)
     } else {
-        case.desk().preview(&goal)
+        case.desk().preview(&goal, threads)
     };
     let preview = preview.map_err(|error| Refusal {
         message: error.to_string(),

@@ -8,7 +8,7 @@ use needlebench_uncertainty::budget::Moments;
 use serde::Serialize;
 
 use crate::case::Case;
-use crate::live::{Aim, Refusal, needle};
+use crate::live::{Aim, Refusal, needle, registered};
 use crate::plan_file::planned;
 
 /// Bias and covariance of the needle's tip.
@@ -67,12 +67,7 @@ pub struct MotionRejection {
 pub fn motion(case: &Case, aim: &Aim, configuration: &str) -> Result<MotionAnswer, Refusal> {
     /// Between two postures, s: as in report pages.
     const PERIOD_S: f64 = 0.04;
-    if let Some(unknown) = case.built().not_registered() {
-        return Err(Refusal::new(
-            unknown,
-            "planning on the slices works without",
-        ));
-    }
+    registered(case)?;
     let known = Configuration::ALL.into_iter();
     let known = known.clone().find(|each| each.label() == configuration);
     let configuration = known.ok_or_else(|| {
@@ -160,13 +155,13 @@ fn tip(case: &Case, goal: &Goal, moments: &Moments) -> TipError {
 /// depend on where that is.
 fn planned_desk<'c>(case: &'c Case, aim: &Aim) -> Result<&'c Desk, Refusal> {
     case.run_desk(|| {
-        let (_, resolved) = planned(
+        let plan = planned(
             case,
             aim,
             None,
             &case.folder().join(crate::plan_file::PLAN_FILE),
         )?;
-        Desk::new(resolved).map_err(|error| Refusal {
+        Desk::new(plan.resolved).map_err(|error| Refusal {
             message: error.to_string(),
             hint: None,
         })

@@ -11,6 +11,9 @@ const VOLUME: &str = include_str!("assets/volume.js");
 const SLICES: &str = include_str!("assets/slices.js");
 const ROOM: &str = include_str!("assets/room.js");
 const ENTRIES: &str = include_str!("assets/entries.js");
+const PEOPLE: &str = include_str!("assets/people.js");
+const ROUTES: &str = include_str!("assets/routes.js");
+const SIMULATION: &str = include_str!("assets/simulation.js");
 const PLANNER: &str = include_str!("assets/planner.js");
 
 /// The page asks nobody but this server, runs no script but its own, and is in nobody's frame.
@@ -36,7 +39,10 @@ pub fn file(name: &str) -> Option<Response> {
         ),
         "view.js" => (
             SCRIPT,
-            [API, VOLUME, SLICES, ROOM, ENTRIES, PLANNER].join("\n"),
+            [
+                API, VOLUME, SLICES, ROOM, ENTRIES, PEOPLE, ROUTES, SIMULATION, PLANNER,
+            ]
+            .join("\n"),
         ),
         "icon.svg" => ("image/svg+xml", include_str!("assets/icon.svg").to_owned()),
         _ => return None,

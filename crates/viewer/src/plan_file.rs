@@ -17,7 +17,20 @@ pub const PLAN_FILE: &str = "planned.toml";
 /// Decimals of places, mm.
 const DECIMALS: usize = 6;
 
-/// Writes the plan into the case's folder as `NAME.toml`; the path.
+/// A plan as a scenario.
+#[derive(Debug, Clone)]
+pub struct Planned {
+    /// Its text.
+    pub text: String,
+    /// What it says.
+    pub resolved: ResolvedScenario,
+    /// Which of its goals the needle is.
+    pub goal: usize,
+    /// Goals of the folder that it does not have, since nobody has given them an entry.
+    pub left_out: Vec<String>,
+}
+
+/// Writes the plan into the case's folder as `NAME.toml`; the path, and the goals that it does not have.
 ///
 /// What is written is what [`needlebench run`] takes: it is resolved and checked before.
 ///
@@ -28,20 +41,21 @@ pub fn write_plan(
     aim: &Aim,
     configuration: Option<&str>,
     name: &str,
-) -> Result<PathBuf, Refusal> {
+) -> Result<(PathBuf, Vec<String>), Refusal> {
     let path = case.folder().join(file_name(name)?);
-    let (text, resolved) = planned(case, aim, configuration, &path)?;
-    Runnable::checked(resolved)?;
-    write_atomically(&path, text.as_bytes()).map_err(|error| Refusal {
+    let plan = planned(case, aim, configuration, &path)?;
+    Runnable::checked(plan.resolved)?;
+    write_atomically(&path, plan.text.as_bytes()).map_err(|error| Refusal {
         message: format!("the plan cannot be written: {error}"),
         hint: Some(
             "the folder may have been moved or deleted since the page was opened".to_owned(),
         ),
     })?;
-    Ok(path)
+    Ok((path, plan.left_out))
 }
 
-/// The text of the plan for a file, and what it is as a scenario.
+/// The text of the plan for a file, and what it is as a scenario. Other goals of the folder that nobody has given an entry
+/// are left out: a plan has the needles that were planned.
 ///
 /// # Errors
 /// What keeps it from being a scenario.
@@ -50,7 +64,7 @@ pub fn planned(
     aim: &Aim,
     configuration: Option<&str>,
     path: &Path,
-) -> Result<(String, ResolvedScenario), Refusal> {
+) -> Result<Planned, Refusal> {
     let needle = needle(case, aim)?;
     // The words of a goal that cannot be placed are those of the page, not of a file's line.
     needle.goal?;
@@ -64,11 +78,35 @@ pub fn planned(
     })?;
     let mut edit = ScenarioEdit::new(&file, &text)?;
     edit_goal(&mut edit, case, &needle.section, configuration)?;
+    let is_open = |goal: &GoalSection| {
+        goal.name != needle.section.name
+            && goal.entry_mm.is_none()
+            && goal.entry_direction_deg.is_none()
+            && goal.flange_pose.is_none()
+            && goal.route.is_none()
+    };
+    let mut left_out = Vec::new();
+    // The last first: those after one that goes count one less.
+    for (index, goal) in case.goals().iter().enumerate().rev() {
+        if is_open(goal) {
+            edit.remove_section(&format!("goals[{index}]"))?;
+            left_out.insert(0, goal.name.clone());
+        }
+    }
     edit.name_after(path)?;
     let to = path.display().to_string();
     let resolved =
         resolve_scenario(&to, edit.text(), case.folder(), case.overrides()).map_err(first)?;
-    Ok((edit.text().to_owned(), resolved))
+    let goal = resolved
+        .goals
+        .iter()
+        .position(|goal| goal.name == needle.section.name);
+    Ok(Planned {
+        text: edit.text().to_owned(),
+        goal: goal.expect("the plan has it"),
+        resolved,
+        left_out,
+    })
 }
 
 /// The file of a name within the folder: never another folder's, and none that something else is kept in.

@@ -32,6 +32,7 @@ use crate::guard::{COOKIE, Hosts, Token, check_cookie, check_token};
 use crate::live::{self, Aim, GoalAim, Refusal};
 use crate::motion;
 use crate::page;
+use crate::people;
 use crate::plan_file::{PLAN_FILE, write_plan};
 use crate::session::{NotKept, SessionFile, State as SessionState};
 use crate::simulation::{Engine, Simulation};
@@ -119,6 +120,7 @@ struct App {
     hosts: Hosts,
     token: Token,
     results: Token,
+    threads: usize,
     quick: Turns,
     /// Of the robot while somebody drags: beside the needle's own numbers, never before them.
     quick_reach: Turns,
@@ -150,6 +152,7 @@ impl Server {
             hosts: Hosts::new(address.port()),
             token: Token::new()?,
             results: Token::new()?,
+            threads,
             quick: Turns::new(threads),
             quick_reach: Turns::new(1),
             exact: Turns::new(threads),
@@ -213,6 +216,7 @@ fn router(app: Arc<App>) -> Router {
         .route("/reach", post(reach))
         .route("/entries", post(planned_entries))
         .route("/motion", post(planned_motion))
+        .route("/people", post(people_at))
         .route("/session", get(session).put(keep_session))
         .route("/plan", post(plan))
         .route("/simulation", get(simulated).post(simulate).delete(cancel))
@@ -511,7 +515,8 @@ async fn reach(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answe
         (&app.exact, "reach")
     };
     let turn = question.turn(kind);
-    let work = move || live::reach(&case, &question.aim, question.quick);
+    let threads = app.threads;
+    let work = move || live::reach(&case, &question.aim, question.quick, threads);
     let found = turns.run(turn, work).await?;
     Ok(answered(&found))
 }
@@ -532,9 +537,10 @@ async fn planned_entries(State(app): Shared, body: Result<Bytes, BytesRejection>
     let question: EntriesQuestion = read(body)?;
     let case = Arc::clone(&app.case);
     let turn = turn_of("entries", question.page.as_ref(), question.turn);
+    let threads = app.threads;
     let work = move |cancel: &AtomicBool| {
         let control = Control {
-            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            threads,
             cancel,
             progress: &Silent,
         };
@@ -559,6 +565,26 @@ async fn planned_motion(State(app): Shared, body: Result<Bytes, BytesRejection>)
         let configuration = question.configuration.as_deref().unwrap_or_default();
         motion::motion(&case, &question.aim, configuration)
     };
+    Ok(answered(&app.exact.run(turn, work).await?))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PeopleQuestion {
+    aim: Aim,
+    /// The posture at the needle.
+    joints_rad: [f64; 6],
+    #[serde(default)]
+    page: Option<String>,
+    #[serde(default)]
+    turn: Option<u64>,
+}
+
+async fn people_at(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
+    let question: PeopleQuestion = read(body)?;
+    let case = Arc::clone(&app.case);
+    let turn = turn_of("people", question.page.as_ref(), question.turn);
+    let work = move || people::people(&case, &question.aim, &question.joints_rad);
     Ok(answered(&app.exact.run(turn, work).await?))
 }
 
@@ -615,7 +641,10 @@ struct PlanQuestion {
     engine: Option<Engine>,
 }
 
-async fn written(app: &Arc<App>, question: PlanQuestion) -> Result<PathBuf, Problem> {
+async fn written(
+    app: &Arc<App>,
+    question: PlanQuestion,
+) -> Result<(PathBuf, Vec<String>), Problem> {
     let case = Arc::clone(&app.case);
     let _one = app.writing.lock().await;
     let work = move || {
@@ -638,16 +667,18 @@ fn file_name(path: &std::path::Path) -> String {
 }
 
 async fn plan(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
-    let path = written(&app, read(body)?).await?;
-    Ok(json_response(
-        &json!({"file": file_name(&path), "path": path.display().to_string()}),
-    ))
+    let (path, left_out) = written(&app, read(body)?).await?;
+    Ok(json_response(&json!({
+        "file": file_name(&path),
+        "path": path.display().to_string(),
+        "left_out": left_out,
+    })))
 }
 
 async fn simulate(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
     let question: PlanQuestion = read(body)?;
     let engine = question.engine.unwrap_or(Engine::Rapier);
-    let path = written(&app, question).await?;
+    let (path, _) = written(&app, question).await?;
     let progress = app.simulation.start(&path, engine)?;
     let cookie = format!(
         "{COOKIE}={}; HttpOnly; SameSite=Strict; Path=/results",

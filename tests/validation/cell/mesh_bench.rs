@@ -110,7 +110,7 @@ fn direction(random: &mut SplitMix64) -> Vector3<f64> {
     let z = random.uniform(-1.0, 1.0);
     let turn = random.uniform(-PI, PI);
     let across = (1.0 - z * z).sqrt();
-    Vector3::new(across * turn.cos(), across * turn.sin(), z)
+    Vector3::new(across * libm::cos(turn), across * libm::sin(turn), z)
 }
 
 /// A subdivided icosahedron of 0.15 m with hollows and ridges of 0.03 m.
@@ -121,7 +121,8 @@ fn bumpy_sphere() -> TriangleMesh {
     }
     for vertex in &mut mesh.vertices_m {
         let unit = vertex.coords / vertex.coords.norm();
-        let bump = (9.0 * unit.x).sin() * (7.0 * unit.y + 1.0).sin() * (8.0 * unit.z).cos();
+        let bump =
+            libm::sin(9.0 * unit.x) * libm::sin(7.0 * unit.y + 1.0) * libm::cos(8.0 * unit.z);
         *vertex = Point3::from(unit * (0.15 + 0.03 * bump));
     }
     mesh
@@ -135,7 +136,11 @@ fn icosahedron() -> TriangleMesh {
     for k in 0..10 {
         let turn = TAU * f64::from(k) / 10.0;
         let z = if k % 2 == 0 { height } else { -height };
-        vertices_m.push(Point3::new(across * turn.cos(), across * turn.sin(), z));
+        vertices_m.push(Point3::new(
+            across * libm::cos(turn),
+            across * libm::sin(turn),
+            z,
+        ));
     }
     vertices_m.push(Point3::new(0.0, 0.0, -1.0));
     let mut triangles = Vec::new();

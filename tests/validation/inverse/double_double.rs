@@ -201,16 +201,16 @@ impl Complex {
             im: sine.re,
         };
         let (ahead, behind) = (cosine + i_sine, cosine - i_sine);
-        let magnitude = |z: Self| z.re.high.hypot(z.im.high);
+        let magnitude = |z: Self| libm::hypot(z.re.high, z.im.high);
         let (a, b) = (magnitude(ahead), magnitude(behind));
         let real = if a >= b {
-            ahead.im.high.atan2(ahead.re.high)
+            libm::atan2(ahead.im.high, ahead.re.high)
         } else {
-            -behind.im.high.atan2(behind.re.high)
+            -libm::atan2(behind.im.high, behind.re.high)
         };
         // b^2 - a^2 = 4 (Im sin Re cos - Re sin Im cos), and ab = 1.
         let product = sine.im * cosine.re - sine.re * cosine.im;
-        let imaginary = 0.5 * (2.0 * product.high).asinh();
+        let imaginary = 0.5 * libm::asinh(2.0 * product.high);
         (if real <= -PI { PI } else { real }, imaginary)
     }
 }

@@ -160,7 +160,10 @@ fn fresh(start: &Start, geometry: &UrGeometry, seed: u64, poses: usize) -> Vec<S
 fn every_posture_of_a_fresh_pose_has_a_row_and_every_row_is_right() {
     let start = start();
     println!("{:26} | away  | {}", "set", Tally::HEADER);
-    let complaints = fresh(&start, &UR3, 20260302, 3);
+    // With the second seed two poses are within 1e-7 rad of two singularities at once: their shoulders
+    // differ by a rounding, and their wrists by half a radian.
+    let mut complaints = fresh(&start, &UR3, 20260302, 3);
+    complaints.extend(fresh(&start, &UR3, 3, 4));
     assert!(complaints.is_empty(), "\n{}", complaints.join("\n"));
 }
 
@@ -183,7 +186,7 @@ fn numbers_of_two_doubles_have_thirty_digits() {
         let angle = f64::from(k) * 0.3;
         let (sin, cos) = Real::sin_cos(angle);
         assert!((sin * sin + cos * cos - Real::ONE).value().abs() < DIGITS);
-        assert!((sin.value() - angle.sin()).abs() < 1e-15);
+        assert!((sin.value() - libm::sin(angle)).abs() < 1e-15);
         let (double_sin, double_cos) = Real::sin_cos(2.0 * angle);
         assert!((double_sin - Real::of(2.0) * sin * cos).value().abs() < DIGITS);
         assert!((double_cos - cos * cos + sin * sin).value().abs() < DIGITS);

@@ -30,7 +30,11 @@ impl Row {
     pub fn is(&self, geometry: &UrGeometry, posture: &Joints) -> bool {
         let near = |a: f64, b: f64, within: f64| wrap_angle(a - b).abs() < within;
         if self.free {
-            let turn = if posture[4].cos() > 0.0 { 1.0 } else { -1.0 };
+            let turn = if libm::cos(posture[4]) > 0.0 {
+                1.0
+            } else {
+                -1.0
+            };
             let sum = |q: &Joints| q[1] + q[2] + q[3] + turn * q[5];
             return near(self.joints[0], posture[0], SAME_RAD)
                 && near(self.joints[4], posture[4], SAME_RAD)

@@ -7,7 +7,7 @@
 //!
 //! As `make_reference.py`, but in 106 bits and along another path.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{ComplexField as _, Matrix6, Vector6};
 use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
 
@@ -229,7 +229,7 @@ fn across(lengths: &Lengths, target: &Target, posture: &Posture) -> (Posture, Sy
         let steep = |i: usize| values[i] >= sorted[last_steep];
         let left = (0..6)
             .filter(|i| steep(*i))
-            .map(|i| along[i].norm())
+            .map(|i| along[i].modulus())
             .fold(0.0, f64::max);
         if left < 1e-12 {
             break;

@@ -216,7 +216,7 @@ fn in_mm2(covariance_m2: &Matrix3<f64>) -> CovarianceMm2 {
     let at = |row: usize, column: usize| covariance_m2[(row, column)] * 1e6;
     // Digits that a person reads, and more than are known: eight of the largest.
     let most = (0..3).map(|axis| at(axis, axis)).fold(0.0, f64::max);
-    let step = 10_f64.powf(most.max(1e-12).log10().floor() - 8.0);
+    let step = libm::pow(10_f64, libm::log10(most.max(1e-12)).floor() - 8.0);
     [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
         .map(|(row, column)| rounded(at(row, column), step))
 }

@@ -187,7 +187,7 @@ impl Posed {
             Vector3::y()
         };
         // How far he is turned from the posture that is named after that direction.
-        let turn = across.cross(&down).z.atan2(across.dot(&down)) + order.turn_rad;
+        let turn = libm::atan2(across.cross(&down).z, across.dot(&down)) + order.turn_rad;
         let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
         Self {
             ct_from_phantom: Pose::from_parts(order.shift_m.into(), rotation),
@@ -241,7 +241,7 @@ impl ScanOrder {
             reason = "from 1 to 65535"
         )]
         let slices = slices as usize;
-        let (sine, cosine) = self.tilt_rad.sin_cos();
+        let (sine, cosine) = libm::sincos(self.tilt_rad);
         let sign = |axis: usize| if self.flipped[axis] { -1.0 } else { 1.0 };
         let steps_m = Matrix3::from_columns(&[
             Vector3::x() * (sign(0) * pixel_m),

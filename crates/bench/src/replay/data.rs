@@ -211,7 +211,7 @@ fn rounded(value: f64, half_width: f64) -> f64 {
         return value;
     }
     #[expect(clippy::cast_possible_truncation, reason = "exponents of doubles")]
-    let places = FIGURES - half_width.log10().floor() as i32;
+    let places = FIGURES - libm::log10(half_width).floor() as i32;
     if !(0..=12).contains(&places) {
         return value;
     }

@@ -45,8 +45,10 @@ pub(super) struct Served {
     pub candidate: Option<Candidate>,
     /// How good it is by the scenario's aim.
     pub value: Option<Merit>,
-    /// Least clearance of what a roll can change, m.
+    /// Least clearance of arm and tool from what stands around, m; none where nothing does.
     pub clearance_m: Option<f64>,
+    /// What such clearances have beyond what they are judged by, m; infinite where there are none.
+    pub clear_spare_m: f64,
     /// Expected error, if the scenario expects one.
     pub error: Option<AxisError>,
     /// What is left of each margin with this error, m; infinite where nothing is near.
@@ -96,11 +98,13 @@ impl Asked {
         })
     }
 
-    /// What is left of the margins, with the error of the configuration to choose.
+    /// What is left: of the needle's margins, with the error of the configuration to choose, and of that configuration's
+    /// clearances; the least of them.
     pub fn spare_m(&self) -> f64 {
+        let needle_m = self.rounded.route.spare_m;
         match self.best() {
-            Some(best) => best.least_spare_m().min(self.rounded.route.spare_m),
-            None => self.rounded.route.spare_m,
+            Some(best) => best.least_spare_m().min(best.clear_spare_m).min(needle_m),
+            None => needle_m,
         }
     }
 }
@@ -213,14 +217,23 @@ impl Robot<'_> {
                 .map(str::to_owned),
         };
         let aim = self.resolved.scenario.planning.roll_aim;
-        let clearance = member.least_clearance();
+        let limits = self.planner.limits();
+        let minima = candidate.into_iter().flat_map(|it| it.clearance.iter());
+        let around = minima.filter(|pair| pair.class.is_surroundings());
+        let (mut clearance_m, mut clear_spare_m) = (None, f64::INFINITY);
+        for pair in around {
+            let distance_m = pair.separation.distance_m;
+            clearance_m = Some(clearance_m.map_or(distance_m, |least: f64| least.min(distance_m)));
+            clear_spare_m = clear_spare_m.min(distance_m - limits.get(pair.class).judged_m);
+        }
         Served {
+            clear_spare_m,
             configuration,
             value: candidate
                 .filter(|_| reason.is_none())
                 .map(|candidate| self.planner.merit(goal, aim, candidate)),
             reason,
-            clearance_m: clearance.map(|pair| pair.separation.distance_m),
+            clearance_m,
             candidate: member.candidate,
             error: None,
             spare_m: None,
@@ -263,16 +276,8 @@ impl Robot<'_> {
         let expected = self.resolved.expected.as_ref()?;
         let told = || {
             let trajectory = self.planner.approach(goal, candidate)?;
-            let place = self.resolved.phantom.as_ref();
-            let case = BudgetCase {
-                cell: &self.resolved.cell,
-                goal,
-                place: place.map(|each| &each.world_from_phantom),
-                servo: &self.servo,
-                imperfections: &expected.imperfections,
-                trajectory: &trajectory,
-                timestep_s: self.resolved.scenario.engines.timestep_ms * 1e-3,
-            };
+            let imperfections = &expected.imperfections;
+            let case = BudgetCase::of(self.resolved, goal, &self.servo, imperfections, &trajectory);
             analytic_total(&case).ok()
         };
         let moments = told();

@@ -26,6 +26,7 @@ use needlebench_routing::{
 
 use crate::Control;
 use crate::ct::BuiltFolder;
+use crate::parallel::in_parallel;
 use crate::suggest::SuggestError;
 use joint::{Asked, ask};
 
@@ -172,6 +173,14 @@ struct Rounded {
     route: Route,
 }
 
+/// Directions as the patient alone judges them, and those of the free ones that stand for the rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeRoutes {
+    rules: RouteRules,
+    searched: Searched,
+    standing: Vec<Rounded>,
+}
+
 /// Plans the routes to a target. The same for any number of threads.
 ///
 /// # Errors
@@ -181,6 +190,22 @@ pub fn plan_routes(
     anatomy: &dyn Anatomy,
     control: &Control<'_>,
 ) -> Result<RoutePlan, SuggestError> {
+    let free = free_routes(task, anatomy, control)?;
+    match task.robot {
+        WithRobot::Yes => free.plan_with_robot(task, anatomy, control),
+        WithRobot::No(_) => Ok(free.plan(task, anatomy)),
+    }
+}
+
+/// The first stage of [`plan_routes`].
+///
+/// # Errors
+/// If it was interrupted.
+pub fn free_routes(
+    task: &RouteTask<'_>,
+    anatomy: &dyn Anatomy,
+    control: &Control<'_>,
+) -> Result<FreeRoutes, SuggestError> {
     let rules = task.route_rules();
     control.progress.message("routes");
     let stop = || control.is_cancelled();
@@ -188,18 +213,44 @@ pub fn plan_routes(
     if control.is_cancelled() {
         return Err(SuggestError::Interrupted);
     }
-    let asked_for = candidates(anatomy, &rules, &searched, task.directions);
-    let asked = match &task.robot {
-        WithRobot::Yes => ask(task, &rules, &asked_for, control)?,
-        WithRobot::No(_) => asked_for.into_iter().map(Asked::without_robot).collect(),
-    };
-    Ok(report::plan(
-        task,
-        anatomy,
-        &rules,
-        &searched,
-        &ordered(asked),
-    ))
+    let standing = candidates(anatomy, &rules, &searched, task.directions, control.threads);
+    Ok(FreeRoutes {
+        rules,
+        searched,
+        standing,
+    })
+}
+
+impl FreeRoutes {
+    /// The plan that the patient alone gives: nobody has asked a robot, or not yet.
+    pub fn plan(&self, task: &RouteTask<'_>, anatomy: &dyn Anatomy) -> RoutePlan {
+        let standing = self.standing.iter().cloned();
+        let unasked = standing.map(Asked::without_robot).collect();
+        let mut plan = self.ordered(task, anatomy, unasked);
+        if plan.robot_not_asked.is_none() {
+            plan.robot_not_asked = Some("it is not asked yet".to_owned());
+            plan.why_not = None;
+        }
+        plan
+    }
+
+    /// The plan with the task's robot.
+    ///
+    /// # Errors
+    /// If the robot is none that can be asked, or it was interrupted.
+    pub fn plan_with_robot(
+        &self,
+        task: &RouteTask<'_>,
+        anatomy: &dyn Anatomy,
+        control: &Control<'_>,
+    ) -> Result<RoutePlan, SuggestError> {
+        let asked = ask(task, &self.rules, &self.standing, control)?;
+        Ok(self.ordered(task, anatomy, asked))
+    }
+
+    fn ordered(&self, task: &RouteTask<'_>, anatomy: &dyn Anatomy, asked: Vec<Asked>) -> RoutePlan {
+        report::plan(task, anatomy, &self.rules, &self.searched, &ordered(asked))
+    }
 }
 
 /// Directions that stand for those around them, each at the best place near by.
@@ -208,24 +259,22 @@ fn candidates(
     rules: &RouteRules,
     searched: &Searched,
     directions: usize,
+    threads: usize,
 ) -> Vec<Rounded> {
     let mut free = searched.free();
     let least = free.first().map_or(0.0, |route| route.risk.log_odds);
-    free.sort_by(|a, b| better_first(least, (a, a.spare_m), (b, b.spare_m)));
+    // Odds that cannot be told apart are no reason to give up what there is to spare.
+    let better = |a: &Route, b: &Route| better_first(least, (a, a.spare_m), (b, b.spare_m));
+    free.sort_by(|a, b| better(a, b));
     let picked = apart(&free, |route| route.outwards, APART_RAD, MOST_ASKED);
     // Half of the distance between directions of an even grid.
     let step_rad = 0.5 * (4.0 * std::f64::consts::PI / directions.max(1) as f64).sqrt();
-    let mut found: Vec<Rounded> = picked
-        .into_iter()
-        .filter_map(|index| {
-            let best = refined(anatomy, rules, free[index], step_rad, REFINED_RAD);
-            rounded(anatomy, rules, &best).or_else(|| rounded(anatomy, rules, free[index]))
-        })
-        .collect();
-    found.sort_by(|a, b| {
-        let (a, b) = (&a.route, &b.route);
-        better_first(least, (a, a.spare_m), (b, b.spare_m))
+    let each = in_parallel(threads, &picked, |&index| {
+        let best = refined(anatomy, rules, free[index], [step_rad, REFINED_RAD], better);
+        rounded(anatomy, rules, &best).or_else(|| rounded(anatomy, rules, free[index]))
     });
+    let mut found: Vec<Rounded> = each.into_iter().flatten().collect();
+    found.sort_by(|a, b| better(&a.route, &b.route));
     // Several may have come to the same place.
     let kept = apart(&found, |each| each.route.outwards, APART_RAD, MOST_ASKED);
     kept.into_iter().map(|index| found[index].clone()).collect()

@@ -144,7 +144,7 @@ pub struct ConfigurationAnswer {
     pub roll_rad: Option<f64>,
     /// The posture.
     pub joints_rad: Option<[f64; 6]>,
-    /// Least clearance of what a roll can change.
+    /// Least clearance of arm and tool from what stands around.
     pub clearance_m: Option<f64>,
     /// What is left of the margins with this configuration's error; none if it is not known or nothing is near.
     pub spare_m: Option<f64>,

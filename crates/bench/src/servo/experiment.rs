@@ -1,12 +1,12 @@
 //! Steps and sines that an engine's arm is made to follow.
 
-use nalgebra::Complex;
+use nalgebra::{Complex, ComplexField as _};
 use needlebench_engine::{EngineError, Plant, Servo};
 use needlebench_kinematics::trajectory::JointState;
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 use serde::Serialize;
 
-use super::linear::Linear;
+use super::linear::{Linear, polar};
 
 /// Amplitude at which the loop is linear, rad: a torque of 1 to 3 N m at the default gains.
 pub const SMALL_RAD: f64 = 1e-3;
@@ -183,7 +183,7 @@ impl Bench<'_> {
         let timestep_s = self.plant.timestep_s();
         let omega = std::f64::consts::TAU / (period as f64 * timestep_s);
         let (servo, posture, held_nm) = (self.servo, self.posture, self.held_nm);
-        let at = move |step: f64| amplitude_rad * (omega * step * timestep_s).sin();
+        let at = move |step: f64| amplitude_rad * libm::sin(omega * step * timestep_s);
         self.run(
             joint,
             steps,
@@ -194,7 +194,7 @@ impl Bench<'_> {
                 reference.position[joint] += at(step);
                 // The velocity that an engine reports belongs half a step earlier.
                 let late = omega * (step - 0.5) * timestep_s;
-                reference.velocity[joint] = amplitude_rad * omega * late.cos();
+                reference.velocity[joint] = amplitude_rad * omega * libm::cos(late);
                 if fed {
                     reference.acceleration[joint] = -omega * omega * at(step);
                     let output = servo.torque(&reference, position, velocity);
@@ -247,7 +247,10 @@ impl Bench<'_> {
         let fitted = whole(FITTED_S / timestep_s).div_ceil(period).max(2) * period;
         let omega = std::f64::consts::TAU * frequency_hz;
         let gains = &self.servo.gains;
-        let stiffness = gains.kp_nm_per_rad[joint].hypot(omega * gains.kd_nms_per_rad[joint]);
+        let stiffness = libm::hypot(
+            gains.kp_nm_per_rad[joint],
+            omega * gains.kd_nms_per_rad[joint],
+        );
         let spare_nm = self.servo.effort_limit_nm[joint] - self.held_nm[joint].abs();
         let amplitude_rad = SMALL_RAD.min(SPARE_TORQUE_USED * spare_nm.max(0.0) / stiffness);
         let course = self.sine(joint, amplitude_rad, period, settled + fitted, false)?;
@@ -261,17 +264,17 @@ impl Bench<'_> {
             .take(fitted)
         {
             let angle = std::f64::consts::TAU * (step % period) as f64 / period as f64;
-            sum += Complex::from_polar(*motion, -angle);
+            sum += polar(*motion, -angle);
         }
         // sin = Im exp: turn by a quarter.
         let found = sum * Complex::i() * (2.0 / (fitted as f64 * amplitude_rad));
         let linear = self.linear.response(joint, frequency_hz);
         Ok(FrequencyPoint {
             frequency_hz,
-            gain: found.norm(),
-            phase_rad: found.arg(),
-            linear_gain: linear.norm(),
-            linear_phase_rad: linear.arg(),
+            gain: found.modulus(),
+            phase_rad: found.argument(),
+            linear_gain: linear.modulus(),
+            linear_phase_rad: linear.argument(),
         })
     }
 }
@@ -355,8 +358,8 @@ mod tests {
         );
         assert!(response.frequencies.len() > 10);
         for point in &response.frequencies {
-            let linear = Complex::from_polar(point.linear_gain, point.linear_phase_rad);
-            let error = (Complex::from_polar(point.gain, point.phase_rad) - linear).norm();
+            let linear = polar(point.linear_gain, point.linear_phase_rad);
+            let error = (polar(point.gain, point.phase_rad) - linear).modulus();
             assert!(error < LINEAR_GAIN, "{point:?}");
         }
         // The small step stays within the torque, the large one is cut.

@@ -1,6 +1,6 @@
 //! The closed loop of servo and arm for small motions about a posture, in closed form.
 
-use nalgebra::{Complex, Matrix6, Vector6};
+use nalgebra::{Complex, ComplexField as _, Matrix6, Vector6};
 use needlebench_engine::{Actuation, ClosedLoop, Servo};
 use needlebench_kinematics::{JOINT_COUNT, Joints};
 use serde::Serialize;
@@ -13,6 +13,12 @@ const LARGEST_FACTOR: f64 = 1e3;
 
 /// Bisections of a margin: six digits.
 const BISECTIONS: usize = 32;
+
+/// `radius exp(i angle_rad)`.
+pub(super) fn polar(radius: f64, angle_rad: f64) -> Complex<f64> {
+    let (sine, cosine) = libm::sincos(angle_rad);
+    Complex::new(radius * cosine, radius * sine)
+}
 
 /// Servo, arm and time step, linear about a posture at rest.
 ///
@@ -70,7 +76,7 @@ impl Linear {
     pub fn response(&self, joint: usize, frequency_hz: f64) -> Complex<f64> {
         let omega = std::f64::consts::TAU * frequency_hz;
         let h = self.timestep_s;
-        let z = Complex::from_polar(1.0, omega * h);
+        let z = polar(1.0, omega * h);
         let s = (z - 1.0) / h;
         let complex = |value: f64| Complex::new(value, 0.0);
         let mut matrix = self.mass.map(complex) * (s * s / z)
@@ -79,7 +85,7 @@ impl Linear {
         matrix += Matrix6::from_diagonal(&self.kd.map(complex)) * (s / z);
         let mut wanted = Vector6::zeros();
         wanted[joint] = complex(self.kp[joint])
-            + Complex::from_polar(self.kd[joint] * omega, -0.5 * omega * h) * Complex::i();
+            + polar(self.kd[joint] * omega, -0.5 * omega * h) * Complex::i();
         // A singular matrix is a resonance without damping.
         matrix
             .lu()
@@ -124,14 +130,15 @@ impl Linear {
 
     fn bandwidth_hz(&self, joint: usize) -> Option<f64> {
         const DECADE_POINTS: i32 = 40;
-        let fallen = |hz: f64| self.response(joint, hz).norm() < std::f64::consts::FRAC_1_SQRT_2;
+        let fallen = |hz: f64| self.response(joint, hz).modulus() < std::f64::consts::FRAC_1_SQRT_2;
         let nyquist_hz = 0.5 / self.timestep_s;
-        let points = (0..).map(|k| 0.1 * 10_f64.powf(f64::from(k) / f64::from(DECADE_POINTS)));
+        let points =
+            (0..).map(|k| 0.1 * libm::pow(10_f64, f64::from(k) / f64::from(DECADE_POINTS)));
         let beyond = points
             .take_while(|hz| *hz < nyquist_hz)
             .find(|hz| fallen(*hz))?;
         let (mut low, mut high) = (
-            beyond * 10_f64.powf(-1.0 / f64::from(DECADE_POINTS)),
+            beyond * libm::pow(10_f64, -1.0 / f64::from(DECADE_POINTS)),
             beyond,
         );
         for _ in 0..BISECTIONS {
@@ -235,12 +242,12 @@ mod tests {
         for step in 0..3000 {
             let time_s = f64::from(step) * TIMESTEP_S;
             if time_s > 2.0 {
-                let steady = (expected * Complex::from_polar(1.0, omega * time_s)).im;
+                let steady = (expected * polar(1.0, omega * time_s)).im;
                 worst = worst.max((x[joint] - steady).abs());
             }
             let (mut reference, mut speed) = (Joints::zeros(), Joints::zeros());
-            reference[joint] = (omega * time_s).sin();
-            speed[joint] = omega * (omega * (time_s - 0.5 * TIMESTEP_S)).cos();
+            reference[joint] = libm::sin(omega * time_s);
+            speed[joint] = omega * libm::cos(omega * (time_s - 0.5 * TIMESTEP_S));
             let torque = linear.kp.component_mul(&(reference - x))
                 + linear.kd.component_mul(&(speed - v))
                 - linear.gravity_gradient * x;
@@ -254,13 +261,13 @@ mod tests {
     fn slow_motions_are_followed_and_fast_ones_are_not() {
         let (_, _, linear) = linear();
         for joint in 0..JOINT_COUNT {
-            let slow = linear.response(joint, 0.01).norm();
+            let slow = linear.response(joint, 0.01).modulus();
             // Gravity bends the servo by its gradient over kp.
             assert!((slow - 1.0).abs() < 0.03, "{joint}: {slow}");
             let bandwidth_hz = linear.joint(joint).bandwidth_hz.unwrap();
-            let there = linear.response(joint, bandwidth_hz).norm();
+            let there = linear.response(joint, bandwidth_hz).modulus();
             assert!((there - std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-6);
-            let beyond = linear.response(joint, 1.2 * bandwidth_hz).norm();
+            let beyond = linear.response(joint, 1.2 * bandwidth_hz).modulus();
             assert!(beyond < 0.95 * there, "{joint}: {beyond}");
         }
     }

@@ -5,6 +5,7 @@ pub mod experiment;
 pub mod linear;
 pub mod settings;
 
+use nalgebra::ComplexField as _;
 use needlebench_engine::{EngineError, Plant, Servo};
 use needlebench_kinematics::{JOINT_LABELS, Joints};
 use serde::Serialize;
@@ -76,11 +77,11 @@ pub fn joints(
             index,
             linear_step: linear.step_response(index, experiment::steps_shown(timestep_s)),
             linear_curve: (0..=CURVE_POINTS)
-                .map(|k| 10_f64.powf(2.0 * f64::from(k) / f64::from(CURVE_POINTS)))
+                .map(|k| libm::pow(10_f64, 2.0 * f64::from(k) / f64::from(CURVE_POINTS)))
                 .filter(|hz| *hz < 0.5 / timestep_s)
                 .map(|hz| {
                     let response = linear.response(index, hz);
-                    [hz, response.norm(), response.arg()]
+                    [hz, response.modulus(), response.argument()]
                 })
                 .collect(),
         })

@@ -26,7 +26,11 @@ pub struct StudyCase {
 impl StudyCase {
     /// The case of a number below the design's count.
     pub fn new(study: &ResolvedStudy, design: &Design, number: u64) -> Self {
-        let values = design.values(number);
+        Self::of_values(study, number, design.values(number))
+    }
+
+    /// The case of a number with such values, in the order of the study's factors, the goal first.
+    pub fn of_values(study: &ResolvedStudy, number: u64, values: Vec<FactorValue>) -> Self {
         let FactorValue::Level(goal) = values[0] else {
             unreachable!("the goal is one of some");
         };

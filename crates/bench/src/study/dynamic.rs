@@ -227,6 +227,7 @@ impl<'a> Case<'a> {
                 detail,
                 mode: StudyMode::Dynamic,
                 measured,
+                margin_m: None,
             }
         }))
     }

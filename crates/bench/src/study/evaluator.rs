@@ -6,6 +6,7 @@ use needlebench_study::{CaseError, CaseEvaluator, CaseResult, CaseWorker, Design
 
 use super::case::StudyCase;
 use super::dynamic::dynamic_rows;
+use super::margin::CountedClasses;
 use super::planned::planned_rows;
 use super::rows::StudyColumns;
 use super::static_case::{StaticWorker, invalid_rows};
@@ -35,11 +36,19 @@ impl CaseEvaluator for StudyEvaluator<'_> {
             study: self.study,
             design: self.design,
             columns: self.columns,
-            postures: StaticWorker::default(),
+            postures: StaticWorker::counting(counted_classes(self.study)),
             pool: EnginePool::new(ENGINES),
             scan: LastScan::default(),
         }))
     }
+}
+
+/// The classes that a study's margins count.
+pub(crate) fn counted_classes(study: &ResolvedStudy) -> CountedClasses {
+    let search = study.file.search.as_ref();
+    search.map_or_else(CountedClasses::default, |search| {
+        CountedClasses::of(|class| search.counts(class))
+    })
 }
 
 struct Worker<'a> {

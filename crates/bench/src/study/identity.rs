@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use needlebench_cell::study::{FactorValues, ResolvedStudy};
 use needlebench_cell::{Finding, ModelSource, ResolvedScenario, sha256_hex};
 
-use crate::provenance::{GIT_REVISION, provenance};
+use crate::provenance::{SOURCE_SHA256, provenance};
 
 /// Hashes of everything that a study reads, by what it is, with a hash over all of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,7 +25,7 @@ impl Identity {
         let mut inputs: BTreeMap<String, String> = BTreeMap::new();
         inputs.insert(
             "program".to_owned(),
-            format!("{} {GIT_REVISION}", env!("CARGO_PKG_VERSION")),
+            format!("{} source {SOURCE_SHA256}", env!("CARGO_PKG_VERSION")),
         );
         let mut add = |role: &str, name: &str, sha256: &str| {
             // Files of the same name in different folders are told apart by their order.

@@ -1,10 +1,13 @@
 //! Cases of a study: rows of numbers from one layout with one goal.
 
+mod assignment;
 mod case;
 mod dynamic;
 mod evaluator;
 mod former;
 mod identity;
+mod launch;
+mod margin;
 mod planned;
 mod prediction;
 mod prepare;
@@ -16,11 +19,17 @@ mod static_case;
 #[cfg(test)]
 mod tests;
 
+pub use assignment::{Assignment, SHARD_VARIABLE, SHARDS_VARIABLE, assignment, shards_of};
 pub use case::StudyCase;
 pub use dynamic::{CaseCost, DynamicCase, ENGINE_FAILURE, dynamic_case, dynamic_rows};
 pub use evaluator::StudyEvaluator;
+pub(crate) use evaluator::counted_classes;
 pub use former::FormerResults;
 pub use identity::Identity;
+pub use launch::{
+    Launch, LaunchFile, LaunchPlan, LaunchRequest, LaunchStep, Launcher, advice, launch_plan,
+};
+pub use margin::{CountedClasses, MARGIN_COLUMN, margin_column};
 pub use planned::planned_rows;
 pub use prepare::{PreparedStudy, in_words, time_per_case};
 pub use replan::{ReplanControl, ReplanDraw, Replanned, replan_draw, replanned};

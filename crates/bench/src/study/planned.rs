@@ -90,6 +90,7 @@ pub fn planned_rows(resolved: &ResolvedScenario) -> Result<[CaseRow; 8], String>
             detail,
             mode: StudyMode::Planned,
             measured,
+            margin_m: None,
         }
     })))
 }

@@ -103,19 +103,8 @@ impl<'a> Prediction<'a> {
     }
 
     fn budget(&self, motion: &JointTrajectory) -> Option<ErrorBudget> {
-        let case = BudgetCase {
-            cell: &self.resolved.cell,
-            goal: &self.resolved.goals[0],
-            place: self
-                .resolved
-                .phantom
-                .as_ref()
-                .map(|each| &each.world_from_phantom),
-            servo: &self.servo,
-            imperfections: self.expected?,
-            trajectory: motion,
-            timestep_s: self.resolved.scenario.engines.timestep_ms * 1e-3,
-        };
+        let goal = &self.resolved.goals[0];
+        let case = BudgetCase::of(self.resolved, goal, &self.servo, self.expected?, motion);
         analytic_total(&case).ok().map(analytic_budget)
     }
 }

@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::identity::Identity;
 use super::rows::StudyColumns;
-use crate::provenance::GIT_REVISION;
+use crate::provenance::{SOURCE_SHA256, arithmetic};
 
 /// A study, its cases, and what decides its results.
 #[derive(Debug)]
@@ -82,7 +82,8 @@ impl PreparedStudy {
             provenance: json!({
                 "program": "needlebench",
                 "version": env!("CARGO_PKG_VERSION"),
-                "git_revision": GIT_REVISION,
+                "source_sha256": SOURCE_SHA256,
+                "arithmetic": self.arithmetic(),
                 "inputs": self.identity.inputs,
                 "seed": file.seed,
                 "sampling": { "method": file.sampling.method.name(), "samples": self.design.samples() },
@@ -90,6 +91,19 @@ impl PreparedStudy {
                 "goals": self.study.goals,
                 "description": file.description,
             }),
+        }
+    }
+
+    /// How numbers are rounded in its cases. MuJoCo takes its elementary functions from the C library and from NumPy,
+    /// which pick them by the CPU: what they look at is said, so that shards of unlike machines are told apart.
+    fn arithmetic(&self) -> String {
+        let common = arithmetic();
+        let in_mujoco =
+            self.modes().contains(&StudyMode::Dynamic) && engines(&self.study).contains(&MUJOCO);
+        if in_mujoco {
+            format!("{common}; MuJoCo on {}", cpu())
+        } else {
+            common
         }
     }
 
@@ -106,6 +120,32 @@ impl PreparedStudy {
                 }),
             self.design.samples(),
         )
+    }
+}
+
+/// Name of the engine whose arithmetic is not ours.
+const MUJOCO: &str = "mujoco";
+
+/// What variants of elementary functions are picked by.
+fn cpu() -> String {
+    #[cfg(target_arch = "x86_64")]
+    {
+        let has = [
+            ("avx2", std::arch::is_x86_feature_detected!("avx2")),
+            ("fma", std::arch::is_x86_feature_detected!("fma")),
+            ("avx512f", std::arch::is_x86_feature_detected!("avx512f")),
+        ];
+        let named = has.iter().filter(|(_, has)| *has);
+        let named: Vec<&str> = named.map(|(name, _)| *name).collect();
+        if named.is_empty() {
+            "sse2".to_owned()
+        } else {
+            named.join("+")
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        std::env::consts::ARCH.to_owned()
     }
 }
 
@@ -133,10 +173,9 @@ fn modes(study: &ResolvedStudy) -> BTreeSet<StudyMode> {
     modes
 }
 
-/// The columns of all that may be computed of any case.
-fn columns(study: &ResolvedStudy) -> StudyColumns {
+/// The engines that may run some case, in their own order.
+fn engines(study: &ResolvedStudy) -> Vec<&str> {
     let file = &study.file;
-    let modes = modes(study);
     let of_scenario = study.family.base().scenario.engines.run.as_ref();
     let named = file.engines.as_ref().or(of_scenario);
     let of_levels = levels(study).filter_map(|level| level.engines.as_ref());
@@ -155,8 +194,18 @@ fn columns(study: &ResolvedStudy) -> StudyColumns {
     engines.retain(|engine| seen.insert(*engine));
     let place = |name: &str| ENGINES.iter().position(|engine| engine.name() == name);
     engines.sort_by_key(|name| place(name).unwrap_or(ENGINES.len()));
+    engines
+}
+
+/// The columns of all that may be computed of any case.
+fn columns(study: &ResolvedStudy) -> StudyColumns {
+    let engines = engines(study);
+    let modes = modes(study);
     let modes: Vec<StudyMode> = modes.into_iter().collect();
-    let columns = StudyColumns::new(&modes, &engines);
+    let mut columns = StudyColumns::new(&modes, &engines);
+    if study.file.search.is_some() && modes.contains(&StudyMode::Static) {
+        columns = columns.with_margin();
+    }
     if has_true_targets(study) {
         columns
     } else {

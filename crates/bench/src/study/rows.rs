@@ -9,6 +9,8 @@ use needlebench_kinematics::ik::Configuration;
 use needlebench_planning::{Rejection, Rule};
 use needlebench_study::{Measure, MetricColumn, Outcome, Row};
 
+use super::margin::margin_column;
+
 /// One configuration in one case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaseRow {
@@ -20,6 +22,8 @@ pub struct CaseRow {
     pub mode: StudyMode,
     /// What was measured; of a static case, of its posture.
     pub measured: ConfigurationReport,
+    /// The signed margin of a static case's posture, m.
+    pub margin_m: Option<f64>,
 }
 
 impl CaseRow {
@@ -35,6 +39,7 @@ impl CaseRow {
             detail: detail.into(),
             mode,
             measured: ConfigurationReport::new(configuration.label()),
+            margin_m: None,
         }
     }
 
@@ -51,38 +56,55 @@ impl CaseRow {
 
 /// The columns of a study.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StudyColumns(Vec<MetricKey>);
+pub struct StudyColumns {
+    keys: Vec<MetricKey>,
+    has_margin: bool,
+}
 
 impl StudyColumns {
     /// The columns of a study that computes cases in such modes and engines.
     pub fn new(modes: &[StudyMode], engines: &[&str]) -> Self {
-        Self(MetricKey::columns(modes, engines))
+        Self {
+            keys: MetricKey::columns(modes, engines),
+            has_margin: false,
+        }
     }
 
     /// Without those that are of true targets alone.
     pub fn without_true_targets(mut self) -> Self {
-        self.0.retain(|key| !key.metric().is_of_true_target);
+        self.keys.retain(|key| !key.metric().is_of_true_target);
         self
     }
 
-    /// The metrics, in the order of the columns.
+    /// With the signed margin, as the last one.
+    pub fn with_margin(mut self) -> Self {
+        self.has_margin = true;
+        self
+    }
+
+    /// The metrics, in the order of the columns; the margin is none.
     pub fn keys(&self) -> &[MetricKey] {
-        &self.0
+        &self.keys
     }
 
     /// What the columns are.
     pub fn described(&self) -> Vec<MetricColumn> {
-        self.0.iter().map(metric_column).collect()
+        let margin = self.has_margin.then(margin_column);
+        self.keys.iter().map(metric_column).chain(margin).collect()
     }
 
     /// A configuration of a case as a row.
     pub fn row(&self, index: usize, case: &CaseRow) -> Row {
         let index = u8::try_from(index).expect("there are eight");
         let row = Row::new(index, case.outcome, case.detail.clone());
-        row.with_values(self.0.iter().map(|key| {
+        let of_metrics = self.keys.iter().map(|key| {
             let known = key.is_measured_in(case.mode);
             known.then(|| key.read_column(&case.measured)).flatten()
-        }))
+        });
+        let margin = self
+            .has_margin
+            .then(|| case.margin_m.map(|margin_m| margin_m * 1e3));
+        row.with_values(of_metrics.chain(margin))
     }
 
     /// All configurations of a case as rows.

@@ -12,6 +12,7 @@ use needlebench_kinematics::ik::{Configuration, Kinematics};
 use needlebench_planning::{Member, Planner, needle_route, route_rejection};
 use needlebench_study::Outcome;
 
+use super::margin::{CountedClasses, margin_m};
 use super::prediction::Prediction;
 use super::rows::{CaseRow, broken_rule};
 use crate::assemble::margins_report;
@@ -40,6 +41,8 @@ pub struct StaticWorker {
     models: Vec<ClearanceModel>,
     /// Of the arm used last.
     kinematics: Option<Kinematics>,
+    /// Classes that count in margins.
+    counted: CountedClasses,
 }
 
 /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
@@ -67,13 +70,29 @@ fn invalid(key: &str) -> [CaseRow; 8] {
 }
 
 impl StaticWorker {
+    /// One whose margins count some classes.
+    pub fn counting(counted: CountedClasses) -> Self {
+        Self {
+            counted,
+            ..Self::default()
+        }
+    }
+
     /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
     pub fn rows(&mut self, resolved: &ResolvedScenario) -> [CaseRow; 8] {
+        let counted = self.counted;
         self.evaluate(resolved, |planner, prediction, route_m| {
             let mut members = planner.postures(&resolved.goals[0]).into_iter();
             Configuration::ALL.map(|configuration| {
                 let member = members.next().expect("there are eight");
-                row(planner, prediction, configuration, &member, route_m)
+                row(
+                    planner,
+                    prediction,
+                    configuration,
+                    &member,
+                    route_m,
+                    counted,
+                )
             })
         })
         .unwrap_or_else(invalid)
@@ -81,9 +100,17 @@ impl StaticWorker {
 
     /// One of [`StaticWorker::rows`].
     pub fn row(&mut self, resolved: &ResolvedScenario, configuration: Configuration) -> CaseRow {
+        let counted = self.counted;
         self.evaluate(resolved, |planner, prediction, route_m| {
             let member = planner.posture(&resolved.goals[0], configuration);
-            row(planner, prediction, configuration, &member, route_m)
+            row(
+                planner,
+                prediction,
+                configuration,
+                &member,
+                route_m,
+                counted,
+            )
         })
         .unwrap_or_else(|key| CaseRow::new(configuration, StudyMode::Static, Outcome::Invalid, key))
     }
@@ -95,12 +122,20 @@ impl StaticWorker {
         configuration: Configuration,
         roll_rad: f64,
     ) -> CaseRow {
+        let counted = self.counted;
         self.evaluate(resolved, |planner, prediction, route_m| {
             let goal = &resolved.goals[0];
             let route = route_rejection(resolved, goal);
             let member = planner.member_at(goal, configuration, roll_rad);
             let member = member.on_route(route.as_ref());
-            row(planner, prediction, configuration, &member, route_m)
+            row(
+                planner,
+                prediction,
+                configuration,
+                &member,
+                route_m,
+                counted,
+            )
         })
         .unwrap_or_else(|key| CaseRow::new(configuration, StudyMode::Static, Outcome::Invalid, key))
     }
@@ -184,6 +219,7 @@ fn row(
     configuration: Configuration,
     member: &Member,
     route_m: Option<f64>,
+    counted: CountedClasses,
 ) -> CaseRow {
     let resolved = prediction.resolved();
     let (outcome, detail) = match broken_rule(&member.rejections) {
@@ -199,6 +235,7 @@ fn row(
         posture.posture_clearance_m.insert(class, route_m);
     }
     let Some(candidate) = &member.candidate else {
+        row.margin_m = Some(margin_m(planner, resolved, member, posture, counted, false));
         return row;
     };
     posture.joints_rad = Some(candidate.joints.into());
@@ -216,6 +253,9 @@ fn row(
         row.outcome = Outcome::Failed;
         row.detail = missed.into();
     }
+    let is_ok = row.outcome == Outcome::Ok;
+    let margin_m = margin_m(planner, resolved, member, &row.measured, counted, is_ok);
+    row.margin_m = Some(margin_m);
     row
 }
 

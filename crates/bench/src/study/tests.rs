@@ -193,7 +193,7 @@ fn a_settled_tip_without_friction_is_that_of_a_run() {
         let [lateral, axial] =
             ["lateral_error_static", "depth_error_static"].map(|key| row.get(key).unwrap());
         // Across and along are not of the same axis, but milliradians apart.
-        let both = lateral.hypot(axial);
+        let both = libm::hypot(lateral, axial);
         assert!((both / tip_m - 1.0).abs() < 0.01);
         compared += 1;
     }

@@ -14,7 +14,7 @@ pub(super) fn directions() -> Vec<[f64; 2]> {
     let mut row = 1.0;
     while row < rows {
         let elevation = STEP_DEG * row - 90.0;
-        let count = (360.0 * elevation.to_radians().cos() / STEP_DEG)
+        let count = (360.0 * libm::cos(elevation.to_radians()) / STEP_DEG)
             .round()
             .max(1.0);
         let mut place = 0.0;
@@ -106,7 +106,7 @@ pub(super) fn places(resolved: &ResolvedScenario) -> Result<Vec<BasePlace>, NotU
     let top_mm = table.map_or(chest_mm.z, |table| table.top_height_mm);
     let half_mm = table.map_or(NO_TABLE_HALF_MM, |table| 0.5 * table.width_mm);
     // The table's middle line, beside the patient.
-    let (sine, cosine) = yaw_deg.to_radians().sin_cos();
+    let (sine, cosine) = libm::sincos(yaw_deg.to_radians());
     let off_mm = table.map_or(0.0, |table| {
         let [x, y] = table.center_mm;
         (y - chest_mm.y) * cosine - (x - chest_mm.x) * sine

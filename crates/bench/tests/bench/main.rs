@@ -1,5 +1,6 @@
 //! Runs and cases of studies, from outside the crate.
 
+mod directed;
 mod further_engine;
 #[path = "../../../engine/tests/engine/common/replay.rs"]
 mod replay;

@@ -9,9 +9,9 @@ use needlebench_bench::progress::Silent;
 use needlebench_bench::routes::{RouteAnswer, RoutePlan, RouteTask, WithRobot, plan_routes};
 use needlebench_bench::{Control, Preview};
 use needlebench_cell::scenario::RouteSection;
-use needlebench_cell::{
-    Change, KeyPath, Overrides, ScenarioEdit, ScenarioFamily, resolve_scenario,
-};
+use needlebench_cell::{Change, KeyPath, Overrides, ScenarioFamily};
+
+use crate::directed::entering_by_direction;
 
 /// Reasons that only the plan has: the expected error, beyond what a posture shows.
 const BY_ERROR: [&str; 2] = ["margin_with_error", "expected_error"];
@@ -77,15 +77,7 @@ fn what_serves_a_route_is_what_an_exhaustive_search_finds() {
         plan.free,
         plan.routes.len()
     );
-    // Of a file in which the goal enters by its direction.
-    let text = std::fs::read_to_string(&path).unwrap();
-    let mut edit = ScenarioEdit::new("s.toml", &text).unwrap();
-    edit.remove("goals[0]", "entry_mm").unwrap();
-    edit.set("goals[0]", "entry_direction_deg", "[-32, -9]")
-        .unwrap();
-    let base =
-        resolve_scenario("s.toml", edit.text(), Path::new(""), &Overrides::default()).unwrap();
-    let by_direction = ScenarioFamily::of(base, Path::new(""), &Overrides::default()).unwrap();
+    let by_direction = entering_by_direction(&path);
     let (mut working, mut not) = (0, 0);
     for route in plan
         .routes

@@ -7,10 +7,10 @@ use nalgebra::{Point3, Vector3};
 use needlebench_bench::progress::Silent;
 use needlebench_bench::suggest::suggest_entries;
 use needlebench_bench::{Control, Preview};
-use needlebench_cell::{
-    Change, KeyPath, Overrides, ResolvedScenario, ScenarioEdit, ScenarioFamily, resolve_scenario,
-};
+use needlebench_cell::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily};
 use needlebench_planning::judge_route;
+
+use crate::directed::entering_by_direction;
 
 /// How much better an entry may be that is not proposed, of a score from 0 to 1: what is lost between directions that
 /// are 3 deg apart, and by asking the robot for the best routes alone. Seen: none is better, the best is 0.008 worse.
@@ -73,15 +73,7 @@ fn no_entry_of_another_grid_is_much_better_than_the_first_proposal() {
     let section = &family.base().scenario.goals[0];
     assert_eq!(section.name, name);
     let found = suggest_entries(family.base(), section, 3, &control).unwrap();
-    // Of a file in which the goal enters by its direction.
-    let text = std::fs::read_to_string(&path).unwrap();
-    let mut edit = ScenarioEdit::new("s.toml", &text).unwrap();
-    edit.remove("goals[0]", "entry_mm").unwrap();
-    edit.set("goals[0]", "entry_direction_deg", "[-32, -9]")
-        .unwrap();
-    let base =
-        resolve_scenario("s.toml", edit.text(), Path::new(""), &Overrides::default()).unwrap();
-    let by_direction = ScenarioFamily::of(base, Path::new(""), &Overrides::default()).unwrap();
+    let by_direction = entering_by_direction(&path);
     let at = |direction: [f64; 2]| {
         let key = KeyPath::parse("goal.entry_direction_deg").unwrap();
         by_direction.vary(name, &[(key, Change::Set(direction.into()))])

@@ -9,7 +9,8 @@ use needlebench_kinematics::{
     Body, Chain, Dynamics, JOINT_COUNT, JointLimits, Joints, Pose, UrGeometry, UrModel,
     base_from_base_link,
 };
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 mod arm_in_use;
 mod pairs;
@@ -215,7 +216,9 @@ pub struct CollisionBody {
 }
 
 /// Classes of clearance, as reports name them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum ClearanceClass {
     /// Moving links against the patient's skin, head and arms included.
@@ -361,11 +364,11 @@ impl NeedleCorridor {
     }
 
     fn hand_cone(&self) -> ConvexMesh {
-        let corner_radius_m = self.length_m * self.hand_cone_half_angle_rad.tan()
-            / (PI / f64::from(HAND_CONE_SIDES)).cos();
+        let corner_radius_m = self.length_m * libm::tan(self.hand_cone_half_angle_rad)
+            / libm::cos(PI / f64::from(HAND_CONE_SIDES));
         let mut vertices_m = vec![Point3::origin()];
         vertices_m.extend((0..HAND_CONE_SIDES).map(|side| {
-            let (sine, cosine) = (TAU * f64::from(side) / f64::from(HAND_CONE_SIDES)).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * f64::from(side) / f64::from(HAND_CONE_SIDES));
             Point3::new(
                 corner_radius_m * cosine,
                 corner_radius_m * sine,
@@ -525,10 +528,10 @@ mod tests {
             hand_cone_half_angle_rad: 0.3,
         };
         let ConvexMesh(mesh) = corridor.hand_cone();
-        let radius_m = 0.15 * 0.3_f64.tan();
+        let radius_m = 0.15 * libm::tan(0.3_f64);
         // The circumscribed polygon's area over the circle's.
         let turn = PI / f64::from(HAND_CONE_SIDES);
-        let volume_m3 = PI * radius_m.powi(2) * 0.15 / 3.0 * turn.tan() / turn;
+        let volume_m3 = PI * radius_m.powi(2) * 0.15 / 3.0 * libm::tan(turn) / turn;
         let measured_m3: f64 = mesh
             .triangles
             .iter()
@@ -547,7 +550,11 @@ mod tests {
         }
         for k in 0..1000 {
             let angle = TAU * f64::from(k) / 1000.0;
-            let rim = Point3::new(radius_m * angle.cos(), radius_m * angle.sin(), -0.15);
+            let rim = Point3::new(
+                radius_m * libm::cos(angle),
+                radius_m * libm::sin(angle),
+                -0.15,
+            );
             for triangle in &mesh.triangles {
                 let [a, b, c] = triangle.map(|i| mesh.vertices_m[i as usize]);
                 assert!((b - a).cross(&(c - a)).dot(&(rim - a)) < 1e-12);

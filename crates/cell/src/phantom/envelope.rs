@@ -66,7 +66,7 @@ impl Section {
     /// Half depth at a distance from the middle; 0 beyond the half width.
     fn half_depth_at_m(&self, x_m: f64) -> f64 {
         let across = (x_m / self.half_width_m).abs().min(1.0);
-        self.half_depth_m * (1.0 - across.powf(self.exponent)).powf(1.0 / self.exponent)
+        self.half_depth_m * libm::pow(1.0 - libm::pow(across, self.exponent), 1.0 / self.exponent)
     }
 
     pub fn front_at_m(&self, x_m: f64) -> f64 {
@@ -75,21 +75,22 @@ impl Section {
 
     /// Point at an angle from the back (0) over the left side (pi/2) to the front (pi).
     pub fn at_angle(&self, angle_rad: f64) -> Point2<f64> {
-        let (sine, cosine) = angle_rad.sin_cos();
+        let (sine, cosine) = libm::sincos(angle_rad);
         let power = 2.0 / self.exponent;
         Point2::new(
-            self.half_width_m * sine.abs().powf(power).copysign(sine),
-            self.center_y_m + self.half_depth_m * cosine.abs().powf(power).copysign(cosine),
+            self.half_width_m * libm::pow(sine.abs(), power).copysign(sine),
+            self.center_y_m + self.half_depth_m * libm::pow(cosine.abs(), power).copysign(cosine),
         )
     }
 
     /// Angle, as in [`Section::at_angle`], of the point at `x_m >= 0` of the front half.
     pub fn front_angle_rad(&self, x_m: f64) -> f64 {
-        let sine = (x_m / self.half_width_m)
-            .clamp(0.0, 1.0)
-            .powf(self.exponent / 2.0);
+        let sine = libm::pow(
+            (x_m / self.half_width_m).clamp(0.0, 1.0),
+            self.exponent / 2.0,
+        );
         let cosine = (1.0 - sine * sine).max(0.0).sqrt();
-        sine.atan2(-cosine)
+        libm::atan2(sine, -cosine)
     }
 }
 
@@ -201,7 +202,7 @@ impl Envelope {
             (WAIST, -above / (1.0 + WIDEST))
         };
         let into_end = ((height.abs() - ROUNDED_FROM) / (1.0 - ROUNDED_FROM)).max(0.0);
-        1.0 - share * way.powf(power) - ROUNDED_BY * into_end.powi(3)
+        1.0 - share * libm::pow(way, power) - ROUNDED_BY * into_end.powi(3)
     }
 
     /// The smooth skin at a height, m.

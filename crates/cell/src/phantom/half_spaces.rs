@@ -116,7 +116,7 @@ fn reach_m(solid: &Solid, direction: &UnitVector3<f64>) -> f64 {
         Shape::Cylinder {
             radius_m,
             half_length_m,
-        } => radius_m * local.x.hypot(local.y) + half_length_m * local.z.abs(),
+        } => radius_m * libm::hypot(local.x, local.y) + half_length_m * local.z.abs(),
         Shape::Capsule {
             radius_m,
             half_length_m,
@@ -183,11 +183,11 @@ mod tests {
     fn depth_is_exact_inside_and_never_overstates_outside() {
         let spaces = HalfSpaces::of(&barrel(Pose::identity())).unwrap();
         // The side faces slope by 0.05 over 0.1, so the centre is nearest to them.
-        let to_side_m = 0.1 * 0.1 / 0.1_f64.hypot(0.05);
+        let to_side_m = 0.1 * 0.1 / libm::hypot(0.1_f64, 0.05);
         assert!((spaces.depth_m(&Point3::origin()) - to_side_m).abs() < ROUNDING_M);
         assert!((spaces.depth_m(&Point3::new(0.0, 0.0, 0.3)) + 0.2).abs() < ROUNDING_M);
         let off_corner = Point3::new(0.2, 0.2, 0.0);
-        let true_distance_m = 0.1_f64.hypot(0.1);
+        let true_distance_m = libm::hypot(0.1_f64, 0.1);
         assert!(spaces.depth_m(&off_corner) < 0.0);
         assert!(-spaces.depth_m(&off_corner) <= true_distance_m);
     }
@@ -199,7 +199,7 @@ mod tests {
             nalgebra::Translation3::new(0.0, 0.0, 0.02),
             UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.3),
         );
-        let (sine, cosine) = 0.3_f64.sin_cos();
+        let (sine, cosine) = libm::sincos(0.3_f64);
         let cases = [
             (Shape::Sphere { radius_m: 0.01 }, 0.01),
             (

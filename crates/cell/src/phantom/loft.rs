@@ -98,10 +98,10 @@ pub(super) fn superellipse(
             0 => [half_axes_m[0], 0.0],
             k if k == per_quadrant => [0.0, half_axes_m[1]],
             k => {
-                let (sine, cosine) = (FRAC_PI_2 * k as f64 / per_quadrant as f64).sin_cos();
+                let (sine, cosine) = libm::sincos(FRAC_PI_2 * k as f64 / per_quadrant as f64);
                 [
-                    half_axes_m[0] * cosine.powf(2.0 / exponent),
-                    half_axes_m[1] * sine.powf(2.0 / exponent),
+                    half_axes_m[0] * libm::pow(cosine, 2.0 / exponent),
+                    half_axes_m[1] * libm::pow(sine, 2.0 / exponent),
                 ]
             }
         })
@@ -122,7 +122,7 @@ pub(super) fn ellipsoid(semi_axes_m: Vector3<f64>) -> ConvexMesh {
     let polygon = superellipse([semi_axes_m.x, semi_axes_m.y], 2.0, PER_QUADRANT);
     let levels: Vec<Level> = (0..=BANDS)
         .map(|k| {
-            let (sine, cosine) = (PI * k as f64 / BANDS as f64).sin_cos();
+            let (sine, cosine) = libm::sincos(PI * k as f64 / BANDS as f64);
             Level {
                 z_m: -semi_axes_m.z * cosine,
                 scale: if k == 0 || k == BANDS { 0.0 } else { sine },
@@ -209,7 +209,7 @@ mod tests {
         for p in &polygon {
             assert!(polygon.iter().any(|q| q.x == -p.x && q.y == p.y));
             assert!(polygon.iter().any(|q| q.x == p.x && q.y == -p.y));
-            let value = (p.x.abs() / 0.15).powf(2.4) + (p.y.abs() / 0.12).powf(2.4);
+            let value = libm::pow(p.x.abs() / 0.15, 2.4) + libm::pow(p.y.abs() / 0.12, 2.4);
             assert!((value - 1.0).abs() < 1e-14);
         }
     }

@@ -37,7 +37,7 @@ pub(super) fn marker(
     if placement.height_mm.abs() > HEIGHT_SHARE * 0.5 * parameters.length_mm {
         return Err(off_skin());
     }
-    let (sine, cosine) = placement.azimuth_deg.to_radians().sin_cos();
+    let (sine, cosine) = libm::sincos(placement.azimuth_deg.to_radians());
     let direction = UnitVector3::new_normalize(Vector3::new(sine, -cosine, 0.0));
     let axis = Point3::new(0.0, 0.0, 1e-3 * placement.height_mm);
     let (_, leave_m) = skin.clip_line(&axis, &direction).ok_or_else(off_skin)?;

@@ -124,12 +124,13 @@ fn lung_solid(lung: &Lung, envelope: &Envelope, frame: &Frame) -> Solid {
 
     let band = |end_mm: f64, exponent: f64, way: f64| Level {
         // Evenly spread over the superelliptic arc rather than over the height.
-        z_m: frame
-            .height_m((end_mm - LUNG_WIDEST_MM) * (0.5 * PI * way).sin().powf(2.0 / exponent)),
+        z_m: frame.height_m(
+            (end_mm - LUNG_WIDEST_MM) * libm::pow(libm::sin(0.5 * PI * way), 2.0 / exponent),
+        ),
         scale: if way >= 1.0 {
             0.0
         } else {
-            (0.5 * PI * way).cos().powf(2.0 / exponent)
+            libm::pow(libm::cos(0.5 * PI * way), 2.0 / exponent)
         },
     };
     let mut levels: Vec<Level> = (1..=LUNG_LOWER_BANDS)
@@ -410,7 +411,7 @@ fn section(solid: &Solid, plane: &Plane) -> Vec<Point3<f64>> {
     let rotation = facing(&plane.normal);
     let bearing = |point: &Point3<f64>| {
         let seen = rotation.inverse() * (point - middle);
-        seen.y.atan2(seen.x)
+        libm::atan2(seen.y, seen.x)
     };
     outline.sort_by(|a, b| bearing(a).total_cmp(&bearing(b)));
     outline

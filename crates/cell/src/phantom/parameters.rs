@@ -229,7 +229,7 @@ macro_rules! preset {
             $name,
             include_str!(concat!(
                 env!("CARGO_MANIFEST_DIR"),
-                "/../../models/chest_phantom/",
+                "/models/chest_phantom/",
                 $name,
                 ".toml"
             )),

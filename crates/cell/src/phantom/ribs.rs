@@ -150,7 +150,7 @@ impl Cage<'_> {
             let angle_rad =
                 NECK_ANGLE_RAD + (front_rad - NECK_ANGLE_RAD) * k as f64 / PIECES_PER_RIB as f64;
             // Half a cosine wave is the height along a planar ring that is tilted.
-            let wave = |way: f64| 0.5 * (1.0 - (PI * way).cos());
+            let wave = |way: f64| 0.5 * (1.0 - libm::cos(PI * way));
             let height_mm = if angle_rad <= lowest_rad {
                 head_mm + (rib.lowest_mm - head_mm) * wave(angle_rad / lowest_rad)
             } else {

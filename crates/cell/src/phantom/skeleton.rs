@@ -67,7 +67,7 @@ fn sternum(parameters: &PhantomParameters, envelope: &Envelope, frame: &Frame) -
             });
             let along = upper - lower;
             // Turn about x only, so that the box keeps its broad side to the front.
-            let lean_rad = (-along.y).atan2(along.z);
+            let lean_rad = libm::atan2(-along.y, along.z);
             let half_extents_m = Vector3::new(
                 0.5e-3 * width * parameters.sternum_width_mm,
                 0.5 * thickness_m,

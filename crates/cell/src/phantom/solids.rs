@@ -36,10 +36,10 @@ pub(super) fn elliptic_capsule(
 ) -> Solid {
     const PER_QUADRANT: usize = 4;
     // Around the ellipse, whose affine image of a circle's polygon it is.
-    let around = 1.0 / (FRAC_PI_2 / (2.0 * PER_QUADRANT as f64)).cos();
+    let around = 1.0 / libm::cos(FRAC_PI_2 / (2.0 * PER_QUADRANT as f64));
     let polygon = superellipse(half_axes_m.map(|half_m| around * half_m), 2.0, PER_QUADRANT);
     // Around a quarter of a circle: its tangents at 0, 45 and 90 degrees.
-    let tangent = FRAC_PI_8.tan();
+    let tangent = libm::tan(FRAC_PI_8);
     let along = to - from;
     let half_m = 0.5 * along.norm();
     let [near_m, far_m] = [tangent, 1.0].map(|share| half_m + share * half_axes_m[0]);
@@ -178,7 +178,7 @@ mod tests {
         for k in 0..2000 {
             // Directions all round; the smooth body's support points are those of ends and ellipse.
             let turn = 0.1 * f64::from(k);
-            let (sine, cosine) = turn.sin_cos();
+            let (sine, cosine) = libm::sincos(turn);
             let height = 2.0 * (f64::from(k) + 0.5) / 2000.0 - 1.0;
             let across = (1.0 - height * height).sqrt();
             let of_ball = x * (half_axes_m[0] * across * cosine)

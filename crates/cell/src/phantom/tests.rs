@@ -43,7 +43,7 @@ fn surface(solid: &Solid) -> Vec<Point3<f64>> {
         } => (0..=RINGS)
             .flat_map(|ring| (0..SPOKES).map(move |spoke| (ring, spoke)))
             .map(|(ring, spoke)| {
-                let (sine, cosine) = (TAU * spoke as f64 / SPOKES as f64).sin_cos();
+                let (sine, cosine) = libm::sincos(TAU * spoke as f64 / SPOKES as f64);
                 let z_m = half_length_m * (2.0 * ring as f64 / RINGS as f64 - 1.0);
                 Point3::new(radius_m * cosine, radius_m * sine, z_m)
             })
@@ -189,9 +189,12 @@ fn lungs_fill_the_rib_cage_without_reaching_the_ribs() {
             breadth_m += points.clone().map(|p| p.x.abs()).fold(0.0, f64::max);
             for p in points {
                 let cage = envelope.cage_section(p.z).grown_by(BEYOND_M);
-                let across = (p.x / cage.half_width_m).abs().powf(cage.exponent);
+                let across = libm::pow((p.x / cage.half_width_m).abs(), cage.exponent);
                 let along = ((p.y - cage.center_y_m) / cage.half_depth_m).abs();
-                assert!(across + along.powf(cage.exponent) < 1.0, "{name} at {p}");
+                assert!(
+                    across + libm::pow(along, cage.exponent) < 1.0,
+                    "{name} at {p}"
+                );
             }
         }
         assert!(breadth_m > 0.95 * 2.0 * envelope.widest_cage().half_width_m);

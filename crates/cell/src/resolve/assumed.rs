@@ -99,7 +99,7 @@ fn assume_table(scenario: &mut Scenario, notes: &mut Vec<String>) {
     if !phantom.rest_on_table || scenario.table.is_some() {
         return;
     }
-    let (sine, cosine) = phantom.head_yaw_deg.to_radians().sin_cos();
+    let (sine, cosine) = libm::sincos(phantom.head_yaw_deg.to_radians());
     let [x, y, _] = phantom.position_mm;
     let along_mm = TABLE_FROM_CHEST_MM;
     let table = TableSection {

@@ -70,7 +70,7 @@ impl Load {
             };
         }
         let size_m = section.size_mm.map_or_else(
-            || Vector3::repeat((mass_kg / DENSITY_KG_M3).cbrt()),
+            || Vector3::repeat(libm::cbrt(mass_kg / DENSITY_KG_M3)),
             |mm| Vector3::from(mm) * 1e-3,
         );
         let com_m = section

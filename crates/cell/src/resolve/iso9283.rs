@@ -185,7 +185,7 @@ fn guide_orientation(section: &Iso9283Section) -> UnitQuaternion<f64> {
 }
 
 fn steel_cube(mass_kg: f64, centre_m: Vector3<f64>) -> Body {
-    let edge_m = (mass_kg / LOAD_DENSITY_KG_M3).cbrt();
+    let edge_m = libm::cbrt(mass_kg / LOAD_DENSITY_KG_M3);
     Body {
         mass_kg,
         com_m: centre_m,

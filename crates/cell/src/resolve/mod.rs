@@ -120,6 +120,21 @@ pub struct ResolvedScenario {
     pub expected: Option<Expected>,
 }
 
+impl ResolvedScenario {
+    /// The same scenario with one of its goals alone.
+    ///
+    /// # Panics
+    /// Without a goal of this index.
+    #[must_use]
+    pub fn with_goal_alone(&self, index: usize) -> Self {
+        let mut alone = self.clone();
+        alone.goals = vec![self.goals[index].clone()];
+        alone.scenario.goals = vec![self.scenario.goals[index].clone()];
+        alone.people.by_goal = vec![self.people.by_goal[index].clone()];
+        alone
+    }
+}
+
 /// Reads, resolves and validates a scenario file.
 ///
 /// # Errors

@@ -7,8 +7,8 @@ use super::overrides::Overrides;
 use crate::Finding;
 use crate::files::Location;
 use crate::model::Tool;
-use crate::robot::{ToolOverrides, read_tool};
-use crate::scenario::{NEEDLE_OUTER_DIAMETER_MM, Scenario};
+use crate::robot::{GuidePlace, ToolOverrides, read_tool};
+use crate::scenario::{NEEDLE_OUTER_DIAMETER_MM, PARAMETRIC_TOOL, Scenario, ToolSection};
 use crate::toml_text::TomlText;
 
 /// A tool before it is mounted, and what was assumed.
@@ -25,7 +25,12 @@ pub(super) fn scenario_tool(
     base: &Path,
     overrides: &Overrides,
 ) -> Result<UnmountedTool, Finding> {
-    let location = Location::of_model(&scenario.tool.urdf, "needle_guide", "urdf", base);
+    let urdf = &scenario.tool.urdf;
+    let location = if urdf == PARAMETRIC_TOOL {
+        Location::Builtin(format!("needle_guide/{PARAMETRIC_TOOL}").into())
+    } else {
+        Location::of_model(urdf, "needle_guide", "urdf", base)
+    };
     let mut notes = Vec::new();
     let tool =
         read_tool(&location, &overrides.packages, wanted, &mut notes).map_err(|finding| {
@@ -42,7 +47,8 @@ pub(super) fn scenario_tool(
                     ..toml.finding(key, finding.message)
                 },
                 _ => {
-                    let names = Location::builtin_names("needle_guide", "urdf");
+                    let mut names = Location::builtin_names("needle_guide", "urdf");
+                    names.push(PARAMETRIC_TOOL.to_owned());
                     with_model_names(toml, finding, &location, "tool.urdf", &names)
                 }
             }
@@ -79,5 +85,50 @@ pub(super) fn tool_overrides(
         needle_gauge: tool.needle_gauge,
         needle_outer_diameter_m,
         needle_length_m: tool.needle_length_mm.map(|mm| mm * 1e-3),
+        guide: guide_place(toml, tool)?,
     })
+}
+
+/// Where the guide of the tool `parametric` is.
+fn guide_place(toml: &TomlText<'_>, tool: &ToolSection) -> Result<Option<GuidePlace>, Finding> {
+    if tool.urdf != PARAMETRIC_TOOL {
+        let given = [
+            ("tool.guide_ahead_mm", tool.guide_ahead_mm),
+            ("tool.guide_beside_mm", tool.guide_beside_mm),
+            ("tool.guide_tilt_deg", tool.guide_tilt_deg),
+        ];
+        return match given.into_iter().find(|(_, value)| value.is_some()) {
+            None => Ok(None),
+            Some((key, _)) => Err(toml
+                .finding(
+                    key,
+                    format!("the tool `{}` has its guide where it is", tool.urdf),
+                )
+                .hint("`urdf = \"parametric\"` takes such numbers")),
+        };
+    }
+    let offset = GuidePlace::OFFSET;
+    let metres = |mm: Option<f64>, default: f64| mm.map_or(default, |mm| mm * 1e-3);
+    let place = GuidePlace {
+        ahead_m: metres(tool.guide_ahead_mm, offset.ahead_m),
+        beside_m: metres(tool.guide_beside_mm, offset.beside_m),
+        tilt_rad: tool.guide_tilt_deg.unwrap_or(0.0).to_radians(),
+    };
+    let least_m = place.least_ahead_m();
+    if place.ahead_m < least_m {
+        return Err(toml
+            .finding(
+                "tool.guide_ahead_mm",
+                format!(
+                    "at {:.1} mm from the flange the guide would stand in the plate",
+                    place.ahead_m * 1e3
+                ),
+            )
+            .hint(format!(
+                "{:.1} mm are the least at a tilt of {:.1} deg",
+                least_m * 1e3,
+                place.tilt_rad.to_degrees()
+            )));
+    }
+    Ok(Some(place))
 }

@@ -149,7 +149,7 @@ fn signed_distance_m(solid: &Solid, point: &Point3<f64>) -> f64 {
             radius_m,
             half_length_m,
         } => beyond(&[
-            local.x.hypot(local.y) - radius_m,
+            libm::hypot(local.x, local.y) - radius_m,
             local.z.abs() - half_length_m,
         ]),
         Shape::Capsule {
@@ -219,7 +219,7 @@ mod tests {
         };
         let found = compare("bowl", std::slice::from_ref(&bowl), &can(0.051));
         // Over the middle of the cavity, which is 40 mm wide on either side and 40 mm deep.
-        let middle_m = 0.04_f64.hypot(0.001);
+        let middle_m = libm::hypot(0.04_f64, 0.001);
         assert!(found.worst_overhang_m < middle_m + 1e-3);
         assert!(found.worst_overhang_m > middle_m - SAMPLED_M);
         // Lid: a disc of 40 mm over the cavity, at most as far as its distance from the rim.

@@ -3,6 +3,7 @@
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use needlebench_kinematics::{Body, Pose};
 
+use super::parametric::GuidePlace;
 use super::urdf::{JointKind, Urdf};
 use super::{read_solids, read_urdf, read_visuals, rename_unique, visual_of};
 use crate::files::{Location, source_of};
@@ -23,6 +24,8 @@ pub(crate) struct ToolOverrides {
     pub needle_gauge: Option<u32>,
     pub needle_outer_diameter_m: Option<f64>,
     pub needle_length_m: Option<f64>,
+    /// Of the tool `parametric`.
+    pub guide: Option<GuidePlace>,
 }
 
 /// Reads a tool; its root link is put on the flange.
@@ -32,7 +35,10 @@ pub(crate) fn read_tool(
     overrides: &ToolOverrides,
     notes: &mut Vec<String>,
 ) -> Result<Tool, Finding> {
-    let urdf = read_urdf(location)?;
+    let urdf = match overrides.guide {
+        Some(guide) => Urdf::parse(&location.display(), guide.urdf().as_bytes())?,
+        None => read_urdf(location)?,
+    };
     notes.extend(urdf.notes.iter().cloned());
     let guide = urdf.needle_guide.ok_or_else(|| {
         Finding::new(&urdf.file, "it has no <needle_guide> element").hint(

@@ -80,8 +80,8 @@ pub use recording::RecordingSection;
 pub use replay::ReplaySection;
 pub use robot::RobotSection;
 pub use route::{OddsSection, RouteSection};
-pub(crate) use tool::NEEDLE_OUTER_DIAMETER_MM;
 pub use tool::ToolSection;
+pub(crate) use tool::{NEEDLE_OUTER_DIAMETER_MM, PARAMETRIC_TOOL};
 
 /// What a scenario file may hold.
 pub(crate) static FILE: LazyLock<FileSchema> = LazyLock::new(FileSchema::of::<Scenario>);

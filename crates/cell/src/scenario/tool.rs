@@ -20,17 +20,32 @@ pub(crate) const NEEDLE_OUTER_DIAMETER_MM: [(u32, f64); 11] = [
     (25, 0.5144),
 ];
 
+/// The tool that is made by numbers.
+pub(crate) const PARAMETRIC_TOOL: &str = "parametric";
+
 /// The needle guide.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ToolSection {
-    /// `offset`, `perpendicular`, `inline`, or the path of a URDF relative to this file.
+    /// `offset`, `perpendicular`, `inline`, `parametric`, or the path of a URDF relative to this file.
     #[schemars(schema_with = "tools")]
     pub urdf: String,
     /// Angle about the flange axis at which the tool is bolted on, deg. The flange's four screws
     /// allow multiples of 90.
     #[schemars(range(min = -360.0, max = 360.0))]
     pub mount_rotation_deg: f64,
+    /// Distance of the middle of the guide tube from the flange along its axis, mm, of the tool `parametric`; 55 if left
+    /// out, as of `offset`.
+    #[schemars(range(min = 20.0, max = 250.0))]
+    pub guide_ahead_mm: Option<f64>,
+    /// Distance of the same from the flange's axis, mm, of the tool `parametric`: away from the arm's connector is
+    /// positive; 70 if left out, as of `offset`.
+    #[schemars(range(min = -200.0, max = 200.0))]
+    pub guide_beside_mm: Option<f64>,
+    /// Angle of the needle's direction from the flange's axis, deg, of the tool `parametric`: 0 along it, 90 across it and
+    /// away from the arm's connector; 0 if left out.
+    #[schemars(range(min = -120.0, max = 120.0))]
+    pub guide_tilt_deg: Option<f64>,
     /// Diameter of the bore, mm; the tool's own if left out.
     #[schemars(range(min = 0.2, max = 10.0))]
     pub bore_mm: Option<f64>,
@@ -58,6 +73,9 @@ impl Default for ToolSection {
         Self {
             urdf: "offset".to_owned(),
             mount_rotation_deg: 0.0,
+            guide_ahead_mm: None,
+            guide_beside_mm: None,
+            guide_tilt_deg: None,
             bore_mm: None,
             needle_gauge: None,
             needle_length_mm: None,
@@ -69,7 +87,7 @@ impl Default for ToolSection {
 }
 
 fn tools(_: &mut SchemaGenerator) -> Schema {
-    reference_schema("needle_guide", "urdf", &[])
+    reference_schema("needle_guide", "urdf", &[PARAMETRIC_TOOL])
 }
 
 fn gauges(_: &mut SchemaGenerator) -> Schema {

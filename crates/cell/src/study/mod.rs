@@ -19,10 +19,12 @@ use crate::toml_text::TomlText;
 use crate::{Finding, ModelSource, Overrides};
 use criteria::StudyCriteria;
 use requirements::study_requirements;
+use search::SearchSection;
 
 pub mod criteria;
 mod requirements;
 mod resolve;
+pub mod search;
 
 /// What a study file may hold.
 pub(crate) static FILE: LazyLock<FileSchema> = LazyLock::new(FileSchema::of::<StudyFile>);
@@ -77,6 +79,9 @@ pub struct StudyFile {
     /// out.
     #[serde(default)]
     pub robustness: Option<RobustnessSection>,
+    /// What `needlebench search` looks for among the factors to choose.
+    #[serde(default)]
+    pub search: Option<SearchSection>,
 }
 
 fn replanned_cases() -> u32 {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::{
     Distribution, FILE, FactorSection, FactorValues, GridSection, MOST_PLANNED_BY_DEFAULT,
-    NormalSection, ResolvedStudy, StudyFactor, StudyFile, StudyLevel, StudyMode,
+    NormalSection, ResolvedStudy, Role, StudyFactor, StudyFile, StudyLevel, StudyMode,
 };
 use crate::engine_name::{EngineName, check_engine_names};
 use crate::family::{Change, KeyPath, ScenarioFamily, Setting};
@@ -30,6 +30,7 @@ pub(super) fn resolve(
     let mut findings = Vec::new();
     check_head(&toml, &study, &mut findings);
     check_engines(&toml, &study, &overrides.engines, &mut findings);
+    check_search(&toml, &study, &mut findings);
     if !findings.is_empty() {
         return Err(findings);
     }
@@ -118,6 +119,48 @@ fn check_head(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Finding
                     factor.name
                 ),
             ));
+        }
+    }
+}
+
+/// What a search needs.
+fn check_search(toml: &TomlText<'_>, study: &StudyFile, findings: &mut Vec<Finding>) {
+    let Some(search) = &study.search else {
+        return;
+    };
+    if !study
+        .factors
+        .iter()
+        .any(|factor| factor.role == Role::Choice)
+    {
+        findings.push(
+            toml.finding(
+                "search",
+                "no factor has `role = \"choice\"`: there is nothing to choose",
+            )
+            .hint("give it to what is yours to choose, such as the place of the robot's base"),
+        );
+    }
+    if search.second_objective == Some(search.objective) {
+        findings.push(
+            toml.finding(
+                "search.second_objective",
+                format!("is the first one, `{}`, again", search.objective.name()),
+            )
+            .hint("name another one, or leave it out"),
+        );
+    }
+    for (index, class) in search.classes.iter().flatten().enumerate() {
+        if search
+            .classes
+            .iter()
+            .flatten()
+            .take(index)
+            .any(|known| known == class)
+        {
+            let key = format!("search.classes[{index}]");
+            let message = format!("the class `{}` is named twice", class.name());
+            findings.push(toml.finding(&key, message));
         }
     }
 }

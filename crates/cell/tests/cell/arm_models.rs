@@ -118,7 +118,7 @@ fn the_joint_origins_multiply_to_the_published_dh_chain() {
     for (robot, published) in arms() {
         for i in 0..500_u32 {
             let q = Joints::from_fn(|joint, _| {
-                (f64::from(i) * 1.7 + joint as f64 * 2.9).sin() * 2.0 * PI
+                libm::sin(f64::from(i) * 1.7 + joint as f64 * 2.9) * 2.0 * PI
             });
             let rows = q.iter().zip(published.lengths_m).zip(TWISTS);
             // The controller's base is `base_link` turned by half a turn.

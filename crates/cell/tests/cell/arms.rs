@@ -56,7 +56,7 @@ fn every_shipped_arm_reaches_what_its_inverse_kinematics_say() {
         let kinematics = Kinematics::new(chain).unwrap();
         assert!(kinematics.is_nominal(), "{}", arm.key);
         for i in 0..20 {
-            let q = Joints::from_fn(|joint, _| (f64::from(i) * 1.3 + joint as f64).sin() * 3.0);
+            let q = Joints::from_fn(|joint, _| libm::sin(f64::from(i) * 1.3 + joint as f64) * 3.0);
             let flange = chain.base_link_from_flange(&q);
             let found = kinematics.solve(&flange, None).solutions;
             assert!(!found.is_empty(), "{}", arm.key);

@@ -172,7 +172,7 @@ fn assert_noted(robot: &Robot, text: &str) {
 fn link_frames_do_not_matter_to_the_flange() {
     let (foreign, ur3) = (arm().chain, UrGeometry::UR3.chain());
     for i in 0..20 {
-        let q = Joints::from_fn(|joint, _| (f64::from(i) * 1.7 + joint as f64).sin() * 3.0);
+        let q = Joints::from_fn(|joint, _| libm::sin(f64::from(i) * 1.7 + joint as f64) * 3.0);
         let [a, b] = [foreign, ur3].map(|chain| chain.base_link_from_flange(&q));
         assert!((a.translation.vector - b.translation.vector).norm() < PRINTED_M);
         assert!(rotation_angle_between(&a.rotation, &b.rotation) < PRINTED_M);

@@ -164,7 +164,7 @@ fn shipped_names_are_in_the_schema() {
     assert!(of("RobotSection", "urdf").contains(&"ur3"));
     assert_eq!(
         of("ToolSection", "urdf"),
-        ["inline", "offset", "perpendicular"]
+        ["inline", "offset", "perpendicular", "parametric"]
     );
     let models = of("PhantomSection", "model");
     for name in needlebench_cell::phantom::SIZE_PRESETS

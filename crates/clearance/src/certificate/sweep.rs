@@ -52,12 +52,12 @@ impl ChainBounds {
             let joint = &chain.joints[k];
             let axis = joint.parent_from_joint.rotation * joint.axis.into_inner();
             let before = chain.joints[k - 1].axis;
-            before.cross(&axis).norm().atan2(before.dot(&axis).abs())
+            libm::atan2(before.cross(&axis).norm(), before.dot(&axis).abs())
         });
         let sine = std::array::from_fn(|j| {
             std::array::from_fn(|k| {
                 let between: f64 = turn_rad[j.min(k) + 1..=j.max(k)].iter().sum();
-                between.min(std::f64::consts::FRAC_PI_2).sin()
+                libm::sin(between.min(std::f64::consts::FRAC_PI_2))
             })
         });
         Self { step_m, sine }

@@ -181,7 +181,7 @@ fn executed_motions_are_certified_with_their_tracking_errors() {
             .iter()
             .map(|&time_s| {
                 trajectory.sample(time_s).position
-                    + Joints::repeat(5e-3 * (7.0 * time_s).sin())
+                    + Joints::repeat(5e-3 * libm::sin(7.0 * time_s))
                     + Joints::from_fn(|_, _| random.uniform(-2e-5, 2e-5))
             })
             .collect();

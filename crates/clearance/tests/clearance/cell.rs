@@ -170,7 +170,8 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
     for (cell, count) in [(cell(), 900), (with_dented_skin(cell()), 60)] {
         let model = ClearanceModel::new(&cell);
         let mut variety = Variety::new(8);
-        let [mut all, mut counted, mut below, mut mixed] = [(); 4].map(|()| Nearby::default());
+        let [mut all, mut counted, mut below, mut any, mut mixed] =
+            [(); 5].map(|()| Nearby::default());
         let (mut hits, mut free) = (0, 0);
         for (k, q) in walk(&mut variety, count).into_iter().enumerate() {
             let pairs = model.all_pairs(&q);
@@ -233,6 +234,11 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
             let near = model.below_near(&q, &mut below, limit_m);
             assert_eq!(near.is_some(), pairs.iter().any(is_below), "{k}");
             assert!(near.is_none_or(|pair| is_below(&pair)));
+            assert_eq!(
+                model.is_below_near(&q, &mut any, limit_m),
+                near.is_some(),
+                "{k}"
+            );
             hits += usize::from(near.is_some());
             // One after the other, whatever was asked before.
             match k % 3 {
@@ -245,6 +251,8 @@ fn what_is_known_from_the_posture_before_changes_no_answer() {
                 _ => {
                     let again = model.below_near(&q, &mut mixed, limit_m);
                     assert_eq!(again.is_some(), near.is_some());
+                    let again = model.is_below_near(&q, &mut mixed, limit_m);
+                    assert_eq!(again, near.is_some());
                 }
             }
         }

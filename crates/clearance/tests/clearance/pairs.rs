@@ -75,7 +75,7 @@ fn bounds_hold_the_extremes_of_a_ball_on_a_circle() {
     };
     let examined = examine_pairs(&cell, &settings);
     let pair = of(&cell, &examined, "base", "shoulder");
-    let distance_m = |across_m: f64| across_m.hypot(height_m - 0.1) - 0.04;
+    let distance_m = |across_m: f64| libm::hypot(across_m, height_m - 0.1) - 0.04;
     for (bound, expected_m) in [
         (pair.nearest.unwrap(), distance_m(0.2)),
         (pair.farthest.unwrap(), distance_m(0.8)),

@@ -108,7 +108,7 @@ impl EngineSession for OwnProcess {
 
 impl MujocoSettings {
     /// What a scenario sets of them.
-    fn of(arm: &ArmSpec<'_>) -> Self {
+    pub(super) fn of(arm: &ArmSpec<'_>) -> Self {
         let own = &arm.settings.mujoco;
         Self {
             contact_stiffness_per_s2: own.contact_stiffness_per_s2,

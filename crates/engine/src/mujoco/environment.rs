@@ -5,6 +5,8 @@ mod guard;
 mod install;
 mod installed;
 mod python;
+mod wanted;
+mod wheels;
 
 use std::env;
 use std::ffi::OsString;
@@ -19,7 +21,9 @@ use sha2::{Digest, Sha256};
 pub use command::CommandFailure;
 use guard::{Guard, Staging};
 use python::Python;
-pub use python::RejectedPython;
+pub use python::{PythonVersion, RejectedPython};
+pub use wanted::{WheelPlatform, WheelsFor};
+pub use wheels::{DownloadedWheels, download_wheels};
 
 /// The MuJoCo that `requirements.lock` pins.
 const MUJOCO_VERSION: &str = "4.0.0";
@@ -77,6 +81,8 @@ pub struct EnvironmentOptions {
     pub python: Option<PathBuf>,
     /// Where Python and uv are searched, in the form of `PATH`.
     pub search_path: Option<OsString>,
+    /// Folder of wheels to install from, without a network (see [`download_wheels`]).
+    pub wheels: Option<PathBuf>,
 }
 
 impl EnvironmentOptions {
@@ -92,6 +98,7 @@ impl EnvironmentOptions {
             cache_dir,
             python: variable("NEEDLEBENCH_PYTHON").map(PathBuf::from),
             search_path: env::var_os("PATH"),
+            wheels: None,
         }
     }
 }
@@ -167,19 +174,41 @@ pub enum EnvironmentError {
     #[error(
         "installing MuJoCo {MUJOCO_VERSION} failed: {failure}\n\
          hint: pip uses your own configuration (index, proxy, certificates). Without a network, run\n  \
-         {} -m pip download --require-hashes --only-binary :all: --no-deps -r {} -d wheels\n\
-         on a machine that has one, with the same system and Python, and set PIP_NO_INDEX=1 and \
-         PIP_FIND_LINKS to the folder `wheels` here",
-        python.display(),
-        requirements.display()
+         needlebench doctor --download wheels {wanted}\n\
+         on a machine that has one, copy the folder `wheels` here, and run\n  \
+         needlebench doctor --prepare --wheels wheels"
     )]
     Install {
         /// What went wrong.
         failure: CommandFailure,
-        /// The Python that was used.
-        python: PathBuf,
-        /// The list of packages with their hashes.
-        requirements: PathBuf,
+        /// Which wheels this machine needs.
+        wanted: WheelsFor,
+    },
+    /// A folder of wheels does not hold those that this machine needs.
+    #[error(
+        "installing MuJoCo {MUJOCO_VERSION} from {} failed: {reason}\n\
+         hint: needlebench doctor --download wheels {wanted}\n\
+         gives the wheels for this machine, on one with a network; copy the whole folder here",
+        folder.display()
+    )]
+    Wheels {
+        /// The folder.
+        folder: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+        /// Which wheels this machine needs.
+        wanted: WheelsFor,
+    },
+    /// The wheels could not be fetched.
+    #[error(
+        "downloading the wheels of MuJoCo {MUJOCO_VERSION} failed: {failure}\n\
+         hint: pip uses your own configuration (index, proxy, certificates); MuJoCo {MUJOCO_VERSION} is made \
+         for Python {}",
+        python::made_for()
+    )]
+    Download {
+        /// What went wrong.
+        failure: CommandFailure,
     },
     /// The installed packages do not work.
     #[error(
@@ -235,6 +264,59 @@ pub fn ensure(progress: &mut dyn FnMut(&str)) -> Result<Environment, Environment
         });
     }
     ensure_with(&EnvironmentOptions::from_process(), progress)
+}
+
+/// An environment that was made ahead.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Prepared {
+    /// The environment.
+    pub environment: Environment,
+    /// Size of all its files, bytes; `None` where another program stands in its place.
+    pub size_bytes: Option<u64>,
+    /// Whether it was made now, and was not there before.
+    pub made: bool,
+}
+
+/// Makes the harness's Python environment ahead, for machines that later have no network, from a folder of
+/// wheels if one is given; there already, it is looked at only.
+pub fn prepare(
+    wheels: Option<&Path>,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Prepared, EnvironmentError> {
+    let options = EnvironmentOptions {
+        wheels: wheels.map(Path::to_owned),
+        ..EnvironmentOptions::from_process()
+    };
+    let mut made = false;
+    let environment = match harness_override() {
+        Some(_) => ensure(progress)?,
+        None => ensure_with(&options, &mut |text| {
+            made = true;
+            progress(text);
+        })?,
+    };
+    if made && environment.folder.is_some() {
+        // Hashes are kept from now on, so that whoever may only read it need not take them at every start.
+        ensure_with(&options, progress)?;
+    }
+    let size_bytes = environment.folder.as_deref().map(size_of_files);
+    Ok(Prepared {
+        environment,
+        size_bytes,
+        made,
+    })
+}
+
+/// Sum over all files below a folder, bytes; links count for nothing.
+fn size_of_files(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .map(|entry| match entry.metadata() {
+            Ok(about) if about.is_dir() => size_of_files(&entry.path()),
+            Ok(about) if about.is_file() => about.len(),
+            _ => 0,
+        })
+        .sum()
 }
 
 /// [`ensure`] with explicit options.
@@ -305,9 +387,7 @@ fn build(
     target: &Path,
     progress: &mut dyn FnMut(&str),
 ) -> Result<(), EnvironmentError> {
-    // Beside the environment: it stays when the set-up fails, for the hint about machines without
-    // a network.
-    let requirements = target.with_extension("requirements.lock");
+    let requirements = folder.join("requirements.lock");
     fs::write(&requirements, REQUIREMENTS).map_err(|source| unwritable(&requirements, source))?;
     install::install(options, python, folder, &requirements, progress)?;
     let venv_python = install::venv_python(&folder.join("venv"));

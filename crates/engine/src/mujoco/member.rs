@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use needlebench_cell::Cell;
-use needlebench_kinematics::{JOINT_COUNT, Joints};
+use needlebench_kinematics::{JOINT_COUNT, JOINT_NAMES, Joints, LINK_NAMES};
 
-use super::mjcf::{FLANGE_SITE, geoms_of, joint_name, link_name, mjcf};
+use super::mjcf::{FLANGE_SITE, geoms_of, mjcf};
 use super::process::GroupStep;
 use super::{HarnessProcess, HarnessState, HarnessVersions, MujocoSettings, PlantHandle};
 use crate::broad_phase::BroadPhase;
@@ -43,8 +43,7 @@ impl Model {
         let timestep_s = checked_timestep_s(timestep_s)?;
         let text = mjcf(cell, timestep_s, settings)?;
         let handle = harness.load(&text, FLANGE_SITE)?;
-        let joints = (0..JOINT_COUNT).map(joint_name);
-        if !joints.eq(handle.joint_names.iter().cloned()) {
+        if handle.joint_names != JOINT_NAMES {
             return Err(mismatch("joints"));
         }
         let mut bodies = BTreeMap::new();
@@ -65,7 +64,7 @@ impl Model {
             *index = handle
                 .body_names
                 .iter()
-                .position(|name| *name == link_name(i))
+                .position(|name| *name == LINK_NAMES[i])
                 .ok_or_else(|| mismatch("links"))?;
         }
         let model = Self {

@@ -11,8 +11,12 @@ mod settings;
 mod tail;
 
 pub(crate) use engine::Mujoco;
-pub use environment::{Environment, EnvironmentError, EnvironmentOptions, ensure, ensure_with};
+pub use environment::{
+    DownloadedWheels, Environment, EnvironmentError, EnvironmentOptions, Prepared, PythonVersion,
+    WheelPlatform, WheelsFor, download_wheels, ensure, ensure_with, prepare,
+};
 pub use fleet::MujocoFleet;
+pub use mjcf::{Keyframe, MarkedPlace, StandaloneModel, standalone_model};
 pub use plant::MujocoPlant;
 pub use process::{
     ContactSummary, GeomDistance, HarnessError, HarnessProcess, HarnessState, HarnessVersions,

@@ -121,5 +121,5 @@ fn growth(dynamics: &Dynamics, position: &Joints, duration_s: f64) -> f64 {
     };
     let modes = SymmetricEigen::new(inverse * slope * inverse.transpose());
     let rate = (-modes.eigenvalues.min()).max(0.0).sqrt();
-    (rate * duration_s).cosh()
+    libm::cosh(rate * duration_s)
 }

@@ -76,7 +76,7 @@ pub fn measure_retraction(
             (lateral_m, at_s) = (here_m, time_s);
         }
         let along = exit.rotation * Vector3::z();
-        angle_rad = angle_rad.max(along.cross(&axis).norm().atan2(along.dot(&axis)));
+        angle_rad = angle_rad.max(libm::atan2(along.cross(&axis).norm(), along.dot(&axis)));
         let tip = tip_of(cell, goal, &recording.state[k].world_from_flange);
         tip_m = tip_m.max(off_axis(&tip.coords));
     }

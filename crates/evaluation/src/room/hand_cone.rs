@@ -72,7 +72,7 @@ impl Cell {
         [
             half(self.distance_m),
             far_m * half(self.angle_rad),
-            far_m * self.angle_rad[1].sin() * half(self.turn_rad),
+            far_m * libm::sin(self.angle_rad[1]) * half(self.turn_rad),
         ]
     }
 
@@ -127,8 +127,9 @@ pub fn hand_cone(
         }
         let point_at = |angle_rad: f64| {
             let turn_rad = middle(cell.turn_rad);
-            let direction = axis * angle_rad.cos()
-                + (across * turn_rad.cos() + beside * turn_rad.sin()) * angle_rad.sin();
+            let direction = axis * libm::cos(angle_rad)
+                + (across * libm::cos(turn_rad) + beside * libm::sin(turn_rad))
+                    * libm::sin(angle_rad);
             apex + direction * middle(cell.distance_m)
         };
         if looked_at >= MOST_CELLS {
@@ -179,7 +180,7 @@ fn touched_rad(
         let offset = point - apex;
         let across = offset - axis * offset.dot(axis);
         let level = across.try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
-        apex + (axis * from_rad.cos() + level * from_rad.sin()) * offset.norm()
+        apex + (axis * libm::cos(from_rad) + level * libm::sin(from_rad)) * offset.norm()
     };
     let is_in_reach =
         |point: &Point3<f64>| (CONE_START_M..=reach_m).contains(&(point - apex).norm());

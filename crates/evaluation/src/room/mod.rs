@@ -11,6 +11,7 @@ mod sector;
 mod sight;
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use nalgebra::{Point3, Vector3};
 use needlebench_cell::people::{ElbowPreference, Handedness, PatientSides, Person, Side};
@@ -111,7 +112,8 @@ pub struct RoomModel<'a> {
     resolved: &'a ResolvedScenario,
     obstacles: Obstacles<'a>,
     sides: Option<PatientSides>,
-    sectors: Vec<Sector>,
+    /// Of each goal, made when it is first asked for.
+    sectors: Vec<OnceLock<Sector>>,
     /// Points all over the arm: body and place in it, m.
     surface: Vec<(usize, Vec<Point3<f64>>)>,
 }
@@ -122,7 +124,7 @@ const SURFACE_SPACING_M: f64 = 0.01;
 const CHORD_ERROR_M: f64 = 1e-3;
 
 impl<'a> RoomModel<'a> {
-    /// Prepares obstacles and, for every goal, its sector.
+    /// Prepares the obstacles.
     pub fn new(resolved: &'a ResolvedScenario) -> Self {
         let cell = &resolved.cell;
         let obstacles = Obstacles::new(cell);
@@ -130,21 +132,6 @@ impl<'a> RoomModel<'a> {
             .phantom
             .as_ref()
             .and_then(|placed| PatientSides::new(&placed.world_from_phantom.rotation));
-        let surroundings = obstacles.surroundings();
-        let sectors = resolved
-            .goals
-            .iter()
-            .map(|goal| {
-                Sector::new(
-                    entry_of(goal),
-                    skin_normal(resolved, goal),
-                    SECTOR_RADIUS_M,
-                    VOXEL_M,
-                    &surroundings,
-                    sides.as_ref(),
-                )
-            })
-            .collect();
         let moving = cell
             .bodies
             .iter()
@@ -163,14 +150,24 @@ impl<'a> RoomModel<'a> {
             resolved,
             obstacles,
             sides,
-            sectors,
+            sectors: resolved.goals.iter().map(|_| OnceLock::new()).collect(),
             surface,
         }
     }
 
     /// The half ball about the entry point of a goal.
     pub fn sector(&self, goal: usize) -> &Sector {
-        &self.sectors[goal]
+        self.sectors[goal].get_or_init(|| {
+            let placed = &self.resolved.goals[goal];
+            Sector::new(
+                entry_of(placed),
+                skin_normal(self.resolved, placed),
+                SECTOR_RADIUS_M,
+                VOXEL_M,
+                &self.obstacles.surroundings(),
+                self.sides.as_ref(),
+            )
+        })
     }
 
     /// The solids of the cell.
@@ -182,7 +179,7 @@ impl<'a> RoomModel<'a> {
     pub fn taken(&self, goal: usize, q: &Joints) -> Vec<bool> {
         self.obstacles
             .robot(q)
-            .taken(&self.sectors[goal].grid, FREE_MARGIN_M)
+            .taken(&self.sector(goal).grid, FREE_MARGIN_M)
     }
 
     /// Entry of the guide as the arm holds it; z points along the insertion.
@@ -193,7 +190,7 @@ impl<'a> RoomModel<'a> {
 
     /// What people look at.
     pub fn targets(&self, goal: usize, q: &Joints) -> SightTargets {
-        let sector = &self.sectors[goal];
+        let sector = self.sector(goal);
         let tool = &self.resolved.cell.tool;
         let standoff_m = self.resolved.goals[goal].standoff_m.unwrap_or(0.0);
         // With the tip on the skin; a needle too short for that ends at the guide.
@@ -218,7 +215,7 @@ impl<'a> RoomModel<'a> {
 
     /// Measures a posture for a goal, given by its index.
     pub fn measure(&self, goal: usize, q: &Joints) -> RoomReport {
-        let sector = &self.sectors[goal];
+        let sector = self.sector(goal);
         let taken = self.taken(goal, q);
         let regions = sector.free_by_region(&taken);
         let all = self.obstacles.all(q);
@@ -306,7 +303,7 @@ impl<'a> RoomModel<'a> {
                 })
                 .map(|point| point.z)
                 .reduce(f64::min)?;
-        Some(lowest - self.sectors[goal].center_m.z)
+        Some(lowest - entry_of(&self.resolved.goals[goal]).z)
     }
 }
 
@@ -456,10 +453,10 @@ mod tests {
             let (lift, elbow) = (angle(), angle());
             // Angle of the wrist's direction from the upper arm's, by the law of cosines.
             let (far, across) = (
-                lengths[0] + lengths[1] * elbow.cos(),
-                lengths[1] * elbow.sin(),
+                lengths[0] + lengths[1] * libm::cos(elbow),
+                lengths[1] * libm::sin(elbow),
             );
-            let towards = lift + across.atan2(far);
+            let towards = lift + libm::atan2(across, far);
             let one = Joints::new(0.4, lift, elbow, 0.2, 0.3, 0.1);
             let other = Joints::new(0.4, 2.0 * towards - lift, -elbow, 0.2, 0.3, 0.1);
             let apart_m = (at(&one, 3) - at(&other, 3)).norm();
@@ -469,7 +466,7 @@ mod tests {
                 continue;
             }
             compared += 1;
-            folded += usize::from(elbow.cos() < -0.9);
+            folded += usize::from(libm::cos(elbow) < -0.9);
             assert_eq!(
                 [up(&one), up(&other)],
                 [higher_m > 0.0, higher_m < 0.0],

@@ -99,13 +99,13 @@ fn series(
     (0..2 * count).map(move |index| {
         let [far, height, turn, out, about] = even_point(index / 2, &start);
         // Even in the ball: the cube root spreads the radius, the height is even by Archimedes.
-        let radius_m = head_movement_m * far.cbrt();
+        let radius_m = head_movement_m * libm::cbrt(far);
         let up = 2.0 * height - 1.0;
         let level = (1.0 - up * up).max(0.0).sqrt();
-        let (sine, cosine) = (TAU * turn).sin_cos();
+        let (sine, cosine) = libm::sincos(TAU * turn);
         let eye = eyes_m + Vector3::new(level * cosine, level * sine, up) * radius_m;
         let target = if index % 2 == 0 {
-            let (sine, cosine) = (TAU * about).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * about);
             targets.entry_m
                 + targets.outwards * ENTRY_DISC_HEIGHT_M
                 + (across * cosine + beside * sine) * (ENTRY_DISC_RADIUS_M * out.sqrt())

@@ -95,16 +95,16 @@ fn a_tilt_about_the_exit_grows_with_the_insertion() {
     let length_m = goal.insertion_length_m;
     // A chord of the circle that the tip runs on; `e_t = e_s + L (v - u)` with `e_s = 0`.
     assert!(
-        (found.tip_position_error_m - 2.0 * length_m * (0.5 * tilt_rad).sin()).abs() < ROUNDING
+        (found.tip_position_error_m - 2.0 * length_m * libm::sin(0.5 * tilt_rad)).abs() < ROUNDING
     );
-    assert!((found.depth_error_m - length_m * (tilt_rad.cos() - 1.0)).abs() < ROUNDING);
-    assert!((found.lateral_error_m - length_m * tilt_rad.sin()).abs() < ROUNDING);
+    assert!((found.depth_error_m - length_m * (libm::cos(tilt_rad) - 1.0)).abs() < ROUNDING);
+    assert!((found.lateral_error_m - length_m * libm::sin(tilt_rad)).abs() < ROUNDING);
     assert!((found.needle_angle_error_rad - tilt_rad).abs() < ROUNDING);
     assert!(found.guide_position_error_m < ROUNDING);
     // The entry lies the stand-off behind the exit.
     let standoff_m = goal.standoff_m.unwrap();
     let entry_m = found.entry_lateral_error_m.unwrap();
-    assert!((entry_m - standoff_m * tilt_rad.sin()).abs() < ROUNDING);
+    assert!((entry_m - standoff_m * libm::sin(tilt_rad)).abs() < ROUNDING);
 }
 
 #[test]
@@ -209,7 +209,7 @@ fn recording(
 /// Distance of the needle's tip from wrist 3's axis: what an error of wrist 3 moves the tip by.
 fn lever_m(resolved: &ResolvedScenario) -> f64 {
     let exit = resolved.cell.tool.flange_from_guide_exit.translation.vector;
-    exit.x.hypot(exit.y)
+    libm::hypot(exit.x, exit.y)
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn settling_ends_when_the_tip_stays_in_its_band() {
         (settled_s - 0.2).abs() <= 2.0 * recording.timestep_s,
         "{settled_s}"
     );
-    let expected_m = 2.0 * lever_m(&resolved) * (0.5e-3_f64).sin();
+    let expected_m = 2.0 * lever_m(&resolved) * libm::sin(0.5e-3_f64);
     assert!((found.peak_tracking_error_m - expected_m).abs() < 1e-12);
     // 6 N m of wrist 3's 12 N m.
     assert!((found.peak_torque_ratio - 0.5).abs() < 1e-12);
@@ -309,7 +309,7 @@ fn the_difference_of_engines_is_that_of_their_tips() {
     let moved = recording(&resolved, &trajectory, bump, |_| 0.0);
     let (cell, goal) = (&resolved.cell, &resolved.goals[0]);
     let found = engine_difference(cell, goal, &[&still, &moved]).unwrap();
-    let chord_m = |angle_rad: f64| 2.0 * lever_m(&resolved) * (0.5 * angle_rad).sin();
+    let chord_m = |angle_rad: f64| 2.0 * lever_m(&resolved) * libm::sin(0.5 * angle_rad);
     assert!((found.peak_tip_m - chord_m(2e-3)).abs() < 1e-12);
     assert!((found.settled_tip_m - chord_m(1e-3)).abs() < 1e-12);
     assert_eq!((found.peak_engines, found.settled_engines), (None, None));

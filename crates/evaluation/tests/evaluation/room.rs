@@ -139,7 +139,7 @@ fn hand_cone_beside_a_ball_touches_it() {
         let distance: f64 = Vector3::new(x, y, z).norm();
         let to_center = Vector3::new(x, y, z).angle(&Vector3::z());
         let truth =
-            to_center - f64::atan2(radius_m, (distance * distance - radius_m * radius_m).sqrt());
+            to_center - libm::atan2(radius_m, (distance * distance - radius_m * radius_m).sqrt());
         let found = cone_beside(Shape::Sphere { radius_m }, Pose::translation(x, y, z));
         assert_bounds(found, truth);
     }
@@ -151,7 +151,7 @@ fn hand_cone_beside_a_wall_ends_at_the_reach() {
     let shape = Shape::Cuboid {
         half_extents_m: Vector3::new(0.5, 2.0, 2.0),
     };
-    let truth = f64::atan2(0.05, (0.2_f64 * 0.2 - 0.05 * 0.05).sqrt());
+    let truth = libm::atan2(0.05, (0.2_f64 * 0.2 - 0.05 * 0.05).sqrt());
     assert_bounds(cone_beside(shape, Pose::translation(0.55, 0.0, 0.0)), truth);
 }
 
@@ -174,12 +174,15 @@ fn true_hand_cone_lies_between_the_bound_and_what_it_may_be_larger_by() {
         let (part, turn) = (f64::from(k) / 31.0, f64::from(k) * 2.4);
         let distance_m = 0.02 + 0.095 * part;
         let tilt = 0.25 + 1.15 * (f64::from(k) * 0.618).fract();
-        let radius_m = 0.6 * distance_m * tilt.sin().min(0.8);
-        let at =
-            Vector3::new(tilt.sin() * turn.cos(), tilt.sin() * turn.sin(), tilt.cos()) * distance_m;
+        let radius_m = 0.6 * distance_m * libm::sin(tilt).min(0.8);
+        let at = Vector3::new(
+            libm::sin(tilt) * libm::cos(turn),
+            libm::sin(tilt) * libm::sin(turn),
+            libm::cos(tilt),
+        ) * distance_m;
         let touches_m = (distance_m * distance_m - radius_m * radius_m).sqrt();
         assert!(touches_m > 0.01, "the hand's cone begins at 10 mm");
-        let truth = tilt - f64::atan2(radius_m, touches_m);
+        let truth = tilt - libm::atan2(radius_m, touches_m);
         let cell = cell_with(
             BodyKind::Table,
             Shape::Sphere { radius_m },
@@ -229,7 +232,7 @@ fn sight_past_a_half_plane_is_the_share_of_the_disc_beyond_it() {
         let ratio: f64 = 2.0 * edge_m / 0.03;
         let hidden = 0.5
             + (ratio * (1.0 - ratio * ratio).sqrt()
-                + f64::atan2(ratio, (1.0 - ratio * ratio).sqrt()))
+                + libm::atan2(ratio, (1.0 - ratio * ratio).sqrt()))
                 / PI;
         assert!(
             (seen.entry_fraction - (1.0 - hidden)).abs() < SIGHT_ERROR,
@@ -414,7 +417,7 @@ fn shares_of_sight_are_as_near_to_the_true_ones_as_they_say() {
                         let beside = targets.outwards.cross(&across);
                         loop {
                             let [a, b] = [2.0 * uniform() - 1.0, 2.0 * uniform() - 1.0];
-                            if a.hypot(b) <= 1.0 {
+                            if libm::hypot(a, b) <= 1.0 {
                                 break targets.entry_m
                                     + targets.outwards * ENTRY_DISC_HEIGHT_M
                                     + (across * a + beside * b) * 0.03;
@@ -448,9 +451,9 @@ fn shares_of_sight_are_as_near_to_the_true_ones_as_they_say() {
                         .sqrt();
                 compared += 1;
                 let apart = (said.fraction - truth).abs();
-                beyond += usize::from(apart > said.accuracy.hypot(2.0 * error));
+                beyond += usize::from(apart > libm::hypot(said.accuracy, 2.0 * error));
                 assert!(
-                    apart < 2.5 * said.accuracy.hypot(2.0 * error),
+                    apart < 2.5 * libm::hypot(said.accuracy, 2.0 * error),
                     "{said:?} {truth}"
                 );
             }

@@ -114,7 +114,8 @@ pub fn chest(cuts: u32) -> TriangleMesh {
     let mut mesh = sphere(cuts);
     for vertex in &mut mesh.vertices_m {
         let v = vertex.coords;
-        let ripple = 1.0 + 0.03 * (9.0 * v.x).sin() * (7.0 * v.y).cos() * (8.0 * v.z).sin();
+        let ripple =
+            1.0 + 0.03 * libm::sin(9.0 * v.x) * libm::cos(7.0 * v.y) * libm::sin(8.0 * v.z);
         *vertex = Point3::new(0.17 * v.x, 0.11 * v.y, 0.28 * v.z) * ripple;
     }
     mesh

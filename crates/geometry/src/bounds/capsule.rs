@@ -30,7 +30,7 @@ impl BoundingCapsule {
 
     /// Around a cylinder about z.
     pub fn around_cylinder(radius_m: f64, half_length_m: f64) -> Self {
-        let ball_radius_m = radius_m.hypot(half_length_m);
+        let ball_radius_m = libm::hypot(radius_m, half_length_m);
         if radius_m > half_length_m {
             return Self {
                 radius_m: ball_radius_m,

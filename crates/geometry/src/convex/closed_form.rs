@@ -70,7 +70,7 @@ pub(crate) fn point_cylinder(
     radius_m: f64,
     half_length_m: f64,
 ) -> CoreSeparation {
-    let from_axis = point.x.hypot(point.y);
+    let from_axis = libm::hypot(point.x, point.y);
     let radial = if from_axis > 0.0 {
         Vector3::new(point.x / from_axis, point.y / from_axis, 0.0)
     } else {

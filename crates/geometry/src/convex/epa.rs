@@ -87,7 +87,7 @@ fn polished(difference: &mut Difference<'_>, start: Overlap) -> Overlap {
             break;
         };
         let mut at = |angle: f64| {
-            let (sin, cos) = angle.sin_cos();
+            let (sin, cos) = libm::sincos(angle);
             Overlap::along(difference, normal * cos + downhill * sin)
         };
         let (mut low, mut high) = (0.0, POLISHING_REACH_RAD);

@@ -287,7 +287,7 @@ fn directions() -> impl Iterator<Item = Vector3<f64>> {
     const GOLDEN_ANGLE_RAD: f64 = 2.399_963_229_728_653;
     (0..COUNT).map(|i| {
         let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(COUNT);
-        let (sine, cosine) = (f64::from(i) * GOLDEN_ANGLE_RAD).sin_cos();
+        let (sine, cosine) = libm::sincos(f64::from(i) * GOLDEN_ANGLE_RAD);
         let across = (1.0 - z * z).sqrt();
         Vector3::new(across * cosine, across * sine, z)
     })

@@ -316,7 +316,7 @@ mod tests {
         let places = (0..rings).flat_map(|ring| (0..spokes).map(move |spoke| (ring, spoke)));
         places
             .map(|(ring, spoke)| {
-                let (sine, cosine) = (TAU * f64::from(spoke) / f64::from(spokes)).sin_cos();
+                let (sine, cosine) = libm::sincos(TAU * f64::from(spoke) / f64::from(spokes));
                 let z_m = 0.1 * f64::from(ring) / f64::from(rings - 1);
                 let point = turn * Point3::new(0.03 * cosine, 0.03 * sine, z_m);
                 point.map(single)
@@ -375,7 +375,7 @@ mod tests {
         let points: Vec<_> = (0..500)
             .map(|i| {
                 let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 500.0;
-                let (s, c) = (f64::from(i) * 2.399_963).sin_cos();
+                let (s, c) = libm::sincos(f64::from(i) * 2.399_963);
                 let r = (1.0 - z * z).sqrt();
                 Point3::new(r * c, r * s, z)
             })

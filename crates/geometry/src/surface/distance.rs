@@ -43,6 +43,51 @@ pub(crate) fn separation_within(
     )
 }
 
+/// Whether the signed distance is less than a positive limit, or is not a number. One of the two has to be a mesh.
+pub(crate) fn is_nearer(
+    a: &PreparedShape,
+    b: &PreparedShape,
+    b_from_a: &Placement,
+    limit_m: f64,
+) -> bool {
+    let (a, tree, hulls, b_from_a) = match (&a.core, &b.core) {
+        (_, ConvexCore::SurfaceHull(tree)) => (a, tree, [&a.core, &b.core], *b_from_a),
+        (ConvexCore::SurfaceHull(tree), _) => {
+            let a_from_b = b_from_a.inverse_after(&Placement::IDENTITY);
+            (b, tree, [&b.core, &a.core], a_from_b)
+        }
+        _ => unreachable!("called for meshes only"),
+    };
+    if !is_finite(&b_from_a) {
+        return true;
+    }
+    let sides = sides(a, tree, hulls, &b_from_a);
+    match nearest::nearest(&sides, limit_m + a.radius_m) {
+        Nearest::BeyondCutoff => is_within(&sides),
+        Nearest::Apart(found) => found.distance_m - a.radius_m < limit_m || is_within(&sides),
+        Nearest::Crossing => true,
+    }
+}
+
+fn is_finite(place: &Placement) -> bool {
+    (place.rotation.sum() + place.translation.sum()).is_finite()
+}
+
+fn sides<'s>(
+    a: &'s PreparedShape,
+    tree: &'s TriangleTree,
+    hulls: [&'s ConvexCore; 2],
+    b_from_a: &Placement,
+) -> Sides<'s> {
+    Sides {
+        a: Mover::new(a),
+        b: tree,
+        hulls,
+        b_from_a: *b_from_a,
+        sweep: Vector3::zeros(),
+    }
+}
+
 fn from_surface(
     a: &PreparedShape,
     tree: &TriangleTree,
@@ -50,15 +95,9 @@ fn from_surface(
     b_from_a: &Placement,
     cutoff_m: f64,
 ) -> Option<Separation> {
-    let sides = Sides {
-        a: Mover::new(a),
-        b: tree,
-        hulls,
-        b_from_a: *b_from_a,
-        sweep: Vector3::zeros(),
-    };
+    let sides = sides(a, tree, hulls, b_from_a);
     let radius_m = a.radius_m;
-    if !(b_from_a.rotation.sum() + b_from_a.translation.sum()).is_finite() {
+    if !is_finite(b_from_a) {
         return Some(not_a_number());
     }
     // What counts below is whether the surface is touched, however deep the cutoff.

@@ -13,5 +13,5 @@ mod separating_translation;
 mod sides;
 mod swept;
 
-pub(crate) use distance::separation_within;
+pub(crate) use distance::{is_nearer, separation_within};
 pub use swept::{EndGaps, MovingSolids};

@@ -221,7 +221,7 @@ mod tests {
                 let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
                 let volume = a.dot(&b.cross(&c));
                 let scale = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-                volume.atan2(scale)
+                libm::atan2(volume, scale)
             })
             .sum();
         half_angles / TAU

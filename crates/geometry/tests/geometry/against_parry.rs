@@ -109,7 +109,7 @@ fn single_precision(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
 fn sphere(count: u32) -> Vec<Point3<f64>> {
     let spiral = (0..count).map(|i| {
         let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
-        let (sine, cosine) = (f64::from(i) * 2.399_963).sin_cos();
+        let (sine, cosine) = libm::sincos(f64::from(i) * 2.399_963);
         let across = (1.0 - z * z).sqrt();
         Point3::new(across * cosine, across * sine, z) * 0.1
     });
@@ -122,7 +122,7 @@ fn rings(count: u32, spokes: u32, radius_m: impl Fn(f64) -> f64) -> Vec<Point3<f
     for ring in 0..count {
         let z_m = 0.1 * (2.0 * f64::from(ring) / f64::from(count - 1) - 1.0);
         for spoke in 0..spokes {
-            let (sine, cosine) = (TAU * f64::from(spoke) / f64::from(spokes)).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * f64::from(spoke) / f64::from(spokes));
             points.push(Point3::new(
                 radius_m(z_m) * cosine,
                 radius_m(z_m) * sine,
@@ -312,8 +312,8 @@ fn volumes_and_centroids_are_those_of_closed_forms() {
     }
     // A ring of n segments, each of m sides, is a polygon swept along chords.
     let ring = torus(64, 32);
-    let section_m2 = 0.5 * 32.0 * 0.02 * 0.02 * (TAU / 32.0).sin();
-    let chords = 64.0 * (PI / 64.0).sin() * (PI / 64.0).cos();
+    let section_m2 = 0.5 * 32.0 * 0.02 * 0.02 * libm::sin(TAU / 32.0);
+    let chords = 64.0 * libm::sin(PI / 64.0) * libm::cos(PI / 64.0);
     let volume = volume_m3(&ring) / (section_m2 * 2.0 * 0.05 * chords);
     assert!((volume - 1.0).abs() < 1e-3, "{volume}");
     assert!(centroid_m(&ring).coords.norm() < ROUNDING);

@@ -332,13 +332,13 @@ fn what_is_in_a_notch_a_hole_or_a_cavity_is_free() {
 fn a_ball_in_the_hole_of_a_torus_is_free() {
     // Flat facets are at most this much inside the round torus.
     let (ring_m, tube_m, n, m) = (0.2, 0.06, 120, 60);
-    let sag_m = |r: f64, n: u32| r * (1.0 - (PI / f64::from(n)).cos());
+    let sag_m = |r: f64, n: u32| r * (1.0 - libm::cos(PI / f64::from(n)));
     let coarse_m = sag_m(ring_m + tube_m, n) + sag_m(tube_m, m);
     let mesh = PreparedShape::new(&solid_mesh(torus(ring_m, tube_m, n, m)));
     let mut variety = Variety::new(35);
     for _ in 0..100 {
         let p = variety.vector(0.3);
-        let exact_m = (p.x.hypot(p.y) - ring_m).hypot(p.z) - tube_m;
+        let exact_m = libm::hypot(libm::hypot(p.x, p.y) - ring_m, p.z) - tube_m;
         let ball = PreparedShape::new(&Shape::Sphere { radius_m: 0.0 });
         let at = Pose::translation(p.x, p.y, p.z);
         let found_m = separation(&ball, &at, &mesh, &Pose::identity()).distance_m;
@@ -358,7 +358,7 @@ fn depth_by_brute_force_m(shape: &Shape, a: &Pose, mesh: &Shape, b: &Pose) -> f6
     let mut least_m = f64::INFINITY;
     for i in 0..count {
         let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
-        let (sin, cos) = (golden * f64::from(i)).sin_cos();
+        let (sin, cos) = libm::sincos(golden * f64::from(i));
         let across = (1.0 - z * z).sqrt();
         let u = Vector3::new(across * cos, across * sin, z);
         let mut length_m = 0.0;

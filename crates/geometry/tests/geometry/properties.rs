@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use crate::common::Variety;
+use crate::common::solids::{bowl, torus};
 use nalgebra::{Point3, Translation3, Vector3};
 use needlebench_geometry::sample_solids::ellipsoid;
 use needlebench_geometry::{
-    ConvexMesh, PreparedShape, Separation, Shape, TriangleMesh, separation,
+    ConvexMesh, Placement, PreparedShape, PreparedSolids, Separation, Shape, Solid, TriangleMesh,
+    is_nearer, separation,
 };
 use needlebench_kinematics::Pose;
 
@@ -116,7 +118,7 @@ fn thin_and_long_shapes_are_reproduced_too() {
     let mut variety = Variety::new(15);
     for _ in 0..3000 {
         // Needles of 0.6 mm, plates of a millimetre, tables of two metres.
-        let mut size_m = || 10_f64.powf(variety.between(-3.3, 0.3));
+        let mut size_m = || libm::pow(10_f64, variety.between(-3.3, 0.3));
         let half_extents_m = Vector3::new(size_m(), size_m(), size_m());
         let plate = PreparedShape::new(&Shape::Cuboid { half_extents_m });
         let rod = PreparedShape::new(&Shape::Cylinder {
@@ -203,4 +205,93 @@ fn degenerate_shapes_have_finite_distances() {
             assert!((0.79..=1.0).contains(&apart_m), "{apart_m}");
         }
     }
+}
+
+#[test]
+fn prepared_solids_contain_what_solids_contain() {
+    let mut variety = Variety::new(31);
+    let (mut inside, mut all) = (0, 0);
+    for _ in 0..40 {
+        let meshes = [
+            Shape::of_surface(bowl()),
+            Shape::of_surface(torus(0.08, 0.03, 24, 12)),
+        ];
+        let shapes = variety.shapes().into_iter().chain(meshes);
+        let solids: Vec<Solid> = shapes
+            .map(|shape| Solid {
+                name: String::new(),
+                shape,
+                parent_from_shape: variety.pose(0.05),
+            })
+            .collect();
+        let prepared = PreparedSolids::new(&solids);
+        for _ in 0..60 {
+            let point = Point3::from(variety.vector(0.15));
+            for (index, solid) in solids.iter().enumerate() {
+                let here = solid.contains(&point);
+                assert_eq!(
+                    prepared.contains(index, &point),
+                    here,
+                    "{point} {:?}",
+                    solid.shape
+                );
+                inside += usize::from(here);
+                all += 1;
+            }
+        }
+    }
+    assert!(
+        inside > all / 10 && inside < all * 9 / 10,
+        "{inside} of {all}"
+    );
+}
+
+#[test]
+fn what_is_nearer_than_a_limit_is_told_without_its_depth() {
+    let mut variety = Variety::new(37);
+    let (mut near, mut deep, mut all) = (0, 0, 0);
+    for _ in 0..60 {
+        let meshes = || {
+            [
+                Shape::of_surface(bowl()),
+                Shape::of_surface(torus(0.08, 0.03, 24, 12)),
+            ]
+        };
+        let mut shapes = || {
+            variety
+                .shapes()
+                .into_iter()
+                .chain(meshes())
+                .collect::<Vec<_>>()
+        };
+        let [ones, others] = [shapes(), shapes()];
+        for one in &ones {
+            for other in &others {
+                let (a, b) = (PreparedShape::new(one), PreparedShape::new(other));
+                let [a_pose, b_pose] = [variety.pose(0.15), variety.pose(0.15)];
+                let found_m = separation(&a, &a_pose, &b, &b_pose).distance_m;
+                let b_from_a = Placement::new(&b_pose).inverse_after(&Placement::new(&a_pose));
+                for limit_m in [
+                    -0.02,
+                    0.0,
+                    1e-6,
+                    0.008,
+                    0.05,
+                    found_m + 1e-8,
+                    found_m - 1e-8,
+                ] {
+                    assert_eq!(
+                        is_nearer(&a, &b, &b_from_a, limit_m),
+                        found_m < limit_m,
+                        "{found_m} {limit_m} {one:?} {other:?}"
+                    );
+                    all += 1;
+                    near += usize::from(found_m < limit_m);
+                }
+                deep += usize::from(found_m < -1e-3);
+            }
+        }
+    }
+    assert!(near > all / 10 && near < all * 9 / 10, "{near} of {all}");
+    assert!(deep > 300, "{deep}");
 }

@@ -310,7 +310,7 @@ fn judged(volume: &Volume, model: &MarkerModel, components: &[Seen]) -> Candidat
                 reason: format!("it is {:.0} mm long", size_m * 1e3),
             });
         } else {
-            found.push(((mass / (dense + layers)).ln().abs(), at_m));
+            found.push((libm::log(mass / (dense + layers)).abs(), at_m));
         }
     }
     let key = |p: &Point3<f64>| [p.z, p.y, p.x];

@@ -32,7 +32,7 @@ impl Edge {
     /// `along` is the cosine between the edge's normal and the slice's.
     pub fn new(along: f64, blur_mm: f64, thickness_mm: f64) -> Self {
         let across = (1.0 - along * along).max(0.0).sqrt();
-        let sigma_mm = (blur_mm * across).hypot(SHARPEST_MM);
+        let sigma_mm = libm::hypot(blur_mm * across, SHARPEST_MM);
         Self {
             sigma_mm,
             half_mm: 0.5 * thickness_mm * along.abs(),
@@ -76,7 +76,7 @@ impl Edge {
 }
 
 fn density(t: f64) -> f64 {
-    (-0.5 * t * t).exp() / std::f64::consts::TAU.sqrt()
+    libm::exp(-0.5 * t * t) / std::f64::consts::TAU.sqrt()
 }
 
 #[cfg(test)]

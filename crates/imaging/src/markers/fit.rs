@@ -273,7 +273,7 @@ fn for_each_voxel(
     let grid = &scan.volume.grid;
     let size = grid.size();
     let middle = grid.index_from_ct(center);
-    let radius = across_mm.hypot(along_mm);
+    let radius = libm::hypot(across_mm, along_mm);
     let range = |axis: usize| {
         let reach = radius * scan.index_from_mm.row(axis).norm();
         let low = (middle[axis] - reach).ceil().max(0.0);
@@ -291,7 +291,7 @@ fn for_each_voxel(
             for i in range(0) {
                 let offset = Vector3::new(i as f64, j as f64, k as f64) - middle.coords;
                 let at = to_slice * offset;
-                if at.x.hypot(at.y) <= across_mm && at.z.abs() <= along_mm {
+                if libm::hypot(at.x, at.y) <= across_mm && at.z.abs() <= along_mm {
                     each([i, j, k], at, scan.volume.hu[grid.offset([i, j, k])]);
                 }
             }
@@ -678,7 +678,7 @@ impl Task<'_> {
             .fold(f64::INFINITY, f64::min);
         let (mut sum, mut mean, mut square) = (0.0, 0.0, 0.0);
         for (z, cost) in places {
-            let weight = (-0.5 * (cost - least)).exp();
+            let weight = libm::exp(-0.5 * (cost - least));
             sum += weight;
             mean += weight * z;
             square += weight * z * z;

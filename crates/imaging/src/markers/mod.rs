@@ -228,7 +228,7 @@ impl MarkerModel {
                 (0..count)
                     .map(|ball| {
                         let angle = std::f64::consts::TAU * ball as f64 / count as f64;
-                        [angle.cos(), angle.sin()].map(|share| 500.0 * diameter_m * share)
+                        [libm::cos(angle), libm::sin(angle)].map(|share| 500.0 * diameter_m * share)
                     })
                     .collect()
             }

@@ -140,7 +140,7 @@ impl<'a> Posed<'a> {
     fn layers(&self, outwards: f64, u: f64, v: f64, by: &mut Unknowns) -> f64 {
         let mut sum = 0.0;
         for (index, layer) in self.of.marker.layers.iter().enumerate() {
-            let across = u.hypot(v).max(1e-6);
+            let across = libm::hypot(u, v).max(1e-6);
             let rim = self.rim.share(layer.radius_m * 1e3 - across);
             if rim.value <= 0.0 {
                 continue;
@@ -180,7 +180,7 @@ impl<'a> Posed<'a> {
         let mut sum = 0.0;
         for ball in &self.balls {
             let offset = place - ball.at;
-            let across = offset.x.hypot(offset.y);
+            let across = libm::hypot(offset.x, offset.y);
             let share = self.of.sphere.share(across, offset.z);
             if share.value == 0.0 && share.blur == 0.0 {
                 continue;

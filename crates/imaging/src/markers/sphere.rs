@@ -167,16 +167,16 @@ fn disc_density(radius_mm: f64, blur_mm: f64, across_mm: f64) -> f64 {
         return 0.0;
     }
     // By the angle at the centre, at which the chords' lengths have no corner.
-    let angle = |x: f64| x.atan2((radius_mm * radius_mm - x * x).max(0.0).sqrt());
+    let angle = |x: f64| libm::atan2(x, (radius_mm * radius_mm - x * x).max(0.0).sqrt());
     let (from, to) = (angle(low), angle(high));
     let step = (to - from) / NODES as f64;
     let sum: f64 = (0..NODES)
         .map(|node| {
-            let (x, half_chord) = (from + (node as f64 + 0.5) * step).sin_cos();
+            let (x, half_chord) = libm::sincos(from + (node as f64 + 0.5) * step);
             let (x, half_chord) = (radius_mm * x, radius_mm * half_chord);
             let t = (x - across_mm) / blur_mm;
             let chord = 2.0 * normal::probability_below(half_chord / blur_mm) - 1.0;
-            (-0.5 * t * t).exp() * chord * half_chord
+            libm::exp(-0.5 * t * t) * chord * half_chord
         })
         .sum();
     sum * step / (blur_mm * (std::f64::consts::TAU).sqrt())

@@ -257,7 +257,7 @@ fn cut_sides(scan: &Scan<'_>, solid: &Mask, remarks: &mut Vec<Remark>) -> Vec<&'
         for j in 0..ny {
             for i in solid.runs(j, k).flat_map(|[from, to]| [from, to - 1]) {
                 let away = [i as f64 - middle[0], j as f64 - middle[1]];
-                if away[0].hypot(away[1]) > radius - 1.5 {
+                if libm::hypot(away[0], away[1]) > radius - 1.5 {
                     let side = match (away[0].abs() > away[1].abs(), away[0] > 0.0, away[1] > 0.0) {
                         (true, right, _) => usize::from(right),
                         (false, _, back) => 2 + usize::from(back),
@@ -295,7 +295,7 @@ fn padding_circle(volume: &Volume) -> Option<f64> {
     for j in 0..ny {
         for i in 0..nx {
             if volume.hu[volume.grid.offset([i, j, nz / 2])] != AIR_HU {
-                radius = radius.max((i as f64 - middle[0]).hypot(j as f64 - middle[1]));
+                radius = radius.max(libm::hypot(i as f64 - middle[0], j as f64 - middle[1]));
             }
         }
     }

@@ -59,7 +59,7 @@ pub(super) fn gaussian(sigma: f64, count: usize) -> Vec<f32> {
     let sigma = sigma.max(LEAST);
     let middle = 0.5 * (count - 1) as f64;
     let weights: Vec<f64> = (0..count)
-        .map(|index| (-0.5 * ((index as f64 - middle) / sigma).powi(2)).exp())
+        .map(|index| libm::exp(-0.5 * ((index as f64 - middle) / sigma).powi(2)))
         .collect();
     let sum: f64 = weights.iter().sum();
     weights.iter().map(|weight| (weight / sum) as f32).collect()

@@ -175,7 +175,7 @@ impl<'g> SliceFrame<'g> {
         let cosine = along_columns.dot(&along_rows);
         if cosine.abs() > SQUARE {
             let sine = along_columns.cross(&along_rows).norm();
-            let between = sine.atan2(cosine).to_degrees();
+            let between = libm::atan2(sine, cosine).to_degrees();
             return Err(ImagingError::refused(format!(
                 "columns and rows of the slices are {between:.3} degrees apart, not 90"
             )));

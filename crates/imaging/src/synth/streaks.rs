@@ -35,12 +35,12 @@ pub(super) fn add_streaks(image: &mut [f32], columns: usize, pixel_m: f64, strea
         return;
     }
     // So many rays that every pixel is between two of them.
-    let half = (middle[0].hypot(middle[1]).ceil() as usize) + 2;
+    let half = (libm::hypot(middle[0], middle[1]).ceil() as usize) + 2;
     let count = 2 * half + 1;
     let to_hu = HU_PER_WATER / (WATER_PER_M * pixel_m) * PI / DIRECTIONS as f64;
     let mut rays = vec![0.0; count];
     for direction in 0..DIRECTIONS {
-        let (sine, cosine) = (PI * direction as f64 / DIRECTIONS as f64).sin_cos();
+        let (sine, cosine) = libm::sincos(PI * direction as f64 / DIRECTIONS as f64);
         rays.fill(0.0);
         for ([x, y], attenuation) in &dense {
             let at = x * cosine + y * sine + half as f64;
@@ -95,7 +95,7 @@ mod tests {
         let mut image = vec![0.0; SIZE * SIZE];
         for (offset, pixel) in image.iter_mut().enumerate() {
             let [x, y] = [(offset % SIZE) as f64, (offset / SIZE) as f64];
-            if places.iter().any(|[i, j]| (x - i).hypot(y - j) < 4.0) {
+            if places.iter().any(|[i, j]| libm::hypot(x - i, y - j) < 4.0) {
                 *pixel = 8000.0;
             }
         }

@@ -54,10 +54,13 @@ fn body_and_bed() -> Vec<Solid> {
             Box::new(|p| (100.0..104.0).contains(&p.y) && p.x.abs() < 160.0),
             -100.0,
         ),
-        Solid(Box::new(move |p| (p.x / a).hypot(p.y / b) <= 1.0), 40.0),
+        Solid(
+            Box::new(move |p| libm::hypot(p.x / a, p.y / b) <= 1.0),
+            40.0,
+        ),
         // A spine with marrow.
-        Solid(Box::new(|p| p.x.hypot(p.y - 66.0) <= 18.0), 700.0),
-        Solid(Box::new(|p| p.x.hypot(p.y - 66.0) <= 13.0), 180.0),
+        Solid(Box::new(|p| libm::hypot(p.x, p.y - 66.0) <= 18.0), 700.0),
+        Solid(Box::new(|p| libm::hypot(p.x, p.y - 66.0) <= 13.0), 180.0),
     ]
 }
 
@@ -309,7 +312,7 @@ fn merged_lungs_are_parted_at_their_connection() {
     let mut solids = chest();
     // A bridge of 8 mm: the anterior junction.
     solids.push(Solid(
-        Box::new(|p| p.x.abs() < 30.0 && (p.y + 10.0).hypot(p.z) < 8.0),
+        Box::new(|p| p.x.abs() < 30.0 && libm::hypot(p.y + 10.0, p.z) < 8.0),
         -850.0,
     ));
     let made = run(&render(&solids, grid()), &options()).unwrap();
@@ -379,7 +382,7 @@ fn nodule_at_a_vessel_and_at_the_wall_is_cut_there() {
     let mut solids = chest();
     // A vessel through the nodule, to the mediastinum.
     solids.push(Solid(
-        Box::new(|p| (p.y - 20.0).hypot(p.z - 10.0) < 3.0 && (-70.0..0.0).contains(&p.x)),
+        Box::new(|p| libm::hypot(p.y - 20.0, p.z - 10.0) < 3.0 && (-70.0..0.0).contains(&p.x)),
         40.0,
     ));
     // Half in the wall.

@@ -159,7 +159,7 @@ fn the_middle_of_a_blurred_ball_is_the_integral_of_gaussian_and_profile() {
         .map(|step| {
             let z_m = thickness_m * ((f64::from(step) + 0.5) / f64::from(steps) - 0.5);
             let disc = (radius_m * radius_m - z_m * z_m).max(0.0);
-            1.0 - (-disc / (2.0 * sigma_m * sigma_m)).exp()
+            1.0 - libm::exp(-disc / (2.0 * sigma_m * sigma_m))
         })
         .sum::<f64>()
         / f64::from(steps);
@@ -251,7 +251,7 @@ fn a_slice_integrates_over_its_thickness_whatever_the_distance_of_slices() {
                     (to_m.min(half) - from_m.max(-half)).max(0.0) / thickness_m
                 }
                 SliceProfile::Bell => {
-                    let sigma_m = thickness_m / (8.0 * 2.0_f64.ln()).sqrt();
+                    let sigma_m = thickness_m / (8.0 * libm::log(2.0_f64)).sqrt();
                     probability_below(to_m / sigma_m) - probability_below(from_m / sigma_m)
                 }
             };
@@ -404,14 +404,14 @@ fn a_tilted_gantry_leaves_a_ball_a_ball() {
     // Rows lean against the table's motion, which stays along z.
     let steps = Matrix3::from_columns(&[
         Vector3::new(spacing_m, 0.0, 0.0),
-        Vector3::new(0.0, tilt.cos(), -tilt.sin()) * spacing_m,
+        Vector3::new(0.0, libm::cos(tilt), -libm::sin(tilt)) * spacing_m,
         Vector3::new(0.0, 0.0, spacing_m),
     ]);
     let middle = steps * Vector3::repeat(14.5);
     let grid = VoxelGrid::new([30; 3], steps, Point3::from(-middle)).unwrap();
     let place = [0.2e-3, -0.3e-3, 0.15e-3];
     let scene = with([(ball(5e-3, at(place[0], place[1], place[2])), 100.0)]);
-    let volume = scan(&scene, &Scanner::ideal(spacing_m * tilt.cos()), &grid);
+    let volume = scan(&scene, &Scanner::ideal(spacing_m * libm::cos(tilt)), &grid);
     let (mass, centre, spread) = moments(&volume);
     assert!((mass / (1100.0 * 4.0 / 3.0 * PI * 5e-3_f64.powi(3)) - 1.0).abs() < 1e-3);
     assert!(
@@ -473,7 +473,7 @@ fn noise_is_as_strong_as_it_says_and_has_the_spectrum_that_it_says() {
     );
     // The spectrum's amplitude is g(f) - 0.8 g(2 f): the correlation is that of the two Gaussians' convolutions.
     let sigma = noise.grain_sigma_m / pixel_m;
-    let product = |variance: f64, r2: f64| (-r2 / (2.0 * variance)).exp() / variance;
+    let product = |variance: f64, r2: f64| libm::exp(-r2 / (2.0 * variance)) / variance;
     let closed = |r2: f64| {
         let s2 = sigma * sigma;
         product(2.0 * s2, r2) - 1.6 * product(5.0 * s2, r2) + 0.64 * product(8.0 * s2, r2)

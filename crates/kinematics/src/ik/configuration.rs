@@ -115,8 +115,8 @@ impl Configuration {
         };
         Self {
             shoulder,
-            elbow: Elbow::of_sign(shoulder, q[2].sin()),
-            wrist: Wrist::of_sign(shoulder, q[4].sin()),
+            elbow: Elbow::of_sign(shoulder, libm::sin(q[2])),
+            wrist: Wrist::of_sign(shoulder, libm::sin(q[4])),
         }
     }
 }

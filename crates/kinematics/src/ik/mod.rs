@@ -6,6 +6,7 @@
 mod calibrated;
 mod closed_form;
 mod configuration;
+mod fused;
 mod numerical;
 mod solve;
 mod wraps;

@@ -547,5 +547,5 @@ const SAME_POSTURE_RAD: f64 = 1e-4;
 
 /// What the search for the nearest posture minimises, rad.
 fn cost(row: &Solution) -> f64 {
-    (RAD_PER_M * row.residual_m).hypot(row.residual_rad)
+    libm::hypot(RAD_PER_M * row.residual_m, row.residual_rad)
 }

@@ -6,6 +6,7 @@
 
 mod line;
 mod path;
+mod piece;
 mod profile;
 mod sampled;
 mod slowing;
@@ -14,6 +15,7 @@ mod travel;
 
 pub use line::LineError;
 pub use path::{JointPath, PathPoint};
+pub use piece::{Piece, PieceCourse};
 pub use profile::{DoubleS, ProfileLimits};
 pub use sampled::NotSampled;
 
@@ -369,7 +371,7 @@ fn path_time_scale(path: &JointPath, profile: &DoubleS, limits: &MotionLimits) -
             scale = scale
                 .max(velocity[i].abs() / limits.velocity[i])
                 .max((acceleration[i].abs() / limits.acceleration[i]).sqrt())
-                .max((jerk[i].abs() / limits.jerk[i]).cbrt());
+                .max(libm::cbrt(jerk[i].abs() / limits.jerk[i]));
         }
     }
     scale

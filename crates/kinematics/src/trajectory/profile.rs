@@ -67,7 +67,7 @@ impl DoubleS {
                 let half = 0.5 * full_jerk_s;
                 acceleration_s = half + (half.powi(2) + length / acceleration).sqrt();
             } else {
-                jerk_phase_s = (length / (2.0 * jerk)).cbrt();
+                jerk_phase_s = libm::cbrt(length / (2.0 * jerk));
                 acceleration_s = 2.0 * jerk_phase_s;
             }
         }
@@ -83,6 +83,12 @@ impl DoubleS {
     /// Time from rest to rest, s.
     pub fn duration_s(&self) -> f64 {
         2.0 * self.acceleration_s + self.cruise_s
+    }
+
+    /// Highest speed and highest acceleration.
+    pub fn peaks(&self) -> (f64, f64) {
+        let middle = self.sample(0.5 * self.duration_s());
+        (middle.velocity, self.jerk * self.jerk_phase_s)
     }
 
     /// State at a time; at rest outside the profile.

@@ -132,3 +132,45 @@ fn a_line_out_of_the_workspace_is_refused() {
             .starts_with("Right-Up")
     );
 }
+
+#[test]
+fn pieces_meet_and_straight_ones_have_the_peaks_of_their_leading_joint() {
+    let motion = motion();
+    let pieces: Vec<Piece> = motion.pieces().collect();
+    assert_eq!(pieces[0].start_s, 0.0);
+    assert!(
+        pieces
+            .windows(2)
+            .all(|pair| pair[0].end_s == pair[1].start_s)
+    );
+    assert!((pieces.last().unwrap().end_s - motion.duration_s()).abs() < 1e-12);
+    let mut straight = 0;
+    for piece in &pieces {
+        let PieceCourse::Straight {
+            leading,
+            speed_rad_s,
+            acceleration_rad_s2,
+        } = piece.course
+        else {
+            continue;
+        };
+        straight += 1;
+        let states = (0..=2000).map(|k| {
+            motion.sample(piece.start_s + (piece.end_s - piece.start_s) * f64::from(k) / 2000.0)
+        });
+        let (mut speed, mut acceleration) = (0.0_f64, 0.0_f64);
+        for state in states {
+            assert!(state.velocity[leading].abs() >= state.velocity.amax() - 1e-12);
+            speed = speed.max(state.velocity[leading].abs());
+            acceleration = acceleration.max(state.acceleration[leading].abs());
+        }
+        // The samples are no farther from the peak than a two-thousandth of the motion.
+        assert!((speed - speed_rad_s).abs() < 1e-6, "{speed} {speed_rad_s}");
+        assert!(
+            acceleration <= acceleration_rad_s2 * (1.0 + 1e-12)
+                && acceleration > 0.99 * acceleration_rad_s2,
+            "{acceleration} {acceleration_rad_s2}"
+        );
+    }
+    assert!(straight > 0);
+}

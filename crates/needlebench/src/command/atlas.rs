@@ -150,7 +150,11 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
     })
 }
 
-fn goals<'r>(resolved: &'r ResolvedScenario, name: Option<&str>) -> Result<Vec<&'r Goal>, Finding> {
+/// The goals of a scenario, or the one of a name.
+pub(super) fn goals<'r>(
+    resolved: &'r ResolvedScenario,
+    name: Option<&str>,
+) -> Result<Vec<&'r Goal>, Finding> {
     if resolved.goals.is_empty() {
         let finding = Finding::new(&resolved.source.file, "it has no goals to look at");
         return Err(finding

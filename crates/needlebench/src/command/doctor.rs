@@ -1,13 +1,80 @@
 //! `needlebench doctor`.
 
+use std::path::{Path, PathBuf};
+
 use anyhow::Result;
+use clap::Args;
+use needlebench_cell::Finding;
 use needlebench_engine::ENGINES;
+use needlebench_engine::mujoco::{
+    EnvironmentError, PythonVersion, WheelPlatform, WheelsFor, download_wheels, prepare,
+};
 use serde::Serialize;
 
 use super::{print_json, print_text};
 use crate::exit::ExitStatus;
+use crate::findings::print_findings;
 use crate::output::complain;
 use needlebench_bench::provenance::GIT_REVISION;
+
+/// How MuJoCo is set up ahead.
+pub(crate) const DOCTOR_HELP: &str = "\
+MuJoCo's Python environment is made on first use, in NEEDLEBENCH_CACHE_DIR or else the user's cache folder, out \
+of wheels whose hashes the program knows. `--prepare` makes it ahead: on the login node of a cluster, in an \
+image. It holds for the same Python at the same path, and may be read-only from then on.
+
+Without a network: fetch the wheels on a machine that has one, for the system and the Python of the other, \
+carry the folder over, and make the environment from it:
+  needlebench doctor --download wheels --for-python 3.12
+  needlebench doctor --prepare --wheels wheels
+
+Example: needlebench doctor --prepare";
+
+#[derive(Debug, Args)]
+pub(crate) struct DoctorArguments {
+    /// Make MuJoCo's environment ahead, if it is not there yet; say where it is and how big.
+    #[arg(long)]
+    prepare: bool,
+    /// Make it from the wheels in this folder, without a network.
+    #[arg(long, value_name = "DIR", requires = "prepare")]
+    wheels: Option<PathBuf>,
+    /// Fetch the wheels into this folder, for a machine without a network.
+    #[arg(long, value_name = "DIR", conflicts_with = "prepare")]
+    download: Option<PathBuf>,
+    /// The Python that wheels are fetched for, such as 3.12, in place of this machine's.
+    #[arg(long, value_name = "VERSION", requires = "download")]
+    for_python: Option<PythonVersion>,
+    /// The system that wheels are fetched for, in place of this one: linux-x86_64, linux-aarch64, macos-arm64,
+    /// windows-x86_64.
+    #[arg(long, value_name = "SYSTEM", requires = "download")]
+    for_platform: Option<WheelPlatform>,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct PrepareAnswer {
+    schema_version: u32,
+    /// Where the environment is; none where another program stands in the harness's place.
+    folder: Option<PathBuf>,
+    python: PathBuf,
+    size_bytes: Option<u64>,
+    made: bool,
+}
+
+#[derive(Serialize)]
+struct DownloadAnswer {
+    schema_version: u32,
+    python: String,
+    files: Vec<DownloadedFile>,
+}
+
+#[derive(Serialize)]
+struct DownloadedFile {
+    file: PathBuf,
+    size_bytes: u64,
+}
 
 #[derive(Serialize)]
 struct DoctorAnswer {
@@ -23,8 +90,112 @@ struct Check {
     detail: String,
 }
 
+/// Checks what the engines need, makes it, or fetches what it is made of.
+pub(crate) fn doctor(arguments: &DoctorArguments) -> Result<ExitStatus> {
+    if let Some(folder) = &arguments.download {
+        return fetch_wheels(folder, arguments);
+    }
+    if arguments.prepare {
+        return prepare_environment(arguments);
+    }
+    check_engines(arguments.json)
+}
+
+fn prepare_environment(arguments: &DoctorArguments) -> Result<ExitStatus> {
+    if let Some(wheels) = arguments.wheels.as_ref().filter(|folder| !folder.is_dir()) {
+        let finding = Finding::new(
+            "--wheels",
+            format!("there is no folder {}", wheels.display()),
+        )
+        .hint("`needlebench doctor --download DIR` fetches the wheels on a machine with a network");
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
+    let prepared = match prepare(arguments.wheels.as_deref(), &mut told(arguments.json)) {
+        Ok(prepared) => prepared,
+        Err(error) => return Ok(environment_failed(&error)),
+    };
+    let environment = prepared.environment;
+    if arguments.json {
+        print_json(&PrepareAnswer {
+            schema_version: 1,
+            folder: environment.folder,
+            python: environment.python,
+            size_bytes: prepared.size_bytes,
+            made: prepared.made,
+        })?;
+        return Ok(ExitStatus::Success);
+    }
+    print_text(&match (&environment.folder, prepared.size_bytes) {
+        (Some(folder), Some(bytes)) => format!(
+            "MuJoCo's environment is {} {} ({})",
+            if prepared.made {
+                "ready in"
+            } else {
+                "there already:"
+            },
+            folder.display(),
+            megabytes(bytes)
+        ),
+        _ => format!(
+            "nothing to prepare: NEEDLEBENCH_HARNESS_COMMAND stands in for it ({})",
+            environment.python.display()
+        ),
+    })?;
+    Ok(ExitStatus::Success)
+}
+
+fn fetch_wheels(folder: &Path, arguments: &DoctorArguments) -> Result<ExitStatus> {
+    let wanted = WheelsFor {
+        python: arguments.for_python,
+        platform: arguments.for_platform,
+    };
+    let fetched = match download_wheels(folder, &wanted, &mut told(arguments.json)) {
+        Ok(fetched) => fetched,
+        Err(error) => return Ok(environment_failed(&error)),
+    };
+    if arguments.json {
+        let files = fetched.files.into_iter();
+        print_json(&DownloadAnswer {
+            schema_version: 1,
+            python: fetched.python.to_string(),
+            files: files
+                .map(|(file, size_bytes)| DownloadedFile { file, size_bytes })
+                .collect(),
+        })?;
+        return Ok(ExitStatus::Success);
+    }
+    for (file, bytes) in &fetched.files {
+        print_text(&format!("{} ({})", file.display(), megabytes(*bytes)))?;
+    }
+    print_text(&format!(
+        "wheels for Python {}; on the other machine: needlebench doctor --prepare --wheels {}",
+        fetched.python,
+        folder.display()
+    ))?;
+    Ok(ExitStatus::Success)
+}
+
+/// Says on standard error what is being done, unless a program reads.
+fn told(json: bool) -> impl FnMut(&str) {
+    move |text| {
+        if !json {
+            complain(text);
+        }
+    }
+}
+
+fn environment_failed(error: &EnvironmentError) -> ExitStatus {
+    complain(&format!("error: {error}"));
+    ExitStatus::EnvironmentFailed
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", bytes as f64 * 1e-6)
+}
+
 /// Checks what the engines need.
-pub(crate) fn doctor(json: bool) -> Result<ExitStatus> {
+fn check_engines(json: bool) -> Result<ExitStatus> {
     let mut checks = vec![
         Check {
             name: "needlebench",
@@ -39,11 +210,7 @@ pub(crate) fn doctor(json: bool) -> Result<ExitStatus> {
         },
     ];
     for engine in ENGINES {
-        let found = engine.check(&mut |text| {
-            if !json {
-                complain(text);
-            }
-        });
+        let found = engine.check(&mut told(json));
         checks.extend(found.into_iter().map(|each| Check {
             name: each.name,
             ok: each.found.is_ok(),

@@ -12,13 +12,13 @@ use std::time::Duration;
 use anyhow::Result;
 use needlebench_cell::Finding;
 use needlebench_kinematics::ik::{
-    Certificate, Configuration, DampedOptions, GaussNewtonOptions, Kinematics, Solution,
-    SolutionKind, Tolerance, WrapSearch, wrap_angle,
+    Configuration, DampedOptions, GaussNewtonOptions, Kinematics, Solution, SolutionKind,
+    Tolerance, WrapSearch, wrap_angle,
 };
 use needlebench_kinematics::{Joints, Pose};
 
 use self::answer::{ArmAnswer, FkAnswer, IkAnswer, SolutionAnswer, UnreachableAnswer, kind_name};
-use self::arm::Arm;
+pub use self::arm::KinematicArm;
 use self::target::{target, tolerance};
 use super::{print_json, print_text};
 
@@ -177,7 +177,7 @@ fn seed(arguments: &IkArguments) -> Option<Joints> {
 
 fn closed_form(
     arguments: &IkArguments,
-    arm: &Arm,
+    arm: &KinematicArm,
     kinematics: &Kinematics,
     base_link_from_flange: &Pose,
     tolerance: Tolerance,
@@ -227,26 +227,14 @@ fn closed_form(
                 missing_m: reason.missing_m(),
             })
             .collect(),
-        certificate: certificate_name(found.certificate),
-    }
-}
-
-fn certificate_name(certificate: Certificate) -> &'static str {
-    match certificate {
-        Certificate::Complete => "complete",
-        Certificate::DecidedInExtendedPrecision => "decided_in_extended_precision",
-        Certificate::MergedBranches => "merged_branches",
-        Certificate::FreeJoint => "free_joint",
-        Certificate::NearestOnly => "nearest_only",
-        Certificate::Refined => "refined",
-        Certificate::NotAPose => "not_a_pose",
+        certificate: found.certificate.name(),
     }
 }
 
 /// One posture, by iteration from a guess.
 fn numerical(
     arguments: &IkArguments,
-    arm: &Arm,
+    arm: &KinematicArm,
     kinematics: &Kinematics,
     base_link_from_flange: &Pose,
 ) -> IkAnswer {
@@ -318,7 +306,7 @@ fn numerical(
 
 /// Prints forward kinematics.
 pub(crate) fn fk(arguments: &FkArguments) -> Result<ExitStatus> {
-    let arm = match Arm::new(&arguments.arm) {
+    let arm = match KinematicArm::new(&arguments.arm) {
         Ok(arm) => arm,
         Err(finding) => {
             print_findings(&[finding]);

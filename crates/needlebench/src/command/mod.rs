@@ -6,6 +6,7 @@ mod clearance;
 mod compare;
 mod ct;
 mod doctor;
+mod export;
 mod init;
 mod iso9283;
 mod kinematics;
@@ -16,6 +17,7 @@ mod replay;
 mod report;
 mod run;
 mod schema;
+mod search;
 mod servo;
 mod study;
 mod suggest;
@@ -35,9 +37,11 @@ pub(crate) use check::{CheckArguments, check};
 pub(crate) use clearance::{ClearanceArguments, clearance};
 pub(crate) use compare::{CompareArguments, compare, compare_help};
 pub(crate) use ct::{CtArguments, ct};
-pub(crate) use doctor::doctor;
+pub(crate) use doctor::{DOCTOR_HELP, DoctorArguments, doctor};
+pub(crate) use export::{ExportArguments, export};
 pub(crate) use init::{InitArguments, init};
 pub(crate) use iso9283::{ISO9283_HELP, Iso9283Arguments, iso9283};
+pub use kinematics::KinematicArm;
 pub(crate) use kinematics::{FkArguments, IkArguments, fk, ik};
 pub(crate) use pairs::{PairsArguments, pairs};
 pub(crate) use paper::{PaperArguments, paper};
@@ -46,6 +50,7 @@ pub(crate) use replay::{REPLAY_HELP, ReplayArguments, replay};
 pub(crate) use report::{REPORT_HELP, ReportArguments, report};
 pub(crate) use run::{RunArguments, run};
 pub(crate) use schema::{SchemaFormat, schema};
+pub(crate) use search::{SEARCH_HELP, SearchArguments, search};
 pub(crate) use servo::{ServoArguments, servo};
 pub(crate) use study::{MergeArguments, STUDY_HELP, StudyArguments, merge, study};
 pub(crate) use suggest::{SuggestArguments, suggest};
@@ -104,6 +109,15 @@ fn urdf_overrides(arguments: &UrdfArguments) -> Result<Overrides, Finding> {
 fn print_json(value: &impl Serialize) -> Result<()> {
     let document = serde_json::to_string_pretty(value).map_err(std::io::Error::from)?;
     print_as_it_is(&printable_json(&document))
+}
+
+/// Licences of what the program is made of, in the crate's folder by a link.
+const NOTICES: &str = include_str!("../../THIRD-PARTY-NOTICES");
+
+/// Prints the licences of what is inside the program.
+pub(crate) fn licences() -> Result<ExitStatus> {
+    print_as_it_is(NOTICES.trim_end())?;
+    Ok(ExitStatus::Success)
 }
 
 /// Prints completions for a shell.

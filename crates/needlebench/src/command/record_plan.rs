@@ -14,11 +14,11 @@ use needlebench_cell::{
 };
 use needlebench_clearance::ClearanceModel;
 use needlebench_evaluation::excitation::proven_m;
+use needlebench_export::excitation_script;
 use needlebench_kinematics::{JOINT_LABELS, Joints};
 use needlebench_planning::excitation::{
     Aim, ExcitationPlan, FoundRun, SearchError, SearchOptions, search,
 };
-use needlebench_report::excitation_script;
 use needlebench_report::files::{Folder, write_plan};
 use needlebench_report::table::excitation::plan_text;
 

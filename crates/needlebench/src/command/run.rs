@@ -4,7 +4,7 @@ use crate::arguments::{
     EngineArgument, EngineParser, PicturesArguments, RobotArguments, TableArguments, leave,
 };
 use crate::output::{complain, print_wide, shown};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -57,6 +57,9 @@ pub(crate) struct RunArguments {
     /// would write it of the real arm.
     #[arg(long)]
     pub rtde: bool,
+    /// Write each recorded motion in another format too, beside its CSV.
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    pub record: Option<Record>,
     #[command(flatten)]
     pub pictures: PicturesArguments,
     /// Write no report page.
@@ -72,6 +75,13 @@ pub(crate) struct RunArguments {
     pub table: TableArguments,
     #[command(flatten)]
     pub robot: RobotArguments,
+}
+
+/// Format of recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Record {
+    /// Messages of ROS 2 in an MCAP file for each goal, configuration and engine.
+    Mcap,
 }
 
 #[derive(Serialize)]
@@ -140,6 +150,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     let mut reports = Vec::new();
     let outputs = Outputs {
         rtde: arguments.rtde,
+        mcap: arguments.record == Some(Record::Mcap),
         pictures: arguments.pictures.are_wanted(arguments.quiet),
         page: !arguments.no_page,
         text: match (arguments.json, arguments.wide) {
@@ -263,6 +274,8 @@ fn scanned(
 pub(super) struct Outputs {
     /// Logs as a controller writes them, whatever the scenario wants.
     pub rtde: bool,
+    /// Recordings as messages of ROS 2.
+    pub mcap: bool,
     /// Pictures, if the scenario wants any.
     pub pictures: bool,
     /// The page.
@@ -298,6 +311,7 @@ pub(super) fn run_into(
     let resolved = runnable.scenario();
     let files = RunFiles {
         rtde: outputs.rtde,
+        mcap: outputs.mcap,
         pictures: outputs.pictures,
         page: outputs.page,
         jobs: options.jobs,

@@ -23,7 +23,21 @@ pub(crate) enum SchemaFormat {
     Metrics,
 }
 
+/// Version of the schemas. It rises when a file that was right would not be any more, or would mean something
+/// else; what is only added leaves it. `tests/schema/released` has the schema of each version.
+pub(crate) const SCHEMA_VERSION: u32 = 1;
+
 impl SchemaFormat {
+    /// Name in the command line and in the schema's own identifier.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Scenario => "scenario",
+            Self::Study => "study",
+            Self::Arm => "arm",
+            Self::Metrics => "metrics",
+        }
+    }
+
     fn title(self) -> &'static str {
         match self {
             Self::Scenario => "Keys of a scenario",
@@ -57,6 +71,9 @@ pub(super) fn document(format: SchemaFormat) -> Value {
         }
     };
     name_engines(&mut schema, ENGINES);
+    // A name, not a place: nobody has to be asked for it.
+    let name = format.name();
+    schema["$id"] = json!(format!("urn:needlebench:schema:{name}:{SCHEMA_VERSION}"));
     schema
 }
 

@@ -1,6 +1,8 @@
 //! `needlebench study` and `needlebench merge`.
 
 mod arguments;
+mod launch;
+mod status;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -10,8 +12,8 @@ use anyhow::{Context, Result};
 use needlebench_cell::Finding;
 use needlebench_cell::study::load_study;
 use needlebench_study::{
-    CSV_FILE, CaseEvaluator, Manifest, ParquetResults, Progress as Event, RunEnd, StudyError,
-    StudyRun, merge as merge_shards, write_csv,
+    CSV_FILE, CaseEvaluator, FactorKind, ParquetResults, Progress as Event, Role, RunEnd, Shard,
+    StudyError, StudyRun, merge as merge_shards, write_csv,
 };
 
 use super::run::{Outputs, Printed, prepare_folder, probe_file, run_into};
@@ -20,15 +22,18 @@ use crate::arguments::{RobotArguments, leave};
 use crate::clock::elapsed;
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
-use crate::interrupts::watch_interrupts;
+use crate::interrupts::{threads, watch_interrupts};
 use crate::output::{complain, print_wide, shown};
 use crate::progress::TerminalProgress;
+pub(super) use arguments::ShardArgument;
 use arguments::StudyResultArguments;
 pub(crate) use arguments::{MergeArguments, STUDY_HELP, StudyArguments};
 use needlebench_bench::accuracy::{AccuracyError, accuracy_of_study, check_study};
 use needlebench_bench::ct::{LastScan, scanned};
 use needlebench_bench::progress::Progress as _;
-use needlebench_bench::study::{PreparedStudy, StudyCase, StudyEvaluator, in_words, time_per_case};
+use needlebench_bench::study::{
+    Assignment, PreparedStudy, StudyCase, StudyEvaluator, assignment, in_words, time_per_case,
+};
 use needlebench_bench::{RunOptions, Runnable};
 use needlebench_report::files::{FilesError, StudyOutput, write_study};
 use needlebench_report::table::study::{CaseReport, case_text};
@@ -46,14 +51,30 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
     if !arguments.case.is_empty() {
         return cases(arguments, &prepared);
     }
-    let folder = arguments.out.join(&prepared.study.file.name);
+    if !arguments.status.is_empty() {
+        return status::status(arguments, &prepared);
+    }
+    if let Some(request) = arguments.launch {
+        return launch::launch(arguments, &prepared, request);
+    }
+    let (shard, out) = match asked_shard(arguments) {
+        Ok(asked) => asked,
+        Err(finding) => {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    if let Some(note) = choice_with_range(&prepared) {
+        complain(&note);
+    }
+    let folder = out.join(&prepared.study.file.name);
     if let Err(finding) = prepare_outputs(&folder, &prepared, &arguments.results) {
         print_findings(&[finding]);
         return Ok(ExitStatus::BadInput);
     }
     let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design, &prepared.columns);
     let threads = threads(arguments.results.jobs);
-    let manifest = prepared.manifest(arguments.shard);
+    let manifest = prepared.manifest(shard);
     if !arguments.yes && !arguments.resume {
         match too_long(&prepared, &evaluator, manifest.own_cases(), threads) {
             Ok(None) => {}
@@ -108,6 +129,19 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
     }
 }
 
+/// A choice of which a study has nothing to compare: all that it draws are different.
+fn choice_with_range(prepared: &PreparedStudy) -> Option<String> {
+    let mut factors = prepared.design.factors().iter();
+    let factor = factors.find(|factor| {
+        factor.role == Role::Choice && matches!(factor.kind, FactorKind::Continuous { .. })
+    })?;
+    Some(format!(
+        "note: `{}` is ours to choose and has a range: a study compares bins of it, under unlike circumstances\n\
+         hint: `needlebench search` finds the best of a range; a `grid` of it is compared pair by pair",
+        factor.name
+    ))
+}
+
 /// Joins the shards of a study.
 pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
     let Some(prepared) = prepare(&arguments.study, &arguments.robot) else {
@@ -120,12 +154,17 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
     }
     let threads = threads(arguments.results.jobs);
     let progress = TerminalProgress::new(arguments.results.quiet);
-    if let Some(error) = foreign_shard(&prepared, &arguments.shards) {
-        return Ok(failed(&error));
-    }
-    let end = merge_shards(&folder, &arguments.shards, threads, true, &|event| {
-        show(&progress, event);
-    });
+    let end = merge_shards(
+        &folder,
+        Some(&prepared.manifest(None)),
+        &arguments.shards,
+        threads,
+        true,
+        &|event| match event {
+            Event::Space { .. } if arguments.results.quiet => {}
+            event => show(&progress, event),
+        },
+    );
     progress.finish();
     match end {
         Err(error) => Ok(failed(&error)),
@@ -135,6 +174,36 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
         }) => finish(&prepared, &folder, &results, &arguments.results, None),
         Ok(_) => unreachable!("a merge writes a table or fails"),
     }
+}
+
+/// The shard that was asked for, if any, and the folder for results.
+fn asked_shard(arguments: &StudyArguments) -> Result<(Option<Shard>, PathBuf), Finding> {
+    Ok(match arguments.shard {
+        None => (None, arguments.out.clone()),
+        Some(ShardArgument::This(shard)) => (Some(shard), arguments.out.clone()),
+        Some(asked @ ShardArgument::Auto) => {
+            let shard = shard_of(asked)?;
+            // All tasks have the same command line, and no two may have the same folder.
+            (Some(shard), arguments.out.join(shard.part().to_string()))
+        }
+    })
+}
+
+/// The shard that was asked for, or that of the environment, which is said.
+pub(super) fn shard_of(asked: ShardArgument) -> Result<Shard, Finding> {
+    match asked {
+        ShardArgument::This(shard) => Ok(shard),
+        ShardArgument::Auto => {
+            let Assignment { shard, by, from } = assignment(&variable)?;
+            complain(&format!("shard {shard}, by {by} ({from})"));
+            Ok(shard)
+        }
+    }
+}
+
+/// An environment variable that is set to something.
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.is_empty())
 }
 
 /// Reads a study; prints what is wrong with it.
@@ -152,19 +221,6 @@ fn prepare(path: &Path, robot: &RobotArguments) -> Option<PreparedStudy> {
     }
 }
 
-/// Why a folder holds no shard of this study.
-fn foreign_shard(prepared: &PreparedStudy, shards: &[PathBuf]) -> Option<StudyError> {
-    let ours = prepared.manifest(None);
-    shards
-        .iter()
-        .find_map(|folder| match Manifest::read(folder) {
-            Ok(Some(manifest)) => ours.other_study(folder, &manifest),
-            // What is no folder of a study is refused by the merge.
-            Ok(None) => None,
-            Err(error) => Some(error),
-        })
-}
-
 fn prepare_outputs(
     folder: &Path,
     prepared: &PreparedStudy,
@@ -176,13 +232,6 @@ fn prepare_outputs(
     prepare_folder(folder)?;
     let junit = wanted.junit.as_deref();
     junit.map_or(Ok(()), |path| probe_file(path, "--junit"))
-}
-
-fn threads(jobs: Option<u16>) -> usize {
-    jobs.map_or_else(
-        || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        usize::from,
-    )
 }
 
 /// A finding if the study will take long, or an error if its cases cannot be computed.
@@ -213,9 +262,13 @@ fn too_long(
     )))
 }
 
-fn show(progress: &TerminalProgress, event: Event<'_>) {
+pub(super) fn show(progress: &TerminalProgress, event: Event<'_>) {
     match event {
-        Event::CutOff { .. } | Event::Damage { .. } | Event::Unsound { .. } => {
+        Event::CutOff { .. }
+        | Event::Damage { .. }
+        | Event::Unsound { .. }
+        | Event::OtherStudies { .. }
+        | Event::Space { .. } => {
             complain(&event.to_string());
         }
         Event::Begin { kept, total } => {
@@ -225,6 +278,10 @@ fn show(progress: &TerminalProgress, event: Event<'_>) {
             progress.message("cases");
             progress.at(kept, total);
         }
+        Event::Shards { done, total } => {
+            progress.message("shards");
+            progress.at(done, total);
+        }
         Event::Cases { done, total } => progress.at(done, total),
         Event::Table { done, total } => {
             progress.message("table");
@@ -233,7 +290,7 @@ fn show(progress: &TerminalProgress, event: Event<'_>) {
     }
 }
 
-fn failed(error: &StudyError) -> ExitStatus {
+pub(super) fn failed(error: &StudyError) -> ExitStatus {
     complain(&format!("error: {error}"));
     if error.is_input() {
         ExitStatus::BadInput
@@ -273,10 +330,10 @@ fn finish(
     let written = write_study(prepared, &results, &output, &progress);
     progress.finish();
     if matches!(written, Err(FilesError::Interrupted)) {
-        anstream::eprintln!(
+        complain(&format!(
             "interrupted: all cases are in {}, their summary is not; --resume goes on",
-            folder.display()
-        );
+            shown(folder)
+        ));
         return Ok(ExitStatus::Interrupted);
     }
     let finished =
@@ -399,6 +456,7 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
     let mut reports = Vec::new();
     let outputs = Outputs {
         rtde: false,
+        mcap: false,
         pictures: arguments.pictures.are_wanted(arguments.results.quiet),
         page: !arguments.results.no_page,
         text: if arguments.results.json {

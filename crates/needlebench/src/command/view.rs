@@ -7,9 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use needlebench_bench::Control;
-use needlebench_bench::Stop;
 use needlebench_bench::ct::{BuildFiles, VOLUME_FILE, imaged};
+use needlebench_bench::{Control, Stop};
 use needlebench_cell::{Finding, Overrides, load_scenario};
 use needlebench_viewer::{Case, Server, Stopper};
 
@@ -18,6 +17,7 @@ use crate::command::run::prepare_folder;
 use crate::command::{overrides, print_text};
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::interrupts::threads;
 use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
@@ -134,7 +134,7 @@ fn folder(path: &Path, overrides: &Overrides, cancel: &AtomicBool) -> Result<Pat
     prepare_folder(&folder).map_err(|finding| Stop::Refused(vec![finding]))?;
     let progress = TerminalProgress::new(false);
     let control = Control {
-        threads: std::thread::available_parallelism().map_or(1, usize::from),
+        threads: threads(None),
         cancel,
         progress: &progress,
     };

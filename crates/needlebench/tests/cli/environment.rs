@@ -163,6 +163,81 @@ fn cache_folder_that_cannot_be_written_is_named() {
 }
 
 #[test]
+fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
+    let bench = Bench::new();
+    let fetched = bench.run(&["doctor", "--download", "wheels", "--json"]);
+    let fetched = fetched.exits_with(0).json();
+    assert_eq!(fetched["files"].as_array().unwrap().len(), 2, "{fetched}");
+
+    // Nobody answers there.
+    let nowhere = "http://127.0.0.1:9";
+    let cache = bench.path("cache").display().to_string();
+    let offline = [
+        ("NEEDLEBENCH_CACHE_DIR", Some(cache.as_str())),
+        ("PIP_INDEX_URL", Some(nowhere)),
+        ("PIP_FIND_LINKS", None),
+        ("HTTPS_PROXY", Some(nowhere)),
+        ("HTTP_PROXY", Some(nowhere)),
+        ("ALL_PROXY", Some(nowhere)),
+        ("PIP_RETRIES", Some("0")),
+    ];
+    let prepare = ["doctor", "--prepare", "--wheels", "wheels", "--json"];
+    let refused = bench
+        .run_with(&offline, &["doctor", "--prepare"])
+        .exits_with(3);
+    refused.complains(["needlebench doctor --download", "--prepare --wheels"]);
+
+    let ready = bench.run_with(&offline, &prepare).exits_with(0).json();
+    assert_eq!(ready["made"], true);
+    let folder = ready["folder"].as_str().unwrap();
+    assert!(folder.starts_with(&cache), "{ready}");
+    // MuJoCo and numpy, unpacked.
+    let size = ready["size_bytes"].as_u64().unwrap();
+    assert!((50_000_000..200_000_000).contains(&size), "{size}");
+    let again = bench.run_with(&offline, &["doctor", "--prepare", "--json"]);
+    assert_eq!(again.exits_with(0).json()["made"], false);
+    bench.run_with(&offline, &["doctor"]).exits_with(0);
+
+    // A wheel that was cut off or changed on its way.
+    std::fs::remove_dir_all(&cache).unwrap();
+    let wheels = bench.tree("wheels");
+    let numpy = wheels
+        .iter()
+        .find(|file| file.display().to_string().contains("numpy"));
+    let name = numpy.unwrap().file_name().unwrap().to_str().unwrap();
+    let mut bytes = bench.read(&format!("wheels/{name}"));
+    *bytes.last_mut().unwrap() ^= 1;
+    bench.write(&format!("wheels/{name}"), bytes);
+    let refused = bench.run_with(&offline, &prepare).exits_with(3);
+    refused.complains([name, "is damaged", "hint: needlebench doctor --download"]);
+    assert!(
+        !bench
+            .tree("cache")
+            .iter()
+            .any(|file| file.ends_with("complete"))
+    );
+}
+
+#[test]
+fn wheels_for_what_there_are_none_are_refused_before_anything_is_fetched() {
+    let bench = Bench::new();
+    let download = ["doctor", "--download", "wheels"];
+    for (option, value, reason) in [
+        ("--for-python", "3.9", "3.11 to 3.15"),
+        ("--for-platform", "amiga", "linux-x86_64"),
+    ] {
+        let arguments = [&download[..], &[option, value]].concat();
+        bench.run(&arguments).exits_with(2).complains([reason]);
+    }
+    let prepare = ["doctor", "--prepare", "--wheels", "nowhere"];
+    bench
+        .run(&prepare)
+        .exits_with(2)
+        .complains(["nowhere", "hint: "]);
+    assert!(!bench.path("wheels").exists());
+}
+
+#[test]
 fn doctor_exits_with_3_and_the_same_advice() {
     let bench = Bench::new();
     let variables = [("NEEDLEBENCH_PYTHON", Some("/nonexistent/python"))];

@@ -2,7 +2,7 @@
 
 use crate::support::{Bench, has_keys, mujoco_is_ready};
 
-const COMMANDS: [&str; 20] = [
+const COMMANDS: [&str; 23] = [
     "init",
     "suggest",
     "run",
@@ -11,6 +11,7 @@ const COMMANDS: [&str; 20] = [
     "fk",
     "clearance",
     "atlas",
+    "export",
     "compare",
     "ct",
     "view",
@@ -21,7 +22,9 @@ const COMMANDS: [&str; 20] = [
     "paper",
     "report",
     "schema",
+    "search",
     "doctor",
+    "licences",
     "completions",
 ];
 
@@ -53,6 +56,25 @@ fn version_says_which_revision_it_is() {
     let version = Bench::new().run(&["--version"]).exits_with(0).stdout;
     let expected = concat!("needlebench ", env!("CARGO_PKG_VERSION"), " (");
     assert!(version.starts_with(expected), "{version}");
+}
+
+#[test]
+fn licences_name_what_is_inside_and_only_what_needs_naming() {
+    let notices = Bench::new().run(&["licences"]).exits_with(0).stdout;
+    for work in [
+        "three.js",
+        "Noto Sans Mono",
+        "Zstandard",
+        "pip-",
+        "crate rapier3d-f64 ",
+        "musl",
+    ] {
+        assert!(notices.contains(work), "{work}");
+    }
+    assert!(
+        !notices.contains("crate needlebench"),
+        "our own are no third party's"
+    );
 }
 
 #[test]

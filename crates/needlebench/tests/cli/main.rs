@@ -1,6 +1,8 @@
 //! The program from outside: what it prints, writes, refuses, and how it ends.
 
 mod accuracy;
+#[cfg(unix)]
+mod action;
 mod arguments;
 mod arms;
 mod atlas;
@@ -10,6 +12,8 @@ mod bad_scenario;
 mod calibration;
 mod check;
 mod clearance;
+#[cfg(target_os = "linux")]
+mod cluster;
 mod compare;
 mod compare_studies;
 mod credibility;
@@ -21,6 +25,8 @@ mod determinism;
 #[cfg(target_os = "linux")]
 mod environment;
 mod events;
+mod export;
+mod export_motion;
 mod first_slips;
 mod help;
 mod imperfect;
@@ -43,6 +49,7 @@ mod robust_io;
 mod run;
 mod schema;
 mod screen;
+mod search;
 mod study;
 mod suggest;
 mod support;

@@ -173,6 +173,8 @@ fn provenance_identifies_the_program_the_engines_and_every_input() {
         &[
             "version",
             "git_revision",
+            "source_sha256",
+            "arithmetic",
             "cargo_lock_sha256",
             "engines",
             "inputs",

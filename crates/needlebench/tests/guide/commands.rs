@@ -3,12 +3,15 @@
 //! Blocks in `console` are run, and what they print is compared. What takes too long for that stands in a block
 //! in `sh`, and has to be a command line that the program understands.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
+
+use sha2::{Digest, Sha256};
 
 use crate::book::{blocks, chapters, workspace};
 
@@ -53,7 +56,19 @@ fn run(chapter: &Path, folder: &Path) {
     }
     // The same in every build.
     cases.insert_var("[BUILD]", build()).unwrap();
+    cases.insert_var("[LOCK]", lock_hash()).unwrap();
     cases.timeout(LONGEST).case(chapter).run();
+}
+
+/// SHA-256 of the lock file, which changes with every dependency.
+fn lock_hash() -> String {
+    let bytes = std::fs::read(workspace().join("Cargo.lock")).unwrap();
+    Sha256::digest(bytes)
+        .iter()
+        .fold(String::new(), |mut text, byte| {
+            let _ = write!(text, "{byte:02x}");
+            text
+        })
 }
 
 /// What stands in brackets behind the program's version.

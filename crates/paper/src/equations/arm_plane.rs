@@ -56,7 +56,7 @@ pub fn planar_up<T: RealField + Copy>(arm: &Arm<T>, q2: T, q3: T) -> T {
 /// Where forward kinematics has wrist 1 in the plane of the arm, m: ahead of and above the
 /// shoulder.
 pub(super) fn wrist_1_in_plane(posture: &Posture) -> (f64, f64) {
-    let (s1, c1) = posture.q[0].sin_cos();
+    let (s1, c1) = libm::sincos(posture.q[0]);
     let from_shoulder = origin(&posture.frames[3]) - origin(&posture.frames[1]);
     (from_shoulder.x * c1 + from_shoulder.y * s1, from_shoulder.z)
 }
@@ -71,7 +71,7 @@ fn error_of_p4(posture: &Posture, axis: usize) -> f64 {
 
 fn error_of_23(posture: &Posture) -> f64 {
     let expected = origin(&posture.frames[4]);
-    (l(&p4_of(posture)) - expected.x.hypot(expected.y)).abs()
+    (l(&p4_of(posture)) - libm::hypot(expected.x, expected.y)).abs()
 }
 
 fn error_of_24_printed(posture: &Posture) -> f64 {

@@ -256,8 +256,9 @@ fn reachable_difference(posture: &Posture) -> (Matrix6<f64>, Vector6<f64>) {
 fn error_of_determinant(posture: &Posture) -> f64 {
     let arm = &posture.arm;
     let q = &posture.q;
-    let forward = super::arm_plane::planar_forward(arm, q[1], q[2]) + arm.d5 * posture.q234().sin();
-    let product = arm.a2 * arm.a3 * q[2].sin() * q[4].sin() * forward;
+    let forward =
+        super::arm_plane::planar_forward(arm, q[1], q[2]) + arm.d5 * libm::sin(posture.q234());
+    let product = arm.a2 * arm.a3 * libm::sin(q[2]) * libm::sin(q[4]) * forward;
     let determinant = jacobian(&posture.frames).determinant();
     (determinant.abs() - product.abs()).abs()
 }
@@ -403,7 +404,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         mended_text: "S_5 = 0 (wrist), S_3 = 0 (elbow), ρ = d_4 (shoulder): |det J| = |a_2a_3S_3S_5(a_2C_2 + a_3C_{23} + d_5S_{234})|",
         // A posture that is singular although S5 says that it is not.
         printed: |posture| {
-            let missed = posture.q[4].sin().abs() > 1e-3 && regularity(posture) < 1e-12;
+            let missed = libm::sin(posture.q[4]).abs() > 1e-3 && regularity(posture) < 1e-12;
             if missed { 1.0 } else { 0.0 }
         },
         mended: error_of_determinant,

@@ -28,7 +28,7 @@ pub fn alpha<T: RealField + Copy>(r1: T, r2: T) -> T {
 
 /// Equation 35 as printed, with one argument: read as an arc tangent.
 pub fn beta_printed(arm: &Arm<f64>, q3: f64) -> f64 {
-    (arm.a3 * q3.sin() * arm.a2 + arm.a3 * q3.cos()).atan()
+    libm::atan(arm.a3 * libm::sin(q3) * arm.a2 + arm.a3 * libm::cos(q3))
 }
 
 /// Equation 35 with its comma.
@@ -57,23 +57,23 @@ fn error_of_29(posture: &Posture) -> f64 {
     let (a2, a3) = (posture.arm.a2, posture.arm.a3);
     let (q2, q23) = (posture.q[1], posture.q[1] + posture.q[2]);
     let left = r1 * r1 + r2 * r2 - (a2 * a2 + a3 * a3);
-    let middle = 2.0 * a2 * a3 * (q23.cos() * q2.cos() + q23.sin() * q2.sin());
-    let right = 2.0 * a2 * a3 * (q23 - q2).cos();
+    let middle = 2.0 * a2 * a3 * (libm::cos(q23) * libm::cos(q2) + libm::sin(q23) * libm::sin(q2));
+    let right = 2.0 * a2 * a3 * libm::cos(q23 - q2);
     (left - middle).abs().max((middle - right).abs())
 }
 
 fn error_of_30(posture: &Posture) -> f64 {
     let q23 = posture.q[1] + posture.q[2];
-    ((q23 - posture.q[1]).cos() - posture.q[2].cos()).abs()
+    (libm::cos(q23 - posture.q[1]) - libm::cos(posture.q[2])).abs()
 }
 
 fn error_of_31(posture: &Posture) -> f64 {
-    (c3_of(posture) - posture.q[2].cos()).abs()
+    (c3_of(posture) - libm::cos(posture.q[2])).abs()
 }
 
 fn error_of_32(posture: &Posture) -> f64 {
     let c3 = c3_of(posture);
-    either_sign(|sign| (sign * (1.0 - c3 * c3).sqrt() - posture.q[2].sin()).abs())
+    either_sign(|sign| (sign * (1.0 - c3 * c3).sqrt() - libm::sin(posture.q[2])).abs())
 }
 
 fn error_of_33(posture: &Posture) -> f64 {
@@ -84,13 +84,13 @@ fn error_of_33(posture: &Posture) -> f64 {
 fn error_of_34(posture: &Posture, r1: f64) -> f64 {
     let (forward, up) = wrist_1_in_plane(posture);
     let found = alpha(r1, r2(&posture.arm, &p4_of(posture)));
-    angle_error(found, up.atan2(forward))
+    angle_error(found, libm::atan2(up, forward))
 }
 
 /// The angle that `q2` is short of the line to wrist 1, by forward kinematics.
 fn true_beta(posture: &Posture) -> f64 {
     let (forward, up) = wrist_1_in_plane(posture);
-    up.atan2(forward) - posture.q[1]
+    libm::atan2(up, forward) - posture.q[1]
 }
 
 fn error_of_36(posture: &Posture, r1: f64) -> f64 {

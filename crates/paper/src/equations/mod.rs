@@ -202,7 +202,7 @@ impl Posture {
 /// A unit vector, uniform on the sphere: Archimedes' cylinder.
 fn random_axis(random: &mut SplitMix64) -> Vector3<f64> {
     let z = random.uniform(-1.0, 1.0);
-    let (sine, cosine) = random.uniform(-PI, PI).sin_cos();
+    let (sine, cosine) = libm::sincos(random.uniform(-PI, PI));
     let radius = (1.0 - z * z).sqrt();
     Vector3::new(radius * cosine, radius * sine, z)
 }
@@ -215,8 +215,8 @@ pub const WELL_CONDITIONED_M: f64 = 0.08;
 /// Far from the wrist's, the elbow's and the shoulder's singularity.
 pub fn well_conditioned(q: &[f64; 6]) -> bool {
     let forward_m = UrGeometry::UR3.wrist_forward_m(&Joints::from(*q));
-    q[2].sin().abs() >= WELL_CONDITIONED_SINE
-        && q[4].sin().abs() >= WELL_CONDITIONED_SINE
+    libm::sin(q[2]).abs() >= WELL_CONDITIONED_SINE
+        && libm::sin(q[4]).abs() >= WELL_CONDITIONED_SINE
         && forward_m.abs() >= WELL_CONDITIONED_M
 }
 

@@ -37,11 +37,11 @@ fn error_of_frame_4(posture: &Posture) -> f64 {
 }
 
 fn error_of_14(posture: &Posture) -> f64 {
-    (posture.frames[4][(2, 0)] - posture.q234().sin()).abs()
+    (posture.frames[4][(2, 0)] - libm::sin(posture.q234())).abs()
 }
 
 fn error_of_15(posture: &Posture) -> f64 {
-    (posture.frames[4][(2, 2)] + posture.q234().cos()).abs()
+    (posture.frames[4][(2, 2)] + libm::cos(posture.q234())).abs()
 }
 
 fn error_of_16(posture: &Posture) -> f64 {
@@ -55,7 +55,7 @@ fn error_of_17(posture: &Posture) -> f64 {
 }
 
 fn error_of_18(posture: &Posture) -> f64 {
-    let of = |frame: &Matrix4<f64>| frame[(2, 0)].atan2(-frame[(2, 2)]);
+    let of = |frame: &Matrix4<f64>| libm::atan2(frame[(2, 0)], -frame[(2, 2)]);
     let from_joints = angle_error(of(&posture.frames[4]), posture.q234());
     let from_target = angle_error(of(&frame_4_from_target(posture)), posture.q234());
     from_joints.max(from_target)

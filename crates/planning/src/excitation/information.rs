@@ -132,7 +132,7 @@ impl<'a> Calibration<'a> {
     pub fn gain(&self, q: &Joints) -> f64 {
         let rows = sensitivity(self.chain, q);
         let spread = rows * self.covariance * rows.transpose() + SMatrix::<f64, 6, 6>::identity();
-        spread.determinant().max(1.0).ln()
+        libm::log(spread.determinant().max(1.0))
     }
 
     pub fn add(&mut self, q: &Joints) {

@@ -579,7 +579,7 @@ impl<'a> Telling<'a> {
             .zip(&self.gravity)
             .map(|(row, known)| {
                 let inverse = known.try_inverse().unwrap_or_else(Matrix2::identity);
-                (1.0 + row.dot(&(inverse * row))).ln()
+                libm::log(1.0 + row.dot(&(inverse * row)))
             })
             .sum();
         self.calibration.gain(q) + gravity

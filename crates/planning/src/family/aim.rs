@@ -140,10 +140,10 @@ fn soft_least_m(clearance: &ByClass) -> f64 {
     let terms: f64 = ClearanceClass::ALL
         .into_iter()
         .filter(|class| changes_with_roll(*class))
-        .map(|class| (-clearance.get(class) / CLEARANCE_SCALE_M).exp())
+        .map(|class| libm::exp(-clearance.get(class) / CLEARANCE_SCALE_M))
         .sum();
     if terms > 0.0 {
-        -CLEARANCE_SCALE_M * terms.ln()
+        -CLEARANCE_SCALE_M * libm::log(terms)
     } else {
         f64::INFINITY
     }

@@ -477,7 +477,7 @@ impl Planner<'_> {
     }
 
     /// The same without clearances.
-    fn surplus_of_joints(&self, margins: &PostureMargins, rejections: &[Rejection]) -> f64 {
+    pub fn surplus_of_joints(&self, margins: &PostureMargins, rejections: &[Rejection]) -> f64 {
         let others = rejections
             .iter()
             .filter_map(|rejection| match rejection.rule {

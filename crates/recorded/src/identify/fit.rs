@@ -392,7 +392,7 @@ impl Fit {
     pub fn unlikelihood(&self, data: &Data) -> f64 {
         let squares = self.squares(&data.sum(|_| true));
         let each = squares.iter().filter(|(_, rows)| *rows > 0.0);
-        each.map(|(sum, rows)| 0.5 * rows * (sum / rows + DIGITS_NM * DIGITS_NM).ln())
+        each.map(|(sum, rows)| 0.5 * rows * libm::log(sum / rows + DIGITS_NM * DIGITS_NM))
             .sum()
     }
 

@@ -30,8 +30,8 @@ fn state(t: f64) -> JointState {
         Joints::from_fn(|i, _| {
             let (a, w, p) = (0.9 - 0.08 * i as f64, 0.7 + 0.23 * i as f64, 0.5 * i as f64);
             let turn = f64::from(k) * std::f64::consts::FRAC_PI_2;
-            let second = 0.3 * (2.3 * w).powi(k.cast_signed()) * (2.3 * w * t + turn).sin();
-            a * w.powi(k.cast_signed()) * (w * t + p + turn).sin() + second
+            let second = 0.3 * (2.3 * w).powi(k.cast_signed()) * libm::sin(2.3 * w * t + turn);
+            a * w.powi(k.cast_signed()) * libm::sin(w * t + p + turn) + second
         })
     };
     JointState {

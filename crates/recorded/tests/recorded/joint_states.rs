@@ -144,6 +144,9 @@ fn of_several_topics_one_is_asked_for() {
         ..ReadOptions::default()
     };
     assert_eq!(read(&folder, &options).unwrap().len(), 100);
+    // What the arm itself does is on ROS's own topic.
+    let folder = file(&["/joint_states_planned", "/joint_states"], 0.0, 0);
+    assert_eq!(read(&folder, &ReadOptions::default()).unwrap().len(), 100);
 }
 
 #[test]

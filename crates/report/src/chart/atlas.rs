@@ -12,7 +12,7 @@ use needlebench_planning::{Member, Rule};
 
 use super::drawing::{Anchor, Chart, Mark, Size};
 use super::legend::{ROW_PX, Sample, legend};
-use super::paint::{Paint, Rgb, Stroke};
+use super::paint::{Paint, Rgb, Stroke, mixed};
 
 /// Width of the map, px: three per degree.
 const MAP_PX: f64 = 1080.0;
@@ -265,20 +265,7 @@ fn clearance_color(clearance_m: f64) -> Rgb {
     } else {
         2
     };
-    let part = place - from as f64;
-    std::array::from_fn(|channel| {
-        let (a, b) = (
-            f64::from(colors[from][channel]),
-            f64::from(colors[from + 1][channel]),
-        );
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between two bytes"
-        )]
-        let mixed = (a + (b - a) * part).round() as u8;
-        mixed
-    })
+    mixed([colors[from], colors[from + 1]], place - from as f64)
 }
 
 #[cfg(test)]

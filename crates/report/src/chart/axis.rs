@@ -95,7 +95,7 @@ impl Axis {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
             Scale::Logarithmic => {
-                (value.max(self.low) / self.low).ln() / (self.high / self.low).ln()
+                libm::log(value.max(self.low) / self.low) / libm::log(self.high / self.low)
             }
         };
         share.clamp(0.0, 1.0)
@@ -134,7 +134,7 @@ pub fn round_step(range: f64, wanted: f64) -> f64 {
     if !(raw > 0.0 && raw.is_finite()) {
         return 0.0;
     }
-    let decade = 10_f64.powf(raw.log10().floor());
+    let decade = libm::pow(10_f64, libm::log10(raw).floor());
     [1.0, 2.0, 5.0, 10.0]
         .map(|factor| factor * decade)
         .into_iter()

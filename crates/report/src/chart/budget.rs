@@ -191,7 +191,7 @@ fn ellipse_points(moments: &Moments, (x, y): (usize, usize)) -> Vec<[f64; 2]> {
     (0..=POINTS)
         .map(|k| {
             let (sine, cosine) =
-                (std::f64::consts::TAU * f64::from(k) / f64::from(POINTS)).sin_cos();
+                libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(POINTS));
             [
                 1e3 * (bias[x] + ELLIPSE_95 * a * cosine),
                 1e3 * (bias[y] + ELLIPSE_95 * (b * cosine + c * sine)),

@@ -3,6 +3,20 @@
 /// Red, green, blue (sRGB).
 pub type Rgb = [u8; 3];
 
+/// Between two colours: the first at 0, the second at 1.
+pub fn mixed([first, second]: [Rgb; 2], share: f64) -> Rgb {
+    std::array::from_fn(|channel| {
+        let (a, b) = (f64::from(first[channel]), f64::from(second[channel]));
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between two bytes"
+        )]
+        let mixed = (a + (b - a) * share).round() as u8;
+        mixed
+    })
+}
+
 /// Colours that people with any colour vision tell apart (Okabe and Ito 2008), the darker ones first:
 /// they stand out from a white page.
 const SERIES: [Rgb; 8] = [
@@ -156,10 +170,10 @@ pub(crate) mod tests {
     ];
 
     fn seen(rgb: Rgb, vision: &[[f64; 3]; 3]) -> [f64; 3] {
-        let light = rgb.map(|byte| (f64::from(byte) / 255.0).powf(2.2));
+        let light = rgb.map(|byte| libm::pow(f64::from(byte) / 255.0, 2.2));
         std::array::from_fn(|row| {
             let mixed: f64 = (0..3).map(|k| vision[row][k] * light[k]).sum();
-            mixed.max(0.0).powf(1.0 / 2.2)
+            libm::pow(mixed.max(0.0), 1.0 / 2.2)
         })
     }
 

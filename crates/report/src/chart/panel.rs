@@ -119,7 +119,7 @@ impl Panel {
             }
             let place = self.at(point);
             let far = run.last().is_none_or(|last| {
-                let gap = (place[0] - last[0]).hypot(place[1] - last[1]);
+                let gap = libm::hypot(place[0] - last[0], place[1] - last[1]);
                 // Less is not seen.
                 gap >= 0.7
             });

@@ -68,7 +68,7 @@ impl Canvas {
         for pair in points.windows(2) {
             let [from, to] = [pair[0], pair[1]];
             let along = [to[0] - from[0], to[1] - from[1]];
-            let length = along[0].hypot(along[1]);
+            let length = libm::hypot(along[0], along[1]);
             if !length.is_finite() {
                 continue;
             }
@@ -130,7 +130,10 @@ impl Canvas {
             } else {
                 0.0
             };
-            depth((offset[0] - share * along[0]).hypot(offset[1] - share * along[1]))
+            depth(libm::hypot(
+                offset[0] - share * along[0],
+                offset[1] - share * along[1],
+            ))
         });
     }
 
@@ -144,7 +147,7 @@ impl Canvas {
                 .map(|[a, b]| {
                     let along = [b[0] - a[0], b[1] - a[1]];
                     let turn = along[0] * (y - a[1]) - along[1] * (x - a[0]);
-                    area.signum() * turn / along[0].hypot(along[1])
+                    area.signum() * turn / libm::hypot(along[0], along[1])
                 })
                 .fold(f64::INFINITY, f64::min)
         });

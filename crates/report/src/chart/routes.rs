@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::drawing::{Anchor, Chart};
 use super::legend::{Sample, legend};
-use super::paint::{Paint, Rgb};
+use super::paint::{Paint, Rgb, mixed};
 use super::skin_map::{HIGHEST_DEG, numbered, skin_panel};
 
 /// Colours of rules, told apart by lightness too.
@@ -86,7 +86,7 @@ pub fn routes_chart(scenario: &str, plan: &RoutePlan) -> Option<Chart> {
                 RULES[known].2
             }
         };
-        let across = half / elevation.to_radians().cos();
+        let across = half / libm::cos(elevation.to_radians());
         let [left, top] = panel.at([(azimuth - across).max(-180.0), elevation + half]);
         let [right, foot] = panel.at([(azimuth + across).min(180.0), elevation - half]);
         chart.fill([left, top], [right - left, foot - top], Paint::Fixed(rgb));
@@ -128,15 +128,6 @@ pub fn routes_chart(scenario: &str, plan: &RoutePlan) -> Option<Chart> {
 
 /// Darker is better.
 fn shade(odds: f64, least: f64) -> Rgb {
-    let share = (odds / least).log2().clamp(0.0, 1.0);
-    std::array::from_fn(|channel| {
-        let (a, b) = (f64::from(FREE[0][channel]), f64::from(FREE[1][channel]));
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between two bytes"
-        )]
-        let mixed = (a + (b - a) * share).round() as u8;
-        mixed
-    })
+    let share = libm::log2(odds / least).clamp(0.0, 1.0);
+    mixed(FREE, share)
 }

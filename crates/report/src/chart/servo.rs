@@ -257,7 +257,7 @@ impl Drawing<'_> {
             [low.min(hertz), high.max(hertz)]
         });
         let rows: [(&str, Response); 2] = [
-            ("gain (dB)", |gain, _| 20.0 * gain.log10()),
+            ("gain (dB)", |gain, _| 20.0 * libm::log10(gain)),
             ("phase (deg)", |_, phase_rad| unwound(phase_rad)),
         ];
         for (row, (label, value)) in rows.into_iter().enumerate() {
@@ -327,7 +327,7 @@ mod tests {
         Course {
             reference_rad: vec![height_rad; STATES],
             motion_rad: (0..STATES)
-                .map(|step| height_rad * (1.0 - (-0.02 * step as f64).exp()))
+                .map(|step| height_rad * (1.0 - libm::exp(-0.02 * step as f64)))
                 .collect(),
             torque_nm: vec![torque_nm; STATES - 1],
             saturated: (0..STATES - 1).map(|step| step < 5).collect(),

@@ -6,7 +6,7 @@ use needlebench_cell::ResolvedScenario;
 use super::axis::Axis;
 use super::drawing::{Anchor, Chart};
 use super::legend::{Sample, legend};
-use super::paint::{Paint, Rgb, Stroke};
+use super::paint::{Paint, Rgb, Stroke, mixed};
 use super::panel::Panel;
 use super::skin_map::{HIGHEST_DEG, MARK_PX, numbered, skin_panel};
 
@@ -39,7 +39,7 @@ pub fn entries_chart(scenario: &str, found: &EntrySearch) -> Chart {
         if elevation.abs() > HIGHEST_DEG {
             continue;
         }
-        let half = HALF_DEG / elevation.to_radians().cos() + 0.6;
+        let half = HALF_DEG / libm::cos(elevation.to_radians()) + 0.6;
         let [left, top] = panel.at([azimuth - half, elevation + HALF_DEG]);
         let [right, foot] = panel.at([azimuth + half, elevation - HALF_DEG]);
         let fill = Paint::Fixed(colour(sample.refused));
@@ -189,7 +189,7 @@ fn axes(found: &PlaceSearch) -> [Axis; 2] {
 /// Table and patient from above.
 fn outline(chart: &mut Chart, panel: &Panel, resolved: &ResolvedScenario) {
     if let Some(table) = &resolved.scenario.table {
-        let (sine, cosine) = table.yaw_deg.to_radians().sin_cos();
+        let (sine, cosine) = libm::sincos(table.yaw_deg.to_radians());
         let [x, y] = table.center_mm;
         let [half_x, half_y] = [0.5 * table.length_mm, 0.5 * table.width_mm];
         let corners = [
@@ -229,16 +229,7 @@ fn count_colour(working: usize) -> Rgb {
         return NONE;
     }
     let share = (working.min(8) - 1) as f64 / 7.0;
-    std::array::from_fn(|channel| {
-        let (a, b) = (f64::from(ENDS[0][channel]), f64::from(ENDS[1][channel]));
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between two bytes"
-        )]
-        let mixed = (a + (b - a) * share).round() as u8;
-        mixed
-    })
+    mixed(ENDS, share)
 }
 
 #[cfg(test)]

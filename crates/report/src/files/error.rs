@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use needlebench_export::ExportError;
 use needlebench_study::ResultsError;
 
 use needlebench_render::PictureError;
@@ -44,6 +45,9 @@ pub enum FilesError {
     /// A static case of a study cannot be planned.
     #[error("planning some cases: {0}")]
     Replan(String),
+    /// A recording cannot be exported.
+    #[error(transparent)]
+    Export(#[from] ExportError),
     /// The user ended it.
     #[error("interrupted")]
     Interrupted,

@@ -13,6 +13,9 @@ use needlebench_render::Image;
 /// Files of charts: pixels for viewers and documents, vectors for papers and pages.
 const CHARTS: [&str; 2] = ["png", "svg"];
 
+/// Files of recordings.
+const RECORDINGS: [&str; 2] = ["csv", "mcap"];
+
 /// A folder of results; names of files are relative to it.
 #[derive(Debug, Clone, Copy)]
 pub struct Folder<'a>(pub &'a Path);
@@ -93,8 +96,9 @@ impl Folder<'_> {
         for entry in entries {
             let name = entry.file_name().to_string_lossy().into_owned();
             let extension = Path::new(&name).extension().and_then(|text| text.to_str());
-            let ours = extension
-                .is_some_and(|extension| extension == "csv" || CHARTS.contains(&extension));
+            let ours = extension.is_some_and(|extension| {
+                RECORDINGS.contains(&extension) || CHARTS.contains(&extension)
+            });
             let name = format!("{folder}/{name}");
             if ours && !written.contains(&name) {
                 self.remove(&name)?;

@@ -7,6 +7,7 @@ use needlebench_bench::progress::Progress;
 use needlebench_bench::{EngineRun, EventRun, ScenarioRun};
 use needlebench_cell::ResolvedScenario;
 use needlebench_engine::Engine;
+use needlebench_export::{Motion, mcap};
 use needlebench_planning::GoalPlan;
 
 use super::accuracy::remove_accuracy;
@@ -23,9 +24,12 @@ use crate::page::run_page;
 
 /// Which files a run leaves besides its report, and how they are made.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_excessive_bools, reason = "switches of a run")]
 pub struct RunFiles<'a> {
     /// A log of each recording by the names of UR's real-time data exchange, whatever the scenario wants.
     pub rtde: bool,
+    /// An MCAP file of each recording.
+    pub mcap: bool,
     /// Pictures and charts, if the scenario wants any.
     pub pictures: bool,
     /// The page.
@@ -55,6 +59,9 @@ pub fn write_run(
     let mut names = write_recordings(resolved, finished, folder)?;
     if wanted.rtde || resolved.scenario.recording.rtde {
         write_rtde(resolved, finished, folder, &mut names)?;
+    }
+    if wanted.mcap {
+        write_mcap(resolved, finished, folder, &mut names)?;
     }
     for run in &finished.events {
         let of_run = write_events(resolved, run, &finished.plans, folder, pictures)?;
@@ -165,6 +172,30 @@ fn write_rtde(
                     resolved.goals[goal].name, run.engine
                 );
                 folder.write(&name, rtde_csv(&log))?;
+                names[goal][configuration].push(name);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Recordings of all motions that came to their end as messages of ROS 2.
+fn write_mcap(
+    resolved: &ResolvedScenario,
+    finished: &ScenarioRun,
+    folder: Folder<'_>,
+    names: &mut Names,
+) -> Result<(), FilesError> {
+    for (goal, runs) in finished.runs.iter().enumerate() {
+        for (configuration, runs) in runs.iter().enumerate() {
+            for run in runs {
+                let place = [goal, configuration];
+                let Some(motion) = Motion::in_run(resolved, finished, place, run) else {
+                    continue;
+                };
+                let label = motion.configuration;
+                let name = format!("{}/{label}.{}.mcap", motion.goal.name, run.engine);
+                folder.write(&name, mcap(&motion, &name)?.bytes)?;
                 names[goal][configuration].push(name);
             }
         }

@@ -1,6 +1,5 @@
 //! What a run's page needs to try postures: the scene, the code that computes with it, and names.
 
-use needlebench_cell::scenario::AttachedTo;
 use needlebench_cell::{ClearanceClass, Frame, Goal, ResolvedScenario, Roll};
 use needlebench_kinematics::Pose;
 use needlebench_kinematics::ik::Configuration;
@@ -108,12 +107,6 @@ fn goal(resolved: &ResolvedScenario, goal: &Goal) -> Value {
         "free": goal.roll == Roll::Free,
         "fromBase": section.is_some_and(|section| section.flange_pose.is_some()),
     })
-}
-
-/// Whether something of the cell goes where the robot's base goes.
-pub(super) fn goes_with_base(resolved: &ResolvedScenario, name: &str) -> bool {
-    let mut obstacles = resolved.scenario.obstacles.iter();
-    obstacles.any(|each| each.name == name && each.attached_to == AttachedTo::RobotBase)
 }
 
 #[cfg(test)]

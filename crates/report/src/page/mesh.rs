@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 use needlebench_geometry::TriangleMesh;
-use needlebench_kinematics::Pose;
 use serde_json::{Value, json};
 
 use super::pack::Pack;
@@ -14,18 +13,6 @@ pub(super) const MOST_TRIANGLES: usize = 16_000;
 /// Edge of the cubes by which the first attempt merges vertices, m, and factor to the next one.
 const FIRST_CUBE_M: f64 = 1e-3;
 const NEXT_CUBE: f64 = 1.3;
-
-/// Adds a copy of a mesh at a place.
-pub(super) fn append(to: &mut TriangleMesh, mesh: &TriangleMesh, place: &Pose) {
-    let first = u32::try_from(to.vertices_m.len()).expect("meshes are far below 2^32 vertices");
-    to.vertices_m
-        .extend(mesh.vertices_m.iter().map(|vertex| place * vertex));
-    to.triangles.extend(
-        mesh.triangles
-            .iter()
-            .map(|corners| corners.map(|corner| corner + first)),
-    );
-}
 
 /// The mesh with at most `most` triangles: vertices within a cube become their mean.
 pub(super) fn thinned(mesh: &TriangleMesh, most: usize) -> TriangleMesh {
@@ -142,37 +129,6 @@ pub(super) fn surface(pack: &mut Pack, mesh: &TriangleMesh) -> Value {
     })
 }
 
-/// Touching solids as one surface, without the walls between them: nobody sees those, but they flicker
-/// along the seams. A triangle is left out where its middle and all its corners, a little in front of
-/// it and off its edges, are within another solid.
-pub(super) fn joined(solids: &[TriangleMesh]) -> TriangleMesh {
-    const IN_FRONT_M: f64 = 1e-4;
-    const OFF_THE_EDGES: f64 = 0.02;
-    let mut whole = TriangleMesh {
-        vertices_m: Vec::new(),
-        triangles: Vec::new(),
-    };
-    for (index, solid) in solids.iter().enumerate() {
-        let mut seen = solid.clone();
-        seen.triangles.retain(|corners| {
-            let [a, b, c] = corners.map(|corner| solid.vertices_m[corner as usize].coords);
-            let Some(normal) = (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE) else {
-                return false;
-            };
-            let middle = (a + b + c) / 3.0;
-            let is_covered = [a, b, c, middle].into_iter().all(|corner| {
-                let point = corner.lerp(&middle, OFF_THE_EDGES) + normal * IN_FRONT_M;
-                solids.iter().enumerate().any(|(other, each)| {
-                    other != index && each.winding_number(&Point3::from(point)) != 0
-                })
-            });
-            !is_covered
-        });
-        append(&mut whole, &seen, &Pose::identity());
-    }
-    whole
-}
-
 #[cfg(test)]
 mod tests {
     use needlebench_geometry::Shape;
@@ -192,26 +148,6 @@ mod tests {
         for vertex in &thin.vertices_m {
             assert!((vertex.coords.norm() - 0.1).abs() < BALL_M);
         }
-    }
-
-    #[test]
-    fn walls_between_touching_solids_are_left_out() {
-        let half_extents_m = Vector3::repeat(0.1);
-        let cube = Shape::Cuboid { half_extents_m }.surface(1e-3);
-        let beside = |x_m: f64, z_m: f64| {
-            let mut moved = cube.clone();
-            for vertex in &mut moved.vertices_m {
-                *vertex += Vector3::new(x_m, 0.0, z_m);
-            }
-            moved
-        };
-        let count = cube.triangles.len();
-        let face = count / 6;
-        let joined_count = |x_m, z_m| joined(&[cube.clone(), beside(x_m, z_m)]).triangles.len();
-        assert_eq!(joined_count(0.2, 0.0), 2 * count - 2 * face);
-        // Apart, or covered in part: all is seen.
-        assert_eq!(joined_count(0.21, 0.0), 2 * count);
-        assert_eq!(joined_count(0.2, 0.1), 2 * count);
     }
 
     #[test]

@@ -313,7 +313,7 @@ mod tests {
     )]
     fn arrays_come_back_within_half_a_step() {
         let mut pack = Pack::default();
-        let wave: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.01).sin()).collect();
+        let wave: Vec<f64> = (0..1000).map(|k| libm::sin(f64::from(k) * 0.01)).collect();
         let mut gaps = wave.clone();
         gaps[3] = f64::NAN;
         gaps[999] = f64::INFINITY;

@@ -62,26 +62,7 @@ pub(super) fn configuration(
 ) -> Option<Value> {
     let q = Joints::from_column_slice(&report.joints_rad?);
     report.room.as_ref()?;
-    let obstacles = room.obstacles().all(&q);
-    let mut sight = obstacles.lines();
-    let targets = room.targets(goal, &q);
-    // Eye, end, and 1 where the line is blocked there.
-    let mut lines: Vec<f64> = Vec::new();
-    for person in &resolved.people.by_goal[goal] {
-        for &stature_m in &person.statures_m {
-            let eyes_m = person.eyes_m(stature_m);
-            let segments =
-                sight_segments(&eyes_m, person.head_movement_m, &targets, LINES_DRAWN / 2);
-            for [eye, target] in segments {
-                let blocked = sight.first_on_the_way(&eye, &target);
-                let end = blocked
-                    .as_ref()
-                    .map_or(target, |(t, _)| eye + (target - eye) * *t);
-                let flag = f64::from(u8::from(blocked.is_some()));
-                lines.extend([eye.x, eye.y, eye.z, end.x, end.y, end.z, flag]);
-            }
-        }
-    }
+    let lines = lines_of_sight(resolved, room, goal, &q);
     let sector = room.sector(goal);
     let taken = room.taken(goal, &q);
     let set: Vec<bool> = sector
@@ -98,4 +79,33 @@ pub(super) fn configuration(
         "taken": surface,
         "guideEntry": pose(&room.guide_entry(&q)),
     }))
+}
+
+/// Some lines of sight past a posture, seven numbers each: eye, end, and 1 where the line is blocked there.
+pub(super) fn lines_of_sight(
+    resolved: &ResolvedScenario,
+    room: &RoomModel<'_>,
+    goal: usize,
+    q: &Joints,
+) -> Vec<f64> {
+    let obstacles = room.obstacles().all(q);
+    let mut sight = obstacles.lines();
+    let targets = room.targets(goal, q);
+    let mut lines: Vec<f64> = Vec::new();
+    for person in &resolved.people.by_goal[goal] {
+        for &stature_m in &person.statures_m {
+            let eyes_m = person.eyes_m(stature_m);
+            let segments =
+                sight_segments(&eyes_m, person.head_movement_m, &targets, LINES_DRAWN / 2);
+            for [eye, target] in segments {
+                let blocked = sight.first_on_the_way(&eye, &target);
+                let end = blocked
+                    .as_ref()
+                    .map_or(target, |(t, _)| eye + (target - eye) * *t);
+                let flag = f64::from(u8::from(blocked.is_some()));
+                lines.extend([eye.x, eye.y, eye.z, end.x, end.y, end.z, flag]);
+            }
+        }
+    }
+    lines
 }

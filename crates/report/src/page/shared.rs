@@ -1,10 +1,13 @@
 //! What pages that are not reports take from those that are: style, scripts, and the cell in three dimensions.
 
 use needlebench_cell::ResolvedScenario;
-use serde_json::json;
+use needlebench_evaluation::room::RoomModel;
+use needlebench_kinematics::Joints;
+use serde_json::{Value, json};
 
 use super::pack::Pack;
-use super::scene::surroundings;
+use super::room;
+use super::scene::{pose, surroundings};
 use super::words::words;
 
 /// Style of all pages.
@@ -27,4 +30,17 @@ pub fn scene(resolved: &ResolvedScenario) -> Vec<u8> {
         "words": words(resolved),
     });
     pack.bytes(&document)
+}
+
+/// The people at a goal, what they see past a posture, and where the guide is, for `NB.View`.
+pub fn people(
+    resolved: &ResolvedScenario,
+    model: &RoomModel<'_>,
+    goal: usize,
+    q: &Joints,
+) -> Value {
+    let mut view = room::people(resolved, model, goal);
+    view["sight"] = json!(room::lines_of_sight(resolved, model, goal, q));
+    view["guideEntry"] = json!(pose(&model.guide_entry(q)));
+    view
 }

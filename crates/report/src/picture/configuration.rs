@@ -130,6 +130,20 @@ pub fn configuration_picture(
     Some(render(&scene, camera))
 }
 
+/// Draws the cell of a scenario with the arm in a posture at its first goal.
+pub fn placement_picture(resolved: &ResolvedScenario, q: &Joints) -> Image {
+    let goal = &resolved.goals[0];
+    let mut scene = posture_scene(resolved, &Backdrop::new(resolved), q);
+    scene.lines.push(Line3 {
+        from_m: Point3::from(goal.world_from_guide_exit.translation.vector),
+        to_m: goal.target_m,
+        color_rgba: NEEDLE_RGBA,
+        width_px: 3.0,
+    });
+    scene.floor = Some(floor(resolved, goal));
+    render(&scene, &goal_camera(resolved, goal))
+}
+
 /// The cell with the arm in a posture.
 pub(super) fn posture_scene(resolved: &ResolvedScenario, backdrop: &Backdrop, q: &Joints) -> Scene {
     let robot = &resolved.cell.robot;

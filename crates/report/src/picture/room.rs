@@ -229,12 +229,12 @@ fn cone(half_angle_rad: f64, length_m: f64) -> TriangleMesh {
     for ring in 0..RINGS {
         let angle = half_angle_rad * (1.0 - f64::from(ring) / f64::from(RINGS));
         for step in 0..AROUND {
-            let (sine, cosine) = (TAU * f64::from(step) / f64::from(AROUND)).sin_cos();
-            let level_m = length_m * angle.sin();
+            let (sine, cosine) = libm::sincos(TAU * f64::from(step) / f64::from(AROUND));
+            let level_m = length_m * libm::sin(angle);
             mesh.vertices_m.push(Point3::new(
                 level_m * cosine,
                 level_m * sine,
-                -length_m * angle.cos(),
+                -length_m * libm::cos(angle),
             ));
         }
     }

@@ -333,7 +333,7 @@ fn line(image: &mut Image, a: [f64; 2], b: [f64; 2], color: [u8; 3]) {
             } else {
                 0.0
             };
-            let away = (px - a[0] - along * dx).hypot(py - a[1] - along * dy);
+            let away = libm::hypot(px - a[0] - along * dx, py - a[1] - along * dy);
             let cover = (HALF_PX + 0.5 - away).clamp(0.0, 1.0);
             if let (Ok(x), Ok(y), Ok(opacity)) = (
                 i64::try_from(x),

@@ -22,13 +22,17 @@ fn change_text(change: Change) -> &'static str {
 
 pub(crate) fn side_text(name: &str, side: &Side) -> String {
     let or_unknown = |text: &Option<String>| text.clone().unwrap_or_else(|| "unknown".to_owned());
+    let source = side
+        .source_sha256
+        .as_ref()
+        .map(|hash| format!("source {}", hash.get(..12).unwrap_or(hash)));
     format!(
         "{name}: {}: {}, verdict {}, needlebench {} ({})",
         side.source,
         or_unknown(&side.scenario),
         or_unknown(&side.verdict),
         or_unknown(&side.version),
-        or_unknown(&side.git_revision)
+        or_unknown(&side.git_revision.clone().or(source))
     )
 }
 

@@ -14,6 +14,7 @@ pub mod replay;
 pub mod routes;
 mod run;
 mod saturation;
+pub mod search;
 pub mod servo;
 pub(crate) mod shown;
 pub mod study;

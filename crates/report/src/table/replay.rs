@@ -62,7 +62,7 @@ fn decimals(half: f64, value: f64) -> usize {
         if x == 0.0 || !x.is_finite() {
             0.0
         } else {
-            digits - 1.0 - x.abs().log10().floor()
+            digits - 1.0 - libm::log10(x.abs()).floor()
         }
     };
     let places = if half > 0.0 { of(half, 2.0) } else { 6.0 };

@@ -177,7 +177,7 @@ fn table(plan: &RoutePlan) -> String {
     ];
     let with_robot = plan.robot_not_asked.is_none();
     if with_robot {
-        header.extend(["works", "best", "clear\n(mm)", "rms\n(mm)"]);
+        header.extend(["serve", "best", "clear\n(mm)", "rms\n(mm)"]);
     }
     let mut table = plain_table(&header);
     let chosen = plan.chosen.as_ref().map(|chosen| chosen.route);
@@ -233,7 +233,7 @@ fn terms(route: &RouteAnswer) -> String {
             if term.share < 1.0 {
                 format!(
                     "{name} x{:.2} ({:.0} % of x{})",
-                    term.log_odds.exp(),
+                    libm::exp(term.log_odds),
                     100.0 * term.share,
                     term.odds_ratio
                 )

@@ -159,7 +159,7 @@ fn rows(joint: &JointReport, response: &JointResponse) -> Vec<Vec<String>> {
 pub fn worst_deviation(response: &JointResponse) -> (f64, f64) {
     let mut worst = (0.0_f64, 0.0_f64);
     for point in &response.frequencies {
-        let gain_db = 20.0 * (point.gain / point.linear_gain).log10();
+        let gain_db = 20.0 * libm::log10(point.gain / point.linear_gain);
         let turned = point.phase_rad - point.linear_phase_rad;
         let phase_deg = needlebench_kinematics::ik::wrap_angle(turned).to_degrees();
         worst = (worst.0.max(gain_db.abs()), worst.1.max(phase_deg.abs()));

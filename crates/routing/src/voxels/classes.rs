@@ -2,6 +2,7 @@
 
 use needlebench_imaging::{Label, LabelMap, SurfaceTissue, structure_of};
 
+use super::blocks::BodySide;
 use crate::Obstacle;
 
 /// What a voxel is to a needle.
@@ -41,7 +42,7 @@ pub(super) enum Mark {
 }
 
 impl Class {
-    fn new(name: &str, kind: Kind) -> Self {
+    pub fn new(name: &str, kind: Kind) -> Self {
         Self {
             name: name.to_owned(),
             kind,
@@ -88,17 +89,29 @@ impl Classes {
                 continue;
             }
             let class = made.class(name, lesions, off);
-            // More structures than a byte tells apart share the last number of their kind.
-            let number = match u8::try_from(made.all.len()) {
-                Ok(number) => {
-                    made.all.push(class);
-                    number
-                }
-                Err(_) => made.like(class.kind),
-            };
+            let number = made.add(class);
             made.of_label[usize::from(*label)] = number;
         }
         made
+    }
+
+    /// Adds a class: its number. More structures than a byte tells apart share the last number of their kind.
+    pub fn add(&mut self, class: Class) -> u8 {
+        match u8::try_from(self.all.len()) {
+            Ok(number) => {
+                self.all.push(class);
+                number
+            }
+            Err(_) => self.like(class.kind),
+        }
+    }
+
+    /// On which side of the skin a class is. Numbers that stand for nothing are outside.
+    pub fn side(&self, number: u8) -> BodySide {
+        match self.all.get(usize::from(number)) {
+            Some(class) if class.kind != Kind::Outside => BodySide::Body,
+            _ => BodySide::Outside,
+        }
     }
 
     fn like(&self, kind: Kind) -> u8 {
@@ -171,13 +184,6 @@ impl Classes {
 
     pub fn all(&self) -> impl Iterator<Item = &Class> {
         self.all.iter()
-    }
-
-    /// Adds a class that has no label; none if there is no number left.
-    pub fn add(&mut self, name: &str, kind: Kind) -> Option<u8> {
-        let number = u8::try_from(self.all.len()).ok()?;
-        self.all.push(Class::new(name, kind));
-        Some(number)
     }
 
     /// Number of a lung.

@@ -73,10 +73,15 @@ impl Mediastinum {
         })
     }
 
+    /// First and last column of a row of a slice of the box that are in it.
+    pub fn columns(&self, j: usize, k: usize) -> Option<[usize; 2]> {
+        self.columns[k - self.first_slice][j]
+    }
+
     /// Whether a voxel of the box is in it.
     pub fn contains(&self, [i, j, k]: [usize; 3]) -> bool {
-        let rows = &self.columns[k - self.first_slice];
-        rows[j].is_some_and(|[first, last]| (first..=last).contains(&i))
+        let columns = self.columns(j, k);
+        columns.is_some_and(|[first, last]| (first..=last).contains(&i))
     }
 }
 

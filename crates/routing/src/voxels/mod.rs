@@ -1,37 +1,28 @@
 //! Voxels of a label map as anatomy.
 
+mod blocks;
 mod classes;
 mod mediastinum;
+mod normal;
+mod rays;
 
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, Vector3};
 use needlebench_cell::scenario::NeedleRouteSection;
 use needlebench_imaging::{
     Components, Connectivity, DistanceField, DistanceOptions, ImagingError, IndexBox, LabelMap,
     Mask, Remark, VoxelGrid, opened, structure_of,
 };
 
-use crate::anatomy::{
-    Anatomy, Exit, LungPassage, Nearest, Obstacle, Ray, angle_rad, is_marker_near,
-};
+use crate::anatomy::Obstacle;
+use blocks::Blocks;
 use classes::{Class, Classes, Kind, Mark};
 use mediastinum::Mediastinum;
+pub use normal::body_normal;
 
 /// Distances beyond this are told as this, m: no margin asks for more.
 const CAP_M: f64 = 20e-3;
-
-/// Places on a ray that are nearer than this are not told apart, m: half of it is taken off what is found.
-const STEP_M: f64 = 0.25e-3;
-
-/// Distance of places on a ray that are looked at in any case, m.
-const COARSE_M: f64 = 4e-3;
-
-/// Radius about a place of a surface within which its normal is found, m.
-const NORMAL_RADIUS_M: f64 = 6e-3;
-
-/// Nearest that an entry may be to the first or last slice, m: the skin beyond is not known (assumed).
-const END_M: f64 = 5e-3;
 
 /// Least pocket of gas that is bowel or airway, m^3: half a millilitre (assumed). Noise under the skin makes smaller ones.
 const GAS_M3: f64 = 0.5e-6;
@@ -56,11 +47,6 @@ const SOFT: [&str; 8] = [
     "tissue",
     "breast",
 ];
-
-/// Of two places with their distances the nearer one.
-fn nearer(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
-    if b.1 < a.1 { b } else { a }
-}
 
 fn is_soft(name: &str) -> bool {
     let lower = name.to_lowercase();
@@ -104,6 +90,7 @@ pub struct VoxelAnatomy {
     within: IndexBox,
     /// One class for each of its voxels.
     voxels: Vec<u8>,
+    blocks: Blocks,
     classes: Classes,
     /// In the order of [`Obstacle::ALL`]; none where there is nothing.
     fields: [Option<DistanceField>; 3],
@@ -150,12 +137,19 @@ impl VoxelAnatomy {
         let voxels = boxed(&labels.labels, grid.size(), &within, |label| {
             classes.of_label(label)
         });
+        let blocks = Blocks::of(
+            &voxels,
+            within.size(),
+            |class| classes.side(class),
+            options.threads,
+        );
         let mut anatomy = Self {
             grid: grid.clone(),
             spacing_m,
             origin_in_ct_m,
             within,
             voxels,
+            blocks,
             classes,
             fields: [None, None, None],
             target,
@@ -303,20 +297,22 @@ impl VoxelAnatomy {
             ));
             return;
         }
-        let Some(class) = self.classes.add(NAME, Kind::Organ) else {
-            return;
-        };
-        let [nx, ny, _] = self.within.size();
-        let first = self.within.first;
-        for (offset, voxel) in self.voxels.iter_mut().enumerate() {
-            let at = [
-                first[0] + offset % nx,
-                first[1] + offset / nx % ny,
-                first[2] + offset / (nx * ny),
-            ];
-            if self.classes.get(*voxel).kind == Kind::Soft && between.contains(at) {
-                *voxel = class;
-                self.knows[Obstacle::Organ as usize] = true;
+        let class = self.classes.add(Class::new(NAME, Kind::Organ));
+        let [first, last] = [self.within.first, self.within.last];
+        for (k, j) in (first[2]..=last[2]).flat_map(|k| (first[1]..=last[1]).map(move |j| (k, j))) {
+            let Some([from, to]) = between.columns(j, k) else {
+                continue;
+            };
+            let [from, to] = [from.max(first[0]), to.min(last[0])];
+            if from > to {
+                continue;
+            }
+            let offset = self.offset([from, j, k]);
+            for voxel in &mut self.voxels[offset..=offset + (to - from)] {
+                if self.classes.get(*voxel).kind == Kind::Soft {
+                    *voxel = class;
+                    self.knows[Obstacle::Organ as usize] = true;
+                }
             }
         }
     }
@@ -419,211 +415,8 @@ impl VoxelAnatomy {
         self.grid.index_from_ct(&(point + self.origin_in_ct_m))
     }
 
-    /// A ray as voxels see it.
-    fn line(&self, ray: &Ray) -> Line {
-        let start = self.index_of(&ray.target);
-        Line {
-            start,
-            per_m: self.index_of(&ray.at(1.0)) - start,
-        }
-    }
-
-    /// Calls with each voxel on a stretch of a ray, from nearer to farther, and where the ray enters and leaves it, m,
-    /// until it is told to stop or what is looked at ends; whether it came to the end of the stretch.
-    fn walk(
-        &self,
-        ray: &Ray,
-        [from_m, to_m]: [f64; 2],
-        mut visit: impl FnMut(u8, [f64; 2], [usize; 3]) -> bool,
-    ) -> bool {
-        let line = self.line(ray);
-        let index = line.at(from_m);
-        let mut voxel = [0_usize; 3];
-        let mut next_m = [f64::INFINITY; 3];
-        let mut pace_m = [f64::INFINITY; 3];
-        for axis in 0..3 {
-            let nearest = (index[axis] + 0.5).floor();
-            let [first, last] = [self.within.first[axis], self.within.last[axis]];
-            if !(first as f64..=last as f64).contains(&nearest) {
-                return false;
-            }
-            voxel[axis] = steps(nearest);
-            let rate = line.per_m[axis];
-            if rate.abs() > 1e-12 {
-                let edge = nearest + 0.5_f64.copysign(rate);
-                next_m[axis] = from_m + (edge - index[axis]) / rate;
-                pace_m[axis] = 1.0 / rate.abs();
-            }
-        }
-        let [nx, ny, _] = self.within.size();
-        let strides = [1, nx, nx * ny];
-        let mut offset = self.offset(voxel);
-        let mut here_m = from_m;
-        loop {
-            let axis = (0..3).fold(0, |best, axis| {
-                if next_m[axis] < next_m[best] {
-                    axis
-                } else {
-                    best
-                }
-            });
-            let leaves_m = next_m[axis].min(to_m);
-            if !visit(self.voxels[offset], [here_m, leaves_m], voxel) || leaves_m >= to_m {
-                return true;
-            }
-            here_m = leaves_m;
-            next_m[axis] += pace_m[axis];
-            let ends = [self.within.first[axis], self.within.last[axis]];
-            if line.per_m[axis] > 0.0 {
-                if voxel[axis] == ends[1] {
-                    return false;
-                }
-                voxel[axis] += 1;
-                offset += strides[axis];
-            } else {
-                if voxel[axis] == ends[0] {
-                    return false;
-                }
-                voxel[axis] -= 1;
-                offset -= strides[axis];
-            }
-        }
-    }
-
-    /// Outward normal of a set of voxels near a place: away from where it is around it.
-    fn normal_near(&self, at: &Point3<f64>, is_inside: impl Fn(Kind) -> bool) -> UnitVector3<f64> {
-        let inside: Vec<bool> = self
-            .classes
-            .all()
-            .map(|class| is_inside(class.kind))
-            .collect();
-        let centre = self.index_of(at);
-        let mut sum = Vector3::zeros();
-        let range = |axis: usize| {
-            let reach = NORMAL_RADIUS_M / self.spacing_m[axis];
-            let [first, last] = [self.within.first[axis], self.within.last[axis]];
-            steps(centre[axis] - reach).max(first)..=steps(centre[axis] + reach + 1.0).min(last)
-        };
-        let step = self.grid.steps_m();
-        let along = |axis: usize, index: usize| (index as f64 - centre[axis]) * step.column(axis);
-        for k in range(2) {
-            let slice = along(2, k);
-            for j in range(1) {
-                let row = slice + along(1, j);
-                let (columns, from) = (range(0), *range(0).start());
-                if columns.is_empty() {
-                    continue;
-                }
-                let offset = self.offset([from, j, k]);
-                for i in columns {
-                    let away = row + along(0, i);
-                    if away.norm_squared() <= NORMAL_RADIUS_M * NORMAL_RADIUS_M {
-                        let is_inside = inside[usize::from(self.voxels[offset + i - from])];
-                        sum += if is_inside { -away } else { away };
-                    }
-                }
-            }
-        }
-        UnitVector3::try_new(sum, 1e-12).unwrap_or_else(Vector3::z_axis)
-    }
-
-    /// Least value of a field along a stretch, and where: a lower bound.
-    ///
-    /// No distance changes by more than the way. Between two places so far apart as `l` none is therefore less than half of
-    /// what their distances have together beyond `l`; where that could be less than what is known, it is looked at in
-    /// the middle, down to [`STEP_M`], half of which is taken off.
-    fn least_along(
-        &self,
-        field: &DistanceField,
-        ray: &Ray,
-        [from_m, to_m]: [f64; 2],
-    ) -> (f64, f64) {
-        let line = self.line(ray);
-        let first = Vector3::from(self.within.first.map(|index| index as f64));
-        let at = |along_m: f64| {
-            (
-                along_m,
-                field.at_least_of_index(&(line.at(along_m) - first)),
-            )
-        };
-        let count = ((to_m - from_m) / COARSE_M).ceil().max(1.0);
-        let mut places = Vec::with_capacity(steps(count) + 1);
-        let mut step = 0.0;
-        while step <= count {
-            places.push(at(from_m + (to_m - from_m) * step / count));
-            step += 1.0;
-        }
-        let mut least = places.iter().copied().fold((from_m, f64::INFINITY), nearer);
-        // The last ones first.
-        let mut left: Vec<[(f64, f64); 2]> =
-            places.windows(2).map(|two| [two[0], two[1]]).collect();
-        while let Some([a, b]) = left.pop() {
-            let apart_m = b.0 - a.0;
-            if apart_m <= STEP_M || 0.5 * (a.1 + b.1 - apart_m) >= least.1 {
-                continue;
-            }
-            let middle = at(0.5 * (a.0 + b.0));
-            least = nearer(least, middle);
-            left.push([a, middle]);
-            left.push([middle, b]);
-            if a.1 < b.1 {
-                let last = left.len() - 1;
-                left.swap(last - 1, last);
-            }
-        }
-        (least.1 - 0.5 * STEP_M - self.mask_error_m, least.0)
-    }
-
-    /// Name of the structure of an obstacle that is nearest to a place.
-    fn name_near(&self, at: &Point3<f64>, obstacle: Obstacle, within_m: f64) -> String {
-        let index = self.index_of(at);
-        let range = |axis: usize| {
-            let reach = within_m / self.spacing_m[axis] + 1.0;
-            let [first, last] = [self.within.first[axis], self.within.last[axis]];
-            steps(index[axis] - reach).max(first)..=steps(index[axis] + reach).min(last)
-        };
-        let mut nearest: Option<(f64, u8)> = None;
-        for k in range(2) {
-            for j in range(1) {
-                for i in range(0) {
-                    let class = self.voxels[self.offset([i, j, k])];
-                    if !self.classes.get(class).is(obstacle, self.target_lung) {
-                        continue;
-                    }
-                    let place = [i, j, k].map(|index| index as f64);
-                    let way: Vec<f64> = (0..3)
-                        .map(|axis| (place[axis] - index[axis]) * self.spacing_m[axis])
-                        .collect();
-                    let way_m = Vector3::from_column_slice(&way).norm();
-                    if nearest.is_none_or(|(best_m, _)| way_m < best_m) {
-                        nearest = Some((way_m, class));
-                    }
-                }
-            }
-        }
-        match nearest {
-            Some((way_m, class)) if way_m <= within_m + self.diagonal_m() => {
-                self.classes.get(class).name.clone()
-            }
-            // Nothing that has a label: what is modelled below ribs.
-            _ => "intercostal vessels below a rib (modelled)".to_owned(),
-        }
-    }
-
     fn diagonal_m(&self) -> f64 {
         Vector3::from(self.spacing_m).norm()
-    }
-}
-
-/// A ray in indices.
-struct Line {
-    start: Point3<f64>,
-    per_m: Vector3<f64>,
-}
-
-impl Line {
-    fn at(&self, along_m: f64) -> Point3<f64> {
-        self.start + along_m * self.per_m
     }
 }
 
@@ -677,156 +470,4 @@ fn lowered(set: &Mask, slices: usize) -> Mask {
         }
     }
     below
-}
-
-impl Anatomy for VoxelAnatomy {
-    fn kind(&self) -> &'static str {
-        "voxels"
-    }
-
-    fn target(&self) -> Point3<f64> {
-        self.target
-    }
-
-    fn exit(&self, ray: &Ray) -> Exit {
-        let mut depth_m = 0.0;
-        let mut found = None;
-        self.walk(
-            ray,
-            [0.0, self.reach_m],
-            |class, [enters_m, leaves_m], voxel| {
-                depth_m = leaves_m;
-                if self.classes.get(class).kind == Kind::Outside {
-                    found = Some((enters_m, voxel));
-                }
-                found.is_none()
-            },
-        );
-        let Some((skin_m, voxel)) = found else {
-            // It ends within the body: far beyond the needle, or where the scan does.
-            return Exit::End(depth_m);
-        };
-        let last = self.grid.size()[2] - 1;
-        let from_end = voxel[2].min(last - voxel[2]) as f64 * self.spacing_m[2];
-        if from_end < END_M {
-            Exit::End(skin_m)
-        } else {
-            Exit::Skin(skin_m)
-        }
-    }
-
-    fn is_body_between(&self, ray: &Ray, [from_m, to_m]: [f64; 2]) -> bool {
-        if is_marker_near(&self.markers, ray, [from_m, to_m]) {
-            return true;
-        }
-        // Past the voxel that the skin cuts.
-        let past_m = from_m + self.diagonal_m();
-        let mut is_there = false;
-        self.walk(ray, [past_m, to_m.max(past_m)], |class, _, _| {
-            is_there = self.classes.get(class).kind != Kind::Outside;
-            !is_there
-        });
-        is_there
-    }
-
-    fn knows(&self, obstacle: Obstacle) -> bool {
-        self.knows[obstacle as usize]
-    }
-
-    fn distance_m(&self, ray: &Ray, from_to_m: [f64; 2], obstacle: Obstacle) -> f64 {
-        self.fields[obstacle as usize]
-            .as_ref()
-            .map_or(f64::INFINITY, |field| {
-                self.least_along(field, ray, from_to_m).0
-            })
-    }
-
-    fn nearest(&self, ray: &Ray, from_to_m: [f64; 2], obstacle: Obstacle) -> Option<Nearest> {
-        let field = self.fields[obstacle as usize].as_ref()?;
-        let (distance_m, where_m) = self.least_along(field, ray, from_to_m);
-        let radius_m = distance_m.max(0.0) + self.mask_error_m + self.diagonal_m();
-        (radius_m < CAP_M).then(|| Nearest {
-            name: self.name_near(&ray.at(where_m), obstacle, radius_m),
-            distance_m,
-        })
-    }
-
-    fn skin_normal(&self, ray: &Ray, depth_m: f64) -> UnitVector3<f64> {
-        self.normal_near(&ray.at(depth_m), |kind| kind != Kind::Outside)
-    }
-
-    fn lungs(&self, ray: &Ray, from_to_m: [f64; 2]) -> LungPassage {
-        let mut passage = LungPassage::default();
-        // From the target outwards: what was passed last is what the needle enters from.
-        let mut inside = self.target_lung;
-        let mut lobe: Option<u8> = None;
-        let mut entered_m = None;
-        self.walk(ray, from_to_m, |class, [enters_m, leaves_m], _| {
-            let found = self.classes.get(class);
-            let now = match found.kind {
-                Kind::Lung(lung) => Some(lung),
-                Kind::Lesion | Kind::InLung => inside,
-                _ => None,
-            };
-            if let (Some(lung), false) = (inside, now == inside) {
-                passage.entries += 1;
-                entered_m = Some((enters_m, lung));
-                lobe = None;
-            }
-            if now.is_some() {
-                passage.within_m += leaves_m - enters_m;
-            }
-            if matches!(found.kind, Kind::Lung(_)) {
-                if let Some(before) = lobe
-                    && before != class
-                {
-                    let [a, b] = [before, class].map(|each| self.classes.get(each).name.clone());
-                    passage.fissures.push(format!("{a} to {b}"));
-                }
-                lobe = Some(class);
-            }
-            if found.mark == Mark::Bulla && passage.bullae.last() != Some(&found.name) {
-                passage.bullae.push(found.name.clone());
-            }
-            if found.mark == Mark::Fissure && passage.fissures.last() != Some(&found.name) {
-                passage.fissures.push(found.name.clone());
-            }
-            inside = now;
-            true
-        });
-        passage.pleura_angle_rad = entered_m.map(|(along_m, lung)| {
-            let normal = self.normal_near(&ray.at(along_m), |kind| match kind {
-                Kind::Lung(each) => each == lung,
-                Kind::InLung | Kind::Lesion => true,
-                _ => false,
-            });
-            angle_rad(&ray.outwards, &normal)
-        });
-        passage
-    }
-
-    fn leaves_lung_m(&self, ray: &Ray, within_m: f64) -> Option<f64> {
-        let lung = self.target_lung?;
-        let back = Ray {
-            outwards: -ray.outwards,
-            ..*ray
-        };
-        let mut left_m = None;
-        self.walk(&back, [0.0, within_m], |class, [enters_m, _], _| {
-            let stays = match self.classes.get(class).kind {
-                Kind::Lung(each) => each == lung,
-                Kind::Lesion | Kind::InLung => true,
-                _ => false,
-            };
-            if !stays {
-                left_m = Some(enters_m);
-            }
-            stays
-        });
-        left_m
-    }
-
-    fn touches_pleura(&self) -> Option<bool> {
-        self.touches_pleura
-    }
 }

@@ -1,4 +1,5 @@
 //! Routes in voxels and among solids, against brute force.
 
+mod normals;
 mod solids;
 mod voxels;

@@ -60,7 +60,7 @@ fn free_routes_keep_their_margins_point_by_point_and_enter_one_lung_once() {
                 let along_m =
                     -rules.throw_m + (route.depth_m + rules.throw_m) * f64::from(step) / 59.0;
                 for turn in 0..6 {
-                    let (sin, cos) = (f64::from(turn) * std::f64::consts::FRAC_PI_3).sin_cos();
+                    let (sin, cos) = libm::sincos(f64::from(turn) * std::f64::consts::FRAC_PI_3);
                     let aside = ray.outwards.cross(&Vector3::z()).normalize();
                     let other = ray.outwards.cross(&aside);
                     for part in &phantom.parts {

@@ -46,7 +46,7 @@ pub use spread::{BEST, PROBABILITIES, QuantileValue, Spread};
 
 pub(crate) use evidence::Largest;
 use interval::TAIL;
-pub(crate) use interval::about_mean;
+pub(crate) use interval::{about_mean, clopper_pearson_with, quantile_ranks};
 pub(crate) use layout::{CONFIGURATIONS, Layout, has_numbers};
 pub(crate) use moments::{Grouped, Points};
 pub(crate) use selection::{PASSES, Quantiles};

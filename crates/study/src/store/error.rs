@@ -5,12 +5,23 @@ use std::path::{Path, PathBuf};
 
 use crate::{CaseError, ResultsError};
 
+/// What fails where a file system has no locks.
+pub(crate) const LOCK: &str = "lock";
+
 /// Why a study cannot be begun, continued or merged.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "fields are named in the messages")]
 pub enum StudyError {
     /// The system refused.
-    #[error("cannot {action} {}: {source}", path.display())]
+    #[error(
+        "cannot {action} {}: {source}{}",
+        path.display(),
+        if *action == LOCK {
+            "\nhint: file systems without locks (flock) cannot say who writes; choose another one"
+        } else {
+            ""
+        }
+    )]
     Io {
         action: &'static str,
         path: PathBuf,
@@ -51,6 +62,25 @@ pub enum StudyError {
         folder.display()
     )]
     Locked { folder: PathBuf },
+    /// A journal is another one than when it was looked through.
+    #[error(
+        "{}: {change} since it was checked\nhint: merge again once nobody writes to it",
+        path.display()
+    )]
+    Changed { path: PathBuf, change: String },
+    /// The disk is too small for what would be written.
+    #[error(
+        "{}: the table will take about {}, and {} are free\n\
+         hint: free some space, or choose another folder; nothing was written",
+        folder.display(),
+        in_words(*needed_bytes),
+        in_words(*free_bytes)
+    )]
+    Space {
+        folder: PathBuf,
+        needed_bytes: u64,
+        free_bytes: u64,
+    },
     /// Results are there, and `--resume` was not asked for.
     #[error(
         "{}: holds {what} already\nhint: --resume continues it; or choose another folder",
@@ -91,18 +121,42 @@ fn lines(differences: &[String]) -> String {
     lines.collect::<Vec<_>>().concat()
 }
 
+/// Bytes as people say them: three digits.
+pub(crate) fn in_words(bytes: u64) -> String {
+    let bytes = bytes as f64;
+    let (unit, size) = [("GB", 1e9), ("MB", 1e6), ("kB", 1e3)]
+        .into_iter()
+        .find(|(_, size)| bytes >= *size)
+        .unwrap_or(("bytes", 1.0));
+    let number = bytes / size;
+    let decimals = if size == 1.0 || number >= 100.0 {
+        0
+    } else if number >= 10.0 {
+        1
+    } else {
+        2
+    };
+    format!("{number:.decimals$} {unit}")
+}
+
 impl StudyError {
-    /// Whether folders, files or the request are at fault, not the machine.
+    /// Whether folders, files or the request are at fault: asked for again, the same comes of it. All else
+    /// may pass.
     pub fn is_input(&self) -> bool {
         match self {
-            Self::Locked { .. }
-            | Self::Exists { .. }
+            Self::Exists { .. }
             | Self::OtherStudy { .. }
             | Self::File { .. }
             | Self::Request(_)
             | Self::Merge(_)
             | Self::Results(_) => true,
-            Self::Io { .. } | Self::Write { .. } | Self::Case { .. } | Self::Worker(_) => false,
+            Self::Io { .. }
+            | Self::Write { .. }
+            | Self::Case { .. }
+            | Self::Worker(_)
+            | Self::Locked { .. }
+            | Self::Changed { .. }
+            | Self::Space { .. } => false,
         }
     }
 

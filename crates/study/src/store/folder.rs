@@ -9,7 +9,7 @@ use super::atomic::sync_folder;
 use super::codec::Packer;
 use super::columns::Columns;
 use super::error::StudyError;
-use super::journal::{BlockReader, JOURNAL_FILE, Journal, Key, Places, kept, scan};
+use super::journal::{CheckedJournal, JOURNAL_FILE, Journal, Key, Places, Readers, kept, scan};
 use super::manifest::{MANIFEST_FILE, Manifest, Status};
 use super::parquet_read::ParquetResults;
 use super::parquet_write::{self, WriteError};
@@ -76,18 +76,19 @@ impl Folder {
         manifest.write(path)?;
         let journal_path = path.join(JOURNAL_FILE);
         let scan = journal.prepare(&journal_path, &manifest)?;
-        for damage in &scan.damages {
+        let extent = &scan.extent;
+        for damage in &extent.damages {
             watch(Progress::Damage {
                 journal: &journal_path,
                 offset: damage.offset,
                 bytes: damage.bytes,
             });
         }
-        if scan.tail_bytes > 0 {
+        if extent.tail_bytes > 0 {
             watch(Progress::CutOff {
                 journal: &journal_path,
-                offset: scan.end,
-                bytes: scan.tail_bytes,
+                offset: extent.end,
+                bytes: extent.tail_bytes,
             });
         }
         let mut folder = Self {
@@ -144,7 +145,11 @@ impl Folder {
     ) -> Result<(), StudyError> {
         if self.manifest.shard.is_none() {
             let blocks = Blocks {
-                folders: vec![(self.path.clone(), self.manifest.clone())],
+                journals: vec![CheckedJournal {
+                    folder: self.path.clone(),
+                    shard: None,
+                    length: None,
+                }],
                 places: self
                     .places
                     .iter()
@@ -269,9 +274,9 @@ fn remove_journal(folder: &Path) -> Result<(), StudyError> {
 
 /// All blocks of a study, in the journals of some folders.
 pub(crate) struct Blocks {
-    pub(crate) folders: Vec<(PathBuf, Manifest)>,
-    /// Index of the folder and place of each block's record.
-    pub(crate) places: Vec<Option<(usize, NonZeroU64)>>,
+    pub(crate) journals: Vec<CheckedJournal>,
+    /// Index of the journal and place of each block's record.
+    pub(crate) places: Vec<Option<(u32, NonZeroU64)>>,
 }
 
 /// Writes the table of a study whose blocks are all there.
@@ -282,29 +287,21 @@ pub(crate) fn write_results(
     threads: usize,
     watch: &(dyn Fn(Progress) + Sync),
 ) -> Result<(), WriteError<StudyError>> {
-    let open = || -> Result<Vec<BlockReader>, StudyError> {
-        let folders = blocks.folders.iter();
-        folders
-            .map(|(folder, manifest)| BlockReader::open(folder, manifest))
-            .collect()
-    };
     // Every thread takes readers from here and puts them back.
     let idle = Mutex::new(Vec::new());
     let idle = || idle.lock().unwrap_or_else(PoisonError::into_inner);
     let source = |first: u64, count: u64| -> Result<Columns, StudyError> {
         let taken = idle().pop();
-        let mut readers = match taken {
-            Some(readers) => readers,
-            None => open()?,
-        };
+        let mut readers =
+            taken.unwrap_or_else(|| Readers::new(&blocks.journals, manifest, threads));
         let mut columns = Columns::new(&manifest.factors, manifest.columns.len());
         let (mut case, end) = (first, first + count);
         while case < end {
             let block = case / u64::from(manifest.block_cases);
             let cases = manifest.block(block);
             let index = usize::try_from(block).expect("blocks are indexed in memory");
-            let (folder, place) = blocks.places[index].expect("all blocks are there");
-            let content = readers[folder].read(place, manifest)?;
+            let (journal, place) = blocks.places[index].expect("all blocks are there");
+            let content = readers.read(journal as usize, place)?;
             let until = cases.end.min(end);
             let place = |case: u64| usize::try_from(case - cases.start).expect("within a block");
             columns.extend(&content, place(case)..place(until));

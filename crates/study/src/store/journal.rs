@@ -37,8 +37,8 @@ use needlebench_cell::{InputError, open_input};
 
 use super::codec::{self, Packed};
 use super::columns::Columns;
-use super::error::StudyError;
-use super::manifest::{Manifest, SCHEMA_VERSION};
+use super::error::{LOCK, StudyError};
+use super::manifest::{Manifest, SCHEMA_VERSION, Shard, owns};
 
 /// Name of the journal in a study's folder.
 pub const JOURNAL_FILE: &str = "journal.nbj";
@@ -46,6 +46,11 @@ pub const JOURNAL_FILE: &str = "journal.nbj";
 const MAGIC: [u8; 8] = *b"NBJRNL\0\0";
 const MARK: [u8; 4] = *b"NBJB";
 const RECORD_HEADER: usize = 32;
+
+/// Who asks how far a study is holds a lock for a moment: so often, and so long after each other, a
+/// process that wants to write tries.
+const LOOKS: u32 = 10;
+const LOOK: std::time::Duration = std::time::Duration::from_millis(50);
 
 /// Where blocks are in a journal: offsets of their records, by index.
 pub(crate) type Places = Vec<Option<NonZeroU64>>;
@@ -61,6 +66,12 @@ pub(crate) struct Damage {
 #[derive(Debug)]
 pub(crate) struct Scan {
     pub(crate) places: Places,
+    pub(crate) extent: Extent,
+}
+
+/// What a journal is beside its blocks.
+#[derive(Debug)]
+pub(crate) struct Extent {
     /// Between records.
     pub(crate) damages: Vec<Damage>,
     /// End of the last record.
@@ -88,7 +99,12 @@ pub(crate) struct Key {
 
 impl Key {
     pub(crate) fn new(manifest: &Manifest) -> Self {
-        let shard = manifest.shard.map_or("all".to_owned(), String::from);
+        Self::of(manifest, manifest.shard)
+    }
+
+    /// That of a shard of the manifest's study.
+    pub(crate) fn of(manifest: &Manifest, shard: Option<Shard>) -> Self {
+        let shard = shard.map_or("all".to_owned(), String::from);
         let text = format!(
             "{}\n{}\n{}\n{shard}\n",
             manifest.study_id, manifest.cases, manifest.block_cases
@@ -170,13 +186,16 @@ impl Journal {
         let mut options = OpenOptions::new();
         let file = options.read(true).append(true).create(true).open(&path);
         let file = file.map_err(StudyError::io("open", &path))?;
-        match file.try_lock() {
-            Ok(()) => Ok(Self { file, end: 0 }),
-            Err(TryLockError::WouldBlock) => Err(StudyError::Locked {
-                folder: folder.to_owned(),
-            }),
-            Err(TryLockError::Error(error)) => Err(StudyError::io("lock", &path)(error)),
+        for _ in 0..LOOKS {
+            match file.try_lock() {
+                Ok(()) => return Ok(Self { file, end: 0 }),
+                Err(TryLockError::WouldBlock) => std::thread::sleep(LOOK),
+                Err(TryLockError::Error(error)) => return Err(StudyError::io(LOCK, &path)(error)),
+            }
         }
+        Err(StudyError::Locked {
+            folder: folder.to_owned(),
+        })
     }
 
     /// Makes the journal ready to go on: writes a header where none is and cuts off what is behind
@@ -186,7 +205,7 @@ impl Journal {
         let key = Key::new(manifest);
         let header = key.header();
         let repair = || -> io::Result<u64> {
-            match scan.header {
+            match scan.extent.header {
                 HeaderState::Whole => {}
                 HeaderState::CutOff => {
                     self.file.set_len(0)?;
@@ -200,8 +219,8 @@ impl Journal {
                     file.write_all(&header)?;
                 }
             }
-            self.file.set_len(scan.end)?;
-            Ok(scan.end)
+            self.file.set_len(scan.extent.end)?;
+            Ok(scan.extent.end)
         };
         self.end = repair().map_err(|source| StudyError::Write {
             path: path.to_owned(),
@@ -239,19 +258,54 @@ pub(crate) fn kept(manifest: &Manifest, places: &Places) -> u64 {
         .sum()
 }
 
+/// Opens a journal to read it.
+pub(crate) fn open(path: &Path) -> Result<File, StudyError> {
+    open_input(path).map_err(|error| match error {
+        InputError::Io(error) => StudyError::io("read", path)(error),
+        error => StudyError::file(path, format!("is no journal: {error}")),
+    })
+}
+
 /// Finds all blocks of a journal, checking each.
 ///
 /// # Errors
 /// [`StudyError::File`] if it is the journal of another study, or none.
 pub(crate) fn scan(path: &Path, manifest: &Manifest) -> Result<Scan, StudyError> {
+    let blocks = usize::try_from(manifest.blocks()).expect("blocks are indexed in memory");
+    let mut places = vec![None; blocks];
+    let file = open(path)?;
+    let extent = scan_blocks(file, path, manifest, manifest.shard, |found| {
+        let block = usize::try_from(found.block).expect("blocks are indexed in memory");
+        places[block] = places[block].or(Some(found.place));
+    })?;
+    Ok(Scan { places, extent })
+}
+
+/// A block that is in a journal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct FoundBlock {
+    /// Index of the block.
+    pub(crate) block: u64,
+    /// Offset of its record.
+    pub(crate) place: NonZeroU64,
+    /// Length of the record.
+    pub(crate) bytes: u64,
+}
+
+/// Checks all of a shard's journal and hands over every block, in the order of the file.
+///
+/// # Errors
+/// As [`scan`].
+pub(crate) fn scan_blocks(
+    file: File,
+    path: &Path,
+    manifest: &Manifest,
+    shard: Option<Shard>,
+    mut found: impl FnMut(FoundBlock),
+) -> Result<Extent, StudyError> {
     let failed = || StudyError::io("read", path);
-    let file = match open_input(path) {
-        Ok(file) => file,
-        Err(InputError::Io(error)) => return Err(failed()(error)),
-        Err(error) => return Err(StudyError::file(path, format!("is no journal: {error}"))),
-    };
     let length = file.metadata().map_err(failed())?.len();
-    let key = Key::new(manifest);
+    let key = Key::of(manifest, shard);
     let mut source = Source {
         file: BufReader::with_capacity(1 << 16, file),
         length,
@@ -259,54 +313,56 @@ pub(crate) fn scan(path: &Path, manifest: &Manifest) -> Result<Scan, StudyError>
         payload: Vec::new(),
     };
     let header = check_header(&mut source, &key, path)?;
-    let blocks = usize::try_from(manifest.blocks()).expect("blocks are indexed in memory");
-    let mut scan = Scan {
-        places: vec![None; blocks],
+    let mut extent = Extent {
         damages: Vec::new(),
         end: 0,
         tail_bytes: 0,
         header,
     };
     if header == HeaderState::CutOff {
-        scan.tail_bytes = length;
-        return Ok(scan);
+        extent.tail_bytes = length;
+        return Ok(extent);
     }
     let mut at = key.header().len() as u64;
     if header == HeaderState::Damaged {
-        scan.damages.push(Damage {
+        extent.damages.push(Damage {
             offset: 0,
             bytes: at,
         });
     }
-    scan.end = at;
+    extent.end = at;
     loop {
-        let mut found = source.record(at, &key).map_err(failed())?;
-        if found.is_none()
-            && let Some((next, record)) = source.search(at + 1, &key).map_err(failed())?
+        let mut record = source.record(at, &key).map_err(failed())?;
+        if record.is_none()
+            && let Some((next, later)) = source.search(at + 1, &key).map_err(failed())?
         {
-            scan.damages.push(Damage {
+            extent.damages.push(Damage {
                 offset: at,
                 bytes: next - at,
             });
             at = next;
-            found = Some(record);
+            record = Some(later);
         }
-        let Some(record) = found else {
-            scan.tail_bytes = length.saturating_sub(scan.end);
-            return Ok(scan);
+        let Some(record) = record else {
+            extent.tail_bytes = length.saturating_sub(extent.end);
+            return Ok(extent);
         };
-        let expected = usize::try_from(record.block)
-            .ok()
-            .filter(|block| *block < blocks && manifest.owns(record.block))
+        let place = NonZeroU64::new(at)
+            .filter(|_| record.block < manifest.blocks() && owns(shard, record.block))
             .filter(|_| manifest.block_len(record.block) == record.cases as usize);
-        let Some(block) = expected else {
+        let Some(place) = place else {
             // Its CRC is right: another version of this program wrote it.
             let message = format!("has a record at byte {at} that this study does not have");
             return Err(StudyError::file(path, message));
         };
-        scan.places[block] = scan.places[block].or(NonZeroU64::new(at));
-        at += RECORD_HEADER as u64 + u64::from(record.length);
-        scan.end = at;
+        let bytes = RECORD_HEADER as u64 + u64::from(record.length);
+        found(FoundBlock {
+            block: record.block,
+            place,
+            bytes,
+        });
+        at += bytes;
+        extent.end = at;
     }
 }
 
@@ -418,6 +474,16 @@ impl Source {
     }
 }
 
+/// A journal that was looked through.
+#[derive(Debug)]
+pub(crate) struct CheckedJournal {
+    pub(crate) folder: PathBuf,
+    /// Which part of the study it is of.
+    pub(crate) shard: Option<Shard>,
+    /// Its length then. `None`: this process holds the lock, and no other can have changed it.
+    pub(crate) length: Option<u64>,
+}
+
 /// Reads blocks at known places.
 #[derive(Debug)]
 pub(crate) struct BlockReader {
@@ -427,12 +493,24 @@ pub(crate) struct BlockReader {
 }
 
 impl BlockReader {
-    pub(crate) fn open(folder: &Path, manifest: &Manifest) -> Result<Self, StudyError> {
-        let path = folder.join(JOURNAL_FILE);
+    /// # Errors
+    /// [`StudyError::Locked`], [`StudyError::Changed`] if somebody writes to it, or has since it was looked
+    /// through.
+    pub(crate) fn open(journal: &CheckedJournal, manifest: &Manifest) -> Result<Self, StudyError> {
+        let path = journal.folder.join(JOURNAL_FILE);
+        let file = File::open(&path).map_err(StudyError::io("open", &path))?;
+        if let Some(length) = journal.length {
+            lock_to_read(&file, &journal.folder)?;
+            let now = file.metadata().map_err(StudyError::io("read", &path))?;
+            if now.len() != length {
+                let change = format!("has grown from {length} to {} bytes", now.len());
+                return Err(StudyError::Changed { path, change });
+            }
+        }
         Ok(Self {
-            file: File::open(&path).map_err(StudyError::io("open", &path))?,
+            file,
             path,
-            key: Key::new(manifest),
+            key: Key::of(manifest, journal.shard),
         })
     }
 
@@ -465,9 +543,74 @@ impl BlockReader {
                     manifest.columns.len(),
                 )
             })
-            .ok_or_else(|| {
-                let message = format!("has changed at byte {place} since it was checked");
-                StudyError::file(&self.path, message)
+            .ok_or_else(|| StudyError::Changed {
+                path: self.path.clone(),
+                change: format!("has changed at byte {place}"),
             })
+    }
+}
+
+/// Keeps writers out of a folder for as long as its journal is open.
+///
+/// # Errors
+/// [`StudyError::Locked`] if one is in it.
+pub(crate) fn lock_to_read(journal: &File, folder: &Path) -> Result<(), StudyError> {
+    match journal.try_lock_shared() {
+        Ok(()) => Ok(()),
+        Err(TryLockError::WouldBlock) => Err(StudyError::Locked {
+            folder: folder.to_owned(),
+        }),
+        Err(TryLockError::Error(error)) => {
+            Err(StudyError::io(LOCK, &folder.join(JOURNAL_FILE))(error))
+        }
+    }
+}
+
+/// Most journals that are open at a time: a process may well have 256 files.
+const OPEN_JOURNALS: usize = 96;
+
+/// Reads blocks of many journals, of which the last used ones stay open.
+pub(crate) struct Readers<'a> {
+    journals: &'a [CheckedJournal],
+    manifest: &'a Manifest,
+    /// The last used one at the end.
+    open: Vec<(usize, BlockReader)>,
+    most: usize,
+}
+
+impl<'a> Readers<'a> {
+    /// One of so many that read at the same time.
+    pub(crate) fn new(
+        journals: &'a [CheckedJournal],
+        manifest: &'a Manifest,
+        threads: usize,
+    ) -> Self {
+        Self {
+            journals,
+            manifest,
+            open: Vec::new(),
+            most: (OPEN_JOURNALS / threads.max(1)).max(1),
+        }
+    }
+
+    /// A block whose journal and place a scan has found.
+    pub(crate) fn read(
+        &mut self,
+        journal: usize,
+        place: NonZeroU64,
+    ) -> Result<Columns, StudyError> {
+        let known = self.open.iter().position(|(index, _)| *index == journal);
+        let reader = if let Some(at) = known {
+            self.open.remove(at)
+        } else {
+            if self.open.len() == self.most {
+                self.open.remove(0);
+            }
+            let reader = BlockReader::open(&self.journals[journal], self.manifest)?;
+            (journal, reader)
+        };
+        self.open.push(reader);
+        let (_, reader) = self.open.last_mut().expect("it was just put there");
+        reader.read(place, self.manifest)
     }
 }

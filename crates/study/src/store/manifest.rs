@@ -91,6 +91,11 @@ impl Shard {
     }
 }
 
+/// Whether a block belongs to a part of a study.
+pub(crate) fn owns(shard: Option<Shard>, block: u64) -> bool {
+    shard.is_none_or(|shard| shard.owns(block))
+}
+
 impl fmt::Display for Shard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}/{}", self.part, self.parts)
@@ -155,7 +160,7 @@ impl Manifest {
     }
 
     /// Number of blocks of the whole study.
-    pub(crate) fn blocks(&self) -> u64 {
+    pub fn blocks(&self) -> u64 {
         self.cases.div_ceil(u64::from(self.block_cases))
     }
 
@@ -173,15 +178,34 @@ impl Manifest {
 
     /// Whether a block belongs to this folder.
     pub(crate) fn owns(&self, block: u64) -> bool {
-        self.shard.is_none_or(|shard| shard.owns(block))
+        owns(self.shard, block)
     }
 
     /// Number of cases of the folder.
     pub fn own_cases(&self) -> u64 {
-        (0..self.blocks())
-            .filter(|block| self.owns(*block))
-            .map(|block| self.block_len(block) as u64)
-            .sum()
+        self.cases_of(self.shard)
+    }
+
+    /// Number of blocks of a part of the study.
+    pub(crate) fn blocks_of(&self, shard: Option<Shard>) -> u64 {
+        shard.map_or(self.blocks(), |shard| {
+            let behind = self.blocks().saturating_sub(u64::from(shard.part - 1));
+            behind.div_ceil(u64::from(shard.parts))
+        })
+    }
+
+    /// Number of cases of a part of the study.
+    pub(crate) fn cases_of(&self, shard: Option<Shard>) -> u64 {
+        let whole = self.blocks_of(shard) * u64::from(self.block_cases);
+        // The last block may be shorter.
+        let last = self
+            .blocks()
+            .checked_sub(1)
+            .filter(|last| owns(shard, *last));
+        let lacking = last.map_or(0, |last| {
+            u64::from(self.block_cases) - self.block_len(last) as u64
+        });
+        whole - lacking
     }
 
     /// `"name" (id), shard 1/2`.

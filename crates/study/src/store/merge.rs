@@ -1,171 +1,190 @@
 //! Shards put together.
+//!
+//! There may be more shards than a process may have files. So each journal is locked, looked through and
+//! closed again; where its blocks are stays in memory, and the few that are read at a time are opened anew:
+//! one that has changed meanwhile, or that somebody writes to, is refused.
 
-use std::fs::File;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use needlebench_cell::{InputError, open_input};
 
 use super::error::StudyError;
 use super::folder::{Blocks, Folder, Opened, RESULTS_FILE, write_results};
-use super::journal::{BlockReader, JOURNAL_FILE, kept, scan};
+use super::journal::{
+    CheckedJournal, Damage, FoundBlock, JOURNAL_FILE, Readers, lock_to_read, scan_blocks,
+};
 use super::manifest::{Manifest, Shard, Status};
+use super::ordered::in_order;
 use super::parquet_write::WriteError;
 use super::progress::Progress;
 use super::run::RunEnd;
+use super::shards::{EmptyFolder, ShardFolder, ranges, shard_folders};
+use super::space;
 
 /// Writes the table of a study, the blocks of which are in the journals of shards. Its bytes are those
 /// that the study has without shards.
 ///
-/// Folders may overlap if they agree. `out` is a folder of its own; with `resume` it may be one of an
-/// earlier, interrupted merge.
+/// `shards` are their folders, or folders that they are in, at most three levels below. They may be of
+/// any numbers of parts, and may overlap if they agree. `study` is what they have to be of; that of the first
+/// if it is left out. `out` is a folder of its own; with `resume` it may be one of an earlier, interrupted
+/// merge.
 ///
 /// # Errors
 /// [`StudyError::OtherStudy`] if the folders are not of one study, [`StudyError::Merge`] if blocks are
-/// missing or folders contradict each other.
+/// missing or folders contradict each other, [`StudyError::Locked`] and [`StudyError::Changed`] if somebody
+/// writes to one, [`StudyError::Space`] if the table would not fit the disk.
 pub fn merge(
     out: &Path,
-    folders: &[PathBuf],
+    study: Option<&Manifest>,
+    shards: &[PathBuf],
     threads: usize,
     resume: bool,
     watch: &(dyn Fn(Progress) + Sync),
 ) -> Result<RunEnd, StudyError> {
-    let shards = manifests(folders)?;
-    let Some((_, first)) = shards.first() else {
-        return Err(StudyError::Merge("there is nothing to merge".to_owned()));
-    };
-    let manifest = Manifest {
-        shard: None,
-        ..first.clone()
-    };
-    // Nobody may go on with a shard while it is read.
-    let _locks = lock(&shards)?;
-    let places = collect(&manifest, &shards, watch)?;
+    let threads = threads.max(1);
+    let nothing = || StudyError::Merge("there is nothing to merge".to_owned());
+    if shards.is_empty() {
+        return Err(nothing());
+    }
+    let found = shard_folders(shards, Some(out), study, EmptyFolder::Refused, threads)?
+        .ok_or_else(nothing)?;
+    let (manifest, shards) = (found.manifest, found.folders);
+    if !found.others.is_empty() {
+        watch(Progress::OtherStudies {
+            folders: &found.others,
+        });
+    }
+    let whole = |each: &&ShardFolder| each.shard.is_none() && each.status == Status::Complete;
+    if let Some(whole) = shards.iter().find(whole) {
+        return Err(StudyError::Merge(format!(
+            "{}: holds the whole study already; there is nothing to merge",
+            whole.path.display()
+        )));
+    }
+    if shards.is_empty() {
+        return Err(nothing());
+    }
     let end = RunEnd::Finished {
         cases: manifest.cases,
         results: Some(out.join(RESULTS_FILE)),
     };
+    let collected = collect(&manifest, &shards, threads, watch)?;
+    if !out.join(RESULTS_FILE).exists() {
+        let table_bytes = space::table_bytes(&manifest, collected.bytes);
+        let free_bytes = space::free_bytes(out);
+        watch(Progress::Space {
+            journal_bytes: collected.bytes,
+            table_bytes,
+            free_bytes,
+        });
+        space::check(out, table_bytes, free_bytes)?;
+    }
     let folder = match Folder::open(out, &manifest, resume, watch)? {
         Opened::Complete => return Ok(end),
         Opened::Running(folder) => folder,
     };
-    let blocks = Blocks {
-        folders: shards,
-        places,
-    };
-    write_results(out, &blocks, &manifest, threads.max(1), watch).map_err(|error| match error {
-        WriteError::Source(error) => error,
-        WriteError::File(source) => StudyError::io("write", &out.join(RESULTS_FILE))(source),
-    })?;
+    write_results(out, &collected.blocks, &manifest, threads, watch).map_err(
+        |error| match error {
+            WriteError::Source(error) => error,
+            WriteError::File(source) => StudyError::io("write", &out.join(RESULTS_FILE))(source),
+        },
+    )?;
     folder.completed()?;
     Ok(end)
 }
 
-/// The manifests of all folders, which are of one study.
-fn manifests(folders: &[PathBuf]) -> Result<Vec<(PathBuf, Manifest)>, StudyError> {
-    let mut shards: Vec<(PathBuf, Manifest)> = Vec::new();
-    for folder in folders {
-        let manifest = Manifest::read(folder)?.ok_or_else(|| {
-            StudyError::file(
-                folder,
-                "holds no study\nhint: give the folders of its shards",
-            )
-        })?;
-        let first = shards.first().map(|(_, first)| first);
-        if let Some(error) = first.and_then(|first| first.other_study(folder, &manifest)) {
-            return Err(error);
-        }
-        if manifest.shard.is_none() && manifest.status == Status::Complete {
-            return Err(StudyError::Merge(format!(
-                "{}: holds the whole study already; there is nothing to merge",
-                folder.display()
-            )));
-        }
-        shards.push((folder.clone(), manifest));
-    }
-    Ok(shards)
-}
-
-fn lock(shards: &[(PathBuf, Manifest)]) -> Result<Vec<File>, StudyError> {
-    let mut locks = Vec::new();
-    for (folder, _) in shards {
-        let path = folder.join(JOURNAL_FILE);
-        let file = match open_input(&path) {
-            Ok(file) => file,
-            Err(error) if error.is_not_found() => {
-                let message = "is not there\nhint: `needlebench study STUDY --shard K/N --resume` computes it again";
-                return Err(StudyError::file(&path, message));
-            }
-            Err(InputError::Io(error)) => return Err(StudyError::io("open", &path)(error)),
-            Err(error) => return Err(StudyError::file(&path, format!("is no journal: {error}"))),
-        };
-        match file.try_lock_shared() {
-            Ok(()) => locks.push(file),
-            Err(std::fs::TryLockError::WouldBlock) => {
-                return Err(StudyError::Locked {
-                    folder: folder.clone(),
-                });
-            }
-            Err(std::fs::TryLockError::Error(error)) => {
-                return Err(StudyError::io("lock", &path)(error));
-            }
-        }
-    }
-    Ok(locks)
-}
-
-type SharedPlaces = Vec<Option<(usize, std::num::NonZeroU64)>>;
-
 /// Where all blocks are.
+struct Collected {
+    blocks: Blocks,
+    /// What they take in the journals.
+    bytes: u64,
+}
+
+/// What is in a shard's journal.
+struct Scanned {
+    /// Each once, by number.
+    blocks: Vec<FoundBlock>,
+    damages: Vec<Damage>,
+    length: u64,
+}
+
+/// Looks through all journals.
 fn collect(
     manifest: &Manifest,
-    shards: &[(PathBuf, Manifest)],
+    shards: &[ShardFolder],
+    threads: usize,
     watch: &(dyn Fn(Progress) + Sync),
-) -> Result<SharedPlaces, StudyError> {
-    let mut places: SharedPlaces = Vec::new();
-    for (index, (folder, shard)) in shards.iter().enumerate() {
-        let path = folder.join(JOURNAL_FILE);
-        let scan = scan(&path, shard)?;
-        // Of what was computed again nothing is missing.
-        let lost = kept(shard, &scan.places) < shard.own_cases();
-        for damage in scan.damages.iter().filter(|_| lost) {
-            watch(Progress::Damage {
-                journal: &path,
-                offset: damage.offset,
-                bytes: damage.bytes,
+) -> Result<Collected, StudyError> {
+    let blocks = usize::try_from(manifest.blocks()).expect("blocks are indexed in memory");
+    let mut journals: Vec<CheckedJournal> = Vec::new();
+    let mut places = vec![None; blocks];
+    let mut bytes = 0;
+    let total = shards.len() as u64;
+    in_order(
+        total,
+        threads,
+        |index| {
+            let index = usize::try_from(index).expect("an index of a list");
+            scan_shard(&shards[index], manifest)
+        },
+        |scanned: Scanned| {
+            let folder = &shards[journals.len()];
+            let path = folder.path.join(JOURNAL_FILE);
+            // Of what was computed again nothing is missing.
+            let lost = (scanned.blocks.len() as u64) < manifest.blocks_of(folder.shard);
+            for damage in scanned.damages.iter().filter(|_| lost) {
+                watch(Progress::Damage {
+                    journal: &path,
+                    offset: damage.offset,
+                    bytes: damage.bytes,
+                });
+            }
+            let index = u32::try_from(journals.len()).expect("a study has fewer than 2^32 shards");
+            journals.push(CheckedJournal {
+                folder: folder.path.clone(),
+                shard: folder.shard,
+                length: Some(scanned.length),
             });
-        }
-        places.resize(scan.places.len(), None);
-        for (block, place) in (0..).zip(scan.places) {
-            let known = usize::try_from(block).expect("blocks are indexed in memory");
-            match (places[known], place) {
-                (None, Some(place)) => places[known] = Some((index, place)),
-                (Some((other, there)), Some(place)) => {
-                    let (other_folder, other_manifest) = &shards[other];
-                    let first =
-                        BlockReader::open(other_folder, other_manifest)?.read(there, manifest)?;
-                    let second = BlockReader::open(folder, shard)?.read(place, manifest)?;
+            let mut readers = Readers::new(&journals, manifest, 2 * threads);
+            for found in scanned.blocks {
+                let known = usize::try_from(found.block).expect("blocks are indexed in memory");
+                if let Some((other, there)) = places[known] {
+                    let other = other as usize;
+                    let first = readers.read(other, there)?;
+                    let second = readers.read(index as usize, found.place)?;
                     if !first.same(&second) {
-                        let cases = manifest.block(block);
+                        let cases = manifest.block(found.block);
                         return Err(StudyError::Merge(format!(
                             "{} and {} contradict each other in cases {} to {}: one of them was not \
                              computed by this program",
-                            other_folder.display(),
-                            folder.display(),
+                            shards[other].path.display(),
+                            folder.path.display(),
                             cases.start,
                             cases.end - 1
                         )));
                     }
+                } else {
+                    places[known] = Some((index, found.place));
+                    bytes += found.bytes;
                 }
-                (_, None) => {}
             }
-        }
-    }
+            watch(Progress::Shards {
+                done: journals.len() as u64,
+                total,
+            });
+            Ok(())
+        },
+    )?;
     let missing = (0..manifest.blocks())
         .zip(&places)
         .filter(|(_, place)| place.is_none());
     let missing: Vec<u64> = missing.map(|(block, _)| block).collect();
     if missing.is_empty() {
-        Ok(places)
+        Ok(Collected {
+            blocks: Blocks { journals, places },
+            bytes,
+        })
     } else {
         Err(StudyError::Merge(missing_message(
             manifest, shards, &missing,
@@ -173,36 +192,92 @@ fn collect(
     }
 }
 
+/// Looks through a shard's journal, which nobody may write to meanwhile.
+fn scan_shard(shard: &ShardFolder, manifest: &Manifest) -> Result<Scanned, StudyError> {
+    let path = shard.path.join(JOURNAL_FILE);
+    let file = match open_input(&path) {
+        Ok(file) => file,
+        Err(error) if error.is_not_found() => {
+            let message = "is not there\nhint: `needlebench study STUDY --shard K/N --resume` computes it again";
+            return Err(StudyError::file(&path, message));
+        }
+        Err(InputError::Io(error)) => return Err(StudyError::io("open", &path)(error)),
+        Err(error) => return Err(StudyError::file(&path, format!("is no journal: {error}"))),
+    };
+    lock_to_read(&file, &shard.path)?;
+    let length = file.metadata().map_err(StudyError::io("read", &path))?;
+    let mut blocks = Vec::new();
+    let extent = scan_blocks(file, &path, manifest, shard.shard, |found| {
+        blocks.push(found);
+    })?;
+    // Of one that was computed again the first counts.
+    blocks.sort_by_key(|found| found.block);
+    blocks.dedup_by_key(|found| found.block);
+    Ok(Scanned {
+        blocks,
+        damages: extent.damages,
+        length: length.len(),
+    })
+}
+
+/// Folders and shards that are named one by one.
+const NAMED: usize = 12;
+
 /// Which shards to compute or to finish.
-fn missing_message(manifest: &Manifest, shards: &[(PathBuf, Manifest)], missing: &[u64]) -> String {
+fn missing_message(manifest: &Manifest, shards: &[ShardFolder], missing: &[u64]) -> String {
     let cases: u64 = missing
         .iter()
         .map(|block| manifest.block_len(*block) as u64)
         .sum();
     let mut lines = vec![format!("{cases} of {} cases are missing", manifest.cases)];
-    for (folder, shard) in shards {
-        if missing.iter().any(|block| shard.owns(*block)) {
-            let part = shard
-                .shard
-                .map_or("the study".to_owned(), |part| format!("shard {part}"));
-            let damaged = if shard.status == Status::Complete {
-                "was complete and is damaged"
-            } else {
-                "is not complete"
-            };
-            lines.push(format!("  {}: {part} {damaged}", folder.display()));
-        }
+    // By number of parts: those that lack something, and those that are there.
+    let mut lacking: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+    let mut given: BTreeSet<Shard> = BTreeSet::new();
+    for shard in shards.iter().filter_map(|folder| folder.shard) {
+        given.insert(shard);
+        lacking.entry(shard.parts()).or_insert_with(|| {
+            let part = |block: &u64| block % u64::from(shard.parts()) + 1;
+            let parts = missing.iter().map(part);
+            parts
+                .map(|part| u32::try_from(part).expect("at most the number of parts"))
+                .collect()
+        });
     }
-    let parts: std::collections::BTreeSet<u32> = shards
-        .iter()
-        .filter_map(|(_, shard)| shard.shard.map(Shard::parts))
-        .collect();
-    for parts in parts {
-        for part in (1..=parts).filter_map(|part| Shard::new(part, parts)) {
-            let given = shards.iter().any(|(_, shard)| shard.shard == Some(part));
-            if !given && missing.iter().any(|block| part.owns(*block)) {
-                lines.push(format!("  shard {part} is not among the folders"));
+    let lacks = |shard: Option<Shard>| {
+        shard.is_none_or(|shard| lacking[&shard.parts()].contains(&shard.part()))
+    };
+    let incomplete: Vec<&ShardFolder> = shards.iter().filter(|each| lacks(each.shard)).collect();
+    for folder in incomplete.iter().take(NAMED) {
+        let part = folder
+            .shard
+            .map_or("the study".to_owned(), |part| format!("shard {part}"));
+        let damaged = if folder.status == Status::Complete {
+            "was complete and is damaged"
+        } else {
+            "is not complete"
+        };
+        lines.push(format!("  {}: {part} {damaged}", folder.path.display()));
+    }
+    if let Some(more) = incomplete.len().checked_sub(NAMED).filter(|more| *more > 0) {
+        lines.push(format!(
+            "  and {more} more that are not complete or damaged"
+        ));
+    }
+    for (parts, lacking) in &lacking {
+        let absent = lacking
+            .iter()
+            .filter(|part| Shard::new(**part, *parts).is_some_and(|shard| !given.contains(&shard)));
+        let absent: Vec<u32> = absent.copied().collect();
+        if absent.len() <= NAMED {
+            for part in absent {
+                lines.push(format!("  shard {part}/{parts} is not among the folders"));
             }
+        } else {
+            lines.push(format!(
+                "  {} shards of {parts} are not among the folders: {}",
+                absent.len(),
+                ranges(absent.iter().copied())
+            ));
         }
     }
     lines.push(

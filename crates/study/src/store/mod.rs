@@ -22,6 +22,9 @@ mod run;
 mod salvage;
 mod schema;
 mod seal;
+mod shards;
+mod space;
+mod survey;
 
 pub use case_design::CaseDesign;
 pub use csv::write_csv;
@@ -33,3 +36,5 @@ pub use merge::merge;
 pub use parquet_read::ParquetResults;
 pub use progress::Progress;
 pub use run::{RunEnd, StudyRun};
+pub use shards::ranges;
+pub use survey::{ShardState, ShardSurvey, Survey, survey};

@@ -1,6 +1,8 @@
 //! What happens while a study is computed or merged.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use super::error::in_words;
 
 /// What happens in a run. `Display` gives a line for people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +22,16 @@ pub enum Progress<'a> {
     },
     /// A folder that says that it is complete is not: what is not sound is computed again.
     Unsound { file: &'a Path, reason: &'a str },
+    /// Below the folders that were given are some of studies of other names, which are left out.
+    OtherStudies { folders: &'a [PathBuf] },
+    /// So many shards are looked through.
+    Shards { done: u64, total: u64 },
+    /// The table will take so many bytes, beside those of the journals.
+    Space {
+        journal_bytes: u64,
+        table_bytes: u64,
+        free_bytes: Option<u64>,
+    },
     /// So many cases were there at the beginning.
     Begin { kept: u64, total: u64 },
     /// So many cases are in the journal.
@@ -54,6 +66,31 @@ impl std::fmt::Display for Progress<'_> {
                 "{}: {reason}; the study was complete, and what is not sound is computed again",
                 file.display()
             ),
+            Self::OtherStudies { folders } => write!(
+                f,
+                "left out, since they are of other studies: {}{}",
+                folders[0].display(),
+                match folders.len() {
+                    1 => String::new(),
+                    more => format!(" and {} more folders", more - 1),
+                }
+            ),
+            Self::Shards { done, total } => write!(f, "{done} of {total} shards looked through"),
+            Self::Space {
+                journal_bytes,
+                table_bytes,
+                free_bytes,
+            } => {
+                let [journals, table] = [*journal_bytes, *table_bytes].map(in_words);
+                write!(
+                    f,
+                    "the table will take about {table} beside {journals} of journals"
+                )?;
+                match free_bytes {
+                    Some(free) => write!(f, "; {} are free", in_words(*free)),
+                    None => Ok(()),
+                }
+            }
             Self::Begin { kept, total } => write!(f, "{kept} of {total} cases are there already"),
             Self::Cases { done, total } => write!(f, "{done} of {total} cases"),
             Self::Table { done, total } => write!(f, "{done} of {total} cases in the table"),

@@ -78,3 +78,13 @@ PLAN.Latest = class {
   }
 };
 PLAN.page = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte.toString(16).padStart(2, '0')).join('');
+
+/** A colour of three bytes. */
+PLAN.rgb = (channels) => `rgb(${channels.join()})`;
+
+/** A patch of colour and what it means. Style attributes are not allowed here; the page's own script may set them. */
+PLAN.swatch = function (color, words) {
+  const patch = NB.el('i');
+  patch.style.background = color;
+  return NB.el('span', { class: 'entry-swatch' }, patch, words);
+};

@@ -75,6 +75,7 @@ PLAN.EntryMap = class {
     this.canvas.hidden = !this.plan;
     this.at = null;
     this.said.textContent = '';
+    this.leastOdds = this.plan ? Math.min(...this.plan.map.odds_ratio.filter((odds) => odds !== null)) : 1;
     this.directions = this.plan ? this.plan.map.azimuth_deg.map((azimuth, index) => [azimuth, this.plan.map.elevation_deg[index]]) : [];
     this.showLegend();
     this.showTable();
@@ -86,12 +87,8 @@ PLAN.EntryMap = class {
   showLegend() {
     if (!this.plan) { NB.clear(this.legend); return; }
     const { rules, free } = this.planner.facts.route_colours;
-    const swatch = (rgb, words) => NB.el('span', { class: 'entry-swatch' }, NB.el('i', { 'data-rgb': rgb.join() }), words);
-    const parts = [swatch(free[0], 'free, least odds'), swatch(free[1], 'twice the odds or more'),
-      ...this.plan.refused.map(({ rule, count }) => swatch(rules[rule]?.[0] ? rules[rule][1] : [0, 0, 0], `${rules[rule]?.[0] || rule} ${count.toLocaleString('en')}`))];
-    NB.clear(this.legend, parts);
-    // Style attributes are not allowed here; the page's own script may set them.
-    for (const mark of this.legend.querySelectorAll('i')) mark.style.background = `rgb(${mark.dataset.rgb})`;
+    NB.clear(this.legend, [PLAN.swatch(PLAN.rgb(free[0]), 'free, least odds'), PLAN.swatch(PLAN.rgb(free[1]), 'twice the odds or more'),
+      ...this.plan.refused.map(({ rule, count }) => PLAN.swatch(PLAN.rgb(rules[rule]?.[1] || [0, 0, 0]), `${rules[rule]?.[0] || rule} ${count.toLocaleString('en')}`))]);
   }
 
   // ---- the picture: azimuth to the right, the sine of the elevation up, so that equal areas are equal solid angles
@@ -164,18 +161,30 @@ PLAN.EntryMap = class {
     this.enter(this.directions[index], depth);
   }
 
-  enter([azimuth, elevation], depth, configuration) {
+  /** The place so deep from the target in a direction, m of the scan. */
+  onSkin([azimuth, elevation], depth) {
     const [a, e] = [azimuth, elevation].map((degrees) => degrees * Math.PI / 180);
     const outwards = [Math.cos(e) * Math.sin(a), -Math.cos(e) * Math.cos(a), Math.sin(e)];
-    const target = this.plan.target_in_phantom_m.map((value, axis) => value + this.plan.phantom_origin_in_ct_m[axis]);
-    const place_m = target.map((value, axis) => value + depth * outwards[axis]);
+    const { target_in_phantom_m: target, phantom_origin_in_ct_m: origin } = this.plan;
+    return target.map((value, axis) => value + origin[axis] + depth * outwards[axis]);
+  }
+
+  /** Colour of a free direction: by how many times the least odds it has, up to twice. */
+  shade(index) {
+    const { free } = this.planner.facts.route_colours;
+    const share = Math.min(Math.max(Math.log2(this.plan.map.odds_ratio[index] / this.leastOdds), 0), 1);
+    return PLAN.rgb(free[0].map((value, channel) => Math.round(value + (free[1][channel] - value) * share)));
+  }
+
+  enter(direction, depth, configuration) {
+    const place_m = this.onSkin(direction, depth);
     this.planner.change({ entry: { place_m }, ...(configuration ? { configuration } : {}) });
     this.planner.look(this.planner.within(this.planner.indexOf(place_m).map(Math.round)));
   }
 
   render() {
     const { map } = this.plan;
-    const { rules, free } = this.planner.facts.route_colours;
+    const { rules } = this.planner.facts.route_colours;
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
     const image = document.createElement('canvas');
@@ -185,21 +194,15 @@ PLAN.EntryMap = class {
     context.fillStyle = '#f7f7f7';
     context.fillRect(0, 0, w, h);
     // An even grid: each has the same area, and a little more so that no paper shows.
-    const [across, up] = [1.25 * Math.sqrt(w * h / this.directions.length), 1.25 * Math.sqrt(w * h / this.directions.length)];
-    const least = Math.min(...map.odds_ratio.filter((odds) => odds !== null));
-    const color = (index) => {
-      const rule = map.rule[index];
-      if (rule !== null) return rules[map.rules[rule]]?.[1] || [0, 0, 0];
-      const share = Math.min(Math.max(Math.log2(map.odds_ratio[index] / least), 0), 1);
-      return free[0].map((value, channel) => Math.round(value + (free[1][channel] - value) * share));
-    };
+    const across = 1.25 * Math.sqrt(w * h / this.directions.length);
+    const color = (index) => (map.rule[index] === null ? this.shade(index) : PLAN.rgb(rules[map.rules[map.rule[index]]]?.[1] || [0, 0, 0]));
     // Free ones last: none of them is to be hidden.
     for (const freeOnes of [false, true]) {
       this.directions.forEach((direction, index) => {
         if ((map.rule[index] === null) !== freeOnes) return;
         const [x, y] = this.place(direction);
-        context.fillStyle = `rgb(${color(index).join()})`;
-        context.fillRect(x - across / 2, y - up / 2, across, up);
+        context.fillStyle = color(index);
+        context.fillRect(x - across / 2, y - across / 2, across, across);
       });
     }
     return image;
@@ -264,24 +267,14 @@ PLAN.EntryMap = class {
     }
   }
 
-  /** Free entries near a slice, as dots: `draw(index, best)`. */
+  /** Free entries near a slice, as dots: `draw(index, color)`. */
   entriesNear(axis, slice, within_mm, draw) {
     if (!this.plan) return;
     const { map } = this.plan;
-    if (!this.free) {
-      const target = this.plan.target_in_phantom_m.map((value, k) => value + this.plan.phantom_origin_in_ct_m[k]);
-      const least = Math.min(...map.odds_ratio.filter((odds) => odds !== null));
-      this.free = [];
-      this.directions.forEach(([azimuth, elevation], index) => {
-        if (map.rule[index] !== null) return;
-        const [a, e] = [azimuth, elevation].map((degrees) => degrees * Math.PI / 180);
-        const outwards = [Math.cos(e) * Math.sin(a), -Math.cos(e) * Math.cos(a), Math.sin(e)];
-        const place = target.map((value, k) => value + map.depth_m[index] * outwards[k]);
-        this.free.push({ index: this.planner.indexOf(place), worse: Math.min(Math.max(Math.log2(map.odds_ratio[index] / least), 0), 1) });
-      });
-    }
+    this.free ??= this.directions.flatMap((direction, index) => (map.rule[index] === null
+      ? [{ index: this.planner.indexOf(this.onSkin(direction, map.depth_m[index])), color: this.shade(index) }] : []));
     const spacing = 1e3 * this.planner.facts.spacing_m[axis];
-    for (const entry of this.free) if (Math.abs(entry.index[axis] - slice) * spacing <= within_mm) draw(entry.index, entry.worse);
+    for (const entry of this.free) if (Math.abs(entry.index[axis] - slice) * spacing <= within_mm) draw(entry.index, entry.color);
   }
 
   // ---- the best routes
@@ -307,14 +300,14 @@ PLAN.EntryMap = class {
     ];
     if (asked) {
       columns.push(
-        { title: 'Works', unit: 'of 8', numeric: true, cell: ({ route }) => String(route.working) },
+        { title: 'Serve', unit: 'of 8', numeric: true, cell: ({ route }) => String(route.working) },
         { title: 'Clear', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.clearance_m) },
         { title: 'Error', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.error?.target_lateral_rms_m) },
         { title: 'Room', unit: '%', numeric: true, cell: (row) => NB.fixed(100 * (best(row)?.free_fraction ?? NaN), 0) });
     }
     const unseen = plan.margins.filter(({ known }) => !known).map(({ obstacle }) => NB.words(obstacle));
     NB.clear(this.table, NB.table('Routes that stand for those around them, the best first', columns, shown, { class: 'small' }),
-      NB.el('p', { class: 'soft', text: 'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Nearest: lower bound of the needle\u2019s distance from bone, vessels and organs. Clear, error across the needle (rms) and room are of the best configuration; postures only, motions are not planned. Room: what arm and tool leave free of the half ball of 0.35 m about the entry.' }),
+      NB.el('p', { class: 'soft', text: 'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Nearest: lower bound of the needle\u2019s distance from bone, vessels and organs. Serve: configurations that work and keep the margins with their own expected error. Clear, error across the needle (rms) and room are of the best of them; postures only, motions are not planned. Room: what arm and tool leave free of the half ball of 0.35 m about the entry.' }),
       unseen.length ? NB.el('p', { class: 'bad', text: `The label map has nothing of: ${unseen.join(', ')}. Distances from it are not known.` }) : null);
   }
 };

@@ -27,6 +27,8 @@ PLAN.Planner = class {
     this.exact = new PLAN.Latest('reach', (answer) => this.reached(answer));
     this.entryMap = new PLAN.EntryMap(this);
     this.planned = new PLAN.Latest('motion', (answer, body) => this.moved(answer, body));
+    this.people = new PLAN.People(this);
+    this.simulation = new PLAN.Simulation(this);
     this.where = new PLAN.Latest('place', (answer) => this.placed(answer));
     this.latencies = [];
     this.reachWaits = [];
@@ -62,7 +64,7 @@ PLAN.Planner = class {
       NB.el('p', null, 'Research software: ', NB.el('strong', { text: 'not a medical device.' }), ' Slices as radiologists see them: the patient\u2019s right is on the left of the picture.'));
     const panes = NB.el('div', { class: 'panes' },
       this.slices.map((slice) => slice.element),
-      NB.el('figure', { class: 'slice' }, this.room.view.element, NB.el('figcaption', null, NB.el('span', { class: 'slice-title', text: 'Room' }), this.playButtons())),
+      NB.el('figure', { class: 'slice' }, this.room.view.element, NB.el('figcaption', null, NB.el('span', { class: 'slice-title', text: 'Room' }), NB.el('span', { class: 'no-print' }, this.people.boxes), this.playButtons())),
       this.probes.map((probe) => probe.element));
     this.numbers = NB.el('div');
     this.configurations = NB.el('div');
@@ -70,8 +72,8 @@ PLAN.Planner = class {
     const side = NB.el('aside', { class: 'side', 'aria-label': 'Plan' },
       this.needlePanel(), this.entryMap.element,
       NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Needle' }), this.numbers),
-      NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Configurations' }), this.configurations),
-      this.routesPanel(), this.markersPanel(), this.notesPanel(), this.simulationPanel());
+      NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Configurations' }), this.configurations, this.people.text),
+      this.routesPanel(), this.markersPanel(), this.notesPanel(), this.simulation.element);
     NB.clear(this.app, heading, this.banner, this.toolbar(), NB.el('div', { class: 'planner' }, NB.el('div', { class: 'pictures' }, panes, this.readout), side), this.signature());
     this.showTool();
     this.showWindow();
@@ -131,8 +133,7 @@ PLAN.Planner = class {
         return [label, (0xff000000 | blue << 16 | green << 8 | red) >>> 0];
       }));
     }
-    NB.clear(this.labelLegend, this.showsLabels ? labels.map(({ name }, at) => NB.el('span', { class: 'entry-swatch' }, NB.el('i', { 'data-color': color(at) }), NB.words(name))) : []);
-    for (const mark of this.labelLegend.querySelectorAll('i')) mark.style.background = mark.dataset.color;
+    NB.clear(this.labelLegend, this.showsLabels ? labels.map(({ name }, at) => PLAN.swatch(color(at), NB.words(name))) : []);
     this.draw();
   }
 
@@ -241,6 +242,7 @@ PLAN.Planner = class {
     this.motion = null;
     this.tip = null;
     this.planned.forget();
+    this.people.forget();
     this.room.stop();
     if (this.goalSelect) this.goalSelect.querySelector('select').value = this.state.needle.goal || this.facts.goals[0].name;
     if (this.aim()) this.askRoute();
@@ -250,12 +252,17 @@ PLAN.Planner = class {
     this.draw();
   }
 
+  /** Numbers and configurations at once: neither waits for the other. */
   askRoute() {
     const aim = this.aim();
-    if (aim) this.quick.ask({ aim });
+    if (!aim) return;
+    this.exact.forget();
+    this.quick.ask({ aim });
+    // Few directions about the needle; all of them, which takes longer, once the needle rests.
+    if (!this.facts.robot_is_unknown) this.bounds.ask({ aim, quick: true });
   }
 
-  routed(answer, body, took) {
+  routed(answer, _, took) {
     if (this.dragging) this.latencies.push(took);
     if (!this.aim()) return;
     if (answer.problem) this.complain(answer.problem);
@@ -266,14 +273,11 @@ PLAN.Planner = class {
     if (this.route && !this.probe.set) { this.probe.depth = 1e3 * this.route.length_m; }
     this.tip = null;
     this.motion = null;
+    this.people.forget();
     this.showRoute();
     this.draw();
     this.entryMap.draw();
-    if (this.route && !this.route.not_placed && !this.facts.robot_is_unknown) {
-      // Few directions about the needle at once; all of them, which takes longer, once the needle rests.
-      this.exact.forget();
-      this.bounds.ask({ aim: body.aim, quick: true });
-    } else { this.bounds.forget(); this.exact.forget(); this.reach = null; this.showReach(); }
+    if (!this.route || this.route.not_placed) { this.bounds.forget(); this.exact.forget(); this.reach = null; this.showReach(); }
   }
 
   bounded(answer, body, took) {
@@ -297,6 +301,7 @@ PLAN.Planner = class {
     if (body.configuration !== this.state.needle.configuration || this.dragging) return;
     this.motion = answer.refused ? { refused: answer.refused } : answer;
     this.tip = answer.tip || null;
+    this.people.ask(answer.end_joints_rad);
     this.showReach();
     this.draw();
   }
@@ -306,6 +311,7 @@ PLAN.Planner = class {
     this.state.needle = { ...this.state.needle, configuration };
     this.motion = null;
     this.tip = null;
+    this.people.forget();
     this.room.stop();
     if (this.reach) this.reached(this.reach);
     this.showUndo();
@@ -338,7 +344,7 @@ PLAN.Planner = class {
     this.targetText.textContent = target ? [lesion && NB.words(lesion.name), this.route && this.millimetres(this.route.target_m)].filter(Boolean).join(', ') : 'not chosen';
     this.entryText.textContent = entry ? (this.route ? this.millimetres(this.route.entry_m) : '') : 'not chosen';
     this.saveButton.disabled = !this.route || Boolean(this.route.not_placed);
-    if (this.simulateButton) this.simulateButton.disabled = this.saveButton.disabled || this.running;
+    this.simulation.allow(!this.saveButton.disabled);
     if (this.refused) {
       NB.clear(this.numbers, NB.el('p', { class: 'error', text: this.refused.message }), this.refused.hint ? NB.el('p', { text: this.refused.hint }) : null);
       return;
@@ -487,10 +493,16 @@ PLAN.Planner = class {
   }
 
   notesPanel() {
-    this.notes = NB.el('textarea', { rows: '3', maxlength: '20000', 'aria-label': 'Notes', oninput: () => { this.state.notes = this.notes.value; this.notesOnPaper.textContent = this.notes.value; this.keepSoon(); } });
-    this.notes.value = this.state.notes;
-    this.notesOnPaper = NB.el('p', { class: 'print-only', text: this.state.notes });
+    this.notes = NB.el('textarea', { rows: '3', maxlength: '20000', 'aria-label': 'Notes', oninput: () => { this.state.notes = this.notes.value; this.showNotes(); this.keepSoon(); } });
+    this.notesOnPaper = NB.el('p', { class: 'print-only' });
+    this.showNotes();
     return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Notes' }), this.notes, this.notesOnPaper);
+  }
+
+  /** On the page, and on paper. */
+  showNotes() {
+    if (this.notes.value !== this.state.notes) this.notes.value = this.state.notes;
+    this.notesOnPaper.textContent = this.state.notes;
   }
 
   signature() {
@@ -569,7 +581,7 @@ PLAN.Planner = class {
         this.version = theirs.version;
         this.conflict = false;
         this.calm();
-        this.notes.value = this.state.notes;
+        this.showNotes();
         this.setWindow(this.state.window_hu);
         this.everything();
         this.look(this.state.crosshair);
@@ -585,56 +597,18 @@ PLAN.Planner = class {
 
   calm() { this.complaint = null; this.banner.classList.remove('shown'); NB.clear(this.banner); }
 
+  /** What is saved as a plan. */
+  plan() { return { aim: this.aim(), configuration: this.state.needle.configuration, name: this.planName.value.trim() }; }
+
   async savePlan() {
     try {
-      const { file } = await PLAN.ask('plan', { body: { aim: this.aim(), configuration: this.state.needle.configuration, name: this.planName.value.trim() } });
-      this.saved.textContent = `Saved as ${file}; needlebench run takes it as it is.`;
+      const { file, left_out: leftOut } = await PLAN.ask('plan', { body: this.plan() });
+      this.saved.textContent = `Saved as ${file}; needlebench run takes it as it is.${leftOut.length ? ` It is without ${leftOut.map(NB.words).join(', ')}: no entry was chosen there.` : ''}`;
       this.saved.className = 'good';
     } catch (error) {
       this.saved.textContent = `Not saved: ${error.message}${error.hint ? ` (${error.hint})` : ''}`;
       this.saved.className = 'bad';
     }
-  }
-
-  // ---- simulation
-
-  simulationPanel() {
-    if (this.facts.robot_is_unknown) return NB.el('section', { class: 'panel no-print' }, NB.el('h2', { text: 'Simulation' }), NB.el('p', { text: 'Needs to know where the robot is.' }));
-    this.engine = 'rapier';
-    this.simulateButton = NB.el('button', { type: 'button', disabled: true, onclick: () => this.simulate() }, 'Save and simulate');
-    this.cancelButton = NB.el('button', { type: 'button', disabled: true, onclick: async () => this.simulated(await PLAN.ask('simulation', { method: 'DELETE' })) }, 'Cancel');
-    this.reportLink = NB.el('a', { href: '/results/report.html', target: '_blank', rel: 'noopener', hidden: true }, 'Open the report');
-    this.simulation = NB.el('p', { role: 'status', class: 'break' });
-    PLAN.ask('simulation').then((progress) => this.simulated(progress, true), () => {});
-    return NB.el('section', { class: 'panel no-print' }, NB.el('h2', { text: 'Simulation' }),
-      NB.select('Engines', [['rapier', 'rapier (quick)'], ['both', 'rapier and MuJoCo']], this.engine, (value) => { this.engine = value; }),
-      NB.el('div', { class: 'tabs' }, this.simulateButton, this.cancelButton), this.simulation, this.reportLink);
-  }
-
-  async simulate() {
-    this.simulateButton.disabled = true;
-    try {
-      const body = { aim: this.aim(), configuration: this.state.needle.configuration, name: this.planName.value.trim(), engine: this.engine };
-      this.simulated(await PLAN.ask('simulation', { body }));
-    } catch (error) {
-      this.simulation.textContent = `${error.message}${error.hint ? ` (${error.hint})` : ''}`;
-      this.simulation.className = 'bad break';
-      this.simulateButton.disabled = false;
-    }
-  }
-
-  simulated(progress, quiet = false) {
-    this.running = progress.state === 'running';
-    this.simulateButton.disabled = this.running || this.saveButton.disabled;
-    this.cancelButton.disabled = !this.running;
-    // The cookie that opens the report is of the page that simulated.
-    this.reportLink.hidden = quiet || !progress.has_report;
-    if (progress.state !== 'none') {
-      const words = { running: 'running', finished: 'finished', failed: 'failed', cancelled: 'cancelled' }[progress.state];
-      this.simulation.textContent = `${progress.plan} ${words}: ${progress.message}`;
-      this.simulation.className = progress.state === 'failed' ? 'bad break' : 'break';
-    }
-    if (this.running) setTimeout(async () => { try { this.simulated(await PLAN.ask('simulation')); } catch (error) { this.complain(error); } }, 500);
   }
 
   key(event) {
@@ -647,42 +621,6 @@ PLAN.Planner = class {
 
 /** What of a session is the page's own. */
 PLAN.taken = ({ schema_version, version, ...state }) => state;
-
-/** Routes as columns, what is known of them as rows. */
-PLAN.routeRows = function (columns, caption) {
-  const rows = [];
-  const row = (title, unit, cell) => rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route, column) : '\u2013')) });
-  if (columns.some(({ route }) => route?.judged)) {
-    row('By the rules of routes', '', (route) => {
-      const { judged } = route;
-      if (!judged) return 'not asked: find routes';
-      if (judged.free) return NB.el('span', { class: 'good', text: `free, odds \u00d7${NB.fixed(judged.odds_ratio, 2)}` });
-      const value = (number) => (judged.unit === 'm' ? `${NB.mm(number)} mm` : judged.unit === 'rad' ? `${NB.deg(number)}\u00b0` : NB.fixed(number, 0));
-      return NB.el('span', { class: 'bad', text: `${judged.broken}: ${value(judged.value)}, ${value(judged.limit)} ${/way|throw/.test(judged.broken) ? 'wanted' : 'allowed'}` });
-    });
-  }
-  row('Skin to target', 'mm', (route) => NB.mm(route.length_m));
-  row('Guide\u2019s exit to tip', 'mm', (route) => (route.insertion_m === null ? '\u2013' : `${NB.mm(route.insertion_m)}; the needle has ${NB.mm(route.needle_m)}`));
-  row('To the skin\u2019s normal', '\u00b0', (route) => NB.deg(route.skin_angle_rad));
-  row('Out of the axial plane', '\u00b0', (route) => NB.deg(route.axial_angle_rad));
-  row('In lung', 'mm', (route) => (route.in_lung_m === null ? 'no lung in the label map' : `${NB.mm(route.in_lung_m)} \u00b1 ${NB.mm(route.crossing_within_m)}`));
-  row('Enters lung', 'times', (route) => (route.lung_entries === null ? '\u2013' : String(route.lung_entries)));
-  for (const tissue of ['bone', 'vessel', 'organ']) {
-    if (!columns.some(({ route }) => route?.tissues.some((each) => each.tissue === tissue))) continue;
-    row(`To ${tissue}`, 'mm', (route) => {
-      const known = route.tissues.find((each) => each.tissue === tissue);
-      if (!known) return '\u2013';
-      const off = known.surface_p99_m === null ? '' : ` \u00b1 ${NB.mm(known.surface_p99_m, 2)}`;
-      return NB.el('span', { class: known.kept ? 'good' : 'bad', text: `${NB.mm(known.distance_m)}${off} to ${known.words}, ${known.kept ? '' : 'too near: '}${NB.mm(known.margin_m)} wanted` });
-    });
-  }
-  if (columns.some(({ route }) => route?.fissures.length)) row('Fissures crossed', '', (route) => route.fissures.map(NB.words).join(', ') || 'none');
-  row('Passes', 'mm from the skin', (route) => route.crossings.map((each) => `${NB.words(each.name)} ${NB.mm(each.from_m, 0)}\u2013${NB.mm(each.to_m, 0)}`).join(', '));
-  if (columns.some(({ reach }) => reach?.preview)) rows.push({ title: 'Configurations', unit: 'of 8', cells: columns.map(({ reach }) => (reach?.preview ? String(reach.preview.working) : '\u2013')) });
-  const heads = [{ title: 'Quantity', cell: ({ title, unit }) => [title, NB.el('span', { class: 'unit', text: unit ? ` ${unit}` : '' })] },
-    ...columns.map(({ name }, index) => ({ title: name, cell: ({ cells }) => cells[index] }))];
-  return NB.table(caption, heads, rows, { class: 'small route' });
-};
 
 /** Opens the case. */
 PLAN.open = async function () {

@@ -215,11 +215,9 @@ PLAN.Slice = class extends PLAN.Picture {
 
   /** Free entries of the map that are within 2 mm of the slice. */
   entries(context, slice) {
-    const { entryMap, facts } = this.planner;
-    const { free } = facts.route_colours;
-    entryMap.entriesNear(this.plane.w, slice, 2, (index, worse) => {
+    this.planner.entryMap.entriesNear(this.plane.w, slice, 2, (index, color) => {
       const [x, y] = this.onCanvas(this.place(index));
-      context.fillStyle = `rgb(${free[0].map((value, channel) => Math.round(value + (free[1][channel] - value) * worse)).join()})`;
+      context.fillStyle = color;
       context.strokeStyle = '#fff';
       context.lineWidth = 1;
       context.beginPath();
@@ -414,10 +412,10 @@ PLAN.Probe = class extends PLAN.Picture {
     const { right, down, middle, size, entry, target } = this.axes(route);
     const context = this.begin(size, [0, 0]);
     if (!context) return;
-    // All of the canvas, with at most as many pixels as it has.
+    // All of the canvas, with at most as many pixels as it has; coarser while the needle moves, so that numbers follow it.
     const [w, h] = this.box;
-    const [columns, rows] = [Math.min(Math.round(w), 420), Math.min(Math.round(h), 420)];
-    const key = `${w} ${h} ${this.scale} ${right} ${down} ${middle} ${state.window_hu}`;
+    const [columns, rows] = [w, h].map((pixels) => Math.round(Math.min(pixels, 420) * (this.planner.dragging ? 0.4 : 1)));
+    const key = `${columns} ${rows} ${w} ${h} ${this.scale} ${right} ${down} ${middle} ${state.window_hu}`;
     if (this.drawn !== key) {
       this.sample(right, down, middle, [w / this.scale, h / this.scale], [columns, rows]);
       this.drawn = key;

@@ -69,24 +69,8 @@ PLAN.greys = function ([low, high]) {
   return table;
 };
 
-/** A plane of the volume as a picture, one pixel a voxel: `u` to the right, `v` down, or up where it is flipped. */
-PLAN.plane = function (volume, { u, v, w, flip }, slice, greys, canvas) {
-  const { size, hu } = volume;
-  const stride = [1, size[0], size[0] * size[1]];
-  if (canvas.width !== size[u] || canvas.height !== size[v]) [canvas.width, canvas.height] = [size[u], size[v]];
-  const context = canvas.getContext('2d');
-  const image = context.createImageData(size[u], size[v]);
-  const pixels = new Uint32Array(image.data.buffer);
-  let to = 0;
-  for (let row = 0; row < size[v]; row++) {
-    let at = slice * stride[w] + (flip ? size[v] - 1 - row : row) * stride[v];
-    for (let column = 0; column < size[u]; column++, at += stride[u]) pixels[to++] = greys[hu[at] + 32768];
-  }
-  context.putImageData(image, 0, 0);
-};
-
-/** The outlines of labels in a slice: a voxel that has another beside it, in its label's colour. */
-PLAN.outlines = function (size, labels, { u, v, w, flip }, slice, colors, canvas) {
+/** Paints a slice, a pixel a voxel: `pixel(at, column, line)` is the colour of the voxel at an offset. */
+PLAN.paint = function (size, { u, v, w, flip }, slice, canvas, pixel) {
   const stride = [1, size[0], size[0] * size[1]];
   if (canvas.width !== size[u] || canvas.height !== size[v]) [canvas.width, canvas.height] = [size[u], size[v]];
   const context = canvas.getContext('2d');
@@ -96,15 +80,26 @@ PLAN.outlines = function (size, labels, { u, v, w, flip }, slice, colors, canvas
   for (let row = 0; row < size[v]; row++) {
     const line = flip ? size[v] - 1 - row : row;
     let at = slice * stride[w] + line * stride[v];
-    for (let column = 0; column < size[u]; column++, at += stride[u], to++) {
-      const label = labels[at];
-      if (!label) continue;
-      const inside = (column === 0 || labels[at - stride[u]] === label) && (column === size[u] - 1 || labels[at + stride[u]] === label)
-        && (line === 0 || labels[at - stride[v]] === label) && (line === size[v] - 1 || labels[at + stride[v]] === label);
-      if (!inside) pixels[to] = colors.get(label) ?? 0xffffffff;
-    }
+    for (let column = 0; column < size[u]; column++, at += stride[u]) pixels[to++] = pixel(at, column, line);
   }
   context.putImageData(image, 0, 0);
+};
+
+/** A slice in greys. */
+PLAN.plane = function ({ size, hu }, plane, slice, greys, canvas) {
+  PLAN.paint(size, plane, slice, canvas, (at) => greys[hu[at] + 32768]);
+};
+
+/** The outlines of labels in a slice: a voxel that has another beside it, in its label's colour. */
+PLAN.outlines = function (size, labels, plane, slice, colors, canvas) {
+  const { u, v } = plane;
+  const stride = [1, size[0], size[0] * size[1]];
+  PLAN.paint(size, plane, slice, canvas, (at, column, line) => {
+    const label = labels[at];
+    const inside = !label || ((column === 0 || labels[at - stride[u]] === label) && (column === size[u] - 1 || labels[at + stride[u]] === label)
+      && (line === 0 || labels[at - stride[v]] === label) && (line === size[v] - 1 || labels[at + stride[v]] === label));
+    return inside ? 0 : colors.get(label) ?? 0xffffffff;
+  });
 };
 
 /** Small vectors. */

@@ -104,7 +104,7 @@ pub(super) fn nearest_break<const N: usize>(
         }
     }
     // As wide as the directions are apart at first.
-    let wide_rad = PI / (directions.len() as f64).powf(1.0 / (N as f64 - 1.0));
+    let wide_rad = PI / libm::pow(directions.len() as f64, 1.0 / (N as f64 - 1.0));
     let mut best: Option<Break<N>> = None;
     for start in breaks {
         let refined = refine(search, start, wide_rad, &mut look);
@@ -213,13 +213,13 @@ fn first_break<const N: usize>(
 /// `x^(N+1) = x + 1` (2018), mapped so that equal volumes have equal numbers of points.
 fn in_ball<const N: usize>(number: u32, radius: f64) -> [f64; N] {
     // The root, by iteration: each step halves the error and more.
-    let root = (0..64).fold(2.0_f64, |x, _| (1.0 + x).powf(1.0 / (N as f64 + 1.0)));
+    let root = (0..64).fold(2.0_f64, |x, _| libm::pow(1.0 + x, 1.0 / (N as f64 + 1.0)));
     let mut power = 1.0;
     let coordinates: [f64; N] = std::array::from_fn(|_| {
         power /= root;
         (0.5 + power * (f64::from(number) + 1.0)).fract()
     });
-    let far = radius * coordinates[0].powf(1.0 / N as f64);
+    let far = radius * libm::pow(coordinates[0], 1.0 / N as f64);
     let turn = TAU * coordinates[N - 1];
     let mut point = [0.0; N];
     let across = if N == 3 {
@@ -229,13 +229,13 @@ fn in_ball<const N: usize>(number: u32, radius: f64) -> [f64; N] {
     } else {
         far
     };
-    (point[0], point[1]) = (across * turn.cos(), across * turn.sin());
+    (point[0], point[1]) = (across * libm::cos(turn), across * libm::sin(turn));
     point
 }
 
 /// A direction turned by an angle both ways towards each direction of a basis across it.
 fn turned<const N: usize>(direction: &[f64; N], angle_rad: f64) -> Vec<[f64; N]> {
-    let (sine, cosine) = angle_rad.sin_cos();
+    let (sine, cosine) = libm::sincos(angle_rad);
     let mut basis: Vec<[f64; N]> = vec![*direction];
     for axis in 0..N {
         let mut across = [0.0; N];
@@ -277,7 +277,7 @@ pub(super) fn on_sphere(count: u32) -> Vec<[f64; 3]> {
     directions.extend((0..count).map(|k| {
         let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
         let across = (1.0 - z * z).sqrt();
-        let (sine, cosine) = (golden_rad * f64::from(k)).sin_cos();
+        let (sine, cosine) = libm::sincos(golden_rad * f64::from(k));
         [across * cosine, across * sine, z]
     }));
     directions
@@ -287,7 +287,7 @@ pub(super) fn on_sphere(count: u32) -> Vec<[f64; 3]> {
 pub(super) fn on_circle(count: u32) -> Vec<[f64; 2]> {
     (0..count.max(1))
         .map(|k| {
-            let (sine, cosine) = (TAU * f64::from(k) / f64::from(count.max(1))).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * f64::from(k) / f64::from(count.max(1)));
             [cosine, sine]
         })
         .collect()
@@ -343,7 +343,7 @@ mod tests {
 
     #[test]
     fn a_turn_is_looked_for_in_both_angles() {
-        let (sine, cosine) = 0.4_f64.sin_cos();
+        let (sine, cosine) = libm::sincos(0.4_f64);
         let found = nearest_break(&SEARCH, &on_circle(16), |[yaw, roll]| {
             when(yaw * cosine + roll * sine < -6.25)
         });

@@ -283,8 +283,8 @@ fn entry_of(
 /// From a target outwards, phantom frame (left, posterior, superior): azimuth about the superior axis
 /// from anterior towards the patient's left, elevation towards superior.
 pub fn direction(azimuth_rad: f64, elevation_rad: f64) -> UnitVector3<f64> {
-    let (azimuth_sine, azimuth_cosine) = azimuth_rad.sin_cos();
-    let (elevation_sine, elevation_cosine) = elevation_rad.sin_cos();
+    let (azimuth_sine, azimuth_cosine) = libm::sincos(azimuth_rad);
+    let (elevation_sine, elevation_cosine) = libm::sincos(elevation_rad);
     UnitVector3::new_normalize(Vector3::new(
         elevation_cosine * azimuth_sine,
         -elevation_cosine * azimuth_cosine,

@@ -375,7 +375,7 @@ impl<'a> Obstacles<'a> {
                 return Vector3::zeros();
             }
             let angle = std::f64::consts::TAU * i as f64 / RIM_POINTS as f64;
-            Vector3::new(angle.cos(), angle.sin(), 0.0) * BODY_RADIUS_M
+            Vector3::new(libm::cos(angle), libm::sin(angle), 0.0) * BODY_RADIUS_M
         });
         let mut height_m = 0.5 * SLICE_M;
         while height_m < stature_m {

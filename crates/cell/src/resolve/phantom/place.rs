@@ -195,8 +195,8 @@ impl PhantomSection {
         };
         let rounded = |value: f64, per_unit: f64| (value * per_unit).round() / per_unit + 0.0;
         let degrees = |angle: f64| rounded(angle.to_degrees(), 1e9);
-        self.head_yaw_deg = degrees(head.y.atan2(head.x));
-        self.head_up_deg = degrees(head.z.atan2(head.x.hypot(head.y)));
+        self.head_yaw_deg = degrees(libm::atan2(head.y, head.x));
+        self.head_up_deg = degrees(libm::atan2(head.z, libm::hypot(head.x, head.y)));
         self.body_roll_deg = 0.0;
         let rest = orientation(self).inverse() * world_from_phantom.rotation;
         self.body_roll_deg = degrees(rest.scaled_axis().z);
@@ -251,7 +251,7 @@ mod tests {
                 ..PhantomSection::default()
             };
             let head = orientation(&section) * Vector3::z();
-            assert!((head.z - 10_f64.to_radians().sin()).abs() < 1e-12);
+            assert!((head.z - libm::sin(10_f64.to_radians())).abs() < 1e-12);
         }
     }
 }

@@ -38,7 +38,11 @@ fn wedge(inner_m: f64, outer_m: f64, half_length_m: f64, half_angle_rad: f64) ->
     for radius in [inner_m, outer_m] {
         for angle in [-half_angle_rad, half_angle_rad] {
             for z in [-half_length_m, half_length_m] {
-                vertices_m.push(Point3::new(radius * angle.cos(), radius * angle.sin(), z));
+                vertices_m.push(Point3::new(
+                    radius * libm::cos(angle),
+                    radius * libm::sin(angle),
+                    z,
+                ));
             }
         }
     }

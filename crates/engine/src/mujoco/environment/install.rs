@@ -10,8 +10,9 @@ use std::time::Duration;
 use sha2::{Digest, Sha256};
 
 use super::command::{CommandFailure, run};
-use super::python::{Python, on_path};
-use super::{EnvironmentError, EnvironmentOptions, hex};
+use super::python::{Python, PythonVersion, on_path};
+use super::wanted::WheelsFor;
+use super::{EnvironmentError, EnvironmentOptions, REQUIREMENTS, hex, pinned};
 
 /// The installer for machines without uv; with it Debian's missing `ensurepip` does no harm.
 pub(super) const PIP_WHEEL: &[u8] =
@@ -41,6 +42,9 @@ pub(super) fn install(
     progress: &mut dyn FnMut(&str),
 ) -> Result<(), EnvironmentError> {
     let venv = folder.join("venv");
+    if let Some(wheels) = &options.wheels {
+        return install_from_wheels(wheels, python, folder, requirements, progress);
+    }
     let uv = on_path(options, OsStr::new("uv")).next();
     if let Some(uv) = uv {
         progress("installing MuJoCo and numpy with uv (about 30 MB)");
@@ -56,16 +60,74 @@ pub(super) fn install(
     make_venv(python, &venv)?;
     let pip = write_pip(folder, PIP_WHEEL)?;
     progress("installing MuJoCo and numpy with pip (about 30 MB)");
-    install_with_pip(&pip, &venv_python(&venv), requirements).map_err(|failure| {
+    install_with_pip(&pip, &venv_python(&venv), requirements, None).map_err(|failure| {
         EnvironmentError::Install {
             failure,
-            python: python.executable.clone(),
-            requirements: requirements.to_owned(),
+            wanted: WheelsFor::this_machine(python),
         }
     })?;
     // 2 MB that nothing needs any more; a leftover does no harm.
     let _ = fs::remove_file(pip);
     Ok(())
+}
+
+/// The same from a folder, with pip alone: it needs no index, and no network.
+fn install_from_wheels(
+    wheels: &Path,
+    python: &Python,
+    folder: &Path,
+    requirements: &Path,
+    progress: &mut dyn FnMut(&str),
+) -> Result<(), EnvironmentError> {
+    let unsuitable = |reason: String| EnvironmentError::Wheels {
+        folder: wheels.to_owned(),
+        reason,
+        wanted: WheelsFor::this_machine(python),
+    };
+    let found = fs::read_dir(wheels).map_err(|error| unsuitable(error.to_string()))?;
+    let is_wheel = |name: &OsStr| Path::new(name).extension() == Some(OsStr::new("whl"));
+    if !found.flatten().any(|entry| is_wheel(&entry.file_name())) {
+        return Err(unsuitable("it holds no wheels (*.whl)".to_owned()));
+    }
+    let venv = folder.join("venv");
+    progress("making a Python environment");
+    make_venv(python, &venv)?;
+    let pip = write_pip(folder, PIP_WHEEL)?;
+    progress(&format!(
+        "installing MuJoCo and numpy from {}",
+        wheels.display()
+    ));
+    install_with_pip(&pip, &venv_python(&venv), requirements, Some(wheels)).map_err(|failure| {
+        // pip names a damaged file last, after every hash that it could have had.
+        unsuitable(damaged(wheels).unwrap_or_else(|| failure.to_string()))
+    })?;
+    // As above.
+    let _ = fs::remove_file(pip);
+    Ok(())
+}
+
+/// The first wheel of a pinned package and version in a folder that is none of those that are pinned.
+fn damaged(wheels: &Path) -> Option<String> {
+    let prefixes: Vec<String> = pinned()
+        .into_iter()
+        .map(|(name, version)| format!("{}-{version}-", name.replace('-', "_")))
+        .collect();
+    let mut files: Vec<PathBuf> = fs::read_dir(wheels)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+        .collect();
+    files.sort();
+    files.into_iter().find_map(|file| {
+        let name = file.file_name()?.to_str()?.to_owned();
+        if !prefixes.iter().any(|prefix| name.starts_with(prefix)) {
+            return None;
+        }
+        let sha256 = hex(&Sha256::digest(fs::read(&file).ok()?));
+        (!REQUIREMENTS.contains(&sha256))
+            .then(|| format!("{name} is damaged: its SHA-256 is none of those that are known"))
+    })
 }
 
 fn install_with_uv(
@@ -119,11 +181,12 @@ pub(super) fn write_pip(folder: &Path, wheel: &[u8]) -> Result<PathBuf, Environm
     Ok(path)
 }
 
-/// Installs exactly the wheels whose hashes the requirements list.
+/// Installs exactly the wheels whose hashes the requirements list, out of a folder if one is given.
 pub(super) fn install_with_pip(
     pip: &Path,
     venv_python: &Path,
     requirements: &Path,
+    wheels: Option<&Path>,
 ) -> Result<(), CommandFailure> {
     let mut install = Command::new(venv_python);
     // Isolated concerns Python alone: pip's configuration (index, proxy, certificates) holds.
@@ -143,12 +206,47 @@ pub(super) fn install_with_pip(
         "-r",
     ]);
     install.arg(requirements);
+    if let Some(wheels) = wheels {
+        install.args(["--no-index", "--find-links"]).arg(wheels);
+    }
     // `user = true` in a pip.conf contradicts a virtual environment.
     install.env("PIP_USER", "0");
-    install.env("PIP_DISABLE_PIP_VERSION_CHECK", "1");
-    // Nobody is there to answer a question about credentials.
-    install.env("PIP_NO_INPUT", "1");
+    set_unattended(&mut install);
     run(&mut install, INSTALL_LIMIT)?;
+    Ok(())
+}
+
+/// Nobody is there to answer a question about credentials, or to read about another pip.
+fn set_unattended(pip: &mut Command) {
+    pip.env("PIP_DISABLE_PIP_VERSION_CHECK", "1");
+    pip.env("PIP_NO_INPUT", "1");
+}
+
+/// Fetches the wheels that requirements without markers name, for a Python and, unless it is this one's,
+/// a platform by its tag.
+pub(super) fn download_with_pip(
+    pip: &Path,
+    python: &Python,
+    requirements: &Path,
+    version: PythonVersion,
+    tag: Option<&str>,
+    folder: &Path,
+) -> Result<(), CommandFailure> {
+    let mut download = Command::new(&python.executable);
+    download.arg("-I").arg(pip.join("pip"));
+    download.args(["download", "--quiet", "--require-hashes", "--no-deps"]);
+    download.args(["--only-binary", ":all:", "--implementation", "cp"]);
+    download.args(["--python-version", &version.to_string()]);
+    if let Some(tag) = tag {
+        download.args(["--platform", tag]);
+    }
+    download
+        .arg("--dest")
+        .arg(folder)
+        .arg("-r")
+        .arg(requirements);
+    set_unattended(&mut download);
+    run(&mut download, INSTALL_LIMIT)?;
     Ok(())
 }
 

@@ -5,14 +5,65 @@ use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::str::FromStr;
 use std::time::Duration;
 
 use super::command::{CommandFailure, run};
-use super::{EnvironmentError, EnvironmentOptions};
+use super::{EnvironmentError, EnvironmentOptions, MUJOCO_VERSION};
 
 /// Oldest and newest Python that MuJoCo 4.0.0 has wheels for.
-const OLDEST: (u32, u32) = (3, 11);
-const NEWEST: (u32, u32) = (3, 15);
+const OLDEST: PythonVersion = PythonVersion {
+    major: 3,
+    minor: 11,
+};
+const NEWEST: PythonVersion = PythonVersion {
+    major: 3,
+    minor: 15,
+};
+
+/// The part of a Python's version that wheels are made for, such as 3.12.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PythonVersion {
+    major: u32,
+    minor: u32,
+}
+
+impl fmt::Display for PythonVersion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.major, self.minor)
+    }
+}
+
+impl FromStr for PythonVersion {
+    type Err = String;
+
+    /// Reads `3.12` or `3.12.1`; of those that the wheels exist for.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let version =
+            leading(text).ok_or_else(|| format!("`{text}` is no version such as 3.12"))?;
+        if version < OLDEST || version > NEWEST {
+            return Err(format!(
+                "MuJoCo {MUJOCO_VERSION} is made for Python {}",
+                made_for()
+            ));
+        }
+        Ok(version)
+    }
+}
+
+/// Major and minor number of a version.
+fn leading(version: &str) -> Option<PythonVersion> {
+    let mut numbers = version.split('.').map(str::parse::<u32>);
+    match (numbers.next(), numbers.next()) {
+        (Some(Ok(major)), Some(Ok(minor))) => Some(PythonVersion { major, minor }),
+        _ => None,
+    }
+}
+
+/// The Pythons that there are wheels for, in words.
+pub(super) fn made_for() -> String {
+    format!("{OLDEST} to {NEWEST}")
+}
 
 /// In the order in which they are tried.
 ///
@@ -42,6 +93,8 @@ pub(super) struct Python {
     pub(super) executable: PathBuf,
     /// Full version, such as `3.11.7`.
     pub(super) version: String,
+    /// The part of it that wheels are made for.
+    pub(super) wheels: PythonVersion,
 }
 
 /// A Python that was tried and will not do.
@@ -121,10 +174,7 @@ fn judge(answer: &str) -> Result<Python, String> {
     else {
         return Err(unreadable());
     };
-    let mut numbers = version.split('.').map(str::parse::<u32>);
-    let (Some(Ok(major)), Some(Ok(minor))) = (numbers.next(), numbers.next()) else {
-        return Err(unreadable());
-    };
+    let short = leading(version).ok_or_else(unreadable)?;
     let name = format!("{implementation} {version}, {bits} bit");
     if implementation != "cpython" || gil != "1" {
         return Err(format!("{name}: not the standard CPython"));
@@ -132,23 +182,17 @@ fn judge(answer: &str) -> Result<Python, String> {
     if bits != "64" {
         return Err(format!("{name}: MuJoCo needs 64 bit"));
     }
-    let wheels = format!(
-        "MuJoCo {} is made for Python {}.{} to {}.{}",
-        super::MUJOCO_VERSION,
-        OLDEST.0,
-        OLDEST.1,
-        NEWEST.0,
-        NEWEST.1
-    );
-    if (major, minor) < OLDEST {
+    let wheels = format!("MuJoCo {MUJOCO_VERSION} is made for Python {}", made_for());
+    if short < OLDEST {
         return Err(format!("Python {version} is too old: {wheels}"));
     }
-    if (major, minor) > NEWEST {
+    if short > NEWEST {
         return Err(format!("Python {version} is too new: {wheels}"));
     }
     Ok(Python {
         executable: PathBuf::from(executable),
         version: version.to_owned(),
+        wheels: short,
     })
 }
 

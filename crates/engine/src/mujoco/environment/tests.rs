@@ -37,6 +37,7 @@ fn key_depends_on_the_python() {
     let python = |version: &str| Python {
         executable: PathBuf::from("/p"),
         version: version.to_owned(),
+        wheels: version.parse().unwrap(),
     };
     assert_eq!(key(&python("3.11.7")), key(&python("3.11.7")));
     assert_ne!(key(&python("3.11.7")), key(&python("3.11.8")));
@@ -74,7 +75,7 @@ fn package_with_another_hash_than_the_lock_says_is_refused() {
     let install = |hash: &str| {
         let line = format!("{} --hash=sha256:{hash}\n", wheel.display());
         fs::write(&requirements, line).unwrap();
-        install::install_with_pip(&pip, &venv_python, &requirements)
+        install::install_with_pip(&pip, &venv_python, &requirements, None)
     };
     let import = || {
         let mut command = Command::new(&venv_python);

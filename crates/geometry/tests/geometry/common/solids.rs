@@ -95,9 +95,9 @@ pub fn torus(ring_m: f64, tube_m: f64, n: u32, m: u32) -> TriangleMesh {
     let mut vertices_m = Vec::new();
     let mut triangles = Vec::new();
     for i in 0..n {
-        let (su, cu) = (2.0 * PI * f64::from(i) / f64::from(n)).sin_cos();
+        let (su, cu) = libm::sincos(2.0 * PI * f64::from(i) / f64::from(n));
         for j in 0..m {
-            let (sv, cv) = (2.0 * PI * f64::from(j) / f64::from(m)).sin_cos();
+            let (sv, cv) = libm::sincos(2.0 * PI * f64::from(j) / f64::from(m));
             let r = ring_m + tube_m * cv;
             vertices_m.push(Point3::new(r * cu, r * su, tube_m * sv));
             let at = |i: u32, j: u32| (i % n) * m + j % m;
@@ -118,9 +118,9 @@ pub fn bowl() -> TriangleMesh {
     let mut vertices_m = Vec::new();
     for (radius, count) in [(0.2, rings), (0.17, rings)] {
         for ring in 0..=count {
-            let (sin, cos) = (0.5 * PI * f64::from(ring) / f64::from(count)).sin_cos();
+            let (sin, cos) = libm::sincos(0.5 * PI * f64::from(ring) / f64::from(count));
             for sector in 0..sectors {
-                let (st, ct) = (2.0 * PI * f64::from(sector) / f64::from(sectors)).sin_cos();
+                let (st, ct) = libm::sincos(2.0 * PI * f64::from(sector) / f64::from(sectors));
                 vertices_m.push(Point3::new(
                     radius * cos * ct,
                     radius * cos * st,

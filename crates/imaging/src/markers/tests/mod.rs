@@ -320,7 +320,7 @@ fn turned_and_tilted_slices_are_no_other() {
     let lean = 0.35_f64;
     tilted
         .axes
-        .set_column(1, &Vector3::new(0.0, lean.cos(), -lean.sin()));
+        .set_column(1, &Vector3::new(0.0, libm::cos(lean), -libm::sin(lean)));
     assert!(trials(2, &tilted, &model, [6.0, 1200.0], |_, _| ()).rms_mm() < 0.06);
 }
 

@@ -111,9 +111,9 @@ impl Scanner {
             for (index, value) in image.into_iter().enumerate() {
                 let (i, j) = (index % self.size[0], index / self.size[0]);
                 let off = [i as f64 - middle.x, j as f64 - middle.y];
-                let near = off[0].hypot(off[1]) * self.pixel < 9.0;
+                let near = libm::hypot(off[0], off[1]) * self.pixel < 9.0;
                 let streak = if near {
-                    self.streaks * (0.9 * off[0] + 0.37 * off[1]).sin()
+                    self.streaks * libm::sin(0.9 * off[0] + 0.37 * off[1])
                 } else {
                     0.0
                 };
@@ -150,7 +150,7 @@ impl Scanner {
             }
         }
         let kernel: Vec<f64> = (0..=2 * margin)
-            .map(|n| (-0.5 * ((n as f64 - margin as f64) * fine / self.blur).powi(2)).exp())
+            .map(|n| libm::exp(-0.5 * ((n as f64 - margin as f64) * fine / self.blur).powi(2)))
             .collect();
         let sum: f64 = kernel.iter().sum();
         let mut rows = vec![0.0; width * ny];
@@ -187,7 +187,7 @@ impl Scanner {
         for dy in 0..=2 * REACH {
             for dx in 0..=2 * REACH {
                 let d2 = (dx as f64 - REACH as f64).powi(2) + (dy as f64 - REACH as f64).powi(2);
-                kernel.push((-0.5 * d2 / self.noise_blur.powi(2)).exp());
+                kernel.push(libm::exp(-0.5 * d2 / self.noise_blur.powi(2)));
             }
         }
         let power = kernel.iter().map(|k| k * k).sum::<f64>().sqrt();
@@ -218,7 +218,7 @@ pub fn ball_on_skin(diameter: f64, hu: f64, skin_radius: f64, random: &mut Norma
     let angle = random.uniform(0.0, std::f64::consts::TAU);
     let up = random.uniform(-0.5, 0.5);
     let level = (1.0 - up * up).sqrt();
-    let normal = Vector3::new(level * angle.cos(), level * angle.sin(), up);
+    let normal = Vector3::new(level * libm::cos(angle), level * libm::sin(angle), up);
     let axis = normal
         .cross(&Vector3::new(-normal.y, normal.x, 0.0))
         .normalize();

@@ -16,6 +16,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch};
 
 use super::super::numerical::{Lanes, Numerical, Placed};
+use crate::ik::fused::Fused as _;
 use crate::{JOINT_COUNT, Joints, Pose, UrGeometry};
 
 /// Vector instructions of this machine, found once.
@@ -69,7 +70,7 @@ impl Block {
     }
 
     pub(super) fn joints(&self, lane: usize) -> Joints {
-        Joints::from_fn(|i, _| self.sines[i][lane].atan2(self.cosines[i][lane]))
+        Joints::from_fn(|i, _| libm::atan2(self.sines[i][lane], self.cosines[i][lane]))
     }
 
     pub(super) fn corrected(&self, lane: usize) -> Placed<f64> {
@@ -99,7 +100,7 @@ struct Posture<V> {
 
 #[inline(always)]
 fn dot<S: Simd, V: SimdFloat<S, Element = f64>>(a: &[V; 3], b: &[V; 3]) -> V {
-    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
+    a[0].fused(b[0], a[1].fused(b[1], a[2] * b[2]))
 }
 
 /// A sum of three vectors with their factors. No closures here: they are not inlined into vector
@@ -107,9 +108,9 @@ fn dot<S: Simd, V: SimdFloat<S, Element = f64>>(a: &[V; 3], b: &[V; 3]) -> V {
 #[inline(always)]
 fn mixed<S: Simd, V: SimdFloat<S, Element = f64>>(v: &[[V; 3]; 3], by: [V; 3]) -> [V; 3] {
     [
-        by[0].mul_add(v[0][0], by[1].mul_add(v[1][0], by[2] * v[2][0])),
-        by[0].mul_add(v[0][1], by[1].mul_add(v[1][1], by[2] * v[2][1])),
-        by[0].mul_add(v[0][2], by[1].mul_add(v[1][2], by[2] * v[2][2])),
+        by[0].fused(v[0][0], by[1].fused(v[1][0], by[2] * v[2][0])),
+        by[0].fused(v[0][1], by[1].fused(v[1][1], by[2] * v[2][1])),
+        by[0].fused(v[0][2], by[1].fused(v[1][2], by[2] * v[2][2])),
     ]
 }
 
@@ -137,7 +138,7 @@ fn turned<S: Simd, V: SimdFloat<S, Element = f64>>(v: &[V; 3]) -> [V; 3] {
 /// A direction; zeros where there is none.
 #[inline(always)]
 fn unit<S: Simd, V: SimdFloat<S, Element = f64>>(simd: S, x: V, y: V) -> (V, V) {
-    let squared = x.mul_add(x, y * y).max(V::splat(simd, f64::MIN_POSITIVE));
+    let squared = x.fused(x, y * y).max(V::splat(simd, f64::MIN_POSITIVE));
     let inverse = V::splat(simd, 1.0) / squared.sqrt();
     (x * inverse, y * inverse)
 }
@@ -244,19 +245,19 @@ impl<'a> Chart<'a> {
         } = pose;
         // Equation 9, its root clamped.
         let [x, y, z] = [p[0] - a[0] * g.d6, p[1] - a[1] * g.d6, p[2] - a[2] * g.d6];
-        let root_squared = x.mul_add(x, y * y) - splat(g.d4 * g.d4);
+        let root_squared = x.fused(x, y * y) - splat(g.d4 * g.d4);
         let forward = root_squared.max(zero).sqrt() * self.shoulder;
         let (c1, s1) = unit(
             simd,
-            forward.mul_add(x, -(y * g.d4)),
-            forward.mul_add(y, x * g.d4),
+            forward.fused(x, -(y * g.d4)),
+            forward.fused(y, x * g.d4),
         );
         // The arm's plane: its normal, the axis of joint 5, and the third.
         let axis = [s1, -c1, zero];
         let along = [-(s234 * c1), -(s234 * s1), c234];
         let third = [-(c1 * c234), -(s1 * c234), -s234];
         let (ahead, up) = (forward - s234 * g.d5, z - splat(g.d1) + c234 * g.d5);
-        let reach_squared = ahead.mul_add(ahead, up * up);
+        let reach_squared = ahead.fused(ahead, up * up);
         let scale = 1.0 / (2.0 * g.a2 * g.a3);
         let one_minus = (splat((g.a2 + g.a3).powi(2)) - reach_squared) * scale;
         let one_plus = (reach_squared - splat((g.a2 - g.a3).powi(2))) * scale;
@@ -265,18 +266,11 @@ impl<'a> Chart<'a> {
             .min(splat(1.0));
         let s3 = (one_minus * one_plus).max(zero).sqrt() * *elbow;
         let (bx, by) = (c3 * g.a3 + splat(g.a2), s3 * g.a3);
-        let (c2, s2) = unit(
-            simd,
-            ahead.mul_add(bx, up * by),
-            up.mul_add(bx, -(ahead * by)),
-        );
-        let (c23, s23) = (c2.mul_add(c3, -(s2 * s3)), s2.mul_add(c3, c2 * s3));
-        let (c4, s4) = (
-            c234.mul_add(c23, s234 * s23),
-            s234.mul_add(c23, -(c234 * s23)),
-        );
+        let (c2, s2) = unit(simd, ahead.fused(bx, up * by), up.fused(bx, -(ahead * by)));
+        let (c23, s23) = (c2.fused(c3, -(s2 * s3)), s2.fused(c3, c2 * s3));
+        let (c4, s4) = (c234.fused(c23, s234 * s23), s234.fused(c23, -(c234 * s23)));
         let (c6, s6) = unit(simd, dot(o, &along), dot(n, &along));
-        let s5 = dot(n, &axis).mul_add(c6, -(dot(o, &axis) * s6));
+        let s5 = dot(n, &axis).fused(c6, -(dot(o, &axis) * s6));
         let (c5, s5) = unit(simd, dot(a, &axis), s5);
         let cosines = [c1, c2, c3, c4, c5, c6];
         let sines = [s1, s2, s3, s4, s5, s6];

@@ -158,15 +158,15 @@ impl Calibrated<'_> {
         let ahead = self.geometry.wrist_forward_m(q).abs() / reach_m;
         Singular {
             shoulder: ahead < NEAR.max(TURNS * self.mismatch.angle_rad),
-            elbow: q[2].sin().abs() < NEAR,
-            wrist: q[4].sin().abs() < NEAR.max(TURNS * self.mismatch.angle_rad),
+            elbow: libm::sin(q[2]).abs() < NEAR,
+            wrist: libm::sin(q[4]).abs() < NEAR.max(TURNS * self.mismatch.angle_rad),
         }
     }
 
     /// By how much the calibration moves wrist 1, which `q6` swings the farther the smaller `s5`
     /// is; four times that, m.
     fn doubtful_m(&self, q: &Joints) -> f64 {
-        let swing = (self.mismatch.angle_rad / q[4].sin().abs()).min(1.0);
+        let swing = (self.mismatch.angle_rad / libm::sin(q[4]).abs()).min(1.0);
         4.0 * (self.mismatch.position_m + self.geometry.d5.abs() * swing)
     }
 
@@ -217,7 +217,7 @@ impl Calibrated<'_> {
         for radius_rad in RADII_RAD {
             for step in 0..DIRECTIONS {
                 let angle = TAU * f64::from(step) / f64::from(DIRECTIONS);
-                let (sine, cosine) = angle.sin_cos();
+                let (sine, cosine) = libm::sincos(angle);
                 let start = centre + (first * cosine + second * sine) * radius_rad;
                 if let Some(found) = self.newton(&start) {
                     self.insert(solutions, &found);

@@ -81,6 +81,6 @@ fn against(geometry: &UrGeometry, q: &Joints, configuration: Configuration) -> f
     let ahead = geometry.wrist_forward_m(q) / (geometry.a2 + geometry.a3).abs();
     // Elbow and wrist are named by their sines relative to the shoulder's sign.
     against(ahead, shoulder.sign())
-        + against(q[2].sin(), elbow.sign(shoulder))
-        + against(q[4].sin(), wrist.sign(shoulder))
+        + against(libm::sin(q[2]), elbow.sign(shoulder))
+        + against(libm::sin(q[4]), wrist.sign(shoulder))
 }

@@ -57,7 +57,7 @@ pub(super) fn sweep(
         ahead_of(centre.root_squared + squares),
     ];
     // The opening is the angle of wrist 1 over that of the wrist centre, a quarter turn off.
-    let beyond = range.map(|ahead| centre.up.atan2(ahead));
+    let beyond = range.map(|ahead| libm::atan2(centre.up, ahead));
     let straight = 0.5 * (beyond[0] + beyond[1]) - FRAC_PI_2;
     let slack = 0.5 * (beyond[0] - beyond[1]).abs();
     let (straight, slack) = if slack > FRAC_PI_2 {
@@ -78,10 +78,10 @@ pub(super) fn sweep(
         let span = (2.0 * distance * d5).max(f64::MIN_POSITIVE);
         (length * length - distance * distance - d5 * d5) / span
     };
-    let distances = range.map(|ahead| ahead.hypot(centre.up));
+    let distances = range.map(|ahead| libm::hypot(ahead, centre.up));
     let angle_of = |cosine: f64| {
         let cosine = cosine.clamp(-1.0, 1.0);
-        ((1.0 - cosine) * (1.0 + cosine)).sqrt().atan2(cosine)
+        libm::atan2(((1.0 - cosine) * (1.0 + cosine)).sqrt(), cosine)
     };
     // Wrist 1 has to be nearer than the longest and farther than the shortest: openings from
     // `least` to `most`.

@@ -385,7 +385,7 @@ fn what_many_descents_find_is_found() {
                     let turn = random.uniform(-PI, PI);
                     let mut start = about.map(|q| q + 0.3 * random.uniform(-1.0, 1.0));
                     start[3] += turn;
-                    start[5] -= turn * about[4].cos().signum();
+                    start[5] -= turn * libm::cos(about[4]).signum();
                     start
                 };
                 if let Some(solution) = descend(&kinematics.chain, pose, &start)

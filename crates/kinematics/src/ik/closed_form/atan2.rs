@@ -4,6 +4,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use fearless_simd::prelude::*;
 
+use crate::ik::fused::Fused as _;
+
 /// Minimax coefficients of `2 (atan t - t) / t^3` in powers of `t^2` on `[0, tan(pi/8)]`, by the
 /// Remez exchange in 60 digits; relative error of the resulting arc tangent 3.5e-17.
 const TWICE_ATAN: [f64; 10] = [
@@ -43,13 +45,13 @@ pub(super) fn upper_half<S: Simd, V: SimdFloat<S, Element = f64>>(
     // Half the angle from the nearer axis.
     let t = x_abs.min(y) / (x_abs.max(y) + length);
     let t2 = t * t;
-    let pair = |i: usize| t2.mul_add(splat(TWICE_ATAN[i + 1]), splat(TWICE_ATAN[i]));
+    let pair = |i: usize| t2.fused(splat(TWICE_ATAN[i + 1]), splat(TWICE_ATAN[i]));
     let t4 = t2 * t2;
     let t8 = t4 * t4;
-    let low = t4.mul_add(pair(2), pair(0));
-    let middle = t4.mul_add(pair(6), pair(4));
-    let high = t8.mul_add(t8.mul_add(pair(8), middle), low);
-    let from_axis = (t * t2).mul_add(high, t + t);
+    let low = t4.fused(pair(2), pair(0));
+    let middle = t4.fused(pair(6), pair(4));
+    let high = t8.fused(t8.fused(pair(8), middle), low);
+    let from_axis = (t * t2).fused(high, t + t);
     // From the y axis the angle is counted against the sign of x, from the x axis with it.
     let signed = from_axis.copysign(steep.select(-x, x));
     let behind = x.simd_lt(0.0).select(splat(PI), splat(0.0));
@@ -79,12 +81,12 @@ mod tests {
             let exact: [f64; 4] = std::array::from_fn(|_| random.uniform(-PI, PI));
             // Coordinates that are doubles, with the length to match: the angle is then known
             // better than a double by a first-order correction.
-            let (y, x) = (exact.map(f64::sin), exact.map(f64::cos));
-            let length = std::array::from_fn(|i| y[i].hypot(x[i]));
+            let (y, x) = (exact.map(libm::sin), exact.map(libm::cos));
+            let length = std::array::from_fn(|i| libm::hypot(y[i], x[i]));
             let found = dispatch!(Level::new(), simd => angles(simd, y, x, length));
             for i in 0..4 {
                 // `atan2` of the standard library is right to 0.6 units in the last place.
-                let reference = y[i].atan2(x[i]);
+                let reference = libm::atan2(y[i], x[i]);
                 assert!(
                     (found[i] - reference).abs() <= ERROR_RAD + f64::EPSILON,
                     "{:e}",

@@ -30,6 +30,10 @@ const NOT_UNIT: f64 = 2e-6;
 /// rounding, by which rounding moves either of them. Their middle solves the pose within 1e-16.
 const MERGED_RAD: f64 = 1.5e-8;
 
+/// Sine of wrist 2 from which on it does not matter to the wrist which of two merged shoulders an arm has: what turns
+/// the shoulder by [`MERGED_RAD`] turns wrist 3 by that over this, 3e-7 rad.
+const WRIST_APART: f64 = 0.05;
+
 /// Double precision decides signs of squared lengths beyond this, relative to the arm's reach
 /// squared and to the amplification by the wrist.
 const DOUBLE_DECIDES: f64 = 32.0 * f64::EPSILON;
@@ -156,7 +160,7 @@ pub(super) fn unreachable(
     let [n, o, a] = columns(pose).map(|column| column.map(Extended::rounded));
     let p = &pose.translation.vector;
     let centre: [f64; 3] = std::array::from_fn(|i| p[i] - a[i] * geometry.d6);
-    let rho = centre[0].hypot(centre[1]);
+    let rho = libm::hypot(centre[0], centre[1]);
     let root_squared = (rho - geometry.d4.abs()) * (rho + geometry.d4.abs());
     if root_squared < 0.0 && rho < geometry.d4.abs() - ROUNDING {
         let missing_m = geometry.d4.abs() - rho;
@@ -168,12 +172,12 @@ pub(super) fn unreachable(
         (forward * centre[0] - geometry.d4 * centre[1]) / rho.powi(2),
     );
     let (n1, o1) = (n[0] * s1 - n[1] * c1, o[0] * s1 - o[1] * c1);
-    let s5 = n1.hypot(o1).max(f64::MIN_POSITIVE) * wrist.sign(shoulder);
+    let s5 = libm::hypot(n1, o1).max(f64::MIN_POSITIVE) * wrist.sign(shoulder);
     let (c6, s6) = (n1 / s5, -o1 / s5);
     let ahead_of = |v: &[f64; 3]| v[0] * c1 + v[1] * s1;
     let ahead = forward + geometry.d5 * (ahead_of(&o) * c6 + ahead_of(&n) * s6);
     let up = centre[2] - geometry.d1 + geometry.d5 * (o[2] * c6 + n[2] * s6);
-    let reach = ahead.hypot(up);
+    let reach = libm::hypot(ahead, up);
     let (longest, shortest) = (
         (geometry.a2 + geometry.a3).abs(),
         (geometry.a2 - geometry.a3).abs(),
@@ -268,17 +272,26 @@ impl<'a> Solver<'a> {
             return [None, None];
         }
         let root = root_squared.sqrt();
-        let merged = root.rounded() <= MERGED_RAD * d4.abs();
+        let side = Extended::from(d4.signum());
+        // Where the roots meet, the wrist centre lies square to the arm's plane.
+        let (c1, s1) = (-(side * y) / rho, (side * x) / rho);
+        let s5 = |c1: Extended, s1: Extended| {
+            let along = |v: &[Extended; 3]| v[0] * s1 - v[1] * c1;
+            (along(&self.n).squared() + along(&self.o).squared())
+                .sqrt()
+                .rounded()
+        };
+        // Two shoulders of a nearly singular wrist are two postures, however near the shoulders are.
+        let merged = root.rounded() <= MERGED_RAD * d4.abs()
+            && (root.rounded() <= 0.0 || s5(c1, s1) >= WRIST_APART);
         // The flange moves by root e + d4 e^2 / 2 when q1 turns by e.
         let slack_m = self.slack.m;
         let slack_rad = 2.0 * slack_m
             / (root.rounded() + (root.rounded().powi(2) + 2.0 * d4.abs() * slack_m).sqrt());
         let touching = root_squared.is_negative();
         let arm = |shoulder: Shoulder| {
-            // Where the roots meet, the wrist centre lies square to the arm's plane.
             let (c1, s1, ahead) = if merged {
-                let side = Extended::from(d4.signum());
-                (-(side * y) / rho, (side * x) / rho, Extended::ZERO)
+                (c1, s1, Extended::ZERO)
             } else {
                 let ahead = root * shoulder.sign();
                 (
@@ -357,8 +370,8 @@ impl<'a> Solver<'a> {
         let inverse = Extended::from(sign) / s5;
         let (c6, s6) = (n1 * inverse, -(o1 * inverse));
         Fold {
-            q5: (sign * s5.rounded()).atan2(arm.along(&self.a).rounded()),
-            q6: s6.rounded().atan2(c6.rounded()),
+            q5: libm::atan2(sign * s5.rounded(), arm.along(&self.a).rounded()),
+            q6: libm::atan2(s6.rounded(), c6.rounded()),
             s5: s5.rounded(),
             s234: -(arm.ahead_of(&self.o) * c6 + arm.ahead_of(&self.n) * s6),
             c234: self.o[2] * c6 + self.n[2] * s6,
@@ -377,7 +390,7 @@ impl<'a> Solver<'a> {
     /// Equations 24 to 38 for one shoulder and wrist; whether the elbow closes.
     fn elbows(&mut self, arm: &Arm, wrist: Wrist, fold: &Fold, allowed_m: f64) -> bool {
         let (ahead, up) = self.wrist_1(arm, wrist, fold);
-        let q234 = fold.s234.rounded().atan2(fold.c234.rounded());
+        let q234 = libm::atan2(fold.s234.rounded(), fold.c234.rounded());
         // An unfolded wrist: q6 and q2 + q3 + q4 half a turn on, q5 mirrored.
         let [q234, q5, q6] = match wrist {
             Wrist::Fold => [q234, fold.q5, fold.q6],
@@ -415,7 +428,7 @@ impl<'a> Solver<'a> {
             elbow,
             wrist,
         };
-        let q1 = arm.s1.rounded().atan2(arm.c1.rounded());
+        let q1 = libm::atan2(arm.s1.rounded(), arm.c1.rounded());
         let elbows: &[Elbow] = if elbows_merge {
             &[Elbow::Down]
         } else {
@@ -434,8 +447,8 @@ impl<'a> Solver<'a> {
             };
             let (bx, by) = (a2 + a3 * c3, a3 * s3);
             let (ahead, up) = (ahead.rounded(), up.rounded());
-            let q2 = (up * bx - ahead * by).atan2(ahead * bx + up * by);
-            let q3 = s3.atan2(c3);
+            let q2 = libm::atan2(up * bx - ahead * by, ahead * bx + up * by);
+            let q3 = libm::atan2(s3, c3);
             let merged = arm.merged || elbows_merge;
             self.row(
                 configuration(elbow),
@@ -486,10 +499,10 @@ impl<'a> Solver<'a> {
             let Some(q6) = nearest else { return };
             let joints = family.member(elbow, q6);
             // Both elbows are one at the end of the family's interval.
-            if elbow == Elbow::Up && straight && joints[2].sin().abs() <= MERGED_RAD {
+            if elbow == Elbow::Up && straight && libm::sin(joints[2]).abs() <= MERGED_RAD {
                 return;
             }
-            straight = joints[2].sin().abs() <= MERGED_RAD;
+            straight = libm::sin(joints[2]).abs() <= MERGED_RAD;
             let configuration = Configuration {
                 shoulder: arm.shoulder,
                 elbow,
@@ -505,7 +518,7 @@ impl<'a> Solver<'a> {
         FreeWrist::new(
             self.geometry,
             arm.shoulder,
-            wrap_angle(arm.s1.rounded().atan2(arm.c1.rounded())),
+            wrap_angle(libm::atan2(arm.s1.rounded(), arm.c1.rounded())),
             if arm.along(&self.a).is_negative() {
                 PI
             } else {
@@ -523,7 +536,7 @@ impl<'a> Solver<'a> {
     /// singularity it moves the wrist centre ahead.
     fn turn_to_reach(&mut self, arm: &Arm, wrist: Wrist) -> bool {
         let a_ahead = arm.ahead_of(&self.a).rounded();
-        let s5 = a_ahead.hypot(self.a[2].rounded());
+        let s5 = libm::hypot(a_ahead, self.a[2].rounded());
         let closes = |turn_rad: f64| {
             let turned = arm.turned(&self.centre, turn_rad);
             self.closing_of(&turned, wrist, &self.fold(&turned))
@@ -531,7 +544,7 @@ impl<'a> Solver<'a> {
         // Wrist 1 moves with the turn by less than the arm's length over s5.
         let per_rad = if s5 > 4.0 * arm.slack_rad {
             let [x, y, _] = self.centre.map(Extended::rounded);
-            self.closing_per_m() * (x.hypot(y) + 2.0 * self.geometry.d5.abs() / s5)
+            self.closing_per_m() * (libm::hypot(x, y) + 2.0 * self.geometry.d5.abs() / s5)
         } else {
             1e3 * (1.0 + 1.0 / s5.max(arm.slack_rad))
         };
@@ -631,7 +644,7 @@ fn bisected(closing: impl Fn(f64) -> f64, mut outside: f64, mut inside: f64) -> 
 impl Fold {
     /// With `q2 + q3 + q4` swung, and `q6` with it in the sense `turn`.
     fn swung(&self, swing_rad: f64, turn: f64) -> Self {
-        let (sine, cosine) = swing_rad.sin_cos();
+        let (sine, cosine) = libm::sincos(swing_rad);
         Self {
             q6: self.q6 + turn * swing_rad,
             s234: self.s234 * cosine + self.c234 * sine,
@@ -653,7 +666,7 @@ impl Arm {
 
     /// The same with `q1` turned a little.
     fn turned(&self, centre: &[Extended; 3], turn_rad: f64) -> Self {
-        let (sine, cosine) = turn_rad.sin_cos();
+        let (sine, cosine) = libm::sincos(turn_rad);
         let c1 = self.c1 * cosine - self.s1 * sine;
         let s1 = self.s1 * cosine + self.c1 * sine;
         Self {

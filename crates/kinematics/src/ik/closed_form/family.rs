@@ -42,14 +42,14 @@ impl FreeWrist {
         n: (f64, f64),
         o: (f64, f64),
     ) -> Self {
-        let distance = centre_m.0.hypot(centre_m.1);
+        let distance = libm::hypot(centre_m.0, centre_m.1);
         let d5 = geometry.d5.abs();
         // Cosine of the opening at which wrist 1 is `length` from the shoulder.
         let cosine =
             |length: f64| (length.powi(2) - distance.powi(2) - d5.powi(2)) / (2.0 * distance * d5);
         let angle_of = |cosine: f64| {
             let cosine = cosine.clamp(-1.0, 1.0);
-            ((1.0 - cosine) * (1.0 + cosine)).sqrt().atan2(cosine)
+            libm::atan2(((1.0 - cosine) * (1.0 + cosine)).sqrt(), cosine)
         };
         let (longest, shortest) = (
             (geometry.a2 + geometry.a3).abs(),
@@ -71,7 +71,7 @@ impl FreeWrist {
             turn: (o.0 * n.1 - o.1 * n.0).signum(),
             // Wrist 1 lies from the wrist centre along o cos q6 + n sin q6, which stands a quarter
             // turn on from q2 + q3 + q4.
-            sum_at_zero_rad: wrap_angle(o.1.atan2(o.0) - FRAC_PI_2),
+            sum_at_zero_rad: wrap_angle(libm::atan2(o.1, o.0) - FRAC_PI_2),
             geometry: *geometry,
             centre_m,
             opening,
@@ -80,7 +80,7 @@ impl FreeWrist {
 
     /// `q2 + q3 + q4` at which wrist 1 lies straight beyond the wrist centre, rad.
     fn sum_straight_rad(&self) -> f64 {
-        let beyond = self.centre_m.1.atan2(self.centre_m.0);
+        let beyond = libm::atan2(self.centre_m.1, self.centre_m.0);
         let flipped = if self.geometry.d5 < 0.0 { PI } else { 0.0 };
         beyond - FRAC_PI_2 + flipped
     }
@@ -126,7 +126,7 @@ impl FreeWrist {
     /// The member with a given `q6`, rad; an elbow that does not close is clamped.
     pub fn member(&self, elbow: Elbow, q6_rad: f64) -> Joints {
         let sum = self.sum_at_zero_rad + self.turn * q6_rad;
-        let (s, c) = sum.sin_cos();
+        let (s, c) = libm::sincos(sum);
         let ahead = self.centre_m.0 - self.geometry.d5 * s;
         let up = self.centre_m.1 + self.geometry.d5 * c;
         let sign = elbow.sign(self.shoulder);

@@ -11,6 +11,7 @@ use fearless_simd::{f64x2, f64x4};
 
 use super::atan2::{atan2, upper_half};
 use super::{ClosedForm, Tolerance};
+use crate::ik::fused::Fused as _;
 use crate::{Pose, UrGeometry};
 
 /// Lanes of the widest vectors.
@@ -81,10 +82,10 @@ impl<V: Copy> Target<V> {
     {
         let [w, x, y, z] = q;
         let splat = |value| V::splat(simd, value);
-        let norm_squared = w.mul_add(w, x.mul_add(x, y.mul_add(y, z * z)));
+        let norm_squared = w.fused(w, x.fused(x, y.fused(y, z * z)));
         // 2 / norm_squared to second order: exact to rounding within `CERTAIN_NORM`.
         let off_unit = norm_squared - splat(1.0);
-        let s = (off_unit * 2.0).mul_add(off_unit - splat(1.0), splat(2.0));
+        let s = (off_unit * 2.0).fused(off_unit - splat(1.0), splat(2.0));
         let (sx, sy, sz) = (s * x, s * y, s * z);
         let (xx, yy, zz) = (sx * x, sy * y, sz * z);
         let (xy, xz, yz) = (sx * y, sx * z, sy * z);
@@ -96,9 +97,9 @@ impl<V: Copy> Target<V> {
             o: [xy - wz, one - (xx + zz), yz + wx],
             a,
             centre: [
-                a[0].mul_add(splat(-g.d6), p[0]),
-                a[1].mul_add(splat(-g.d6), p[1]),
-                a[2].mul_add(splat(-g.d6), p[2] - g.d1),
+                a[0].fused(splat(-g.d6), p[0]),
+                a[1].fused(splat(-g.d6), p[1]),
+                a[2].fused(splat(-g.d6), p[2] - g.d1),
             ],
             off_unit,
         }
@@ -124,7 +125,7 @@ fn shoulder_root<S: Simd, V: SimdFloat<S, Element = f64>>(
     target: &Target<V>,
 ) -> (V, V) {
     let [cx, cy, _] = target.centre;
-    let rho_squared = cx.mul_add(cx, cy * cy);
+    let rho_squared = cx.fused(cx, cy * cy);
     (rho_squared, rho_squared - V::splat(simd, g.d4 * g.d4))
 }
 
@@ -143,20 +144,20 @@ fn fold<S: Simd, V: SimdFloat<S, Element = f64>>(
     } = target;
     let inverse = splat(1.0) / rho_squared.max(splat(f64::MIN_POSITIVE));
     let (fx, fy) = (forward * inverse, splat(g.d4) * inverse);
-    let c1 = fx.mul_add(centre[0], -(fy * centre[1]));
-    let s1 = fy.mul_add(centre[0], fx * centre[1]);
+    let c1 = fx.fused(centre[0], -(fy * centre[1]));
+    let s1 = fy.fused(centre[0], fx * centre[1]);
     // Along the axis of joints 2, 3 and 4, and ahead in the arm's plane.
-    let along = |v: &[V; 3]| v[0].mul_add(s1, -(v[1] * c1));
-    let ahead = |v: &[V; 3]| v[0].mul_add(c1, v[1] * s1);
+    let along = |v: &[V; 3]| v[0].fused(s1, -(v[1] * c1));
+    let ahead = |v: &[V; 3]| v[0].fused(c1, v[1] * s1);
     let (n1, o1, c5) = (along(n), along(o), along(a));
-    let s5_squared = n1.mul_add(n1, o1 * o1);
+    let s5_squared = n1.fused(n1, o1 * o1);
     let s5 = fold_sign * s5_squared.sqrt(); // eq 10
     // Square root and division side by side instead of one after the other.
     let inverse = s5 * (splat(1.0) / s5_squared.max(splat(f64::MIN_POSITIVE)));
     let (c6, s6) = (n1 * inverse, -(o1 * inverse)); // eq 11, sign corrected
     // Direction of wrist 1 from the wrist centre; its components are those of q2 + q3 + q4.
-    let s234 = -(ahead(o).mul_add(c6, ahead(n) * s6));
-    let c234 = o[2].mul_add(c6, n[2] * s6); // eq 19
+    let s234 = -(ahead(o).fused(c6, ahead(n) * s6));
+    let c234 = o[2].fused(c6, n[2] * s6); // eq 19
     Fold {
         cos_sin_1: [c1, s1],
         cos_sin_5: [c5, s5],
@@ -189,18 +190,18 @@ fn elbows<S: Simd, V: SimdFloat<S, Element = f64>>(
     let splat = |value| V::splat(simd, value);
     let (a2, a3) = (g.a2, g.a3);
     let scale = 1.0 / (2.0 * a2 * a3);
-    let reach_squared = ahead.mul_add(ahead, up * up);
+    let reach_squared = ahead.fused(ahead, up * up);
     // Without cancellation at the stretched and at the folded elbow.
-    let one_minus = reach_squared.mul_add(splat(-scale), splat((a2 + a3).powi(2) * scale));
-    let one_plus = reach_squared.mul_add(splat(scale), splat(-(a2 - a3).powi(2) * scale));
+    let one_minus = reach_squared.fused(splat(-scale), splat((a2 + a3).powi(2) * scale));
+    let one_plus = reach_squared.fused(splat(scale), splat(-(a2 - a3).powi(2) * scale));
     let zero = splat(0.0);
     let c3 = (one_plus - one_minus) * 0.5; // eq 31
     let s3 = (one_minus * one_plus).max(zero).sqrt(); // eq 32
     // Direction of wrist 1 from the shoulder in the frame of the upper arm (eq 35).
-    let (bx, by) = (c3.mul_add(splat(a3), splat(a2)), s3 * a3);
+    let (bx, by) = (c3.fused(splat(a3), splat(a2)), s3 * a3);
     let (ax, ux) = (ahead * bx, up * bx);
-    let positive = [up.mul_add(by, ax), ahead.mul_add(-by, ux)];
-    let negative = [up.mul_add(-by, ax), ahead.mul_add(by, ux)];
+    let positive = [up.fused(by, ax), ahead.fused(-by, ux)];
+    let negative = [up.fused(-by, ax), ahead.fused(by, ux)];
     Elbows {
         closing: one_minus.min(one_plus),
         cos_sin_3: [c3, s3],
@@ -218,8 +219,8 @@ fn fold_elbows<S: Simd, V: SimdFloat<S, Element = f64>>(
     d5: f64,
 ) -> Elbows<V> {
     let d5 = V::splat(simd, d5);
-    let ahead = d5.mul_add(-fold.cos_sin_234[1], fold.forward);
-    let up = d5.mul_add(fold.cos_sin_234[0], target.centre[2]);
+    let ahead = d5.fused(-fold.cos_sin_234[1], fold.forward);
+    let up = d5.fused(fold.cos_sin_234[0], target.centre[2]);
     elbows(simd, g, ahead, up)
 }
 
@@ -249,7 +250,7 @@ fn elbow_angles<S: Simd, V: SimdFloat<S, Element = f64>>(
 #[inline(always)]
 fn wrap<S: Simd, V: SimdFloat<S, Element = f64>>(simd: S, angle: V) -> V {
     let turns = (angle * (1.0 / TAU)).round_ties_even();
-    turns.mul_add(V::splat(simd, -TAU), angle)
+    turns.fused(V::splat(simd, -TAU), angle)
 }
 
 /// Angle of a `(cosine, sine)`, in `[-pi, pi]`.
@@ -292,8 +293,8 @@ pub(super) fn one_pose<S: Simd>(
     // one turned by pi in q6 and in q2 + q3 + q4.
     let twice = |v: f64x2<S>| simd.combine_f64x2(v.zip_low(v), v.zip_high(v));
     let wrist = f64x4::simd_from(simd, [g.d5, -g.d5, g.d5, -g.d5]);
-    let ahead = wrist.mul_add(-twice(fold.cos_sin_234[1]), twice(fold.forward));
-    let up = wrist.mul_add(twice(fold.cos_sin_234[0]), twice(target.centre[2]));
+    let ahead = wrist.fused(-twice(fold.cos_sin_234[1]), twice(fold.forward));
+    let up = wrist.fused(twice(fold.cos_sin_234[0]), twice(target.centre[2]));
     let elbows = elbows(simd, g, ahead, up);
 
     let four = |a, b, c, d| simd.combine_f64x4(simd.combine_f64x2(a, b), simd.combine_f64x2(c, d));
@@ -518,7 +519,7 @@ fn is_certain_pose<S: Simd, V: SimdFloat<S, Element = f64>>(
 ) -> V::Mask {
     let up = target.centre[2];
     target.off_unit.abs().simd_le(CERTAIN_NORM)
-        & up.mul_add(up, rho_squared).simd_lt(CERTAIN_RHO_SQUARED)
+        & up.fused(up, rho_squared).simd_lt(CERTAIN_RHO_SQUARED)
 }
 
 #[inline(always)]

@@ -9,9 +9,11 @@ mod clamped;
 mod extended;
 mod family;
 mod lanes;
+mod memory;
 
 use std::sync::LazyLock;
 
+use bytemuck::{CheckedBitPattern, NoUninit};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch};
 
@@ -111,13 +113,14 @@ impl Unreachable {
     }
 }
 
-/// What an answer of the closed form is worth.
+/// What an answer of the closed form is worth. Its number, from 0 in this order, is that in memory.
 ///
 /// The pose is what its doubles say, exactly. Its branches depend on three signs, of
 /// `rho^2 - d4^2`, `s5^2` and `1 -+ cos q3`, and on nothing else. A row that these signs deny, and
 /// that exists within rounding or a tolerance only, says so itself
 /// ([`ClosedFormSolution::touching`]).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, NoUninit, CheckedBitPattern)]
+#[repr(u8)]
 pub enum Certificate {
     /// Every sign was beyond the error bound of double precision: no branch is missing, and none but
     /// touching ones is too many.
@@ -148,7 +151,10 @@ pub struct Preference<'a> {
 }
 
 /// All configurations of one pose.
-#[derive(Debug, Clone, Copy)]
+///
+/// Its memory may be looked at from other languages: see [`ClosedForm::DOUBLES`].
+#[derive(Debug, Clone, Copy, NoUninit, CheckedBitPattern)]
+#[repr(C)]
 pub struct ClosedForm {
     /// By joint, then by the index of a configuration in [`Configuration::ALL`], rad.
     joints: [[f64; 8]; 6],
@@ -158,6 +164,8 @@ pub struct ClosedForm {
     free: u8,
     touching: u8,
     certificate: Certificate,
+    /// Up to whole doubles.
+    rest: [u8; 3],
 }
 
 impl ClosedForm {
@@ -169,6 +177,7 @@ impl ClosedForm {
         free: 0,
         touching: 0,
         certificate: Certificate::NearestOnly,
+        rest: [0; 3],
     };
 
     /// What the answer is worth.

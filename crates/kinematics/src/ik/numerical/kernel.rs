@@ -10,6 +10,7 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 use fearless_simd::prelude::*;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
+use crate::ik::fused::Fused as _;
 use crate::{Chain, JOINT_COUNT, Joints, Pose};
 
 /// One value per joint, and two spare ones.
@@ -42,7 +43,7 @@ pub(in super::super) fn sin_cos(angles: &Lanes) -> (Lanes, Lanes) {
     // Written so that NaN counts as large.
     if !angles.iter().all(|angle| angle.abs() <= LARGEST_RAD) {
         for i in 0..8 {
-            (sines[i], cosines[i]) = angles[i].sin_cos();
+            (sines[i], cosines[i]) = libm::sincos(angles[i]);
         }
         return (sines, cosines);
     }
@@ -159,7 +160,7 @@ pub(super) struct State {
 /// exact; `(1, 0)` where there is no direction.
 fn direction(y: f64, x: f64) -> (f64, f64) {
     const ROUNDING: f64 = 5e-16;
-    let length = y.hypot(x);
+    let length = libm::hypot(y, x);
     if length < 1e-15 {
         return (1.0, 0.0);
     }
@@ -208,7 +209,7 @@ impl Kernel {
         for i in 1..JOINT_COUNT {
             let r = rotations[i];
             // The next axis is (sin a sin b, -cos a sin b, cos b).
-            let sin_b = r[(0, 2)].hypot(r[(1, 2)]);
+            let sin_b = libm::hypot(r[(0, 2)], r[(1, 2)]);
             let a = direction(r[(0, 2)], -r[(1, 2)]);
             let a = if sin_b < 1e-15 { (1.0, 0.0) } else { a };
             let b = direction(sin_b, r[(2, 2)]);
@@ -277,8 +278,8 @@ impl Kernel {
             let shift = &self.arm[i];
             for k in 0..3 {
                 let (xk, yk) = (x[k], y[k]);
-                x[k] = c.mul_add(xk, s * yk);
-                y[k] = c.mul_add(yk, -(s * xk));
+                x[k] = c.fused(xk, s * yk);
+                y[k] = c.fused(yk, -(s * xk));
                 p[k] = p[k] + x[k] * shift[0] + y[k] * shift[1] + z[k] * shift[2];
             }
             if i + 1 < JOINT_COUNT {
@@ -500,7 +501,7 @@ fn near_half_turn(target: &Target, state: &State, axial: &V3, cosine: f64) -> V3
     axis[most] -= cosine;
     let length = dot(&axis, &axis).sqrt();
     let sign = if dot(&axis, axial) < 0.0 { -1.0 } else { 1.0 };
-    let angle = dot(axial, axial).sqrt().atan2(cosine);
+    let angle = libm::atan2(dot(axial, axial).sqrt(), cosine);
     axis.map(|v| v * sign * angle / length)
 }
 
@@ -526,11 +527,11 @@ mod tests {
             let size = if count % 2 == 0 { 4.0 } else { 100.0 };
             let angle = random.uniform(-size, size);
             let (s, c) = sin_cos(&[angle; 8]);
-            assert!((s[0] - angle.sin()).abs() <= SINE, "{angle}");
-            assert!((c[0] - angle.cos()).abs() <= SINE, "{angle}");
+            assert!((s[0] - libm::sin(angle)).abs() <= SINE, "{angle}");
+            assert!((c[0] - libm::cos(angle)).abs() <= SINE, "{angle}");
         }
         let (s, _) = sin_cos(&[1e6, f64::NAN, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!(s[0], 1e6_f64.sin());
+        assert_eq!(s[0], libm::sin(1e6_f64));
         assert!(s[1].is_nan());
     }
 

@@ -89,7 +89,7 @@ fn configuration(row: &Row, keys: &[Option<MetricKey>]) -> StoredConfiguration {
     }
 }
 
-/// Version and revision of the program that computed the study.
+/// Version of the program that computed the study, and the hash of its sources.
 fn program(results: &ParquetResults) -> [Option<&str>; 2] {
-    ["version", "git_revision"].map(|key| results.provenance()[key].as_str())
+    ["version", "source_sha256"].map(|key| results.provenance()[key].as_str())
 }

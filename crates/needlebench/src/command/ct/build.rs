@@ -7,12 +7,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use nalgebra::{Matrix3, Point3, Vector3};
-use needlebench_bench::Control;
-use needlebench_bench::Stop;
 use needlebench_bench::ct::{
     BuildFiles, BuildOptions, BuildReport, GivenLabels, KnownMarkers, PatientFrame, Room,
     ScanBuild, build, write_patient,
 };
+use needlebench_bench::{Control, Stop};
 use needlebench_cell::scenario::{GoalSection, Posture, Target};
 use needlebench_cell::{
     Finding, MarkerFrame, MarkerList, Overrides, load_open_scenario, name_from_file,

@@ -290,7 +290,7 @@ fn thickness(volume: &VolumeAnswer) -> String {
     let Some(thickness_m) = volume.slice_thickness_m else {
         return "not known".to_owned();
     };
-    let between_m = volume.spacing_m[2] * volume.tilt_rad.cos();
+    let between_m = volume.spacing_m[2] * libm::cos(volume.tilt_rad);
     let thickness_mm = thickness_m * 1e3;
     let difference_mm = thickness_mm - between_m * 1e3;
     // A hundredth of a millimetre is rounding.

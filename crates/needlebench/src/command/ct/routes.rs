@@ -6,14 +6,13 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result};
 use clap::Args;
 use nalgebra::Vector3;
-use needlebench_bench::Control;
-use needlebench_bench::Stop;
 use needlebench_bench::ct::{BuiltFolder, SCENARIO_FILE};
 use needlebench_bench::routes::{
     RoutePlan, RouteTask, SOLID_DIRECTIONS, VOXEL_DIRECTIONS, VoxelsError, WithRobot, free,
     plan_routes,
 };
 use needlebench_bench::suggest::SuggestError;
+use needlebench_bench::{Control, Stop};
 use needlebench_cell::scenario::{GoalSection, Target};
 use needlebench_cell::{
     Finding, OpenScenario, Overrides, ResolvedScenario, ScenarioEdit, load_open_scenario,

@@ -6,7 +6,7 @@ use needlebench_kinematics::ik::SolutionKind;
 use needlebench_kinematics::{Joints, Pose, rotation_vector};
 use serde::Serialize;
 
-use super::arm::Arm;
+use super::arm::KinematicArm;
 
 /// The arm and the calibration that an answer is for.
 #[derive(Debug, Serialize)]
@@ -23,7 +23,7 @@ struct CalibrationAnswer {
 }
 
 impl ArmAnswer {
-    pub(super) fn of(arm: &Arm) -> Self {
+    pub(super) fn of(arm: &KinematicArm) -> Self {
         Self {
             arm: arm.name.clone(),
             calibration: arm
@@ -213,7 +213,7 @@ impl PoseAnswer {
 }
 
 impl FkAnswer {
-    pub(super) fn new(arm: &Arm, q: &Joints) -> Self {
+    pub(super) fn new(arm: &KinematicArm, q: &Joints) -> Self {
         let in_base_link = arm.chain.base_link_from_flange(q);
         let in_base = needlebench_cell::Robot::base_link_from_base().inverse() * in_base_link;
         let poses = arm.chain.link_poses(q);

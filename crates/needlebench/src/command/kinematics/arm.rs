@@ -11,20 +11,23 @@ use super::super::urdf_overrides;
 use crate::arguments::ArmArguments;
 
 /// What kinematics need of an arm.
-#[derive(Debug)]
-pub(super) struct Arm {
+#[derive(Debug, Clone)]
+pub struct KinematicArm {
     /// The maker's name where it is a known arm.
     pub name: String,
     /// Where it comes from, for complaints.
     pub file: String,
+    /// Its links.
     pub chain: Chain,
+    /// Limits of its joints.
     pub limits: JointLimits,
     /// Short names of the moving links.
     pub links: [String; 6],
+    /// The calibration that it has.
     pub calibration: Option<AppliedCalibration>,
 }
 
-impl Arm {
+impl KinematicArm {
     pub(super) fn new(arguments: &ArmArguments) -> Result<Self, Finding> {
         match arguments.arm {
             Some(model) => Self::of_model(model, arguments.robot.calibration.as_deref()),
@@ -34,7 +37,8 @@ impl Arm {
         }
     }
 
-    pub(super) fn of_robot(robot: &Robot) -> Self {
+    /// That of a robot.
+    pub fn of_robot(robot: &Robot) -> Self {
         Self {
             name: robot.arm_name(),
             file: robot.source.file.clone(),
@@ -45,7 +49,11 @@ impl Arm {
         }
     }
 
-    fn of_model(model: UrModel, calibration: Option<&Path>) -> Result<Self, Finding> {
+    /// The nominal arm of a model, or a calibrated one.
+    ///
+    /// # Errors
+    /// A [`Finding`] about the calibration.
+    pub fn of_model(model: UrModel, calibration: Option<&Path>) -> Result<Self, Finding> {
         let geometry = model.geometry();
         let mut arm = Self {
             name: model.name().to_owned(),

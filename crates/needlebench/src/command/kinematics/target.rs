@@ -14,7 +14,7 @@ use needlebench_planning::Planner;
 
 use super::super::urdf_overrides;
 use super::IkArguments;
-use super::arm::Arm;
+use super::arm::KinematicArm;
 use crate::arguments::{PoseMatrix, Six};
 
 /// A coordinate beyond this is in another unit.
@@ -60,7 +60,7 @@ pub(super) fn tolerance(arguments: &IkArguments) -> Result<Tolerance, Finding> {
 }
 
 /// The arm, and the pose of its flange in `base_link`.
-pub(super) fn target(arguments: &IkArguments) -> Result<(Arm, Pose), Vec<Finding>> {
+pub(super) fn target(arguments: &IkArguments) -> Result<(KinematicArm, Pose), Vec<Finding>> {
     if let Some(path) = &arguments.scenario {
         return goal_pose(arguments, path);
     }
@@ -71,7 +71,7 @@ pub(super) fn target(arguments: &IkArguments) -> Result<(Arm, Pose), Vec<Finding
         (None, None) => unreachable!("clap asks for one of them without a scenario"),
     }
     .map_err(one)?;
-    let arm = Arm::new(&arguments.arm).map_err(one)?;
+    let arm = KinematicArm::new(&arguments.arm).map_err(one)?;
     Ok((arm, Robot::base_link_from_base() * base_from_flange))
 }
 
@@ -136,7 +136,7 @@ fn check_position(argument: &str, position_m: &Vector3<f64>) -> Result<(), Findi
     Err(Finding::new(argument, message).hint("x, y and z are in metres"))
 }
 
-fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(Arm, Pose), Vec<Finding>> {
+fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(KinematicArm, Pose), Vec<Finding>> {
     let overrides = urdf_overrides(&arguments.arm.robot).map_err(|finding| vec![finding])?;
     let resolved = needlebench_cell::load_scenario(path, &overrides)?;
     let name = arguments.goal.as_deref().unwrap_or_default();
@@ -166,5 +166,5 @@ fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(Arm, Pose), Vec<Fi
         Roll::Free => 0.0,
     };
     let pose = planner.base_link_from_flange(goal, roll_rad);
-    Ok((Arm::of_robot(&resolved.cell.robot), pose))
+    Ok((KinematicArm::of_robot(&resolved.cell.robot), pose))
 }

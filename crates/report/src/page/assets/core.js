@@ -119,6 +119,9 @@ NB.metricColumns = (columns) => columns.map(({ title, unit, format, keys, help }
 NB.words = (name) => NB.dictionary.get(String(name)) ?? String(name).replace(/\.\d+$/, '').replaceAll('_', ' ');
 NB.dictionary = new Map();
 
+/** Where the half ball about the entry point is cut. */
+NB.regionWords = { above: 'above', feet: 'towards the feet', head: 'towards the head', left: 'on the patient\u2019s left', right: 'on the patient\u2019s right' };
+
 /**
  * What a page's address says of the view, as in `report.html#goal=pose&time=2.4`: it can be sent, and survives
  * a reload. Works from disk, too.

@@ -435,24 +435,9 @@ NB.RunPage = class {
 
   drawPeople() {
     const view = this.view;
-    view.empty('people');
     view.empty('space');
     const { people, sector } = this.extra.room;
-    for (const person of people) {
-      const [x, y, z] = person.position;
-      const tall = 0.82 * person.shortest;
-      if (view.works) {
-        const body = new THREE.Mesh(new THREE.CapsuleGeometry(0.12, tall - 0.24, 6, 20), view.material([0.35, 0.42, 0.62, 0.28]));
-        body.rotation.x = Math.PI / 2;
-        body.position.set(x, y, z + tall / 2);
-        body.renderOrder = 12;
-        view.add('people', body);
-      }
-      for (const [stature, eyes] of Object.entries(person.eyes)) {
-        view.ball('people', eyes, 0.045, [0.35, 0.42, 0.62, 1]);
-        view.label('people', `${NB.words(person.name)}, ${stature} m`, eyes);
-      }
-    }
+    view.people(people);
     if (sector && view.works) {
       const half = new THREE.Mesh(NB.cone(Math.PI / 2, sector.radius), view.material([0, 0.62, 0.45, 0.16]));
       half.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, -1), new THREE.Vector3(...sector.outwards));
@@ -465,23 +450,17 @@ NB.RunPage = class {
   /** What the configuration leaves: lines of sight, taken space, cone. */
   drawRoom() {
     const view = this.view;
-    for (const layer of ['sight', 'taken', 'cone']) view.empty(layer);
+    view.empty('taken');
+    view.sight([]);
+    view.empty('cone');
     const { room } = this.own;
     if (room && view.works) {
-      const lines = NB.array(room.sight);
-      for (let k = 0; k < lines.length; k += 7) {
-        const color = lines[k + 6] ? [0.84, 0.37, 0, 1] : [0, 0.45, 0.7, 1];
-        view.rod('sight', lines.slice(k, k + 3), lines.slice(k + 3, k + 6), lines[k + 6] ? 0.0022 : 0.0015, color);
-      }
+      view.sight(NB.array(room.sight));
       if (room.taken) view.add('taken', view.surface(room.taken, [0.84, 0.37, 0, 0.35]));
       const { hand_cone_half_angle_rad: angle, hand_cone_length_m: length } = this.configuration.room;
-      const cone = new THREE.Mesh(NB.cone(angle, length), view.material([0, 0.45, 0.7, 0.4]));
-      cone.applyMatrix4(NB.matrix(room.guideEntry));
-      cone.renderOrder = 16;
-      view.add('cone', cone);
+      view.handCone(room.guideEntry, angle, length);
     }
-    // They belong to layers with other things in them.
-    view.group('people').add?.(view.group('sight'));
+    // It belongs to a layer with other things in it.
     view.group('space').add?.(view.group('taken'));
     view.draw();
   }

@@ -205,9 +205,6 @@ NB.sections = {
   },
 };
 
-/** Where the half ball about the entry point is cut. */
-NB.regionWords = { above: 'above', feet: 'towards the feet', head: 'towards the head', left: 'on the patient\u2019s left', right: 'on the patient\u2019s right' };
-
 /** Contacts, stop and way back of a goal's configurations; null where the scenario asks for none. */
 NB.sections.events = function (goal, configuration, charts, name) {
   const with_ = goal.configurations.filter((c) => c.events);

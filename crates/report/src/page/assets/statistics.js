@@ -304,8 +304,8 @@ NB.Statistics = class {
     const { manifest } = this.page;
     const { study_id: id, sampling, repeats } = this.summary;
     const { provenance = {}, inputs = [], seed } = manifest || {};
-    const facts = [['program', provenance.version ? `needlebench ${provenance.version} (${provenance.git_revision ?? 'revision not known'})` : null], ['study file', this.page.file], ['seed of the samples', seed ?? provenance.seed],
-      ['sampling', sampling], ['cases of each sampled point', repeats], ['hash of all that decides the results', id]];
+    const facts = [['program', provenance.version ? `needlebench ${provenance.version} (source ${provenance.source_sha256?.slice(0, 12) ?? 'not known'})` : null], ['study file', this.page.file], ['seed of the samples', seed ?? provenance.seed],
+      ['arithmetic', provenance.arithmetic], ['sampling', sampling], ['cases of each sampled point', repeats], ['hash of all that decides the results', id]];
     return NB.el('div', null, NB.el('dl', null, facts.filter(([, value]) => value !== null && value !== undefined).flatMap(([name, value]) => [NB.el('dt', { text: name }), NB.el('dd', { text: String(value) })])),
       inputs.length ? NB.table('Files that went in', [
         { title: 'Role', cell: (input) => input.role || '' }, { title: 'File', cell: (input) => input.file }, { title: 'SHA-256', cell: (input) => NB.el('code', { text: input.sha256 }) },

@@ -299,6 +299,45 @@ NB.View = class {
     this.labels.push({ layer: name, element, at: new THREE.Vector3(...at) });
   }
 
+  /** People as they stand, with the eyes of each stature, in the layer `people`; lines of sight belong to it. */
+  people(people) {
+    this.empty('people');
+    if (!this.works) return;
+    for (const person of people) {
+      const [x, y, z] = person.position;
+      const tall = 0.82 * person.shortest;
+      const body = new THREE.Mesh(new THREE.CapsuleGeometry(0.12, tall - 0.24, 6, 20), this.material([0.35, 0.42, 0.62, 0.28]));
+      body.rotation.x = Math.PI / 2;
+      body.position.set(x, y, z + tall / 2);
+      body.renderOrder = 12;
+      this.add('people', body);
+      for (const [stature, eyes] of Object.entries(person.eyes)) {
+        this.ball('people', eyes, 0.045, [0.35, 0.42, 0.62, 1]);
+        this.label('people', `${NB.words(person.name)}, ${stature} m`, eyes);
+      }
+    }
+    this.group('people').add(this.group('sight'));
+  }
+
+  /** Lines of sight, seven numbers each: eye, end, and 1 where it is blocked there. */
+  sight(lines) {
+    this.empty('sight');
+    for (let k = 0; k < lines.length; k += 7) {
+      const color = lines[k + 6] ? [0.84, 0.37, 0, 1] : [0, 0.45, 0.7, 1];
+      this.rod('sight', lines.slice(k, k + 3), lines.slice(k + 3, k + 6), lines[k + 6] ? 0.0022 : 0.0015, color);
+    }
+  }
+
+  /** The cone that is free for the hand behind the guide, in the layer `cone`. */
+  handCone(guideEntry, halfAngle, length) {
+    this.empty('cone');
+    if (!this.works) return;
+    const cone = new THREE.Mesh(NB.cone(halfAngle, length), this.material([0, 0.45, 0.7, 0.4]));
+    cone.applyMatrix4(NB.matrix(guideEntry));
+    cone.renderOrder = 16;
+    this.add('cone', cone);
+  }
+
   /** Looks at a box of points from a direction. */
   frame(points, direction) {
     if (!this.works) return;

@@ -150,7 +150,7 @@ fn a_damaged_shard_is_refused_by_merge_and_made_whole_by_resume() {
     let bytes = std::fs::read(&journal).unwrap();
     let merged = || -> Result<Vec<u8>, StudyError> {
         let out = tempfile::tempdir().unwrap();
-        merge(out.path(), &folders, 2, true, &|_| {})?;
+        merge(out.path(), None, &folders, 2, true, &|_| {})?;
         Ok(std::fs::read(out.path().join(RESULTS_FILE)).unwrap())
     };
     let expected = complete(None).1;

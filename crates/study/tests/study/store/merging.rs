@@ -2,8 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use std::sync::Mutex;
+
 use needlebench_study::{
-    CaseError, CaseEvaluator, CaseResult, CaseWorker, MANIFEST_FILE, RunEnd, Shard, merge,
+    CaseError, CaseEvaluator, CaseResult, CaseWorker, JOURNAL_FILE, MANIFEST_FILE, Progress,
+    RESULTS_FILE, RunEnd, Shard, StudyError, merge,
 };
 
 use super::folder::{Request, files, tables};
@@ -25,7 +28,7 @@ fn shard(place: &Path, part: u32, parts: u32) -> PathBuf {
 
 fn refused(place: &Path, folders: &[PathBuf]) -> String {
     let out = place.join("out");
-    let text = merge(&out, folders, 1, false, &|_| {})
+    let text = merge(&out, None, folders, 1, false, &|_| {})
         .unwrap_err()
         .to_string();
     assert!(!out.exists(), "{text}");
@@ -80,13 +83,13 @@ fn shards_that_agree_may_overlap() {
         shard(place, 3, 3),
     ];
     let out = place.join("out");
-    let end = merge(&out, &folders, 2, false, &|_| {}).unwrap();
+    let end = merge(&out, None, &folders, 2, false, &|_| {}).unwrap();
     assert!(matches!(end, RunEnd::Finished { cases: CASES, .. }));
     assert_eq!(files(&out), ["results.parquet", "study.json"]);
     assert!(tables(&out) == tables(&whole));
     // Again: refused, unless it is to go on.
-    assert!(merge(&out, &folders, 2, false, &|_| {}).is_err());
-    assert!(merge(&out, &folders, 2, true, &|_| {}).is_ok());
+    assert!(merge(&out, None, &folders, 2, false, &|_| {}).is_err());
+    assert!(merge(&out, None, &folders, 2, true, &|_| {}).is_ok());
 }
 
 /// Computes every case as if it were the next.
@@ -157,4 +160,217 @@ fn a_shard_that_is_being_written_is_not_merged() {
         text.starts_with("/2of2: another process is writing here"),
         "{text}"
     );
+}
+
+/// As `--out DIR/K` makes them.
+fn nested_shard(place: &Path, part: u32, parts: u32) -> PathBuf {
+    let folder = place.join(part.to_string()).join("synthetic");
+    let request = Request {
+        shard: Shard::new(part, parts),
+        ..Request::new(CASES, BLOCK)
+    };
+    request.run(&folder).unwrap();
+    folder
+}
+
+#[test]
+fn shards_are_found_below_a_folder_and_results_beside_them_are_none() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let whole = place.join("whole");
+    Request::new(CASES, BLOCK).run(&whole).unwrap();
+    let out = place.join("synthetic");
+    let shards = out.join("shards");
+    for part in 1..=12 {
+        nested_shard(&shards, part, 12);
+    }
+    // Twelve of thirteen blocks, the last of which has another's.
+    for given in [
+        vec![shards.clone()],
+        vec![out.clone()],
+        vec![shards.join("12"), out.clone()],
+    ] {
+        merge(&out, None, &given, 3, true, &|_| {}).unwrap();
+        assert!(tables(&out)[0] == tables(&whole)[0]);
+        for file in [RESULTS_FILE, MANIFEST_FILE] {
+            std::fs::remove_file(out.join(file)).unwrap();
+        }
+    }
+    // One of another study, which has another name, is left out and said.
+    let other = shards.join("3/other");
+    let copied = nested_shard(&place.join("elsewhere"), 3, 12);
+    std::fs::rename(copied, &other).unwrap();
+    let manifest = other.join(MANIFEST_FILE);
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    std::fs::write(&manifest, text.replace("\"synthetic\"", "\"other\"")).unwrap();
+    let said = Mutex::new(Vec::new());
+    merge(
+        &out,
+        None,
+        std::slice::from_ref(&shards),
+        2,
+        true,
+        &|event| {
+            if let Progress::OtherStudies { .. } = event {
+                said.lock().unwrap().push(event.to_string());
+            }
+        },
+    )
+    .unwrap();
+    let said = said.into_inner().unwrap();
+    assert_eq!(
+        said,
+        [format!(
+            "left out, since they are of other studies: {}",
+            other.display()
+        )]
+    );
+    // Named by itself it is refused.
+    let error = merge(
+        &place.join("new"),
+        None,
+        &[shards.join("1"), other],
+        2,
+        true,
+        &|_| {},
+    );
+    assert!(
+        matches!(error, Err(StudyError::OtherStudy { .. })),
+        "{error:?}"
+    );
+}
+
+#[test]
+fn neither_order_nor_threads_nor_numbers_of_parts_matter() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let whole = place.join("whole");
+    Request::new(CASES, BLOCK).run(&whole).unwrap();
+    let expected = std::fs::read(whole.join(RESULTS_FILE)).unwrap();
+    // Of halves and of fifths.
+    let mut folders = vec![shard(place, 2, 2)];
+    folders.extend((1..=5).map(|part| shard(place, part, 5)));
+    for (turn, threads) in [(0, 1), (1, 2), (3, 5)] {
+        folders.rotate_left(turn);
+        let out = place.join(format!("out{turn}"));
+        merge(&out, None, &folders, threads, false, &|_| {}).unwrap();
+        assert!(std::fs::read(out.join(RESULTS_FILE)).unwrap() == expected);
+    }
+}
+
+#[test]
+fn many_missing_shards_are_a_list_and_not_a_page() {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let shards = |cases, part, parts| {
+        let folder = place.join(format!("{part}of{parts}"));
+        let request = Request {
+            shard: Shard::new(part, parts),
+            ..Request::new(cases, 1)
+        };
+        request.run(&folder).unwrap();
+        folder
+    };
+    let folders = [shards(300, 3, 300), shards(300, 17, 300)];
+    let text = refused(place, &folders);
+    assert_eq!(
+        text.lines().nth(1).unwrap(),
+        "  298 shards of 300 are not among the folders: 1,2,4-16,18-300"
+    );
+    assert_eq!(text.lines().count(), 3);
+}
+
+/// Merges two shards, to one of which something happens once all have been looked through.
+fn disturbed(happens: impl Fn(&Path) + Sync) -> (StudyError, String) {
+    let place = tempfile::tempdir().unwrap();
+    let place = place.path();
+    let folders = [shard(place, 1, 2), shard(place, 2, 2)];
+    let out = place.join("out");
+    let error = merge(&out, None, &folders, 2, false, &|event| {
+        if let Progress::Space { .. } = event {
+            happens(&folders[1].join(JOURNAL_FILE));
+        }
+    })
+    .unwrap_err();
+    assert!(!out.join(RESULTS_FILE).exists());
+    // Asked for again, when nobody writes, it goes well.
+    assert!(!error.is_input(), "{error}");
+    let text = error.to_string().replace(&place.display().to_string(), "");
+    (error, text)
+}
+
+#[test]
+fn a_shard_that_somebody_goes_on_writing_is_refused_when_it_is_read() {
+    let (_, text) = disturbed(|journal| {
+        use std::io::Write as _;
+        let mut file = std::fs::File::options().append(true).open(journal).unwrap();
+        file.write_all(b"more").unwrap();
+    });
+    assert!(
+        text.starts_with("/2of2/journal.nbj: has grown from "),
+        "{text}"
+    );
+    let (_, text) = disturbed(|journal| {
+        let bytes = std::fs::read(journal).unwrap();
+        let changed: Vec<u8> = bytes.iter().map(|byte| byte ^ 0x55).collect();
+        std::fs::write(journal, changed).unwrap();
+    });
+    assert!(
+        text.starts_with("/2of2/journal.nbj: has changed at byte "),
+        "{text}"
+    );
+    let held = Mutex::new(None);
+    let (error, _) = disturbed(|journal| {
+        let file = std::fs::File::open(journal).unwrap();
+        file.try_lock().unwrap();
+        *held.lock().unwrap() = Some(file);
+    });
+    assert!(matches!(error, StudyError::Locked { .. }), "{error}");
+}
+
+#[test]
+fn room_for_the_table_is_asked_for_and_is_enough() {
+    for (cases, block) in [(1, 1), (300, 1), (3000, 64), (20_000, 64)] {
+        let place = tempfile::tempdir().unwrap();
+        let place = place.path();
+        let folder = place.join("1of1");
+        let request = Request {
+            shard: Shard::new(1, 1),
+            ..Request::new(cases, block)
+        };
+        request.run(&folder).unwrap();
+        let room = Mutex::new(None);
+        merge(
+            &place.join("out"),
+            None,
+            std::slice::from_ref(&folder),
+            2,
+            false,
+            &|event| {
+                if let Progress::Space {
+                    journal_bytes,
+                    table_bytes,
+                    ..
+                } = event
+                {
+                    assert!(!place.join("out").exists());
+                    *room.lock().unwrap() = Some((journal_bytes, table_bytes));
+                }
+            },
+        )
+        .unwrap();
+        let (journal, table) = room.into_inner().unwrap().unwrap();
+        let length = |path: PathBuf| std::fs::metadata(path).unwrap().len();
+        let real = length(folder.join(JOURNAL_FILE));
+        assert!(journal <= real && real < journal + 200);
+        let real = length(place.join("out").join(RESULTS_FILE));
+        assert!(
+            real <= table,
+            "{cases} cases: {real} bytes, {table} asked for"
+        );
+        if cases == 20_000 {
+            // No more than a quarter in vain.
+            assert!(table < real + real / 4, "{real} bytes, {table} asked for");
+        }
+    }
 }

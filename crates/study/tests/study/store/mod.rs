@@ -7,4 +7,5 @@ mod merging;
 mod reading;
 mod refusals;
 mod same_bytes;
+mod surveying;
 mod synthetic;

@@ -68,7 +68,7 @@ fn threads_and_shards_leave_no_trace() {
             })
             .collect();
         let out = place.path().join("merged");
-        merge(&out, &folders, 2, false, &|_| {}).unwrap();
+        merge(&out, None, &folders, 2, false, &|_| {}).unwrap();
         let results = std::fs::read(out.join(RESULTS_FILE)).unwrap();
         assert!(results == expected[0], "{parts} shards");
         assert!(std::fs::read(out.join(MANIFEST_FILE)).unwrap() == manifest);
@@ -97,7 +97,7 @@ fn journals_cut_off_anywhere_are_continued() {
     }
     shard.run(place.path()).unwrap();
     let out = place.path().join("merged");
-    merge(&out, &[place.path().to_owned()], 2, false, &|_| {}).unwrap();
+    merge(&out, None, &[place.path().to_owned()], 2, false, &|_| {}).unwrap();
     assert!(tables(&out) == expected);
 }
 

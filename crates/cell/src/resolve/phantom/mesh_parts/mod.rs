@@ -305,7 +305,7 @@ fn lesion_of(
         name: section.name.clone(),
         center_m,
         // Of the ball with the same volume.
-        diameter_m: (6.0 * volume_m3(&mesh.surface) / std::f64::consts::PI).cbrt(),
+        diameter_m: libm::cbrt(6.0 * volume_m3(&mesh.surface) / std::f64::consts::PI),
         organ,
     }
 }

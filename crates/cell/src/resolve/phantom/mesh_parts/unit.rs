@@ -74,7 +74,7 @@ pub(super) fn wrong_unit(
         noun(tissue)
     );
     let mut likely: Vec<LengthUnit> = LengthUnit::ALL.into_iter().filter(fits).collect();
-    let unlikeness = |unit: LengthUnit| (millimetres(unit) / usual_mm).ln().abs();
+    let unlikeness = |unit: LengthUnit| libm::log(millimetres(unit) / usual_mm).abs();
     likely.sort_by(|a, b| unlikeness(*a).total_cmp(&unlikeness(*b)));
     Some(match likely.split_first() {
         None => (

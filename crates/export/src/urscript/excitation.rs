@@ -6,12 +6,12 @@ use needlebench_bench::record_plan::PlanReport;
 use needlebench_cell::ResolvedScenario;
 use needlebench_cell::excitation::ExcitationProtocol;
 use needlebench_evaluation::excitation::proven_m;
-use needlebench_kinematics::Joints;
 use needlebench_planning::excitation::{Aim, ExcitationPlan};
 
-/// How far a joint may be from the start posture for the program to begin, rad: 1 deg, which moves no part of the arm by
-/// more than about the clearance that the start posture has. It goes slowly to the start posture first.
-const AT_START_RAD: f64 = 0.017;
+use super::{AT_START_RAD, joints, set_payload, write_check_start, write_head};
+
+/// Decimals of joint positions.
+const DECIMALS: usize = 6;
 
 /// The program. Motions are `movej` without blending along the same straight joint paths, with the same speeds and
 /// accelerations of the leading joint.
@@ -78,27 +78,8 @@ fn write_script(
         start = start_deg.join(", "),
     );
     writeln!(out, "def needlebench_excitation():")?;
-    for line in head.lines() {
-        writeln!(out, "{}", format!("  # {line}").trim_end())?;
-    }
-    writeln!(out, "\n  global nb_start = {}", joints(&resolved.start))?;
-    write!(
-        out,
-        "\n  def nb_check_start():\n    \
-             local q = get_actual_joint_positions()\n    \
-             local i = 0\n    \
-             while i < 6:\n      \
-               if norm(q[i] - nb_start[i]) > {AT_START_RAD}:\n        \
-                 popup(\"Move the arm to the start posture that stands in the program, turns of the wrist \
-         included, and start again.\", title=\"Not at the start posture\", error=True, blocking=True)\n        \
-                 halt\n      \
-               end\n      \
-               i = i + 1\n    \
-             end\n    \
-             # Slowly to the very start posture.\n    \
-             movej(nb_start, a=0.5, v=0.1)\n  \
-           end\n"
-    )?;
+    write_head(out, &head)?;
+    write_check_start(out, &joints(&resolved.start, DECIMALS))?;
     writeln!(out, "\n  def nb_run():")?;
     let acceleration = resolved.motion.acceleration.min();
     for leg in &plan.legs {
@@ -108,7 +89,7 @@ fn write_script(
         writeln!(
             out,
             "    movej({}, a={acceleration:.4}, v={:.4})",
-            joints(&leg.to),
+            joints(&leg.to, DECIMALS),
             leg.speed_rad_s
         )?;
         writeln!(out, "    sleep({:?})", leg.stand_s)?;
@@ -135,19 +116,10 @@ fn write_script(
              run.\", title=\"Payload {number} of {}\", warning=True, blocking=True)",
             protocol.loads.len()
         )?;
-        writeln!(
-            out,
-            "  set_payload({:.4}, [{:.5}, {:.5}, {:.5}])",
-            whole.mass_kg, whole.com_m.x, whole.com_m.y, whole.com_m.z
-        )?;
+        writeln!(out, "  {}", set_payload(&whole))?;
         writeln!(out, "  nb_check_start()")?;
         writeln!(out, "  nb_run()")?;
     }
     writeln!(out, "\n  halt")?;
     writeln!(out, "end")
-}
-
-fn joints(q: &Joints) -> String {
-    let texts: Vec<String> = q.iter().map(|rad| format!("{rad:.6}")).collect();
-    format!("[{}]", texts.join(", "))
 }

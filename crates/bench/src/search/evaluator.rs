@@ -1,0 +1,50 @@
+//! The rows of a generation's cases.
+
+use needlebench_study::search::GenerationDesign;
+use needlebench_study::{CaseDesign as _, CaseError, CaseEvaluator, CaseResult, CaseWorker};
+
+use super::PreparedSearch;
+use crate::ct::{LastScan, scanned};
+use crate::study::{StaticWorker, StudyCase, counted_classes, invalid_rows};
+
+/// Computes the cases of a generation: final postures.
+pub struct GenerationEvaluator<'a> {
+    /// The search.
+    pub search: &'a PreparedSearch,
+    /// The generation.
+    pub design: GenerationDesign<'a>,
+}
+
+impl CaseEvaluator for GenerationEvaluator<'_> {
+    fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String> {
+        Ok(Box::new(Worker {
+            of: self,
+            postures: StaticWorker::counting(counted_classes(&self.search.study)),
+            scan: LastScan::default(),
+        }))
+    }
+}
+
+struct Worker<'a> {
+    of: &'a GenerationEvaluator<'a>,
+    postures: StaticWorker,
+    scan: LastScan,
+}
+
+impl CaseWorker for Worker<'_> {
+    fn evaluate(&mut self, case: u64) -> Result<CaseResult, CaseError> {
+        let study = &self.of.search.study;
+        let layout = StudyCase::of_values(study, case, self.of.design.values(case));
+        let rows = match layout
+            .scenario(study)
+            .and_then(|resolved| scanned(resolved, study.family.overrides(), &mut self.scan))
+        {
+            Err(findings) => invalid_rows(&findings),
+            Ok(resolved) => self.postures.rows(&resolved),
+        };
+        Ok(CaseResult {
+            case,
+            rows: self.of.search.columns.rows(&rows),
+        })
+    }
+}

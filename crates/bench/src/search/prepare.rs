@@ -1,0 +1,222 @@
+//! From a study to what is searched.
+
+use needlebench_cell::study::search::SearchSection;
+use needlebench_cell::study::{ResolvedStudy, StudyMode};
+use needlebench_cell::{Finding, sha256_hex};
+use needlebench_study::search::{
+    Candidate, Generation, GenerationDesign, Objective, SearchError, SearchPlan, SearchSpace,
+    SpaceError, Stream,
+};
+use needlebench_study::{Factor, FactorKind, FactorValue, Level, Manifest, Role, Shard};
+use serde_json::json;
+
+use crate::provenance::{SOURCE_SHA256, arithmetic};
+use crate::study::{Identity, StudyColumns};
+
+/// Layouts of the last candidates where nothing says how many.
+const SAMPLES: u64 = 128;
+/// Cases of a search of ranges where nothing says how many.
+const RANGES_BUDGET: u64 = 6144;
+/// Share of the cases of all choices with all layouts, where nothing says how many.
+const GRID_SHARE: u64 = 3;
+/// Cases of a block of a generation, which are written together.
+const BLOCK_CASES: u32 = 4;
+
+/// A study ready to be searched.
+#[derive(Debug)]
+pub struct PreparedSearch {
+    /// The study as it was read.
+    pub study: ResolvedStudy,
+    /// What is asked; the defaults if the study does not say it.
+    pub section: SearchSection,
+    /// Its candidates and circumstances.
+    pub space: SearchSpace,
+    /// What is looked for, at what cost.
+    pub plan: SearchPlan,
+    /// What decides its results.
+    pub identity: Identity,
+    /// Columns of the tables of generations.
+    pub columns: StudyColumns,
+}
+
+impl PreparedSearch {
+    /// Makes candidates and circumstances of a study.
+    ///
+    /// # Errors
+    /// A study without choices or circumstances, or with a budget that is too small.
+    pub fn new(study: ResolvedStudy) -> Result<Self, Vec<Finding>> {
+        let section = study.file.search.clone().unwrap_or_default();
+        let samples = section
+            .samples
+            .or(study.file.sampling.samples)
+            .unwrap_or(SAMPLES);
+        let space = SearchSpace::new(&study, samples)
+            .map_err(|error| vec![space_finding(&study, &error)])?;
+        let named = |name| Objective::named(name, section.quantile, section.failure_counts_mm);
+        let mut plan = SearchPlan {
+            objective: named(section.objective),
+            second: section.second_objective.map(named),
+            samples,
+            fresh: section.fresh,
+            budget: 0,
+            seed: study.file.seed,
+        };
+        plan.budget = section.budget.unwrap_or_else(|| {
+            let usual = match grid_cases(&space, samples) {
+                Some(grid) => grid / GRID_SHARE,
+                None => RANGES_BUDGET,
+            };
+            // A small choice costs what it costs.
+            match plan.check(space.choices()) {
+                Err(SearchError::<()>::Budget { least, .. }) => usual.max(least),
+                _ => usual,
+            }
+        });
+        plan.check(space.choices())
+            .map_err(|error: SearchError<()>| vec![plan_finding(&study, &error)])?;
+        let identity = Identity::new(&study)?;
+        let columns = StudyColumns::new(&[StudyMode::Static], &[]).with_margin();
+        Ok(Self {
+            study,
+            section,
+            space,
+            plan,
+            identity,
+            columns,
+        })
+    }
+
+    /// Cases of all choices with all layouts; none of choices with ranges.
+    pub fn grid_cases(&self) -> Option<u64> {
+        grid_cases(&self.space, self.plan.samples)
+    }
+
+    /// The factors to choose.
+    pub fn choices(&self) -> impl Iterator<Item = &Factor> {
+        let factors = self.space.factors().iter();
+        factors.filter(|factor| factor.role == Role::Choice)
+    }
+
+    /// The candidate of a description in the log; none where it is of no factor's values.
+    pub fn candidate_of(&self, choice: &[(String, serde_json::Value)]) -> Option<Candidate> {
+        self.choices()
+            .zip(choice)
+            .map(|(factor, (_, value))| match &factor.kind {
+                FactorKind::Levels(levels) => {
+                    let is_it = |level: &Level| match level.number {
+                        Some(number) => value.as_f64() == Some(number),
+                        None => value.as_str() == Some(&level.label),
+                    };
+                    levels.iter().position(is_it).map(FactorValue::Level)
+                }
+                FactorKind::Continuous { .. } => value.as_f64().map(FactorValue::Number),
+            })
+            .collect()
+    }
+
+    /// What the folder of a generation has results of.
+    pub fn manifest(&self, generation: &Generation, shard: Option<Shard>) -> Manifest {
+        let design = GenerationDesign {
+            space: &self.space,
+            generation,
+        };
+        let candidates: Vec<_> = generation
+            .candidates
+            .iter()
+            .map(|candidate| json!(self.space.describe(candidate)))
+            .collect();
+        let file = &self.study.file;
+        let of_generation = json!({
+            "generation": generation.number,
+            "stream": generation.stream,
+            "circumstances": [generation.first, generation.first + generation.count],
+            "candidates": candidates,
+            "ids": generation.ids,
+        });
+        let text = format!("{} {of_generation}", self.identity.id);
+        let mut manifest = Manifest::new(
+            sha256_hex(text.as_bytes()),
+            format!("{}_gen_{:03}", file.name, generation.number),
+            &design,
+            self.columns.described(),
+            BLOCK_CASES,
+            json!({
+                "program": "needlebench",
+                "version": env!("CARGO_PKG_VERSION"),
+                "source_sha256": SOURCE_SHA256,
+                "arithmetic": arithmetic(),
+                "inputs": self.identity.inputs,
+                "seed": file.seed,
+                "sampling": {
+                    "method": match generation.stream {
+                        Stream::Common => file.sampling.method.name(),
+                        Stream::Fresh => "random",
+                    },
+                    "samples": generation.count,
+                },
+                "mode": StudyMode::Static.name(),
+                "goals": self.study.goals,
+                "description": file.description,
+                "search": of_generation,
+            }),
+        );
+        manifest.shard = shard;
+        manifest.inputs.clone_from(&self.identity.inputs);
+        manifest
+    }
+
+    /// What keeps a search from going on, as a finding about the study.
+    pub fn finding<S>(&self, error: &SearchError<S>) -> Finding {
+        plan_finding(&self.study, error)
+    }
+}
+
+fn grid_cases(space: &SearchSpace, samples: u64) -> Option<u64> {
+    if space.choices().dimensions() > 0 {
+        return None;
+    }
+    let combinations = space.choices().combinations()? as u64;
+    combinations.checked_mul(samples)
+}
+
+fn space_finding(study: &ResolvedStudy, error: &SpaceError) -> Finding {
+    let finding = Finding::new(&study.source.file, error.to_string()).key("factors");
+    match error {
+        SpaceError::NoChoice => finding.hint(
+            "give `role = \"choice\"` to what is yours to choose, such as the place of the robot's base",
+        ),
+        SpaceError::NoCircumstance => finding.hint(
+            "add a factor that a choice is to hold for, such as `key = \"phantom.position_mm[0]\"`, \
+             `range = [-30, 30]`, `relative = true`",
+        ),
+        SpaceError::Drawn { .. } => {
+            finding.hint("`range = [from, to]` has all between two ends, `grid` some of them")
+        }
+        SpaceError::TooManyDimensions { .. } => finding
+            .key("sampling.method")
+            .hint("`method = \"latin-hypercube\"` has no limit"),
+    }
+}
+
+fn plan_finding<S>(study: &ResolvedStudy, error: &SearchError<S>) -> Finding {
+    let message = match error {
+        SearchError::Stopped(_) => "the search was stopped".to_owned(),
+        SearchError::Budget {
+            budget,
+            least,
+            what,
+        } => format!("a budget of {budget} cases is too small: {least} are the least for {what}"),
+        SearchError::Combinations { combinations, most } => {
+            format!("{combinations} combinations of choices; at most {most} are looked at")
+        }
+    };
+    let finding = Finding::new(&study.source.file, message);
+    match error {
+        SearchError::Budget { least, .. } => finding.key("search.budget").hint(format!(
+            "`budget = {least}`, or fewer `samples` or `fresh` layouts under [search]"
+        )),
+        _ => finding
+            .key("factors")
+            .hint("fewer levels; or `range` instead of `grid`, of which there may be several"),
+    }
+}

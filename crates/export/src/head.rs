@@ -1,0 +1,49 @@
+//! What every export says of itself.
+
+use needlebench_bench::provenance::PROGRAM_VERSION;
+use needlebench_cell::ResolvedScenario;
+
+/// Lines for the head of a file: which scenario, from which bytes, by which program, in which units,
+/// and what was assumed. No time and no path of this machine: the same scenario gives the same lines.
+pub(crate) fn head(resolved: &ResolvedScenario, what: &str) -> Vec<String> {
+    let robot = &resolved.cell.robot;
+    let mut lines = vec![
+        format!("{what}, of the scenario {}", resolved.scenario.name),
+        format!("scenario file: sha256 {}", resolved.source.sha256),
+        format!("made by needlebench {PROGRAM_VERSION}"),
+        format!(
+            "arm: {}, tool: {}",
+            robot.arm_name(),
+            resolved.cell.tool.name
+        ),
+        "units: m, kg, s, rad, N m; z is up; the world is that of the scenario".to_owned(),
+    ];
+    if resolved.imperfections.is_some() {
+        lines.push(
+            "The cell is the nominal one: the imperfections that the scenario draws are not in it"
+                .to_owned(),
+        );
+    }
+    lines.extend(robot.notes.iter().map(|note| format!("note: {note}")));
+    let own = resolved.notes.iter();
+    let own = own.filter(|note| !robot.notes.contains(note));
+    lines.extend(own.map(|note| format!("note: {note}")));
+    lines
+}
+
+/// The lines as one comment of an XML file.
+pub(crate) fn xml_comment(lines: &[String]) -> String {
+    let lines: Vec<String> = lines
+        .iter()
+        // A comment may not hold two hyphens, nor what no XML holds.
+        .map(|line| {
+            let line: String = line
+                .chars()
+                .map(|letter| if letter.is_control() { ' ' } else { letter })
+                .collect();
+            let line = line.replace("--", "- -");
+            format!("  {}", line.strip_suffix('-').unwrap_or(&line))
+        })
+        .collect();
+    format!("<!--\n{}\n-->\n", lines.join("\n"))
+}

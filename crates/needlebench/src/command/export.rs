@@ -1,0 +1,435 @@
+//! `needlebench export`.
+
+mod motion;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use needlebench_cell::{Finding, ResolvedScenario, nearest_name, sha256_hex};
+use needlebench_export::{ExportError, ExportedFile, Shown, gltf, mjcf, urdf};
+use needlebench_kinematics::Joints;
+use needlebench_kinematics::ik::Configuration;
+use needlebench_report::write_atomically;
+use serde::Serialize;
+
+use super::atlas::goals;
+use super::run::prepare_folder;
+use super::{load, overrides, print_json, print_text};
+use crate::arguments::{EngineArgument, EngineParser, RobotArguments, Six};
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::output::shown;
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportArguments {
+    /// Scenario that is exported.
+    #[arg(value_name = "SCENARIO")]
+    pub scenario: PathBuf,
+    /// Format.
+    #[arg(long = "as", value_name = "FORMAT", value_enum)]
+    pub format: Format,
+    /// One goal, for formats of a posture or a motion; the scenario's only one if left out.
+    #[arg(long, value_name = "NAME")]
+    pub goal: Option<String>,
+    /// One configuration of the goal, such as Right-Up-Fold; of a motion the recommended one if left out.
+    #[arg(long, value_name = "CONFIGURATION")]
+    pub configuration: Option<String>,
+    /// Engine whose motion it is, for formats of a motion; rapier if left out.
+    #[arg(long, value_name = "ENGINE", value_parser = EngineParser)]
+    pub engine: Option<EngineArgument>,
+    /// Joint positions, shoulder pan to wrist 3, rad, for formats of a posture.
+    #[arg(
+        long,
+        value_name = "q1,..,q6",
+        allow_hyphen_values = true,
+        conflicts_with_all = ["goal", "configuration"]
+    )]
+    pub joints: Option<Six>,
+    /// File to write; files that belong to it are written beside it. Left out, a file of the scenario's name in the
+    /// folder where its results go, out/NAME.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Print one JSON document.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+/// What other tools read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// The whole cell as a model of MuJoCo.
+    Mjcf,
+    /// A motion as an engine recorded it, as messages of ROS 2 in an MCAP file.
+    Mcap,
+    /// A planned motion as a joint trajectory of ROS 2: JSON, YAML or CSV.
+    Trajectory,
+    /// A planned motion as a program for the arm's controller.
+    Urscript,
+    /// The whole cell as a robot description for ROS: URDF, SRDF, and a package of the surfaces that they name.
+    Urdf,
+    /// The whole cell in a posture as a picture in space, for Blender, slides and viewers: binary glTF.
+    Gltf,
+}
+
+/// What is true of a format.
+struct Traits {
+    /// Extension of the file that people open.
+    extension: &'static str,
+    /// What it is, for people.
+    what: &'static str,
+    /// It is of one posture.
+    posture: bool,
+    /// It is of one motion: of a goal in a configuration.
+    motion: bool,
+    /// It is of what an engine recorded.
+    recording: bool,
+}
+
+impl Traits {
+    /// Of formats of one motion, which a run in an engine says that it works.
+    fn of_motion(extension: &'static str, what: &'static str) -> Self {
+        Self {
+            extension,
+            what,
+            posture: false,
+            motion: true,
+            recording: true,
+        }
+    }
+}
+
+impl Format {
+    fn traits(self) -> Traits {
+        match self {
+            Self::Mjcf => Traits {
+                extension: "xml",
+                what: "the cell as a model of MuJoCo",
+                posture: false,
+                motion: false,
+                recording: false,
+            },
+            Self::Mcap => Traits::of_motion("mcap", "a recorded motion as messages of ROS 2"),
+            Self::Trajectory => Traits::of_motion("json", "a planned motion as a joint trajectory"),
+            Self::Urscript => Traits::of_motion(
+                "script",
+                "a planned motion as a program, never run on a robot",
+            ),
+            Self::Urdf => Traits {
+                extension: "urdf",
+                what: "the cell as a robot description for ROS",
+                posture: false,
+                motion: false,
+                recording: false,
+            },
+            Self::Gltf => Traits {
+                extension: "glb",
+                what: "the cell in a posture as a picture in space",
+                posture: true,
+                motion: false,
+                recording: false,
+            },
+        }
+    }
+
+    fn name(self) -> String {
+        let value = self.to_possible_value();
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+}
+
+#[derive(Serialize)]
+struct ExportAnswer {
+    schema_version: u32,
+    scenario: String,
+    format: String,
+    files: Vec<FileAnswer>,
+}
+
+#[derive(Serialize)]
+struct FileAnswer {
+    name: String,
+    bytes: usize,
+    sha256: String,
+}
+
+/// What of the scenario is wanted.
+struct Wanted<'a> {
+    resolved: &'a ResolvedScenario,
+    /// Name of the file that people open, without its extension.
+    stem: &'a str,
+    /// Index of a goal, and a configuration of it.
+    chosen: Option<(usize, Configuration)>,
+    /// A posture of the user's own.
+    joints: Option<Joints>,
+}
+
+impl Wanted<'_> {
+    /// The posture.
+    fn shown(&self) -> Shown {
+        match (self.chosen, self.joints) {
+            (Some((goal, configuration)), _) => Shown::Goal {
+                goal,
+                configuration,
+            },
+            (None, Some(joints)) => Shown::Joints(joints),
+            (None, None) => Shown::Start,
+        }
+    }
+
+    fn files(&self, format: Format) -> Result<Vec<ExportedFile>, ExportError> {
+        match format {
+            Format::Mjcf => mjcf(self.resolved, self.stem),
+            Format::Mcap | Format::Trajectory | Format::Urscript => {
+                unreachable!("motions are exported after a run")
+            }
+            Format::Urdf => urdf(self.resolved, self.stem),
+            Format::Gltf => gltf(self.resolved, self.stem, &self.shown()),
+        }
+    }
+}
+
+/// Writes a scenario in the format of another tool.
+pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus> {
+    let refuse = |finding: Finding| {
+        print_findings(&[finding]);
+        Ok(ExitStatus::BadInput)
+    };
+    if let Err(finding) = check_options(arguments) {
+        return refuse(finding);
+    }
+    let overrides = match overrides(&arguments.robot) {
+        Ok(overrides) => overrides,
+        Err(finding) => return refuse(finding),
+    };
+    let Some(resolved) = load(&arguments.scenario, &overrides) else {
+        return Ok(ExitStatus::BadInput);
+    };
+    if arguments.format.traits().motion {
+        return motion::export(arguments, &resolved);
+    }
+    let chosen = match chosen(arguments, &resolved) {
+        Ok(chosen) => chosen,
+        Err(finding) => return refuse(finding),
+    };
+    let joints = match joints(arguments, &resolved) {
+        Ok(joints) => joints,
+        Err(finding) => return refuse(finding),
+    };
+    let (folder, stem, extension) = match place(arguments, &resolved) {
+        Ok(place) => place,
+        Err(finding) => return refuse(finding),
+    };
+    if let Err(finding) = prepare_folder(&folder) {
+        return refuse(finding);
+    }
+    let wanted = Wanted {
+        resolved: &resolved,
+        stem: &stem,
+        chosen,
+        joints,
+    };
+    let mut files = match wanted.files(arguments.format) {
+        Ok(files) => files,
+        Err(error) => {
+            return refuse(Finding::new(&resolved.source.file, error.to_string()));
+        }
+    };
+    if let Some(first) = files.first_mut() {
+        first.name = format!("{stem}{extension}");
+    }
+    finish(arguments, &resolved, &folder, &files)
+}
+
+/// Writes the files and says which they are.
+fn finish(
+    arguments: &ExportArguments,
+    resolved: &ResolvedScenario,
+    folder: &Path,
+    files: &[ExportedFile],
+) -> Result<ExitStatus> {
+    let written = write(folder, files)?;
+    let traits = arguments.format.traits();
+    if arguments.json {
+        print_json(&ExportAnswer {
+            schema_version: 1,
+            scenario: resolved.scenario.name.clone(),
+            format: arguments.format.name(),
+            files: written,
+        })?;
+    } else {
+        let mut lines = vec![format!("{}: {}", resolved.scenario.name, traits.what)];
+        // A cell has up to a hundred surfaces: their folder says it.
+        let (shown_files, further) = written.split_at(written.len().min(MOST_FILES_SHOWN));
+        lines.extend(
+            shown_files
+                .iter()
+                .map(|file| format!("{} ({} bytes)", shown(Path::new(&file.name)), file.bytes)),
+        );
+        if !further.is_empty() {
+            lines.push(format!("and {} more beside them", further.len()));
+        }
+        print_text(&lines.join("\n"))?;
+    }
+    Ok(ExitStatus::Success)
+}
+
+/// Files that are listed for people.
+const MOST_FILES_SHOWN: usize = 6;
+
+/// Refuses options that the format has nothing to do with: what is ignored is believed to be heeded.
+fn check_options(arguments: &ExportArguments) -> Result<(), Finding> {
+    let traits = arguments.format.traits();
+    let choice = traits.posture || traits.motion;
+    for (given, applies, option) in [
+        (arguments.goal.is_some(), choice, "--goal"),
+        (arguments.configuration.is_some(), choice, "--configuration"),
+        (arguments.joints.is_some(), traits.posture, "--joints"),
+        (arguments.engine.is_some(), traits.recording, "--engine"),
+    ] {
+        if given && !applies {
+            let name = arguments.format.name();
+            let finding = Finding::new(
+                "the command line",
+                format!(
+                    "{option} does not apply to {name}, which is {}",
+                    traits.what
+                ),
+            );
+            return Err(finding.key(option).hint(format!("leave {option} out")));
+        }
+    }
+    Ok(())
+}
+
+/// The goal and the configuration that are wanted; none if none is named.
+fn chosen(
+    arguments: &ExportArguments,
+    resolved: &ResolvedScenario,
+) -> Result<Option<(usize, Configuration)>, Finding> {
+    if arguments.goal.is_none() && arguments.configuration.is_none() {
+        return Ok(None);
+    }
+    let found = goals(resolved, arguments.goal.as_deref())?;
+    let &[goal] = found.as_slice() else {
+        let names: Vec<&str> = resolved.goals.iter().map(|goal| &*goal.name).collect();
+        let finding = Finding::new(
+            &resolved.source.file,
+            format!("it has {} goals, and none is named", found.len()),
+        );
+        return Err(finding
+            .key("--goal")
+            .hint(format!("name one with --goal: {}", names.join(", "))));
+    };
+    let index = resolved
+        .goals
+        .iter()
+        .position(|each| each.name == goal.name);
+    let labels = || Configuration::ALL.map(Configuration::label);
+    let Some(label) = arguments.configuration.as_deref() else {
+        let finding = Finding::new("the command line", "--goal needs a --configuration");
+        return Err(finding
+            .key("--configuration")
+            .hint(format!("configurations: {}", labels().join(", "))));
+    };
+    let configuration = configuration_named(label)?;
+    Ok(index.map(|index| (index, configuration)))
+}
+
+/// The configuration of a label.
+fn configuration_named(label: &str) -> Result<Configuration, Finding> {
+    let labels = || Configuration::ALL.map(Configuration::label);
+    Configuration::from_label(label).ok_or_else(|| {
+        let finding = Finding::new(
+            "the command line",
+            format!("there is no configuration `{label}`"),
+        );
+        let all = labels().join(", ");
+        let hint = match nearest_name(label, labels()) {
+            Some(near) => format!("did you mean `{near}`? Configurations: {all}"),
+            None => format!("configurations: {all}"),
+        };
+        finding.key("--configuration").hint(hint)
+    })
+}
+
+/// The posture that was given, which has to be one that the arm can have.
+fn joints(
+    arguments: &ExportArguments,
+    resolved: &ResolvedScenario,
+) -> Result<Option<Joints>, Finding> {
+    let Some(six) = &arguments.joints else {
+        return Ok(None);
+    };
+    six.doubt_degrees();
+    let q = Joints::from_column_slice(&six.0);
+    let limits = &resolved.cell.robot.limits;
+    let Some(joint) = limits.first_violation(&q) else {
+        return Ok(Some(q));
+    };
+    let limit = &limits.0[joint];
+    let finding = Finding::new(
+        "the command line",
+        format!(
+            "{} is {} rad, outside of its limits from {:.4} to {:.4} rad",
+            needlebench_kinematics::JOINT_LABELS[joint],
+            q[joint],
+            limit.lower_rad,
+            limit.upper_rad
+        ),
+    );
+    Err(finding
+        .key("--joints")
+        .hint("give six joint positions within the limits, in rad"))
+}
+
+/// Folder, name and extension (with its dot) of the file that people open.
+fn place(
+    arguments: &ExportArguments,
+    resolved: &ResolvedScenario,
+) -> Result<(PathBuf, String, String), Finding> {
+    let extension = arguments.format.traits().extension;
+    let Some(out) = &arguments.out else {
+        let name = resolved.scenario.name.clone();
+        return Ok((Path::new("out").join(&name), name, format!(".{extension}")));
+    };
+    let refuse = |message: &str| {
+        let finding = Finding::new(out.display().to_string(), message);
+        Err(finding
+            .key("--out")
+            .hint(format!("name a file, such as cell.{extension}")))
+    };
+    if out.is_dir() {
+        return refuse("it is a folder");
+    }
+    let Some((stem, name)) = out
+        .file_stem()
+        .and_then(|stem| stem.to_str())
+        .zip(out.file_name().and_then(|name| name.to_str()))
+    else {
+        return refuse("it names no file");
+    };
+    let folder = out.parent().map(Path::to_owned).unwrap_or_default();
+    Ok((folder, stem.to_owned(), name[stem.len()..].to_owned()))
+}
+
+/// Writes the files, the one that people open last: where it is, the others are.
+fn write(folder: &Path, files: &[ExportedFile]) -> Result<Vec<FileAnswer>> {
+    let mut written = Vec::new();
+    for file in files.iter().rev() {
+        let path = folder.join(&file.name);
+        let parent = path.parent().unwrap_or(folder);
+        std::fs::create_dir_all(parent)
+            .and_then(|()| write_atomically(&path, &file.bytes))
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        written.push(FileAnswer {
+            name: path.display().to_string(),
+            bytes: file.bytes.len(),
+            sha256: sha256_hex(&file.bytes),
+        });
+    }
+    written.reverse();
+    Ok(written)
+}

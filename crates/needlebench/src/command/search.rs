@@ -1,0 +1,347 @@
+//! `needlebench search`.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use needlebench_cell::study::load_study;
+use needlebench_study::search::{
+    CaseWorth, Generation, GenerationDesign, Judge, SearchError, SearchLog, search as search_for,
+};
+use needlebench_study::{
+    FactorValue, MANIFEST_FILE, Manifest, ParquetResults, Results as _, RunEnd, Shard, Status,
+    StudyError, StudyRun, merge,
+};
+
+use super::run::prepare_folder;
+use super::study::{ShardArgument, failed, shard_of, show};
+use super::{overrides, print_json, print_text};
+use crate::arguments::RobotArguments;
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::interrupts::{threads, watch_interrupts};
+use crate::output::{complain, shown};
+use crate::progress::TerminalProgress;
+use needlebench_bench::progress::Progress as _;
+use needlebench_bench::search::{GenerationEvaluator, PreparedSearch, out_of_reach, worth_of};
+use needlebench_report::files::{FilesError, SearchDocument, write_search, write_search_log};
+
+pub(crate) const SEARCH_HELP: &str = "\
+Factors with `role = \"choice\"` are searched, all others are what a choice has to hold for. [search] in the study's \
+file says by what: a lower quantile of the margin, the share of layouts that work, or the expected error of the tip.
+
+Writes DIR/NAME/search.json, search.html and a folder for each generation, DIR/NAME/search/gen_000 and so on, which is a \
+study of its own. An interrupted search goes on with --resume. With --shard K/N a process computes its part of the generation that \
+is next and ends; a search without --shard joins parts that are all there and goes on.
+
+Example: needlebench search scenarios/studies/search_base.toml
+Example: needlebench search scenarios/studies/tools.toml --json";
+
+/// Folder of generations in a study's folder.
+const GENERATIONS: &str = "search";
+
+/// Arguments of `search`.
+#[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+pub(crate) struct SearchArguments {
+    /// Study file.
+    #[arg(value_name = "STUDY")]
+    pub study: PathBuf,
+    /// Folder for results; the study gets a folder of its name in it.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Go on with a search that was interrupted.
+    #[arg(long)]
+    pub resume: bool,
+    /// Compute one of N parts of the next generation and end: 1/N to N/N; `auto` takes it from the scheduler's
+    /// environment.
+    #[arg(long, value_name = "K/N|auto")]
+    pub shard: Option<ShardArgument>,
+    /// Print one JSON document instead of the answer for people.
+    #[arg(long)]
+    pub json: bool,
+    /// Threads; the number of cores if left out. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: Option<u16>,
+    /// Write no page.
+    #[arg(long)]
+    pub no_page: bool,
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+    #[command(flatten)]
+    pub robot: RobotArguments,
+}
+
+/// Searches the choices of a study.
+pub(crate) fn search(arguments: &SearchArguments) -> Result<ExitStatus> {
+    let prepared = overrides(&arguments.robot)
+        .map_err(|finding| vec![finding])
+        .and_then(|overrides| load_study(&arguments.study, &overrides))
+        .and_then(PreparedSearch::new);
+    let prepared = match prepared {
+        Ok(prepared) => prepared,
+        Err(findings) => {
+            print_findings(&findings);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let folder = arguments.out.join(&prepared.study.file.name);
+    if let Err(finding) = prepare_folder(&folder) {
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
+    let generations = folder.join(GENERATIONS);
+    // A shard is asked for again and again, one generation after the other.
+    if generations.exists() && !arguments.resume && arguments.shard.is_none() {
+        return Ok(failed(&StudyError::Exists {
+            folder: generations,
+            what: "a search".to_owned(),
+        }));
+    }
+    let shard = match arguments.shard.map(shard_of).transpose() {
+        Ok(shard) => shard,
+        Err(finding) => {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let cancel = watch_interrupts()?;
+    let progress = TerminalProgress::new(arguments.quiet);
+    let mut judge = GenerationJudge {
+        search: &prepared,
+        folder: &folder,
+        generations: &generations,
+        shard,
+        threads: threads(arguments.jobs),
+        cancel: &cancel,
+        progress: &progress,
+    };
+    let found = search_for(&prepared.plan, prepared.space.choices(), &mut judge);
+    progress.finish();
+    let log = match found {
+        Ok(log) => log,
+        Err(SearchError::Stopped(stop)) => return stop.status(&folder),
+        Err(error) => {
+            print_findings(&[prepared.finding(&error)]);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let text = write_search(&prepared, &log, &folder, !arguments.no_page)
+        .with_context(|| format!("cannot write the results to {}", folder.display()))?;
+    if arguments.json {
+        print_json(&SearchDocument::new(&prepared, &log))?;
+    } else {
+        print_text(&format!("{text}results: {}", shown(&folder)))?;
+    }
+    Ok(ExitStatus::Success)
+}
+
+/// Computes generations as studies, each in a folder of its own.
+struct GenerationJudge<'a> {
+    search: &'a PreparedSearch,
+    folder: &'a Path,
+    generations: &'a Path,
+    shard: Option<Shard>,
+    threads: usize,
+    cancel: &'a AtomicBool,
+    progress: &'a TerminalProgress,
+}
+
+/// Why a search ends early.
+enum Stop {
+    Interrupted,
+    /// A part of a generation is there.
+    Part {
+        generation: u32,
+        shard: Shard,
+        cases: u64,
+        folder: PathBuf,
+    },
+    Study(StudyError),
+    Files(FilesError),
+}
+
+impl Stop {
+    fn status(self, folder: &Path) -> Result<ExitStatus> {
+        match self {
+            Self::Interrupted => {
+                complain(&format!(
+                    "interrupted: what is done is in {}; --resume goes on",
+                    shown(folder)
+                ));
+                Ok(ExitStatus::Interrupted)
+            }
+            Self::Part {
+                generation,
+                shard,
+                cases,
+                folder,
+            } => {
+                print_text(&format!(
+                    "{cases} cases of generation {generation}, part {shard}, are in {}; once all parts are \
+                     there, `needlebench search --resume` joins them and goes on",
+                    shown(&folder)
+                ))?;
+                Ok(ExitStatus::Success)
+            }
+            Self::Study(error) => Ok(failed(&error)),
+            Self::Files(error) => {
+                Err(error).with_context(|| format!("cannot write to {}", folder.display()))
+            }
+        }
+    }
+}
+
+impl From<StudyError> for Stop {
+    fn from(error: StudyError) -> Self {
+        Self::Study(error)
+    }
+}
+
+impl GenerationJudge<'_> {
+    fn path(&self, generation: u32) -> PathBuf {
+        self.generations.join(format!("gen_{generation:03}"))
+    }
+
+    fn part(&self, generation: u32, shard: Shard) -> PathBuf {
+        let (part, parts) = (shard.part(), shard.parts());
+        self.generations
+            .join(format!("gen_{generation:03}.part_{part}_of_{parts}"))
+    }
+
+    /// Computes what is missing of a generation, or of a part of it.
+    fn compute(&self, generation: &Generation, shard: Option<Shard>) -> Result<(), Stop> {
+        let design = GenerationDesign {
+            space: &self.search.space,
+            generation,
+        };
+        let evaluator = GenerationEvaluator {
+            search: self.search,
+            design,
+        };
+        let folder = match shard {
+            Some(shard) => self.part(generation.number, shard),
+            None => self.path(generation.number),
+        };
+        let run = StudyRun {
+            design: &evaluator.design,
+            manifest: self.search.manifest(generation, shard),
+            evaluator: &evaluator,
+            threads: self.threads,
+            resume: true,
+        };
+        self.progress
+            .message(&format!("generation {}", generation.number));
+        match run.run(&folder, self.cancel, &|event| show(self.progress, event))? {
+            RunEnd::Finished { .. } => Ok(()),
+            RunEnd::Partial { .. } => Err(Stop::Interrupted),
+        }
+    }
+
+    /// Joins the parts of a generation if all are there.
+    fn join(&self, generation: &Generation) -> Result<(), Stop> {
+        let Some(parts) = self.complete_parts(generation)? else {
+            return Ok(());
+        };
+        let folder = self.path(generation.number);
+        let ours = self.search.manifest(generation, None);
+        merge(&folder, Some(&ours), &parts, self.threads, true, &|event| {
+            show(self.progress, event);
+        })?;
+        Ok(())
+    }
+
+    /// Folders of all parts of a generation; none unless all are there.
+    fn complete_parts(&self, generation: &Generation) -> Result<Option<Vec<PathBuf>>, Stop> {
+        let prefix = format!("gen_{:03}.part_", generation.number);
+        let Ok(entries) = self.generations.read_dir() else {
+            return Ok(None);
+        };
+        let mut found: Vec<(Shard, PathBuf)> = Vec::new();
+        let ours = self.search.manifest(generation, None);
+        for entry in entries.flatten() {
+            if !entry.file_name().to_string_lossy().starts_with(&prefix) {
+                continue;
+            }
+            let path = entry.path();
+            let Some(manifest) = Manifest::read(&path)? else {
+                continue;
+            };
+            if let Some(error) = ours.other_study(&path, &manifest) {
+                return Err(error.into());
+            }
+            if let (Some(shard), Status::Complete) = (manifest.shard, manifest.status) {
+                found.push((shard, path));
+            }
+        }
+        found.sort();
+        let parts = |shard: Shard| {
+            found
+                .iter()
+                .filter(move |(each, _)| each.parts() == shard.parts())
+        };
+        let whole = found
+            .iter()
+            .find(|(shard, _)| parts(*shard).count() == shard.parts() as usize);
+        Ok(whole.map(|(shard, _)| parts(*shard).map(|(_, path)| path.clone()).collect()))
+    }
+
+    fn is_complete(&self, generation: u32) -> Result<bool, Stop> {
+        let path = self.path(generation);
+        let found = path
+            .join(MANIFEST_FILE)
+            .exists()
+            .then(|| Manifest::read(&path));
+        let found = found.transpose()?.flatten();
+        Ok(found.is_some_and(|manifest| manifest.status == Status::Complete))
+    }
+}
+
+impl Judge for GenerationJudge<'_> {
+    type Stop = Stop;
+
+    fn out_of_reach(&mut self, generation: &Generation) -> Result<Vec<Vec<Option<f64>>>, Stop> {
+        Ok(out_of_reach(self.search, generation, self.threads))
+    }
+
+    fn judge(&mut self, generation: &Generation) -> Result<Vec<Vec<CaseWorth>>, Stop> {
+        let number = generation.number;
+        if !self.is_complete(number)? {
+            if let Some(shard) = self.shard {
+                self.compute(generation, Some(shard))?;
+                let cases = self.search.manifest(generation, Some(shard)).own_cases();
+                return Err(Stop::Part {
+                    generation: number,
+                    shard,
+                    cases,
+                    folder: self.part(number, shard),
+                });
+            }
+            self.join(generation)?;
+        }
+        // Of a complete one this checks that it is of this search, and sound.
+        self.compute(generation, None)?;
+        let table = self.path(number).join(needlebench_study::RESULTS_FILE);
+        let results = ParquetResults::open(&table).map_err(StudyError::from)?;
+        let columns = results.columns().to_vec();
+        let count = usize::try_from(generation.count).expect("held in memory");
+        let mut worth = vec![Vec::with_capacity(count); generation.candidates.len()];
+        results
+            .visit(&mut |_, case| {
+                let candidate = usize::try_from(case.case).expect("held in memory") / count;
+                worth[candidate].push(worth_of(&columns, case));
+            })
+            .map_err(StudyError::from)?;
+        Ok(worth)
+    }
+
+    fn describe(&self, candidate: &[FactorValue]) -> Vec<(String, serde_json::Value)> {
+        self.search.space.describe(candidate)
+    }
+
+    fn note(&mut self, log: &SearchLog) -> Result<(), Stop> {
+        write_search_log(self.search, log, self.folder).map_err(Stop::Files)
+    }
+}

@@ -1,0 +1,209 @@
+//! `needlebench study --launch`: scripts for shards, and the lines to type.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use needlebench_bench::study::{
+    Launch, LaunchFile, LaunchPlan, LaunchRequest, Launcher, PreparedStudy, StudyEvaluator, advice,
+    launch_plan, time_per_case,
+};
+use needlebench_cell::Finding;
+use needlebench_cell::study::StudyMode;
+use needlebench_report::files::write_atomically;
+use serde::Serialize;
+
+use super::super::{print_json, print_text};
+use super::{StudyArguments, prepare_folder};
+use crate::arguments::RobotArguments;
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::host;
+use crate::output::{complain, shown};
+
+#[derive(Serialize)]
+struct LaunchAnswer {
+    schema_version: u32,
+    folder: String,
+    shards: u32,
+    /// Most shards that the study may have.
+    blocks: u64,
+    files: Vec<String>,
+    steps: Vec<StepAnswer>,
+    advice: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct StepAnswer {
+    does: &'static str,
+    line: String,
+}
+
+/// Writes the scripts and prints what to type; starts nothing.
+pub(super) fn launch(
+    arguments: &StudyArguments,
+    prepared: &PreparedStudy,
+    request: LaunchRequest,
+) -> Result<ExitStatus> {
+    let manifest = prepared.manifest(None);
+    let blocks = manifest.blocks();
+    if u64::from(request.shards) > blocks {
+        let finding = Finding::new(
+            &prepared.study.source.file,
+            format!(
+                "{} shards are too many: the study has {blocks} blocks of {} cases",
+                request.shards, manifest.block_cases
+            ),
+        )
+        .key("--launch")
+        .hint(format!(
+            "{}:{blocks} at most; a shard has at least one block",
+            request.launcher.name()
+        ));
+        print_findings(&[finding]);
+        return Ok(ExitStatus::BadInput);
+    }
+    let here = std::env::current_dir().context("cannot tell the current folder")?;
+    // Inside another program the command line is what is on the path.
+    let program = if host::is_hosted() {
+        PathBuf::from("needlebench")
+    } else {
+        std::env::current_exe().context("cannot tell where this program is")?
+    };
+    let cache = std::env::var_os("NEEDLEBENCH_CACHE_DIR").map(PathBuf::from);
+    let cache = cache.filter(|cache| !cache.as_os_str().is_empty());
+    let options = options(&arguments.robot);
+    let jobs = arguments.results.jobs.unwrap_or(1);
+    let plan = Launch {
+        request,
+        name: &prepared.study.file.name,
+        program: &program,
+        folder: &here,
+        study: &arguments.study,
+        out: &arguments.out,
+        options: &options,
+        jobs,
+        cache: cache.as_deref(),
+        needs_mujoco: needs_mujoco(prepared),
+    };
+    let written = launch_plan(&plan).and_then(|plan| {
+        prepare_folder(&plan.folder)?;
+        for folder in &plan.folders {
+            prepare_folder(folder)?;
+        }
+        Ok(plan)
+    });
+    let plan = match written {
+        Ok(plan) => plan,
+        Err(finding) => {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    for name in &plan.stale {
+        let path = plan.folder.join(name);
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(error).with_context(|| format!("cannot remove {}", path.display()));
+            }
+            _ => {}
+        }
+    }
+    for file in &plan.files {
+        let path = plan.folder.join(file.name);
+        write(&path, file).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let advice = advised(prepared, request, manifest.cases, jobs);
+    answer(arguments, &plan, request, blocks, advice)?;
+    Ok(ExitStatus::Success)
+}
+
+fn answer(
+    arguments: &StudyArguments,
+    plan: &LaunchPlan,
+    request: LaunchRequest,
+    blocks: u64,
+    advice: Vec<String>,
+) -> Result<()> {
+    if arguments.results.json {
+        let files = plan.files.iter().map(|file| file.name.to_owned());
+        let steps = plan.steps.iter();
+        return print_json(&LaunchAnswer {
+            schema_version: 1,
+            folder: plan.folder.display().to_string(),
+            shards: request.shards,
+            blocks,
+            files: files.collect(),
+            steps: steps
+                .map(|step| StepAnswer {
+                    does: step.does,
+                    line: step.line.clone(),
+                })
+                .collect(),
+            advice,
+        });
+    }
+    let names: Vec<&str> = plan.files.iter().map(|file| file.name).collect();
+    let mut lines = vec![format!("{}: {}", shown(&plan.folder), names.join(", "))];
+    for step in &plan.steps {
+        lines.push(format!("{}:\n  {}", step.does, step.line));
+    }
+    print_text(&lines.join("\n"))?;
+    for line in advice {
+        complain(&format!("note: {line}"));
+    }
+    Ok(())
+}
+
+fn write(path: &Path, file: &LaunchFile) -> std::io::Result<()> {
+    write_atomically(path, file.text.as_bytes())?;
+    #[cfg(unix)]
+    if file.is_executable() {
+        use std::os::unix::fs::PermissionsExt;
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755))?;
+    }
+    Ok(())
+}
+
+fn needs_mujoco(prepared: &PreparedStudy) -> bool {
+    let engines = prepared.study.file.engines.as_deref();
+    prepared.most_costly_mode() == StudyMode::Dynamic
+        && engines.is_none_or(|engines| engines.iter().any(|engine| engine.as_ref() == "mujoco"))
+}
+
+/// What is worth changing, once a few cases have been computed.
+fn advised(prepared: &PreparedStudy, request: LaunchRequest, cases: u64, jobs: u16) -> Vec<String> {
+    let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design, &prepared.columns);
+    let mut lines = match time_per_case(&evaluator, cases) {
+        Ok(each) => advice(request, cases, jobs, each),
+        Err(message) => vec![format!("how long a shard takes is not known: {message}")],
+    };
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let processes = u64::from(request.shards) * u64::from(jobs);
+    if request.launcher == Launcher::Local && processes > cores as u64 {
+        lines.push(format!(
+            "all shards run at the same time, and this machine has {cores} cores"
+        ));
+    }
+    lines
+}
+
+/// Another robot, as options.
+fn options(robot: &RobotArguments) -> Vec<String> {
+    let path = |path: &PathBuf| path.display().to_string();
+    let urdf = &robot.urdf;
+    let mut options = Vec::new();
+    let mut add = |name: &str, value: Option<String>| {
+        options.extend(value.map(|value| format!("--{name}={value}")));
+    };
+    add("arm", robot.arm.clone());
+    add("robot", urdf.robot.as_ref().map(path));
+    for package in &urdf.package_path {
+        add("package-path", Some(package.clone()));
+    }
+    add("calibration", urdf.calibration.as_ref().map(path));
+    add(
+        "missing-inertia",
+        urdf.missing_inertia.as_ref().map(ToString::to_string),
+    );
+    options
+}

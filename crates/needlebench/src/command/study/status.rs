@@ -1,0 +1,199 @@
+//! `needlebench study --status`: how far the shards of a study are.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use needlebench_bench::study::{PreparedStudy, SHARDS_VARIABLE, shards_of};
+use needlebench_cell::Finding;
+use needlebench_study::{Shard, ShardState, Survey, ranges, survey};
+use serde::Serialize;
+
+use super::super::{print_json, print_text};
+use super::{StudyArguments, failed, variable};
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::interrupts::threads;
+use crate::output::{complain, shown};
+
+#[derive(Serialize)]
+struct StatusAnswer<'a> {
+    schema_version: u32,
+    name: &'a str,
+    study_id: &'a str,
+    /// Whether all cases are there.
+    complete: bool,
+    cases: u64,
+    /// Cases that are in some shard.
+    done: u64,
+    /// Most shards that the study may have.
+    blocks: u64,
+    /// Number of parts of which `missing` and `running` are; null where nobody says it.
+    shards: Option<u32>,
+    /// Other numbers of parts, and how many folders are of each.
+    mixed: &'a BTreeMap<u32, usize>,
+    /// Parts to start, or to start again.
+    missing: &'a [u32],
+    /// Parts that somebody computes.
+    running: &'a [u32],
+    folders: Vec<FolderAnswer>,
+}
+
+#[derive(Serialize)]
+struct FolderAnswer {
+    folder: String,
+    /// K/N; null where it is of the whole study.
+    shard: Option<String>,
+    state: &'static str,
+    done: u64,
+    cases: u64,
+}
+
+fn word(state: ShardState) -> &'static str {
+    match state {
+        ShardState::Done => "done",
+        ShardState::Running => "running",
+        ShardState::Stopped => "stopped",
+    }
+}
+
+/// Prints how far the shards are: 0 if all cases are there.
+pub(super) fn status(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus> {
+    let manifest = prepared.manifest(None);
+    let parts = match shards_of(&variable) {
+        Ok(parts) => parts,
+        Err(finding) => {
+            print_findings(&[finding]);
+            return Ok(ExitStatus::BadInput);
+        }
+    };
+    let threads = threads(arguments.results.jobs);
+    let found = match survey(&manifest, &arguments.status, parts, threads) {
+        Ok(found) => found,
+        Err(error) => return Ok(failed(&error)),
+    };
+    let end = if found.is_complete() {
+        ExitStatus::Success
+    } else {
+        ExitStatus::CriterionFailed
+    };
+    for line in remarks(&found) {
+        complain(&line);
+    }
+    if arguments.missing {
+        if found.parts.is_none() && !found.is_complete() {
+            print_findings(&[nobody_says(arguments)]);
+            return Ok(ExitStatus::BadInput);
+        }
+        if !found.running.is_empty() {
+            complain(&format!(
+                "left out, since they are running: {}",
+                ranges(found.running.iter().copied())
+            ));
+        }
+        if !found.missing.is_empty() {
+            print_text(&ranges(found.missing.iter().copied()))?;
+        }
+        return Ok(end);
+    }
+    if arguments.results.json {
+        let folders = found.shards.iter();
+        print_json(&StatusAnswer {
+            schema_version: 1,
+            name: &manifest.name,
+            study_id: &manifest.study_id,
+            complete: found.is_complete(),
+            cases: found.cases,
+            done: found.done,
+            blocks: found.blocks,
+            shards: found.parts,
+            mixed: &found.mixed,
+            missing: &found.missing,
+            running: &found.running,
+            folders: folders
+                .map(|each| FolderAnswer {
+                    folder: each.folder.display().to_string(),
+                    shard: each.shard.map(|shard| shard.to_string()),
+                    state: word(each.state),
+                    done: each.done,
+                    cases: each.cases,
+                })
+                .collect(),
+        })?;
+    } else {
+        print_text(&text(&manifest.name, &found))?;
+    }
+    Ok(end)
+}
+
+fn nobody_says(arguments: &StudyArguments) -> Finding {
+    Finding::new(
+        shown(&arguments.status[0]),
+        "no shard is there yet, so nobody says of how many",
+    )
+    .key("--missing")
+    .hint(format!("set {SHARDS_VARIABLE} to the number of shards"))
+}
+
+/// What is odd about the folders.
+fn remarks(found: &Survey) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(first) = found.others.first() {
+        lines.push(format!(
+            "left out, since they are of other studies: {} folders, such as {}",
+            found.others.len(),
+            shown(first)
+        ));
+    }
+    if let (Some(parts), false) = (found.parts, found.mixed.is_empty()) {
+        let mixed = found.mixed.iter();
+        let mixed: Vec<String> = mixed
+            .map(|(parts, count)| format!("{count} of shards of {parts}"))
+            .collect();
+        lines.push(format!(
+            "shards are mixed: beside those of {parts} there are {}; their cases count, the numbers below are of {parts}",
+            mixed.join(", ")
+        ));
+    }
+    lines
+}
+
+fn text(name: &str, found: &Survey) -> String {
+    let of = found
+        .parts
+        .map_or(String::new(), |parts| format!(", in shards of {parts}"));
+    let mut lines = vec![format!(
+        "{name}: {} of {} cases are there{of}",
+        found.done, found.cases
+    )];
+    for state in [ShardState::Done, ShardState::Running, ShardState::Stopped] {
+        let count = found.count(state);
+        let numbers: std::collections::BTreeSet<u32> = found
+            .shards
+            .iter()
+            .filter(|each| each.state == state)
+            .filter_map(|each| each.shard)
+            .filter(|shard| Some(shard.parts()) == found.parts)
+            .map(Shard::part)
+            .collect();
+        lines.push(line(word(state), count, &ranges(numbers)));
+    }
+    let begun = |part: &&u32| {
+        let mut shards = found.shards.iter().filter_map(|each| each.shard);
+        !shards.any(|shard| Some(shard.parts()) == found.parts && shard.part() == **part)
+    };
+    let begun: Vec<u32> = found.missing.iter().filter(begun).copied().collect();
+    lines.push(line("missing", begun.len(), &ranges(begun)));
+    if !found.missing.is_empty() {
+        lines.push(format!(
+            "to start, or start again: {}",
+            ranges(found.missing.iter().copied())
+        ));
+    }
+    lines.join("\n")
+}
+
+fn line(word: &str, count: usize, numbers: &str) -> String {
+    format!("{word:<8} {count:>5}  {numbers}")
+        .trim_end()
+        .to_owned()
+}

@@ -1,0 +1,126 @@
+//! `export`.
+
+use std::fmt::Write as _;
+
+use sha2::{Digest, Sha256};
+
+use crate::support::{Bench, SMALL, has_keys};
+
+fn hex(bytes: &[u8]) -> String {
+    let mut text = String::new();
+    for byte in Sha256::digest(bytes) {
+        // Writing to a String cannot fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+#[test]
+fn each_format_is_written_where_results_go_and_says_what_it_is() {
+    let bench = Bench::with_scenario(SMALL);
+    for (format, file) in [
+        ("mjcf", "small.xml"),
+        ("urdf", "small.urdf"),
+        ("gltf", "small.glb"),
+    ] {
+        let words = ["export", "s.toml", "--as", format, "--json"];
+        let answer = bench.run(&words).exits_with(0).json();
+        has_keys(&answer, &["schema_version", "scenario", "format", "files"]);
+        assert_eq!(answer["format"], format);
+        let files = answer["files"].as_array().unwrap();
+        assert_eq!(files[0]["name"], format!("out/small/{file}"));
+        for each in files {
+            let bytes = bench.read(each["name"].as_str().unwrap());
+            assert_eq!(each["bytes"], bytes.len());
+            assert_eq!(each["sha256"], hex(&bytes));
+        }
+        assert_eq!(bench.run(&words).exits_with(0).json(), answer);
+        let shown = bench.run(&words[..4]).exits_with(0).stdout;
+        assert!(shown.contains(&format!("out/small/{file}")), "{shown}");
+    }
+    let text = String::from_utf8(bench.read("out/small/small.srdf")).unwrap();
+    assert!(text.contains("<group name=\"manipulator\">"));
+}
+
+#[test]
+fn a_file_can_be_named_and_what_belongs_to_it_is_beside_it() {
+    let bench = Bench::with_scenario(SMALL);
+    let words = [
+        "export",
+        "s.toml",
+        "--as",
+        "urdf",
+        "--out",
+        "a/b/robot.xacro",
+    ];
+    bench.run(&words).exits_with(0);
+    let tree = bench.tree("a/b");
+    for name in ["robot.xacro", "robot.srdf", "robot_meshes/package.xml"] {
+        assert!(tree.contains(&name.into()), "{tree:?}");
+    }
+}
+
+#[test]
+fn options_that_mean_nothing_to_a_format_are_refused() {
+    let bench = Bench::with_scenario(SMALL);
+    let still = "0,-1.57,-1,-1.57,1.57,0";
+    for (format, option, value) in [
+        ("mjcf", "--goal", "pose"),
+        ("mjcf", "--joints", still),
+        ("urdf", "--configuration", "Right-Up-Fold"),
+        ("urdf", "--engine", "mujoco"),
+        ("gltf", "--engine", "rapier"),
+    ] {
+        let words = ["export", "s.toml", "--as", format, option, value];
+        let answer = bench.run(&words).exits_with(2);
+        answer.complains([option, "does not apply", "hint"]);
+    }
+    assert!(!bench.path("out").exists());
+}
+
+#[test]
+fn wrong_goals_configurations_and_postures_are_refused_with_what_there_is() {
+    let bench = Bench::with_scenario(SMALL);
+    let gltf = ["export", "s.toml", "--as", "gltf"];
+    let refused = |words: &[&str]| bench.run(&[&gltf, words].concat()).exits_with(2);
+    refused(&["--goal", "pos", "--configuration", "Right-Up-Fold"])
+        .complains(["no goal `pos`", "did you mean `pose`?"]);
+    refused(&["--configuration", "Right-Up-Fld"]).complains([
+        "no configuration `Right-Up-Fld`",
+        "did you mean `Right-Up-Fold`?",
+    ]);
+    refused(&["--goal", "pose"]).complains(["--configuration", "Left-Down-Unfold"]);
+    refused(&["--joints", "0,0,0,0,0,7"]).complains(["wrist_3 is 7 rad", "limits"]);
+    refused(&["--joints", "0,0,0"]).complains(["needs six numbers"]);
+    refused(&["--joints", "0,0,0,0,0,0", "--goal", "pose"]).complains(["cannot be used with"]);
+    refused(&["--out", "."]).complains(["it is a folder", "cell.glb"]);
+    bench
+        .run(&["export", "s.toml"])
+        .exits_with(2)
+        .complains(["--as"]);
+    let unknown = ["export", "s.toml", "--as", "fbx"];
+    bench
+        .run(&unknown)
+        .exits_with(2)
+        .complains(["fbx", "mjcf", "gltf"]);
+    let missing = ["export", "t.toml", "--as", "mjcf"];
+    bench.run(&missing).exits_with(2).complains(["t.toml"]);
+}
+
+#[test]
+fn the_only_goal_need_not_be_named() {
+    let bench = Bench::with_scenario(SMALL);
+    let words = [
+        "export",
+        "s.toml",
+        "--as",
+        "gltf",
+        "--configuration",
+        "Right-Up-Fold",
+    ];
+    bench.run(&words).exits_with(0);
+    let first = bench.read("out/small/small.glb");
+    let named = [&words[..], &["--goal", "pose"]].concat();
+    bench.run(&named).exits_with(0);
+    assert_eq!(bench.read("out/small/small.glb"), first);
+}

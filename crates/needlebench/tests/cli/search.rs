@@ -1,0 +1,144 @@
+//! `search`: from a study file to the best choice, whatever happens on the way.
+
+use crate::support::{Answer, Bench, SMALL, has_keys};
+
+/// Three heights and two mounts of the tool.
+const STUDY: &str = r#"
+name = "best"
+scenario = "s.toml"
+seed = 1
+[sampling]
+samples = 16
+[search]
+fresh = 16
+budget = 112
+[[factors]]
+name = "along"
+key = "phantom.position_mm[0]"
+range = [-20, 20]
+relative = true
+[[factors]]
+name = "height"
+key = "robot.base_position_mm[2]"
+role = "choice"
+values = [790, 800, 810]
+[[factors]]
+name = "tool"
+key = "tool.mount_rotation_deg"
+role = "choice"
+values = [90, 180]
+"#;
+
+fn bench(study: &str) -> Bench {
+    let bench = Bench::with_scenario(SMALL);
+    bench.write("study.toml", study);
+    bench
+}
+
+fn run(bench: &Bench, more: &[&str]) -> Answer {
+    let mut arguments = vec!["search", "study.toml", "--quiet"];
+    arguments.extend(more);
+    bench.run(&arguments)
+}
+
+/// All that a search has written, without parts of generations.
+fn written(bench: &Bench, folder: &str) -> Vec<(String, Vec<u8>)> {
+    let files = bench.tree(folder);
+    let named = files.iter().map(|path| path.display().to_string());
+    let named = named.filter(|name| !name.contains(".part_") && !name.contains(".nbj"));
+    named
+        .map(|name| {
+            let bytes = bench.read(&format!("{folder}/{name}"));
+            (name, bytes)
+        })
+        .collect()
+}
+
+#[test]
+fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
+    let bench = bench(STUDY);
+    let document = run(&bench, &["--json"]).exits_with(0).json();
+    has_keys(
+        &document,
+        &[
+            "schema_version",
+            "study_id",
+            "answer",
+            "candidates",
+            "generations",
+        ],
+    );
+    let answer = &document["answer"];
+    assert_eq!(answer["figures"][0]["cases"], 16);
+    assert_eq!(answer["rate"]["cases"], 16);
+    assert_eq!(document, bench.read_json("out/best/search.json"));
+    assert_eq!(
+        document["cases"], 112,
+        "six choices with all layouts, and the winner anew"
+    );
+    assert!(bench.path("out/best/search.html").exists());
+    assert!(
+        bench
+            .path("out/best/search/gen_000/results.parquet")
+            .exists()
+    );
+    let again = run(&bench, &[]).exits_with(2);
+    again.complains(["--resume"]);
+    let text = run(&bench, &["--resume"]).exits_with(0).stdout;
+    assert!(text.contains("best") && text.contains("works"), "{text}");
+    assert!(
+        text.lines().all(|line| line.chars().count() <= 100),
+        "{text}"
+    );
+}
+
+#[test]
+fn threads_shards_and_breaks_give_the_same_bytes() {
+    let whole = bench(STUDY);
+    run(&whole, &["--jobs", "1"]).exits_with(0);
+    let expected = written(&whole, "out/best");
+
+    let threads = bench(STUDY);
+    run(&threads, &["--jobs", "3"]).exits_with(0);
+    assert!(written(&threads, "out/best") == expected);
+
+    // Parts of every generation, then a search that joins them.
+    let shards = bench(STUDY);
+    for shard in ["2/2", "1/2"] {
+        let said = run(&shards, &["--shard", shard]).exits_with(0).stdout;
+        assert!(said.contains("generation 0"), "{said}");
+    }
+    run(&shards, &["--resume"]).exits_with(0);
+    assert!(written(&shards, "out/best") == expected);
+
+    // As after a kill: a generation that has begun, and a log that is behind.
+    let broken = bench(STUDY);
+    run(&broken, &["--shard", "1/2"]).exits_with(0);
+    broken.write("out/best/search.json", "{");
+    run(&broken, &["--resume"]).exits_with(0);
+    assert!(written(&broken, "out/best") == expected);
+}
+
+#[test]
+fn what_cannot_be_searched_says_why() {
+    let bench = bench(&STUDY.replace("budget = 112", "budget = 50"));
+    run(&bench, &[])
+        .exits_with(2)
+        .complains(["budget", "50", "search.budget"]);
+    let no_choice = STUDY.replace("role = \"choice\"\n", "");
+    bench.write("study.toml", no_choice);
+    run(&bench, &[])
+        .exits_with(2)
+        .complains(["study.toml", "nothing to choose"]);
+    bench.write(
+        "study.toml",
+        STUDY.replace("fresh = 16", "classes = [\"robot_phantm\"]"),
+    );
+    run(&bench, &[])
+        .exits_with(2)
+        .complains(["study.toml", "robot_phantm", "robot_phantom"]);
+    let ranges = STUDY.replace("values = [790, 800, 810]", "range = [790, 810]");
+    bench.write("study.toml", ranges);
+    let study = bench.run(&["study", "study.toml", "--quiet"]).exits_with(0);
+    study.complains(["height", "needlebench search"]);
+}

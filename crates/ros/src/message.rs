@@ -1,0 +1,299 @@
+//! Messages of ROS 2: `std_msgs`, `geometry_msgs`, `sensor_msgs`, `tf2_msgs`, `visualization_msgs`.
+//!
+//! Fields, their order and constants are those of ROS 2's interface definitions since Humble.
+
+mod marker;
+
+pub use marker::{Colour, Marker, MarkerArray, MarkerShape};
+
+use serde::Deserialize;
+
+use crate::cdr::{Decoder, Encoder};
+
+/// A type of message that can be written.
+pub trait Message {
+    /// Name with package, e.g. `std_msgs/msg/String`.
+    const TYPE: &'static str;
+
+    /// Its definition and those of all types in it, as MCAP's `ros2msg` has them.
+    fn definition() -> String;
+
+    /// Writes its fields.
+    fn encode(&self, cdr: &mut Encoder);
+
+    /// Its bytes.
+    fn to_cdr(&self) -> Vec<u8> {
+        let mut cdr = Encoder::default();
+        self.encode(&mut cdr);
+        cdr.finish()
+    }
+}
+
+/// Definition of a message followed by those of the types in it.
+fn with_types(own: &str, types: &[(&str, &str)]) -> String {
+    let line = "=".repeat(80);
+    types.iter().fold(own.to_owned(), |text, (name, fields)| {
+        text + &line + "\nMSG: " + name + "\n" + fields
+    })
+}
+
+const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
+const HEADER: (&str, &str) = (
+    "std_msgs/Header",
+    "builtin_interfaces/Time stamp\nstring frame_id\n",
+);
+const VECTOR3: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
+const QUATERNION: (&str, &str) = (
+    "geometry_msgs/Quaternion",
+    "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
+);
+
+/// `builtin_interfaces/msg/Time`.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(default)]
+pub struct Stamp {
+    /// Seconds.
+    pub sec: i64,
+    /// Nanoseconds besides.
+    #[serde(alias = "nsec")]
+    pub nanosec: u32,
+}
+
+/// Nanoseconds of a second.
+const NS: u64 = 1_000_000_000;
+
+impl Stamp {
+    /// Of a time in nanoseconds.
+    pub fn of_ns(time_ns: u64) -> Self {
+        Self {
+            sec: i64::try_from(time_ns / NS).unwrap_or(i64::MAX),
+            nanosec: u32::try_from(time_ns % NS).unwrap_or_default(),
+        }
+    }
+
+    /// Seconds; none where nobody set it.
+    pub fn seconds(self) -> Option<f64> {
+        (self != Self::default()).then(|| self.sec as f64 + f64::from(self.nanosec) * 1e-9)
+    }
+
+    fn encode(self, cdr: &mut Encoder) {
+        // ROS has 32 bits of it.
+        cdr.i32(i32::try_from(self.sec).unwrap_or(i32::MAX));
+        cdr.u32(self.nanosec);
+    }
+}
+
+/// `std_msgs/msg/Header`.
+#[derive(Debug, Default, Clone, PartialEq, Eq, Deserialize)]
+#[serde(default)]
+pub struct Header {
+    /// When.
+    pub stamp: Stamp,
+    /// Frame of what follows; empty if it has none.
+    pub frame_id: String,
+}
+
+impl Header {
+    fn encode(&self, cdr: &mut Encoder) {
+        self.stamp.encode(cdr);
+        cdr.string(&self.frame_id);
+    }
+}
+
+/// `sensor_msgs/msg/JointState`.
+#[derive(Debug, Default, Clone, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct JointState {
+    /// When; its frame is empty.
+    pub header: Header,
+    /// Names of joints.
+    pub name: Vec<String>,
+    /// Positions, rad.
+    pub position: Vec<f64>,
+    /// Velocities, rad/s.
+    pub velocity: Vec<f64>,
+    /// Efforts, N m; empty where there are none.
+    pub effort: Vec<f64>,
+}
+
+/// Why bytes are no message of the type that they should be.
+#[derive(Debug, thiserror::Error)]
+pub enum NotAMessage {
+    /// CDR that ends too early.
+    #[error("it is cut off")]
+    CutOff,
+    /// JSON that is none, or of something else.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+}
+
+impl JointState {
+    /// Of the bytes of a message in an encoding: `json`, or else CDR.
+    ///
+    /// # Errors
+    /// [`NotAMessage`].
+    pub fn decode(encoding: &str, data: &[u8]) -> Result<Self, NotAMessage> {
+        if encoding == "json" {
+            return Ok(serde_json::from_slice(data)?);
+        }
+        Self::from_cdr(data).ok_or(NotAMessage::CutOff)
+    }
+
+    fn from_cdr(data: &[u8]) -> Option<Self> {
+        let mut cdr = Decoder::new(data)?;
+        let stamp = Stamp {
+            sec: i64::from(cdr.i32()?),
+            nanosec: cdr.u32()?,
+        };
+        let frame_id = cdr.string()?;
+        Some(Self {
+            header: Header { stamp, frame_id },
+            name: cdr.strings()?,
+            position: cdr.doubles()?,
+            velocity: cdr.doubles()?,
+            effort: cdr.doubles()?,
+        })
+    }
+}
+
+impl Message for JointState {
+    const TYPE: &'static str = "sensor_msgs/msg/JointState";
+
+    fn definition() -> String {
+        with_types(
+            "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
+            &[HEADER, TIME],
+        )
+    }
+
+    fn encode(&self, cdr: &mut Encoder) {
+        self.header.encode(cdr);
+        cdr.strings(self.name.iter().map(String::as_str));
+        for values in [&self.position, &self.velocity, &self.effort] {
+            cdr.doubles(values);
+        }
+    }
+}
+
+/// `std_msgs/msg/String`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Text(pub String);
+
+impl Message for Text {
+    const TYPE: &'static str = "std_msgs/msg/String";
+
+    fn definition() -> String {
+        "string data\n".to_owned()
+    }
+
+    fn encode(&self, cdr: &mut Encoder) {
+        cdr.string(&self.0);
+    }
+}
+
+/// `std_msgs/msg/Float64`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Number(pub f64);
+
+impl Message for Number {
+    const TYPE: &'static str = "std_msgs/msg/Float64";
+
+    fn definition() -> String {
+        "float64 data\n".to_owned()
+    }
+
+    fn encode(&self, cdr: &mut Encoder) {
+        cdr.f64(self.0);
+    }
+}
+
+/// A place and a direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// x, y, z, m.
+    pub position: [f64; 3],
+    /// Unit quaternion, x, y, z, w.
+    pub quat_xyzw: [f64; 4],
+}
+
+impl Pose {
+    fn encode(&self, cdr: &mut Encoder) {
+        for value in self.position.iter().chain(&self.quat_xyzw) {
+            cdr.f64(*value);
+        }
+    }
+}
+
+/// `geometry_msgs/msg/TransformStamped`: the place of a child frame in its parent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TransformStamped {
+    /// When, and the parent.
+    pub header: Header,
+    /// The child.
+    pub child_frame_id: String,
+    /// Coordinates in the child to coordinates in the parent.
+    pub parent_from_child: Pose,
+}
+
+/// `tf2_msgs/msg/TFMessage`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TfMessage(pub Vec<TransformStamped>);
+
+impl Message for TfMessage {
+    const TYPE: &'static str = "tf2_msgs/msg/TFMessage";
+
+    fn definition() -> String {
+        with_types(
+            "geometry_msgs/TransformStamped[] transforms\n",
+            &[
+                (
+                    "geometry_msgs/TransformStamped",
+                    "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n",
+                ),
+                HEADER,
+                TIME,
+                (
+                    "geometry_msgs/Transform",
+                    "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
+                ),
+                VECTOR3,
+                QUATERNION,
+            ],
+        )
+    }
+
+    fn encode(&self, cdr: &mut Encoder) {
+        cdr.count(self.0.len());
+        for each in &self.0 {
+            each.header.encode(cdr);
+            cdr.string(&each.child_frame_id);
+            each.parent_from_child.encode(cdr);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joint_states_come_back_as_they_were_written() {
+        let state = JointState {
+            header: Header {
+                stamp: Stamp::of_ns(12_000_000_345),
+                frame_id: String::new(),
+            },
+            name: vec!["shoulder_pan_joint".to_owned(), "elbow_joint".to_owned()],
+            position: vec![0.1, -2.5e-300],
+            velocity: vec![f64::MIN_POSITIVE, 4.0],
+            effort: Vec::new(),
+        };
+        let back = JointState::decode("cdr", &state.to_cdr()).unwrap();
+        assert_eq!(back, state);
+        assert_eq!(
+            (back.header.stamp.sec, back.header.stamp.nanosec),
+            (12, 345)
+        );
+        assert!(JointState::decode("cdr", &state.to_cdr()[..70]).is_err());
+    }
+}

@@ -1,0 +1,73 @@
+//! Where in the voxels the body is at all, coarsely: rays skip what cannot have what they look for.
+
+/// Voxels along each side of a block.
+pub(super) const BLOCK: usize = 8;
+
+/// Of the body, or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum BodySide {
+    Outside = 1,
+    Body = 2,
+}
+
+/// Blocks of voxels, and which sides of the body each has voxels of.
+#[derive(Debug)]
+pub(super) struct Blocks {
+    pub size: [usize; 3],
+    /// Bits of [`BodySide`].
+    sides: Vec<u8>,
+    /// The side of each class.
+    side_of: [u8; 256],
+}
+
+impl Blocks {
+    /// Of a box of classes, each of which is on a side.
+    pub fn of(
+        voxels: &[u8],
+        [nx, ny, nz]: [usize; 3],
+        side: impl Fn(u8) -> BodySide,
+        threads: usize,
+    ) -> Self {
+        let size = [nx, ny, nz].map(|count| count.div_ceil(BLOCK));
+        let side_of: [u8; 256] =
+            std::array::from_fn(|class| u8::try_from(class).map_or(0, |class| side(class) as u8));
+        let layer = size[0] * size[1];
+        let mut sides = vec![0; layer * size[2]];
+        let each = size[2].div_ceil(threads.max(1)).max(1);
+        std::thread::scope(|scope| {
+            for (part, sides) in sides.chunks_mut(each * layer).enumerate() {
+                scope.spawn(move || {
+                    let from = part * each * BLOCK;
+                    let to = (from + sides.len() / layer * BLOCK).min(nz);
+                    for k in from..to {
+                        for j in 0..ny {
+                            let row = &voxels[(k * ny + j) * nx..][..nx];
+                            let at = (k - from) / BLOCK * layer + j / BLOCK * size[0];
+                            for (block, voxels) in sides[at..].iter_mut().zip(row.chunks(BLOCK)) {
+                                for &class in voxels {
+                                    *block |= side_of[usize::from(class)];
+                                }
+                            }
+                        }
+                    }
+                });
+            }
+        });
+        Self {
+            size,
+            sides,
+            side_of,
+        }
+    }
+
+    /// Whether a class is on a side.
+    #[inline]
+    pub fn is(&self, class: u8, side: BodySide) -> bool {
+        self.side_of[usize::from(class)] == side as u8
+    }
+
+    /// Whether a block has a voxel of a side.
+    pub fn has(&self, [i, j, k]: [usize; 3], side: BodySide) -> bool {
+        self.sides[(k * self.size[1] + j) * self.size[0] + i] & side as u8 != 0
+    }
+}
