@@ -109,7 +109,6 @@ fn gather(top: &Path, path: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
             gather(top, &path.join(entry?.file_name()), files)?;
         }
     } else if full.is_file() {
-        println!("cargo:rerun-if-changed={}", full.display());
         let kind = path.extension().unwrap_or_default();
         if KINDS.iter().any(|known| kind == *known) {
             files.push(path.to_owned());
@@ -122,7 +121,9 @@ fn hash(top: &Path, mut files: Vec<PathBuf>) -> io::Result<String> {
     files.sort();
     let mut all = Sha256::new();
     for file in files {
-        let content = fs::read(top.join(&file))?;
+        let full = top.join(&file);
+        println!("cargo:rerun-if-changed={}", full.display());
+        let content = fs::read(full)?;
         all.update(format!(
             "{} {}\n",
             file.to_string_lossy().replace('\\', "/"),
