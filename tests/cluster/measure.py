@@ -130,7 +130,7 @@ def main() -> None:
         if installed(False) is None:
             answer["slurm, there already"] = on_slurm(study, launch, folder / "slurm")
         if arguments.python:
-            answer["dask, there already"] = on_dask(study, arguments.python, folder)
+            answer["dask, there already"] = on_dask(study, arguments.python.absolute(), folder)
         answer["weak scaling"] = weak_scaling(program, folder / "weak")
         json.dump(answer, sys.stdout, indent=2)
         print()
