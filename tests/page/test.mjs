@@ -236,7 +236,7 @@ async function testSearch(page, judge, name) {
     pictures: document.querySelectorAll('.placements img').length, wanted: NB.current.page.pictures.length,
     winner: NB.current.answer.winner, equals: NB.current.answer.equals, fresh: NB.current.answer.figures[0].cases,
   }));
-  assert.match(found.sentence, /(interval|sure) .*on \d+ layouts that nothing was compared by/, 'the answer has no figure with an interval');
+  assert.match(found.sentence, /(interval|sure)\b.*on \d+ layouts that nothing was compared by/, 'the answer has no figure with an interval');
   assert.ok(found.sentence.includes(`${found.fresh} layouts`));
   assert.ok(!found.stray, 'something says null');
   for (const words of found.factors) assert.ok(found.figures.includes(words), `no figure of ${words}`);

@@ -1,6 +1,9 @@
 // The page of a search: where the best choice lies, how flat it is there, and what else is as good.
 'use strict';
 
+/** A number of things. */
+const counted = (number, thing) => `${number} ${thing}${number === 1 ? '' : 's'}`;
+
 NB.SearchPage = class {
   constructor(page, app) {
     this.page = page;
@@ -258,7 +261,7 @@ NB.SearchPage = class {
       NB.table('Cases by what they were for', [
         { title: 'For', cell: ([purpose]) => words[purpose] || purpose }, { title: 'Cases', numeric: true, cell: ([, cases]) => cases },
       ], [...byPurpose, ['all', log.cases]]),
-      NB.el('p', { class: 'small', text: `${log.grid_cases ? `All choices with all layouts are ${log.grid_cases} cases. ` : ''}Reach alone ruled out ${log.cases_out_of_reach} cases and ${log.ruled_out} candidates, of which no clearance was asked.` }));
+      NB.el('p', { class: 'small', text: `${log.grid_cases ? `All choices with all layouts are ${log.grid_cases} cases. ` : ''}Reach alone ruled out ${counted(log.cases_out_of_reach, 'case')} and ${counted(log.ruled_out, 'candidate')}, of which no clearance was asked.` }));
   }
 
   placements() {
