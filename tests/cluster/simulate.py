@@ -18,7 +18,8 @@ CASES_PER_WORKER = [25_000, 250_000]
 OVERHEAD_S = 0.09
 # Of the time of a shard, between shards of one study: 0.57 to 0.78 s in eight.
 SPREAD = 0.1
-# What the scheduler does for one shard, during which it does nothing for another.
+# What the scheduler does for one shard, during which it does nothing for another: Slurm's is measured, the others are
+# assumed.
 START_S = {"Slurm": 0.5, "Dask": 0.007, "local": 0.002}
 SHARDS_PER_WORKER = [1, 4, 16]
 WORKERS = [1, 10, 100, 1000]
