@@ -106,11 +106,11 @@ impl Classes {
         }
     }
 
-    /// On which side of the skin a class is. Numbers that stand for nothing are outside.
+    /// On which side of the skin a class is. What is added later is found within the body.
     pub fn side(&self, number: u8) -> BodySide {
         match self.all.get(usize::from(number)) {
-            Some(class) if class.kind != Kind::Outside => BodySide::Body,
-            _ => BodySide::Outside,
+            Some(class) if class.kind == Kind::Outside => BodySide::Outside,
+            _ => BodySide::Body,
         }
     }
 

@@ -6,7 +6,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use needlebench_cell::scenario::OddsSection;
 use needlebench_imaging::{LabelMap, VoxelGrid};
 use needlebench_routing::{
-    Anatomy, Obstacle, Ray, Route, RouteRule, RouteRules, VoxelAnatomy, VoxelOptions, apart,
+    Anatomy, Exit, Obstacle, Ray, Route, RouteRule, RouteRules, VoxelAnatomy, VoxelOptions, apart,
     evenly, pareto, refined, search,
 };
 
@@ -320,6 +320,11 @@ fn nothing_goes_through_a_marker_on_the_skin() {
 
 /// Two lungs, a vertebra between their backs, and soft tissue, in voxels of 2 mm.
 fn two_lungs(names: &[(u16, &str)]) -> LabelMap {
+    lungs_from(10, names)
+}
+
+/// The same with lungs from some row on; the skin is before row 2.
+fn lungs_from(row: usize, names: &[(u16, &str)]) -> LabelMap {
     let size = [90, 70, 10];
     let grid = VoxelGrid::aligned(size, [2e-3; 3], Point3::origin()).unwrap();
     let mut labels = vec![0_u16; grid.len()];
@@ -327,8 +332,8 @@ fn two_lungs(names: &[(u16, &str)]) -> LabelMap {
         for j in 2..68_usize {
             for i in 2..88_usize {
                 let label = match (i, j) {
-                    (10..30, 10..50) => OTHER_LUNG,
-                    (60..80, 10..50) => LUNG,
+                    (10..30, _) if (row..50).contains(&j) => OTHER_LUNG,
+                    (60..80, _) if (row..50).contains(&j) => LUNG,
                     (37..53, 35..48) => BONE,
                     _ => SOFT,
                 };
@@ -415,6 +420,45 @@ fn what_lies_between_the_lungs_is_an_organ_but_not_the_muscles_of_the_back() {
         assert!(said(&anatomy, word), "{word}");
     }
     assert!(!anatomy.knows(Obstacle::Bone));
+}
+
+#[test]
+fn what_lies_between_the_lungs_is_no_way_out_of_the_body() {
+    // From row 4 on: in the same block of voxels as the air before row 2.
+    let labels = lungs_from(
+        4,
+        &[
+            (SOFT, "soft_tissue"),
+            (LUNG, "lung_left"),
+            (OTHER_LUNG, "lung_right"),
+            (BONE, "bone"),
+        ],
+    );
+    let options = VoxelOptions {
+        lesions: &[],
+        off: &[],
+        needle_m: 0.15,
+        markers: &[],
+        outside_m: 0.05,
+        lung_vessel_m: 0.0,
+        below_rib_m: 3e-3,
+        threads: 1,
+        cancel: &GO,
+    };
+    let in_lung = Point3::new(65.0 * 2e-3, 30.0 * 2e-3, 0.01);
+    let anatomy = VoxelAnatomy::new(&labels, Vector3::zeros(), in_lung, &options).unwrap();
+    let ray = Ray {
+        target: Point3::new(45.0 * 2e-3, 20.0 * 2e-3, 0.01),
+        outwards: -Vector3::y_axis(),
+    };
+    let organ = anatomy.nearest(&ray, [0.0, 0.03], Obstacle::Organ);
+    assert_eq!(organ.unwrap().name, "mediastinum");
+    let (Exit::Skin(skin_m) | Exit::End(skin_m)) = anatomy.exit(&ray) else {
+        panic!("the ray leaves the body");
+    };
+    // Between the middles of rows 1 and 2.
+    assert!((skin_m - 18.5 * 2e-3).abs() < 1e-9, "{skin_m}");
+    assert!(anatomy.is_body_between(&ray, [0.0245, 0.030]));
 }
 
 #[test]
