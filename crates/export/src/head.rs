@@ -31,17 +31,20 @@ pub(crate) fn head(resolved: &ResolvedScenario, what: &str) -> Vec<String> {
     lines
 }
 
+/// What cannot end a line before its end.
+pub(crate) fn on_one_line(text: &str) -> String {
+    text.chars()
+        .map(|letter| if letter.is_control() { ' ' } else { letter })
+        .collect()
+}
+
 /// The lines as one comment of an XML file.
 pub(crate) fn xml_comment(lines: &[String]) -> String {
     let lines: Vec<String> = lines
         .iter()
         // A comment may not hold two hyphens, nor what no XML holds.
         .map(|line| {
-            let line: String = line
-                .chars()
-                .map(|letter| if letter.is_control() { ' ' } else { letter })
-                .collect();
-            let line = line.replace("--", "- -");
+            let line = on_one_line(line).replace("--", "- -");
             format!("  {}", line.strip_suffix('-').unwrap_or(&line))
         })
         .collect();

@@ -12,6 +12,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::file::ExportedFile;
+use crate::head::on_one_line;
 use crate::motion::Motion;
 
 /// Longest time between two points, ns.
@@ -295,13 +296,7 @@ fn head(motion: &Motion<'_>, off: &Interpolation) -> Vec<String> {
 fn comments(lines: &[String]) -> String {
     lines
         .iter()
-        .map(|line| {
-            let line: String = line
-                .chars()
-                .map(|letter| if letter.is_control() { ' ' } else { letter })
-                .collect();
-            format!("# {line}")
-        })
+        .map(|line| format!("# {}", on_one_line(line)))
         .chain([String::new()])
         .collect::<Vec<String>>()
         .join("\n")

@@ -28,6 +28,7 @@ import tempfile
 
 import numpy as np
 import yaml
+from common import JOINTS, LINKS, ROOT
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from motion_to_rerun import convert
@@ -37,7 +38,6 @@ from urscript_standin import Controller, forward, transform
 
 # Beside the interpreter that runs this.
 RERUN = pathlib.Path(sys.executable).parent / "rerun"
-ROOT = pathlib.Path(__file__).resolve().parents[3]
 
 # Scenario, goal (None: its only one), configuration (None: the recommended one). The arm that is parked low goes
 # around the patient.
@@ -59,16 +59,7 @@ PATH_M = 1e-6
 # What is measured between other places than the file's, at most twice as much.
 BETWEEN = 2.0
 
-JOINTS = [
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-]
 LABELS = [each.removesuffix("_joint") for each in JOINTS]
-LINKS = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"]
 
 worst: dict[str, float] = {}
 
@@ -184,8 +175,7 @@ def check_recording(mcap: Recording, rows: list[dict], nominal: bool) -> None:
         hold("needle tip at the end against the target (m)", np.abs((target - tip)[:3, 3]).max(), 1e-4)
     names = {each.ns for each in mcap.topics["/cell"][0][1].markers}
     assert {"planned_needle", "forearm", "tool", "guide_tube", "mount"} <= names, names
-    moving = {f"{each}_link" for each in LINKS}
-    assert {each.child_frame_id for each in mcap.topics["/tf"][0][1].transforms} == moving
+    assert {each.child_frame_id for each in mcap.topics["/tf"][0][1].transforms} == set(LINKS)
 
 
 def check_trajectory(folder: pathlib.Path, mcap: Recording):

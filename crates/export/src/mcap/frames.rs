@@ -2,21 +2,11 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use needlebench_cell::Robot;
-use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
+use needlebench_kinematics::{Joints, LINK_NAMES, Pose};
 use needlebench_ros::Stamp;
 use needlebench_ros::message::{self, Header, TfMessage, TransformStamped};
 
 use crate::motion::Motion;
-
-/// Links of a UR arm that its joints move, as ROS names them.
-pub(super) const LINKS: [&str; JOINT_COUNT] = [
-    "shoulder_link",
-    "upper_arm_link",
-    "forearm_link",
-    "wrist_1_link",
-    "wrist_2_link",
-    "wrist_3_link",
-];
 
 /// A pose as messages have it.
 pub(super) fn pose(of: &Pose) -> message::Pose {
@@ -60,7 +50,7 @@ pub(super) fn fixed(motion: &Motion<'_>) -> TfMessage {
     let mut all = vec![
         transform("world", "base_link", &arm.world_from_base_link, 0),
         transform("base_link", "base", &Robot::base_link_from_base(), 0),
-        transform(LINKS[5], "tool0", &arm.chain.wrist_3_from_flange, 0),
+        transform(LINK_NAMES[5], "tool0", &arm.chain.wrist_3_from_flange, 0),
         transform("tool0", "guide_entry", &entry, 0),
         transform("tool0", "guide_exit", &exit, 0),
         transform(
@@ -81,10 +71,12 @@ pub(super) fn fixed(motion: &Motion<'_>) -> TfMessage {
 pub(super) fn moving(motion: &Motion<'_>, q: &Joints, time_ns: u64) -> TfMessage {
     let joints = motion.real_arm.chain.joints.iter().enumerate();
     let links = joints.map(|(index, joint)| {
-        let parent = index.checked_sub(1).map_or("base_link", |at| LINKS[at]);
+        let parent = index
+            .checked_sub(1)
+            .map_or("base_link", |at| LINK_NAMES[at]);
         let turn = UnitQuaternion::from_axis_angle(&joint.axis, q[index]);
         let parent_from_link = joint.parent_from_joint * turn;
-        transform(parent, LINKS[index], &parent_from_link, time_ns)
+        transform(parent, LINK_NAMES[index], &parent_from_link, time_ns)
     });
     TfMessage(links.collect())
 }

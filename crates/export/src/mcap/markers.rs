@@ -2,9 +2,10 @@
 
 use needlebench_cell::{BodyKind, Frame};
 use needlebench_geometry::Shape;
+use needlebench_kinematics::LINK_NAMES;
 use needlebench_ros::message::{Colour, Marker, MarkerArray, MarkerShape};
 
-use super::frames::{LINKS, between, header, pose};
+use super::frames::{between, header, pose};
 use crate::motion::Motion;
 
 /// How far surfaces that are made of triangles may be inside the true ones, m.
@@ -22,7 +23,7 @@ pub(super) fn cell(motion: &Motion<'_>) -> MarkerArray {
         };
         let frame = match body.frame {
             Frame::World => "world",
-            Frame::Link(index) => LINKS[index],
+            Frame::Link(index) => LINK_NAMES[index],
         };
         for (id, solid) in (0..).zip(&body.solids) {
             all.push(Marker {

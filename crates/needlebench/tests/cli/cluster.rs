@@ -27,12 +27,6 @@ role = "choice"
 values = [790, 800]
 "#;
 
-fn bench() -> Bench {
-    let bench = Bench::with_scenario(SMALL);
-    bench.write("study.toml", STUDY);
-    bench
-}
-
 /// A task of a scheduler.
 fn task(bench: &Bench, variables: &[(&str, &str)]) -> Answer {
     let mut all = vec![];
@@ -74,7 +68,7 @@ fn status(bench: &Bench, more: &[&str]) -> Answer {
 
 #[test]
 fn shards_of_any_scheduler_are_told_apart_counted_and_merged_from_their_folder() {
-    let bench = bench();
+    let bench = Bench::with_study(STUDY);
     status(&bench, &["--missing"])
         .exits_with(2)
         .complains(["nobody says of how many", "NEEDLEBENCH_SHARDS"]);
@@ -166,7 +160,7 @@ fn shards_of_any_scheduler_are_told_apart_counted_and_merged_from_their_folder()
 
 #[test]
 fn a_folder_in_use_may_pass_and_a_wrong_one_never_does() {
-    let bench = bench();
+    let bench = Bench::with_study(STUDY);
     let of = [("PBS_ARRAY_INDEX", "2"), ("NEEDLEBENCH_SHARDS", "4")];
     task(&bench, &of).exits_with(0);
     let manifest = String::from_utf8(bench.read("shards/2/moved/study.json")).unwrap();
@@ -223,8 +217,7 @@ fn shell(bench: &Bench, line: &str) -> Answer {
 #[test]
 fn more_shards_than_a_process_may_have_files_are_merged_and_counted() {
     const SHARDS: u32 = 288;
-    let bench = Bench::with_scenario(SMALL);
-    bench.write("study.toml", STUDY.replace("samples = 48", "samples = 144"));
+    let bench = Bench::with_study(&STUDY.replace("samples = 48", "samples = 144"));
     bench
         .run(&[
             "study",
@@ -265,7 +258,7 @@ fn more_shards_than_a_process_may_have_files_are_merged_and_counted() {
 
 #[test]
 fn a_launch_is_refused_where_it_cannot_go_well_and_writes_the_same_bytes_elsewhere() {
-    let bench = bench();
+    let bench = Bench::with_study(STUDY);
     let launch = |what: &str| bench.run(&["study", "study.toml", "--launch", what]);
     launch("slurm:97")
         .exits_with(2)

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, SMALL, has_keys, workspace};
+use crate::support::{Bench, has_keys, workspace};
 
 /// 96 static cases.
 const STUDY: &str = r#"
@@ -29,13 +29,6 @@ key = "tool.mount_rotation_deg"
 values = [90, 180]
 "#;
 
-/// A bench with a study of the small scenario.
-fn bench(study: &str) -> Bench {
-    let bench = Bench::with_scenario(SMALL);
-    bench.write("study.toml", study);
-    bench
-}
-
 fn run(bench: &Bench, more: &[&str]) -> crate::support::Answer {
     let mut arguments = vec!["study", "study.toml", "--quiet"];
     arguments.extend(more);
@@ -44,7 +37,7 @@ fn run(bench: &Bench, more: &[&str]) -> crate::support::Answer {
 
 #[test]
 fn a_study_leaves_a_table_a_summary_and_a_page() {
-    let bench = bench(STUDY);
+    let bench = Bench::with_study(STUDY);
     let answer = run(&bench, &["--csv", "--junit", "junit.xml"]).exits_with(0);
     for word in ["96 cases", "Right-Up-Fold", "height"] {
         assert!(answer.stdout.contains(word), "{}", answer.stdout);
@@ -72,7 +65,7 @@ fn a_study_leaves_a_table_a_summary_and_a_page() {
 
 #[test]
 fn a_study_of_postures_says_so_everywhere_and_what_they_overstate() {
-    let bench = bench(&format!("{STUDY}[criteria]\nmin_layouts_working = 0.0\n"));
+    let bench = Bench::with_study(&format!("{STUDY}[criteria]\nmin_layouts_working = 0.0\n"));
     let answer = run(&bench, &["--junit", "junit.xml"]).exits_with(0);
     let warned = answer
         .stdout
@@ -122,7 +115,7 @@ const SCREEN: usize = 48;
 
 #[test]
 fn the_verdict_and_the_answer_come_first_on_one_screen_of_80_columns() {
-    let bench = bench(&format!(
+    let bench = Bench::with_study(&format!(
         "{STUDY}[criteria]\nmin_layouts_working = 0.0\n[requirements]\nmin_layouts_working = \"SRS-1\"\n"
     ));
     let arguments = ["study", "study.toml", "--quiet", "--no-page"];
@@ -185,7 +178,7 @@ fn named_levels_are_held_against_each_other_where_nothing_is_to_be_chosen() {
         "key = \"tool.mount_rotation_deg\"\nvalues = [90, 180]",
         "[[factors.levels]]\nname = \"plain\"\n[[factors.levels]]\nname = \"wide berth\"\nset = { \"planning.min_clearance_mm\" = 60 }",
     );
-    let bench = bench(&study.replace(
+    let bench = Bench::with_study(&study.replace(
         "key = \"phantom.position_mm[0]\"\nrange = [-20, 20]\nrelative = true",
         "key = \"phantom.head_yaw_deg\"\nrange = [-5, 5]\nrelative = true",
     ));
@@ -206,7 +199,7 @@ fn named_levels_are_held_against_each_other_where_nothing_is_to_be_chosen() {
 
 #[test]
 fn what_was_planned_for_the_gap_is_not_planned_again() {
-    let bench = bench(STUDY);
+    let bench = Bench::with_study(STUDY);
     run(&bench, &["--no-page"]).exits_with(0);
     let whole = bench.read("out/moved/summary.json");
     let kept = String::from_utf8(bench.read("out/moved/replanned.txt")).unwrap();
@@ -222,7 +215,7 @@ fn what_was_planned_for_the_gap_is_not_planned_again() {
 
 #[test]
 fn a_case_alone_has_the_numbers_of_its_rows() {
-    let bench = bench(STUDY);
+    let bench = Bench::with_study(STUDY);
     run(&bench, &["--csv", "--no-page"]).exits_with(0);
     let table = String::from_utf8(bench.read("out/moved/results.csv")).unwrap();
     let mut lines = table.lines();
@@ -263,7 +256,7 @@ fn a_case_alone_has_the_numbers_of_its_rows() {
 
 #[test]
 fn shards_on_any_number_of_threads_merge_into_the_same_bytes() {
-    let bench = bench(STUDY);
+    let bench = Bench::with_study(STUDY);
     run(&bench, &["--jobs", "2"]).exits_with(0);
     let whole: Vec<Vec<u8>> = ["results.parquet", "summary.json", "report.html"]
         .map(|file| bench.read(&format!("out/moved/{file}")))
@@ -299,7 +292,7 @@ fn shards_on_any_number_of_threads_merge_into_the_same_bytes() {
 
 #[test]
 fn results_do_not_depend_on_how_the_study_was_called() {
-    let bench = bench(STUDY);
+    let bench = Bench::with_study(STUDY);
     let absolute = bench.path("study.toml").display().to_string();
     let all = ["--quiet", "--csv", "--out"];
     bench
@@ -326,7 +319,7 @@ fn results_do_not_depend_on_how_the_study_was_called() {
 
 #[test]
 fn a_folder_with_results_is_neither_overwritten_nor_mixed() {
-    let bench = bench(STUDY);
+    let bench = Bench::with_study(STUDY);
     run(&bench, &["--no-page"]).exits_with(0);
     let table = bench.read("out/moved/results.parquet");
     run(&bench, &[]).exits_with(2).complains(["--resume"]);
@@ -376,14 +369,14 @@ fn what_a_study_cannot_be_is_refused_at_its_line() {
             ["study.toml:4", "dynamik", "dynamic"],
         ),
     ] {
-        let bench = bench(&STUDY.replacen(edit.0, edit.1, 1));
+        let bench = Bench::with_study(&STUDY.replacen(edit.0, edit.1, 1));
         run(&bench, &[]).exits_with(2).complains(parts);
     }
 }
 
 #[test]
 fn a_study_that_takes_long_says_how_long_and_asks() {
-    let bench = bench(&STUDY.replace("samples = 16", "samples = 1000000000"));
+    let bench = Bench::with_study(&STUDY.replace("samples = 16", "samples = 1000000000"));
     run(&bench, &[])
         .exits_with(2)
         .complains(["6000000000 cases", "will take about", "--yes"]);
@@ -394,7 +387,7 @@ fn a_study_that_takes_long_says_how_long_and_asks() {
 
 #[test]
 fn a_missed_criterion_of_a_study_is_a_failure() {
-    let bench = bench(&format!(
+    let bench = Bench::with_study(&format!(
         "{STUDY}[criteria]\nmin_layouts_working = 1.0\nmin_clearance_mm = {{ at_least = 500 }}\n"
     ));
     let answer = run(&bench, &["--junit", "junit.xml", "--json", "--no-page"]).exits_with(1);
@@ -408,7 +401,7 @@ fn a_missed_criterion_of_a_study_is_a_failure() {
 
 #[test]
 fn a_case_is_run_with_everything_that_a_run_leaves() {
-    let bench = bench(STUDY);
+    let bench = Bench::with_study(STUDY);
     run(&bench, &["--case", "7", "--run", "--engine-free"]).exits_with(2);
     let study = STUDY.replace(
         "mode = \"static\"",

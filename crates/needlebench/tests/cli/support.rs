@@ -91,6 +91,13 @@ impl Bench {
         bench
     }
 
+    /// With a study `study.toml` of the small scenario.
+    pub fn with_study(text: &str) -> Self {
+        let bench = Self::with_scenario(SMALL);
+        bench.write("study.toml", text);
+        bench
+    }
+
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }

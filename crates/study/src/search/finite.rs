@@ -15,6 +15,17 @@ pub(super) struct Round {
     pub keep: usize,
 }
 
+impl Round {
+    /// The last one has all circumstances.
+    pub fn purpose(self, plan: &SearchPlan) -> Purpose {
+        if self.circumstances == plan.samples {
+            Purpose::Final
+        } else {
+            Purpose::Halving
+        }
+    }
+}
+
 /// Rounds of halving from so many circumstances on, and their cases at most.
 pub(super) fn rounds(
     candidates: usize,
@@ -71,7 +82,7 @@ pub(super) fn search<J: Judge>(
     choices: &Choices,
 ) -> Result<Found, SearchError<J::Stop>> {
     let count = listed(choices)?;
-    let rounds = planned(pool.plan, count)?;
+    let rounds = planned_for(pool.plan, count)?;
     let all: Vec<usize> = (0..count)
         .map(|combination| pool.add(choices.candidate(combination, &[])))
         .collect();
@@ -79,14 +90,31 @@ pub(super) fn search<J: Judge>(
 }
 
 pub(super) fn check<S>(plan: &SearchPlan, choices: &Choices) -> Result<(), SearchError<S>> {
-    planned(plan, listed(choices)?).map(|_| ())
+    planned_for(plan, listed(choices)?).map(|_| ())
 }
 
-fn planned<S>(plan: &SearchPlan, count: usize) -> Result<Vec<Round>, SearchError<S>> {
-    affordable(count, plan, FINALISTS, plan.fresh).map_err(|least| SearchError::Budget {
+fn planned_for<S>(plan: &SearchPlan, count: usize) -> Result<Vec<Round>, SearchError<S>> {
+    planned(
+        count,
+        plan,
+        FINALISTS,
+        plan.fresh,
+        format!("{count} candidates"),
+    )
+}
+
+/// [`affordable`] rounds, or an error that says what the budget has no room for.
+pub(super) fn planned<S>(
+    candidates: usize,
+    plan: &SearchPlan,
+    finalists: usize,
+    reserved: u64,
+    what: String,
+) -> Result<Vec<Round>, SearchError<S>> {
+    affordable(candidates, plan, finalists, reserved).map_err(|least| SearchError::Budget {
         budget: plan.budget,
         least,
-        what: format!("{count} candidates"),
+        what,
     })
 }
 
@@ -111,13 +139,9 @@ pub(super) fn race<J: Judge>(
     // Bonferroni over the looks, which are few.
     let alpha = ALPHA / rounds.len() as f64;
     let mut undecided = Vec::new();
-    for (index, round) in rounds.iter().enumerate() {
-        let is_last = index + 1 == rounds.len();
-        let purpose = if is_last {
-            Purpose::Final
-        } else {
-            Purpose::Halving
-        };
+    for round in rounds {
+        let purpose = round.purpose(pool.plan);
+        let is_last = purpose == Purpose::Final;
         let circumstances = round.circumstances;
         let keep = if is_last { 1 } else { round.keep };
         let best = pool.best(&alive, circumstances, keep, purpose)?;

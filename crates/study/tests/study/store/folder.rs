@@ -1,6 +1,6 @@
 //! Folders of synthetic studies.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
@@ -55,6 +55,22 @@ impl Request<'_> {
         });
         (end, lines.into_inner().unwrap())
     }
+}
+
+/// A shard of a synthetic study where `--out DIR/K` has it.
+pub fn nested_shard(
+    place: &Path,
+    [part, parts]: [u32; 2],
+    cases: u64,
+    block_cases: u32,
+) -> PathBuf {
+    let folder = place.join(part.to_string()).join("synthetic");
+    let request = Request {
+        shard: Shard::new(part, parts),
+        ..Request::new(cases, block_cases)
+    };
+    request.run(&folder).unwrap();
+    folder
 }
 
 /// Bytes of a folder's tables; the CSV is made here.

@@ -9,7 +9,7 @@ use needlebench_study::{
     RESULTS_FILE, RunEnd, Shard, StudyError, merge,
 };
 
-use super::folder::{Request, files, tables};
+use super::folder::{Request, files, nested_shard, tables};
 use super::synthetic::SyntheticEvaluator;
 
 const CASES: u64 = 100;
@@ -162,17 +162,6 @@ fn a_shard_that_is_being_written_is_not_merged() {
     );
 }
 
-/// As `--out DIR/K` makes them.
-fn nested_shard(place: &Path, part: u32, parts: u32) -> PathBuf {
-    let folder = place.join(part.to_string()).join("synthetic");
-    let request = Request {
-        shard: Shard::new(part, parts),
-        ..Request::new(CASES, BLOCK)
-    };
-    request.run(&folder).unwrap();
-    folder
-}
-
 #[test]
 fn shards_are_found_below_a_folder_and_results_beside_them_are_none() {
     let place = tempfile::tempdir().unwrap();
@@ -182,7 +171,7 @@ fn shards_are_found_below_a_folder_and_results_beside_them_are_none() {
     let out = place.join("synthetic");
     let shards = out.join("shards");
     for part in 1..=12 {
-        nested_shard(&shards, part, 12);
+        nested_shard(&shards, [part, 12], CASES, BLOCK);
     }
     // Twelve of thirteen blocks, the last of which has another's.
     for given in [
@@ -198,7 +187,7 @@ fn shards_are_found_below_a_folder_and_results_beside_them_are_none() {
     }
     // One of another study, which has another name, is left out and said.
     let other = shards.join("3/other");
-    let copied = nested_shard(&place.join("elsewhere"), 3, 12);
+    let copied = nested_shard(&place.join("elsewhere"), [3, 12], CASES, BLOCK);
     std::fs::rename(copied, &other).unwrap();
     let manifest = other.join(MANIFEST_FILE);
     let text = std::fs::read_to_string(&manifest).unwrap();

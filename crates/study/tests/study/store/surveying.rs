@@ -9,20 +9,14 @@ use needlebench_study::{
     StudyRun, Survey, survey,
 };
 
-use super::folder::Request;
+use super::folder::{Request, nested_shard};
 use super::synthetic::{SyntheticDesign, SyntheticEvaluator};
 
 const CASES: u64 = 100;
 const BLOCK: u32 = 8;
 
 fn shard(place: &Path, part: u32, parts: u32) -> PathBuf {
-    let folder = place.join(part.to_string()).join("synthetic");
-    let request = Request {
-        shard: Shard::new(part, parts),
-        ..Request::new(CASES, BLOCK)
-    };
-    request.run(&folder).unwrap();
-    folder
+    nested_shard(place, [part, parts], CASES, BLOCK)
 }
 
 fn surveyed(place: &Path, parts: Option<u32>) -> Survey {
