@@ -94,13 +94,13 @@ fn of_published(crate_folder: &Path) -> io::Result<String> {
 
 /// The files under a path, but for tests and what is no text of ours.
 fn gather(top: &Path, path: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
-    const TESTS: [&str; 2] = ["tests", "tests.rs"];
-    const KINDS: [&str; 4] = ["rs", "toml", "py", "txt"];
+    const LEFT_OUT: [&str; 3] = ["tests", "tests.rs", "__pycache__"];
+    const KINDS: [&str; 5] = ["rs", "toml", "py", "txt", "lock"];
     let full = top.join(path);
-    if path
-        .file_name()
-        .is_some_and(|name| TESTS.iter().any(|test| name == *test))
-    {
+    // Nor what tools leave behind.
+    if path.file_name().is_some_and(|name| {
+        LEFT_OUT.iter().any(|each| name == *each) || name.to_string_lossy().starts_with('.')
+    }) {
         return Ok(());
     }
     if full.is_dir() {

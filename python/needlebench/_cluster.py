@@ -170,20 +170,21 @@ def compute_shard(file: str, shard: int, shards: int, out: str, stop: str, argum
     Path(out).mkdir(parents=True, exist_ok=True)
     running = Path(out) / RUNNING
     status, said = 3, ""
-    for attempt in range(RESTARTS + 1):
-        if Path(stop).exists():
-            raise InterruptedShard(f"shard {shard}/{shards}: asked to stop")
-        running.touch()
-        try:
+    # Between attempts, too: whoever asks it to stop waits until it has seen that.
+    running.touch()
+    try:
+        for attempt in range(RESTARTS + 1):
+            if Path(stop).exists():
+                raise InterruptedShard(f"shard {shard}/{shards}: asked to stop")
             status, said = _watched(command_line, Path(stop))
-        finally:
-            running.unlink(missing_ok=True)
-        if status == 0:
-            return status
-        if status == 2:
-            raise InputError(said)
-        # The folder of a worker that has died is in use until its process has seen that.
-        time.sleep(0.0 if Path(stop).exists() else min(2.0**attempt, 10.0))
+            if status == 0:
+                return status
+            if status == 2:
+                raise InputError(said)
+            # The folder of a worker that has died is in use until its process has seen that.
+            time.sleep(0.0 if Path(stop).exists() else min(2.0**attempt, 10.0))
+    finally:
+        running.unlink(missing_ok=True)
     raise EnvironmentFailed(said or f"shard {shard}/{shards} ended with {status}")
 
 

@@ -100,7 +100,8 @@ def command(
     if interrupted is not None:
         raise with_result(interrupted, answer)
     if status == InputError.status:
-        raise InputError(messages.strip(), findings)
+        # A document may have what is wrong, and nothing stands beside it.
+        raise InputError(messages.strip() or output.strip(), findings)
     if status == EnvironmentFailed.status:
         raise EnvironmentFailed(messages.strip(), answer if output else None)
     return answer

@@ -70,12 +70,22 @@ compare() {
     for word in "${words[@]}"; do losses+=(--max-loss "$word"); done
     for folder in "$out"/*/; do
         name=$(basename "$folder")
-        [ -f "$INPUT_BASELINE/$name/report.json" ] && [ -f "$folder/report.json" ] || continue
+        [ -f "$folder/report.json" ] || continue
+        if [ ! -f "$INPUT_BASELINE/$name/report.json" ]; then
+            # Of a whole new baseline one line is enough.
+            [ ! -d "$INPUT_BASELINE" ] || printf '::warning::%s has no baseline: not compared\n' "$name"
+            continue
+        fi
         found=1 status=0
         needlebench compare "${losses[@]}" --junit "$folder/compare.xml" --markdown "$folder/compare.md" -- \
             "$INPUT_BASELINE/$name" "$folder" || status=$?
         [ ! -f "$folder/compare.md" ] || cat "$folder/compare.md" >> "${GITHUB_STEP_SUMMARY:-/dev/null}"
         [ "$status" -le "$worst" ] || worst=$status
+    done
+    for folder in "$INPUT_BASELINE"/*/; do
+        name=$(basename "$folder")
+        [ ! -f "$folder/report.json" ] || [ -f "$out/$name/report.json" ] ||
+            printf '::warning::%s of the baseline was not run: not compared\n' "$name"
     done
     # The first run has nothing to compare with; a baseline of other scenarios is a mistake.
     if [ "$found" = 0 ]; then

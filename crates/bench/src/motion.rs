@@ -1,5 +1,7 @@
 //! One motion that works: of a goal in a configuration, as a run of that goal has it.
 
+use std::fmt::Write as _;
+
 use needlebench_cell::scenario::EngineName;
 use needlebench_cell::{Finding, Goal, ResolvedScenario, rule_in_words};
 use needlebench_evaluation::report::{ConfigurationReport, Report, Status};
@@ -219,6 +221,12 @@ fn why_not(report: &Report, configuration: &ConfigurationReport) -> String {
         .find(|each| !each.pass && each.label.as_deref() == Some(configuration.label));
     missed.map_or_else(
         || "it misses a criterion of the scenario".to_owned(),
-        |each| format!("it misses {}: {}", each.criterion, each.detail),
+        |each| {
+            let mut words = format!("it misses {}", each.criterion);
+            if !each.detail.is_empty() {
+                let _ = write!(words, ": {}", each.detail);
+            }
+            words
+        },
     )
 }

@@ -82,7 +82,7 @@ pub fn gltf(
     {
         extras["goal"] = json!(resolved.goals[*goal].name);
         extras["configuration"] = json!(configuration.label());
-        extras["works"] = json!(posed.broken_rules.is_empty() && posed.motion.is_some());
+        extras["planned"] = json!(posed.broken_rules.is_empty() && posed.motion.is_some());
         extras["broken_rules"] = json!(posed.broken_rules);
     }
     Ok(vec![ExportedFile {

@@ -98,6 +98,8 @@ fn metadata(motion: &Motion<'_>) -> BTreeMap<String, String> {
         },
     );
     all.insert("planning_rules".to_owned(), rules);
+    // `failed` where it keeps the rules but misses a criterion.
+    all.insert("status".to_owned(), motion.status.name().to_owned());
     all.insert(
         "effort".to_owned(),
         "joint torque in N m, gravity included".to_owned(),

@@ -6,6 +6,7 @@ use needlebench_bench::provenance::PROGRAM_VERSION;
 use needlebench_bench::{RealArm, ScenarioRun};
 use needlebench_cell::{ClearanceClass, Goal, ResolvedScenario, pair_in_words};
 use needlebench_clearance::MotionCertificate;
+use needlebench_evaluation::report::Status;
 use needlebench_kinematics::ik::Configuration;
 use needlebench_kinematics::trajectory::JointTrajectory;
 use needlebench_kinematics::{JOINT_COUNT, Joints, Pose};
@@ -22,6 +23,8 @@ pub struct Motion<'a> {
     pub configuration: Configuration,
     /// As planned.
     pub trajectory: &'a JointTrajectory,
+    /// What the run says of it.
+    pub status: Status,
     /// Rules that it breaks, the first failing one first: what runs simulate of configurations that do not work.
     pub rejections: &'a [Rejection],
     /// What is proven of its clearances; none where nothing is.
@@ -40,6 +43,7 @@ impl<'a> Motion<'a> {
             goal: working.goal(),
             configuration: working.plan().configuration,
             trajectory: working.trajectory(),
+            status: Status::Ok,
             rejections: &working.plan().rejections,
             certificate: working.plan().certificate.as_ref(),
             recorded: working.recorded(),
@@ -60,6 +64,7 @@ impl<'a> Motion<'a> {
             goal: &resolved.goals[goal],
             configuration: plan.configuration,
             trajectory: plan.trajectory.as_ref()?,
+            status: finished.report.goals[goal].configurations[configuration].status,
             rejections: &plan.rejections,
             certificate: plan.certificate.as_ref(),
             recorded,

@@ -678,8 +678,8 @@ async fn plan(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer
 async fn simulate(State(app): Shared, body: Result<Bytes, BytesRejection>) -> Answer {
     let question: PlanQuestion = read(body)?;
     let engine = question.engine.unwrap_or(Engine::Rapier);
-    let (path, _) = written(&app, question).await?;
-    let progress = app.simulation.start(&path, engine)?;
+    let (path, left_out) = written(&app, question).await?;
+    let progress = app.simulation.start(&path, left_out, engine)?;
     let cookie = format!(
         "{COOKIE}={}; HttpOnly; SameSite=Strict; Path=/results",
         app.results.text()

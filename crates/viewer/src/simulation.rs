@@ -22,6 +22,8 @@ pub struct Progress {
     pub state: State,
     /// File of the plan.
     pub plan: Option<String>,
+    /// Goals that the plan is without: no entry was chosen there, and nothing is said of them.
+    pub left_out: Vec<String>,
     /// What it does now, or what it said last.
     pub message: String,
     /// Exit status: 0 all criteria met, 1 one is not, 2 bad input, 3 the environment failed.
@@ -76,7 +78,12 @@ impl Simulation {
     ///
     /// # Errors
     /// One that runs already; a program that does not start.
-    pub fn start(&self, plan: &Path, engine: Engine) -> Result<Progress, Problem> {
+    pub fn start(
+        &self,
+        plan: &Path,
+        left_out: Vec<String>,
+        engine: Engine,
+    ) -> Result<Progress, Problem> {
         let mut inner = self.lock();
         if inner.progress.state == State::Running {
             return Err(
@@ -109,6 +116,7 @@ impl Simulation {
             plan: plan
                 .file_name()
                 .map(|name| name.to_string_lossy().into_owned()),
+            left_out,
             message: "starting".to_owned(),
             ..Progress::default()
         };

@@ -485,7 +485,7 @@ fn a_folder_is_shown_once_at_a_time() {
     server().unwrap();
 }
 
-/// What the mean over 6 mm about the skin changes by where voxels of 4 mm and the surface made of them differ by half of one.
+/// What the normal within 12 mm of the skin changes by where voxels of 4 mm and the surface made of them differ by half of one.
 const SAME_ANGLE_RAD: f64 = 0.05;
 
 #[test]

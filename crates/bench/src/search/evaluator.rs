@@ -19,7 +19,8 @@ impl CaseEvaluator for GenerationEvaluator<'_> {
     fn worker(&self) -> Result<Box<dyn CaseWorker + '_>, String> {
         Ok(Box::new(Worker {
             of: self,
-            postures: StaticWorker::counting(counted_classes(&self.search.study)),
+            postures: StaticWorker::counting(counted_classes(&self.search.study))
+                .expecting_tip(self.search.expects_tip()),
             scan: LastScan::default(),
         }))
     }

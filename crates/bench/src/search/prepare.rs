@@ -1,7 +1,7 @@
 //! From a study to what is searched.
 
-use needlebench_cell::study::search::SearchSection;
-use needlebench_cell::study::{ResolvedStudy, StudyMode};
+use needlebench_cell::study::search::{ObjectiveName, SearchSection};
+use needlebench_cell::study::{FactorValues, ResolvedStudy, StudyMode};
 use needlebench_cell::{Finding, sha256_hex};
 use needlebench_study::search::{
     Candidate, Generation, GenerationDesign, Objective, SearchError, SearchPlan, SearchSpace,
@@ -13,6 +13,8 @@ use serde_json::json;
 use crate::provenance::{SOURCE_SHA256, arithmetic};
 use crate::study::{Identity, StudyColumns};
 
+/// Layouts that candidates may be compared by; fewer tell nothing apart.
+const SAMPLES_RANGE: std::ops::RangeInclusive<u64> = 16..=1_000_000;
 /// Layouts of the last candidates where nothing says how many.
 const SAMPLES: u64 = 128;
 /// Cases of a search of ranges where nothing says how many.
@@ -50,6 +52,30 @@ impl PreparedSearch {
             .samples
             .or(study.file.sampling.samples)
             .unwrap_or(SAMPLES);
+        if !SAMPLES_RANGE.contains(&samples) {
+            let message = format!(
+                "samples is {samples} layouts, but a search compares candidates by {} to {}",
+                SAMPLES_RANGE.start(),
+                SAMPLES_RANGE.end()
+            );
+            return Err(vec![
+                Finding::new(&study.source.file, message)
+                    .key("sampling.samples")
+                    .hint(
+                        "fewer tell nothing apart; `samples` under [search] is for a search alone",
+                    ),
+            ]);
+        }
+        if expects_tip(&section) && !has_imperfections(&study) {
+            return Err(vec![
+                Finding::new(
+                    &study.source.file,
+                    "`tip_error` is expected over real arms and patients, of which this scenario says too little",
+                )
+                .key("search.objective")
+                .hint("say them in [imperfections] of the scenario, or search by `margin` or `rate`"),
+            ]);
+        }
         let space = SearchSpace::new(&study, samples)
             .map_err(|error| vec![space_finding(&study, &error)])?;
         let named = |name| Objective::named(name, section.quantile, section.failure_counts_mm);
@@ -84,6 +110,11 @@ impl PreparedSearch {
             identity,
             columns,
         })
+    }
+
+    /// Whether the expected error of the tip is an objective.
+    pub fn expects_tip(&self) -> bool {
+        expects_tip(&self.section)
     }
 
     /// Cases of all choices with all layouts; none of choices with ranges.
@@ -171,6 +202,23 @@ impl PreparedSearch {
     }
 }
 
+fn expects_tip(section: &SearchSection) -> bool {
+    let second = section.second_objective;
+    section.objective == ObjectiveName::TipError || second == Some(ObjectiveName::TipError)
+}
+
+/// Whether there is an arm and a patient to expect an error of, in the scenario or by a factor.
+fn has_imperfections(study: &ResolvedStudy) -> bool {
+    study.family.base().expected.is_some()
+        || study.factors.iter().any(|factor| match &factor.values {
+            FactorValues::Continuum { .. } => false,
+            FactorValues::Levels(levels) => levels
+                .iter()
+                .flat_map(|level| &level.changes)
+                .any(|(key, _)| key.to_string().starts_with("imperfections")),
+        })
+}
+
 fn grid_cases(space: &SearchSpace, samples: u64) -> Option<u64> {
     if space.choices().dimensions() > 0 {
         return None;
@@ -192,6 +240,7 @@ fn space_finding(study: &ResolvedStudy, error: &SpaceError) -> Finding {
         SpaceError::Drawn { .. } => {
             finding.hint("`range = [from, to]` has all between two ends, `grid` some of them")
         }
+        SpaceError::TooManyRanges { .. } => finding.hint("`values` for those that matter least"),
         SpaceError::TooManyDimensions { .. } => finding
             .key("sampling.method")
             .hint("`method = \"latin-hypercube\"` has no limit"),

@@ -39,11 +39,12 @@ struct Real {
 }
 
 impl<'a> Prediction<'a> {
-    /// Draws the layout's imperfections, if it has any.
+    /// Draws the layout's imperfections, if it has any; the expected error of the tip is computed if it is asked for
+    /// here or by a criterion.
     ///
     /// # Errors
     /// The key at fault.
-    pub fn new(resolved: &'a ResolvedScenario) -> Result<Self, &'static str> {
+    pub fn new(resolved: &'a ResolvedScenario, expects_tip: bool) -> Result<Self, &'static str> {
         let real = drawn_truth(resolved)
             .map(|truth| {
                 let truth = truth.map_err(|_| "imperfections.registration.markers_mm")?;
@@ -55,7 +56,9 @@ impl<'a> Prediction<'a> {
             })
             .transpose()?;
         let criteria = &resolved.scenario.criteria;
-        let asked = criteria.max_tip_rms_mm.is_some() || criteria.max_tip_lateral_rms_mm.is_some();
+        let asked = expects_tip
+            || criteria.max_tip_rms_mm.is_some()
+            || criteria.max_tip_lateral_rms_mm.is_some();
         let expected = resolved.expected.as_ref().filter(|_| asked);
         Ok(Self {
             resolved,

@@ -96,11 +96,14 @@ impl PreparedStudy {
 
     /// How numbers are rounded in its cases. MuJoCo takes its elementary functions from the C library and from NumPy,
     /// which pick them by the CPU: what they look at is said, so that shards of unlike machines are told apart.
+    /// Whether MuJoCo runs any case.
+    pub fn needs_mujoco(&self) -> bool {
+        self.modes().contains(&StudyMode::Dynamic) && engines(&self.study).contains(&MUJOCO)
+    }
+
     fn arithmetic(&self) -> String {
         let common = arithmetic();
-        let in_mujoco =
-            self.modes().contains(&StudyMode::Dynamic) && engines(&self.study).contains(&MUJOCO);
-        if in_mujoco {
+        if self.needs_mujoco() {
             format!("{common}; MuJoCo on {}", cpu())
         } else {
             common

@@ -43,6 +43,8 @@ pub struct StaticWorker {
     kinematics: Option<Kinematics>,
     /// Classes that count in margins.
     counted: CountedClasses,
+    /// Whether the expected error of the tip is wanted without a criterion, too.
+    expects_tip: bool,
 }
 
 /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
@@ -78,6 +80,14 @@ impl StaticWorker {
         }
     }
 
+    /// Computes the expected error of the tip without a criterion, too.
+    pub fn expecting_tip(self, expects_tip: bool) -> Self {
+        Self {
+            expects_tip,
+            ..self
+        }
+    }
+
     /// The eight rows of one layout; `resolved` has one goal, or its first one counts.
     pub fn rows(&mut self, resolved: &ResolvedScenario) -> [CaseRow; 8] {
         let counted = self.counted;
@@ -100,19 +110,9 @@ impl StaticWorker {
 
     /// One of [`StaticWorker::rows`].
     pub fn row(&mut self, resolved: &ResolvedScenario, configuration: Configuration) -> CaseRow {
-        let counted = self.counted;
-        self.evaluate(resolved, |planner, prediction, route_m| {
-            let member = planner.posture(&resolved.goals[0], configuration);
-            row(
-                planner,
-                prediction,
-                configuration,
-                &member,
-                route_m,
-                counted,
-            )
+        self.row_of(resolved, configuration, |planner| {
+            planner.posture(&resolved.goals[0], configuration)
         })
-        .unwrap_or_else(|key| CaseRow::new(configuration, StudyMode::Static, Outcome::Invalid, key))
     }
 
     /// One of [`StaticWorker::rows`] if the guide stood at a roll that others than the planner chose.
@@ -122,12 +122,22 @@ impl StaticWorker {
         configuration: Configuration,
         roll_rad: f64,
     ) -> CaseRow {
+        self.row_of(resolved, configuration, |planner| {
+            let goal = &resolved.goals[0];
+            let member = planner.member_at(goal, configuration, roll_rad);
+            member.on_route(route_rejection(resolved, goal).as_ref())
+        })
+    }
+
+    fn row_of(
+        &mut self,
+        resolved: &ResolvedScenario,
+        configuration: Configuration,
+        member: impl Fn(&Planner<'_>) -> Member,
+    ) -> CaseRow {
         let counted = self.counted;
         self.evaluate(resolved, |planner, prediction, route_m| {
-            let goal = &resolved.goals[0];
-            let route = route_rejection(resolved, goal);
-            let member = planner.member_at(goal, configuration, roll_rad);
-            let member = member.on_route(route.as_ref());
+            let member = member(planner);
             row(
                 planner,
                 prediction,
@@ -167,7 +177,7 @@ impl StaticWorker {
             return Err("goals");
         }
         let route_m = route_m(resolved);
-        let prediction = Prediction::new(resolved)?;
+        let prediction = Prediction::new(resolved, self.expects_tip)?;
         let known = self.kinematics.take();
         let model = self.model(resolved);
         let planner = match known {

@@ -112,7 +112,7 @@ fn a_motion_is_an_animation_from_the_start_to_the_posture() {
     };
     let files = gltf(&resolved, "cell", &shown).unwrap();
     let (scene, _) = read(&files[0].bytes);
-    assert_eq!(scene["asset"]["extras"]["works"], true);
+    assert_eq!(scene["asset"]["extras"]["planned"], true);
     let animation = &scene["animations"][0];
     assert_eq!(animation["channels"].as_array().unwrap().len(), 6);
     // The flange is where the goal wants it.

@@ -16,6 +16,7 @@ use super::{load_checked, overrides, print_json, print_text};
 
 use crate::exit::ExitStatus;
 use crate::findings::print_findings;
+use crate::host::take_findings;
 
 #[derive(Debug, Args)]
 pub(crate) struct CheckArguments {
@@ -80,6 +81,7 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
     }
     let ok = findings.is_empty();
     if arguments.json {
+        take_findings(&findings);
         print_json(&CheckAnswer {
             schema_version: 1,
             ok,

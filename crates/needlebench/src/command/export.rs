@@ -237,8 +237,19 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus> {
             return refuse(Finding::new(&resolved.source.file, error.to_string()));
         }
     };
-    if let Some(first) = files.first_mut() {
+    if let Some((first, others)) = files.split_first_mut() {
         first.name = format!("{stem}{extension}");
+        if others.iter().any(|other| other.name == first.name) {
+            let message = format!(
+                "the export writes another file beside it of the name {}",
+                first.name
+            );
+            return refuse(
+                Finding::new(&resolved.source.file, message)
+                    .key("--out")
+                    .hint("choose another extension, such as the format's own"),
+            );
+        }
     }
     finish(arguments, &resolved, &folder, &files)
 }

@@ -10,8 +10,8 @@ use needlebench_study::search::{
     CaseWorth, Generation, GenerationDesign, Judge, SearchError, SearchLog, search as search_for,
 };
 use needlebench_study::{
-    FactorValue, MANIFEST_FILE, Manifest, ParquetResults, Results as _, RunEnd, Shard, Status,
-    StudyError, StudyRun, merge,
+    FactorValue, Manifest, ParquetResults, Results as _, RunEnd, Shard, Status, StudyError,
+    StudyRun, merge,
 };
 
 use super::run::prepare_folder;
@@ -117,6 +117,7 @@ pub(crate) fn search(arguments: &SearchArguments) -> Result<ExitStatus> {
         threads: threads(arguments.jobs),
         cancel: &cancel,
         progress: &progress,
+        has_computed: false,
     };
     let found = search_for(&prepared.plan, prepared.space.choices(), &mut judge);
     progress.finish();
@@ -147,6 +148,7 @@ struct GenerationJudge<'a> {
     threads: usize,
     cancel: &'a AtomicBool,
     progress: &'a TerminalProgress,
+    has_computed: bool,
 }
 
 /// Why a search ends early.
@@ -158,6 +160,11 @@ enum Stop {
         shard: Shard,
         cases: u64,
         folder: PathBuf,
+    },
+    /// A generation has fewer parts than processes.
+    NoPart {
+        generation: u32,
+        parts: u32,
     },
     Study(StudyError),
     Files(FilesError),
@@ -183,6 +190,12 @@ impl Stop {
                     "{cases} cases of generation {generation}, part {shard}, are in {}; once all parts are \
                      there, `needlebench search --resume` joins them and goes on",
                     shown(&folder)
+                ))?;
+                Ok(ExitStatus::Success)
+            }
+            Self::NoPart { generation, parts } => {
+                print_text(&format!(
+                    "generation {generation} is so small that it has {parts} parts: nothing to do for this one"
                 ))?;
                 Ok(ExitStatus::Success)
             }
@@ -290,12 +303,7 @@ impl GenerationJudge<'_> {
 
     fn is_complete(&self, generation: u32) -> Result<bool, Stop> {
         let path = self.path(generation);
-        let found = path
-            .join(MANIFEST_FILE)
-            .exists()
-            .then(|| Manifest::read(&path));
-        let found = found.transpose()?.flatten();
-        Ok(found.is_some_and(|manifest| manifest.status == Status::Complete))
+        Ok(Manifest::read(&path)?.is_some_and(|manifest| manifest.status == Status::Complete))
     }
 }
 
@@ -310,16 +318,27 @@ impl Judge for GenerationJudge<'_> {
         let number = generation.number;
         if !self.is_complete(number)? {
             if let Some(shard) = self.shard {
-                self.compute(generation, Some(shard))?;
-                let cases = self.search.manifest(generation, Some(shard)).own_cases();
+                // A generation of fewer blocks than parts is for the first ones.
+                let blocks = self.search.manifest(generation, None).blocks();
+                let parts =
+                    u32::try_from(blocks).map_or(shard.parts(), |all| all.min(shard.parts()));
+                let Some(own) = Shard::new(shard.part(), parts) else {
+                    return Err(Stop::NoPart {
+                        generation: number,
+                        parts,
+                    });
+                };
+                self.compute(generation, Some(own))?;
+                let cases = self.search.manifest(generation, Some(own)).own_cases();
                 return Err(Stop::Part {
                     generation: number,
-                    shard,
+                    shard: own,
                     cases,
-                    folder: self.part(number, shard),
+                    folder: self.part(number, own),
                 });
             }
             self.join(generation)?;
+            self.has_computed = true;
         }
         // Of a complete one this checks that it is of this search, and sound.
         self.compute(generation, None)?;
@@ -342,6 +361,10 @@ impl Judge for GenerationJudge<'_> {
     }
 
     fn note(&mut self, log: &SearchLog) -> Result<(), Stop> {
+        // What is only read again stands in the file already, perhaps with its answer.
+        if !self.has_computed {
+            return Ok(());
+        }
         write_search_log(self.search, log, self.folder).map_err(Stop::Files)
     }
 }

@@ -58,6 +58,13 @@ fn a_file_can_be_named_and_what_belongs_to_it_is_beside_it() {
     for name in ["robot.xacro", "robot.srdf", "robot_meshes/package.xml"] {
         assert!(tree.contains(&name.into()), "{tree:?}");
     }
+    // Where its name is that of another file of the same export.
+    let words = ["export", "s.toml", "--as", "urdf", "--out", "c/robot.srdf"];
+    bench
+        .run(&words)
+        .exits_with(2)
+        .complains(["robot.srdf", "--out", "hint: "]);
+    assert!(!bench.path("c/robot.srdf").exists());
 }
 
 #[test]

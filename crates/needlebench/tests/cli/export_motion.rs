@@ -109,6 +109,14 @@ fn a_recording_is_the_same_from_an_export_and_from_a_run_and_again() {
             "results",
         ])
         .exits_with(0);
+    // What a run says of a configuration stands in its recording.
+    let holds = |name: &str, word: &str| {
+        let bytes = bench.read(name);
+        bytes
+            .windows(word.len())
+            .any(|each| each == word.as_bytes())
+    };
+    assert!(holds(&file, "status\u{2}\0\0\0ok"));
     let beside = "results/table3/pose/Right-Up-Fold.rapier.mcap";
     assert_eq!(bench.read(beside), first);
     let report = bench.read_json("results/table3/report.json");

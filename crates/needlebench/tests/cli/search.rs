@@ -1,6 +1,6 @@
 //! `search`: from a study file to the best choice, whatever happens on the way.
 
-use crate::support::{Answer, Bench, SMALL, has_keys};
+use crate::support::{Answer, Bench, has_keys};
 
 /// Three heights and two mounts of the tool.
 const STUDY: &str = r#"
@@ -29,12 +29,6 @@ role = "choice"
 values = [90, 180]
 "#;
 
-fn bench(study: &str) -> Bench {
-    let bench = Bench::with_scenario(SMALL);
-    bench.write("study.toml", study);
-    bench
-}
-
 fn run(bench: &Bench, more: &[&str]) -> Answer {
     let mut arguments = vec!["search", "study.toml", "--quiet"];
     arguments.extend(more);
@@ -56,7 +50,7 @@ fn written(bench: &Bench, folder: &str) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
-    let bench = bench(STUDY);
+    let bench = Bench::with_study(STUDY);
     let document = run(&bench, &["--json"]).exits_with(0).json();
     has_keys(
         &document,
@@ -94,16 +88,16 @@ fn the_answer_has_figures_of_layouts_that_nothing_was_compared_by() {
 
 #[test]
 fn threads_shards_and_breaks_give_the_same_bytes() {
-    let whole = bench(STUDY);
+    let whole = Bench::with_study(STUDY);
     run(&whole, &["--jobs", "1"]).exits_with(0);
     let expected = written(&whole, "out/best");
 
-    let threads = bench(STUDY);
+    let threads = Bench::with_study(STUDY);
     run(&threads, &["--jobs", "3"]).exits_with(0);
     assert!(written(&threads, "out/best") == expected);
 
     // Parts of every generation, then a search that joins them.
-    let shards = bench(STUDY);
+    let shards = Bench::with_study(STUDY);
     for shard in ["2/2", "1/2"] {
         let said = run(&shards, &["--shard", shard]).exits_with(0).stdout;
         assert!(said.contains("generation 0"), "{said}");
@@ -112,7 +106,7 @@ fn threads_shards_and_breaks_give_the_same_bytes() {
     assert!(written(&shards, "out/best") == expected);
 
     // As after a kill: a generation that has begun, and a log that is behind.
-    let broken = bench(STUDY);
+    let broken = Bench::with_study(STUDY);
     run(&broken, &["--shard", "1/2"]).exits_with(0);
     broken.write("out/best/search.json", "{");
     run(&broken, &["--resume"]).exits_with(0);
@@ -121,7 +115,7 @@ fn threads_shards_and_breaks_give_the_same_bytes() {
 
 #[test]
 fn what_cannot_be_searched_says_why() {
-    let bench = bench(&STUDY.replace("budget = 112", "budget = 50"));
+    let bench = Bench::with_study(&STUDY.replace("budget = 112", "budget = 50"));
     run(&bench, &[])
         .exits_with(2)
         .complains(["budget", "50", "search.budget"]);
@@ -137,8 +131,31 @@ fn what_cannot_be_searched_says_why() {
     run(&bench, &[])
         .exits_with(2)
         .complains(["study.toml", "robot_phantm", "robot_phantom"]);
+    bench.write("study.toml", STUDY.replace("samples = 16", "samples = 8"));
+    run(&bench, &[])
+        .exits_with(2)
+        .complains(["sampling.samples", "8 layouts", "16"]);
     let ranges = STUDY.replace("values = [790, 800, 810]", "range = [790, 810]");
     bench.write("study.toml", ranges);
     let study = bench.run(&["study", "study.toml", "--quiet"]).exits_with(0);
     study.complains(["height", "needlebench search"]);
+}
+
+#[test]
+fn the_error_of_the_tip_is_that_of_real_arms() {
+    let by_error = STUDY.replace("fresh = 16", "fresh = 16\nobjective = \"tip_error\"");
+    let bench = Bench::with_study(&by_error);
+    let document = run(&bench, &["--json"]).exits_with(0).json();
+    let error_mm = document["answer"]["figures"][0]["value"].as_f64().unwrap();
+    // Without a criterion on it, too. A perfect arm's is below a micrometre, and what does not work counts 10 mm.
+    assert!((0.3..9.0).contains(&error_mm), "{error_mm}");
+}
+
+#[test]
+fn of_a_generation_with_fewer_blocks_than_parts_the_last_ones_have_nothing() {
+    let bench = Bench::with_study(STUDY);
+    let answer = run(&bench, &["--shard", "200/256"]).exits_with(0);
+    assert!(answer.stdout.contains("nothing to do"), "{}", answer.stdout);
+    let own = run(&bench, &["--shard", "1/256"]).exits_with(0);
+    assert!(own.stdout.contains("part 1/24"), "{}", own.stdout);
 }

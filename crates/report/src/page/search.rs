@@ -82,8 +82,12 @@ pub fn search_page(
         .collect();
     let mut pictures = Vec::new();
     if let Some(answer) = &log.answer {
-        let others = answer.equals.iter().filter(|&&id| id != answer.winner);
-        for &id in std::iter::once(&answer.winner)
+        let on_the_front = answer.front.iter().filter(|member| member.by_estimate);
+        let others = on_the_front
+            .map(|member| member.id)
+            .chain(answer.equals.iter().copied())
+            .filter(|&id| id != answer.winner);
+        for id in std::iter::once(answer.winner)
             .chain(others)
             .take(MOST_PICTURES)
         {

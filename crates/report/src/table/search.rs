@@ -126,7 +126,7 @@ fn sentences(search: &PreparedSearch, log: &SearchLog) -> Vec<String> {
         all.push(format!(
             "{} told from the best, all pairs together but for 5 %{}.",
             match equals {
-                0 => "None of the others with all layouts cannot be".to_owned(),
+                0 => "All others with all layouts are".to_owned(),
                 1 => "1 other with all layouts cannot be".to_owned(),
                 _ => format!("{equals} others with all layouts cannot be"),
             },
@@ -154,11 +154,11 @@ fn sentences(search: &PreparedSearch, log: &SearchLog) -> Vec<String> {
         )
     });
     all.push(format!(
-        "{} cases{grid}, in {} generations; reach alone ruled out {} and {}.",
+        "{} cases{grid}, in {} generations; reach alone ruled out {}, which spared {}.",
         log.cases,
         log.generations.len(),
-        counted(log.cases_out_of_reach, "case"),
-        counted(log.ruled_out as u64, "candidate")
+        counted(log.ruled_out as u64, "candidate"),
+        counted(log.cases_spared, "case")
     ));
     let keys: Vec<String> = search
         .study

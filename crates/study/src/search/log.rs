@@ -107,7 +107,8 @@ pub struct Answer {
     pub rate: Estimate,
     /// Its figures on those that it was selected by, which look better than they are.
     pub selected_by: Vec<Estimate>,
-    /// Who cannot be told from it, of those that have all circumstances, the best first and the winner among them.
+    /// Who cannot be told from it, of those that have all circumstances, the best first and the winner among them; empty
+    /// with two objectives, which have a front.
     pub equals: Vec<usize>,
     /// Who was dropped with fewer circumstances and could not be told from the best of their round.
     pub undecided: Vec<usize>,
@@ -129,9 +130,10 @@ pub struct SearchLog {
     pub budget: u64,
     /// Cases that were computed.
     pub cases: u64,
-    /// Cases that reach alone ruled out: no configuration comes to the needle.
-    pub cases_out_of_reach: u64,
-    /// Candidates that reach alone ruled out.
+    /// Cases that were not computed, since reach alone had ruled their candidates out: in so many layouts no
+    /// configuration comes to the needle. They count against the budget.
+    pub cases_spared: u64,
+    /// Candidates that reach alone ruled out, and that were not judged later after all.
     pub ruled_out: usize,
     /// The candidates.
     pub candidates: Vec<CandidateLog>,

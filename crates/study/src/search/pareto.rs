@@ -1,13 +1,13 @@
 //! Two objectives: the candidates that cannot be improved in one without loss in the other.
 
-use super::finite::{Round, affordable, listed};
-use super::log::{Decision, FrontMember, Purpose};
+use super::finite::{Round, listed, planned};
+use super::log::{Decision, FrontMember};
 use super::pool::{Found, Pool};
 use super::ranges::spread_point;
 use super::{ALPHA, Choices, Judge, SearchError, SearchPlan};
 
 /// Candidates of the last round, at least.
-const FINALISTS: usize = 16;
+const FRONT_FINALISTS: usize = 16;
 /// Members that are judged on fresh circumstances, at most.
 const JUDGED_ANEW: usize = 8;
 /// Points over ranges, for each combination of finite choices.
@@ -19,16 +19,18 @@ pub(super) fn check<S>(plan: &SearchPlan, choices: &Choices) -> Result<(), Searc
     } else {
         POINTS as usize
     };
-    planned(plan, listed(choices)? * points).map(|_| ())
+    planned_for(plan, listed(choices)? * points).map(|_| ())
 }
 
-fn planned<S>(plan: &SearchPlan, count: usize) -> Result<Vec<Round>, SearchError<S>> {
+fn planned_for<S>(plan: &SearchPlan, count: usize) -> Result<Vec<Round>, SearchError<S>> {
     let reserved = plan.fresh * JUDGED_ANEW.min(count) as u64;
-    affordable(count, plan, FINALISTS, reserved).map_err(|least| SearchError::Budget {
-        budget: plan.budget,
-        least,
-        what: format!("{count} candidates and a front"),
-    })
+    planned(
+        count,
+        plan,
+        FRONT_FINALISTS,
+        reserved,
+        format!("{count} candidates and a front"),
+    )
 }
 
 pub(super) fn search<J: Judge>(
@@ -49,15 +51,10 @@ pub(super) fn search<J: Judge>(
         }
     }
     let plan = pool.plan;
-    let rounds = planned(plan, all.len())?;
+    let rounds = planned_for(plan, all.len())?;
     let mut undecided = Vec::new();
-    for (index, round) in rounds.iter().enumerate() {
-        let is_last = index + 1 == rounds.len();
-        let purpose = if is_last {
-            Purpose::Final
-        } else {
-            Purpose::Halving
-        };
+    for round in &rounds {
+        let purpose = round.purpose(plan);
         pool.evaluate(&all, round.circumstances, purpose)?;
         let mut ordered = by_layers(pool, &all, round.circumstances);
         let dropped = ordered.split_off(round.keep.min(ordered.len()));
@@ -110,10 +107,10 @@ pub(super) fn search<J: Judge>(
     for member in &mut front {
         member.fresh = judged.contains(&member.id).then(|| pool.fresh(member.id));
     }
-    let equals = members.clone();
     let found = Found {
         ranked: members,
-        equals,
+        // A front has members, not equals.
+        equals: Vec::new(),
         undecided,
     };
     pool.answer_with(found, front);

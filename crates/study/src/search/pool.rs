@@ -16,7 +16,6 @@ struct Entry {
     /// Of cases out of reach, the most of their margin, mm.
     out_of_reach: Vec<Option<f64>>,
     fresh: Vec<CaseWorth>,
-    is_ruled_out: bool,
     /// Circumstances that count against the budget.
     charged: u64,
 }
@@ -51,7 +50,7 @@ impl<'a, J: Judge> Pool<'a, J> {
                 fresh: plan.fresh,
                 budget: plan.budget,
                 cases: 0,
-                cases_out_of_reach: 0,
+                cases_spared: 0,
                 ruled_out: 0,
                 candidates: Vec::new(),
                 generations: Vec::new(),
@@ -70,7 +69,6 @@ impl<'a, J: Judge> Pool<'a, J> {
                 worth: Vec::new(),
                 out_of_reach: Vec::new(),
                 fresh: Vec::new(),
-                is_ruled_out: false,
                 charged: 0,
             });
             self.entries.len() - 1
@@ -215,6 +213,13 @@ impl<'a, J: Judge> Pool<'a, J> {
     fn describe(&mut self) {
         let judge = &*self.judge;
         let objectives = &self.log.objectives;
+        // What counts against the budget without having been computed.
+        let spared = self
+            .entries
+            .iter()
+            .map(|each| each.charged - each.worth.len() as u64);
+        self.log.ruled_out = spared.clone().filter(|&cases| cases > 0).count();
+        self.log.cases_spared = spared.sum();
         self.log.candidates = self
             .entries
             .iter()
@@ -261,8 +266,6 @@ impl<'a, J: Judge> Pool<'a, J> {
             .partition(|&id| last.is_some_and(|last| bound(self, id) < last));
         self.evaluate(&others, circumstances, purpose)?;
         for &id in &ruled_out {
-            self.log.ruled_out += usize::from(!self.entries[id].is_ruled_out);
-            self.entries[id].is_ruled_out = true;
             self.charge(id, circumstances);
         }
         let judged: Vec<usize> = open.into_iter().chain(others).collect();
@@ -298,7 +301,6 @@ impl<'a, J: Judge> Pool<'a, J> {
                 .out_of_reach(&asked)
                 .map_err(SearchError::Stopped)?;
             for (&id, found) in now.iter().zip(found) {
-                self.log.cases_out_of_reach += found.iter().flatten().count() as u64;
                 self.entries[id].out_of_reach.extend(found);
             }
         }

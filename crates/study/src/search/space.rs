@@ -8,6 +8,7 @@ use super::{Candidate, ChoiceAxis, Choices, Generation, Stream};
 use crate::design::{described, goal_factor};
 use crate::distribution::quantile;
 use crate::sampling::{Dimension, most_dimensions};
+use crate::sobol::DIMENSIONS;
 use crate::store::CaseDesign;
 use crate::{Factor, FactorKind, FactorValue};
 
@@ -39,6 +40,14 @@ pub enum SpaceError {
         /// Name of the method.
         method: &'static str,
         /// Its dimensions.
+        most: usize,
+    },
+    /// More ranges than points can be spread over.
+    #[error("{ranges} choices have ranges, but points are spread over {most} at most")]
+    TooManyRanges {
+        /// How many have one.
+        ranges: usize,
+        /// Dimensions of Sobol's sequence.
         most: usize,
     },
 }
@@ -177,10 +186,18 @@ impl SearchSpace {
         if circumstances == 0 {
             return Err(SpaceError::NoCircumstance);
         }
+        let choices = Choices(axes);
+        let ranges = choices.dimensions();
+        if ranges > DIMENSIONS {
+            return Err(SpaceError::TooManyRanges {
+                ranges,
+                most: DIMENSIONS,
+            });
+        }
         Ok(Self {
             factors: all,
             parts,
-            choices: Choices(axes),
+            choices,
         })
     }
 

@@ -603,7 +603,7 @@ PLAN.Planner = class {
   async savePlan() {
     try {
       const { file, left_out: leftOut } = await PLAN.ask('plan', { body: this.plan() });
-      this.saved.textContent = `Saved as ${file}; needlebench run takes it as it is.${leftOut.length ? ` It is without ${leftOut.map(NB.words).join(', ')}: no entry was chosen there.` : ''}`;
+      this.saved.textContent = `Saved as ${file}; needlebench run takes it as it is.${PLAN.withoutGoals(leftOut)}`;
       this.saved.className = 'good';
     } catch (error) {
       this.saved.textContent = `Not saved: ${error.message}${error.hint ? ` (${error.hint})` : ''}`;

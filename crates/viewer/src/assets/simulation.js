@@ -1,6 +1,9 @@
 // A plan that is saved, run in the background by the server, and its report.
 'use strict';
 
+/** What a plan is without. */
+PLAN.withoutGoals = (leftOut) => (leftOut.length ? ` It is without ${leftOut.map(NB.words).join(', ')}: no entry was chosen there.` : '');
+
 PLAN.Simulation = class {
   constructor(planner) {
     this.planner = planner;
@@ -46,7 +49,7 @@ PLAN.Simulation = class {
     this.reportLink.hidden = quiet || !progress.has_report;
     if (progress.state !== 'none') {
       const words = { running: 'running', finished: 'finished', failed: 'failed', cancelled: 'cancelled' }[progress.state];
-      this.said.textContent = `${progress.plan} ${words}: ${progress.message}`;
+      this.said.textContent = `${progress.plan} ${words}: ${progress.message}${PLAN.withoutGoals(progress.left_out)}`;
       this.said.className = progress.state === 'failed' ? 'bad break' : 'break';
     }
     if (this.running) setTimeout(async () => { try { this.told(await PLAN.ask('simulation')); } catch (error) { this.planner.complain(error); } }, 500);

@@ -8,7 +8,6 @@ use needlebench_bench::study::{
     launch_plan, time_per_case,
 };
 use needlebench_cell::Finding;
-use needlebench_cell::study::StudyMode;
 use needlebench_report::files::write_atomically;
 use serde::Serialize;
 
@@ -83,7 +82,7 @@ pub(super) fn launch(
         options: &options,
         jobs,
         cache: cache.as_deref(),
-        needs_mujoco: needs_mujoco(prepared),
+        needs_mujoco: prepared.needs_mujoco(),
     };
     let written = launch_plan(&plan).and_then(|plan| {
         prepare_folder(&plan.folder)?;
@@ -162,12 +161,6 @@ fn write(path: &Path, file: &LaunchFile) -> std::io::Result<()> {
         std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755))?;
     }
     Ok(())
-}
-
-fn needs_mujoco(prepared: &PreparedStudy) -> bool {
-    let engines = prepared.study.file.engines.as_deref();
-    prepared.most_costly_mode() == StudyMode::Dynamic
-        && engines.is_none_or(|engines| engines.iter().any(|engine| engine.as_ref() == "mujoco"))
 }
 
 /// What is worth changing, once a few cases have been computed.

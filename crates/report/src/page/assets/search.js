@@ -193,7 +193,7 @@ NB.SearchPage = class {
         members.forEach((point, k) => (k ? context.lineTo(axes.px(point.x), axes.py(point.y)) : context.moveTo(axes.px(point.x), axes.py(point.y))));
         context.stroke();
         for (const member of this.front.values()) {
-          if (!member.fresh) continue;
+          if (!member.fresh || member.fresh.some((estimate) => estimate.value === null)) continue;
           const scale = (value, index) => (this.page.objectives[index].unit === '1' ? 100 * value : value);
           const [a, b] = member.fresh.map((estimate, index) => ({ at: scale(estimate.value, index), low: estimate.interval.low === null ? null : scale(estimate.interval.low, index), high: estimate.interval.high === null ? null : scale(estimate.interval.high, index) }));
           context.strokeStyle = '#0072b2';
@@ -261,7 +261,7 @@ NB.SearchPage = class {
       NB.table('Cases by what they were for', [
         { title: 'For', cell: ([purpose]) => words[purpose] || purpose }, { title: 'Cases', numeric: true, cell: ([, cases]) => cases },
       ], [...byPurpose, ['all', log.cases]]),
-      NB.el('p', { class: 'small', text: `${log.grid_cases ? `All choices with all layouts are ${log.grid_cases} cases. ` : ''}Reach alone ruled out ${counted(log.cases_out_of_reach, 'case')} and ${counted(log.ruled_out, 'candidate')}, of which no clearance was asked.` }));
+      NB.el('p', { class: 'small', text: `${log.grid_cases ? `All choices with all layouts are ${log.grid_cases} cases. ` : ''}Reach alone ruled out ${counted(log.ruled_out, 'candidate')}, which spared ${counted(log.cases_spared, 'case')}.` }));
   }
 
   placements() {
@@ -269,7 +269,7 @@ NB.SearchPage = class {
       NB.el('p', { class: 'soft small', text: 'The patient as the scenario has it, the configuration with the most margin.' }),
       NB.el('div', { class: 'placements' }, this.page.pictures.map((picture) => NB.el('figure', null,
         NB.el('img', { src: picture.address, alt: `${picture.choice}: ${picture.configuration}` }),
-        NB.el('figcaption', { class: 'small' }, NB.el('strong', { text: picture.id === this.winner.id ? 'Best: ' : 'As good: ' }), `${picture.choice}. ${picture.configuration} at ${NB.words(picture.goal)}, margin ${NB.fixed(picture.marginMm, 1)} mm.`)))),
+        NB.el('figcaption', { class: 'small' }, NB.el('strong', { text: this.front.size ? 'On the front: ' : picture.id === this.winner.id ? 'Best: ' : 'As good: ' }), `${picture.choice}. ${picture.configuration} at ${NB.words(picture.goal)}, margin ${NB.fixed(picture.marginMm, 1)} mm.`)))),
     ];
   }
 
