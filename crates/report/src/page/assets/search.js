@@ -60,7 +60,7 @@ NB.SearchPage = class {
       NB.el('dl', null,
         choice.map(([factor, value]) => [NB.el('dt', { text: factor.words }), NB.el('dd', null, `${value} ${factor.unit}`, factor.key ? [' ', NB.el('code', { class: 'soft', text: factor.key })] : null)]),
         NB.el('dt', { text: 'layouts that work' }), NB.el('dd', { text: `${this.share(answer.rate.value)}${this.ends(answer.rate, (value) => this.share(value))}` }),
-        NB.el('dt', { text: 'as good' }), NB.el('dd', { text: as_good }),
+        NB.el('dt', { text: this.front.size ? 'front' : 'as good' }), NB.el('dd', { text: as_good }),
         NB.el('dt', { text: 'by the layouts that selected it' }), NB.el('dd', { text: `${this.figure(answer.selected_by[0].value)}: of many candidates the one that looks best looks better than it is` }),
         NB.el('dt', { text: 'room counted' }), NB.el('dd', { text: log.classes.map((name) => NB.words(name)).join(', ') })),
       NB.el('p', { class: 'soft small', text: 'Cases are final postures: whether a motion gets there was not looked at.' }));
@@ -151,7 +151,7 @@ NB.SearchPage = class {
       label: `${this.page.objectives[0].words} over ${factor.words}`,
       legend: () => this.legend(x.labels ? null : 'best of each stretch'),
       paint: (context, width, height) => {
-        const axes = new NB.Axes({ left: 56, top: 8, width: width - 66, height: height - 52 }, x, y);
+        const axes = new NB.Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
         context.save();
         context.beginPath(); context.rect(axes.box.left, axes.box.top, axes.box.width, axes.box.height); context.clip();
@@ -184,7 +184,7 @@ NB.SearchPage = class {
       help: 'Bars are 95 % intervals of those that were judged on fresh layouts.',
       legend: () => this.legend(),
       paint: (context, width, height) => {
-        const axes = new NB.Axes({ left: 56, top: 8, width: width - 66, height: height - 52 }, x, y);
+        const axes = new NB.Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
         context.save();
         context.beginPath(); context.rect(axes.box.left, axes.box.top, axes.box.width, axes.box.height); context.clip();
@@ -232,6 +232,9 @@ NB.SearchPage = class {
       points.forEach((point, k) => (k ? context.lineTo(axes.px(point.x), axes.py(point[key])) : context.moveTo(axes.px(point.x), axes.py(point[key]))));
       context.stroke();
       context.setLineDash([]);
+      // A generation alone makes no line.
+      context.fillStyle = color;
+      for (const point of points) { context.beginPath(); context.arc(axes.px(point.x), axes.py(point[key]), 2.5, 0, 2 * Math.PI); context.fill(); }
     };
     const key = (text, color, dash) => ({ text, draw: (context, px, py) => { context.strokeStyle = color; context.setLineDash(dash); context.lineWidth = 1.5; context.beginPath(); context.moveTo(px - 8, py); context.lineTo(px + 8, py); context.stroke(); context.setLineDash([]); } });
     const figure = new NB.Figure({
@@ -239,7 +242,7 @@ NB.SearchPage = class {
       help: 'By the layouts that each had: where those become more, figures may fall.',
       legend: () => [key('best of the generation', '#d55e00', []), key('middle of the generation', '#666', [5, 3])],
       paint: (context, width, height) => {
-        const axes = new NB.Axes({ left: 56, top: 8, width: width - 66, height: height - 52 }, x, y);
+        const axes = new NB.Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
         context.save();
         context.beginPath(); context.rect(axes.box.left, axes.box.top, axes.box.width, axes.box.height); context.clip();
