@@ -2,7 +2,7 @@
 //
 //   npm ci && node explore.mjs --out SCREENSHOTS --program NEEDLEBENCH --postures EXAMPLE SCENARIO.toml REPORT.html ...
 //
-// EXAMPLE is crates/live/examples/postures.rs, which computes with the program's crates what `needlebench
+// EXAMPLE is tests/programs/cell/src/bin/postures.rs, which computes with the program's crates what `needlebench
 // clearance` prints; that command is asked for some of the postures itself.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';

@@ -1,9 +1,9 @@
 """Whether others read a study's tables as they were meant.
 
-    cargo build --release -p needlebench-study --example synthetic
+    cargo build --release -p needlebench-programs-study
     cargo build --release -p needlebench
     python3 -m venv env && env/bin/pip install -r tests/results/requirements.txt
-    env/bin/python tests/results/check.py --maker target/release/examples/synthetic \\
+    env/bin/python tests/results/check.py --maker target/release/synthetic \\
         --program target/release/needlebench
 
 Makes the tables of a study without physics, runs the examples beside this file on both, and compares

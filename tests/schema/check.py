@@ -1,7 +1,9 @@
 """Compares the reader of scenario and study files with an independent validator of their schemas.
 
-    cargo run -p needlebench-cell --example schema_probes > probes.jsonl
+    cargo run --release -p needlebench-programs-schema --bin schema_probes > probes.jsonl
     python tests/schema/check.py probes.jsonl
+
+Without probes, only whether the schemas are schemas and every shipped file fits.
 
 Each probe is a document at, inside or outside one limit that a schema states, with what the reader
 said of it. The validator (jsonschema) has to say the same, and every shipped file has to fit.
@@ -60,12 +62,13 @@ def main() -> int:
         validators[kind] = Draft7Validator(schema)
     wrong: list[str] = []
     seen: Counter[tuple[str, bool]] = Counter()
-    with Pool() as pool, Path(sys.argv[1]).open() as lines:
-        for kind, is_valid, disagreement in pool.imap(judge, lines, chunksize=200):
-            seen[kind, is_valid] += 1
-            if disagreement:
-                wrong.append(disagreement)
-    for kind in SCHEMAS:
+    for file in map(Path, sys.argv[1:2]):
+        with Pool() as pool, file.open() as lines:
+            for kind, is_valid, disagreement in pool.imap(judge, lines, chunksize=200):
+                seen[kind, is_valid] += 1
+                if disagreement:
+                    wrong.append(disagreement)
+    for kind in SCHEMAS if sys.argv[1:] else ():
         count = seen[kind, True] + seen[kind, False]
         print(f"{kind}: {count} probes, of which {seen[kind, False]} are to be refused")
         if count < LEAST_PROBES[kind] or min(seen[kind, True], seen[kind, False]) < count // 10:

@@ -1,8 +1,8 @@
 """Clearances of whole cells by needlebench against Coal and Pinocchio, posture by posture.
 
-    cargo build --release -p needlebench-tests --example cell_export
-    python3 -m venv env && env/bin/pip install -r tests/validation/cell/requirements.txt
-    env/bin/python tests/validation/cell/compare.py --exporter target/release/examples/cell_export
+    cargo build --release -p needlebench-programs-cell
+    python3 -m venv env && env/bin/pip install -r tests/validation/requirements.txt
+    env/bin/python tests/validation/cell/compare.py --exporter target/release/cell_export
 
 Builds every scenario's cell a second time (`cell.py`), asks Coal for the signed distance of every
 pair at the exporter's random postures, and fails where the two differ and needlebench cannot be

@@ -9,9 +9,9 @@ Nothing of needlebench is used but the answers of `markers_export`:
   they do not change; covariance from its Jacobian, by finite differences;
 - error at a target: a simulation with that fit.
 
-    cargo build --release -p needlebench-imaging --example markers_export
-    python3 -m venv env && env/bin/pip install -r tests/validation/imaging/markers/requirements.txt
-    env/bin/python tests/validation/imaging/markers/check.py --exporter target/release/examples/markers_export
+    cargo build --release -p needlebench-programs-imaging
+    python3 -m venv env && env/bin/pip install -r tests/validation/imaging/requirements.txt
+    env/bin/python tests/validation/imaging/markers/check.py --exporter target/release/markers_export
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """Markers of the synthetic chest: found, localised, registered, against the truth of `needlebench ct synth`.
 
     target/markers/bin/python tests/validation/imaging/markers/phantom.py --program target/release/needlebench \
-        --finder target/release/examples/scan_markers [--full]
+        --finder target/release/scan_markers [--full]
 
 Every marker has to be found and nothing else. Slices that are thicker than a sphere leave its place along them open,
 which the covariance has to say: there the error counts in units of the covariance alone. Without --full some of the

@@ -1,6 +1,6 @@
 """The readers of volumes against nibabel and pydicom: HU bit for bit, places to rounding, bad files answered.
 
-    check.py --reader target/release/examples/dump_volume --program target/release/needlebench [--times]
+    check.py --reader target/release/dump_volume --program target/release/needlebench [--times]
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Segmentation, distances and surfaces against other programs and against analytic solids.
 
-    cargo build --release -p needlebench-imaging --example segment_raw
-    python3 -m venv target/segment && target/segment/bin/pip install -r tests/validation/imaging/segment/requirements.txt
+    cargo build --release -p needlebench-programs-imaging
+    python3 -m venv target/segment && target/segment/bin/pip install -r tests/validation/imaging/requirements.txt
     target/segment/bin/python tests/validation/imaging/segment/check.py [--full]
 
 A chest of analytic solids is scanned (phantom.py), at 1 mm and at 5 mm slices. Components are compared with cc3d and
@@ -32,7 +32,7 @@ from scipy.spatial import cKDTree
 from skimage import measure
 
 ROOT = Path(__file__).resolve().parents[4]
-PROGRAM = ROOT / "target/release/examples/segment_raw"
+PROGRAM = ROOT / "target/release/segment_raw"
 
 # Half a step of 16 bits over 40 mm, and single precision.
 DISTANCE_MM = 0.5 * 40 / 32767 + 1e-5

@@ -1,7 +1,7 @@
 //! Runs a study without physics: what the runner, the journal and the tables cost by themselves.
 //!
 //! ```text
-//! cargo run --release -p needlebench-study --example synthetic -- FOLDER CASES THREADS DRAWS [csv]
+//! cargo run --release -p needlebench-programs-study --bin synthetic -- FOLDER CASES THREADS DRAWS [csv]
 //! ```
 //!
 //! DRAWS random numbers per case stand for the work of computing it: 200 000 take about half a
@@ -18,7 +18,7 @@ use needlebench_study::{
 };
 use synthetic::{SyntheticDesign, SyntheticEvaluator};
 
-#[path = "../tests/study/store/synthetic.rs"]
+#[path = "../../../../../crates/study/tests/study/store/synthetic.rs"]
 mod synthetic;
 
 /// Works for its rows.

@@ -1,6 +1,4 @@
-//! Work for an instruction counter: `instructions OPERATION COUNT` does one operation so often.
-//!
-//! `.ci/instructions` runs it under valgrind with two counts and divides the difference.
+//! Inverse kinematics of poses drawn at random.
 
 use std::f64::consts::PI;
 use std::hint::black_box;
@@ -13,12 +11,8 @@ use needlebench_kinematics::pose_sets::PoseSet;
 use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
 
-fn main() {
-    let mut arguments = std::env::args().skip(1);
-    let operation = arguments.next().unwrap_or_default();
-    // `cargo bench` passes `--bench` and wants nothing done.
-    let count = arguments.next().and_then(|count| count.parse().ok());
-    let Some(count) = count else { return };
+/// Does the operation so often, each time for another pose.
+pub fn run(operation: &str, count: usize) {
     let geometry = UrGeometry::UR3;
     let chain = geometry.chain();
     let numerical = Numerical::new(&chain);
@@ -37,14 +31,13 @@ fn main() {
         .collect();
     let starts: Vec<Joints> = postures
         .iter()
-        .map(|q| match operation.as_str() {
+        .map(|q| match operation {
             "damped" => Joints::from_fn(|_, _| random.uniform(-PI, PI)),
             _ => q.map(|joint| joint + random.uniform(-0.1, 0.1)),
         })
         .collect();
     let preference = Preference::default();
-    match operation.as_str() {
-        "nothing" => {}
+    match operation {
         "one_pose" => {
             for (pose, out) in in_base.iter().zip(&mut out) {
                 closed_form_into(&geometry, pose, preference, out);
@@ -63,7 +56,7 @@ fn main() {
                 black_box(numerical.damped(pose, start, &options));
             }
         }
-        other => eprintln!("no operation `{other}`"),
+        other => panic!("no operation `{other}`"),
     }
     black_box(&out);
 }

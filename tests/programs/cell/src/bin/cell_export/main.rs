@@ -1,6 +1,6 @@
 //! Writes what needlebench says about the cells of scenarios, for `compare.py` to check.
 //!
-//! `cargo run --release -p needlebench-tests --example cell_export -- --out DIR SCENARIO...`
+//! `cargo run --release -p needlebench-programs-cell --bin cell_export -- --out DIR SCENARIO...`
 //!
 //! With `--surfaces` every scenario a second time with a tenth of the postures, the phantom's skin
 //! given as a triangle mesh instead of a convex piece, as `NAME_surface`.

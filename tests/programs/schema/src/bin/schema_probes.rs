@@ -1,7 +1,7 @@
 //! Writes documents at, inside and outside every limit of the published schemas, one a line, with what
 //! the reader says of each. `tests/schema/check.py` compares that with an independent validator.
 
-#[path = "../tests/cell/schema_probes.rs"]
+#[path = "../../../../../crates/cell/tests/cell/schema_probes.rs"]
 mod probes;
 
 use std::io::Write as _;

@@ -1,8 +1,8 @@
 //! Shards of a study without physics, by the thousand: what it costs to merge them.
 //!
 //! ```text
-//! cargo run --release -p needlebench-study --example shards -- make FOLDER CASES SHARDS THREADS
-//! cargo run --release -p needlebench-study --example shards -- merge OUT FOLDER THREADS
+//! cargo run --release -p needlebench-programs-study --bin shards -- make FOLDER CASES SHARDS THREADS
+//! cargo run --release -p needlebench-programs-study --bin shards -- merge OUT FOLDER THREADS
 //! ```
 //!
 //! Shards are made in processes of their own, so that what merging takes is seen by itself.
@@ -15,7 +15,7 @@ use std::time::Instant;
 use needlebench_study::{Progress, Shard, StudyError, StudyRun, merge};
 use synthetic::{SyntheticDesign, SyntheticEvaluator};
 
-#[path = "../tests/study/store/synthetic.rs"]
+#[path = "../../../../../crates/study/tests/study/store/synthetic.rs"]
 mod synthetic;
 
 /// Cases of a block, as large studies have.
