@@ -1,7 +1,7 @@
 """Exports of cells in the tools that they are for, against what needlebench says of the same cells.
 
     cargo build --release
-    python3 -m venv env && env/bin/pip install -r tests/validation/export/requirements.txt
+    python3 -m venv env && env/bin/pip install -r tests/validation/requirements.txt
     env/bin/python tests/validation/export/check.py --program target/release/needlebench
 
 MuJoCo opens the MJCF models, Pinocchio and Coal the URDF and SRDF files, Khronos's validator the
