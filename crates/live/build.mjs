@@ -21,18 +21,33 @@ const record = `${asset}.json`;
 const run = (program, words, options = {}) => execFileSync(program, words, { cwd: root, encoding: 'utf8', ...options });
 
 function files(folder) {
-  return readdirSync(folder).sort().flatMap((name) => {
-    const path = join(folder, name);
-    return statSync(path).isDirectory() ? files(path) : [path];
-  });
+  return readdirSync(folder)
+    .sort()
+    .flatMap((name) => {
+      const path = join(folder, name);
+      return statSync(path).isDirectory() ? files(path) : [path];
+    });
 }
 
 /** Of all that decides about the bytes but the compiler. */
 function sources() {
   const hash = createHash('sha256');
   // Versions of what is from elsewhere; paths of what is not are those of this checkout.
-  const tree = run('cargo', ['tree', '--locked', '--package', 'needlebench-live', '--target', TARGET, '--edges', 'normal', '--prefix', 'none', '--no-dedupe'])
-    .split('\n').map((line) => line.replace(/ \(.*/, ''));
+  const tree = run('cargo', [
+    'tree',
+    '--locked',
+    '--package',
+    'needlebench-live',
+    '--target',
+    TARGET,
+    '--edges',
+    'normal',
+    '--prefix',
+    'none',
+    '--no-dedupe',
+  ])
+    .split('\n')
+    .map((line) => line.replace(/ \(.*/, ''));
   const crates = [...new Set(tree)].sort();
   hash.update(crates.join('\n'));
   const workspace = readFileSync(join(root, 'Cargo.toml'), 'utf8');
@@ -52,10 +67,30 @@ function compile() {
   // A toolchain without the target's own libraries.
   if (!existsSync(targets)) run('rustup', ['target', 'add', TARGET], { stdio: 'inherit' });
   const cargo = process.env.CARGO_HOME || join(homedir(), '.cargo');
-  const remap = [[root, '.'], [cargo, 'cargo']].map(([from, to]) => `--remap-path-prefix=${from}=${to}`);
+  const remap = [
+    [root, '.'],
+    [cargo, 'cargo'],
+  ].map(([from, to]) => `--remap-path-prefix=${from}=${to}`);
   const folder = process.env.CARGO_TARGET_DIR ? join(process.env.CARGO_TARGET_DIR, 'page') : join(root, 'target/page');
-  run('cargo', ['rustc', '--locked', '--package', 'needlebench-live', '--lib', '--crate-type', 'cdylib', '--profile', 'page', '--target', TARGET, '--target-dir', folder],
-    { stdio: 'inherit', env: { ...process.env, CARGO_ENCODED_RUSTFLAGS: remap.join('\x1f') } });
+  run(
+    'cargo',
+    [
+      'rustc',
+      '--locked',
+      '--package',
+      'needlebench-live',
+      '--lib',
+      '--crate-type',
+      'cdylib',
+      '--profile',
+      'page',
+      '--target',
+      TARGET,
+      '--target-dir',
+      folder,
+    ],
+    { stdio: 'inherit', env: { ...process.env, CARGO_ENCODED_RUSTFLAGS: remap.join('\x1f') } },
+  );
   return readFileSync(join(folder, TARGET, 'page/needlebench_live.wasm'));
 }
 
@@ -63,8 +98,12 @@ const now = { rustc: run('rustc', ['--version']).trim(), sources_sha256: sources
 if (process.argv.includes('--check')) {
   const then = JSON.parse(readFileSync(record, 'utf8'));
   if (then.sources_sha256 === now.sources_sha256) console.log('live.wasm: the sources are those that it was made of');
-  else if (then.rustc !== now.rustc) console.log(`live.wasm: was made by ${then.rustc} of other sources; this is ${now.rustc}, whose bytes cannot be compared`);
-  else if (compile().equals(readFileSync(asset))) console.log('live.wasm: the sources have changed, the bytes have not');
+  else if (then.rustc !== now.rustc)
+    console.log(
+      `live.wasm: was made by ${then.rustc} of other sources; this is ${now.rustc}, whose bytes cannot be compared`,
+    );
+  else if (compile().equals(readFileSync(asset)))
+    console.log('live.wasm: the sources have changed, the bytes have not');
   else {
     console.error('live.wasm is not what the sources give: run `node crates/live/build.mjs` and commit it');
     process.exit(1);

@@ -18,4 +18,5 @@ async function executable() {
 const browser = await executable();
 
 /** A running Chromium with further arguments. */
-export const launch = (args) => chromium.launch({ executablePath: browser.path, args: ['--no-sandbox', ...browser.args, ...args] });
+export const launch = (args) =>
+  chromium.launch({ executablePath: browser.path, args: ['--no-sandbox', ...browser.args, ...args] });

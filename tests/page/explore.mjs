@@ -36,8 +36,13 @@ const folder = mkdtempSync(join(tmpdir(), 'explore-'));
 process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
 
 const ask = (binary, ...rest) => execFileSync(binary, rest, { encoding: 'utf8', maxBuffer: 1 << 28, stdio: 'pipe' });
-const postures = (scenario, count) => ask(example, scenario, String(count)).trim().split('\n').map((line) => JSON.parse(line));
-const settle = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+const postures = (scenario, count) =>
+  ask(example, scenario, String(count))
+    .trim()
+    .split('\n')
+    .map((line) => JSON.parse(line));
+const settle = (page) =>
+  page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 
 /** The scenario with its base elsewhere, as a file that finds its models. */
 function elsewhere(scenario, toml, name) {
@@ -56,9 +61,13 @@ async function open(running, file, size = { width: 1400, height: 1000 }, script 
   // A picture takes long without a graphics card, and longer beside other programs.
   page.setDefaultTimeout(120_000);
   const problems = [];
-  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`); });
+  page.on('console', (message) => {
+    if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`);
+  });
   page.on('pageerror', (error) => problems.push(error.message));
-  page.on('request', (request) => { if (!/^(file|data|blob):/.test(request.url())) problems.push(`asked for ${request.url()}`); });
+  page.on('request', (request) => {
+    if (!/^(file|data|blob):/.test(request.url())) problems.push(`asked for ${request.url()}`);
+  });
   if (script) await page.addInitScript(script);
   await page.goto(pathToFileURL(file).href);
   await page.waitForSelector('html[data-ready]', { timeout: 60_000 });
@@ -67,12 +76,18 @@ async function open(running, file, size = { width: 1400, height: 1000 }, script 
 
 /** The largest difference of all pairs, m. */
 async function differ(page, expected) {
-  const found = await page.evaluate((all) => all.map((joints) => NB.current.explore.live.pairs(joints).map((pair) => pair.distance)), expected.map(({ joints }) => joints));
+  const found = await page.evaluate(
+    (all) => all.map((joints) => NB.current.explore.live.pairs(joints).map((pair) => pair.distance)),
+    expected.map(({ joints }) => joints),
+  );
   let worst = 0;
   let count = 0;
   expected.forEach(({ distances_m: theirs }, k) => {
     assert.equal(found[k].length, theirs.length);
-    theirs.forEach((distance, pair) => { worst = Math.max(worst, Math.abs(found[k][pair] - distance)); count++; });
+    theirs.forEach((distance, pair) => {
+      worst = Math.max(worst, Math.abs(found[k][pair] - distance));
+      count++;
+    });
   });
   assert.ok(worst <= SAME_M, `distances differ by ${worst} m`);
   return { worst, count };
@@ -86,11 +101,21 @@ async function testCommand(page, scenario) {
   const command = await explore(page, 'explore.command(explore.joints)');
   const list = command.match(/ --joints (\S+)$/)[1];
   const { classes } = JSON.parse(ask(program, 'clearance', scenario, '--joints', list, '--json'));
-  const shown = await page.locator('.explore table').first().locator('tbody tr').evaluateAll((rows) => rows.map((row) => [...row.children].map((cell) => cell.textContent)));
+  const shown = await page
+    .locator('.explore table')
+    .first()
+    .locator('tbody tr')
+    .evaluateAll((rows) => rows.map((row) => [...row.children].map((cell) => cell.textContent)));
   assert.equal(shown.length, Object.keys(classes).length);
-  const least = await explore(page, 'explore.least.map((pair) => ({ name: explore.data.classes[pair.class].name, distance: pair.distance, solids: pair.solids }))');
+  const least = await explore(
+    page,
+    'explore.least.map((pair) => ({ name: explore.data.classes[pair.class].name, distance: pair.distance, solids: pair.solids }))',
+  );
   least.forEach(({ name, distance, solids }, row) => {
-    assert.ok(Math.abs(classes[name].minimum_m - distance) <= SAME_M, `${name}: ${distance} m, ${classes[name].minimum_m} m`);
+    assert.ok(
+      Math.abs(classes[name].minimum_m - distance) <= SAME_M,
+      `${name}: ${distance} m, ${classes[name].minimum_m} m`,
+    );
     assert.deepEqual(solids, classes[name].pair);
     assert.ok(Math.abs(mm(shown[row][1]) - distance * 1e3) <= 0.0501, `${shown[row][1]} mm is shown for ${distance} m`);
   });
@@ -105,15 +130,15 @@ async function testJoints(page, scenario) {
   const text = await page.locator('.explore table').first().textContent();
   await sliders.nth(2).focus();
   for (let k = 0; k < 12; k++) await page.keyboard.press('ArrowRight');
-  const turned = await explore(page, 'explore.joints[2]') - before;
-  assert.ok(Math.abs(turned * 180 / Math.PI - 6) < 0.51, `twelve steps turn by ${turned} rad`);
+  const turned = (await explore(page, 'explore.joints[2]')) - before;
+  assert.ok(Math.abs((turned * 180) / Math.PI - 6) < 0.51, `twelve steps turn by ${turned} rad`);
   assert.notEqual(await page.locator('.explore table').first().textContent(), text, 'the clearances stay');
   await testCommand(page, scenario);
   // A number, and one beyond the limits.
   const number = page.locator('.explore input[type=number]').nth(4);
   await number.fill('33.25');
   await number.press('Enter');
-  assert.ok(Math.abs(await explore(page, 'explore.joints[4]') - 33.25 * Math.PI / 180) < 1e-12);
+  assert.ok(Math.abs((await explore(page, 'explore.joints[4]')) - (33.25 * Math.PI) / 180) < 1e-12);
   await number.fill('99999');
   await number.press('Enter');
   const [low, high] = await explore(page, 'explore.data.joints[4]');
@@ -126,7 +151,10 @@ async function testJoints(page, scenario) {
 
 /** Drags the ring, and types; then the scenario with that base has to give the same. */
 async function testBase(page, scenario, name) {
-  await page.evaluate(() => { window.scrollTo(0, 0); NB.current.view.look([0.3, 0.5, -0.9], 3.5, NB.current.explore.pose().elements.slice(12, 15)); });
+  await page.evaluate(() => {
+    window.scrollTo(0, 0);
+    NB.current.view.look([0.3, 0.5, -0.9], 3.5, NB.current.explore.pose().elements.slice(12, 15));
+  });
   await settle(page);
   await page.locator('.view canvas').scrollIntoViewIfNeeded();
   const ring = await page.evaluate(() => {
@@ -134,7 +162,7 @@ async function testBase(page, scenario, name) {
     const [x, y, z] = explore.pose().elements.slice(12, 15);
     const place = new THREE.Vector3(x + NB.Explore.RING - 0.01, y, z).project(view.camera);
     const box = view.renderer.domElement.getBoundingClientRect();
-    return [box.left + (place.x + 1) / 2 * box.width, box.top + (1 - place.y) / 2 * box.height];
+    return [box.left + ((place.x + 1) / 2) * box.width, box.top + ((1 - place.y) / 2) * box.height];
   });
   const camera = () => page.evaluate(() => NB.current.view.camera.position.toArray());
   const [home, eye] = [await explore(page, 'explore.base.position'), await camera()];
@@ -154,12 +182,25 @@ async function testBase(page, scenario, name) {
   let worst = 0;
   // A goal that is given from the base goes along with it in the scenario, and may miss the patient there.
   const goesAlong = await explore(page, 'explore.data.goals.some((goal) => goal.fromBase)');
-  if (goesAlong) assert.ok((await page.locator('.explore').textContent()).includes('flange_pose'), 'nothing says that the goal goes along');
-  for (const [x, y, height, yaw] of [[null, null, null, null], [home[0] - 60, home[1] + 30, home[2] + 40, 20], [home[0] + 25, home[1] - 15, home[2] - 20, -15]]) {
+  if (goesAlong)
+    assert.ok(
+      (await page.locator('.explore').textContent()).includes('flange_pose'),
+      'nothing says that the goal goes along',
+    );
+  for (const [x, y, height, yaw] of [
+    [null, null, null, null],
+    [home[0] - 60, home[1] + 30, home[2] + 40, 20],
+    [home[0] + 25, home[1] - 15, home[2] - 20, -15],
+  ]) {
     if (x !== null) {
       const fields = page.locator('.base-fields input');
       const turn = await explore(page, 'explore.data.base.rpy[2]');
-      for (const [k, value] of [[0, x], [1, y], [2, height], [5, turn + yaw]]) {
+      for (const [k, value] of [
+        [0, x],
+        [1, y],
+        [2, height],
+        [5, turn + yaw],
+      ]) {
         await fields.nth(k).fill(String(value));
         await fields.nth(k).press('Enter');
       }
@@ -169,14 +210,20 @@ async function testBase(page, scenario, name) {
     const file = elsewhere(scenario, toml, name);
     let expected;
     // A place that the program refuses has nothing to be held against, and the page has to say why.
-    try { expected = postures(file, POSTURES_ELSEWHERE); } catch (error) {
-      assert.ok((await page.locator('.explore [role=alert]').textContent()).includes(' in the '), `${toml}: ${error.message}`);
+    try {
+      expected = postures(file, POSTURES_ELSEWHERE);
+    } catch (error) {
+      assert.ok(
+        (await page.locator('.explore [role=alert]').textContent()).includes(' in the '),
+        `${toml}: ${error.message}`,
+      );
       continue;
     }
     worst = Math.max(worst, (await differ(page, expected)).worst);
     // The command wants a start that collides with nothing; the page has to say so, too.
     const hits = await explore(page, 'explore.startHits');
-    if (hits) assert.throws(() => ask(program, 'clearance', file, '--joints', '0,0,0,0,0,0'), /the start posture collides/);
+    if (hits)
+      assert.throws(() => ask(program, 'clearance', file, '--joints', '0,0,0,0,0,0'), /the start posture collides/);
     else await testCommand(page, file);
   }
   await page.getByRole('button', { name: 'Reset base' }).click();
@@ -190,25 +237,38 @@ async function testConfigurations(page) {
   const found = await explore(page, 'explore.found');
   assert.equal(found.length, 8);
   // At the run's own base, what the run has found to work keeps its limits at some roll, too.
-  const ok = await page.evaluate(() => NB.current.goal.configurations.filter((each) => each.status === 'ok').map((each) => each.label));
+  const ok = await page.evaluate(() =>
+    NB.current.goal.configurations.filter((each) => each.status === 'ok').map((each) => each.label),
+  );
   for (const label of ok) assert.equal(found.find((each) => each.label === label).outcome, 'works', label);
   const reached = found.findIndex((each) => each.joints);
-  await page.getByRole('button', { name: /^Take the posture/ }).nth(reached).click();
+  await page
+    .getByRole('button', { name: /^Take the posture/ })
+    .nth(reached)
+    .click();
   const at = await page.evaluate((index) => {
     const { explore } = NB.current;
     const { guide } = NB.current.page.scene;
     const flange = NB.forward(explore.chain(), explore.joints)[6];
     const exit = flange.multiply(NB.matrix(guide[1])).elements;
-    return { exit: [12, 13, 14].map((k) => exit[k]), wanted: NB.current.extra.guideExit.slice(0, 3), joints: explore.found[index].joints, taken: explore.joints };
+    return {
+      exit: [12, 13, 14].map((k) => exit[k]),
+      wanted: NB.current.extra.guideExit.slice(0, 3),
+      joints: explore.found[index].joints,
+      taken: explore.joints,
+    };
   }, reached);
   assert.deepEqual(at.taken, at.joints);
-  at.exit.forEach((value, k) => assert.ok(Math.abs(value - at.wanted[k]) < 1e-6, `the guide is at ${at.exit}, not ${at.wanted}`));
+  at.exit.forEach((value, k) =>
+    assert.ok(Math.abs(value - at.wanted[k]) < 1e-6, `the guide is at ${at.exit}, not ${at.wanted}`),
+  );
 }
 
 /** Nothing of the run is shown meanwhile, and all of it afterwards. */
 async function testLeaving(page) {
   assert.ok(await page.locator('.tried-sign').isVisible());
-  const shown = () => page.evaluate(() => ['arm', 'witness', 'ellipsoids', 'cone'].filter((name) => NB.current.view.group(name).visible));
+  const shown = () =>
+    page.evaluate(() => ['arm', 'witness', 'ellipsoids', 'cone'].filter((name) => NB.current.view.group(name).visible));
   assert.deepEqual(await shown(), []);
   const layer = page.locator('[aria-label="Parts of the picture"] input').first();
   await layer.click();
@@ -230,16 +290,24 @@ for (let k = 0; k < words.length; k += 2) {
   const name = `explore-${basename(scenario, '.toml')}`;
   const running = await launch(SOFTWARE_GL);
   const { page, problems } = await open(running, file);
-  const brought = await page.evaluate(() => ['code', 'scene'].map((part) => [...NB.array(NB.current.page.explore[part])]));
-  const [code, scene] = brought.map((bytes) => Math.ceil(deflateSync(Uint8Array.from(bytes)).length * 4 / 3));
+  const brought = await page.evaluate(() =>
+    ['code', 'scene'].map((part) => [...NB.array(NB.current.page.explore[part])]),
+  );
+  const [code, scene] = brought.map((bytes) => Math.ceil((deflateSync(Uint8Array.from(bytes)).length * 4) / 3));
   assert.ok(code + scene <= MOST_BYTES, `code and scene add ${code + scene} bytes to the page`);
-  const picture = () => page.evaluate(() => { NB.current.view.render(); return NB.current.view.renderer.domElement.toDataURL(); });
+  const picture = () =>
+    page.evaluate(() => {
+      NB.current.view.render();
+      return NB.current.view.renderer.domElement.toDataURL();
+    });
   await page.evaluate(() => NB.current.seek(NB.current.end / 2));
   const before = await picture();
   await page.getByRole('button', { name: 'Try a posture' }).click();
   await page.waitForSelector('.view.trying');
   const { worst, count } = await differ(page, postures(scenario, POSTURES));
-  console.log(`${name}: ${count} distances of ${POSTURES} postures, largest difference ${worst.toExponential(1)} m; in the page, code takes ${(code / 1e3).toFixed(0)} kB and the scene ${(scene / 1e3).toFixed(0)} kB`);
+  console.log(
+    `${name}: ${count} distances of ${POSTURES} postures, largest difference ${worst.toExponential(1)} m; in the page, code takes ${(code / 1e3).toFixed(0)} kB and the scene ${(scene / 1e3).toFixed(0)} kB`,
+  );
   await testJoints(page, scenario);
   await page.screenshot({ path: `${out}/${name}.png` });
   await page.locator('.explore').screenshot({ path: `${out}/${name}-panel.png` });
@@ -256,16 +324,24 @@ for (let k = 0; k < words.length; k += 2) {
       computed.push(explore.computedInMs);
       whole.push(explore.evaluatedInMs);
     }
-    for (let k = 0; k < 5; k++) { explore.showReach(NB.Explore.ROLLS, true); reached.push(explore.reachedInMs); }
+    for (let k = 0; k < 5; k++) {
+      explore.showReach(NB.Explore.ROLLS, true);
+      reached.push(explore.reachedInMs);
+    }
     const median = (list) => Math.round(100 * list.sort((a, b) => a - b)[list.length >> 1]) / 100;
     return { computed: median(computed), whole: median(whole), reached: median(reached) };
   });
-  console.log(`  ms: all pairs ${times.computed}, with table and picture ${times.whole}, eight configurations at ${await page.evaluate(() => NB.Explore.ROLLS)} rolls ${times.reached}`);
+  console.log(
+    `  ms: all pairs ${times.computed}, with table and picture ${times.whole}, eight configurations at ${await page.evaluate(() => NB.Explore.ROLLS)} rolls ${times.reached}`,
+  );
   assert.ok(times.computed <= COMPUTED_MS, `one posture takes ${times.computed} ms`);
   await testLeaving(page);
-  await page.evaluate(() => { NB.current.seek(NB.current.end / 2); NB.current.view.reset(); });
+  await page.evaluate(() => {
+    NB.current.seek(NB.current.end / 2);
+    NB.current.view.reset();
+  });
   await settle(page);
-  assert.ok(await picture() === before, 'the run looks otherwise after trying a posture');
+  assert.ok((await picture()) === before, 'the run looks otherwise after trying a posture');
   await page.setViewportSize({ width: 390, height: 844 });
   await page.getByRole('button', { name: 'Try a posture' }).click();
   await page.waitForSelector('.view.trying');
@@ -280,7 +356,9 @@ for (let k = 0; k < words.length; k += 2) {
   await flat.page.waitForSelector('.explore table');
   await testCommand(flat.page, scenario);
   assert.deepEqual(flat.problems, []);
-  const old = await open(without, file, undefined, () => { delete window.WebAssembly; });
+  const old = await open(without, file, undefined, () => {
+    delete window.WebAssembly;
+  });
   await old.page.getByRole('button', { name: 'Try a posture' }).click();
   const said = await old.page.locator('.explore [role=status]').first().textContent();
   assert.ok(said.includes('no WebAssembly') && said.includes('needlebench clearance'), said);

@@ -11,14 +11,18 @@ const text = (page, selector) => page.locator(selector).first().textContent();
 export async function testNearest(page, settle) {
   const times = await page.evaluate(() => [0, 0.31, 0.77, 1].map((share) => share * NB.current.end));
   for (const time of times) {
-    await page.evaluate((seconds) => { NB.current.pause(); NB.current.seek(seconds); }, time);
+    await page.evaluate((seconds) => {
+      NB.current.pause();
+      NB.current.seek(seconds);
+    }, time);
     await settle(page);
     const { shown, label, least } = await page.evaluate(() => {
       const run = NB.current;
       const { curveTime, curves } = run.decode(run.shown[0]);
       const around = curves.filter(([name]) => run.page.classesAround.includes(name));
       return {
-        shown: run.now.textContent, least: Math.min(...around.map(([, y]) => NB.at(curveTime, y, run.time))),
+        shown: run.now.textContent,
+        least: Math.min(...around.map(([, y]) => NB.at(curveTime, y, run.time))),
         label: run.view.labels.filter((each) => each.layer === 'witness').map((each) => each.element.textContent),
       };
     });
@@ -32,10 +36,14 @@ export async function testNearest(page, settle) {
   // A row of the table: the least of its class, at its time and only there.
   const row = page.locator('.panel .choose').nth(1).locator('tbody tr').first();
   await row.click();
-  const pinned = await page.evaluate(() => NB.current.view.labels.find((each) => each.layer === 'witness').element.textContent);
+  const pinned = await page.evaluate(
+    () => NB.current.view.labels.find((each) => each.layer === 'witness').element.textContent,
+  );
   assert.match(pinned, /^least /);
   await page.evaluate(() => NB.current.seek(NB.current.time > 0.5 ? NB.current.time - 0.5 : NB.current.time + 0.5));
-  const moved = await page.evaluate(() => NB.current.view.labels.find((each) => each.layer === 'witness').element.textContent);
+  const moved = await page.evaluate(
+    () => NB.current.view.labels.find((each) => each.layer === 'witness').element.textContent,
+  );
   assert.doesNotMatch(moved, /^least /);
 }
 
@@ -44,7 +52,9 @@ export async function testGhosts(page, settle) {
   await page.getByRole('button', { name: 'All as ghosts' }).click();
   await settle(page);
   const { labels, expected, colors } = await page.evaluate(() => ({
-    labels: NB.current.view.labels.filter((each) => each.layer === 'ghost labels').map((each) => each.element.textContent),
+    labels: NB.current.view.labels
+      .filter((each) => each.layer === 'ghost labels')
+      .map((each) => each.element.textContent),
     expected: NB.current.goal.configurations.filter((each) => each.joints_rad).map((each) => each.label),
     colors: [...new Set(NB.ghostColors)].length,
   }));
@@ -63,17 +73,27 @@ export async function testAddress(page, settle) {
     run.seek(1);
     return { goal: run.goal.name, configuration: run.configuration.label, time: '1.00' };
   });
-  const stands = (choices) => JSON.stringify(Object.fromEntries([...new URLSearchParams(location.hash.slice(1))].sort())) === JSON.stringify(choices);
+  const stands = (choices) =>
+    JSON.stringify(Object.fromEntries([...new URLSearchParams(location.hash.slice(1))].sort())) ===
+    JSON.stringify(choices);
   await page.waitForFunction(stands, Object.fromEntries(Object.entries(wanted).sort()));
   await page.reload();
   await page.waitForSelector('html[data-ready]');
-  const after = await page.evaluate(() => ({ goal: NB.current.goal.name, configuration: NB.current.configuration.label, time: NB.current.time.toFixed(2) }));
+  const after = await page.evaluate(() => ({
+    goal: NB.current.goal.name,
+    configuration: NB.current.configuration.label,
+    time: NB.current.time.toFixed(2),
+  }));
   assert.deepEqual(after, wanted);
   // Another address in the open page, and one that asks for what there is not.
-  await page.evaluate(() => { location.hash = `#goal=${NB.current.report.goals[0].name}`; });
+  await page.evaluate(() => {
+    location.hash = `#goal=${NB.current.report.goals[0].name}`;
+  });
   await settle(page);
   assert.equal(await page.evaluate(() => NB.current.goalIndex), 0);
-  await page.evaluate(() => { location.hash = '#goal=nowhere&configuration=None&time=abc'; });
+  await page.evaluate(() => {
+    location.hash = '#goal=nowhere&configuration=None&time=abc';
+  });
   await settle(page);
   assert.equal(await page.evaluate(() => NB.current.goalIndex), 0);
 }
@@ -81,7 +101,10 @@ export async function testAddress(page, settle) {
 /** Figures are saved as SVG for a column of 85 mm, and the view as PNG. */
 export async function testSaving(page) {
   const save = async (name) => {
-    const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('button', { name, exact: true }).first().click()]);
+    const [download] = await Promise.all([
+      page.waitForEvent('download'),
+      page.getByRole('button', { name, exact: true }).first().click(),
+    ]);
     return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
   };
   const curves = await save('Clearance over time: save as SVG');
@@ -95,11 +118,17 @@ export async function testSaving(page) {
 
 /** Every chart of the program is drawn, and fits its frame. */
 export async function testCharts(page) {
-  await page.evaluate(() => { for (const each of document.querySelectorAll('details')) each.open = true; });
-  const charts = await page.evaluate(() => Promise.all([...document.querySelectorAll('.chart img')].map(async (image) => {
-    await image.decode();
-    return [image.alt, image.naturalWidth];
-  })));
+  await page.evaluate(() => {
+    for (const each of document.querySelectorAll('details')) each.open = true;
+  });
+  const charts = await page.evaluate(() =>
+    Promise.all(
+      [...document.querySelectorAll('.chart img')].map(async (image) => {
+        await image.decode();
+        return [image.alt, image.naturalWidth];
+      }),
+    ),
+  );
   for (const [title, width] of charts) assert.ok(title && width > 100, `${title} is not drawn`);
   return charts.map(([title]) => title);
 }
@@ -123,10 +152,13 @@ export async function testEvents(page) {
   if (!asked) return;
   for (const title of ['Contacts that were asked for', 'Emergency stop', 'Way back']) {
     const table = page.locator('h3', { hasText: title }).locator('xpath=following-sibling::div[1]//tbody/tr');
-    assert.ok(await table.count() > 0, `${title}: nothing`);
+    assert.ok((await table.count()) > 0, `${title}: nothing`);
   }
   const charts = await testCharts(page);
-  assert.ok(charts.some((title) => title.includes('contact 1')), 'no chart of a contact');
+  assert.ok(
+    charts.some((title) => title.includes('contact 1')),
+    'no chart of a contact',
+  );
 }
 
 /** Sheets of a PDF file. */

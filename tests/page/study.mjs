@@ -11,9 +11,14 @@ async function answerFirst(page) {
     const answer = document.querySelector('#app .answer');
     const plots = [...document.querySelectorAll('#app .plot')];
     return {
-      sentence: answer?.querySelector('.sentence')?.textContent, wanted: NB.current.summary.answer.sentence, bottom: answer?.getBoundingClientRect().bottom,
+      sentence: answer?.querySelector('.sentence')?.textContent,
+      wanted: NB.current.summary.answer.sentence,
+      bottom: answer?.getBoundingClientRect().bottom,
       before: plots.every((plot) => answer.compareDocumentPosition(plot) & Node.DOCUMENT_POSITION_FOLLOWING),
-      criteria: NB.current.summary.criteria.length, cells: [...document.querySelectorAll('.criteria tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent)),
+      criteria: NB.current.summary.criteria.length,
+      cells: [...document.querySelectorAll('.criteria tbody tr')].map((row) =>
+        [...row.children].map((cell) => cell.textContent),
+      ),
       choices: NB.current.summary.choices ? NB.current.compared?.title : 'none',
     };
   });
@@ -24,19 +29,29 @@ async function answerFirst(page) {
   assert.equal(found.cells.length, found.criteria);
   for (const [criterion, met, ...rest] of found.cells) {
     assert.match(met, /met|missed|not judged/, `${criterion} has no verdict`);
-    assert.ok(rest.some((text) => /\d.*\(.* to .*\)/.test(text)), `${criterion} has no value with its interval`);
-    assert.ok(rest.some((text) => /^[\u2264\u2265] \d/.test(text)), `${criterion} has no limit`);
+    assert.ok(
+      rest.some((text) => /\d.*\(.* to .*\)/.test(text)),
+      `${criterion} has no value with its interval`,
+    );
+    assert.ok(
+      rest.some((text) => /^[\u2264\u2265] \d/.test(text)),
+      `${criterion} has no limit`,
+    );
   }
 }
 
 /** No number with a power of ten, and no section that is named after a key. */
 async function readable(page) {
   const { text, titles } = await page.evaluate(() => ({
-    text: [...document.querySelectorAll('#app .panel, #app table')].filter((each) => !each.closest('dl')).map((each) => each.textContent).join('\n'),
+    text: [...document.querySelectorAll('#app .panel, #app table')]
+      .filter((each) => !each.closest('dl'))
+      .map((each) => each.textContent)
+      .join('\n'),
     titles: [...document.querySelectorAll('h2')].map((each) => each.textContent),
   }));
   assert.deepEqual(text.match(/\d(\.\d+)?e[-\u2212]\d+/g) || [], [], 'numbers that people cannot read');
-  for (const name of ['study id', 'repeats', 'sampling', 'cases', 'name', 'description']) assert.ok(!titles.includes(name), `a section is called "${name}"`);
+  for (const name of ['study id', 'repeats', 'sampling', 'cases', 'name', 'description'])
+    assert.ok(!titles.includes(name), `a section is called "${name}"`);
 }
 
 /** The picture of a case has the tool of that case, and no other. */
@@ -54,19 +69,29 @@ async function ownTool(page) {
       const { scene, view } = NB.current;
       const seen = scene.looks.tools.map((_, at) => {
         const before = [];
-        view.world.traverse((mesh) => { if (mesh.isMesh) before.push(mesh.visible); });
+        view.world.traverse((mesh) => {
+          if (mesh.isMesh) before.push(mesh.visible);
+        });
         scene.arm.layer(`tool@${at}`, false);
         const after = [];
-        view.world.traverse((mesh) => { if (mesh.isMesh) after.push(mesh.visible); });
+        view.world.traverse((mesh) => {
+          if (mesh.isMesh) after.push(mesh.visible);
+        });
         const shown = before.some((each, k) => each && !after[k]);
         let k = 0;
-        view.world.traverse((mesh) => { if (mesh.isMesh) mesh.visible = before[k++]; });
+        view.world.traverse((mesh) => {
+          if (mesh.isMesh) mesh.visible = before[k++];
+        });
         return shown;
       });
       view.render();
       return { seen, picture: view.renderer.domElement.toDataURL() };
     });
-    assert.deepEqual(seen, seen.map((_, at) => at === tool), `case ${index} has another tool`);
+    assert.deepEqual(
+      seen,
+      seen.map((_, at) => at === tool),
+      `case ${index} has another tool`,
+    );
     pictures.add(picture);
   }
   assert.equal(pictures.size, cases.length, 'cases with different tools look the same');
@@ -75,10 +100,14 @@ async function ownTool(page) {
 
 /** Cases of one place are one mark, which says how many work. */
 async function sharesOfPlaces(page) {
-  await page.evaluate(() => { NB.before = { ...NB.current.state }; });
+  await page.evaluate(() => {
+    NB.before = { ...NB.current.state };
+  });
   const found = await page.evaluate(() => {
     const study = NB.current;
-    const levels = study.factors.map((factor, index) => index).filter((index) => study.factors[index].levels?.length > 1);
+    const levels = study.factors
+      .map((factor, index) => index)
+      .filter((index) => study.factors[index].levels?.length > 1);
     study.state.x = levels[0];
     study.state.y = levels[1] ?? levels[0];
     study.state.filters = new Map();
@@ -91,14 +120,16 @@ async function sharesOfPlaces(page) {
     const context = study.scatter.canvas.canvas.getContext('2d');
     return first.map((_, place) => {
       let working = 0;
-      study.indices.forEach((index, at) => { if (of[at] === place && study.outcome(index) === 'ok') working++; });
+      study.indices.forEach((index, at) => {
+        if (of[at] === place && study.outcome(index) === 'ok') working++;
+      });
       const radius = study.radius(counts[place], study.places().most, study.scatter.canvas.canvas.clientWidth);
       const [x, y] = [axes.px(study.places().x[place]), axes.py(study.places().y[place])];
       const box = [x - radius, y - radius, 2 * radius, 2 * radius].map((value) => Math.round(value * ratio));
       const { data } = context.getImageData(...box);
       let [blue, all] = [0, 0];
       for (let k = 0; k < data.length; k += 4) {
-        const [px, py] = [(k / 4) % box[2] - box[2] / 2, Math.floor(k / 4 / box[2]) - box[3] / 2];
+        const [px, py] = [((k / 4) % box[2]) - box[2] / 2, Math.floor(k / 4 / box[2]) - box[3] / 2];
         if (Math.hypot(px, py) > box[2] / 2 - 2) continue;
         all++;
         if (data[k] < 60 && data[k + 2] > 140) blue++;
@@ -110,7 +141,11 @@ async function sharesOfPlaces(page) {
     assert.ok(grid);
     assert.ok(Math.abs(share - drawn) < 0.08, `a place in which ${share} work is drawn as ${drawn}`);
   }
-  await page.evaluate(() => { Object.assign(NB.current.state, NB.before); NB.current.filter(); NB.current.redraw(); });
+  await page.evaluate(() => {
+    Object.assign(NB.current.state, NB.before);
+    NB.current.filter();
+    NB.current.redraw();
+  });
   return found.length;
 }
 
@@ -123,8 +158,12 @@ async function figures(page) {
       const document = new DOMParser().parseFromString(figure.svg(), 'image/svg+xml');
       const texts = [...document.querySelectorAll('text')];
       return {
-        fails: document.querySelector('parsererror')?.textContent, width: document.documentElement.getAttribute('width'), box: document.documentElement.getAttribute('viewBox').split(' ').map(Number),
-        sizes: [...new Set(texts.map((text) => Number(text.getAttribute('font-size'))))], texts: texts.map((text) => text.textContent), shapes: document.querySelectorAll('path').length,
+        fails: document.querySelector('parsererror')?.textContent,
+        width: document.documentElement.getAttribute('width'),
+        box: document.documentElement.getAttribute('viewBox').split(' ').map(Number),
+        sizes: [...new Set(texts.map((text) => Number(text.getAttribute('font-size'))))],
+        texts: texts.map((text) => text.textContent),
+        shapes: document.querySelectorAll('path').length,
       };
     }, which);
     if (!found) continue;
@@ -148,21 +187,42 @@ async function addresses(page) {
     study.choose(index, 3);
     return study.caseOf(index);
   });
-  await page.waitForFunction((number) => new URLSearchParams(location.hash.slice(1)).get('case') === String(number), wanted);
+  await page.waitForFunction(
+    (number) => new URLSearchParams(location.hash.slice(1)).get('case') === String(number),
+    wanted,
+  );
   const [factor, axis] = await page.evaluate(() => {
     const { factors, state } = NB.current;
     const other = factors.findIndex((each, index) => !each.levels && index !== state.x);
     return [factors.find((each) => each.levels && each.levels.length > 1), factors[other].name];
   });
   const level = factor.levels[1].label;
-  await page.evaluate((hash) => { location.hash = hash; }, `#${new URLSearchParams({ case: '7', y: axis, of: 'Left-Up-Fold', colour: 'working', [`with.${factor.name}`]: level })}`);
+  await page.evaluate(
+    (hash) => {
+      location.hash = hash;
+    },
+    `#${new URLSearchParams({ case: '7', y: axis, of: 'Left-Up-Fold', colour: 'working', [`with.${factor.name}`]: level })}`,
+  );
   await page.waitForFunction(() => NB.current.caseOf(NB.current.chosen) === 7);
   const shown = await page.evaluate(() => {
-    const { state, factors, page: { configurations } } = NB.current;
-    return { y: factors[state.y].name, of: configurations[state.configuration], colour: state.color, filters: [...state.filters], selects: NB.current.kept.map(([control, value]) => control.querySelector('select').value === value()) };
+    const {
+      state,
+      factors,
+      page: { configurations },
+    } = NB.current;
+    return {
+      y: factors[state.y].name,
+      of: configurations[state.configuration],
+      colour: state.color,
+      filters: [...state.filters],
+      selects: NB.current.kept.map(([control, value]) => control.querySelector('select').value === value()),
+    };
   });
   assert.deepEqual([shown.y, shown.of, shown.colour], [axis, 'Left-Up-Fold', 'working']);
-  assert.ok(shown.filters.some(([, at]) => at === 1), 'a filter of the address is not kept');
+  assert.ok(
+    shown.filters.some(([, at]) => at === 1),
+    'a filter of the address is not kept',
+  );
   assert.ok(shown.selects.every(Boolean), 'lists show something else than the plots');
 }
 
@@ -171,18 +231,28 @@ export async function testStudy(page, judge, name, { notBlank, settle, out }) {
   await answerFirst(page);
   await readable(page);
   for (const which of FIGURES) {
-    const index = await page.evaluate((each) => [...document.querySelectorAll('.plot canvas')].indexOf(NB.current[each].canvas.canvas), which);
+    const index = await page.evaluate(
+      (each) => [...document.querySelectorAll('.plot canvas')].indexOf(NB.current[each].canvas.canvas),
+      which,
+    );
     const handle = page.locator('.plot canvas').nth(index);
     await handle.scrollIntoViewIfNeeded();
     await settle(page);
     await notBlank(judge, handle, which, which === 'histogram' ? 5 : 12);
   }
-  const times = await page.evaluate((names) => names.map((which) => {
-    const figure = NB.current[which];
-    const runs = [];
-    for (let k = 0; k < 7; k++) { figure.render(); runs.push(figure.paintedInMs); }
-    return [which, Math.round(runs.sort((a, b) => a - b)[3] * 10) / 10];
-  }), FIGURES);
+  const times = await page.evaluate(
+    (names) =>
+      names.map((which) => {
+        const figure = NB.current[which];
+        const runs = [];
+        for (let k = 0; k < 7; k++) {
+          figure.render();
+          runs.push(figure.paintedInMs);
+        }
+        return [which, Math.round(runs.sort((a, b) => a - b)[3] * 10) / 10];
+      }),
+    FIGURES,
+  );
   console.log(`  redraws, ms: ${times.map((each) => each.join(' ')).join(', ')}`);
   for (const [which, ms] of times) assert.ok(ms < REDRAW_MS, `${which} takes ${ms} ms`);
   console.log(`  ${await ownTool(page)} tools drawn, ${await sharesOfPlaces(page)} places with their shares`);
@@ -207,7 +277,10 @@ export async function testStudy(page, judge, name, { notBlank, settle, out }) {
   // Every choice of every list draws without errors.
   for (const select of await page.locator('select').all()) {
     const values = await select.locator('option').evaluateAll((options) => options.map((option) => option.value));
-    for (const value of values) { await select.selectOption(value); await settle(page); }
+    for (const value of values) {
+      await select.selectOption(value);
+      await settle(page);
+    }
     await select.selectOption(values[0]);
   }
   const map = await page.evaluate(() => {
@@ -217,9 +290,9 @@ export async function testStudy(page, judge, name, { notBlank, settle, out }) {
   });
   await page.mouse.click(...map);
   const listed = page.locator('.explore .legend button.key');
-  assert.ok(await listed.count() > 0, 'a cell of the map lists no cases');
+  assert.ok((await listed.count()) > 0, 'a cell of the map lists no cases');
   await listed.first().focus();
   await page.keyboard.press('ArrowRight');
-  assert.ok(await page.evaluate(() => NB.current.chosen) >= 0);
+  assert.ok((await page.evaluate(() => NB.current.chosen)) >= 0);
   await page.screenshot({ path: `${out}/${name}-map.png` });
 }

@@ -13,7 +13,17 @@ import { pathToFileURL } from 'node:url';
 import { NO_GL, SOFTWARE_GL, launch } from './browser.mjs';
 import { testLayout } from './layout.mjs';
 import { testNumbers } from './numbers.mjs';
-import { MOST_SHEETS, sheets, testAddress, testCharts, testEvents, testGhosts, testNearest, testPoses, testSaving } from './run.mjs';
+import {
+  MOST_SHEETS,
+  sheets,
+  testAddress,
+  testCharts,
+  testEvents,
+  testGhosts,
+  testNearest,
+  testPoses,
+  testSaving,
+} from './run.mjs';
 import { testStudy } from './study.mjs';
 
 // A study's hundred thousand cases take a moment to unpack.
@@ -32,9 +42,13 @@ async function open(running, file) {
   // Pictures are drawn in software, on machines that may have other things to do.
   page.setDefaultTimeout(120_000);
   const problems = [];
-  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`); });
+  page.on('console', (message) => {
+    if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`);
+  });
   page.on('pageerror', (error) => problems.push(error.message));
-  page.on('request', (request) => { if (!/^(file|data|blob):/.test(request.url())) problems.push(`asked for ${request.url()}`); });
+  page.on('request', (request) => {
+    if (!/^(file|data|blob):/.test(request.url())) problems.push(`asked for ${request.url()}`);
+  });
   await page.goto(pathToFileURL(file).href);
   await page.waitForSelector('html[data-ready]', { timeout: 60_000 });
   const timing = await page.evaluate(() => NB.timing.firstView ?? 0);
@@ -63,13 +77,17 @@ async function notBlank(judge, locator, name, least = 12) {
   assert.ok(count >= least && most < 0.97, `${name} is blank: ${count} colours, ${(100 * most).toFixed(1)} % of one`);
 }
 
-const settle = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
-const picture = async (page) => { await settle(page); return page.evaluate(() => NB.current.view.renderer.domElement.toDataURL()); };
+const settle = (page) =>
+  page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+const picture = async (page) => {
+  await settle(page);
+  return page.evaluate(() => NB.current.view.renderer.domElement.toDataURL());
+};
 
 /** Whether the picture becomes another one; it is drawn when there is time for it. */
 async function changes(page, before) {
   for (let look = 0; look < 50; look++) {
-    if (await picture(page) !== before) return true;
+    if ((await picture(page)) !== before) return true;
     await page.waitForTimeout(100);
   }
   return false;
@@ -77,7 +95,10 @@ async function changes(page, before) {
 
 /** Tab reaches every control, and shows where it is. */
 async function walk(page) {
-  await page.evaluate(() => { window.scrollTo(0, 0); document.activeElement?.blur?.(); });
+  await page.evaluate(() => {
+    window.scrollTo(0, 0);
+    document.activeElement?.blur?.();
+  });
   const seen = new Set();
   for (let step = 0; step < 400; step++) {
     await page.keyboard.press('Tab');
@@ -86,7 +107,12 @@ async function walk(page) {
       if (!element || element === document.body) return null;
       element.dataset.walked ||= String(document.querySelectorAll('[data-walked]').length);
       const style = getComputedStyle(element);
-      return { id: element.dataset.walked, tag: element.tagName, ring: element.matches(':focus-visible') ? style.outlineStyle !== 'none' : false, name: element.getAttribute('aria-label') || element.textContent || element.closest('label')?.textContent || '' };
+      return {
+        id: element.dataset.walked,
+        tag: element.tagName,
+        ring: element.matches(':focus-visible') ? style.outlineStyle !== 'none' : false,
+        name: element.getAttribute('aria-label') || element.textContent || element.closest('label')?.textContent || '',
+      };
     });
     if (!found) break;
     if (seen.has(found.id)) break;
@@ -94,18 +120,30 @@ async function walk(page) {
     assert.ok(found.ring, `${found.tag} shows no focus: ${found.name.slice(0, 40)}`);
     assert.ok(found.name.trim(), `${found.tag} has no name`);
   }
-  const missed = await page.evaluate(() => [...document.querySelectorAll('button, select, input, summary, [tabindex="0"]')]
-    .filter((element) => element.checkVisibility({ contentVisibilityAuto: true, visibilityProperty: true }) && !element.disabled && element.tabIndex >= 0 && !element.dataset.walked)
-    .map((element) => element.outerHTML.slice(0, 100)));
+  const missed = await page.evaluate(() =>
+    [...document.querySelectorAll('button, select, input, summary, [tabindex="0"]')]
+      .filter(
+        (element) =>
+          element.checkVisibility({ contentVisibilityAuto: true, visibilityProperty: true }) &&
+          !element.disabled &&
+          element.tabIndex >= 0 &&
+          !element.dataset.walked,
+      )
+      .map((element) => element.outerHTML.slice(0, 100)),
+  );
   assert.deepEqual(missed, [], 'the keyboard does not reach everything');
   return seen.size;
 }
 
 /** Switches every checkbox under "Show" there and back: the picture has to change and to come back. */
 async function toggles(page) {
-  const labels = await page.evaluate(() => [...document.querySelectorAll('[aria-label="Parts of the picture"] .check')].map((label) => label.textContent));
+  const labels = await page.evaluate(() =>
+    [...document.querySelectorAll('[aria-label="Parts of the picture"] .check')].map((label) => label.textContent),
+  );
   for (const text of labels) {
-    const box = page.locator('[aria-label="Parts of the picture"] .check', { hasText: new RegExp(`^${text}$`) }).locator('input');
+    const box = page
+      .locator('[aria-label="Parts of the picture"] .check', { hasText: new RegExp(`^${text}$`) })
+      .locator('input');
     const before = await picture(page);
     await box.click();
     const changed = await picture(page);
@@ -122,12 +160,14 @@ async function testRun(page, judge, name) {
   const worst = await page.evaluate(() => {
     const { page: data, report } = NB.current;
     let most = 0;
-    report.goals.forEach((goal, g) => goal.configurations.forEach((configuration, c) => {
-      const { flange } = data.goals[g].configurations[c];
-      if (!flange) return;
-      const pose = NB.forward(data.scene.chain, configuration.joints_rad)[6].elements;
-      for (let k = 0; k < 3; k++) most = Math.max(most, Math.abs(pose[12 + k] - flange[k]));
-    }));
+    report.goals.forEach((goal, g) =>
+      goal.configurations.forEach((configuration, c) => {
+        const { flange } = data.goals[g].configurations[c];
+        if (!flange) return;
+        const pose = NB.forward(data.scene.chain, configuration.joints_rad)[6].elements;
+        for (let k = 0; k < 3; k++) most = Math.max(most, Math.abs(pose[12 + k] - flange[k]));
+      }),
+    );
     return most;
   });
   assert.ok(worst < 1e-9, `flange off by ${worst} m`);
@@ -156,12 +196,16 @@ async function testRun(page, judge, name) {
   await rows.nth(3).locator('input').click();
 
   // Replay.
-  const playable = await page.evaluate(() => NB.current.goal.configurations.findIndex((_, c) => NB.current.extra.configurations[c].runs.length > 0));
+  const playable = await page.evaluate(() =>
+    NB.current.goal.configurations.findIndex((_, c) => NB.current.extra.configurations[c].runs.length > 0),
+  );
   await page.evaluate((index) => NB.current.setConfiguration(index), playable);
   const end = await page.evaluate(() => NB.current.end);
   const still = await picture(page);
   await page.getByRole('button', { name: 'Play' }).click();
-  await page.waitForFunction(() => NB.current.time > 0.5 && NB.current.time < NB.current.end - 0.1, null, { timeout: 30_000 });
+  await page.waitForFunction(() => NB.current.time > 0.5 && NB.current.time < NB.current.end - 0.1, null, {
+    timeout: 30_000,
+  });
   await page.getByRole('button', { name: 'Pause' }).click();
   const paused = await page.evaluate(() => NB.current.time);
   assert.ok(paused > 0.4 && paused < end);
@@ -169,7 +213,7 @@ async function testRun(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-replay.png` });
   await page.locator('.replay input[type=range]').focus();
   await page.keyboard.press('ArrowLeft');
-  assert.ok(await page.evaluate(() => NB.current.time) < paused, 'the arrow key does not move the time');
+  assert.ok((await page.evaluate(() => NB.current.time)) < paused, 'the arrow key does not move the time');
   const curves = page.locator('.curves .plot canvas');
   await curves.evaluate((element) => element.scrollIntoView({ block: 'center' }));
   await settle(page);
@@ -190,8 +234,12 @@ async function testRun(page, judge, name) {
     await page.locator('[aria-label=Goal] button').nth(goal).click();
     for (let row = 0; row < 8; row++) await rows.nth(row).click();
   }
-  await page.evaluate(() => { NB.current.view.look([0.4, 0.9, -0.5], 3.2); window.scrollTo(0, 0); });
-  for (const text of ['people and sight', 'free space', 'cone for the hand']) await page.locator('.check', { hasText: text }).locator('input').click();
+  await page.evaluate(() => {
+    NB.current.view.look([0.4, 0.9, -0.5], 3.2);
+    window.scrollTo(0, 0);
+  });
+  for (const text of ['people and sight', 'free space', 'cone for the hand'])
+    await page.locator('.check', { hasText: text }).locator('input').click();
   await page.evaluate(() => window.scrollTo(0, 0));
   await settle(page);
   await page.screenshot({ path: `${out}/${name}-room.png` });
@@ -202,12 +250,25 @@ async function testAtlas(page, judge, name) {
   await notBlank(judge, page.locator('.plot canvas').nth(0), 'the strips');
   await notBlank(judge, page.locator('.plot canvas').nth(1), 'the curves');
   await testNumbers(page);
-  const asked = await page.evaluate(() => ({ goal: NB.current.page.goals.at(-1).name, configuration: NB.current.goal.branches[2].label, roll: '90' }));
-  await page.evaluate((choices) => { location.hash = `#${new URLSearchParams(choices)}`; }, asked);
+  const asked = await page.evaluate(() => ({
+    goal: NB.current.page.goals.at(-1).name,
+    configuration: NB.current.goal.branches[2].label,
+    roll: '90',
+  }));
+  await page.evaluate((choices) => {
+    location.hash = `#${new URLSearchParams(choices)}`;
+  }, asked);
   await page.waitForTimeout(300);
   await page.reload();
   await page.waitForSelector('html[data-ready]');
-  assert.deepEqual(await page.evaluate(() => ({ goal: NB.current.goal.name, configuration: NB.current.branch.label, roll: String(NB.current.roll) })), asked);
+  assert.deepEqual(
+    await page.evaluate(() => ({
+      goal: NB.current.goal.name,
+      configuration: NB.current.branch.label,
+      roll: String(NB.current.roll),
+    })),
+    asked,
+  );
   const legend = await page.locator('.curves .legend').first().textContent();
   assert.ok(legend.indexOf('works') < legend.indexOf('Rejected by:'), legend);
   // At a roll that works: elsewhere there may be no posture to move.
@@ -231,19 +292,28 @@ async function testAtlas(page, judge, name) {
 /** The answer stands first with its interval, every choice has its figure, and placements are pictures. */
 async function testSearch(page, judge, name) {
   const found = await page.evaluate(() => ({
-    sentence: document.querySelector('#app .answer .sentence')?.textContent, stray: document.querySelector('#app').innerText.includes('null'),
-    figures: [...document.querySelectorAll('#app .points h3')].map((each) => each.textContent), factors: NB.current.page.factors.map((each) => each.words),
-    pictures: document.querySelectorAll('.placements img').length, wanted: NB.current.page.pictures.length,
-    winner: NB.current.answer.winner, equals: NB.current.answer.equals, fresh: NB.current.answer.figures[0].cases,
+    sentence: document.querySelector('#app .answer .sentence')?.textContent,
+    stray: document.querySelector('#app').innerText.includes('null'),
+    figures: [...document.querySelectorAll('#app .points h3')].map((each) => each.textContent),
+    factors: NB.current.page.factors.map((each) => each.words),
+    pictures: document.querySelectorAll('.placements img').length,
+    wanted: NB.current.page.pictures.length,
+    winner: NB.current.answer.winner,
+    equals: NB.current.answer.equals,
+    fresh: NB.current.answer.figures[0].cases,
   }));
-  assert.match(found.sentence, /(interval|sure)\b.*on \d+ layouts that nothing was compared by/, 'the answer has no figure with an interval');
+  assert.match(
+    found.sentence,
+    /(interval|sure)\b.*on \d+ layouts that nothing was compared by/,
+    'the answer has no figure with an interval',
+  );
   assert.ok(found.sentence.includes(`${found.fresh} layouts`));
   assert.ok(!found.stray, 'something says null');
   for (const words of found.factors) assert.ok(found.figures.includes(words), `no figure of ${words}`);
   assert.ok(found.equals.includes(found.winner));
   assert.equal(found.pictures, found.wanted);
   const plots = page.locator('#app .points .plot canvas');
-  for (let at = 0; at < await plots.count(); at++) {
+  for (let at = 0; at < (await plots.count()); at++) {
     await plots.nth(at).scrollIntoViewIfNeeded();
     await settle(page);
     await notBlank(judge, plots.nth(at), `figure ${at}`);
@@ -253,7 +323,13 @@ async function testSearch(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-all.png`, fullPage: true });
 }
 
-const tests = { run: testRun, search: testSearch, atlas: testAtlas, study: (page, judge, name) => testStudy(page, judge, name, { notBlank, settle, out }), replay: async () => {} };
+const tests = {
+  run: testRun,
+  search: testSearch,
+  atlas: testAtlas,
+  study: (page, judge, name) => testStudy(page, judge, name, { notBlank, settle, out }),
+  replay: async () => {},
+};
 
 for (const given of words) {
   const file = resolve(given);
@@ -290,7 +366,10 @@ for (const given of words) {
   if (kind === 'run') assert.ok(count >= 1 && count <= MOST_SHEETS, `${count} sheets of paper`);
   if (await page.locator('.view').count()) {
     await page.emulateMedia({ media: 'print' });
-    assert.ok(await page.evaluate(() => document.querySelector('.view-image').src.startsWith('data:image/png')), 'no picture for paper');
+    assert.ok(
+      await page.evaluate(() => document.querySelector('.view-image').src.startsWith('data:image/png')),
+      'no picture for paper',
+    );
     assert.equal(await page.locator('.view canvas').isVisible(), false);
     assert.equal(await page.locator('.no-print').first().isVisible(), false);
     await page.screenshot({ path: `${out}/${name}-paper.png`, fullPage: true });
@@ -306,7 +385,8 @@ for (const given of words) {
     const rows = without.page.locator('.choose').first().locator('tbody tr');
     if (await rows.count()) await rows.nth(1).click();
   }
-  if (await without.page.locator('.plot canvas').count()) await notBlank(await plain.newPage(), without.page.locator('.plot canvas').first(), 'a plot without WebGL');
+  if (await without.page.locator('.plot canvas').count())
+    await notBlank(await plain.newPage(), without.page.locator('.plot canvas').first(), 'a plot without WebGL');
   await without.page.screenshot({ path: `${out}/${name}-no-webgl.png` });
   assert.deepEqual(without.problems, []);
   await plain.close();

@@ -23,7 +23,9 @@ PLAN.fetch = async function (path, options = {}) {
   try {
     response = await fetch(`/api/${path}`, {
       method: options.method || (options.body === undefined ? 'GET' : 'POST'),
-      headers, body: options.body === undefined ? undefined : JSON.stringify(options.body), cache: 'no-store',
+      headers,
+      body: options.body === undefined ? undefined : JSON.stringify(options.body),
+      cache: 'no-store',
     });
   } catch {
     throw new PLAN.Problem(0, {
@@ -33,7 +35,11 @@ PLAN.fetch = async function (path, options = {}) {
   }
   if (!response.ok) {
     let body = {};
-    try { body = await response.json(); } catch { /* no sentence */ }
+    try {
+      body = await response.json();
+    } catch {
+      /* no sentence */
+    }
     throw new PLAN.Problem(response.status, body);
   }
   return response;
@@ -57,7 +63,10 @@ PLAN.Latest = class {
   }
 
   /** What is on its way does not count any more. */
-  forget() { this.turn++; this.next = null; }
+  forget() {
+    this.turn++;
+    this.next = null;
+  }
 
   async work() {
     this.busy = true;
@@ -77,7 +86,9 @@ PLAN.Latest = class {
     this.busy = false;
   }
 };
-PLAN.page = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte.toString(16).padStart(2, '0')).join('');
+PLAN.page = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte.toString(16).padStart(2, '0')).join(
+  '',
+);
 
 /** A colour of three bytes. */
 PLAN.rgb = (channels) => `rgb(${channels.join()})`;

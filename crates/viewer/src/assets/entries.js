@@ -6,25 +6,47 @@ PLAN.EntryMap = class {
   constructor(planner) {
     this.planner = planner;
     this.canvas = NB.el('canvas', {
-      class: 'entry-map', tabindex: '0', role: 'application', hidden: true,
-      'aria-label': 'Entry map: directions from the target to the skin. Arrow keys move a mark over it, Enter takes the entry there.',
-      onclick: (event) => this.clicked(event), onkeydown: (event) => this.key(event),
+      class: 'entry-map',
+      tabindex: '0',
+      role: 'application',
+      hidden: true,
+      'aria-label':
+        'Entry map: directions from the target to the skin. Arrow keys move a mark over it, Enter takes the entry there.',
+      onclick: (event) => this.clicked(event),
+      onkeydown: (event) => this.key(event),
       onpointermove: (event) => this.say(this.near(this.pointed(event))),
     });
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.button = NB.el('button', { type: 'button', onclick: () => this.find() }, 'Find routes to the target');
-    this.status = NB.el('p', { class: 'soft', role: 'status', text: 'Judges 20\u202f000 directions by the rules of routes, and asks the robot for the best.' });
+    this.status = NB.el('p', {
+      class: 'soft',
+      role: 'status',
+      text: 'Judges 20\u202f000 directions by the rules of routes, and asks the robot for the best.',
+    });
     this.said = NB.el('p', { class: 'entry-said', 'aria-live': 'polite' });
     this.legend = NB.el('p', { class: 'entry-legend' });
     this.table = NB.el('div');
     this.remarks = NB.el('div');
     this.latest = new PLAN.Latest('entries', (answer, body) => this.answered(answer, body));
     // On paper the needle's own row says how the rules judge it.
-    this.element = NB.el('section', { class: 'panel no-print' }, NB.el('h2', { text: 'Entry map' }), NB.el('div', { class: 'tabs' }, this.button), this.status, this.canvas, this.said, this.legend, this.table, this.remarks);
+    this.element = NB.el(
+      'section',
+      { class: 'panel no-print' },
+      NB.el('h2', { text: 'Entry map' }),
+      NB.el('div', { class: 'tabs' }, this.button),
+      this.status,
+      this.canvas,
+      this.said,
+      this.legend,
+      this.table,
+      this.remarks,
+    );
   }
 
   /** What the map is of. */
-  static key({ goal, target }) { return JSON.stringify([goal, target]); }
+  static key({ goal, target }) {
+    return JSON.stringify([goal, target]);
+  }
 
   /** Another needle: a map of another target is no map of this one. */
   needleChanged() {
@@ -51,7 +73,12 @@ PLAN.EntryMap = class {
   answered(answer, body) {
     if (this.of !== PLAN.EntryMap.key(body.aim)) return;
     if (answer.problem) this.planner.complain(answer.problem);
-    if (answer.refused) { this.plan = null; this.of = undefined; this.show(`${answer.refused.message}${answer.refused.hint ? ` (${answer.refused.hint})` : ''}`, 'error'); return; }
+    if (answer.refused) {
+      this.plan = null;
+      this.of = undefined;
+      this.show(`${answer.refused.message}${answer.refused.hint ? ` (${answer.refused.hint})` : ''}`, 'error');
+      return;
+    }
     const { plan } = answer;
     this.plan = plan;
     this.notes = answer.remarks;
@@ -62,7 +89,10 @@ PLAN.EntryMap = class {
       this.latest.ask({ aim: body.aim, robot: true });
     } else if (!plan.routes.length) this.show(`${free}.`);
     else if (unknown) this.show(`${free}. The robot is not asked: ${unknown}.`);
-    else if (plan.chosen) this.show(`${free}. Route ${plan.chosen.route + 1} is the best that the robot serves in ${plan.wanted} of 8 configurations.`);
+    else if (plan.chosen)
+      this.show(
+        `${free}. Route ${plan.chosen.route + 1} is the best that the robot serves in ${plan.wanted} of 8 configurations.`,
+      );
     else this.show(`${free}; none of the best is served by the robot in ${plan.wanted} of 8 configurations.`);
     // How the needle that is shown is judged is known now.
     this.planner.askRoute();
@@ -76,26 +106,44 @@ PLAN.EntryMap = class {
     this.at = null;
     this.said.textContent = '';
     this.leastOdds = this.plan ? Math.min(...this.plan.map.odds_ratio.filter((odds) => odds !== null)) : 1;
-    this.directions = this.plan ? this.plan.map.azimuth_deg.map((azimuth, index) => [azimuth, this.plan.map.elevation_deg[index]]) : [];
+    this.directions = this.plan
+      ? this.plan.map.azimuth_deg.map((azimuth, index) => [azimuth, this.plan.map.elevation_deg[index]])
+      : [];
     this.showLegend();
     this.showTable();
-    NB.clear(this.remarks, ((this.plan && this.notes) || []).map((remark) => NB.el('p', { class: 'soft', text: `Note: ${remark.message}.` })));
+    NB.clear(
+      this.remarks,
+      ((this.plan && this.notes) || []).map((remark) =>
+        NB.el('p', { class: 'soft', text: `Note: ${remark.message}.` }),
+      ),
+    );
     this.image = null;
     this.draw();
   }
 
   showLegend() {
-    if (!this.plan) { NB.clear(this.legend); return; }
+    if (!this.plan) {
+      NB.clear(this.legend);
+      return;
+    }
     const { rules, free } = this.planner.facts.route_colours;
-    NB.clear(this.legend, [PLAN.swatch(PLAN.rgb(free[0]), 'free, least odds'), PLAN.swatch(PLAN.rgb(free[1]), 'twice the odds or more'),
-      ...this.plan.refused.map(({ rule, count }) => PLAN.swatch(PLAN.rgb(rules[rule]?.[1] || [0, 0, 0]), `${rules[rule]?.[0] || rule} ${count.toLocaleString('en')}`))]);
+    NB.clear(this.legend, [
+      PLAN.swatch(PLAN.rgb(free[0]), 'free, least odds'),
+      PLAN.swatch(PLAN.rgb(free[1]), 'twice the odds or more'),
+      ...this.plan.refused.map(({ rule, count }) =>
+        PLAN.swatch(
+          PLAN.rgb(rules[rule]?.[1] || [0, 0, 0]),
+          `${rules[rule]?.[0] || rule} ${count.toLocaleString('en')}`,
+        ),
+      ),
+    ]);
   }
 
   // ---- the picture: azimuth to the right, the sine of the elevation up, so that equal areas are equal solid angles
 
   place([azimuth, elevation]) {
     const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
-    return [w * (azimuth + 180) / 360, h * (1 - Math.sin(elevation * Math.PI / 180)) / 2];
+    return [(w * (azimuth + 180)) / 360, (h * (1 - Math.sin((elevation * Math.PI) / 180))) / 2];
   }
 
   pointed(event) {
@@ -126,16 +174,23 @@ PLAN.EntryMap = class {
     const where = `${NB.fixed(Math.abs(azimuth), 0)}\u00b0 to the ${azimuth < 0 ? 'right' : 'left'} of the front, ${NB.fixed(Math.abs(elevation), 0)}\u00b0 ${elevation < 0 ? 'downwards' : 'upwards'}`;
     const depth = map.depth_m[index] === null ? '' : `, ${NB.mm(map.depth_m[index], 0)} mm deep`;
     const rule = map.rule[index] === null ? null : map.rules[map.rule[index]];
-    const how = rule === null ? `free, odds \u00d7${NB.fixed(map.odds_ratio[index], 2)}` : `${rules[rule]?.[0] || rule}${this.found(rule, map.value[index], map.limit[index])}`;
+    const how =
+      rule === null
+        ? `free, odds \u00d7${NB.fixed(map.odds_ratio[index], 2)}`
+        : `${rules[rule]?.[0] || rule}${this.found(rule, map.value[index], map.limit[index])}`;
     this.said.textContent = `${where}${depth}: ${how}`;
   }
 
   found(rule, value, limit) {
     if (value === null || !['bone', 'vessel', 'organ', 'throw', 'needle_too_short'].includes(rule)) return '';
-    return rule === 'needle_too_short' ? `, ${NB.mm(value)} mm, the needle reaches ${NB.mm(limit)} mm` : `, ${NB.mm(value)} mm of ${NB.mm(limit)} mm wanted`;
+    return rule === 'needle_too_short'
+      ? `, ${NB.mm(value)} mm, the needle reaches ${NB.mm(limit)} mm`
+      : `, ${NB.mm(value)} mm of ${NB.mm(limit)} mm wanted`;
   }
 
-  clicked(event) { this.take(this.near(this.pointed(event))); }
+  clicked(event) {
+    this.take(this.near(this.pointed(event)));
+  }
 
   key(event) {
     if (!this.plan) return;
@@ -143,7 +198,7 @@ PLAN.EntryMap = class {
     if (steps) {
       event.preventDefault();
       const [azimuth, elevation] = this.at || [0, 0];
-      this.at = [(azimuth + steps[0] + 540) % 360 - 180, Math.min(Math.max(elevation + steps[1], -88), 88)];
+      this.at = [((azimuth + steps[0] + 540) % 360) - 180, Math.min(Math.max(elevation + steps[1], -88), 88)];
       this.say(this.near(this.place(this.at)));
       this.draw();
     } else if ((event.key === 'Enter' || event.key === ' ') && this.at) {
@@ -163,7 +218,7 @@ PLAN.EntryMap = class {
 
   /** The place so deep from the target in a direction, m of the scan. */
   onSkin([azimuth, elevation], depth) {
-    const [a, e] = [azimuth, elevation].map((degrees) => degrees * Math.PI / 180);
+    const [a, e] = [azimuth, elevation].map((degrees) => (degrees * Math.PI) / 180);
     const outwards = [Math.cos(e) * Math.sin(a), -Math.cos(e) * Math.cos(a), Math.sin(e)];
     const { target_in_phantom_m: target, phantom_origin_in_ct_m: origin } = this.plan;
     return target.map((value, axis) => value + origin[axis] + depth * outwards[axis]);
@@ -194,8 +249,9 @@ PLAN.EntryMap = class {
     context.fillStyle = '#f7f7f7';
     context.fillRect(0, 0, w, h);
     // An even grid: each has the same area, and a little more so that no paper shows.
-    const across = 1.25 * Math.sqrt(w * h / this.directions.length);
-    const color = (index) => (map.rule[index] === null ? this.shade(index) : PLAN.rgb(rules[map.rules[map.rule[index]]]?.[1] || [0, 0, 0]));
+    const across = 1.25 * Math.sqrt((w * h) / this.directions.length);
+    const color = (index) =>
+      map.rule[index] === null ? this.shade(index) : PLAN.rgb(rules[map.rules[map.rule[index]]]?.[1] || [0, 0, 0]);
     // Free ones last: none of them is to be hidden.
     for (const freeOnes of [false, true]) {
       this.directions.forEach((direction, index) => {
@@ -212,7 +268,10 @@ PLAN.EntryMap = class {
     const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
     if (!this.plan || !w || !h) return;
     const size = `${w} ${h}`;
-    if (!this.image || this.drawn !== size) { this.image = this.render(); this.drawn = size; }
+    if (!this.image || this.drawn !== size) {
+      this.image = this.render();
+      this.drawn = size;
+    }
     [this.canvas.width, this.canvas.height] = [this.image.width, this.image.height];
     const context = this.canvas.getContext('2d');
     context.drawImage(this.image, 0, 0);
@@ -228,18 +287,31 @@ PLAN.EntryMap = class {
       context.fillStyle = '#000';
       context.fillText(words, x, y);
     };
-    for (const [azimuth, letter] of [[-90, 'R'], [0, 'A'], [90, 'L']]) write(letter, this.place([azimuth, 0])[0], h - 9);
+    for (const [azimuth, letter] of [
+      [-90, 'R'],
+      [0, 'A'],
+      [90, 'L'],
+    ])
+      write(letter, this.place([azimuth, 0])[0], h - 9);
     write('P', 7, h - 9);
     write('P', w - 7, h - 9);
     write('S', 7, 10);
     write('I', 7, h - 24);
-    this.plan.routes.slice(0, 8).map((route, index) => [route, index]).reverse().forEach(([route, index]) => this.ring(context, this.place(route.direction_deg), String(index + 1), write));
+    this.plan.routes
+      .slice(0, 8)
+      .map((route, index) => [route, index])
+      .reverse()
+      .forEach(([route, index]) => this.ring(context, this.place(route.direction_deg), String(index + 1), write));
     const { chosen } = this.plan;
-    if (chosen && chosen.route >= 8) this.ring(context, this.place(this.plan.routes[chosen.route].direction_deg), String(chosen.route + 1), write);
+    if (chosen && chosen.route >= 8)
+      this.ring(context, this.place(this.plan.routes[chosen.route].direction_deg), String(chosen.route + 1), write);
     const { route } = this.planner;
     if (route) {
       const way = route.entry_m.map((value, axis) => value - route.target_m[axis]);
-      const at = this.place([Math.atan2(way[0], -way[1]) * 180 / Math.PI, Math.atan2(way[2], Math.hypot(way[0], way[1])) * 180 / Math.PI]);
+      const at = this.place([
+        (Math.atan2(way[0], -way[1]) * 180) / Math.PI,
+        (Math.atan2(way[2], Math.hypot(way[0], way[1])) * 180) / Math.PI,
+      ]);
       this.cross(context, at, '#000', PLAN.COLORS.needle);
     }
     if (this.at) this.cross(context, this.place(this.at), '#fff', '#000');
@@ -255,7 +327,10 @@ PLAN.EntryMap = class {
   }
 
   cross(context, [x, y], outer, inner) {
-    for (const [style, width] of [[outer, 5], [inner, 2.5]]) {
+    for (const [style, width] of [
+      [outer, 5],
+      [inner, 2.5],
+    ]) {
       context.strokeStyle = style;
       context.lineWidth = width;
       context.beginPath();
@@ -271,10 +346,14 @@ PLAN.EntryMap = class {
   entriesNear(axis, slice, within_mm, draw) {
     if (!this.plan) return;
     const { map } = this.plan;
-    this.free ??= this.directions.flatMap((direction, index) => (map.rule[index] === null
-      ? [{ index: this.planner.indexOf(this.onSkin(direction, map.depth_m[index])), color: this.shade(index) }] : []));
+    this.free ??= this.directions.flatMap((direction, index) =>
+      map.rule[index] === null
+        ? [{ index: this.planner.indexOf(this.onSkin(direction, map.depth_m[index])), color: this.shade(index) }]
+        : [],
+    );
     const spacing = 1e3 * this.planner.facts.spacing_m[axis];
-    for (const entry of this.free) if (Math.abs(entry.index[axis] - slice) * spacing <= within_mm) draw(entry.index, entry.color);
+    for (const entry of this.free)
+      if (Math.abs(entry.index[axis] - slice) * spacing <= within_mm) draw(entry.index, entry.color);
   }
 
   // ---- the best routes
@@ -282,9 +361,14 @@ PLAN.EntryMap = class {
   showTable() {
     this.free = null;
     const { plan } = this;
-    if (!plan || !plan.routes.length) { NB.clear(this.table); return; }
+    if (!plan || !plan.routes.length) {
+      NB.clear(this.table);
+      return;
+    }
     const chosen = plan.chosen?.route;
-    const shown = plan.routes.map((route, index) => ({ route, index })).filter(({ index }) => index < 8 || index === chosen);
+    const shown = plan.routes
+      .map((route, index) => ({ route, index }))
+      .filter(({ index }) => index < 8 || index === chosen);
     const best = ({ route }) => route.configurations.find(({ label }) => label === route.best);
     const asked = plan.routes.some(({ configurations }) => configurations.length);
     const nearest = (route) => {
@@ -293,7 +377,19 @@ PLAN.EntryMap = class {
       return least ? `${NB.mm(least.distance_m)} ${NB.words(least.obstacle)}` : 'far';
     };
     const columns = [
-      { title: 'Route', cell: ({ route, index }) => NB.el('button', { type: 'button', title: route.best || '', onclick: () => this.enter(route.direction_deg, route.depth_m, route.best) }, `Take ${index + 1}${index === chosen ? ' (chosen)' : ''}`) },
+      {
+        title: 'Route',
+        cell: ({ route, index }) =>
+          NB.el(
+            'button',
+            {
+              type: 'button',
+              title: route.best || '',
+              onclick: () => this.enter(route.direction_deg, route.depth_m, route.best),
+            },
+            `Take ${index + 1}${index === chosen ? ' (chosen)' : ''}`,
+          ),
+      },
       { title: 'Deep', unit: 'mm', numeric: true, cell: ({ route }) => NB.mm(route.depth_m, 0) },
       { title: 'Odds', numeric: true, cell: ({ route }) => `\u00d7${NB.fixed(route.risk.odds_ratio, 2)}` },
       { title: 'Nearest', unit: 'mm', cell: ({ route }) => nearest(route) },
@@ -303,11 +399,28 @@ PLAN.EntryMap = class {
         { title: 'Serve', unit: 'of 8', numeric: true, cell: ({ route }) => String(route.working) },
         { title: 'Clear', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.clearance_m) },
         { title: 'Error', unit: 'mm', numeric: true, cell: (row) => NB.mm(best(row)?.error?.target_lateral_rms_m) },
-        { title: 'Room', unit: '%', numeric: true, cell: (row) => NB.fixed(100 * (best(row)?.free_fraction ?? NaN), 0) });
+        {
+          title: 'Room',
+          unit: '%',
+          numeric: true,
+          cell: (row) => NB.fixed(100 * (best(row)?.free_fraction ?? NaN), 0),
+        },
+      );
     }
     const unseen = plan.margins.filter(({ known }) => !known).map(({ obstacle }) => NB.words(obstacle));
-    NB.clear(this.table, NB.table('Routes that stand for those around them, the best first', columns, shown, { class: 'small' }),
-      NB.el('p', { class: 'soft', text: 'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Nearest: lower bound of the needle\u2019s distance from bone, vessels and organs. Serve: configurations that work and keep the margins with their own expected error. Clear, error across the needle (rms) and room are of the best of them; postures only, motions are not planned. Room: what arm and tool leave free of the half ball of 0.35 m about the entry.' }),
-      unseen.length ? NB.el('p', { class: 'bad', text: `The label map has nothing of: ${unseen.join(', ')}. Distances from it are not known.` }) : null);
+    NB.clear(
+      this.table,
+      NB.table('Routes that stand for those around them, the best first', columns, shown, { class: 'small' }),
+      NB.el('p', {
+        class: 'soft',
+        text: 'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Nearest: lower bound of the needle\u2019s distance from bone, vessels and organs. Serve: configurations that work and keep the margins with their own expected error. Clear, error across the needle (rms) and room are of the best of them; postures only, motions are not planned. Room: what arm and tool leave free of the half ball of 0.35 m about the entry.',
+      }),
+      unseen.length
+        ? NB.el('p', {
+            class: 'bad',
+            text: `The label map has nothing of: ${unseen.join(', ')}. Distances from it are not known.`,
+          })
+        : null,
+    );
   }
 };

@@ -7,11 +7,16 @@ PLAN.People = class {
     this.latest = new PLAN.Latest('people', (answer) => this.answered(answer));
     this.text = NB.el('div');
     this.layers = { people: false, cone: false };
-    this.boxes = NB.el('span', { class: 'layers', hidden: true },
-      Object.entries({ people: 'people and sight', cone: 'cone for the hand' }).map(([layer, words]) => NB.checkbox(words, false, (shown) => {
-        this.layers[layer] = shown;
-        this.draw();
-      })));
+    this.boxes = NB.el(
+      'span',
+      { class: 'layers', hidden: true },
+      Object.entries({ people: 'people and sight', cone: 'cone for the hand' }).map(([layer, words]) =>
+        NB.checkbox(words, false, (shown) => {
+          this.layers[layer] = shown;
+          this.draw();
+        }),
+      ),
+    );
   }
 
   /** Of a posture at the needle; none while there is no motion to it. */
@@ -28,7 +33,10 @@ PLAN.People = class {
   }
 
   answered(answer) {
-    if (answer.problem) { this.planner.complain(answer.problem); return; }
+    if (answer.problem) {
+      this.planner.complain(answer.problem);
+      return;
+    }
     this.answer = answer.refused ? null : answer;
     this.show();
   }
@@ -36,21 +44,46 @@ PLAN.People = class {
   show() {
     this.boxes.hidden = !this.answer;
     this.draw();
-    if (!this.answer) { NB.clear(this.text); return; }
+    if (!this.answer) {
+      NB.clear(this.text);
+      return;
+    }
     const { room } = this.answer;
-    const regions = Object.entries(room.regions).map(([name, share]) => `${NB.regionWords[name] || NB.words(name)} ${NB.percent(share)}`);
-    const table = NB.table('What people see of the entry and of the needle behind the guide, past arm and tool', [
-      { title: 'Who', cell: (each) => each.person_in_words },
-      { title: 'Entry', unit: '%', numeric: true, cell: (each) => NB.percent(each.entry_fraction) },
-      { title: 'Needle', unit: '%', numeric: true, cell: (each) => NB.percent(each.needle_fraction) },
-      { title: '\u00b1', unit: '%', numeric: true, cell: (each) => NB.fixed(100 * each.accuracy, 1), help: 'half-width of the 95 % interval of the mean of both' },
-      { title: 'In the way', text: true, cell: (each) => (each.blocker ? NB.words(each.blocker) : '') },
-    ], room.sight, { class: 'small' });
-    const seen = room.sight.map((each) => `${each.person_in_words} ${NB.percent(each.entry_fraction)}, ${NB.percent(each.needle_fraction)}`);
-    NB.clear(this.text,
-      NB.el('p', { text: `Space for people: ${NB.percent(room.free_fraction)} % of the half ball of 0.35 m about the entry${regions.length ? ` (${regions.join(', ')})` : ''}. Cone for the hand: ${NB.deg(room.hand_cone_half_angle_rad)}\u00b0 to each side${room.hand_cone_blocker ? `, up to ${NB.words(room.hand_cone_blocker)}` : ''}. Elbow ${room.elbow_up ? 'up' : 'down'}.` }),
+    const regions = Object.entries(room.regions).map(
+      ([name, share]) => `${NB.regionWords[name] || NB.words(name)} ${NB.percent(share)}`,
+    );
+    const table = NB.table(
+      'What people see of the entry and of the needle behind the guide, past arm and tool',
+      [
+        { title: 'Who', cell: (each) => each.person_in_words },
+        { title: 'Entry', unit: '%', numeric: true, cell: (each) => NB.percent(each.entry_fraction) },
+        { title: 'Needle', unit: '%', numeric: true, cell: (each) => NB.percent(each.needle_fraction) },
+        {
+          title: '\u00b1',
+          unit: '%',
+          numeric: true,
+          cell: (each) => NB.fixed(100 * each.accuracy, 1),
+          help: 'half-width of the 95 % interval of the mean of both',
+        },
+        { title: 'In the way', text: true, cell: (each) => (each.blocker ? NB.words(each.blocker) : '') },
+      ],
+      room.sight,
+      { class: 'small' },
+    );
+    const seen = room.sight.map(
+      (each) => `${each.person_in_words} ${NB.percent(each.entry_fraction)}, ${NB.percent(each.needle_fraction)}`,
+    );
+    NB.clear(
+      this.text,
+      NB.el('p', {
+        text: `Space for people: ${NB.percent(room.free_fraction)} % of the half ball of 0.35 m about the entry${regions.length ? ` (${regions.join(', ')})` : ''}. Cone for the hand: ${NB.deg(room.hand_cone_half_angle_rad)}\u00b0 to each side${room.hand_cone_blocker ? `, up to ${NB.words(room.hand_cone_blocker)}` : ''}. Elbow ${room.elbow_up ? 'up' : 'down'}.`,
+      }),
       NB.el('div', { class: 'no-print' }, table),
-      NB.el('p', { class: 'print-only', text: `Seen past arm and tool, % of the entry and of the needle behind the guide: ${seen.join('; ')}.` }));
+      NB.el('p', {
+        class: 'print-only',
+        text: `Seen past arm and tool, % of the entry and of the needle behind the guide: ${seen.join('; ')}.`,
+      }),
+    );
   }
 
   draw() {
@@ -59,7 +92,8 @@ PLAN.People = class {
     const shown = this.answer?.view;
     view.people(shown && this.layers.people ? shown.people : []);
     view.sight(shown && this.layers.people ? shown.sight : []);
-    if (shown && this.layers.cone) view.handCone(shown.guideEntry, this.answer.room.hand_cone_half_angle_rad, this.answer.room.hand_cone_length_m);
+    if (shown && this.layers.cone)
+      view.handCone(shown.guideEntry, this.answer.room.hand_cone_half_angle_rad, this.answer.room.hand_cone_length_m);
     else view.empty('cone');
     view.draw();
   }

@@ -17,7 +17,12 @@ PLAN.Planner = class {
     this.probe = { turn: 0, depth: 0 };
     const middle = facts.size.map((count) => Math.floor(count / 2));
     this.state = {
-      notes: '', window_hu: PLAN.WINDOWS.lung, crosshair: middle, hidden_markers: [], needle: {}, routes: [],
+      notes: '',
+      window_hu: PLAN.WINDOWS.lung,
+      crosshair: middle,
+      hidden_markers: [],
+      needle: {},
+      routes: [],
       ...Object.fromEntries(Object.entries(PLAN.taken(session)).filter(([, value]) => value !== null)),
     };
     if (session.version === 0) this.state.needle = this.firstNeedle();
@@ -46,9 +51,13 @@ PLAN.Planner = class {
     return needle;
   }
 
-  within(index) { return index.map((value, axis) => Math.min(Math.max(value, 0), this.facts.size[axis] - 1)); }
+  within(index) {
+    return index.map((value, axis) => Math.min(Math.max(value, 0), this.facts.size[axis] - 1));
+  }
 
-  indexOf(place) { return place.map((metres, axis) => (metres - this.facts.first_voxel_m[axis]) / this.facts.spacing_m[axis]); }
+  indexOf(place) {
+    return place.map((metres, axis) => (metres - this.facts.first_voxel_m[axis]) / this.facts.spacing_m[axis]);
+  }
 
   // ---- the page
 
@@ -59,22 +68,65 @@ PLAN.Planner = class {
     this.probes = ['along', 'across'].map((kind) => new PLAN.Probe(kind, this));
     this.readout = NB.el('p', { class: 'readout', role: 'status', 'aria-live': 'polite' });
     this.room = new PLAN.Room(this.page, this.facts);
-    const heading = NB.el('header', { class: 'top' },
+    const heading = NB.el(
+      'header',
+      { class: 'top' },
       NB.el('h1', { text: `Plan: ${this.facts.name}` }),
-      NB.el('p', null, 'Research software: ', NB.el('strong', { text: 'not a medical device.' }), ' Slices as radiologists see them: the patient\u2019s right is on the left of the picture.'));
-    const panes = NB.el('div', { class: 'panes' },
+      NB.el(
+        'p',
+        null,
+        'Research software: ',
+        NB.el('strong', { text: 'not a medical device.' }),
+        ' Slices as radiologists see them: the patient\u2019s right is on the left of the picture.',
+      ),
+    );
+    const panes = NB.el(
+      'div',
+      { class: 'panes' },
       this.slices.map((slice) => slice.element),
-      NB.el('figure', { class: 'slice' }, this.room.view.element, NB.el('figcaption', null, NB.el('span', { class: 'slice-title', text: 'Room' }), NB.el('span', { class: 'no-print' }, this.people.boxes), this.playButtons())),
-      this.probes.map((probe) => probe.element));
+      NB.el(
+        'figure',
+        { class: 'slice' },
+        this.room.view.element,
+        NB.el(
+          'figcaption',
+          null,
+          NB.el('span', { class: 'slice-title', text: 'Room' }),
+          NB.el('span', { class: 'no-print' }, this.people.boxes),
+          this.playButtons(),
+        ),
+      ),
+      this.probes.map((probe) => probe.element),
+    );
     this.numbers = NB.el('div');
     this.configurations = NB.el('div');
     this.comparison = NB.el('div');
-    const side = NB.el('aside', { class: 'side', 'aria-label': 'Plan' },
-      this.needlePanel(), this.entryMap.element,
+    const side = NB.el(
+      'aside',
+      { class: 'side', 'aria-label': 'Plan' },
+      this.needlePanel(),
+      this.entryMap.element,
       NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Needle' }), this.numbers),
-      NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Configurations' }), this.configurations, this.people.text),
-      this.routesPanel(), this.markersPanel(), this.notesPanel(), this.simulation.element);
-    NB.clear(this.app, heading, this.banner, this.toolbar(), NB.el('div', { class: 'planner' }, NB.el('div', { class: 'pictures' }, panes, this.readout), side), this.signature());
+      NB.el(
+        'section',
+        { class: 'panel' },
+        NB.el('h2', { text: 'Configurations' }),
+        this.configurations,
+        this.people.text,
+      ),
+      this.routesPanel(),
+      this.markersPanel(),
+      this.notesPanel(),
+      this.simulation.element,
+    );
+    NB.clear(
+      this.app,
+      heading,
+      this.banner,
+      this.toolbar(),
+      NB.el('div', { class: 'planner' }, NB.el('div', { class: 'pictures' }, panes, this.readout), side),
+      this.signature(),
+    );
     this.showTool();
     this.showWindow();
     this.showMarkers();
@@ -82,58 +134,120 @@ PLAN.Planner = class {
     this.needleChanged();
     this.look(this.state.crosshair, false);
     window.addEventListener('keydown', (event) => this.key(event));
-    window.addEventListener('beforeprint', () => { this.printed.textContent = new Date().toLocaleString(); });
+    window.addEventListener('beforeprint', () => {
+      this.printed.textContent = new Date().toLocaleString();
+    });
   }
 
   toolbar() {
-    this.tools = Object.fromEntries(Object.entries({ crosshair: 'Crosshair', target: 'Click the target', entry: 'Click the entry' }).map(([name, words]) => [name, NB.el('button', {
-      type: 'button', role: 'radio', 'aria-checked': 'false', onclick: () => { this.tool = name; this.showTool(); },
-    }, words)]));
-    this.windows = Object.fromEntries(Object.entries(PLAN.WINDOW_NAMES).map(([name, words]) => [name, NB.el('button', {
-      type: 'button', role: 'radio', 'aria-checked': 'false', onclick: () => this.setWindow(PLAN.WINDOWS[name]),
-    }, words)]));
+    this.tools = Object.fromEntries(
+      Object.entries({ crosshair: 'Crosshair', target: 'Click the target', entry: 'Click the entry' }).map(
+        ([name, words]) => [
+          name,
+          NB.el(
+            'button',
+            {
+              type: 'button',
+              role: 'radio',
+              'aria-checked': 'false',
+              onclick: () => {
+                this.tool = name;
+                this.showTool();
+              },
+            },
+            words,
+          ),
+        ],
+      ),
+    );
+    this.windows = Object.fromEntries(
+      Object.entries(PLAN.WINDOW_NAMES).map(([name, words]) => [
+        name,
+        NB.el(
+          'button',
+          {
+            type: 'button',
+            role: 'radio',
+            'aria-checked': 'false',
+            onclick: () => this.setWindow(PLAN.WINDOWS[name]),
+          },
+          words,
+        ),
+      ]),
+    );
     this.undoButton = NB.el('button', { type: 'button', onclick: () => this.undo(), title: 'Ctrl+Z' }, 'Undo');
     this.redoButton = NB.el('button', { type: 'button', onclick: () => this.redo(), title: 'Ctrl+Shift+Z' }, 'Redo');
     this.labelsBox = NB.checkbox('Label outlines', false, (checked) => this.showLabels(checked));
     this.labelLegend = NB.el('span', { class: 'entry-legend' });
     this.kept = NB.el('span', { class: 'soft', role: 'status' });
-    return NB.el('div', { class: 'bar no-print' },
+    return NB.el(
+      'div',
+      { class: 'bar no-print' },
       NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'What a click does' }, Object.values(this.tools)),
-      NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Window: centre and width, HU' }, Object.values(this.windows)),
-      NB.el('div', { class: 'tabs' }, this.undoButton, this.redoButton, NB.el('button', { type: 'button', onclick: () => window.print() }, 'Print')),
-      this.labelsBox, this.labelLegend,
-      this.kept);
+      NB.el(
+        'div',
+        { class: 'tabs', role: 'radiogroup', 'aria-label': 'Window: centre and width, HU' },
+        Object.values(this.windows),
+      ),
+      NB.el(
+        'div',
+        { class: 'tabs' },
+        this.undoButton,
+        this.redoButton,
+        NB.el('button', { type: 'button', onclick: () => window.print() }, 'Print'),
+      ),
+      this.labelsBox,
+      this.labelLegend,
+      this.kept,
+    );
   }
 
-  showTool() { for (const [name, button] of Object.entries(this.tools)) button.setAttribute('aria-checked', String(name === this.tool)); }
+  showTool() {
+    for (const [name, button] of Object.entries(this.tools))
+      button.setAttribute('aria-checked', String(name === this.tool));
+  }
 
   showWindow() {
-    for (const [name, button] of Object.entries(this.windows)) button.setAttribute('aria-checked', String(String(PLAN.WINDOWS[name]) === String(this.state.window_hu)));
+    for (const [name, button] of Object.entries(this.windows))
+      button.setAttribute('aria-checked', String(String(PLAN.WINDOWS[name]) === String(this.state.window_hu)));
   }
 
   /** Outlines of what each voxel was taken for; the labels come when they are first wanted. */
   async showLabels(wanted) {
     this.showsLabels = wanted;
     const { labels } = this.facts;
-    const palette = ['sky', 'green', 'orange', 'purple', 'yellow', 'vermillion', 'blue', 'grey'].map((name) => NB.palette[name]);
+    const palette = ['sky', 'green', 'orange', 'purple', 'yellow', 'vermillion', 'blue', 'grey'].map(
+      (name) => NB.palette[name],
+    );
     const color = (at) => palette[at % palette.length];
     if (wanted && !this.labels) {
       this.labelLegend.textContent = 'Reading labels ...';
       try {
         const [n, m, l] = this.facts.size;
-        this.labels = new Uint16Array((await PLAN.bytes('labels', 2 * n * m * l, (share) => { this.labelLegend.textContent = `Reading labels: ${Math.round(100 * share)} %`; })).buffer);
+        this.labels = new Uint16Array(
+          (
+            await PLAN.bytes('labels', 2 * n * m * l, (share) => {
+              this.labelLegend.textContent = `Reading labels: ${Math.round(100 * share)} %`;
+            })
+          ).buffer,
+        );
       } catch (error) {
         this.complain(error);
         this.labelsBox.querySelector('input').checked = false;
         NB.clear(this.labelLegend);
         return;
       }
-      this.labelColors = new Map(labels.map(({ label }, at) => {
-        const [red, green, blue] = [1, 3, 5].map((from) => parseInt(color(at).slice(from, from + 2), 16));
-        return [label, (0xff000000 | blue << 16 | green << 8 | red) >>> 0];
-      }));
+      this.labelColors = new Map(
+        labels.map(({ label }, at) => {
+          const [red, green, blue] = [1, 3, 5].map((from) => parseInt(color(at).slice(from, from + 2), 16));
+          return [label, (0xff000000 | (blue << 16) | (green << 8) | red) >>> 0];
+        }),
+      );
     }
-    NB.clear(this.labelLegend, this.showsLabels ? labels.map(({ name }, at) => PLAN.swatch(color(at), NB.words(name))) : []);
+    NB.clear(
+      this.labelLegend,
+      this.showsLabels ? labels.map(({ name }, at) => PLAN.swatch(color(at), NB.words(name))) : [],
+    );
     this.draw();
   }
 
@@ -148,22 +262,76 @@ PLAN.Planner = class {
   needlePanel() {
     this.targetText = NB.el('dd');
     this.entryText = NB.el('dd');
-    const lesions = this.facts.lesions.map((lesion) => NB.el('button', { type: 'button', onclick: () => {
-      this.change({ target: { lesion: lesion.name } });
-      this.look(this.within(lesion.index.map(Math.round)));
-    } }, `Target: ${NB.words(lesion.name)}`));
-    const goals = this.facts.goals.length > 1
-      ? [this.goalSelect = NB.select('Goal of the scenario', this.facts.goals.map(({ name }) => [name, NB.words(name)]), this.state.needle.goal, (goal) => this.change({ goal }))] : [];
-    this.planName = NB.el('input', { type: 'text', value: this.facts.plan_file, size: '18', 'aria-label': 'File name of the plan', maxlength: '64', spellcheck: 'false' });
+    const lesions = this.facts.lesions.map((lesion) =>
+      NB.el(
+        'button',
+        {
+          type: 'button',
+          onclick: () => {
+            this.change({ target: { lesion: lesion.name } });
+            this.look(this.within(lesion.index.map(Math.round)));
+          },
+        },
+        `Target: ${NB.words(lesion.name)}`,
+      ),
+    );
+    const goals =
+      this.facts.goals.length > 1
+        ? [
+            (this.goalSelect = NB.select(
+              'Goal of the scenario',
+              this.facts.goals.map(({ name }) => [name, NB.words(name)]),
+              this.state.needle.goal,
+              (goal) => this.change({ goal }),
+            )),
+          ]
+        : [];
+    this.planName = NB.el('input', {
+      type: 'text',
+      value: this.facts.plan_file,
+      size: '18',
+      'aria-label': 'File name of the plan',
+      maxlength: '64',
+      spellcheck: 'false',
+    });
     this.saveButton = NB.el('button', { type: 'button', onclick: () => this.savePlan() }, 'Save plan');
     this.saved = NB.el('p', { class: 'soft', role: 'status' });
-    return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Target and entry' }), goals,
-      NB.el('div', { class: 'tabs no-print' }, lesions,
-        NB.el('button', { type: 'button', onclick: () => this.put('target', this.state.crosshair) }, 'Target at crosshair (T)'),
-        NB.el('button', { type: 'button', onclick: () => this.put('entry', this.state.crosshair) }, 'Entry at crosshair (E)')),
-      NB.el('dl', null, NB.el('dt', { text: 'Target' }), this.targetText, NB.el('dt', { text: 'Entry' }), this.entryText),
-      NB.el('p', { class: 'soft' }, 'mm of the scan: left, posterior, superior (LPS). The entry is where the line from the target through your click leaves the skin.'),
-      NB.el('div', { class: 'bar no-print' }, this.planName, this.saveButton), this.saved);
+    return NB.el(
+      'section',
+      { class: 'panel' },
+      NB.el('h2', { text: 'Target and entry' }),
+      goals,
+      NB.el(
+        'div',
+        { class: 'tabs no-print' },
+        lesions,
+        NB.el(
+          'button',
+          { type: 'button', onclick: () => this.put('target', this.state.crosshair) },
+          'Target at crosshair (T)',
+        ),
+        NB.el(
+          'button',
+          { type: 'button', onclick: () => this.put('entry', this.state.crosshair) },
+          'Entry at crosshair (E)',
+        ),
+      ),
+      NB.el(
+        'dl',
+        null,
+        NB.el('dt', { text: 'Target' }),
+        this.targetText,
+        NB.el('dt', { text: 'Entry' }),
+        this.entryText,
+      ),
+      NB.el(
+        'p',
+        { class: 'soft' },
+        'mm of the scan: left, posterior, superior (LPS). The entry is where the line from the target through your click leaves the skin.',
+      ),
+      NB.el('div', { class: 'bar no-print' }, this.planName, this.saveButton),
+      this.saved,
+    );
   }
 
   // ---- the crosshair
@@ -184,7 +352,10 @@ PLAN.Planner = class {
   }
 
   placed(answer) {
-    if (answer.problem) { this.complain(answer.problem); return; }
+    if (answer.problem) {
+      this.complain(answer.problem);
+      return;
+    }
     const [x, y, z] = answer.ct_mm;
     const names = [x < 0 ? 'right' : 'left', y < 0 ? 'anterior' : 'posterior', z < 0 ? 'inferior' : 'superior'];
     const place = [x, y, z].map((value) => NB.fixed(value, 2)).join(', ');
@@ -209,7 +380,12 @@ PLAN.Planner = class {
     this.keepSoon();
   }
 
-  beginDrag() { this.remember(); this.dragging = true; this.latencies = []; this.reachWaits = []; }
+  beginDrag() {
+    this.remember();
+    this.dragging = true;
+    this.latencies = [];
+    this.reachWaits = [];
+  }
 
   drag(what, index) {
     this.state.needle = { ...this.state.needle, [what]: { index } };
@@ -244,9 +420,16 @@ PLAN.Planner = class {
     this.planned.forget();
     this.people.forget();
     this.room.stop();
-    if (this.goalSelect) this.goalSelect.querySelector('select').value = this.state.needle.goal || this.facts.goals[0].name;
+    if (this.goalSelect)
+      this.goalSelect.querySelector('select').value = this.state.needle.goal || this.facts.goals[0].name;
     if (this.aim()) this.askRoute();
-    else { this.route = null; this.reach = null; this.refused = null; this.showRoute(); this.showReach(); }
+    else {
+      this.route = null;
+      this.reach = null;
+      this.refused = null;
+      this.showRoute();
+      this.showReach();
+    }
     this.entryMap.needleChanged();
     this.showUndo();
     this.draw();
@@ -269,15 +452,23 @@ PLAN.Planner = class {
     this.refused = answer.refused || null;
     this.route = answer.refused ? null : answer;
     if (this.route && !this.dragging) this.shown = { target: this.route.target_index, entry: this.route.entry_index };
-    if (this.route) this.probe.depth = Math.min(this.probe.depth || 1e3 * this.route.length_m, 1e3 * this.route.length_m);
-    if (this.route && !this.probe.set) { this.probe.depth = 1e3 * this.route.length_m; }
+    if (this.route)
+      this.probe.depth = Math.min(this.probe.depth || 1e3 * this.route.length_m, 1e3 * this.route.length_m);
+    if (this.route && !this.probe.set) {
+      this.probe.depth = 1e3 * this.route.length_m;
+    }
     this.tip = null;
     this.motion = null;
     this.people.forget();
     this.showRoute();
     this.draw();
     this.entryMap.draw();
-    if (!this.route || this.route.not_placed) { this.bounds.forget(); this.exact.forget(); this.reach = null; this.showReach(); }
+    if (!this.route || this.route.not_placed) {
+      this.bounds.forget();
+      this.exact.forget();
+      this.reach = null;
+      this.showReach();
+    }
   }
 
   bounded(answer, body, took) {
@@ -287,17 +478,24 @@ PLAN.Planner = class {
   }
 
   reached(answer) {
-    if (answer.problem) { this.complain(answer.problem); return; }
+    if (answer.problem) {
+      this.complain(answer.problem);
+      return;
+    }
     this.reach = answer.refused ? null : answer;
     this.showReach();
     const label = this.state.needle.configuration;
     const known = this.reach?.preview?.configurations.find((each) => each.label === label);
     if (known?.joints_rad && !this.dragging) this.room.pose(known.joints_rad);
-    if (label && !this.dragging && this.aim() && this.reach?.preview && !this.reach.quick) this.planned.ask({ aim: this.aim(), configuration: label });
+    if (label && !this.dragging && this.aim() && this.reach?.preview && !this.reach.quick)
+      this.planned.ask({ aim: this.aim(), configuration: label });
   }
 
   moved(answer, body) {
-    if (answer.problem) { this.complain(answer.problem); return; }
+    if (answer.problem) {
+      this.complain(answer.problem);
+      return;
+    }
     if (body.configuration !== this.state.needle.configuration || this.dragging) return;
     this.motion = answer.refused ? { refused: answer.refused } : answer;
     this.tip = answer.tip || null;
@@ -322,7 +520,7 @@ PLAN.Planner = class {
   turnProbe(kind, step) {
     if (!this.route) return;
     this.probe.set = true;
-    if (kind === 'along') this.probe.turn = (this.probe.turn + step * Math.PI / 36) % (2 * Math.PI);
+    if (kind === 'along') this.probe.turn = (this.probe.turn + (step * Math.PI) / 36) % (2 * Math.PI);
     else this.probe.depth = Math.min(Math.max(this.probe.depth + step, 0), 1e3 * this.route.length_m);
     this.draw();
   }
@@ -336,45 +534,102 @@ PLAN.Planner = class {
 
   // ---- numbers
 
-  millimetres(place) { return `(${place.map((metres) => NB.mm(metres, 2)).join(', ')}) mm`; }
+  millimetres(place) {
+    return `(${place.map((metres) => NB.mm(metres, 2)).join(', ')}) mm`;
+  }
 
   showRoute() {
     const { target, entry } = this.state.needle;
     const lesion = this.facts.lesions.find((each) => each.name === target?.lesion);
-    this.targetText.textContent = target ? [lesion && NB.words(lesion.name), this.route && this.millimetres(this.route.target_m)].filter(Boolean).join(', ') : 'not chosen';
+    this.targetText.textContent = target
+      ? [lesion && NB.words(lesion.name), this.route && this.millimetres(this.route.target_m)]
+          .filter(Boolean)
+          .join(', ')
+      : 'not chosen';
     this.entryText.textContent = entry ? (this.route ? this.millimetres(this.route.entry_m) : '') : 'not chosen';
     this.saveButton.disabled = !this.route || Boolean(this.route.not_placed);
     this.simulation.allow(!this.saveButton.disabled);
     if (this.refused) {
-      NB.clear(this.numbers, NB.el('p', { class: 'error', text: this.refused.message }), this.refused.hint ? NB.el('p', { text: this.refused.hint }) : null);
+      NB.clear(
+        this.numbers,
+        NB.el('p', { class: 'error', text: this.refused.message }),
+        this.refused.hint ? NB.el('p', { text: this.refused.hint }) : null,
+      );
       return;
     }
     if (!this.route) {
-      NB.clear(this.numbers, NB.el('p', { text: target ? 'Click the entry, on the skin.' : 'Choose a lesion, or click the target.' }));
+      NB.clear(
+        this.numbers,
+        NB.el('p', { text: target ? 'Click the entry, on the skin.' : 'Choose a lesion, or click the target.' }),
+      );
       return;
     }
     const { not_placed: unplaced } = this.route;
-    NB.clear(this.numbers, unplaced ? [NB.el('p', { class: 'error', text: `${unplaced.message}.` }), unplaced.hint ? NB.el('p', { text: `Try ${unplaced.hint}.` }) : null] : null,
+    NB.clear(
+      this.numbers,
+      unplaced
+        ? [
+            NB.el('p', { class: 'error', text: `${unplaced.message}.` }),
+            unplaced.hint ? NB.el('p', { text: `Try ${unplaced.hint}.` }) : null,
+          ]
+        : null,
       PLAN.routeRows([{ name: 'value', route: this.route }], 'Straight needle from the skin to the target'),
       Math.abs(this.route.entry_moved_m) > 5e-3
-        ? NB.el('p', { text: `You pointed ${NB.mm(Math.abs(this.route.entry_moved_m))} mm ${this.route.entry_moved_m > 0 ? 'inside' : 'outside'} the skin: the entry is on the line from there to the target.` }) : null);
+        ? NB.el('p', {
+            text: `You pointed ${NB.mm(Math.abs(this.route.entry_moved_m))} mm ${this.route.entry_moved_m > 0 ? 'inside' : 'outside'} the skin: the entry is on the line from there to the target.`,
+          })
+        : null,
+    );
   }
 
   showReach() {
     if (this.facts.robot_is_unknown) {
-      NB.clear(this.configurations, NB.el('p', { text: `Nothing is said of the robot: ${this.facts.robot_is_unknown}.` }));
+      NB.clear(
+        this.configurations,
+        NB.el('p', { text: `Nothing is said of the robot: ${this.facts.robot_is_unknown}.` }),
+      );
       return;
     }
     const { preview } = this.reach || {};
-    if (!preview) { NB.clear(this.configurations, NB.el('p', { class: 'soft', text: 'They follow once target and entry are chosen.' })); return; }
+    if (!preview) {
+      NB.clear(
+        this.configurations,
+        NB.el('p', { class: 'soft', text: 'They follow once target and entry are chosen.' }),
+      );
+      return;
+    }
     const chosen = this.state.needle.configuration;
-    const counted = this.reach.quick ? `At least ${preview.working} of 8 can reach it: 12 directions about the needle each; all of them follow` : `${preview.working} of 8 can reach it, by their postures`;
-    const list = NB.table(counted, [
-      { title: 'Configuration', cell: ({ each }) => each.label },
-      { title: 'Works', cell: ({ each }) => NB.el('span', { class: each.works ? 'good' : 'bad', text: each.works ? 'yes' : this.reach.quick ? 'not yet' : 'no' }) },
-      { title: 'Nearest', unit: 'mm', numeric: true, cell: ({ each }) => NB.mm(each.nearest?.distance_m) },
-      { title: 'Of what, or why not', text: true, cell: ({ each, reason }) => (each.works ? (each.nearest?.pair || []).map(NB.words).join(' \u2013 ') : reason) },
-    ], preview.configurations.map((each, index) => ({ each, reason: this.reach.reasons[index] })), { class: 'choose small', row: ({ each }) => ({ 'aria-selected': String(each.label === chosen), tabindex: each.label === chosen || !chosen ? '0' : '-1' }) });
+    const counted = this.reach.quick
+      ? `At least ${preview.working} of 8 can reach it: 12 directions about the needle each; all of them follow`
+      : `${preview.working} of 8 can reach it, by their postures`;
+    const list = NB.table(
+      counted,
+      [
+        { title: 'Configuration', cell: ({ each }) => each.label },
+        {
+          title: 'Works',
+          cell: ({ each }) =>
+            NB.el('span', {
+              class: each.works ? 'good' : 'bad',
+              text: each.works ? 'yes' : this.reach.quick ? 'not yet' : 'no',
+            }),
+        },
+        { title: 'Nearest', unit: 'mm', numeric: true, cell: ({ each }) => NB.mm(each.nearest?.distance_m) },
+        {
+          title: 'Of what, or why not',
+          text: true,
+          cell: ({ each, reason }) => (each.works ? (each.nearest?.pair || []).map(NB.words).join(' \u2013 ') : reason),
+        },
+      ],
+      preview.configurations.map((each, index) => ({ each, reason: this.reach.reasons[index] })),
+      {
+        class: 'choose small',
+        row: ({ each }) => ({
+          'aria-selected': String(each.label === chosen),
+          tabindex: each.label === chosen || !chosen ? '0' : '-1',
+        }),
+      },
+    );
     const rows = [...list.querySelectorAll('tbody tr')];
     NB.rows(rows, (index) => this.choose(preview.configurations[index].label));
     const focused = [...this.configurations.querySelectorAll('tbody tr')].indexOf(document.activeElement);
@@ -386,33 +641,78 @@ PLAN.Planner = class {
     const { motion } = this;
     const chosen = this.state.needle.configuration;
     this.playButton.disabled = !motion?.time_s?.length;
-    if (!chosen) return NB.el('p', { class: 'soft', text: 'Choose one to see its motion and the error that is to be expected.' });
+    if (!chosen)
+      return NB.el('p', { class: 'soft', text: 'Choose one to see its motion and the error that is to be expected.' });
     if (!motion) return NB.el('p', { class: 'soft', text: `Planning the motion of ${chosen} ...` });
     if (motion.refused) return NB.el('p', { class: 'error', text: motion.refused.message });
     const first = motion.rejections[0];
     const how = first
       ? NB.el('p', { class: 'bad', text: `${chosen}: ${first.words}. ${first.detail}.` })
-      : NB.el('p', { class: 'good', text: `${chosen}: a motion of ${NB.fixed(motion.time_s.at(-1), 1)} s is planned and keeps all clearances.` });
+      : NB.el('p', {
+          class: 'good',
+          text: `${chosen}: a motion of ${NB.fixed(motion.time_s.at(-1), 1)} s is planned and keeps all clearances.`,
+        });
     const tip = motion.tip
-      ? NB.el('p', { text: `Expected tip error at the target: ${NB.mm(motion.tip.rms_m, 2)} mm rms, ${NB.mm(motion.tip.lateral_rms_m, 2)} mm rms across the needle. The outline on the slices holds 95 % of tips, to scale.` })
-      : NB.el('p', { class: 'soft', text: motion.tip_unknown ? `Expected tip error: not known, ${motion.tip_unknown}.` : 'Expected tip error: not known without a motion.' });
+      ? NB.el('p', {
+          text: `Expected tip error at the target: ${NB.mm(motion.tip.rms_m, 2)} mm rms, ${NB.mm(motion.tip.lateral_rms_m, 2)} mm rms across the needle. The outline on the slices holds 95 % of tips, to scale.`,
+        })
+      : NB.el('p', {
+          class: 'soft',
+          text: motion.tip_unknown
+            ? `Expected tip error: not known, ${motion.tip_unknown}.`
+            : 'Expected tip error: not known without a motion.',
+        });
     return NB.el('div', null, how, tip);
   }
 
   playButtons() {
-    this.playButton = NB.el('button', { type: 'button', disabled: true, onclick: () => {
-      this.room.play(this.motion, (time, whole) => { this.clock.textContent = `${NB.fixed(time, 1)} of ${NB.fixed(whole, 1)} s`; });
-    } }, 'Play motion');
+    this.playButton = NB.el(
+      'button',
+      {
+        type: 'button',
+        disabled: true,
+        onclick: () => {
+          this.room.play(this.motion, (time, whole) => {
+            this.clock.textContent = `${NB.fixed(time, 1)} of ${NB.fixed(whole, 1)} s`;
+          });
+        },
+      },
+      'Play motion',
+    );
     this.clock = NB.el('span', { class: 'soft' });
-    return NB.el('span', { class: 'no-print' }, this.playButton, ' ', NB.el('button', { type: 'button', onclick: () => this.room.home(this.route) }, 'Show the needle'), ' ', this.clock);
+    return NB.el(
+      'span',
+      { class: 'no-print' },
+      this.playButton,
+      ' ',
+      NB.el('button', { type: 'button', onclick: () => this.room.home(this.route) }, 'Show the needle'),
+      ' ',
+      this.clock,
+    );
   }
 
   // ---- routes side by side
 
   routesPanel() {
-    this.routeName = NB.el('input', { type: 'text', size: '16', maxlength: '64', 'aria-label': 'Name of the route', value: '' });
-    return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Routes side by side' }),
-      NB.el('div', { class: 'bar no-print' }, this.routeName, NB.el('button', { type: 'button', onclick: () => this.keepRoute() }, 'Keep this route')), this.comparison);
+    this.routeName = NB.el('input', {
+      type: 'text',
+      size: '16',
+      maxlength: '64',
+      'aria-label': 'Name of the route',
+      value: '',
+    });
+    return NB.el(
+      'section',
+      { class: 'panel' },
+      NB.el('h2', { text: 'Routes side by side' }),
+      NB.el(
+        'div',
+        { class: 'bar no-print' },
+        this.routeName,
+        NB.el('button', { type: 'button', onclick: () => this.keepRoute() }, 'Keep this route'),
+      ),
+      this.comparison,
+    );
   }
 
   keepRoute() {
@@ -430,57 +730,123 @@ PLAN.Planner = class {
 
   async showRoutes() {
     const { routes } = this.state;
-    if (!routes.length) { NB.clear(this.comparison, NB.el('p', { class: 'soft', text: 'Keep a route to compare others with it.' })); return; }
-    const asked = this.comparing = {};
-    const answers = await Promise.all(routes.map(async ({ name, needle }) => {
-      const { goal, target, entry } = needle;
-      try {
-        const [route, reach] = await Promise.all(['route', 'reach'].map((path) => PLAN.ask(path, { body: { aim: { goal, target, entry } } })));
-        return { name, needle, route: route.refused ? null : route, reach: reach.refused ? null : reach };
-      } catch (error) {
-        this.complain(error);
-        return { name, needle, route: null, reach: null };
-      }
-    }));
+    if (!routes.length) {
+      NB.clear(this.comparison, NB.el('p', { class: 'soft', text: 'Keep a route to compare others with it.' }));
+      return;
+    }
+    const asked = (this.comparing = {});
+    const answers = await Promise.all(
+      routes.map(async ({ name, needle }) => {
+        const { goal, target, entry } = needle;
+        try {
+          const [route, reach] = await Promise.all(
+            ['route', 'reach'].map((path) => PLAN.ask(path, { body: { aim: { goal, target, entry } } })),
+          );
+          return { name, needle, route: route.refused ? null : route, reach: reach.refused ? null : reach };
+        } catch (error) {
+          this.complain(error);
+          return { name, needle, route: null, reach: null };
+        }
+      }),
+    );
     if (asked !== this.comparing) return;
-    const buttons = answers.map((each, index) => NB.el('span', { class: 'pick' },
-      NB.el('button', { type: 'button', onclick: () => { this.change(structuredClone(each.needle)); } }, `Take ${each.name}`),
-      NB.el('button', { type: 'button', 'aria-label': `Forget ${each.name}`, onclick: () => {
-        this.remember();
-        this.state.routes = this.state.routes.filter((_, at) => at !== index);
-        this.showRoutes();
-        this.showUndo();
-        this.keepSoon();
-      } }, '\u00d7')));
-    NB.clear(this.comparison, PLAN.routeRows(answers, 'Routes that were kept'), NB.el('div', { class: 'tabs no-print' }, buttons));
+    const buttons = answers.map((each, index) =>
+      NB.el(
+        'span',
+        { class: 'pick' },
+        NB.el(
+          'button',
+          {
+            type: 'button',
+            onclick: () => {
+              this.change(structuredClone(each.needle));
+            },
+          },
+          `Take ${each.name}`,
+        ),
+        NB.el(
+          'button',
+          {
+            type: 'button',
+            'aria-label': `Forget ${each.name}`,
+            onclick: () => {
+              this.remember();
+              this.state.routes = this.state.routes.filter((_, at) => at !== index);
+              this.showRoutes();
+              this.showUndo();
+              this.keepSoon();
+            },
+          },
+          '\u00d7',
+        ),
+      ),
+    );
+    NB.clear(
+      this.comparison,
+      PLAN.routeRows(answers, 'Routes that were kept'),
+      NB.el('div', { class: 'tabs no-print' }, buttons),
+    );
   }
 
   // ---- markers, notes
 
   markersPanel() {
     const { markers, registration } = this.facts;
-    if (!markers.length) return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Markers' }), NB.el('p', { text: 'None are registered.' }));
-    this.markerBoxes = new Map(markers.map(({ name }) => [name, NB.checkbox('', true, (checked) => {
-      this.remember();
-      const hidden = this.state.hidden_markers.filter((each) => each !== name);
-      this.state.hidden_markers = checked ? hidden : [...hidden, name];
-      this.showMarkers();
-      this.showUndo();
-      this.keepSoon();
-    })]));
-    for (const [name, box] of this.markerBoxes) box.querySelector('input').setAttribute('aria-label', `Show ${NB.words(name)}`);
-    const table = NB.table('Residuals of the registration', [
-      { title: 'Marker', cell: ({ name }) => NB.words(name) },
-      { title: 'Shown', cell: ({ name }) => this.markerBoxes.get(name) },
-      { title: 'Residual', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.residual_m, 2) },
-      { title: 'Expected', unit: 'mm rms', numeric: true, cell: (each) => NB.mm(each.expected_residual_m, 2) },
-      { title: 'By the others', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.by_the_others_m, 2) },
-    ], markers, { class: 'small' });
-    const suspects = registration.suspects.length ? NB.el('p', { class: 'bad', text: `May have moved: ${registration.suspects.map(NB.words).join(', ')}.` }) : null;
-    const errors = this.facts.lesions.filter((lesion) => lesion.registration_rms_m !== null)
-      .map((lesion) => NB.el('p', { text: `At ${NB.words(lesion.name)} the registration is off by ${NB.mm(lesion.registration_rms_m, 2)} mm rms (TRE).` }));
-    return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Markers' }), table,
-      NB.el('p', { text: `They agree to ${NB.mm(registration.fre_rms_m, 2)} mm rms (FRE; ${NB.mm(registration.expected_fre_rms_m, 2)} expected), which does not tell the error at the target.` }), errors, suspects);
+    if (!markers.length)
+      return NB.el(
+        'section',
+        { class: 'panel' },
+        NB.el('h2', { text: 'Markers' }),
+        NB.el('p', { text: 'None are registered.' }),
+      );
+    this.markerBoxes = new Map(
+      markers.map(({ name }) => [
+        name,
+        NB.checkbox('', true, (checked) => {
+          this.remember();
+          const hidden = this.state.hidden_markers.filter((each) => each !== name);
+          this.state.hidden_markers = checked ? hidden : [...hidden, name];
+          this.showMarkers();
+          this.showUndo();
+          this.keepSoon();
+        }),
+      ]),
+    );
+    for (const [name, box] of this.markerBoxes)
+      box.querySelector('input').setAttribute('aria-label', `Show ${NB.words(name)}`);
+    const table = NB.table(
+      'Residuals of the registration',
+      [
+        { title: 'Marker', cell: ({ name }) => NB.words(name) },
+        { title: 'Shown', cell: ({ name }) => this.markerBoxes.get(name) },
+        { title: 'Residual', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.residual_m, 2) },
+        { title: 'Expected', unit: 'mm rms', numeric: true, cell: (each) => NB.mm(each.expected_residual_m, 2) },
+        { title: 'By the others', unit: 'mm', numeric: true, cell: (each) => NB.mm(each.by_the_others_m, 2) },
+      ],
+      markers,
+      { class: 'small' },
+    );
+    const suspects = registration.suspects.length
+      ? NB.el('p', { class: 'bad', text: `May have moved: ${registration.suspects.map(NB.words).join(', ')}.` })
+      : null;
+    const errors = this.facts.lesions
+      .filter((lesion) => lesion.registration_rms_m !== null)
+      .map((lesion) =>
+        NB.el('p', {
+          text: `At ${NB.words(lesion.name)} the registration is off by ${NB.mm(lesion.registration_rms_m, 2)} mm rms (TRE).`,
+        }),
+      );
+    return NB.el(
+      'section',
+      { class: 'panel' },
+      NB.el('h2', { text: 'Markers' }),
+      table,
+      NB.el('p', {
+        text: `They agree to ${NB.mm(registration.fre_rms_m, 2)} mm rms (FRE; ${NB.mm(registration.expected_fre_rms_m, 2)} expected), which does not tell the error at the target.`,
+      }),
+      errors,
+      suspects,
+    );
   }
 
   showMarkers() {
@@ -493,7 +859,16 @@ PLAN.Planner = class {
   }
 
   notesPanel() {
-    this.notes = NB.el('textarea', { rows: '3', maxlength: '20000', 'aria-label': 'Notes', oninput: () => { this.state.notes = this.notes.value; this.showNotes(); this.keepSoon(); } });
+    this.notes = NB.el('textarea', {
+      rows: '3',
+      maxlength: '20000',
+      'aria-label': 'Notes',
+      oninput: () => {
+        this.state.notes = this.notes.value;
+        this.showNotes();
+        this.keepSoon();
+      },
+    });
     this.notesOnPaper = NB.el('p', { class: 'print-only' });
     this.showNotes();
     return NB.el('section', { class: 'panel' }, NB.el('h2', { text: 'Notes' }), this.notes, this.notesOnPaper);
@@ -507,7 +882,13 @@ PLAN.Planner = class {
 
   signature() {
     this.printed = NB.el('span');
-    return NB.el('p', { class: 'print-only signature' }, 'Printed ', this.printed, '. Research software, not a medical device. Planned by: ______________________  Date: ______________  Signature: ______________________');
+    return NB.el(
+      'p',
+      { class: 'print-only signature' },
+      'Printed ',
+      this.printed,
+      '. Research software, not a medical device. Planned by: ______________________  Date: ______________  Signature: ______________________',
+    );
   }
 
   // ---- what is kept
@@ -519,11 +900,21 @@ PLAN.Planner = class {
     this.undone = [];
   }
 
-  undoable() { return structuredClone({ needle: this.state.needle, hidden_markers: this.state.hidden_markers, routes: this.state.routes }); }
+  undoable() {
+    return structuredClone({
+      needle: this.state.needle,
+      hidden_markers: this.state.hidden_markers,
+      routes: this.state.routes,
+    });
+  }
 
-  undo() { this.back(this.done, this.undone); }
+  undo() {
+    this.back(this.done, this.undone);
+  }
 
-  redo() { this.back(this.undone, this.done); }
+  redo() {
+    this.back(this.undone, this.done);
+  }
 
   back(from, to) {
     if (!from.length) return;
@@ -554,39 +945,74 @@ PLAN.Planner = class {
 
   async keep() {
     if (this.conflict) return;
-    if (this.writing) { this.again = true; return; }
+    if (this.writing) {
+      this.again = true;
+      return;
+    }
     this.writing = true;
     try {
-      const { version } = await PLAN.ask('session', { method: 'PUT', body: { version: this.version, state: this.state } });
+      const { version } = await PLAN.ask('session', {
+        method: 'PUT',
+        body: { version: this.version, state: this.state },
+      });
       this.version = version;
       this.kept.textContent = this.again ? 'not kept yet' : 'kept';
       if (this.complaint === 'keeping') this.calm();
     } catch (error) {
       this.kept.textContent = 'not kept';
       if (error.status === 409) this.meet(error);
-      else this.complain(error, 'keeping', NB.el('button', { type: 'button', onclick: () => this.keep() }, 'Try again'));
+      else
+        this.complain(error, 'keeping', NB.el('button', { type: 'button', onclick: () => this.keep() }, 'Try again'));
     }
     this.writing = false;
-    if (this.again) { this.again = false; this.keep(); }
+    if (this.again) {
+      this.again = false;
+      this.keep();
+    }
   }
 
   /** Another tab was first: nothing is lost either way. */
   meet(error) {
     const theirs = error.body.session;
     this.conflict = true;
-    this.complain(error, 'conflict',
-      NB.el('button', { type: 'button', onclick: () => {
-        this.remember();
-        Object.assign(this.state, Object.fromEntries(Object.entries(PLAN.taken(theirs)).filter(([, value]) => value !== null)));
-        this.version = theirs.version;
-        this.conflict = false;
-        this.calm();
-        this.showNotes();
-        this.setWindow(this.state.window_hu);
-        this.everything();
-        this.look(this.state.crosshair);
-      } }, 'Reload what the other tab has'),
-      NB.el('button', { type: 'button', onclick: () => { this.version = theirs.version; this.conflict = false; this.calm(); this.keep(); } }, 'Keep what is here'));
+    this.complain(
+      error,
+      'conflict',
+      NB.el(
+        'button',
+        {
+          type: 'button',
+          onclick: () => {
+            this.remember();
+            Object.assign(
+              this.state,
+              Object.fromEntries(Object.entries(PLAN.taken(theirs)).filter(([, value]) => value !== null)),
+            );
+            this.version = theirs.version;
+            this.conflict = false;
+            this.calm();
+            this.showNotes();
+            this.setWindow(this.state.window_hu);
+            this.everything();
+            this.look(this.state.crosshair);
+          },
+        },
+        'Reload what the other tab has',
+      ),
+      NB.el(
+        'button',
+        {
+          type: 'button',
+          onclick: () => {
+            this.version = theirs.version;
+            this.conflict = false;
+            this.calm();
+            this.keep();
+          },
+        },
+        'Keep what is here',
+      ),
+    );
   }
 
   complain(error, about = 'other', ...buttons) {
@@ -595,10 +1021,16 @@ PLAN.Planner = class {
     this.banner.classList.add('shown');
   }
 
-  calm() { this.complaint = null; this.banner.classList.remove('shown'); NB.clear(this.banner); }
+  calm() {
+    this.complaint = null;
+    this.banner.classList.remove('shown');
+    NB.clear(this.banner);
+  }
 
   /** What is saved as a plan. */
-  plan() { return { aim: this.aim(), configuration: this.state.needle.configuration, name: this.planName.value.trim() }; }
+  plan() {
+    return { aim: this.aim(), configuration: this.state.needle.configuration, name: this.planName.value.trim() };
+  }
 
   async savePlan() {
     try {
@@ -614,8 +1046,15 @@ PLAN.Planner = class {
   key(event) {
     if (!(event.ctrlKey || event.metaKey) || event.target.closest('input[type="text"], textarea')) return;
     const name = event.key.toLowerCase();
-    if (name === 'z') { event.preventDefault(); if (event.shiftKey) this.redo(); else this.undo(); }
-    if (name === 'y') { event.preventDefault(); this.redo(); }
+    if (name === 'z') {
+      event.preventDefault();
+      if (event.shiftKey) this.redo();
+      else this.undo();
+    }
+    if (name === 'y') {
+      event.preventDefault();
+      this.redo();
+    }
   }
 };
 
@@ -627,24 +1066,41 @@ PLAN.open = async function () {
   const app = document.getElementById('app');
   const loading = document.getElementById('loading');
   try {
-    if (!/^[0-9a-f]{32}$/.test(PLAN.token)) throw new PLAN.Problem(401, { error: 'the address lacks its token', hint: 'open the whole address that `needlebench view` prints' });
+    if (!/^[0-9a-f]{32}$/.test(PLAN.token))
+      throw new PLAN.Problem(401, {
+        error: 'the address lacks its token',
+        hint: 'open the whole address that `needlebench view` prints',
+      });
     loading.textContent = 'Reading the patient ...';
-    const [facts, session, scene] = await Promise.all([PLAN.ask('case'), PLAN.ask('session'), PLAN.fetch('scene').then((response) => response.arrayBuffer())]);
+    const [facts, session, scene] = await Promise.all([
+      PLAN.ask('case'),
+      PLAN.ask('session'),
+      PLAN.fetch('scene').then((response) => response.arrayBuffer()),
+    ]);
     const page = NB.unpack(scene);
     for (const [name, words] of Object.entries(page.words || {})) NB.dictionary.set(name, words);
     document.title = `needlebench: plan of ${facts.name}`;
-    const coming = PLAN.Volume.load(facts.size, facts.spacing_m, (share) => { loading.textContent = `Reading the volume: ${Math.round(100 * share)} %`; });
+    const coming = PLAN.Volume.load(facts.size, facts.spacing_m, (share) => {
+      loading.textContent = `Reading the volume: ${Math.round(100 * share)} %`;
+    });
     const volume = await coming;
     const planner = new PLAN.Planner(facts, session, page, app);
     PLAN.planner = planner;
     planner.volume = volume;
     planner.draw();
-    requestAnimationFrame(() => requestAnimationFrame(() => {
-      NB.timing.firstView = performance.now();
-      document.documentElement.dataset.ready = 'true';
-    }));
+    requestAnimationFrame(() =>
+      requestAnimationFrame(() => {
+        NB.timing.firstView = performance.now();
+        document.documentElement.dataset.ready = 'true';
+      }),
+    );
   } catch (error) {
-    NB.clear(app, NB.el('h1', { text: 'needlebench' }), NB.el('p', { class: 'error', role: 'alert', text: `This patient cannot be shown: ${error.message}.` }), error.hint ? NB.el('p', { text: error.hint }) : null);
+    NB.clear(
+      app,
+      NB.el('h1', { text: 'needlebench' }),
+      NB.el('p', { class: 'error', role: 'alert', text: `This patient cannot be shown: ${error.message}.` }),
+      error.hint ? NB.el('p', { text: error.hint }) : null,
+    );
     if (!(error instanceof PLAN.Problem)) throw error;
   }
 };

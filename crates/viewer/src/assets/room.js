@@ -14,8 +14,15 @@ PLAN.Room = class {
     this.arm.layer('corridor', false);
     this.pose(page.start);
     this.place = facts.world_from_phantom && NB.matrix(facts.world_from_phantom);
-    for (const lesion of facts.lesions) this.view.ball('lesions', this.world(lesion.center_m), 0.5 * (lesion.diameter_m || 0.01), [0.8, 0.47, 0.65, 1]);
-    for (const marker of facts.markers) this.view.ball(`marker ${marker.name}`, this.world(marker.center_m), 0.5 * marker.diameter_m, [0.34, 0.71, 0.91, 1]);
+    for (const lesion of facts.lesions)
+      this.view.ball('lesions', this.world(lesion.center_m), 0.5 * (lesion.diameter_m || 0.01), [0.8, 0.47, 0.65, 1]);
+    for (const marker of facts.markers)
+      this.view.ball(
+        `marker ${marker.name}`,
+        this.world(marker.center_m),
+        0.5 * marker.diameter_m,
+        [0.34, 0.71, 0.91, 1],
+      );
     if (!this.known) {
       this.arm.show(false);
       for (const part of ['robot', 'mount']) this.view.show(part, false);
@@ -31,15 +38,25 @@ PLAN.Room = class {
 
   home(route = null) {
     if (!this.view.works || !this.place) return;
-    const middle = route ? route.target_m : PLAN.add(this.facts.first_voxel_m, this.facts.size.map((count, axis) => count * this.facts.spacing_m[axis] / 2));
+    const middle = route
+      ? route.target_m
+      : PLAN.add(
+          this.facts.first_voxel_m,
+          this.facts.size.map((count, axis) => (count * this.facts.spacing_m[axis]) / 2),
+        );
     const at = this.world(middle);
-    const near = [-0.2, 0.2].flatMap((x) => [-0.2, 0.2].flatMap((y) => [-0.2, 0.2].map((z) => PLAN.add(at, [x, y, z]))));
+    const near = [-0.2, 0.2].flatMap((x) =>
+      [-0.2, 0.2].flatMap((y) => [-0.2, 0.2].map((z) => PLAN.add(at, [x, y, z]))),
+    );
     const base = this.page.scene.chain.base;
     this.view.frame(this.known ? [...NB.aboutBase(base, 0.55), ...near] : near, NB.direction(base, at, [0, 0, -1]));
   }
 
   pose(joints) {
-    if (this.view.works && joints) { this.arm.pose(this.page.scene.chain, joints); this.view.draw(); }
+    if (this.view.works && joints) {
+      this.arm.pose(this.page.scene.chain, joints);
+      this.view.draw();
+    }
   }
 
   needle(route, tip) {
@@ -55,7 +72,9 @@ PLAN.Room = class {
     this.view.draw();
   }
 
-  marker(name, visible) { if (this.view.works) this.view.show(`marker ${name}`, visible); }
+  marker(name, visible) {
+    if (this.view.works) this.view.show(`marker ${name}`, visible);
+  }
 
   /** Plays a motion; `told(time, whole)` follows it. */
   play(motion, told) {

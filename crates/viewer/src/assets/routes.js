@@ -4,22 +4,43 @@
 /** Routes as columns, what is known of them as rows. */
 PLAN.routeRows = function (columns, caption) {
   const rows = [];
-  const row = (title, unit, cell) => rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route, column) : '\u2013')) });
+  const row = (title, unit, cell) =>
+    rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route, column) : '\u2013')) });
   if (columns.some(({ route }) => route?.judged)) {
     row('By the rules of routes', '', (route) => {
       const { judged } = route;
       if (!judged) return 'not asked: find routes';
-      const unseen = judged.unknown.length ? `; not labelled, so not judged: ${judged.unknown.map(NB.words).join(', ')}` : '';
-      if (judged.free) return NB.el('span', { class: unseen ? 'bad' : 'good', text: `free, odds \u00d7${NB.fixed(judged.odds_ratio, 2)}${unseen}` });
-      const value = (number) => (judged.unit === 'm' ? `${NB.mm(number)} mm` : judged.unit === 'rad' ? `${NB.deg(number)}\u00b0` : NB.fixed(number, 0));
-      return NB.el('span', { class: 'bad', text: `${judged.broken}: ${value(judged.value)}, ${value(judged.limit)} ${judged.is_least ? 'wanted' : 'allowed'}${unseen}` });
+      const unseen = judged.unknown.length
+        ? `; not labelled, so not judged: ${judged.unknown.map(NB.words).join(', ')}`
+        : '';
+      if (judged.free)
+        return NB.el('span', {
+          class: unseen ? 'bad' : 'good',
+          text: `free, odds \u00d7${NB.fixed(judged.odds_ratio, 2)}${unseen}`,
+        });
+      const value = (number) =>
+        judged.unit === 'm'
+          ? `${NB.mm(number)} mm`
+          : judged.unit === 'rad'
+            ? `${NB.deg(number)}\u00b0`
+            : NB.fixed(number, 0);
+      return NB.el('span', {
+        class: 'bad',
+        text: `${judged.broken}: ${value(judged.value)}, ${value(judged.limit)} ${judged.is_least ? 'wanted' : 'allowed'}${unseen}`,
+      });
     });
   }
   row('Skin to target', 'mm', (route) => NB.mm(route.length_m));
-  row('Guide\u2019s exit to tip', 'mm', (route) => (route.insertion_m === null ? '\u2013' : `${NB.mm(route.insertion_m)}; the needle has ${NB.mm(route.needle_m)}`));
+  row('Guide\u2019s exit to tip', 'mm', (route) =>
+    route.insertion_m === null ? '\u2013' : `${NB.mm(route.insertion_m)}; the needle has ${NB.mm(route.needle_m)}`,
+  );
   row('To the skin\u2019s normal', '\u00b0', (route) => NB.deg(route.skin_angle_rad));
   row('Out of the axial plane', '\u00b0', (route) => NB.deg(route.axial_angle_rad));
-  row('In lung', 'mm', (route) => (route.in_lung_m === null ? 'no lung in the label map' : `${NB.mm(route.in_lung_m)} \u00b1 ${NB.mm(route.crossing_within_m)}`));
+  row('In lung', 'mm', (route) =>
+    route.in_lung_m === null
+      ? 'no lung in the label map'
+      : `${NB.mm(route.in_lung_m)} \u00b1 ${NB.mm(route.crossing_within_m)}`,
+  );
   row('Enters lung', 'times', (route) => (route.lung_entries === null ? '\u2013' : String(route.lung_entries)));
   for (const tissue of ['bone', 'vessel', 'organ']) {
     if (!columns.some(({ route }) => route?.tissues.some((each) => each.tissue === tissue))) continue;
@@ -27,13 +48,31 @@ PLAN.routeRows = function (columns, caption) {
       const known = route.tissues.find((each) => each.tissue === tissue);
       if (!known) return '\u2013';
       const off = known.surface_p99_m === null ? '' : ` \u00b1 ${NB.mm(known.surface_p99_m, 2)}`;
-      return NB.el('span', { class: known.kept ? 'good' : 'bad', text: `${NB.mm(known.distance_m)}${off} to ${known.words}, ${known.kept ? '' : 'too near: '}${NB.mm(known.margin_m)} wanted` });
+      return NB.el('span', {
+        class: known.kept ? 'good' : 'bad',
+        text: `${NB.mm(known.distance_m)}${off} to ${known.words}, ${known.kept ? '' : 'too near: '}${NB.mm(known.margin_m)} wanted`,
+      });
     });
   }
-  if (columns.some(({ route }) => route?.fissures.length)) row('Fissures crossed', '', (route) => route.fissures.map(NB.words).join(', ') || 'none');
-  row('Passes', 'mm from the skin', (route) => route.crossings.map((each) => `${NB.words(each.name)} ${NB.mm(each.from_m, 0)}\u2013${NB.mm(each.to_m, 0)}`).join(', '));
-  if (columns.some(({ reach }) => reach?.preview)) rows.push({ title: 'Configurations', unit: 'of 8', cells: columns.map(({ reach }) => (reach?.preview ? String(reach.preview.working) : '\u2013')) });
-  const heads = [{ title: 'Quantity', cell: ({ title, unit }) => [title, NB.el('span', { class: 'unit', text: unit ? ` ${unit}` : '' })] },
-    ...columns.map(({ name }, index) => ({ title: name, cell: ({ cells }) => cells[index] }))];
+  if (columns.some(({ route }) => route?.fissures.length))
+    row('Fissures crossed', '', (route) => route.fissures.map(NB.words).join(', ') || 'none');
+  row('Passes', 'mm from the skin', (route) =>
+    route.crossings
+      .map((each) => `${NB.words(each.name)} ${NB.mm(each.from_m, 0)}\u2013${NB.mm(each.to_m, 0)}`)
+      .join(', '),
+  );
+  if (columns.some(({ reach }) => reach?.preview))
+    rows.push({
+      title: 'Configurations',
+      unit: 'of 8',
+      cells: columns.map(({ reach }) => (reach?.preview ? String(reach.preview.working) : '\u2013')),
+    });
+  const heads = [
+    {
+      title: 'Quantity',
+      cell: ({ title, unit }) => [title, NB.el('span', { class: 'unit', text: unit ? ` ${unit}` : '' })],
+    },
+    ...columns.map(({ name }, index) => ({ title: name, cell: ({ cells }) => cells[index] })),
+  ];
   return NB.table(caption, heads, rows, { class: 'small route' });
 };

@@ -2,7 +2,8 @@
 'use strict';
 
 /** What a plan is without. */
-PLAN.withoutGoals = (leftOut) => (leftOut.length ? ` It is without ${leftOut.map(NB.words).join(', ')}: no entry was chosen there.` : '');
+PLAN.withoutGoals = (leftOut) =>
+  leftOut.length ? ` It is without ${leftOut.map(NB.words).join(', ')}: no entry was chosen there.` : '';
 
 PLAN.Simulation = class {
   constructor(planner) {
@@ -13,16 +14,50 @@ PLAN.Simulation = class {
       this.element = this.panel(NB.el('p', { text: 'Needs to know where the robot is.' }));
       return;
     }
-    this.startButton = NB.el('button', { type: 'button', disabled: true, onclick: () => this.start() }, 'Save and simulate');
-    this.cancelButton = NB.el('button', { type: 'button', disabled: true, onclick: async () => this.told(await PLAN.ask('simulation', { method: 'DELETE' })) }, 'Cancel');
-    this.reportLink = NB.el('a', { href: '/results/report.html', target: '_blank', rel: 'noopener', hidden: true }, 'Open the report');
+    this.startButton = NB.el(
+      'button',
+      { type: 'button', disabled: true, onclick: () => this.start() },
+      'Save and simulate',
+    );
+    this.cancelButton = NB.el(
+      'button',
+      {
+        type: 'button',
+        disabled: true,
+        onclick: async () => this.told(await PLAN.ask('simulation', { method: 'DELETE' })),
+      },
+      'Cancel',
+    );
+    this.reportLink = NB.el(
+      'a',
+      { href: '/results/report.html', target: '_blank', rel: 'noopener', hidden: true },
+      'Open the report',
+    );
     this.element = this.panel(
-      NB.select('Engines', [['both', 'rapier and MuJoCo'], ['rapier', 'rapier alone']], this.engine, (value) => { this.engine = value; }),
-      NB.el('div', { class: 'tabs' }, this.startButton, this.cancelButton), this.said, this.reportLink);
-    PLAN.ask('simulation').then((progress) => this.told(progress, true), () => {});
+      NB.select(
+        'Engines',
+        [
+          ['both', 'rapier and MuJoCo'],
+          ['rapier', 'rapier alone'],
+        ],
+        this.engine,
+        (value) => {
+          this.engine = value;
+        },
+      ),
+      NB.el('div', { class: 'tabs' }, this.startButton, this.cancelButton),
+      this.said,
+      this.reportLink,
+    );
+    PLAN.ask('simulation').then(
+      (progress) => this.told(progress, true),
+      () => {},
+    );
   }
 
-  panel(...parts) { return NB.el('section', { class: 'panel no-print' }, NB.el('h2', { text: 'Simulation' }), parts); }
+  panel(...parts) {
+    return NB.el('section', { class: 'panel no-print' }, NB.el('h2', { text: 'Simulation' }), parts);
+  }
 
   /** Whether there is a plan that can be run. */
   allow(isPlan) {
@@ -48,10 +83,19 @@ PLAN.Simulation = class {
     // The cookie that opens the report is of the page that simulated.
     this.reportLink.hidden = quiet || !progress.has_report;
     if (progress.state !== 'none') {
-      const words = { running: 'running', finished: 'finished', failed: 'failed', cancelled: 'cancelled' }[progress.state];
+      const words = { running: 'running', finished: 'finished', failed: 'failed', cancelled: 'cancelled' }[
+        progress.state
+      ];
       this.said.textContent = `${progress.plan} ${words}: ${progress.message}${PLAN.withoutGoals(progress.left_out)}`;
       this.said.className = progress.state === 'failed' ? 'bad break' : 'break';
     }
-    if (this.running) setTimeout(async () => { try { this.told(await PLAN.ask('simulation')); } catch (error) { this.planner.complain(error); } }, 500);
+    if (this.running)
+      setTimeout(async () => {
+        try {
+          this.told(await PLAN.ask('simulation'));
+        } catch (error) {
+          this.planner.complain(error);
+        }
+      }, 500);
   }
 };

@@ -9,8 +9,13 @@ PLAN.PLANES = {
 };
 
 PLAN.COLORS = {
-  needle: NB.palette.yellow, target: NB.palette.orange, entry: NB.palette.sky, cross: NB.palette.green,
-  lesion: NB.palette.purple, marker: NB.palette.sky, error: NB.palette.vermillion,
+  needle: NB.palette.yellow,
+  target: NB.palette.orange,
+  entry: NB.palette.sky,
+  cross: NB.palette.green,
+  lesion: NB.palette.purple,
+  marker: NB.palette.sky,
+  error: NB.palette.vermillion,
 };
 
 /** Square root of what chi-square of three degrees of freedom stays below in 95 % of cases. */
@@ -31,7 +36,10 @@ PLAN.Picture = class {
   /** Draws once before the next frame, however often it is asked. */
   draw() {
     if (this.asked) return;
-    this.asked = requestAnimationFrame(() => { this.asked = 0; this.render(); });
+    this.asked = requestAnimationFrame(() => {
+      this.asked = 0;
+      this.render();
+    });
   }
 
   begin([width, height], middle) {
@@ -53,16 +61,24 @@ PLAN.Picture = class {
   }
 
   /** A place of the picture, mm, on the canvas. */
-  onCanvas([x, y]) { return [this.origin[0] + x * this.scale, this.origin[1] + y * this.scale]; }
+  onCanvas([x, y]) {
+    return [this.origin[0] + x * this.scale, this.origin[1] + y * this.scale];
+  }
 
   inPicture(event) {
     const box = this.canvas.getBoundingClientRect();
-    return [(event.clientX - box.left - this.origin[0]) / this.scale, (event.clientY - box.top - this.origin[1]) / this.scale];
+    return [
+      (event.clientX - box.left - this.origin[0]) / this.scale,
+      (event.clientY - box.top - this.origin[1]) / this.scale,
+    ];
   }
 
   line(context, a, b, color, width, dashes = []) {
     context.setLineDash(dashes);
-    for (const [style, size] of [['rgba(0, 0, 0, 0.7)', width + 2], [color, width]]) {
+    for (const [style, size] of [
+      ['rgba(0, 0, 0, 0.7)', width + 2],
+      [color, width],
+    ]) {
       context.strokeStyle = style;
       context.lineWidth = size;
       context.beginPath();
@@ -74,7 +90,10 @@ PLAN.Picture = class {
   }
 
   ring(context, at, radius, color, width = 1.5) {
-    for (const [style, size] of [['rgba(0, 0, 0, 0.7)', width + 2], [color, width]]) {
+    for (const [style, size] of [
+      ['rgba(0, 0, 0, 0.7)', width + 2],
+      [color, width],
+    ]) {
       context.strokeStyle = style;
       context.lineWidth = size;
       context.beginPath();
@@ -114,13 +133,22 @@ PLAN.Picture = class {
 
   /** The outline of the 95 % ellipsoid on a plane of two unit vectors (axes of ct): mm of the plane. */
   ellipse(context, at, covariance, a, b, color) {
-    const of = (p, q) => PLAN.dot(p, covariance.map((row) => PLAN.dot(row, q)));
+    const of = (p, q) =>
+      PLAN.dot(
+        p,
+        covariance.map((row) => PLAN.dot(row, q)),
+      );
     const [xx, xy, yy] = [of(a, a), of(a, b), of(b, b)];
     const mean = (xx + yy) / 2;
     const spread = Math.hypot((xx - yy) / 2, xy);
-    const radii = [mean + spread, mean - spread].map((variance) => PLAN.SIGMAS_95 * 1e3 * Math.sqrt(Math.max(variance, 0)) * this.scale);
+    const radii = [mean + spread, mean - spread].map(
+      (variance) => PLAN.SIGMAS_95 * 1e3 * Math.sqrt(Math.max(variance, 0)) * this.scale,
+    );
     const turn = 0.5 * Math.atan2(2 * xy, xx - yy);
-    for (const [style, size] of [['rgba(0, 0, 0, 0.7)', 3.5], [color, 1.75]]) {
+    for (const [style, size] of [
+      ['rgba(0, 0, 0, 0.7)', 3.5],
+      [color, 1.75],
+    ]) {
       context.strokeStyle = style;
       context.lineWidth = size;
       context.beginPath();
@@ -133,7 +161,10 @@ PLAN.Picture = class {
 /** A slice along the patient's axes. `planner` has the volume and what is shown; it is told of clicks and drags. */
 PLAN.Slice = class extends PLAN.Picture {
   constructor(plane, planner) {
-    super(plane.title, 'Arrow keys move the crosshair, page up and down change the slice, plus and minus zoom, 0 shows all, T and E put target and entry at the crosshair.');
+    super(
+      plane.title,
+      'Arrow keys move the crosshair, page up and down change the slice, plus and minus zoom, 0 shows all, T and E put target and entry at the crosshair.',
+    );
     this.plane = plane;
     this.planner = planner;
     this.image = document.createElement('canvas');
@@ -241,7 +272,8 @@ PLAN.Slice = class extends PLAN.Picture {
       this.text(context, name, [at[0], at[1] + size + 9], color, 'center');
     };
     for (const lesion of facts.lesions) cut(lesion, PLAN.COLORS.lesion, NB.words(lesion.name));
-    for (const marker of facts.markers) if (!state.hidden_markers.includes(marker.name)) cut(marker, PLAN.COLORS.marker, NB.words(marker.name));
+    for (const marker of facts.markers)
+      if (!state.hidden_markers.includes(marker.name)) cut(marker, PLAN.COLORS.marker, NB.words(marker.name));
   }
 
   crosshair(context) {
@@ -250,7 +282,24 @@ PLAN.Slice = class extends PLAN.Picture {
     context.strokeStyle = PLAN.COLORS.cross;
     context.lineWidth = 1;
     // Open in the middle, so that what is there is seen.
-    for (const [a, b] of [[[0, y], [x - 8, y]], [[x + 8, y], [w, y]], [[x, 0], [x, y - 8]], [[x, y + 8], [x, h]]]) {
+    for (const [a, b] of [
+      [
+        [0, y],
+        [x - 8, y],
+      ],
+      [
+        [x + 8, y],
+        [w, y],
+      ],
+      [
+        [x, 0],
+        [x, y - 8],
+      ],
+      [
+        [x, y + 8],
+        [x, h],
+      ],
+    ]) {
       context.beginPath();
       context.moveTo(...a);
       context.lineTo(...b);
@@ -267,16 +316,39 @@ PLAN.Slice = class extends PLAN.Picture {
     this.line(context, at(-15e-3 / route.length_m), at(1), PLAN.COLORS.needle, 1, [5, 4]);
     const half = Math.max(0.5, 1 / volume.spacing[w]);
     const along = to[w] - from[w];
-    const shares = Math.abs(along) < 1e-9
-      ? Math.abs(from[w] - slice) <= half ? [0, 1] : null
-      : [(slice - half - from[w]) / along, (slice + half - from[w]) / along].sort((a, b) => a - b);
+    const shares =
+      Math.abs(along) < 1e-9
+        ? Math.abs(from[w] - slice) <= half
+          ? [0, 1]
+          : null
+        : [(slice - half - from[w]) / along, (slice + half - from[w]) / along].sort((a, b) => a - b);
     if (shares && shares[0] < 1 && shares[1] > 0) {
-      this.line(context, at(Math.max(shares[0], 0)), at(Math.min(shares[1], 1)), PLAN.COLORS.needle, Math.max(1e3 * facts.needle_diameter_m * this.scale, 2));
+      this.line(
+        context,
+        at(Math.max(shares[0], 0)),
+        at(Math.min(shares[1], 1)),
+        PLAN.COLORS.needle,
+        Math.max(1e3 * facts.needle_diameter_m * this.scale, 2),
+      );
     }
     if (tip) {
-      const axes = [[1, 0, 0], [0, 1, 0], [0, 0, this.plane.flip ? -1 : 1]];
-      const center = PLAN.add(to, tip.bias_m.map((metres, axis) => metres * 1e3 / volume.spacing[axis]));
-      this.ellipse(context, this.onCanvas(this.place(center)), tip.covariance_m2, axes[this.plane.u], axes[this.plane.v], PLAN.COLORS.error);
+      const axes = [
+        [1, 0, 0],
+        [0, 1, 0],
+        [0, 0, this.plane.flip ? -1 : 1],
+      ];
+      const center = PLAN.add(
+        to,
+        tip.bias_m.map((metres, axis) => (metres * 1e3) / volume.spacing[axis]),
+      );
+      this.ellipse(
+        context,
+        this.onCanvas(this.place(center)),
+        tip.covariance_m2,
+        axes[this.plane.u],
+        axes[this.plane.v],
+        PLAN.COLORS.error,
+      );
     }
   }
 
@@ -291,14 +363,20 @@ PLAN.Slice = class extends PLAN.Picture {
       this.moved = false;
       if (this.held) return;
       if (planner.tool !== 'crosshair') planner.put(planner.tool, this.voxel(event));
-      else { this.held = 'crosshair'; planner.look(this.voxel(event)); }
+      else {
+        this.held = 'crosshair';
+        planner.look(this.voxel(event));
+      }
     });
     canvas.addEventListener('pointermove', (event) => {
       if (!this.held) {
         canvas.style.cursor = planner.volume && this.handleAt(event) ? 'grab' : 'crosshair';
         return;
       }
-      if (this.held === 'crosshair') { planner.look(this.voxel(event)); return; }
+      if (this.held === 'crosshair') {
+        planner.look(this.voxel(event));
+        return;
+      }
       if (!this.moved) {
         // A click on it brings the crosshair there.
         if (Math.hypot(event.clientX - this.from[0], event.clientY - this.from[1]) < 3) return;
@@ -318,11 +396,15 @@ PLAN.Slice = class extends PLAN.Picture {
     };
     canvas.addEventListener('pointerup', end);
     canvas.addEventListener('pointercancel', end);
-    canvas.addEventListener('wheel', (event) => {
-      event.preventDefault();
-      if (event.ctrlKey) this.zoomBy(event.deltaY < 0 ? 1.2 : 1 / 1.2, this.inPicture(event));
-      else planner.step(this.plane.w, event.deltaY < 0 ? 1 : -1);
-    }, { passive: false });
+    canvas.addEventListener(
+      'wheel',
+      (event) => {
+        event.preventDefault();
+        if (event.ctrlKey) this.zoomBy(event.deltaY < 0 ? 1.2 : 1 / 1.2, this.inPicture(event));
+        else planner.step(this.plane.w, event.deltaY < 0 ? 1 : -1);
+      },
+      { passive: false },
+    );
     canvas.addEventListener('dblclick', () => this.zoomBy(0));
     canvas.addEventListener('keydown', (event) => this.key(event));
   }
@@ -344,11 +426,11 @@ PLAN.Slice = class extends PLAN.Picture {
   zoomBy(factor, about = null) {
     const { u, v } = this.plane;
     const { size, spacing } = this.planner.volume;
-    const whole = [size[u] * spacing[u] / 2, size[v] * spacing[v] / 2];
+    const whole = [(size[u] * spacing[u]) / 2, (size[v] * spacing[v]) / 2];
     const zoom = factor === 0 ? 1 : Math.min(Math.max(this.zoom * factor, 1), 12);
     const at = about || this.place(this.planner.state.crosshair);
     const middle = this.middle || whole;
-    this.middle = zoom === 1 ? null : middle.map((value, axis) => at[axis] + (value - at[axis]) * this.zoom / zoom);
+    this.middle = zoom === 1 ? null : middle.map((value, axis) => at[axis] + ((value - at[axis]) * this.zoom) / zoom);
     this.zoom = zoom;
     this.draw();
   }
@@ -356,7 +438,14 @@ PLAN.Slice = class extends PLAN.Picture {
   key(event) {
     const { planner, plane } = this;
     if (!planner.volume || event.ctrlKey || event.metaKey || event.altKey) return;
-    const move = { ArrowLeft: [plane.u, -1], ArrowRight: [plane.u, 1], ArrowUp: [plane.v, plane.flip ? 1 : -1], ArrowDown: [plane.v, plane.flip ? -1 : 1], PageUp: [plane.w, 1], PageDown: [plane.w, -1] }[event.key];
+    const move = {
+      ArrowLeft: [plane.u, -1],
+      ArrowRight: [plane.u, 1],
+      ArrowUp: [plane.v, plane.flip ? 1 : -1],
+      ArrowDown: [plane.v, plane.flip ? -1 : 1],
+      PageUp: [plane.w, 1],
+      PageDown: [plane.w, -1],
+    }[event.key];
     if (move) planner.step(move[0], move[1] * (event.shiftKey ? 10 : 1));
     else if (event.key === '+' || event.key === '=') this.zoomBy(1.2);
     else if (event.key === '-') this.zoomBy(1 / 1.2);
@@ -371,7 +460,12 @@ PLAN.Slice = class extends PLAN.Picture {
 /** Slices along the needle, interpolated between voxels: in line with it, and across it at a depth. */
 PLAN.Probe = class extends PLAN.Picture {
   constructor(kind, planner) {
-    super(kind === 'along' ? 'In line with the needle' : 'Across the needle', kind === 'along' ? 'Left and right arrow keys turn it about the needle.' : 'Left and right arrow keys move it along the needle.');
+    super(
+      kind === 'along' ? 'In line with the needle' : 'Across the needle',
+      kind === 'along'
+        ? 'Left and right arrow keys turn it about the needle.'
+        : 'Left and right arrow keys move it along the needle.',
+    );
     this.kind = kind;
     this.planner = planner;
     this.image = document.createElement('canvas');
@@ -396,7 +490,14 @@ PLAN.Probe = class extends PLAN.Picture {
     if (this.kind === 'along') {
       const aside = PLAN.unit(across.map((value, axis) => value * Math.cos(turn) + third[axis] * Math.sin(turn)));
       const length = Math.hypot(...PLAN.add(target, entry, -1));
-      return { right: along, down: aside, middle: PLAN.add(entry, along, length / 2), size: [length + 60, 90], entry, target };
+      return {
+        right: along,
+        down: aside,
+        middle: PLAN.add(entry, along, length / 2),
+        size: [length + 60, 90],
+        entry,
+        target,
+      };
     }
     return { right: across, down: third, middle: PLAN.add(entry, along, depth), size: [90, 90], entry, target };
   }
@@ -414,7 +515,9 @@ PLAN.Probe = class extends PLAN.Picture {
     if (!context) return;
     // All of the canvas, with at most as many pixels as it has; coarser while the needle moves, so that numbers follow it.
     const [w, h] = this.box;
-    const [columns, rows] = [w, h].map((pixels) => Math.round(Math.min(pixels, 420) * (this.planner.dragging ? 0.4 : 1)));
+    const [columns, rows] = [w, h].map((pixels) =>
+      Math.round(Math.min(pixels, 420) * (this.planner.dragging ? 0.4 : 1)),
+    );
     const key = `${columns} ${rows} ${w} ${h} ${this.scale} ${right} ${down} ${middle} ${state.window_hu}`;
     if (this.drawn !== key) {
       this.sample(right, down, middle, [w / this.scale, h / this.scale], [columns, rows]);
@@ -422,12 +525,24 @@ PLAN.Probe = class extends PLAN.Picture {
     }
     context.imageSmoothingEnabled = true;
     context.drawImage(this.image, 0, 0, w, h);
-    const flat = (mm) => { const off = PLAN.add(mm, middle, -1); return this.onCanvas([PLAN.dot(off, right), PLAN.dot(off, down)]); };
+    const flat = (mm) => {
+      const off = PLAN.add(mm, middle, -1);
+      return this.onCanvas([PLAN.dot(off, right), PLAN.dot(off, down)]);
+    };
     const thick = Math.max(1e3 * facts.needle_diameter_m * this.scale, 2);
     if (this.kind === 'along') this.line(context, flat(entry), flat(target), PLAN.COLORS.needle, thick);
-    else this.ring(context, flat(PLAN.add(entry, PLAN.unit(PLAN.add(target, entry, -1)), this.planner.probe.depth)), thick / 2, PLAN.COLORS.needle);
+    else
+      this.ring(
+        context,
+        flat(PLAN.add(entry, PLAN.unit(PLAN.add(target, entry, -1)), this.planner.probe.depth)),
+        thick / 2,
+        PLAN.COLORS.needle,
+      );
     if (tip && (this.kind === 'along' || Math.abs(this.planner.probe.depth - 1e3 * route.length_m) < 0.5)) {
-      const center = PLAN.add(target, tip.bias_m.map((metres) => 1e3 * metres));
+      const center = PLAN.add(
+        target,
+        tip.bias_m.map((metres) => 1e3 * metres),
+      );
       this.ellipse(context, flat(center), tip.covariance_m2, right, down, PLAN.COLORS.error);
     }
     if (this.kind === 'along') {
@@ -436,18 +551,22 @@ PLAN.Probe = class extends PLAN.Picture {
     }
     this.letters(context, [right.map((value) => -value), right, down.map((value) => -value), down].map(PLAN.towards));
     this.ruler(context);
-    const degrees = Math.round(this.planner.probe.turn * 180 / Math.PI);
-    this.caption.textContent = this.kind === 'along' ? `${this.title}, turned by ${NB.minus(String(degrees))}\u00b0` : `${this.title} at ${NB.fixed(this.planner.probe.depth, 1)} mm from the skin`;
+    const degrees = Math.round((this.planner.probe.turn * 180) / Math.PI);
+    this.caption.textContent =
+      this.kind === 'along'
+        ? `${this.title}, turned by ${NB.minus(String(degrees))}\u00b0`
+        : `${this.title} at ${NB.fixed(this.planner.probe.depth, 1)} mm from the skin`;
   }
 
   sample(right, down, middle, [width, height], [columns, rows]) {
     const { volume, greys } = this.planner;
     const { spacing } = volume;
-    if (this.image.width !== columns || this.image.height !== rows) [this.image.width, this.image.height] = [columns, rows];
+    if (this.image.width !== columns || this.image.height !== rows)
+      [this.image.width, this.image.height] = [columns, rows];
     const context = this.image.getContext('2d');
     const image = context.createImageData(columns, rows);
     const pixels = new Uint32Array(image.data.buffer);
-    const step = right.map((value, axis) => value * width / columns / spacing[axis]);
+    const step = right.map((value, axis) => (value * width) / columns / spacing[axis]);
     for (let row = 0, to = 0; row < rows; row++) {
       const y = ((row + 0.5) / rows - 0.5) * height;
       const x = (0.5 / columns - 0.5) * width;
@@ -462,7 +581,16 @@ PLAN.Probe = class extends PLAN.Picture {
 
 /** Letters of where a direction runs, the main one first: `A` or `AL`. */
 PLAN.towards = function (direction) {
-  const letters = [['R', 'L'], ['A', 'P'], ['I', 'S']];
+  const letters = [
+    ['R', 'L'],
+    ['A', 'P'],
+    ['I', 'S'],
+  ];
   const sides = direction.map((value, axis) => [Math.abs(value), letters[axis][value > 0 ? 1 : 0]]);
-  return sides.filter(([size]) => size > 0.35).sort((a, b) => b[0] - a[0]).map(([, letter]) => letter).slice(0, 2).join('');
+  return sides
+    .filter(([size]) => size > 0.35)
+    .sort((a, b) => b[0] - a[0])
+    .map(([, letter]) => letter)
+    .slice(0, 2)
+    .join('');
 };

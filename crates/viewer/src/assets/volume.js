@@ -33,7 +33,9 @@ PLAN.Volume = class {
     return new PLAN.Volume(size, spacing, new Int16Array(bytes.buffer));
   }
 
-  holds(index) { return index.every((value, axis) => value >= -0.5 && value < this.size[axis] - 0.5); }
+  holds(index) {
+    return index.every((value, axis) => value >= -0.5 && value < this.size[axis] - 0.5);
+  }
 
   /** Voxel by voxel: the nearest one's value, or nothing outside. */
   at(index) {
@@ -47,13 +49,21 @@ PLAN.Volume = class {
   between(x, y, z) {
     const [n, m, l] = this.size;
     if (!(x >= 0 && y >= 0 && z >= 0 && x <= n - 1 && y <= m - 1 && z <= l - 1)) return -1000;
-    const i = Math.min(Math.floor(x), n - 2 < 0 ? 0 : n - 2), j = Math.min(Math.floor(y), m - 2 < 0 ? 0 : m - 2), k = Math.min(Math.floor(z), l - 2 < 0 ? 0 : l - 2);
-    const di = n > 1 ? 1 : 0, dj = m > 1 ? n : 0, dk = l > 1 ? n * m : 0;
-    const u = x - i, v = y - j, w = z - k;
+    const i = Math.min(Math.floor(x), n - 2 < 0 ? 0 : n - 2),
+      j = Math.min(Math.floor(y), m - 2 < 0 ? 0 : m - 2),
+      k = Math.min(Math.floor(z), l - 2 < 0 ? 0 : l - 2);
+    const di = n > 1 ? 1 : 0,
+      dj = m > 1 ? n : 0,
+      dk = l > 1 ? n * m : 0;
+    const u = x - i,
+      v = y - j,
+      w = z - k;
     const at = (k * m + j) * n + i;
     const { hu } = this;
     const low = (hu[at] * (1 - u) + hu[at + di] * u) * (1 - v) + (hu[at + dj] * (1 - u) + hu[at + dj + di] * u) * v;
-    const high = (hu[at + dk] * (1 - u) + hu[at + dk + di] * u) * (1 - v) + (hu[at + dk + dj] * (1 - u) + hu[at + dk + dj + di] * u) * v;
+    const high =
+      (hu[at + dk] * (1 - u) + hu[at + dk + di] * u) * (1 - v) +
+      (hu[at + dk + dj] * (1 - u) + hu[at + dk + dj + di] * u) * v;
     return low * (1 - w) + high * w;
   }
 };
@@ -64,7 +74,7 @@ PLAN.greys = function ([low, high]) {
   for (let code = 0; code < 65536; code++) {
     const share = (code - 32768 - low) / (high - low);
     const grey = Math.round(255 * Math.min(Math.max(share, 0), 1));
-    table[code] = 0xff000000 | grey << 16 | grey << 8 | grey;
+    table[code] = 0xff000000 | (grey << 16) | (grey << 8) | grey;
   }
   return table;
 };
@@ -96,9 +106,13 @@ PLAN.outlines = function (size, labels, plane, slice, colors, canvas) {
   const stride = [1, size[0], size[0] * size[1]];
   PLAN.paint(size, plane, slice, canvas, (at, column, line) => {
     const label = labels[at];
-    const inside = !label || ((column === 0 || labels[at - stride[u]] === label) && (column === size[u] - 1 || labels[at + stride[u]] === label)
-      && (line === 0 || labels[at - stride[v]] === label) && (line === size[v] - 1 || labels[at + stride[v]] === label));
-    return inside ? 0 : colors.get(label) ?? 0xffffffff;
+    const inside =
+      !label ||
+      ((column === 0 || labels[at - stride[u]] === label) &&
+        (column === size[u] - 1 || labels[at + stride[u]] === label) &&
+        (line === 0 || labels[at - stride[v]] === label) &&
+        (line === size[v] - 1 || labels[at + stride[v]] === label));
+    return inside ? 0 : (colors.get(label) ?? 0xffffffff);
   });
 };
 
@@ -106,4 +120,7 @@ PLAN.outlines = function (size, labels, plane, slice, colors, canvas) {
 PLAN.add = (a, b, by = 1) => a.map((value, axis) => value + by * b[axis]);
 PLAN.dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 PLAN.cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-PLAN.unit = (a) => { const size = Math.hypot(...a) || 1; return a.map((value) => value / size); };
+PLAN.unit = (a) => {
+  const size = Math.hypot(...a) || 1;
+  return a.map((value) => value / size);
+};

@@ -4,23 +4,46 @@
 /** Colour and hatching of what works and of the rules that reject; the text under the cursor tells them apart, too. */
 NB.ruleStyle = function (colors, name) {
   const at = Object.keys(colors).indexOf(name);
-  return [colors[name] || '#999999', name === 'works' || name === 'unreachable' || at < 0 ? 0 : at % 3 + 1];
+  return [colors[name] || '#999999', name === 'works' || name === 'unreachable' || at < 0 ? 0 : (at % 3) + 1];
 };
 
 /** What a roll is best at. */
 NB.aims = {
-  clearance: 'clearance', joint_margin: 'distance from the joint limits', singularity: 'distance from singularities',
-  tip_accuracy: 'accuracy of the tip', balanced: 'all aims together',
+  clearance: 'clearance',
+  joint_margin: 'distance from the joint limits',
+  singularity: 'distance from singularities',
+  tip_accuracy: 'accuracy of the tip',
+  balanced: 'all aims together',
 };
 
 NB.AtlasPage = class {
   constructor(page, app) {
     this.page = page;
-    this.layers = { robot: true, tool: true, table: true, gantry: true, mount: true, obstacle: true, skin: true, bone: true, organ: true, vessel: true, lesion: true, marker: true, corridor: false, collision: false, needle: true };
+    this.layers = {
+      robot: true,
+      tool: true,
+      table: true,
+      gantry: true,
+      mount: true,
+      obstacle: true,
+      skin: true,
+      bone: true,
+      organ: true,
+      vessel: true,
+      lesion: true,
+      marker: true,
+      corridor: false,
+      collision: false,
+      needle: true,
+    };
     this.view = new NB.View(page.scene, `Cell of ${page.scenario}`);
     this.arm = this.view.arm('arm');
     this.curves = new NB.Curves({
-      height: 240, label: 'Clearance of each class over the roll', xTitle: 'roll (deg)', yTitle: 'clearance (mm)', seek: (roll) => this.setRoll(roll),
+      height: 240,
+      label: 'Clearance of each class over the roll',
+      xTitle: 'roll (deg)',
+      yTitle: 'clearance (mm)',
+      seek: (roll) => this.setRoll(roll),
     });
     this.strips = new NB.Canvas(300, 'Which configuration works at which roll', (...all) => this.paint(...all));
     this.stripLegend = NB.el('div', { class: 'legend' });
@@ -33,42 +56,136 @@ NB.AtlasPage = class {
     };
     this.strips.canvas.addEventListener('pointerdown', pick);
     this.strips.canvas.addEventListener('pointermove', pick);
-    this.goalButtons = page.goals.map((goal, index) => NB.el('button', {
-      type: 'button', role: 'radio', onclick: () => this.setGoal(index),
-      onkeydown: (event) => {
-        const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
-        if (!step) return;
-        event.preventDefault();
-        const to = (index + step + page.goals.length) % page.goals.length;
-        this.setGoal(to);
-        this.goalButtons[to].focus();
-      },
-    }, NB.words(goal.name)));
-    this.slider = NB.el('input', { type: 'range', min: '0', max: '360', step: '1', value: '0', 'aria-label': 'Roll, degrees', oninput: (event) => this.setRoll(Number(event.target.value)) });
+    this.goalButtons = page.goals.map((goal, index) =>
+      NB.el(
+        'button',
+        {
+          type: 'button',
+          role: 'radio',
+          onclick: () => this.setGoal(index),
+          onkeydown: (event) => {
+            const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+            if (!step) return;
+            event.preventDefault();
+            const to = (index + step + page.goals.length) % page.goals.length;
+            this.setGoal(to);
+            this.goalButtons[to].focus();
+          },
+        },
+        NB.words(goal.name),
+      ),
+    );
+    this.slider = NB.el('input', {
+      type: 'range',
+      min: '0',
+      max: '360',
+      step: '1',
+      value: '0',
+      'aria-label': 'Roll, degrees',
+      oninput: (event) => this.setRoll(Number(event.target.value)),
+    });
     this.clock = NB.el('span', { class: 'clock', role: 'status' });
     this.side = NB.el('div', { class: 'panel' });
     this.table = NB.el('div');
     const present = new Set(page.scene.parts.map((part) => part.group));
-    const layerNames = { robot: 'robot', tool: 'tool', collision: 'collision shapes', table: 'table', gantry: 'gantry', mount: 'mount', obstacle: 'obstacles', skin: 'skin', bone: 'bones', organ: 'organs', vessel: 'vessels', lesion: 'lesions', marker: 'markers', corridor: 'needle corridor', needle: 'needle line' };
+    const layerNames = {
+      robot: 'robot',
+      tool: 'tool',
+      collision: 'collision shapes',
+      table: 'table',
+      gantry: 'gantry',
+      mount: 'mount',
+      obstacle: 'obstacles',
+      skin: 'skin',
+      bone: 'bones',
+      organ: 'organs',
+      vessel: 'vessels',
+      lesion: 'lesions',
+      marker: 'markers',
+      corridor: 'needle corridor',
+      needle: 'needle line',
+    };
     app.append(
-      NB.el('p', { class: 'soft', text: 'Every configuration over the roll of the guide about the needle: where it works, how near anything comes in its final posture, and what stands against it elsewhere. Motions are not planned here.' }),
-      NB.el('div', { class: 'bar' }, NB.el('strong', { text: 'Goal' }), NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons), NB.copyLink(),
-        NB.pngButton(this.view, 'The view', () => this.fileName(`${NB.plain.shown.millimetres(this.roll / 1e3)}deg`))),
-      NB.el('div', { class: 'grid' },
-        NB.el('div', null, this.view.element,
-          NB.el('div', { class: 'replay', role: 'group', 'aria-label': 'Roll' }, NB.el('span', { text: 'Roll' }), this.slider, this.clock),
-          NB.el('section', { class: 'panel curves' },
-            NB.el('div', { class: 'figure-head' }, NB.el('h3', { text: 'What works at which roll' }),
-              NB.saveButton('SVG', 'What works at which roll', () => [`${this.fileName('atlas')}.svg`, this.stripsSvg(), 'image/svg+xml'])),
-            this.strips.element, this.stripLegend),
-          NB.el('section', { class: 'panel' },
-            NB.el('div', { class: 'figure-head' }, this.title = NB.el('h3'),
-              NB.saveButton('SVG', 'Clearance over roll', () => [`${this.fileName('clearance')}.svg`, this.curves.svg(this.title.textContent), 'image/svg+xml'])),
-            this.curves.element)),
-        NB.el('div', null, this.side, NB.el('div', { class: 'panel no-print' }, NB.el('h3', { text: 'Show' }),
-          Object.entries(layerNames).filter(([name]) => present.has(name) || name === 'needle').map(([name, text]) => NB.checkbox(text, this.layers[name], (on) => { this.layers[name] = on; this.applyLayers(); }))))),
+      NB.el('p', {
+        class: 'soft',
+        text: 'Every configuration over the roll of the guide about the needle: where it works, how near anything comes in its final posture, and what stands against it elsewhere. Motions are not planned here.',
+      }),
+      NB.el(
+        'div',
+        { class: 'bar' },
+        NB.el('strong', { text: 'Goal' }),
+        NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons),
+        NB.copyLink(),
+        NB.pngButton(this.view, 'The view', () => this.fileName(`${NB.plain.shown.millimetres(this.roll / 1e3)}deg`)),
+      ),
+      NB.el(
+        'div',
+        { class: 'grid' },
+        NB.el(
+          'div',
+          null,
+          this.view.element,
+          NB.el(
+            'div',
+            { class: 'replay', role: 'group', 'aria-label': 'Roll' },
+            NB.el('span', { text: 'Roll' }),
+            this.slider,
+            this.clock,
+          ),
+          NB.el(
+            'section',
+            { class: 'panel curves' },
+            NB.el(
+              'div',
+              { class: 'figure-head' },
+              NB.el('h3', { text: 'What works at which roll' }),
+              NB.saveButton('SVG', 'What works at which roll', () => [
+                `${this.fileName('atlas')}.svg`,
+                this.stripsSvg(),
+                'image/svg+xml',
+              ]),
+            ),
+            this.strips.element,
+            this.stripLegend,
+          ),
+          NB.el(
+            'section',
+            { class: 'panel' },
+            NB.el(
+              'div',
+              { class: 'figure-head' },
+              (this.title = NB.el('h3')),
+              NB.saveButton('SVG', 'Clearance over roll', () => [
+                `${this.fileName('clearance')}.svg`,
+                this.curves.svg(this.title.textContent),
+                'image/svg+xml',
+              ]),
+            ),
+            this.curves.element,
+          ),
+        ),
+        NB.el(
+          'div',
+          null,
+          this.side,
+          NB.el(
+            'div',
+            { class: 'panel no-print' },
+            NB.el('h3', { text: 'Show' }),
+            Object.entries(layerNames)
+              .filter(([name]) => present.has(name) || name === 'needle')
+              .map(([name, text]) =>
+                NB.checkbox(text, this.layers[name], (on) => {
+                  this.layers[name] = on;
+                  this.applyLayers();
+                }),
+              ),
+          ),
+        ),
+      ),
       NB.section('Ranges of roll that work', true, this.table),
-      NB.section('Where the numbers come from', false, NB.provenance(page.provenance)));
+      NB.section('Where the numbers come from', false, NB.provenance(page.provenance)),
+    );
     this.branchIndex = 0;
     this.roll = 0;
     this.setGoal(0);
@@ -86,7 +203,9 @@ NB.AtlasPage = class {
     if (roll !== undefined && Number.isFinite(Number(roll))) this.setRoll(Number(roll));
   }
 
-  fileName(...words) { return NB.fileName(this.page.scenario, this.goal.name, this.branch.label, ...words); }
+  fileName(...words) {
+    return NB.fileName(this.page.scenario, this.goal.name, this.branch.label, ...words);
+  }
 
   applyLayers() {
     for (const [name, on] of Object.entries(this.layers)) {
@@ -96,15 +215,24 @@ NB.AtlasPage = class {
     this.view.draw();
   }
 
-  get goal() { return this.page.goals[this.goalIndex]; }
+  get goal() {
+    return this.page.goals[this.goalIndex];
+  }
 
-  get branch() { return this.decode(this.goal.branches[this.branchIndex]); }
+  get branch() {
+    return this.decode(this.goal.branches[this.branchIndex]);
+  }
 
   decode(branch) {
     if (!branch.decoded) {
       branch.decoded = {
-        rules: NB.array(branch.rules), joints: branch.joints.map(NB.array), surplus: NB.array(branch.surplus),
-        curves: Object.entries(branch.curves).map(([name, column]) => [name, NB.array(column).map((value) => value * 1e3)]),
+        rules: NB.array(branch.rules),
+        joints: branch.joints.map(NB.array),
+        surplus: NB.array(branch.surplus),
+        curves: Object.entries(branch.curves).map(([name, column]) => [
+          name,
+          NB.array(column).map((value) => value * 1e3),
+        ]),
       };
     }
     return { ...branch, ...branch.decoded };
@@ -120,19 +248,38 @@ NB.AtlasPage = class {
     view.empty('needle');
     const [x, y, z] = goal.guideExit;
     const length = this.page.scene.needleLength * 0.6;
-    view.rod('needle', [x - goal.axis[0] * length, y - goal.axis[1] * length, z - goal.axis[2] * length], goal.target, 0.0012, [0, 0.45, 0.32, 1]);
+    view.rod(
+      'needle',
+      [x - goal.axis[0] * length, y - goal.axis[1] * length, z - goal.axis[2] * length],
+      goal.target,
+      0.0012,
+      [0, 0.45, 0.32, 1],
+    );
     view.ball('needle', goal.target, 0.004, [0.84, 0.37, 0, 1]);
     view.label('needle', 'target', goal.target);
-    if (goal.entry) { view.ball('needle', goal.entry, 0.0035, [0, 0.45, 0.7, 1]); view.label('needle', 'entry', goal.entry); }
-    view.frame([...NB.aboutBase(this.page.scene.chain.base, 0.55), goal.target.map((v) => v - 0.25), goal.target.map((v) => v + 0.25)], NB.direction(this.page.scene.chain.base, goal.target, goal.axis));
+    if (goal.entry) {
+      view.ball('needle', goal.entry, 0.0035, [0, 0.45, 0.7, 1]);
+      view.label('needle', 'entry', goal.entry);
+    }
+    view.frame(
+      [
+        ...NB.aboutBase(this.page.scene.chain.base, 0.55),
+        goal.target.map((v) => v - 0.25),
+        goal.target.map((v) => v + 0.25),
+      ],
+      NB.direction(this.page.scene.chain.base, goal.target, goal.axis),
+    );
     this.slider.step = String(360 / goal.rolls);
     this.slider.max = String(360 - 360 / goal.rolls);
     this.sideTable();
     this.rangeTable();
     const best = this.freest(goal);
-    const range = goal.branches[Math.max(best, 0)].ranges.reduce((a, b) => (!a || b.width_rad > a.width_rad ? b : a), undefined);
+    const range = goal.branches[Math.max(best, 0)].ranges.reduce(
+      (a, b) => (!a || b.width_rad > a.width_rad ? b : a),
+      undefined,
+    );
     this.setBranch(Math.max(best, 0));
-    this.setRoll(range ? range.best[goal.aim].roll_rad * 180 / Math.PI : 0);
+    this.setRoll(range ? (range.best[goal.aim].roll_rad * 180) / Math.PI : 0);
   }
 
   setBranch(index) {
@@ -140,24 +287,35 @@ NB.AtlasPage = class {
     NB.mark(this.sideRows, index);
     const { branch, goal } = this;
     this.title.textContent = `Clearance over roll: ${branch.label}`;
-    const x = Float32Array.from({ length: goal.rolls }, (_, k) => 360 * k / goal.rolls);
-    const bands = branch.ranges.flatMap((range) => this.pieces(range).map(([from, to]) => ({ from, to, text: 'works', color: '#e3f0f9' })));
-    this.curves.set(branch.curves.map(([name, y]) => ({ name, x, y, ...NB.styleOf(name) })), bands, [0, 360]);
+    const x = Float32Array.from({ length: goal.rolls }, (_, k) => (360 * k) / goal.rolls);
+    const bands = branch.ranges.flatMap((range) =>
+      this.pieces(range).map(([from, to]) => ({ from, to, text: 'works', color: '#e3f0f9' })),
+    );
+    this.curves.set(
+      branch.curves.map(([name, y]) => ({ name, x, y, ...NB.styleOf(name) })),
+      bands,
+      [0, 360],
+    );
     this.setRoll(this.roll);
   }
 
   /** A range as pieces of 0 to 360 degrees. */
   pieces(range) {
     if (range.is_whole_circle) return [[0, 360]];
-    const from = ((range.from_rad * 180 / Math.PI) % 360 + 360) % 360;
-    const to = from + range.width_rad * 180 / Math.PI;
-    return to > 360 ? [[from, 360], [0, to - 360]] : [[from, to]];
+    const from = ((((range.from_rad * 180) / Math.PI) % 360) + 360) % 360;
+    const to = from + (range.width_rad * 180) / Math.PI;
+    return to > 360
+      ? [
+          [from, 360],
+          [0, to - 360],
+        ]
+      : [[from, to]];
   }
 
   setRoll(roll) {
     const { goal, branch } = this;
-    const at = ((Math.round(roll / 360 * goal.rolls) % goal.rolls) + goal.rolls) % goal.rolls;
-    this.roll = 360 * at / goal.rolls;
+    const at = ((Math.round((roll / 360) * goal.rolls) % goal.rolls) + goal.rolls) % goal.rolls;
+    this.roll = (360 * at) / goal.rolls;
     this.slider.value = String(this.roll);
     const joints = branch.joints.map((column) => column[at]);
     const has = joints.every((value) => !Number.isNaN(value));
@@ -174,53 +332,115 @@ NB.AtlasPage = class {
     goal.branches.forEach((each, index) => {
       const decoded = this.decode(each);
       const code = decoded.rules[at];
-      this.sideCells[index].replaceChildren(code === 255 ? NB.el('span', { class: 'good', text: '\u2713 works' }) : NB.el('span', { class: 'off', text: NB.words(each.ruleNames[code]) }));
+      this.sideCells[index].replaceChildren(
+        code === 255
+          ? NB.el('span', { class: 'good', text: '\u2713 works' })
+          : NB.el('span', { class: 'off', text: NB.words(each.ruleNames[code]) }),
+      );
     });
   }
 
   sideTable() {
     const total = (branch) => this.turns(branch);
-    const table = NB.table('Choose a configuration', [
-      { title: 'Configuration', cell: (b) => b.label },
-      { title: 'At this roll', cell: () => '' },
-      { title: 'Works over', unit: 'deg', numeric: true, cell: (b) => NB.deg(total(b), 0) },
-    ], this.goal.branches, { class: 'choose small full' });
+    const table = NB.table(
+      'Choose a configuration',
+      [
+        { title: 'Configuration', cell: (b) => b.label },
+        { title: 'At this roll', cell: () => '' },
+        { title: 'Works over', unit: 'deg', numeric: true, cell: (b) => NB.deg(total(b), 0) },
+      ],
+      this.goal.branches,
+      { class: 'choose small full' },
+    );
     this.sideRows = [...table.querySelectorAll('tbody tr')];
     this.sideCells = this.sideRows.map((row) => row.cells[1]);
     NB.rows(this.sideRows, (index) => this.setBranch(index));
-    NB.clear(this.side, table, this.goal.fixedRoll === null ? null : NB.el('p', { class: 'soft small', text: `The goal fixes the roll at ${NB.deg(this.goal.fixedRoll)}\u00b0.` }));
+    NB.clear(
+      this.side,
+      table,
+      this.goal.fixedRoll === null
+        ? null
+        : NB.el('p', { class: 'soft small', text: `The goal fixes the roll at ${NB.deg(this.goal.fixedRoll)}\u00b0.` }),
+    );
   }
 
   /** How far a configuration can turn about the needle, over all its ranges. */
-  turns(branch) { return branch.ranges.reduce((sum, range) => sum + (range.is_whole_circle ? 2 * Math.PI : range.width_rad), 0); }
+  turns(branch) {
+    return branch.ranges.reduce((sum, range) => sum + (range.is_whole_circle ? 2 * Math.PI : range.width_rad), 0);
+  }
 
   /** The configuration with most room to turn, the first of equals; -1 where none works. */
   freest(goal) {
-    return goal.branches.reduce((best, branch, at) => (branch.ranges.length && (best < 0 || this.turns(branch) > this.turns(goal.branches[best])) ? at : best), -1);
+    return goal.branches.reduce(
+      (best, branch, at) =>
+        branch.ranges.length && (best < 0 || this.turns(branch) > this.turns(goal.branches[best])) ? at : best,
+      -1,
+    );
   }
 
   rangeTable() {
     const { goal } = this;
-    const rows = goal.branches.flatMap((branch, index) => (branch.ranges.length ? branch.ranges.map((range) => ({ branch, range, index })) : [{ branch, range: null, index }]));
+    const rows = goal.branches.flatMap((branch, index) =>
+      branch.ranges.length
+        ? branch.ranges.map((range) => ({ branch, range, index }))
+        : [{ branch, range: null, index }],
+    );
     const edge = (found) => (found ? `${NB.words(found.rule)}: ${found.detail}` : '');
-    const table = NB.table(`Goal ${NB.words(goal.name)}: what stands against the rolls before and after each range; best roll for ${NB.aims[goal.aim] || NB.words(goal.aim)}`, [
-      { title: 'Configuration', cell: ({ branch }) => branch.label },
-      { title: 'From', unit: 'deg', numeric: true, cell: ({ range }) => (range ? (range.is_whole_circle ? 'all round' : NB.deg(range.from_rad, 2)) : 'nowhere') },
-      { title: 'To', unit: 'deg', numeric: true, cell: ({ range }) => (range && !range.is_whole_circle ? `${NB.deg(range.to_rad % (2 * Math.PI), 2)}${range.to_rad > 2 * Math.PI ? ', past 360' : ''}` : '') },
-      { title: 'Before it', text: true, cell: ({ range }) => edge(range?.before) },
-      { title: 'After it', text: true, cell: ({ range }) => edge(range?.after) },
-      { title: 'Best roll', unit: 'deg', numeric: true, cell: ({ range }) => (range ? NB.deg(range.best[goal.aim].roll_rad, 2) : '') },
-      { title: 'Least clearance there', unit: 'mm', numeric: true, cell: ({ range }) => (range ? NB.mm(range.best[goal.aim].least_clearance_m) : '') },
-      { title: 'Between', cell: ({ range }) => [...new Set((range?.best[goal.aim].pair || []).map(NB.words))].join(' to ') },
-    ], rows, { class: 'choose small' });
+    const table = NB.table(
+      `Goal ${NB.words(goal.name)}: what stands against the rolls before and after each range; best roll for ${NB.aims[goal.aim] || NB.words(goal.aim)}`,
+      [
+        { title: 'Configuration', cell: ({ branch }) => branch.label },
+        {
+          title: 'From',
+          unit: 'deg',
+          numeric: true,
+          cell: ({ range }) => (range ? (range.is_whole_circle ? 'all round' : NB.deg(range.from_rad, 2)) : 'nowhere'),
+        },
+        {
+          title: 'To',
+          unit: 'deg',
+          numeric: true,
+          cell: ({ range }) =>
+            range && !range.is_whole_circle
+              ? `${NB.deg(range.to_rad % (2 * Math.PI), 2)}${range.to_rad > 2 * Math.PI ? ', past 360' : ''}`
+              : '',
+        },
+        { title: 'Before it', text: true, cell: ({ range }) => edge(range?.before) },
+        { title: 'After it', text: true, cell: ({ range }) => edge(range?.after) },
+        {
+          title: 'Best roll',
+          unit: 'deg',
+          numeric: true,
+          cell: ({ range }) => (range ? NB.deg(range.best[goal.aim].roll_rad, 2) : ''),
+        },
+        {
+          title: 'Least clearance there',
+          unit: 'mm',
+          numeric: true,
+          cell: ({ range }) => (range ? NB.mm(range.best[goal.aim].least_clearance_m) : ''),
+        },
+        {
+          title: 'Between',
+          cell: ({ range }) => [...new Set((range?.best[goal.aim].pair || []).map(NB.words))].join(' to '),
+        },
+      ],
+      rows,
+      { class: 'choose small' },
+    );
     const elements = [...table.querySelectorAll('tbody tr')];
     NB.rows(elements, (at) => {
       NB.mark(elements, at);
       this.setBranch(rows[at].index);
-      if (rows[at].range) this.setRoll(rows[at].range.best[goal.aim].roll_rad * 180 / Math.PI);
+      if (rows[at].range) this.setRoll((rows[at].range.best[goal.aim].roll_rad * 180) / Math.PI);
     });
     const freest = this.freest(goal);
-    NB.mark(elements, Math.max(rows.findIndex(({ index }) => index === freest), 0));
+    NB.mark(
+      elements,
+      Math.max(
+        rows.findIndex(({ index }) => index === freest),
+        0,
+      ),
+    );
     const working = goal.branches.filter((branch) => branch.ranges.length).length;
     const answer = `${working} of ${goal.branches.length} configurations work${freest < 0 ? '' : `; ${goal.branches[freest].label} has most room to turn, ${NB.deg(this.turns(goal.branches[freest]), 0)} of 360\u00b0`}.`;
     NB.clear(this.table, NB.el('p', null, NB.el('strong', { text: answer })), table);
@@ -230,11 +450,15 @@ NB.AtlasPage = class {
     const { goal } = this;
     const left = width < 420 ? 106 : 150;
     const box = { left, top: 8, width: width - left - 16, height: height - 50 };
-    const axes = new NB.Axes(box, { low: 0, high: 360, title: 'roll (deg)' }, { low: -0.5, high: 7.5, title: '', labels: goal.branches.map((branch) => branch.label).reverse() });
+    const axes = new NB.Axes(
+      box,
+      { low: 0, high: 360, title: 'roll (deg)' },
+      { low: -0.5, high: 7.5, title: '', labels: goal.branches.map((branch) => branch.label).reverse() },
+    );
     this.axes = axes;
     axes.draw(context);
     const used = new Map();
-    const h = box.height / 8 * 0.7;
+    const h = (box.height / 8) * 0.7;
     goal.branches.forEach((each, row) => {
       const branch = this.decode(each);
       const y = axes.py(7 - row) - h / 2;
@@ -246,7 +470,10 @@ NB.AtlasPage = class {
         const style = NB.ruleStyle(this.page.ruleColors, name);
         used.set(name, style);
         // A roll stands for half a step on both sides.
-        const [from, to] = [axes.px(Math.max(0, 360 * (start - 0.5) / goal.rolls)), axes.px(Math.min(360, 360 * (at - 0.5) / goal.rolls))];
+        const [from, to] = [
+          axes.px(Math.max(0, (360 * (start - 0.5)) / goal.rolls)),
+          axes.px(Math.min(360, (360 * (at - 0.5)) / goal.rolls)),
+        ];
         this.block(context, style, from, y, to - from, h);
         start = at;
       }
@@ -254,10 +481,18 @@ NB.AtlasPage = class {
       context.strokeStyle = '#000';
       context.lineWidth = 1.5;
       for (const range of each.ranges) {
-        for (const [from, to] of this.pieces(range)) context.strokeRect(axes.px(from), y, axes.px(to) - axes.px(from), h);
-        const best = axes.px((range.best[goal.aim].roll_rad * 180 / Math.PI + 360) % 360);
+        for (const [from, to] of this.pieces(range))
+          context.strokeRect(axes.px(from), y, axes.px(to) - axes.px(from), h);
+        const best = axes.px(((range.best[goal.aim].roll_rad * 180) / Math.PI + 360) % 360);
         context.fillStyle = '#fff';
-        context.beginPath(); context.moveTo(best, y + 3); context.lineTo(best + 5, y + h / 2); context.lineTo(best, y + h - 3); context.lineTo(best - 5, y + h / 2); context.closePath(); context.fill(); context.stroke();
+        context.beginPath();
+        context.moveTo(best, y + 3);
+        context.lineTo(best + 5, y + h / 2);
+        context.lineTo(best, y + h - 3);
+        context.lineTo(best - 5, y + h / 2);
+        context.closePath();
+        context.fill();
+        context.stroke();
       }
       if (row === this.branchIndex) {
         context.fillStyle = '#0072b2';
@@ -267,11 +502,17 @@ NB.AtlasPage = class {
     const at = Math.round(axes.px(this.roll)) + 0.5;
     context.strokeStyle = '#000';
     context.lineWidth = 1;
-    context.beginPath(); context.moveTo(at, box.top); context.lineTo(at, box.top + box.height); context.stroke();
+    context.beginPath();
+    context.moveTo(at, box.top);
+    context.lineTo(at, box.top + box.height);
+    context.stroke();
     if (this.fixedMark(goal) !== null) {
       context.setLineDash([4, 3]);
       const fixed = axes.px(this.fixedMark(goal));
-      context.beginPath(); context.moveTo(fixed, box.top); context.lineTo(fixed, box.top + box.height); context.stroke();
+      context.beginPath();
+      context.moveTo(fixed, box.top);
+      context.lineTo(fixed, box.top + box.height);
+      context.stroke();
       context.setLineDash([]);
     }
     this.used = used;
@@ -284,28 +525,42 @@ NB.AtlasPage = class {
         return NB.el('span', { class: 'key' }, canvas, NB.words(name));
       };
       const rejecting = [...used].filter(([name]) => name !== 'works');
-      NB.clear(this.stripLegend, [...used].filter(([name]) => name === 'works').map(key),
-        rejecting.length ? NB.el('strong', { class: 'small', text: 'Rejected by:' }) : null, rejecting.map(key),
-        NB.el('span', { class: 'soft small', text: `Black frame: a range that works, to the exact angle; diamond: its best roll${this.fixedMark(this.goal) === null ? '' : '; dashed line: the roll that the goal fixes'}.` }));
+      NB.clear(
+        this.stripLegend,
+        [...used].filter(([name]) => name === 'works').map(key),
+        rejecting.length ? NB.el('strong', { class: 'small', text: 'Rejected by:' }) : null,
+        rejecting.map(key),
+        NB.el('span', {
+          class: 'soft small',
+          text: `Black frame: a range that works, to the exact angle; diamond: its best roll${this.fixedMark(this.goal) === null ? '' : '; dashed line: the roll that the goal fixes'}.`,
+        }),
+      );
     }
   }
 
   stripsSvg() {
     const title = `${NB.words(this.goal.name)}: what works at which roll`;
     const words = (name) => (name === 'works' ? 'works' : `rejected by: ${NB.words(name)}`);
-    const legend = [...this.used].map(([name, style]) => ({ text: words(name), draw: (context, x, y) => this.block(context, style, x - 13, y - 6, 26, 12) }));
+    const legend = [...this.used].map(([name, style]) => ({
+      text: words(name),
+      draw: (context, x, y) => this.block(context, style, x - 13, y - 6, 26, 12),
+    }));
     const svg = NB.paper(title, (...all) => this.paint(...all), 230, legend);
     this.strips.draw();
     return svg;
   }
 
-  fixedMark(goal) { return goal.fixedRoll === null ? null : (goal.fixedRoll * 180 / Math.PI % 360 + 360) % 360; }
+  fixedMark(goal) {
+    return goal.fixedRoll === null ? null : ((((goal.fixedRoll * 180) / Math.PI) % 360) + 360) % 360;
+  }
 
   block(context, [color, hatch], x, y, width, height) {
     context.save();
     context.fillStyle = color;
     context.fillRect(x, y, width, height);
-    context.beginPath(); context.rect(x, y, width, height); context.clip();
+    context.beginPath();
+    context.rect(x, y, width, height);
+    context.clip();
     context.strokeStyle = 'rgba(255, 255, 255, 0.75)';
     context.lineWidth = 1.3;
     const lines = { 1: [1], 2: [-1], 3: [1, -1] }[hatch] || [];
@@ -321,4 +576,6 @@ NB.AtlasPage = class {
   }
 };
 
-NB.start((page, app) => { NB.current = new NB.AtlasPage(page, app); });
+NB.start((page, app) => {
+  NB.current = new NB.AtlasPage(page, app);
+});

@@ -8,8 +8,15 @@ NB.timing = { opened: performance.now() };
 
 /** Okabe and Ito's colours, which people with any colour vision tell apart. */
 NB.palette = {
-  black: '#000000', orange: '#e69f00', sky: '#56b4e9', green: '#009e73',
-  yellow: '#f0e442', blue: '#0072b2', vermillion: '#d55e00', purple: '#cc79a7', grey: '#767676',
+  black: '#000000',
+  orange: '#e69f00',
+  sky: '#56b4e9',
+  green: '#009e73',
+  yellow: '#f0e442',
+  blue: '#0072b2',
+  vermillion: '#d55e00',
+  purple: '#cc79a7',
+  grey: '#767676',
 };
 
 /** An element. Attributes starting with `on` are listeners; text goes in as text, never as markup. */
@@ -19,7 +26,8 @@ NB.el = function (tag, attributes, ...children) {
     if (value === null || value === undefined || value === false) continue;
     if (name.startsWith('on')) element.addEventListener(name.slice(2), value);
     else if (name === 'text') element.textContent = value;
-    else if (name === 'value' || name === 'checked' || name === 'disabled' || name === 'selected') element[name] = value;
+    else if (name === 'value' || name === 'checked' || name === 'disabled' || name === 'selected')
+      element[name] = value;
     else element.setAttribute(name, value === true ? '' : value);
   }
   element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined));
@@ -66,7 +74,7 @@ NB.array = function (reference) {
   if (p) {
     const bytes = new Uint8Array(NB.raw, start, 2 * n);
     codes = new Uint16Array(n);
-    for (let k = 0; k < n; k++) codes[k] = bytes[k] | bytes[n + k] << 8;
+    for (let k = 0; k < n; k++) codes[k] = bytes[k] | (bytes[n + k] << 8);
   } else if (d || h) {
     codes = codes.slice();
   }
@@ -97,30 +105,48 @@ NB.start = async function (build) {
     app.replaceChildren();
     for (const [name, words] of Object.entries(page.words || {})) NB.dictionary.set(name, words);
     build(page, app);
-    requestAnimationFrame(() => requestAnimationFrame(() => {
-      NB.timing.firstView = performance.now();
-      document.documentElement.dataset.ready = 'true';
-    }));
+    requestAnimationFrame(() =>
+      requestAnimationFrame(() => {
+        NB.timing.firstView = performance.now();
+        document.documentElement.dataset.ready = 'true';
+      }),
+    );
   } catch (error) {
-    app.replaceChildren(NB.el('p', { class: 'error', role: 'alert', text: `This page cannot be shown: ${error.message}` }));
+    app.replaceChildren(
+      NB.el('p', { class: 'error', role: 'alert', text: `This page cannot be shown: ${error.message}` }),
+    );
     throw error;
   }
 };
 
 /** Columns of metrics, described by the page: the first of their keys that a configuration has is shown. */
-NB.metricColumns = (columns) => columns.map(({ title, unit, format, keys, help }) => ({
-  title, unit, help, numeric: true,
-  cell: ({ metrics }) => NB.formats[format](keys.map((key) => metrics[key]).find((value) => value !== undefined)),
-}));
+NB.metricColumns = (columns) =>
+  columns.map(({ title, unit, format, keys, help }) => ({
+    title,
+    unit,
+    help,
+    numeric: true,
+    cell: ({ metrics }) => NB.formats[format](keys.map((key) => metrics[key]).find((value) => value !== undefined)),
+  }));
 /**
  * A name from a scenario or a report as people in the room say it: the document's own words for it, else
  * the name itself, without the number of a solid and without underscores.
  */
-NB.words = (name) => NB.dictionary.get(String(name)) ?? String(name).replace(/\.\d+$/, '').replaceAll('_', ' ');
+NB.words = (name) =>
+  NB.dictionary.get(String(name)) ??
+  String(name)
+    .replace(/\.\d+$/, '')
+    .replaceAll('_', ' ');
 NB.dictionary = new Map();
 
 /** Where the half ball about the entry point is cut. */
-NB.regionWords = { above: 'above', feet: 'towards the feet', head: 'towards the head', left: 'on the patient\u2019s left', right: 'on the patient\u2019s right' };
+NB.regionWords = {
+  above: 'above',
+  feet: 'towards the feet',
+  head: 'towards the head',
+  left: 'on the patient\u2019s left',
+  right: 'on the patient\u2019s right',
+};
 
 /**
  * What a page's address says of the view, as in `report.html#goal=pose&time=2.4`: it can be sent, and survives
@@ -145,35 +171,85 @@ NB.address = {
 
   /** Calls `apply(choices)` when somebody changes the address of the open page. */
   watch(apply) {
-    window.addEventListener('hashchange', () => { if (location.hash !== NB.address.written) apply(NB.address.read()); });
+    window.addEventListener('hashchange', () => {
+      if (location.hash !== NB.address.written) apply(NB.address.read());
+    });
   },
   pending: {},
 };
 
 /** A button that puts the address with its choices on the clipboard. */
 NB.copyLink = function () {
-  const button = NB.el('button', { type: 'button', class: 'no-print', title: 'Address of this page with what is chosen now', onclick: () => {
-    const said = (text) => { button.textContent = text; setTimeout(() => { button.textContent = 'Copy link'; }, 2000); };
-    setTimeout(() => (navigator.clipboard ? navigator.clipboard.writeText(location.href) : Promise.reject()).then(() => said('Copied'), () => said('It is in the address bar')), 200);
-  } }, 'Copy link');
+  const button = NB.el(
+    'button',
+    {
+      type: 'button',
+      class: 'no-print',
+      title: 'Address of this page with what is chosen now',
+      onclick: () => {
+        const said = (text) => {
+          button.textContent = text;
+          setTimeout(() => {
+            button.textContent = 'Copy link';
+          }, 2000);
+        };
+        setTimeout(
+          () =>
+            (navigator.clipboard ? navigator.clipboard.writeText(location.href) : Promise.reject()).then(
+              () => said('Copied'),
+              () => said('It is in the address bar'),
+            ),
+          200,
+        );
+      },
+    },
+    'Copy link',
+  );
   return button;
 };
 
 /** A table with a caption: `columns` of `{ title, unit, numeric, cell(row) }`. */
 NB.table = function (caption, columns, rows, options = {}) {
-  const head = NB.el('tr', null, columns.map((column) => NB.el('th', {
-    scope: 'col', class: column.numeric ? 'number' : null, title: column.help,
-  }, column.title, column.unit ? NB.el('span', { class: 'unit', text: ` ${column.unit}` }) : null)));
-  const body = rows.map((row) => NB.el('tr', options.row ? options.row(row) : null, columns.map((column, index) => {
-    const content = column.cell(row);
-    const attributes = { class: column.numeric ? 'number' : column.text ? 'text' : null };
-    const isNode = content instanceof Node || Array.isArray(content);
-    return index === 0
-      ? NB.el('th', { scope: 'row' }, isNode ? content : String(content))
-      : NB.el('td', attributes, isNode ? content : String(content));
-  })));
-  return NB.scroll(caption, NB.el('table', { class: options.class },
-    NB.el('caption', { text: caption }), NB.el('thead', null, head), NB.el('tbody', null, body)));
+  const head = NB.el(
+    'tr',
+    null,
+    columns.map((column) =>
+      NB.el(
+        'th',
+        {
+          scope: 'col',
+          class: column.numeric ? 'number' : null,
+          title: column.help,
+        },
+        column.title,
+        column.unit ? NB.el('span', { class: 'unit', text: ` ${column.unit}` }) : null,
+      ),
+    ),
+  );
+  const body = rows.map((row) =>
+    NB.el(
+      'tr',
+      options.row ? options.row(row) : null,
+      columns.map((column, index) => {
+        const content = column.cell(row);
+        const attributes = { class: column.numeric ? 'number' : column.text ? 'text' : null };
+        const isNode = content instanceof Node || Array.isArray(content);
+        return index === 0
+          ? NB.el('th', { scope: 'row' }, isNode ? content : String(content))
+          : NB.el('td', attributes, isNode ? content : String(content));
+      }),
+    ),
+  );
+  return NB.scroll(
+    caption,
+    NB.el(
+      'table',
+      { class: options.class },
+      NB.el('caption', { text: caption }),
+      NB.el('thead', null, head),
+      NB.el('tbody', null, body),
+    ),
+  );
 };
 
 /** A box that scrolls sideways where its contents are wider than it, and says so. */
@@ -198,8 +274,12 @@ NB.hint = function (box) {
     const edge = box.getBoundingClientRect().right;
     const heads = [...(box.querySelector('thead tr')?.cells || [])];
     const beyond = heads.filter((cell) => cell.getBoundingClientRect().right > edge + 1).length;
-    hint.textContent = rest <= 1 ? '\u2190 the rest is to the left'
-      : beyond ? `${beyond} more column${beyond === 1 ? '' : 's'}: scroll sideways \u2192` : 'scroll sideways for the rest \u2192';
+    hint.textContent =
+      rest <= 1
+        ? '\u2190 the rest is to the left'
+        : beyond
+          ? `${beyond} more column${beyond === 1 ? '' : 's'}: scroll sideways \u2192`
+          : 'scroll sideways for the rest \u2192';
   };
   box.addEventListener('scroll', look, { passive: true });
   const observer = new ResizeObserver(look);
@@ -209,11 +289,20 @@ NB.hint = function (box) {
 
 /** A fold-out section. */
 NB.section = (title, open, ...children) =>
-  NB.el('details', { class: 'section', open: open || null }, NB.el('summary', null, NB.el('h2', { text: title })), ...children);
+  NB.el(
+    'details',
+    { class: 'section', open: open || null },
+    NB.el('summary', null, NB.el('h2', { text: title })),
+    ...children,
+  );
 
 /** A verdict as a chip: only `pass` is good. */
 NB.verdict = (verdict) => {
-  const words = { pass: ['good', '\u2713 passed'], fail: ['bad', '\u2717 failed'], incomplete: ['bad', '? incomplete'] };
+  const words = {
+    pass: ['good', '\u2713 passed'],
+    fail: ['bad', '\u2717 failed'],
+    incomplete: ['bad', '? incomplete'],
+  };
   const [style, text] = words[verdict] || ['bad', String(verdict)];
   return NB.el('span', { class: `chip ${style}`, text });
 };
@@ -224,8 +313,11 @@ NB.checkbox = function (label, checked, change) {
 };
 
 NB.select = function (label, options, value, change) {
-  const select = NB.el('select', { onchange: (event) => change(event.target.value) },
-    options.map(([key, text]) => NB.el('option', { value: key, selected: key === value, text })));
+  const select = NB.el(
+    'select',
+    { onchange: (event) => change(event.target.value) },
+    options.map(([key, text]) => NB.el('option', { value: key, selected: key === value, text })),
+  );
   return NB.el('label', { class: 'field' }, NB.el('span', { text: label }), select);
 };
 
@@ -240,7 +332,7 @@ NB.rows = function (rows, choose) {
       else if (event.key === 'Home') to = 0;
       else if (event.key === 'End') to = rows.length - 1;
       else if (event.key === 'Enter' || event.key === ' ') to = index;
-      if (to === null || event.target.closest('input, button') ) return;
+      if (to === null || event.target.closest('input, button')) return;
       event.preventDefault();
       choose(to);
       rows[to].focus();
@@ -275,25 +367,58 @@ NB.tree = function (value) {
   if (typeof value === 'number') return NB.el('span', { text: NB.significant(value) });
   if (typeof value !== 'object') return NB.el('span', { text: String(value) });
   if (Array.isArray(value) && value.every((each) => typeof each !== 'object' || each === null)) {
-    return NB.el('span', { text: value.map((each) => (typeof each === 'number' ? NB.significant(each) : String(each))).join(', ') });
+    return NB.el('span', {
+      text: value.map((each) => (typeof each === 'number' ? NB.significant(each) : String(each))).join(', '),
+    });
   }
-  return NB.el('dl', null, Object.entries(value).flatMap(([key, each]) => [NB.el('dt', { text: NB.words(key) }), NB.el('dd', null, NB.tree(each))]));
+  return NB.el(
+    'dl',
+    null,
+    Object.entries(value).flatMap(([key, each]) => [
+      NB.el('dt', { text: NB.words(key) }),
+      NB.el('dd', null, NB.tree(each)),
+    ]),
+  );
 };
 
 NB.provenance = function (provenance, file) {
-  return NB.el('div', null,
-    NB.el('dl', null,
-      NB.el('dt', { text: 'needlebench' }), NB.el('dd', { text: `${provenance.version} (${provenance.git_revision})` }),
+  return NB.el(
+    'div',
+    null,
+    NB.el(
+      'dl',
+      null,
+      NB.el('dt', { text: 'needlebench' }),
+      NB.el('dd', { text: `${provenance.version} (${provenance.git_revision})` }),
       file ? [NB.el('dt', { text: 'file' }), NB.el('dd', { text: file })] : null,
-      NB.el('dt', { text: 'seed' }), NB.el('dd', { text: String(provenance.seed) }),
-      NB.el('dt', { text: 'truth' }), NB.el('dd', { text: provenance.truth }),
-      NB.el('dt', { text: 'lock file' }), NB.el('dd', null, NB.el('code', { text: provenance.cargo_lock_sha256 })),
-      provenance.engines.map((engine) => [NB.el('dt', { text: `${engine.name} ${engine.version}` }),
-        NB.el('dd', { text: engine.settings.map(([key, value]) => `${key} = ${value}`).join(', ') })])),
-    NB.el('p', { class: 'print-only', text: `${provenance.inputs.length} files went in; report.json has their names and hashes.` }),
-    NB.el('div', { class: 'no-print' }, NB.table('Files that went in', [
-      { title: 'Role', cell: (input) => input.role },
-      { title: 'File', cell: (input) => input.file },
-      { title: 'SHA-256', cell: (input) => NB.el('code', { text: input.sha256 }) },
-    ], provenance.inputs, { class: 'small' })));
+      NB.el('dt', { text: 'seed' }),
+      NB.el('dd', { text: String(provenance.seed) }),
+      NB.el('dt', { text: 'truth' }),
+      NB.el('dd', { text: provenance.truth }),
+      NB.el('dt', { text: 'lock file' }),
+      NB.el('dd', null, NB.el('code', { text: provenance.cargo_lock_sha256 })),
+      provenance.engines.map((engine) => [
+        NB.el('dt', { text: `${engine.name} ${engine.version}` }),
+        NB.el('dd', { text: engine.settings.map(([key, value]) => `${key} = ${value}`).join(', ') }),
+      ]),
+    ),
+    NB.el('p', {
+      class: 'print-only',
+      text: `${provenance.inputs.length} files went in; report.json has their names and hashes.`,
+    }),
+    NB.el(
+      'div',
+      { class: 'no-print' },
+      NB.table(
+        'Files that went in',
+        [
+          { title: 'Role', cell: (input) => input.role },
+          { title: 'File', cell: (input) => input.file },
+          { title: 'SHA-256', cell: (input) => NB.el('code', { text: input.sha256 }) },
+        ],
+        provenance.inputs,
+        { class: 'small' },
+      ),
+    ),
+  );
 };

@@ -17,9 +17,15 @@ NB.Live = class {
     return live;
   }
 
-  bytes(at, count) { return new Uint8Array(this.code.memory.buffer, at, count); }
+  bytes(at, count) {
+    return new Uint8Array(this.code.memory.buffer, at, count);
+  }
 
-  put(numbers) { this.bytes(this.code.input(8 * numbers.length), 8 * numbers.length).set(new Uint8Array(Float64Array.from(numbers).buffer)); }
+  put(numbers) {
+    this.bytes(this.code.input(8 * numbers.length), 8 * numbers.length).set(
+      new Uint8Array(Float64Array.from(numbers).buffer),
+    );
+  }
 
   /** Rows of so many numbers, of an answer with `count` numbers. */
   rows(count, width) {
@@ -32,11 +38,20 @@ NB.Live = class {
     this.put(joints);
     return this.rows(this.code.pairs(), 9).map((row, index) => {
       const [a, b, kind] = this.data.pairs[index];
-      return { index, class: kind, bodies: [a, b], distance: row[0], points: [[...row.subarray(1, 4)], [...row.subarray(4, 7)]], solids: [this.solid(a, row[7]), this.solid(b, row[8])] };
+      return {
+        index,
+        class: kind,
+        bodies: [a, b],
+        distance: row[0],
+        points: [[...row.subarray(1, 4)], [...row.subarray(4, 7)]],
+        solids: [this.solid(a, row[7]), this.solid(b, row[8])],
+      };
     });
   }
 
-  solid(body, index) { return this.data.bodies[body].solids[index]; }
+  solid(body, index) {
+    return this.data.bodies[body].solids[index];
+  }
 
   lowest(joints) {
     this.put(joints);
@@ -50,22 +65,35 @@ NB.Live = class {
     return length ? new TextDecoder().decode(this.bytes(this.code.message(), length)) : null;
   }
 
-  resetBase() { this.code.reset_base(); }
+  resetBase() {
+    this.code.reset_base();
+  }
 
   /** What base and mount stand in. */
   overlaps() {
-    return this.rows(this.code.overlaps(), 3).map(([body, other, depth]) => ({ body: this.data.bodies[body].name, other: this.data.bodies[other].name, depth }));
+    return this.rows(this.code.overlaps(), 3).map(([body, other, depth]) => ({
+      body: this.data.bodies[body].name,
+      other: this.data.bodies[other].name,
+      depth,
+    }));
   }
 
   /** All eight configurations at a goal, each at the best of so many rolls. */
   reach(goal, rolls) {
     return this.rows(this.code.reach(goal, rolls), 11).map((row, index) => ({
-      label: this.data.configurations[index], outcome: NB.Live.OUTCOMES[row[0]], roll: row[1], surplus: row[2],
-      joints: Number.isNaN(row[3]) ? null : [...row.subarray(3, 9)], pair: Number.isNaN(row[9]) ? null : row[9], distance: row[10],
+      label: this.data.configurations[index],
+      outcome: NB.Live.OUTCOMES[row[0]],
+      roll: row[1],
+      surplus: row[2],
+      joints: Number.isNaN(row[3]) ? null : [...row.subarray(3, 9)],
+      pair: Number.isNaN(row[9]) ? null : row[9],
+      distance: row[10],
     }));
   }
 
-  mountSurface() { return this.rows(this.code.mount_surface(), 9).flatMap((row) => [...row]); }
+  mountSurface() {
+    return this.rows(this.code.mount_surface(), 9).flatMap((row) => [...row]);
+  }
 };
 NB.Live.OUTCOMES = ['unreachable', 'merged', 'joint_limit', 'singular', 'too_near', 'misses', 'works'];
 
@@ -93,11 +121,19 @@ NB.Explore = class {
     this.view = run.view;
     this.active = false;
     this.open = NB.el('button', { type: 'button', onclick: () => this.enter() }, 'Try a posture');
-    this.status = NB.el('span', { class: 'soft', role: 'status', text: 'Move the joints and the base by hand, with the clearances there.' });
+    this.status = NB.el('span', {
+      class: 'soft',
+      role: 'status',
+      text: 'Move the joints and the base by hand, with the clearances there.',
+    });
     this.bar = NB.el('div', { class: 'bar' }, this.open, this.status);
     this.body = NB.el('div', { hidden: true });
-    this.element = NB.el('section', { class: 'panel explore no-print', 'aria-label': 'Try a posture' },
-      this.bar, this.body);
+    this.element = NB.el(
+      'section',
+      { class: 'panel explore no-print', 'aria-label': 'Try a posture' },
+      this.bar,
+      this.body,
+    );
     this.sign = NB.el('p', { class: 'tried-sign', hidden: true, text: 'Tried posture: not a result of the run' });
     this.view.element.append(this.sign);
     // What is printed are results.
@@ -154,35 +190,81 @@ NB.Explore = class {
     this.open.focus();
   }
 
-  startJoints() { return [...(this.run.joints || this.run.page.start)]; }
+  startJoints() {
+    return [...(this.run.joints || this.run.page.start)];
+  }
 
-  homeBase() { return { position: [...this.data.base.position], rpy: [...this.data.base.rpy] }; }
+  homeBase() {
+    return { position: [...this.data.base.position], rpy: [...this.data.base.rpy] };
+  }
 
   get baseMoved() {
     const home = this.data.base;
-    return this.base.position.some((value, k) => value !== home.position[k]) || this.base.rpy.some((value, k) => value !== home.rpy[k]);
+    return (
+      this.base.position.some((value, k) => value !== home.position[k]) ||
+      this.base.rpy.some((value, k) => value !== home.rpy[k])
+    );
   }
 
   build() {
     this.built = true;
-    const degrees = (rad) => rad * 180 / Math.PI;
-    const field = (label, attributes, change) => NB.el('input', { type: 'number', 'aria-label': label, ...attributes,
-      onchange: (event) => { if (Number.isFinite(event.target.valueAsNumber)) change(event.target.valueAsNumber); else this.write(); } });
+    const degrees = (rad) => (rad * 180) / Math.PI;
+    const field = (label, attributes, change) =>
+      NB.el('input', {
+        type: 'number',
+        'aria-label': label,
+        ...attributes,
+        onchange: (event) => {
+          if (Number.isFinite(event.target.valueAsNumber)) change(event.target.valueAsNumber);
+          else this.write();
+        },
+      });
     this.sliders = [];
     this.numbers = [];
     const joints = NB.JOINTS.map((name, joint) => {
       const [low, high] = this.data.joints[joint].map(degrees);
-      const set = (value) => this.setJoint(joint, Math.min(Math.max(value, low), high) * Math.PI / 180);
+      const set = (value) => this.setJoint(joint, (Math.min(Math.max(value, low), high) * Math.PI) / 180);
       const ends = { min: low.toFixed(1), max: high.toFixed(1) };
-      this.sliders[joint] = NB.el('input', { type: 'range', ...ends, step: '0.5', 'aria-label': `${name}, degrees`, oninput: (event) => set(event.target.valueAsNumber) });
+      this.sliders[joint] = NB.el('input', {
+        type: 'range',
+        ...ends,
+        step: '0.5',
+        'aria-label': `${name}, degrees`,
+        oninput: (event) => set(event.target.valueAsNumber),
+      });
       this.numbers[joint] = field(`${name}, degrees, ${ends.min} to ${ends.max}`, { ...ends, step: 'any' }, set);
-      return NB.el('div', { class: 'joint' }, NB.el('span', { text: name }), this.sliders[joint], this.numbers[joint], NB.el('span', { class: 'unit', text: '\u00b0' }));
+      return NB.el(
+        'div',
+        { class: 'joint' },
+        NB.el('span', { text: name }),
+        this.sliders[joint],
+        this.numbers[joint],
+        NB.el('span', { class: 'unit', text: '\u00b0' }),
+      );
     });
     this.baseFields = [
-      ...['x', 'y', 'height'].map((name, k) => [name, 'mm', () => this.base.position[k], (value) => { this.base.position[k] = value; }]),
-      ...['roll', 'pitch', 'yaw'].map((name, k) => [name, '\u00b0', () => this.base.rpy[k], (value) => { this.base.rpy[k] = value; }]),
+      ...['x', 'y', 'height'].map((name, k) => [
+        name,
+        'mm',
+        () => this.base.position[k],
+        (value) => {
+          this.base.position[k] = value;
+        },
+      ]),
+      ...['roll', 'pitch', 'yaw'].map((name, k) => [
+        name,
+        '\u00b0',
+        () => this.base.rpy[k],
+        (value) => {
+          this.base.rpy[k] = value;
+        },
+      ]),
     ].map(([name, unit, get, set]) => {
-      const input = field(`Base, ${name}, ${unit === 'mm' ? 'millimetres' : 'degrees'}`, { step: unit === 'mm' ? '10' : '5' }, (value) => this.moveBase(() => set(value)));
+      const input = field(
+        `Base, ${name}, ${unit === 'mm' ? 'millimetres' : 'degrees'}`,
+        { step: unit === 'mm' ? '10' : '5' },
+        (value) => this.moveBase(() => set(value)),
+      );
       return { name, unit, get, input };
     });
     this.problems = NB.el('div', { role: 'alert' });
@@ -192,22 +274,64 @@ NB.Explore = class {
     this.copied = NB.el('span', { class: 'soft', role: 'status' });
     const button = (text, click, extra = {}) => NB.el('button', { type: 'button', onclick: click, ...extra }, text);
     this.body.append(
-      NB.el('p', { class: 'tried-note', text: 'What is shown is this posture alone, not a result of the run: nothing is simulated, and no motion to it is planned or proven. The blue ghost is the run\u2019s posture.' }),
-      NB.el('div', { class: 'bar' },
-        button('Back to the run', () => this.back()), button('Reset joints', () => this.resetJoints()), button('Reset base', () => this.resetBase())),
-      NB.el('div', { class: 'explore-grid' },
+      NB.el('p', {
+        class: 'tried-note',
+        text: 'What is shown is this posture alone, not a result of the run: nothing is simulated, and no motion to it is planned or proven. The blue ghost is the run\u2019s posture.',
+      }),
+      NB.el(
+        'div',
+        { class: 'bar' },
+        button('Back to the run', () => this.back()),
+        button('Reset joints', () => this.resetJoints()),
+        button('Reset base', () => this.resetBase()),
+      ),
+      NB.el(
+        'div',
+        { class: 'explore-grid' },
         NB.el('fieldset', null, NB.el('legend', { text: 'Joints' }), joints),
-        NB.el('fieldset', null, NB.el('legend', { text: 'Base: drag the ring at its foot, or' }),
-          NB.el('div', { class: 'base-fields' }, this.baseFields.map(({ name, unit, input }) => NB.el('label', null, NB.el('span', { text: name }), input, NB.el('span', { class: 'unit', text: unit })))))),
-      this.problems, this.classes,
-      NB.el('p', { class: 'legend small' }, 'Lines and parts: ', NB.NEARNESS.map(({ words, color }) => NB.el('span', { class: 'nearness' },
-        NB.el('span', { class: 'swatch', style: `background: rgb(${color.map((c) => Math.round(255 * c)).join(' ')})` }), words))),
+        NB.el(
+          'fieldset',
+          null,
+          NB.el('legend', { text: 'Base: drag the ring at its foot, or' }),
+          NB.el(
+            'div',
+            { class: 'base-fields' },
+            this.baseFields.map(({ name, unit, input }) =>
+              NB.el('label', null, NB.el('span', { text: name }), input, NB.el('span', { class: 'unit', text: unit })),
+            ),
+          ),
+        ),
+      ),
+      this.problems,
+      this.classes,
+      NB.el(
+        'p',
+        { class: 'legend small' },
+        'Lines and parts: ',
+        NB.NEARNESS.map(({ words, color }) =>
+          NB.el(
+            'span',
+            { class: 'nearness' },
+            NB.el('span', {
+              class: 'swatch',
+              style: `background: rgb(${color.map((c) => Math.round(255 * c)).join(' ')})`,
+            }),
+            words,
+          ),
+        ),
+      ),
       this.reached,
       NB.el('h3', { text: 'The same on the command line' }),
       this.text,
-      NB.el('div', { class: 'bar' },
-        button('Copy joints', () => this.copy(this.jointList())), button('Copy command', () => this.copy(this.command(this.joints))),
-        button('Copy base as TOML', () => this.copy(this.toml())), this.copied));
+      NB.el(
+        'div',
+        { class: 'bar' },
+        button('Copy joints', () => this.copy(this.jointList())),
+        button('Copy command', () => this.copy(this.command(this.joints))),
+        button('Copy base as TOML', () => this.copy(this.toml())),
+        this.copied,
+      ),
+    );
   }
 
   resetAll() {
@@ -229,7 +353,11 @@ NB.Explore = class {
     this.evaluate();
   }
 
-  resetBase() { this.moveBase(() => { this.base = this.homeBase(); }); }
+  resetBase() {
+    this.moveBase(() => {
+      this.base = this.homeBase();
+    });
+  }
 
   setJoint(joint, value) {
     this.joints[joint] = value;
@@ -262,25 +390,33 @@ NB.Explore = class {
   /** Writes the state into the controls; a joint's own control is being moved. */
   write(moved = null) {
     this.joints.forEach((q, joint) => {
-      const degrees = q * 180 / Math.PI;
+      const degrees = (q * 180) / Math.PI;
       if (joint !== moved || document.activeElement !== this.sliders[joint]) this.sliders[joint].value = degrees;
       this.numbers[joint].value = degrees.toFixed(2);
     });
     for (const { get, input } of this.baseFields) input.value = Number(get().toFixed(3));
   }
 
-  get goalIndex() { return this.run.goalIndex; }
+  get goalIndex() {
+    return this.run.goalIndex;
+  }
 
   pose() {
     const [x, y, z] = this.base.position.map((mm) => mm * 1e-3);
-    const [roll, pitch, yaw] = this.base.rpy.map((deg) => deg * Math.PI / 180);
-    const turn = new THREE.Matrix4().makeRotationZ(yaw).multiply(new THREE.Matrix4().makeRotationY(pitch)).multiply(new THREE.Matrix4().makeRotationX(roll));
+    const [roll, pitch, yaw] = this.base.rpy.map((deg) => (deg * Math.PI) / 180);
+    const turn = new THREE.Matrix4()
+      .makeRotationZ(yaw)
+      .multiply(new THREE.Matrix4().makeRotationY(pitch))
+      .multiply(new THREE.Matrix4().makeRotationX(roll));
     return this.baseMoved ? turn.setPosition(x, y, z) : NB.matrix(this.run.page.scene.chain.base);
   }
 
   chain() {
     const pose = this.pose();
-    const [at, turn] = [new THREE.Vector3().setFromMatrixPosition(pose), new THREE.Quaternion().setFromRotationMatrix(pose)];
+    const [at, turn] = [
+      new THREE.Vector3().setFromMatrixPosition(pose),
+      new THREE.Quaternion().setFromRotationMatrix(pose),
+    ];
     return { ...this.run.page.scene.chain, base: [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w] };
   }
 
@@ -330,11 +466,14 @@ NB.Explore = class {
     this.computedInMs = performance.now() - started;
     this.pairs = pairs;
     const least = new Map();
-    for (const pair of pairs) if (!least.has(pair.class) || pair.distance < least.get(pair.class).distance) least.set(pair.class, pair);
+    for (const pair of pairs)
+      if (!least.has(pair.class) || pair.distance < least.get(pair.class).distance) least.set(pair.class, pair);
     this.least = [...least.values()].sort((a, b) => a.class - b.class);
     this.showClasses();
     this.showProblems();
-    this.text.textContent = [this.baseMoved ? this.toml() : null, this.command(this.joints)].filter(Boolean).join('\n\n');
+    this.text.textContent = [this.baseMoved ? this.toml() : null, this.command(this.joints)]
+      .filter(Boolean)
+      .join('\n\n');
     this.draw();
     this.evaluatedInMs = performance.now() - started;
   }
@@ -343,32 +482,61 @@ NB.Explore = class {
     const low = this.live.lowest(this.joints);
     const lines = [
       this.refused ? `The base cannot go there: ${this.refused}.` : null,
-      ...this.live.overlaps().map(({ body, other, depth }) => `The ${NB.words(body)} stands ${NB.mm(depth)} mm in the ${NB.words(other)}.`),
-      this.startHits ? `From here, the posture that the scenario starts in collides: ${this.startHits.solids.map(NB.words).join(' and ')} overlap by ${NB.mm(-this.startHits.distance)} mm. Give another one under [start].` : null,
+      ...this.live
+        .overlaps()
+        .map(({ body, other, depth }) => `The ${NB.words(body)} stands ${NB.mm(depth)} mm in the ${NB.words(other)}.`),
+      this.startHits
+        ? `From here, the posture that the scenario starts in collides: ${this.startHits.solids.map(NB.words).join(' and ')} overlap by ${NB.mm(-this.startHits.distance)} mm. Give another one under [start].`
+        : null,
       low < -0.001 ? `The arm reaches ${NB.mm(-low)} mm under the floor.` : null,
     ].filter(Boolean);
     const text = lines.join(' ');
     // Said once, and not at every step of a drag.
-    if (this.problems.textContent !== text) NB.clear(this.problems, lines.map((line) => NB.el('p', { class: 'error', text: line })));
+    if (this.problems.textContent !== text)
+      NB.clear(
+        this.problems,
+        lines.map((line) => NB.el('p', { class: 'error', text: line })),
+      );
   }
 
-  limit(pair) { return this.data.classes[pair.class].judged; }
+  limit(pair) {
+    return this.data.classes[pair.class].judged;
+  }
 
   showClasses() {
     const name = (pair) => this.data.classes[pair.class].name;
     const columns = [
       { title: 'Clearance of this posture', cell: (pair) => NB.words(name(pair)) },
-      { title: 'Distance', unit: 'mm', numeric: true, cell: (pair) => NB.mm(pair.distance), help: 'signed: negative where they overlap' },
-      { title: 'Limit', unit: 'mm', numeric: true, cell: (pair) => NB.mm(this.limit(pair)), help: 'the scenario\u2019s criterion, or what planning wants at least' },
+      {
+        title: 'Distance',
+        unit: 'mm',
+        numeric: true,
+        cell: (pair) => NB.mm(pair.distance),
+        help: 'signed: negative where they overlap',
+      },
+      {
+        title: 'Limit',
+        unit: 'mm',
+        numeric: true,
+        cell: (pair) => NB.mm(this.limit(pair)),
+        help: 'the scenario\u2019s criterion, or what planning wants at least',
+      },
       { title: '', cell: (pair) => this.judgement(pair.distance, this.limit(pair)) },
       { title: 'Between', cell: (pair) => pair.solids.map(NB.words).join(' and ') },
     ];
-    NB.clear(this.classes, NB.table('Signed distances of this posture by class; not proven along any motion', columns, this.least, { class: 'small full' }));
+    NB.clear(
+      this.classes,
+      NB.table('Signed distances of this posture by class; not proven along any motion', columns, this.least, {
+        class: 'small full',
+      }),
+    );
   }
 
   judgement(distance, limit) {
     if (limit === null) return NB.el('span', { class: 'soft', text: 'no limit' });
-    return distance >= limit ? NB.el('span', { class: 'good', text: '\u2713 kept' }) : NB.el('span', { class: 'bad', text: distance < 0 ? '\u2717 overlap' : '\u2717 too near' });
+    return distance >= limit
+      ? NB.el('span', { class: 'good', text: '\u2713 kept' })
+      : NB.el('span', { class: 'bad', text: distance < 0 ? '\u2717 overlap' : '\u2717 too near' });
   }
 
   draw() {
@@ -385,7 +553,8 @@ NB.Explore = class {
       if (!labelled.has(pair.index) && (!unwanted || nearness.key === 'far')) continue;
       view.rod('tried-lines', ...pair.points, nearness.radius, [...nearness.color, 1], true);
       if (nearness.key === 'far') continue;
-      for (const point of pair.points) view.ball('tried-lines', point, 2 * nearness.radius, [...nearness.color, 1], true);
+      for (const point of pair.points)
+        view.ball('tried-lines', point, 2 * nearness.radius, [...nearness.color, 1], true);
       if (!labelled.has(pair.index)) continue;
       const middle = pair.points[0].map((value, k) => (value + pair.points[1][k]) / 2);
       view.label('tried-lines', `${pair.solids.map(NB.words).join(' and ')}: ${NB.mm(pair.distance)} mm`, middle);
@@ -424,7 +593,9 @@ NB.Explore = class {
       for (const button of this.reached.querySelectorAll('button')) button.disabled = true;
     }
     clearTimeout(this.later);
-    this.later = setTimeout(() => { if (this.active) this.showReach(NB.Explore.ROLLS, true); }, 200);
+    this.later = setTimeout(() => {
+      if (this.active) this.showReach(NB.Explore.ROLLS, true);
+    }, 200);
   }
 
   showReach(rolls, isLast) {
@@ -434,8 +605,13 @@ NB.Explore = class {
     this.reachedInMs = performance.now() - started;
     if (!this.found.length) return;
     const words = {
-      works: ['good', '\u2713 limits kept'], misses: ['bad', '\u2717 limit missed'], too_near: ['bad', '\u2717 too near'], singular: ['bad', '\u2717 near a singularity'],
-      joint_limit: ['off', '\u2013 beyond a joint limit'], merged: ['off', '\u2013 same as another'], unreachable: ['off', '\u2013 out of reach'],
+      works: ['good', '\u2713 limits kept'],
+      misses: ['bad', '\u2717 limit missed'],
+      too_near: ['bad', '\u2717 too near'],
+      singular: ['bad', '\u2717 near a singularity'],
+      joint_limit: ['off', '\u2013 beyond a joint limit'],
+      merged: ['off', '\u2013 same as another'],
+      unreachable: ['off', '\u2013 out of reach'],
     };
     const between = ({ pair, distance }) => {
       if (pair === null) return '';
@@ -444,16 +620,41 @@ NB.Explore = class {
     };
     const columns = [
       { title: 'From this base', cell: (each) => each.label },
-      { title: 'Final posture', cell: (each) => NB.el('span', { class: words[each.outcome][0], text: words[each.outcome][1] }) },
+      {
+        title: 'Final posture',
+        cell: (each) => NB.el('span', { class: words[each.outcome][0], text: words[each.outcome][1] }),
+      },
       { title: 'Nearest to its limit', cell: between },
       { title: 'Roll', unit: '\u00b0', numeric: true, cell: (each) => (each.joints ? NB.deg(each.roll, 0) : '\u2013') },
-      { title: '', cell: (each) => NB.el('button', { type: 'button', disabled: !each.joints, 'aria-label': `Take the posture of ${each.label}`,
-        onclick: () => this.take(each) }, 'Take') },
+      {
+        title: '',
+        cell: (each) =>
+          NB.el(
+            'button',
+            {
+              type: 'button',
+              disabled: !each.joints,
+              'aria-label': `Take the posture of ${each.label}`,
+              onclick: () => this.take(each),
+            },
+            'Take',
+          ),
+      },
     ];
     const count = this.found.filter((each) => each.outcome === 'works').length;
     const at = free ? 'the best roll found about the needle' : 'the roll that the goal fixes';
-    const table = NB.table(`Goal ${NB.words(this.run.goal.name)}: ${count} of ${this.found.length} postures keep all limits, at ${at}`, columns, this.found, { class: 'small full' });
-    const note = fromBase ? NB.el('p', { class: 'small', text: 'Here the goal stays where it is in the room. The scenario gives it from the robot\u2019s base (flange_pose), so there it goes along with the base: give its target and entry in the room before you move the base.' }) : null;
+    const table = NB.table(
+      `Goal ${NB.words(this.run.goal.name)}: ${count} of ${this.found.length} postures keep all limits, at ${at}`,
+      columns,
+      this.found,
+      { class: 'small full' },
+    );
+    const note = fromBase
+      ? NB.el('p', {
+          class: 'small',
+          text: 'Here the goal stays where it is in the room. The scenario gives it from the robot\u2019s base (flange_pose), so there it goes along with the base: give its target and entry in the room before you move the base.',
+        })
+      : null;
     // A button that has the focus keeps it.
     const focused = [...this.reached.querySelectorAll('button')].indexOf(document.activeElement);
     NB.clear(this.reached, NB.el('h3', { text: 'What if the robot stood here?' }), table, note);
@@ -467,9 +668,13 @@ NB.Explore = class {
     this.evaluate();
   }
 
-  jointList() { return this.joints.map((q) => String(q)).join(','); }
+  jointList() {
+    return this.joints.map((q) => String(q)).join(',');
+  }
 
-  command(joints) { return `needlebench clearance ${this.run.report.scenario.file} --joints ${joints.join(',')}`; }
+  command(joints) {
+    return `needlebench clearance ${this.run.report.scenario.file} --joints ${joints.join(',')}`;
+  }
 
   toml() {
     const list = (values) => `[${values.map((value) => Number(value.toFixed(6))).join(', ')}]`;
@@ -490,7 +695,9 @@ NB.Explore = class {
       this.copied.textContent = 'selected: copy it with Ctrl+C';
     }
     clearTimeout(this.copiedUntil);
-    this.copiedUntil = setTimeout(() => { this.copied.textContent = ''; }, 4000);
+    this.copiedUntil = setTimeout(() => {
+      this.copied.textContent = '';
+    }, 4000);
   }
 
   /** The run's layers, less what is a result of the run. */
@@ -512,13 +719,22 @@ NB.Explore = class {
     const [around, inner, outer] = [64, NB.Explore.RING - 0.02, NB.Explore.RING];
     const positions = [];
     for (let step = 0; step < around; step++) {
-      const [a, b] = [step, step + 1].map((k) => 2 * Math.PI * k / around);
+      const [a, b] = [step, step + 1].map((k) => (2 * Math.PI * k) / around);
       const at = (radius, angle) => [x + radius * Math.cos(angle), y + radius * Math.sin(angle), z];
-      positions.push(...at(inner, a), ...at(outer, a), ...at(outer, b), ...at(inner, a), ...at(outer, b), ...at(inner, b));
+      positions.push(
+        ...at(inner, a),
+        ...at(outer, a),
+        ...at(outer, b),
+        ...at(inner, a),
+        ...at(outer, b),
+        ...at(inner, b),
+      );
     }
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(positions), 3));
-    const material = view.marked(new THREE.MeshBasicMaterial({ color: 0x0072b2, opacity: 0.8, transparent: true, side: THREE.DoubleSide }));
+    const material = view.marked(
+      new THREE.MeshBasicMaterial({ color: 0x0072b2, opacity: 0.8, transparent: true, side: THREE.DoubleSide }),
+    );
     const ring = new THREE.Mesh(geometry, material);
     ring.renderOrder = 31;
     view.add('tried-handle', ring);
@@ -529,7 +745,11 @@ NB.Explore = class {
   under(event) {
     const { view } = this;
     const box = view.renderer.domElement.getBoundingClientRect();
-    const far = new THREE.Vector3((event.clientX - box.left) / box.width * 2 - 1, 1 - (event.clientY - box.top) / box.height * 2, 0.5).unproject(view.camera);
+    const far = new THREE.Vector3(
+      ((event.clientX - box.left) / box.width) * 2 - 1,
+      1 - ((event.clientY - box.top) / box.height) * 2,
+      0.5,
+    ).unproject(view.camera);
     const eye = view.camera.position;
     const way = far.sub(eye).normalize();
     if (Math.abs(way.z) < 0.03) return null;
@@ -539,7 +759,10 @@ NB.Explore = class {
 
   isOnRing(event) {
     const at = this.active && this.under(event);
-    return Boolean(at) && Math.hypot(at[0] - this.base.position[0] * 1e-3, at[1] - this.base.position[1] * 1e-3) <= NB.Explore.RING + 0.01;
+    return (
+      Boolean(at) &&
+      Math.hypot(at[0] - this.base.position[0] * 1e-3, at[1] - this.base.position[1] * 1e-3) <= NB.Explore.RING + 0.01
+    );
   }
 
   grabBase() {
@@ -566,7 +789,12 @@ NB.Explore = class {
       // Once before the next frame, however often the pointer moves.
       this.asked = requestAnimationFrame(() => {
         this.asked = 0;
-        if (this.active) this.moveBase(() => at.forEach((value, k) => { this.base.position[k] = Math.round(value * 1e3 - held0[k]); }));
+        if (this.active)
+          this.moveBase(() =>
+            at.forEach((value, k) => {
+              this.base.position[k] = Math.round(value * 1e3 - held0[k]);
+            }),
+          );
       });
       const held0 = held;
     });

@@ -16,36 +16,96 @@ NB.TestPage = class {
   buildOther(app) {
     this.arm.pose(this.page.scene.chain, this.page.start);
     this.view.frame(NB.aboutBase(this.page.scene.chain.base, 0.55), [-0.75, 0.45, -0.55]);
-    app.append(this.view.element, NB.el('p', { class: 'soft', text: 'The arm at its start.' }),
-      NB.section('Run that excites every joint', true,
+    app.append(
+      this.view.element,
+      NB.el('p', { class: 'soft', text: 'The arm at its start.' }),
+      NB.section(
+        'Run that excites every joint',
+        true,
         NB.el('p', { text: 'Proven clearances by motion are in report.json; the logs are in the files named here.' }),
-        NB.tree(this.report.excitation)));
+        NB.tree(this.report.excitation),
+      ),
+    );
   }
 
   buildTest(app) {
-    const { view, page: { iso9283: test }, report: { iso9283: report } } = this;
+    const {
+      view,
+      page: { iso9283: test },
+      report: { iso9283: report },
+    } = this;
     this.engine = 0;
     const engines = test.engines.map((each) => each.engine);
-    this.poseButtons = test.commanded.map((_, index) => NB.el('button', { type: 'button', 'aria-pressed': 'false', onclick: () => this.setPose(index) }, `P${index + 1}`));
+    this.poseButtons = test.commanded.map((_, index) =>
+      NB.el('button', { type: 'button', 'aria-pressed': 'false', onclick: () => this.setPose(index) }, `P${index + 1}`),
+    );
     this.note = NB.el('p', { class: 'soft', role: 'status' });
     this.spread = this.spreadFactor();
     const { protocol } = report;
     app.append(
-      NB.el('p', { text: `The arm goes from P1 to P5 and back as ${protocol.configuration}, at ${NB.percent(protocol.speed_share)} % of its rated joint speeds, with ${NB.significant(protocol.load_kg)} kg at the flange. A tracker measures where it comes to rest; its noise has a standard deviation of ${NB.length(protocol.tracker_noise_m)} on each axis.` }),
-      NB.el('div', { class: 'grid' },
-        NB.el('div', null,
-          NB.el('div', { class: 'bar no-print', role: 'group', 'aria-label': 'Pose' }, NB.el('span', { text: 'Arm at' }), this.poseButtons,
-            engines.length > 1 ? NB.select('Spread of', engines.map((name, at) => [String(at), name]), '0', (value) => { this.engine = Number(value); this.drawSpread(); }) : null,
-            NB.pngButton(view, 'ISO 9283 poses', NB.fileName(this.report.scenario.name, 'poses'))),
-          view.element, this.note),
-        NB.el('div', null, NB.el('div', { class: 'panel' }, this.results(), this.remarks()))),
-      NB.section('Where the arm came to rest', true, test.engines.map(({ engine, attained }) => NB.chart(`${engine}: attained positions about the command`, attained, NB.fileName(this.report.scenario.name, 'attained', engine),
-        'Positions in the controller\u2019s base frame, all poses to one scale. AP: distance of the mean from the command; RP: mean distance from the mean and three standard deviations of it.'))),
-      NB.section('How it came to rest', true, test.engines.map(({ engine, stabilisation }) => NB.chart(`${engine}: distance from the attained position after the motion`, stabilisation, NB.fileName(this.report.scenario.name, 'stabilisation', engine)))),
-      NB.section('All of the test\u2019s numbers', true, this.tables()));
+      NB.el('p', {
+        text: `The arm goes from P1 to P5 and back as ${protocol.configuration}, at ${NB.percent(protocol.speed_share)} % of its rated joint speeds, with ${NB.significant(protocol.load_kg)} kg at the flange. A tracker measures where it comes to rest; its noise has a standard deviation of ${NB.length(protocol.tracker_noise_m)} on each axis.`,
+      }),
+      NB.el(
+        'div',
+        { class: 'grid' },
+        NB.el(
+          'div',
+          null,
+          NB.el(
+            'div',
+            { class: 'bar no-print', role: 'group', 'aria-label': 'Pose' },
+            NB.el('span', { text: 'Arm at' }),
+            this.poseButtons,
+            engines.length > 1
+              ? NB.select(
+                  'Spread of',
+                  engines.map((name, at) => [String(at), name]),
+                  '0',
+                  (value) => {
+                    this.engine = Number(value);
+                    this.drawSpread();
+                  },
+                )
+              : null,
+            NB.pngButton(view, 'ISO 9283 poses', NB.fileName(this.report.scenario.name, 'poses')),
+          ),
+          view.element,
+          this.note,
+        ),
+        NB.el('div', null, NB.el('div', { class: 'panel' }, this.results(), this.remarks())),
+      ),
+      NB.section(
+        'Where the arm came to rest',
+        true,
+        test.engines.map(({ engine, attained }) =>
+          NB.chart(
+            `${engine}: attained positions about the command`,
+            attained,
+            NB.fileName(this.report.scenario.name, 'attained', engine),
+            'Positions in the controller\u2019s base frame, all poses to one scale. AP: distance of the mean from the command; RP: mean distance from the mean and three standard deviations of it.',
+          ),
+        ),
+      ),
+      NB.section(
+        'How it came to rest',
+        true,
+        test.engines.map(({ engine, stabilisation }) =>
+          NB.chart(
+            `${engine}: distance from the attained position after the motion`,
+            stabilisation,
+            NB.fileName(this.report.scenario.name, 'stabilisation', engine),
+          ),
+        ),
+      ),
+      NB.section('All of the test\u2019s numbers', true, this.tables()),
+    );
     const spots = test.commanded;
     const middle = spots[0];
-    view.frame([...NB.aboutBase(this.page.scene.chain.base, 0.55), ...spots], NB.direction(this.page.scene.chain.base, middle, [0, 0, -1]));
+    view.frame(
+      [...NB.aboutBase(this.page.scene.chain.base, 0.55), ...spots],
+      NB.direction(this.page.scene.chain.base, middle, [0, 0, -1]),
+    );
     // The way of a cycle: P5 P4 P3 P2 P1.
     spots.forEach((at, index) => {
       view.rod('needle', at, spots[(index + spots.length - 1) % spots.length], 0.0012, [0.35, 0.38, 0.42, 1], true);
@@ -73,13 +133,22 @@ NB.TestPage = class {
   }
 
   drawSpread() {
-    const { view, page: { iso9283: test } } = this;
+    const {
+      view,
+      page: { iso9283: test },
+    } = this;
     view.empty('attained');
     const run = test.engines[this.engine];
     test.commanded.forEach((at, index) => {
       const offsets = run ? NB.array(run.offsets[index]) : [];
       for (let k = 0; k < offsets.length; k += 3) {
-        view.ball('attained', at.map((value, axis) => value + this.spread * offsets[k + axis]), 0.004, [0, 0.45, 0.7, 1], true);
+        view.ball(
+          'attained',
+          at.map((value, axis) => value + this.spread * offsets[k + axis]),
+          0.004,
+          [0, 0.45, 0.7, 1],
+          true,
+        );
       }
     });
     this.setPose(this.poseIndex);
@@ -87,16 +156,34 @@ NB.TestPage = class {
 
   results() {
     const rows = Object.entries(this.report.iso9283.engines);
-    const worst = (each, key) => { const all = each.stabilisation.map((s) => s[key]); return all.some((v) => v === null) ? null : Math.max(...all); };
-    return NB.table('The worst of all poses', [
-      { title: 'Engine', cell: ([engine]) => engine },
-      { title: 'Accuracy AP', numeric: true, cell: ([, each]) => NB.length(each.ap_m), help: 'distance of the mean from the command' },
-      { title: 'Repeatability RP', numeric: true, cell: ([, each]) => NB.length(each.rp_m) },
-      { title: 'Direction vAP', numeric: true, cell: ([, each]) => NB.length(each.vap_m), help: 'how far the means lie apart that were approached from different directions' },
-      { title: 'Settles in', unit: 's', numeric: true, cell: ([, each]) => NB.fixed(worst(each, 'time_s'), 3) },
-      { title: 'Overshoot', numeric: true, cell: ([, each]) => NB.length(worst(each, 'overshoot_m')) },
-      { title: 'Torque of limit', unit: '%', numeric: true, cell: ([, each]) => NB.percent(each.peak_torque_ratio) },
-    ], rows, { class: 'small full' });
+    const worst = (each, key) => {
+      const all = each.stabilisation.map((s) => s[key]);
+      return all.some((v) => v === null) ? null : Math.max(...all);
+    };
+    return NB.table(
+      'The worst of all poses',
+      [
+        { title: 'Engine', cell: ([engine]) => engine },
+        {
+          title: 'Accuracy AP',
+          numeric: true,
+          cell: ([, each]) => NB.length(each.ap_m),
+          help: 'distance of the mean from the command',
+        },
+        { title: 'Repeatability RP', numeric: true, cell: ([, each]) => NB.length(each.rp_m) },
+        {
+          title: 'Direction vAP',
+          numeric: true,
+          cell: ([, each]) => NB.length(each.vap_m),
+          help: 'how far the means lie apart that were approached from different directions',
+        },
+        { title: 'Settles in', unit: 's', numeric: true, cell: ([, each]) => NB.fixed(worst(each, 'time_s'), 3) },
+        { title: 'Overshoot', numeric: true, cell: ([, each]) => NB.length(worst(each, 'overshoot_m')) },
+        { title: 'Torque of limit', unit: '%', numeric: true, cell: ([, each]) => NB.percent(each.peak_torque_ratio) },
+      ],
+      rows,
+      { class: 'small full' },
+    );
   }
 
   /** What has to be known to read the numbers, before anybody reads them. */
@@ -111,21 +198,42 @@ NB.TestPage = class {
   tables() {
     return Object.entries(this.report.iso9283.engines).map(([engine, each]) => {
       const rows = each.poses.map((pose) => ({
-        pose, settled: each.stabilisation.find((s) => s.pose === pose.pose), direction: each.directional.find((d) => d.pose === pose.pose),
+        pose,
+        settled: each.stabilisation.find((s) => s.pose === pose.pose),
+        direction: each.directional.find((d) => d.pose === pose.pose),
       }));
       return [
-        NB.table(`${engine}: by pose; ${each.cycles_simulated} cycles simulated, each pose read with the tracker's noise`, [
-          { title: 'Pose', cell: ({ pose }) => `P${pose.pose}` },
-          { title: 'Measured', numeric: true, cell: ({ pose }) => `${pose.count} readings` },
-          { title: 'AP', numeric: true, cell: ({ pose }) => NB.length(pose.ap_m) },
-          ...['x', 'y', 'z'].map((axis, k) => ({ title: `AP ${axis}`, numeric: true, cell: ({ pose }) => NB.length(pose.ap_xyz_m[k]) })),
-          { title: 'RP', numeric: true, cell: ({ pose }) => NB.length(pose.rp_m) },
-          { title: 'vAP', numeric: true, cell: ({ direction }) => NB.length(direction?.vap_m) },
-          { title: 'Settles in', unit: 's', numeric: true, cell: ({ settled }) => NB.fixed(settled?.time_s, 3) },
-          { title: 'after the motion', unit: 's', numeric: true, cell: ({ settled }) => NB.fixed(settled?.after_motion_s, 3), help: 'negative: before its end' },
-          { title: 'Overshoot', numeric: true, cell: ({ settled }) => NB.length(settled?.overshoot_m) },
-        ], rows, { class: 'small' }),
-        each.drift ? NB.el('p', { text: `Drift at P${each.drift.pose}: accuracy ${NB.length(each.drift.dap_m)}, repeatability ${NB.length(each.drift.drp_m)}.` }) : null,
+        NB.table(
+          `${engine}: by pose; ${each.cycles_simulated} cycles simulated, each pose read with the tracker's noise`,
+          [
+            { title: 'Pose', cell: ({ pose }) => `P${pose.pose}` },
+            { title: 'Measured', numeric: true, cell: ({ pose }) => `${pose.count} readings` },
+            { title: 'AP', numeric: true, cell: ({ pose }) => NB.length(pose.ap_m) },
+            ...['x', 'y', 'z'].map((axis, k) => ({
+              title: `AP ${axis}`,
+              numeric: true,
+              cell: ({ pose }) => NB.length(pose.ap_xyz_m[k]),
+            })),
+            { title: 'RP', numeric: true, cell: ({ pose }) => NB.length(pose.rp_m) },
+            { title: 'vAP', numeric: true, cell: ({ direction }) => NB.length(direction?.vap_m) },
+            { title: 'Settles in', unit: 's', numeric: true, cell: ({ settled }) => NB.fixed(settled?.time_s, 3) },
+            {
+              title: 'after the motion',
+              unit: 's',
+              numeric: true,
+              cell: ({ settled }) => NB.fixed(settled?.after_motion_s, 3),
+              help: 'negative: before its end',
+            },
+            { title: 'Overshoot', numeric: true, cell: ({ settled }) => NB.length(settled?.overshoot_m) },
+          ],
+          rows,
+          { class: 'small' },
+        ),
+        each.drift
+          ? NB.el('p', {
+              text: `Drift at P${each.drift.pose}: accuracy ${NB.length(each.drift.dap_m)}, repeatability ${NB.length(each.drift.drp_m)}.`,
+            })
+          : null,
       ];
     });
   }

@@ -4,7 +4,13 @@
 
 {
   /** Pages have signs that terminals may lack: minus, micro, degree; and no minus before zero. */
-  const typeset = (text) => text.replace(/^-(?=0(\.0+)?( |$))/, '').replace(/^-/, '\u2212').replace(/ um$/, ' \u00b5m').replace(/ deg$/, '\u00b0').replace(/e-/, 'e\u2212');
+  const typeset = (text) =>
+    text
+      .replace(/^-(?=0(\.0+)?( |$))/, '')
+      .replace(/^-/, '\u2212')
+      .replace(/ um$/, ' \u00b5m')
+      .replace(/ deg$/, '\u00b0')
+      .replace(/e-/, 'e\u2212');
   const absent = (value) => value === null || value === undefined || Number.isNaN(value);
   const NONE = '\u2013';
 
@@ -19,7 +25,12 @@
     return Number(cut.at(-1)) % 2 === 0 ? cut : text;
   };
 
-  const LENGTHS = [['pm', 1e-12, 1e12], ['nm', 1e-9, 1e9], ['um', 1e-6, 1e6], ['mm', 1e-3, 1e3]];
+  const LENGTHS = [
+    ['pm', 1e-12, 1e12],
+    ['nm', 1e-9, 1e9],
+    ['um', 1e-6, 1e6],
+    ['mm', 1e-3, 1e3],
+  ];
   const unitOfLength = (metres) => LENGTHS.findLast(([, length]) => Math.abs(metres) >= length) || LENGTHS[0];
 
   const smallLength = function (metres) {
@@ -34,10 +45,12 @@
     let digits = 3;
     while (digits < 17 && Math.sign(rounded(value, digits) - limit) !== side) digits++;
     const size = Math.abs(value);
-    return value === 0 || (size >= 1e-3 && size < 1e7) ? String(rounded(value, digits)) : value.toExponential(digits - 1).replace('e+', 'e');
+    return value === 0 || (size >= 1e-3 && size < 1e7)
+      ? String(rounded(value, digits))
+      : value.toExponential(digits - 1).replace('e+', 'e');
   };
 
-  const degrees = (radians) => radians * 180 / Math.PI;
+  const degrees = (radians) => (radians * 180) / Math.PI;
   const valueAndLimit = function (value, limit, unit) {
     const text = function (each) {
       if (unit === 'm') return limit !== 0 && Math.abs(limit) < 1e-3 ? smallLength(each) : `${fixed(each * 1e3, 2)} mm`;
@@ -47,8 +60,12 @@
     };
     const texts = [text(value), text(limit)];
     if (texts[0] !== texts[1] || value === limit) return texts;
-    const [factor, name] = unit === 'm' ? [1e3, ' mm'] : unit === 'rad' ? [degrees(1), ' deg'] : [1, unit === '1' ? '' : ` ${unit}`];
-    return [`${digitsApart(value * factor, limit * factor)}${name}`, `${digitsApart(limit * factor, value * factor)}${name}`];
+    const [factor, name] =
+      unit === 'm' ? [1e3, ' mm'] : unit === 'rad' ? [degrees(1), ' deg'] : [1, unit === '1' ? '' : ` ${unit}`];
+    return [
+      `${digitsApart(value * factor, limit * factor)}${name}`,
+      `${digitsApart(limit * factor, value * factor)}${name}`,
+    ];
   };
 
   const percent = function (share) {
@@ -70,8 +87,11 @@
   };
 
   const shown = {
-    millimetres: (value) => fixed(value * 1e3, 1), length: smallLength, number: (value) => fixed(value, 2),
-    percent: (value) => fixed(100 * value, 0), degrees: (value) => fixed(degrees(value), 1),
+    millimetres: (value) => fixed(value * 1e3, 1),
+    length: smallLength,
+    number: (value) => fixed(value, 2),
+    percent: (value) => fixed(100 * value, 0),
+    degrees: (value) => fixed(degrees(value), 1),
   };
 
   /** Texts as number.rs writes them; for the test. */
@@ -90,7 +110,9 @@
   NB.measured = (value, unit) => (absent(value) ? NONE : typeset(measured(value, unit)));
   /** A length in the unit that suits it. */
   NB.length = (metres) => (absent(metres) ? NONE : metres === 0 ? '0' : typeset(smallLength(metres)));
-  NB.formats = Object.fromEntries(Object.entries(shown).map(([name, text]) => [name, (value) => (absent(value) ? NONE : typeset(text(value)))]));
+  NB.formats = Object.fromEntries(
+    Object.entries(shown).map(([name, text]) => [name, (value) => (absent(value) ? NONE : typeset(text(value)))]),
+  );
   /** A value and its limit, or two dashes. */
   NB.valueAndLimit = function (value, limit, unit) {
     if (absent(value) || absent(limit)) return [NB.quantity(value, unit), NB.quantity(limit, unit)];

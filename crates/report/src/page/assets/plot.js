@@ -59,13 +59,21 @@ NB.Axes = class {
     Object.assign(this, { box, x, y });
   }
 
-  px(value) { return this.box.left + (value - this.x.low) / (this.x.high - this.x.low) * this.box.width; }
+  px(value) {
+    return this.box.left + ((value - this.x.low) / (this.x.high - this.x.low)) * this.box.width;
+  }
 
-  py(value) { return this.box.top + (1 - (value - this.y.low) / (this.y.high - this.y.low)) * this.box.height; }
+  py(value) {
+    return this.box.top + (1 - (value - this.y.low) / (this.y.high - this.y.low)) * this.box.height;
+  }
 
-  xAt(px) { return this.x.low + (px - this.box.left) / this.box.width * (this.x.high - this.x.low); }
+  xAt(px) {
+    return this.x.low + ((px - this.box.left) / this.box.width) * (this.x.high - this.x.low);
+  }
 
-  yAt(py) { return this.y.low + (1 - (py - this.box.top) / this.box.height) * (this.y.high - this.y.low); }
+  yAt(py) {
+    return this.y.low + (1 - (py - this.box.top) / this.box.height) * (this.y.high - this.y.low);
+  }
 
   draw(context) {
     const { left, top, width, height } = this.box;
@@ -75,20 +83,30 @@ NB.Axes = class {
     context.lineWidth = 1;
     context.textBaseline = 'middle';
     context.textAlign = 'right';
-    const yTicks = this.y.labels ? this.y.labels.map((_, index) => index) : NB.ticks(this.y.low, this.y.high, height / 38);
+    const yTicks = this.y.labels
+      ? this.y.labels.map((_, index) => index)
+      : NB.ticks(this.y.low, this.y.high, height / 38);
     for (const tick of yTicks) {
       const at = Math.round(this.py(tick)) + 0.5;
-      context.beginPath(); context.moveTo(left, at); context.lineTo(left + width, at); context.stroke();
+      context.beginPath();
+      context.moveTo(left, at);
+      context.lineTo(left + width, at);
+      context.stroke();
       const text = this.y.labels ? this.y.labels[tick] : NB.tickText(tick, yTicks.step || 1);
       context.fillText(this.fit(context, text, left - 26), left - 6, at);
     }
     context.textAlign = 'center';
     context.textBaseline = 'top';
-    const xTicks = this.x.labels ? this.x.labels.map((_, index) => index) : NB.ticks(this.x.low, this.x.high, width / 60);
+    const xTicks = this.x.labels
+      ? this.x.labels.map((_, index) => index)
+      : NB.ticks(this.x.low, this.x.high, width / 60);
     const space = this.x.labels ? width / this.x.labels.length - 6 : 60;
     for (const tick of xTicks) {
       const at = Math.round(this.px(tick)) + 0.5;
-      context.beginPath(); context.moveTo(at, top); context.lineTo(at, top + height); context.stroke();
+      context.beginPath();
+      context.moveTo(at, top);
+      context.lineTo(at, top + height);
+      context.stroke();
       const text = this.x.labels ? this.x.labels[tick] : NB.tickText(tick, xTicks.step || 1);
       context.fillText(this.fit(context, text, space), at, top + height + 5);
     }
@@ -133,7 +151,15 @@ NB.sample = function ({ color, dash }) {
   svg.setAttribute('height', '10');
   svg.setAttribute('aria-hidden', 'true');
   const line = document.createElementNS('http://www.w3.org/2000/svg', 'line');
-  for (const [name, value] of Object.entries({ x1: 1, y1: 5, x2: 27, y2: 5, stroke: color, 'stroke-width': 2.5, 'stroke-dasharray': dash.join(' ') })) {
+  for (const [name, value] of Object.entries({
+    x1: 1,
+    y1: 5,
+    x2: 27,
+    y2: 5,
+    stroke: color,
+    'stroke-width': 2.5,
+    'stroke-dasharray': dash.join(' '),
+  })) {
     line.setAttribute(name, value);
   }
   svg.append(line);
@@ -169,19 +195,35 @@ NB.Curves = class {
     this.range = range;
     this.values = new Map();
     const names = [...new Set(curves.map((curve) => curve.name))];
-    NB.clear(this.legend, names.map((name) => {
-      const value = NB.el('span', { class: 'value' });
-      this.values.set(name, value);
-      const button = NB.el('button', {
-        type: 'button', class: 'key', 'aria-pressed': String(!this.hidden.has(name)), title: 'Show or hide this curve',
-        onclick: () => {
-          if (!this.hidden.delete(name)) this.hidden.add(name);
-          button.setAttribute('aria-pressed', String(!this.hidden.has(name)));
-          this.draw();
-        },
-      }, NB.sample(curves.find((curve) => curve.name === name)), NB.words(name), value);
-      return button;
-    }), NB.checkbox('whole range', this.whole, (on) => { this.whole = on; this.draw(); }));
+    NB.clear(
+      this.legend,
+      names.map((name) => {
+        const value = NB.el('span', { class: 'value' });
+        this.values.set(name, value);
+        const button = NB.el(
+          'button',
+          {
+            type: 'button',
+            class: 'key',
+            'aria-pressed': String(!this.hidden.has(name)),
+            title: 'Show or hide this curve',
+            onclick: () => {
+              if (!this.hidden.delete(name)) this.hidden.add(name);
+              button.setAttribute('aria-pressed', String(!this.hidden.has(name)));
+              this.draw();
+            },
+          },
+          NB.sample(curves.find((curve) => curve.name === name)),
+          NB.words(name),
+          value,
+        );
+        return button;
+      }),
+      NB.checkbox('whole range', this.whole, (on) => {
+        this.whole = on;
+        this.draw();
+      }),
+    );
     this.draw();
   }
 
@@ -190,12 +232,18 @@ NB.Curves = class {
     const names = [...new Set(this.curves.map((curve) => curve.name))].filter((name) => !this.hidden.has(name));
     const legend = names.map((name) => {
       const { color, dash } = this.curves.find((curve) => curve.name === name);
-      return { text: NB.words(name), draw: (context, x, y) => {
-        context.strokeStyle = color;
-        context.lineWidth = 1.8;
-        context.setLineDash(dash);
-        context.beginPath(); context.moveTo(x - 14, y); context.lineTo(x + 14, y); context.stroke();
-      } };
+      return {
+        text: NB.words(name),
+        draw: (context, x, y) => {
+          context.strokeStyle = color;
+          context.lineWidth = 1.8;
+          context.setLineDash(dash);
+          context.beginPath();
+          context.moveTo(x - 14, y);
+          context.lineTo(x + 14, y);
+          context.stroke();
+        },
+      };
     });
     const svg = NB.paper(title, (...all) => this.paint(...all), 220, legend);
     // The axes were those of the paper.
@@ -214,7 +262,9 @@ NB.Curves = class {
     this.draw();
   }
 
-  draw() { this.canvas.draw(); }
+  draw() {
+    this.canvas.draw();
+  }
 
   paint(context, width, height) {
     const shown = this.curves.filter((curve) => !this.hidden.has(curve.name));
@@ -226,12 +276,17 @@ NB.Curves = class {
       }
     }
     // What matters is near zero.
-    if (!this.whole) { high = Math.min(high, 120); low = Math.max(low, -60); }
+    if (!this.whole) {
+      high = Math.min(high, 120);
+      low = Math.max(low, -60);
+    }
     const pad = 0.06 * (high - low);
     const box = { left: 58, top: 18, width: width - 72, height: height - 58 };
-    const axes = new NB.Axes(box,
+    const axes = new NB.Axes(
+      box,
       { low: this.range[0], high: this.range[1], title: this.options.xTitle },
-      { low: low - pad, high: high + pad, title: this.options.yTitle });
+      { low: low - pad, high: high + pad, title: this.options.yTitle },
+    );
     this.axes = axes;
     context.save();
     for (const { from, to, text, color } of this.bands) {
@@ -252,7 +307,10 @@ NB.Curves = class {
     context.fillStyle = 'rgba(213, 94, 0, 0.10)';
     context.fillRect(box.left, axes.py(0), box.width, box.height);
     context.strokeStyle = NB.palette.vermillion;
-    context.beginPath(); context.moveTo(box.left, axes.py(0)); context.lineTo(box.left + box.width, axes.py(0)); context.stroke();
+    context.beginPath();
+    context.moveTo(box.left, axes.py(0));
+    context.lineTo(box.left + box.width, axes.py(0));
+    context.stroke();
     for (const { x, y, color, dash, width: wide } of shown) {
       context.strokeStyle = color;
       context.lineWidth = wide || 1.8;
@@ -260,8 +318,12 @@ NB.Curves = class {
       context.beginPath();
       let drawing = false;
       for (let k = 0; k < x.length; k++) {
-        if (Number.isNaN(y[k])) { drawing = false; continue; }
-        if (drawing) context.lineTo(axes.px(x[k]), axes.py(y[k])); else context.moveTo(axes.px(x[k]), axes.py(y[k]));
+        if (Number.isNaN(y[k])) {
+          drawing = false;
+          continue;
+        }
+        if (drawing) context.lineTo(axes.px(x[k]), axes.py(y[k]));
+        else context.moveTo(axes.px(x[k]), axes.py(y[k]));
         drawing = true;
       }
       context.stroke();
@@ -271,12 +333,17 @@ NB.Curves = class {
       context.strokeStyle = '#111';
       context.lineWidth = 1;
       const at = Math.round(axes.px(this.cursor)) + 0.5;
-      context.beginPath(); context.moveTo(at, box.top); context.lineTo(at, box.top + box.height); context.stroke();
+      context.beginPath();
+      context.moveTo(at, box.top);
+      context.lineTo(at, box.top + box.height);
+      context.stroke();
       context.fillStyle = '#111';
       for (const { x, y } of shown) {
         const value = NB.at(x, y, this.cursor);
         if (Number.isNaN(value)) continue;
-        context.beginPath(); context.arc(at, axes.py(value), 2.5, 0, 7); context.fill();
+        context.beginPath();
+        context.arc(at, axes.py(value), 2.5, 0, 7);
+        context.fill();
       }
     }
     context.restore();
@@ -291,7 +358,8 @@ NB.at = function (x, y, at) {
   if (at >= x[high]) return y[high];
   while (high - low > 1) {
     const middle = (low + high) >> 1;
-    if (x[middle] <= at) low = middle; else high = middle;
+    if (x[middle] <= at) low = middle;
+    else high = middle;
   }
-  return y[low] + (y[high] - y[low]) * (at - x[low]) / (x[high] - x[low]);
+  return y[low] + ((y[high] - y[low]) * (at - x[low])) / (x[high] - x[low]);
 };

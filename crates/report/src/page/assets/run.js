@@ -7,9 +7,26 @@ NB.RunPage = class {
     this.report = page.report;
     this.ghosts = new Set();
     this.layers = {
-      robot: true, tool: true, collision: false, table: true, gantry: true, mount: true, obstacle: true, skin: true, bone: true,
-      organ: true, vessel: true, lesion: true, marker: true, corridor: false, needle: true, witness: true,
-      people: false, space: false, cone: false, ellipsoids: true,
+      robot: true,
+      tool: true,
+      collision: false,
+      table: true,
+      gantry: true,
+      mount: true,
+      obstacle: true,
+      skin: true,
+      bone: true,
+      organ: true,
+      vessel: true,
+      lesion: true,
+      marker: true,
+      corridor: false,
+      needle: true,
+      witness: true,
+      people: false,
+      space: false,
+      cone: false,
+      ellipsoids: true,
     };
     this.magnify = 10;
     this.time = 0;
@@ -18,7 +35,11 @@ NB.RunPage = class {
     this.view = new NB.View(page.scene, `Cell of ${this.report.scenario.name}`);
     if (this.report.goals.length) this.build(app);
     else this.buildWithoutGoals(app);
-    app.append(NB.sections.criteria(this.page), NB.sections.requirements(this.report) || '', NB.sections.provenance(this.report));
+    app.append(
+      NB.sections.criteria(this.page),
+      NB.sections.requirements(this.report) || '',
+      NB.sections.provenance(this.report),
+    );
     this.fromAddress(NB.address.read());
     NB.address.watch((choices) => this.fromAddress(choices));
   }
@@ -31,21 +52,34 @@ NB.RunPage = class {
     const index = this.goal.configurations.findIndex((each) => each.label === configuration);
     if (index >= 0 && index !== this.configurationIndex) this.setConfiguration(index);
     const seconds = Number(time);
-    if (time !== undefined && Number.isFinite(seconds) && this.shown.length) this.seek(Math.min(Math.max(seconds, 0), this.end));
+    if (time !== undefined && Number.isFinite(seconds) && this.shown.length)
+      this.seek(Math.min(Math.max(seconds, 0), this.end));
   }
 
   toAddress() {
     const isEnd = !this.shown?.length || this.time >= this.end;
-    NB.address.write({ goal: this.goal.name, configuration: this.configuration.label, time: isEnd ? null : this.time.toFixed(2) });
+    NB.address.write({
+      goal: this.goal.name,
+      configuration: this.configuration.label,
+      time: isEnd ? null : this.time.toFixed(2),
+    });
   }
 
   head() {
     const { verdict, engine_failures: failures } = this.report;
-    return NB.el('div', { class: 'bar' },
+    return NB.el(
+      'div',
+      { class: 'bar' },
       NB.verdict(verdict),
       NB.el('span', { text: this.page.counts }),
       NB.copyLink(),
-      failures.map((each) => NB.el('span', { class: 'error', text: `${each.engine} failed${each.during ? ` during ${each.during}` : ''}: ${each.message}` })));
+      failures.map((each) =>
+        NB.el('span', {
+          class: 'error',
+          text: `${each.engine} failed${each.during ? ` during ${each.during}` : ''}: ${each.message}`,
+        }),
+      ),
+    );
   }
 
   build(app) {
@@ -57,18 +91,26 @@ NB.RunPage = class {
       return made;
     });
     const goals = this.report.goals;
-    this.goalButtons = goals.map((goal, index) => NB.el('button', {
-      type: 'button', role: 'radio', 'aria-checked': 'false',
-      onclick: () => this.setGoal(index),
-      onkeydown: (event) => {
-        const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
-        if (!step) return;
-        event.preventDefault();
-        const to = (index + step + goals.length) % goals.length;
-        this.setGoal(to);
-        this.goalButtons[to].focus();
-      },
-    }, NB.words(goal.name)));
+    this.goalButtons = goals.map((goal, index) =>
+      NB.el(
+        'button',
+        {
+          type: 'button',
+          role: 'radio',
+          'aria-checked': 'false',
+          onclick: () => this.setGoal(index),
+          onkeydown: (event) => {
+            const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+            if (!step) return;
+            event.preventDefault();
+            const to = (index + step + goals.length) % goals.length;
+            this.setGoal(to);
+            this.goalButtons[to].focus();
+          },
+        },
+        NB.words(goal.name),
+      ),
+    );
     this.goalTable = NB.sections.goals(this, (index) => this.setGoal(index));
     this.answer = NB.el('div', { class: 'answer' });
     this.explore = new NB.Explore(this);
@@ -82,27 +124,57 @@ NB.RunPage = class {
     this.events = NB.el('div');
     this.now = NB.el('div', { class: 'now small', role: 'status', 'aria-live': 'off' });
     this.curves = new NB.Curves({
-      height: 250, label: 'Clearance of each class over the time of the motion', xTitle: 'time (s)', yTitle: 'clearance (mm)',
-      seek: (time) => { this.pause(); this.seek(time); },
+      height: 250,
+      label: 'Clearance of each class over the time of the motion',
+      xTitle: 'time (s)',
+      yTitle: 'clearance (mm)',
+      seek: (time) => {
+        this.pause();
+        this.seek(time);
+      },
     });
     const hasEvents = goals.some((goal) => goal.configurations.some((each) => each.events));
     this.budgetSection = NB.section('How far off the needle will be: error budget', true, this.budget);
     app.append(
       this.goalTable?.element || '',
-      NB.el('div', { class: 'bar' }, NB.el('strong', { text: 'Goal' }),
-        NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons)),
+      NB.el(
+        'div',
+        { class: 'bar' },
+        NB.el('strong', { text: 'Goal' }),
+        NB.el('div', { class: 'tabs', role: 'radiogroup', 'aria-label': 'Goal' }, this.goalButtons),
+      ),
       this.answer,
-      NB.el('div', { class: 'grid' },
-        NB.el('div', null, this.viewBar(), view.element, this.replayBar(), this.now, this.explore.element,
-          NB.el('div', { class: 'figure-head' }, NB.el('h3', { text: 'Clearance over time' }),
-            NB.saveButton('SVG', 'Clearance over time', () => [`${this.fileName('clearance')}.svg`, this.curves.svg(`${this.configuration.label}: clearance over time`), 'image/svg+xml'])),
-          this.curves.element),
-        NB.el('div', null, this.side, this.details, this.layerPanel())),
+      NB.el(
+        'div',
+        { class: 'grid' },
+        NB.el(
+          'div',
+          null,
+          this.viewBar(),
+          view.element,
+          this.replayBar(),
+          this.now,
+          this.explore.element,
+          NB.el(
+            'div',
+            { class: 'figure-head' },
+            NB.el('h3', { text: 'Clearance over time' }),
+            NB.saveButton('SVG', 'Clearance over time', () => [
+              `${this.fileName('clearance')}.svg`,
+              this.curves.svg(`${this.configuration.label}: clearance over time`),
+              'image/svg+xml',
+            ]),
+          ),
+          this.curves.element,
+        ),
+        NB.el('div', null, this.side, this.details, this.layerPanel()),
+      ),
       NB.section('Configurations compared', true, this.table),
       this.budgetSection,
       hasEvents ? NB.section('Contact, emergency stop and way back', true, this.events) : '',
       NB.section('Clearance kept by the planned motion', false, this.margins),
-      NB.section('People and free space', false, this.people));
+      NB.section('People and free space', false, this.people),
+    );
     this.setGoal(0);
   }
 
@@ -110,28 +182,39 @@ NB.RunPage = class {
     this.test = new NB.TestPage(this.page, app, this.view, this.layers);
   }
 
-  fileName(...words) { return NB.fileName(this.report.scenario.name, this.goal.name, this.configuration.label, ...words); }
+  fileName(...words) {
+    return NB.fileName(this.report.scenario.name, this.goal.name, this.configuration.label, ...words);
+  }
 
   /** Base and shoulders of the arm, and points of the goal. */
   framed(points) {
     return [...NB.aboutBase(this.page.scene.chain.base, 0.55), ...points];
   }
 
-  direction(target, axis) { return NB.direction(this.page.scene.chain.base, target, axis); }
+  direction(target, axis) {
+    return NB.direction(this.page.scene.chain.base, target, axis);
+  }
 
   viewBar() {
     const look = (name, make) => NB.el('button', { type: 'button', onclick: () => this.aim(make()) }, name);
     const entry = () => this.goal.entry_m || this.goal.target_m;
-    return NB.el('div', { class: 'bar no-print', role: 'group', 'aria-label': 'Viewpoint' },
+    return NB.el(
+      'div',
+      { class: 'bar no-print', role: 'group', 'aria-label': 'Viewpoint' },
       NB.el('button', { type: 'button', onclick: () => this.view.reset() }, 'Whole cell'),
-      look('Front', () => ({ direction: [0, 1, -0.12] })), look('Side', () => ({ direction: [-1, 0, -0.12] })),
+      look('Front', () => ({ direction: [0, 1, -0.12] })),
+      look('Side', () => ({ direction: [-1, 0, -0.12] })),
       look('From above', () => ({ direction: [0, 0.02, -1] })),
       look('Needle', () => {
         const d = this.direction(this.goal.target_m, this.goal.axis);
         return { direction: d, distance: 0.55, middle: entry() };
       }),
       NB.pngButton(this.view, 'The view', () => this.fileName(`${this.time.toFixed(2)}s`)),
-      NB.el('span', { class: 'soft small', text: 'drag: turn \u00b7 wheel or two fingers: zoom \u00b7 right button: move' }));
+      NB.el('span', {
+        class: 'soft small',
+        text: 'drag: turn \u00b7 wheel or two fingers: zoom \u00b7 right button: move',
+      }),
+    );
   }
 
   aim({ direction, distance, middle }) {
@@ -140,44 +223,130 @@ NB.RunPage = class {
   }
 
   layerPanel() {
-    const box = (name, text) => NB.checkbox(text, this.layers[name], (on) => { this.layers[name] = on; this.applyLayers(); });
+    const box = (name, text) =>
+      NB.checkbox(text, this.layers[name], (on) => {
+        this.layers[name] = on;
+        this.applyLayers();
+      });
     const present = new Set(this.page.scene.parts.map((part) => part.group));
-    const parts = [['robot', 'robot'], ['tool', 'tool'], ['collision', 'collision shapes'], ['table', 'table'], ['gantry', 'gantry'], ['mount', 'mount'], ['obstacle', 'obstacles'],
-      ['skin', 'skin'], ['bone', 'bones'], ['organ', 'organs'], ['vessel', 'vessels'], ['lesion', 'lesions'], ['marker', 'markers'],
-      ['corridor', 'needle corridor']].filter(([name]) => present.has(name));
+    const parts = [
+      ['robot', 'robot'],
+      ['tool', 'tool'],
+      ['collision', 'collision shapes'],
+      ['table', 'table'],
+      ['gantry', 'gantry'],
+      ['mount', 'mount'],
+      ['obstacle', 'obstacles'],
+      ['skin', 'skin'],
+      ['bone', 'bones'],
+      ['organ', 'organs'],
+      ['vessel', 'vessels'],
+      ['lesion', 'lesions'],
+      ['marker', 'markers'],
+      ['corridor', 'needle corridor'],
+    ].filter(([name]) => present.has(name));
     const hasBudget = this.report.goals.some((goal) => goal.configurations.some((each) => each.budget));
-    return NB.el('div', { class: 'panel no-print' }, NB.el('h3', { text: 'Show' }),
-      NB.el('div', { role: 'group', 'aria-label': 'Parts of the picture' },
+    return NB.el(
+      'div',
+      { class: 'panel no-print' },
+      NB.el('h3', { text: 'Show' }),
+      NB.el(
+        'div',
+        { role: 'group', 'aria-label': 'Parts of the picture' },
         parts.map(([name, text]) => box(name, text)),
-        box('needle', 'needle line'), box('cone', 'cone for the hand'), box('people', 'people and sight'), box('space', 'free space'),
-        box('witness', 'what is nearest'), hasBudget ? box('ellipsoids', 'error ellipsoids') : null),
-      NB.el('div', { class: 'bar' },
-        hasBudget ? NB.select('Error ellipsoids drawn at', [['1', 'true size'], ['5', '5 \u00d7'], ['10', '10 \u00d7'], ['20', '20 \u00d7']], '10',
-          (value) => { this.magnify = Number(value); this.drawBudget(); }) : null));
+        box('needle', 'needle line'),
+        box('cone', 'cone for the hand'),
+        box('people', 'people and sight'),
+        box('space', 'free space'),
+        box('witness', 'what is nearest'),
+        hasBudget ? box('ellipsoids', 'error ellipsoids') : null,
+      ),
+      NB.el(
+        'div',
+        { class: 'bar' },
+        hasBudget
+          ? NB.select(
+              'Error ellipsoids drawn at',
+              [
+                ['1', 'true size'],
+                ['5', '5 \u00d7'],
+                ['10', '10 \u00d7'],
+                ['20', '20 \u00d7'],
+              ],
+              '10',
+              (value) => {
+                this.magnify = Number(value);
+                this.drawBudget();
+              },
+            )
+          : null,
+      ),
+    );
   }
 
   replayBar() {
-    this.playButton = NB.el('button', { type: 'button', onclick: () => (this.playing ? this.pause() : this.play()) }, '\u25b6 Play');
+    this.playButton = NB.el(
+      'button',
+      { type: 'button', onclick: () => (this.playing ? this.pause() : this.play()) },
+      '\u25b6 Play',
+    );
     this.slider = NB.el('input', {
-      type: 'range', min: '0', max: '1', step: '0.01', value: '0', 'aria-label': 'Time of the motion',
-      oninput: (event) => { this.pause(); this.seek(Number(event.target.value)); },
+      type: 'range',
+      min: '0',
+      max: '1',
+      step: '0.01',
+      value: '0',
+      'aria-label': 'Time of the motion',
+      oninput: (event) => {
+        this.pause();
+        this.seek(Number(event.target.value));
+      },
     });
     this.clock = NB.el('span', { class: 'clock', role: 'status', 'aria-live': 'off' });
     this.engineSelect = NB.el('select', { 'aria-label': 'Engine', onchange: () => this.showMotion() });
     this.apart = NB.el('span', { class: 'soft' });
-    const speed = NB.select('Speed', [['0.1', '0.1 \u00d7'], ['0.25', '0.25 \u00d7'], ['0.5', '0.5 \u00d7'], ['1', '1 \u00d7'], ['2', '2 \u00d7'], ['4', '4 \u00d7']], '1',
-      (value) => { this.speed = Number(value); });
-    return NB.el('div', { class: 'replay', role: 'group', 'aria-label': 'Replay' },
-      this.playButton, this.slider, this.clock, speed, this.engineSelect, this.apart);
+    const speed = NB.select(
+      'Speed',
+      [
+        ['0.1', '0.1 \u00d7'],
+        ['0.25', '0.25 \u00d7'],
+        ['0.5', '0.5 \u00d7'],
+        ['1', '1 \u00d7'],
+        ['2', '2 \u00d7'],
+        ['4', '4 \u00d7'],
+      ],
+      '1',
+      (value) => {
+        this.speed = Number(value);
+      },
+    );
+    return NB.el(
+      'div',
+      { class: 'replay', role: 'group', 'aria-label': 'Replay' },
+      this.playButton,
+      this.slider,
+      this.clock,
+      speed,
+      this.engineSelect,
+      this.apart,
+    );
   }
 
-  get goal() { return this.report.goals[this.goalIndex]; }
+  get goal() {
+    return this.report.goals[this.goalIndex];
+  }
 
-  get extra() { return this.page.goals[this.goalIndex]; }
+  get extra() {
+    return this.page.goals[this.goalIndex];
+  }
 
-  get configuration() { return this.goal.configurations[this.configurationIndex]; }
+  get configuration() {
+    return this.goal.configurations[this.configurationIndex];
+  }
 
-  get own() { return this.extra.configurations[this.configurationIndex]; }
+  get own() {
+    return this.extra.configurations[this.configurationIndex];
+  }
 
   setGoal(index) {
     this.goalIndex = index;
@@ -204,11 +373,17 @@ NB.RunPage = class {
     NB.clear(this.answer, NB.sections.answer(this.goal, this.report.criteria, this.extra.trueTarget));
     NB.clear(this.people, NB.sections.people(this.goal));
     if (this.goalTable) NB.mark(this.goalTable.rows, index);
-    const around = [[-0.25, -0.25, -0.1], [0.25, 0.25, 0.3]].map((offset) => offset.map((value, k) => target[k] + value));
+    const around = [
+      [-0.25, -0.25, -0.1],
+      [0.25, 0.25, 0.3],
+    ].map((offset) => offset.map((value, k) => target[k] + value));
     view.frame(this.framed(around), this.direction(target, axis));
     const first = this.goal.recommended
       ? this.goal.configurations.findIndex((each) => each.label === this.goal.recommended.label)
-      : Math.max(0, this.goal.configurations.findIndex((each) => each.joints_rad));
+      : Math.max(
+          0,
+          this.goal.configurations.findIndex((each) => each.joints_rad),
+        );
     this.drawGhosts();
     this.setConfiguration(first);
     this.applyLayers();
@@ -223,12 +398,24 @@ NB.RunPage = class {
     const { runs } = this.own;
     // Two engines at a time: all pairs of them.
     this.pairs = runs.flatMap((second, at) => runs.slice(0, at).map((first) => [first, second]));
-    NB.clear(this.engineSelect, this.pairs.map(([first, second], at) => NB.el('option', { value: at ? `pair ${at}` : 'both',
-      text: `${runs.length > 2 ? `${first.engine} and ${second.engine}` : 'both engines'}, second in orange` })),
-      runs.map((run, at) => NB.el('option', { value: String(at), text: `${run.engine}${run.stopped ? ' (stopped)' : ''}` })),
-      runs.length ? null : NB.el('option', { value: '', text: 'no motion recorded' }));
+    NB.clear(
+      this.engineSelect,
+      this.pairs.map(([first, second], at) =>
+        NB.el('option', {
+          value: at ? `pair ${at}` : 'both',
+          text: `${runs.length > 2 ? `${first.engine} and ${second.engine}` : 'both engines'}, second in orange`,
+        }),
+      ),
+      runs.map((run, at) =>
+        NB.el('option', { value: String(at), text: `${run.engine}${run.stopped ? ' (stopped)' : ''}` }),
+      ),
+      runs.length ? null : NB.el('option', { value: '', text: 'no motion recorded' }),
+    );
     const apart_m = this.configuration.engine_difference?.peak_tip_m;
-    this.apart.textContent = apart_m === undefined ? '' : `The engines\u2019 tips are at most ${NB.length(apart_m)} apart; the second is seen only where they differ.`;
+    this.apart.textContent =
+      apart_m === undefined
+        ? ''
+        : `The engines\u2019 tips are at most ${NB.length(apart_m)} apart; the second is seen only where they differ.`;
     this.showDetails();
     this.showSections();
     this.drawRoom();
@@ -252,10 +439,21 @@ NB.RunPage = class {
   decode(run) {
     if (!run.decoded) {
       run.decoded = {
-        time: NB.array(run.time), joints: run.joints.map(NB.array), curveTime: NB.array(run.curveTime),
-        curves: Object.entries(run.curves).map(([name, column]) => [name, NB.array(column).map((value) => value * 1e3)]),
+        time: NB.array(run.time),
+        joints: run.joints.map(NB.array),
+        curveTime: NB.array(run.curveTime),
+        curves: Object.entries(run.curves).map(([name, column]) => [
+          name,
+          NB.array(column).map((value) => value * 1e3),
+        ]),
       };
-      if (run.nearest) run.decoded.nearest = { ...run.nearest, time: NB.array(run.nearest.time), pair: NB.array(run.nearest.pair), points: run.nearest.points.map(NB.array) };
+      if (run.nearest)
+        run.decoded.nearest = {
+          ...run.nearest,
+          time: NB.array(run.nearest.time),
+          pair: NB.array(run.nearest.pair),
+          points: run.nearest.points.map(NB.array),
+        };
     }
     return run.decoded;
   }
@@ -270,11 +468,25 @@ NB.RunPage = class {
     this.other.show(this.shown.length > 1);
     const curves = this.shown.flatMap((run, at) => {
       const { curveTime, curves: found } = this.decode(run);
-      return found.map(([name, y]) => ({ name, x: curveTime, y, ...NB.styleOf(name), width: at ? 4 : 1.8, color: at ? `${NB.styleOf(name).color}55` : NB.styleOf(name).color }));
+      return found.map(([name, y]) => ({
+        name,
+        x: curveTime,
+        y,
+        ...NB.styleOf(name),
+        width: at ? 4 : 1.8,
+        color: at ? `${NB.styleOf(name).color}55` : NB.styleOf(name).color,
+      }));
     });
     this.end = has ? Math.max(...this.shown.map((run) => this.decode(run).time.at(-1))) : 1;
     const tints = ['#f1f4f7', '#e6ecf2'];
-    const bands = has ? this.configuration.motion.map((phase, at) => ({ from: phase.start_s, to: Math.min(phase.end_s, this.end), text: phase.phase, color: tints[at % 2] })) : [];
+    const bands = has
+      ? this.configuration.motion.map((phase, at) => ({
+          from: phase.start_s,
+          to: Math.min(phase.end_s, this.end),
+          text: phase.phase,
+          color: tints[at % 2],
+        }))
+      : [];
     this.slider.max = String(this.end);
     this.curves.set(curves, bands, [0, this.end]);
     this.seek(has ? this.end : 0);
@@ -318,17 +530,21 @@ NB.RunPage = class {
     let last = performance.now();
     const step = (now) => {
       if (!this.playing) return;
-      const time = Math.min(this.time + (now - last) / 1e3 * this.speed, this.end);
+      const time = Math.min(this.time + ((now - last) / 1e3) * this.speed, this.end);
       last = now;
       this.seek(time);
-      if (time >= this.end) this.pause(); else requestAnimationFrame(step);
+      if (time >= this.end) this.pause();
+      else requestAnimationFrame(step);
     };
     requestAnimationFrame(step);
   }
 
   pause() {
     this.explore.leave();
-    if (this.playing) { this.playing = false; this.toAddress(); }
+    if (this.playing) {
+      this.playing = false;
+      this.toAddress();
+    }
     if (this.playButton) this.playButton.textContent = '\u25b6 Play';
   }
 
@@ -382,18 +598,26 @@ NB.RunPage = class {
     if (pair === undefined || pair === 255) return null;
     // Between two samples of one pair its points move steadily; of two pairs the nearer sample's is shown.
     const same = nearest.pair[before] === nearest.pair[after];
-    const point = (axis) => (same ? nearest.points[axis][before] + share * (nearest.points[axis][after] - nearest.points[axis][before]) : nearest.points[axis][at]);
+    const point = (axis) =>
+      same
+        ? nearest.points[axis][before] + share * (nearest.points[axis][after] - nearest.points[axis][before])
+        : nearest.points[axis][at];
     const name = nearest.classes[pair];
     const curve = curves.find(([each]) => each === name);
     return {
-      name, pair: nearest.names[pair], time_s: time, minimum_m: NB.at(curveTime, curve[1], time) / 1e3,
+      name,
+      pair: nearest.names[pair],
+      time_s: time,
+      minimum_m: NB.at(curveTime, curve[1], time) / 1e3,
       witness_points_m: [[0, 1, 2].map(point), [3, 4, 5].map(point)],
     };
   }
 
   /** The least clearance over the whole motion of arm and tool from what stands around them. */
   leastOf(configuration) {
-    const all = Object.entries(configuration.clearance).filter(([name, found]) => found?.witness_points_m && this.page.classesAround.includes(name));
+    const all = Object.entries(configuration.clearance).filter(
+      ([name, found]) => found?.witness_points_m && this.page.classesAround.includes(name),
+    );
     const least = all.reduce((best, each) => (!best || each[1].minimum_m < best[1].minimum_m ? each : best), null);
     return least && { name: least[0], ...least[1] };
   }
@@ -406,13 +630,19 @@ NB.RunPage = class {
     const pairWords = (each) => [...new Set(each.pair.map(NB.words))].join(' to ');
     if (found && view.works) {
       const color = new THREE.Color(NB.styleOf(found.name).color);
-      const rgba = [color.r, color.g, color.b].map((c) => (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055)).concat(1);
+      const rgba = [color.r, color.g, color.b]
+        .map((c) => (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055))
+        .concat(1);
       const [a, b] = found.witness_points_m;
       view.rod('witness', a, b, 0.002, rgba, true);
       for (const end of [a, b]) view.ball('witness', end, 0.005, rgba, true);
       const when = !this.shown.length || found.time_s === null ? '' : ` at ${found.time_s.toFixed(2)} s`;
       const what = this.pinned ? `least ${NB.words(found.name)}` : pairWords(found);
-      view.label('witness', `${what}: ${NB.mm(found.minimum_m)} mm${when}`, a.map((value, k) => (value + b[k]) / 2));
+      view.label(
+        'witness',
+        `${what}: ${NB.mm(found.minimum_m)} mm${when}`,
+        a.map((value, k) => (value + b[k]) / 2),
+      );
     }
     this.sayNearest(this.pinned ? this.nearestAt(this.time) : found, pairWords);
     view.draw();
@@ -420,9 +650,33 @@ NB.RunPage = class {
 
   sayNearest(found, pairWords) {
     const least = this.leastOf(this.configuration);
-    const now = found && NB.el('p', { text: `Nearest ${this.shown.length ? `now, at ${this.time.toFixed(2)} s` : 'in the final posture'}: ${pairWords(found)}, ${NB.mm(found.minimum_m)} mm.` });
-    const all = least && this.shown.length && NB.el('p', null, `Least over the whole motion: ${pairWords(least)}, ${NB.mm(least.minimum_m)} mm${least.time_s === null ? '. ' : ` at ${least.time_s.toFixed(2)} s. `}`,
-      least.time_s === null ? null : NB.el('button', { type: 'button', class: 'no-print save', onclick: () => { this.pause(); this.seek(Math.min(least.time_s, this.end)); } }, 'Go there'));
+    const now =
+      found &&
+      NB.el('p', {
+        text: `Nearest ${this.shown.length ? `now, at ${this.time.toFixed(2)} s` : 'in the final posture'}: ${pairWords(found)}, ${NB.mm(found.minimum_m)} mm.`,
+      });
+    const all =
+      least &&
+      this.shown.length &&
+      NB.el(
+        'p',
+        null,
+        `Least over the whole motion: ${pairWords(least)}, ${NB.mm(least.minimum_m)} mm${least.time_s === null ? '. ' : ` at ${least.time_s.toFixed(2)} s. `}`,
+        least.time_s === null
+          ? null
+          : NB.el(
+              'button',
+              {
+                type: 'button',
+                class: 'no-print save',
+                onclick: () => {
+                  this.pause();
+                  this.seek(Math.min(least.time_s, this.end));
+                },
+              },
+              'Go there',
+            ),
+      );
     const own = this.configuration.clearance.self;
     if (all && own) all.append(`Of the arm from itself, by its build: ${pairWords(own)}, ${NB.mm(own.minimum_m)} mm. `);
     if (this.playing && this.now.firstChild && now) {
@@ -471,18 +725,32 @@ NB.RunPage = class {
     view.empty('ellipsoids');
     const total = this.configuration.budget?.total;
     if (total && view.works) {
-      const turn = new THREE.Matrix4().makeRotationFromQuaternion(new THREE.Quaternion(...this.extra.guideExit.slice(3)));
+      const turn = new THREE.Matrix4().makeRotationFromQuaternion(
+        new THREE.Quaternion(...this.extra.guideExit.slice(3)),
+      );
       const entry = this.goal.entry_m;
-      for (const [where, at, color] of [['target', this.goal.target_m, [0, 0.45, 0.7, 0.55]], ['skin', entry, [0.84, 0.37, 0, 0.55]]]) {
+      for (const [where, at, color] of [
+        ['target', this.goal.target_m, [0, 0.45, 0.7, 0.55]],
+        ['skin', entry, [0.84, 0.37, 0, 0.55]],
+      ]) {
         const moments = total[`at_${where}`]?.analytic;
         if (!at || !moments) continue;
         const spread = NB.cholesky(moments.covariance_m2);
         const scale = 2.7955 * this.magnify;
-        const columns = [0, 1, 2].map((k) => new THREE.Vector3(spread[0][k], spread[1][k], spread[2][k]).applyMatrix4(turn).multiplyScalar(scale).toArray());
+        const columns = [0, 1, 2].map((k) =>
+          new THREE.Vector3(spread[0][k], spread[1][k], spread[2][k])
+            .applyMatrix4(turn)
+            .multiplyScalar(scale)
+            .toArray(),
+        );
         const bias = new THREE.Vector3(...moments.bias_m).applyMatrix4(turn).multiplyScalar(this.magnify);
         const center = at.map((value, k) => value + bias.getComponent(k));
         view.ellipsoid('ellipsoids', center, columns, color);
-        view.label('ellipsoids', `${this.magnify === 1 ? '' : `\u00d7 ${this.magnify}: `}95 % at ${where}, longest half axis ${NB.mm(2.7955 * NB.longest(moments.covariance_m2), 1)} mm`, center);
+        view.label(
+          'ellipsoids',
+          `${this.magnify === 1 ? '' : `\u00d7 ${this.magnify}: `}95 % at ${where}, longest half axis ${NB.mm(2.7955 * NB.longest(moments.covariance_m2), 1)} mm`,
+          center,
+        );
       }
     }
     view.draw();
@@ -490,39 +758,86 @@ NB.RunPage = class {
 
   status(configuration) {
     const recommended = this.goal.recommended?.label === configuration.label;
-    const words = { ok: ['good', '\u2713 works'], failed: ['bad', '\u2717 failed'], rejected: ['off', '\u2013 rejected'] };
-    const missed = this.report.criteria.some((each) => !each.pass && each.criterion !== 'expected' && each.goal === this.goal.name && each.label === configuration.label);
+    const words = {
+      ok: ['good', '\u2713 works'],
+      failed: ['bad', '\u2717 failed'],
+      rejected: ['off', '\u2013 rejected'],
+    };
+    const missed = this.report.criteria.some(
+      (each) =>
+        !each.pass &&
+        each.criterion !== 'expected' &&
+        each.goal === this.goal.name &&
+        each.label === configuration.label,
+    );
     const open = configuration.not_judged > 0 && !missed;
-    const isExpected = configuration.status === 'failed' && this.page.missedAsExpected.some((index) => this.report.criteria[index].goal === this.goal.name && this.report.criteria[index].label === configuration.label);
-    const [style, text] = open ? ['bad', '? incomplete'] : isExpected ? ['off', '\u2717 failed, as expected'] : words[configuration.status];
-    return [NB.el('span', { class: style, text }), recommended ? NB.el('span', { class: 'good', text: ' \u2605', title: 'recommended' }) : ''];
+    const isExpected =
+      configuration.status === 'failed' &&
+      this.page.missedAsExpected.some(
+        (index) =>
+          this.report.criteria[index].goal === this.goal.name &&
+          this.report.criteria[index].label === configuration.label,
+      );
+    const [style, text] = open
+      ? ['bad', '? incomplete']
+      : isExpected
+        ? ['off', '\u2717 failed, as expected']
+        : words[configuration.status];
+    return [
+      NB.el('span', { class: style, text }),
+      recommended ? NB.el('span', { class: 'good', text: ' \u2605', title: 'recommended' }) : '',
+    ];
   }
 
   sideTable() {
     const columns = [
       { title: 'Configuration', cell: (c) => c.label },
-      { title: 'Ghost', help: 'show its posture, too', cell: (c) => NB.el('span', { class: 'pick' }, NB.el('input', {
-        type: 'checkbox', 'aria-label': `ghost of ${c.label}`, checked: this.ghosts.has(this.goal.configurations.indexOf(c)), disabled: !c.joints_rad,
-        onclick: (event) => event.stopPropagation(),
-        onchange: (event) => {
-          const at = this.goal.configurations.indexOf(c);
-          if (event.target.checked) this.ghosts.add(at); else this.ghosts.delete(at);
-          this.drawGhosts();
-        },
-      }), NB.swatch(NB.ghostColors[this.goal.configurations.indexOf(c)])) },
+      {
+        title: 'Ghost',
+        help: 'show its posture, too',
+        cell: (c) =>
+          NB.el(
+            'span',
+            { class: 'pick' },
+            NB.el('input', {
+              type: 'checkbox',
+              'aria-label': `ghost of ${c.label}`,
+              checked: this.ghosts.has(this.goal.configurations.indexOf(c)),
+              disabled: !c.joints_rad,
+              onclick: (event) => event.stopPropagation(),
+              onchange: (event) => {
+                const at = this.goal.configurations.indexOf(c);
+                if (event.target.checked) this.ghosts.add(at);
+                else this.ghosts.delete(at);
+                this.drawGhosts();
+              },
+            }),
+            NB.swatch(NB.ghostColors[this.goal.configurations.indexOf(c)]),
+          ),
+      },
       { title: 'Status', cell: (c) => this.status(c) },
       ...NB.metricColumns(this.extra.columns.side),
     ];
-    const table = NB.table('Choose a configuration (\u2605 recommended)', columns, this.goal.configurations, { class: 'choose small full' });
+    const table = NB.table('Choose a configuration (\u2605 recommended)', columns, this.goal.configurations, {
+      class: 'choose small full',
+    });
     this.sideRows = [...table.querySelectorAll('tbody tr')];
     NB.rows(this.sideRows, (index) => this.setConfiguration(index));
-    const all = NB.el('button', { type: 'button', class: 'no-print', onclick: () => {
-      const on = this.ghosts.size === 0;
-      this.ghosts = new Set(on ? this.goal.configurations.keys() : []);
-      this.sideTable();
-      NB.mark(this.sideRows, this.configurationIndex);
-      this.drawGhosts();
-    } }, this.ghosts.size ? 'No ghosts' : 'All as ghosts');
+    const all = NB.el(
+      'button',
+      {
+        type: 'button',
+        class: 'no-print',
+        onclick: () => {
+          const on = this.ghosts.size === 0;
+          this.ghosts = new Set(on ? this.goal.configurations.keys() : []);
+          this.sideTable();
+          NB.mark(this.sideRows, this.configurationIndex);
+          this.drawGhosts();
+        },
+      },
+      this.ghosts.size ? 'No ghosts' : 'All as ghosts',
+    );
     NB.clear(this.side, table, all);
   }
 
@@ -530,18 +845,27 @@ NB.RunPage = class {
     const c = this.configuration;
     const item = (before, each) => {
       const [value, limit] = NB.valueAndLimit(each.value, each.limit, each.unit);
-      return NB.el('li', { text: `${before}${each.value === null ? '' : `: ${value}, limit ${limit}`}${each.engine ? ` (${each.engine})` : ''}${each.detail ? `. ${each.detail.charAt(0).toUpperCase()}${each.detail.slice(1)}` : ''}.` });
+      return NB.el('li', {
+        text: `${before}${each.value === null ? '' : `: ${value}, limit ${limit}`}${each.engine ? ` (${each.engine})` : ''}${each.detail ? `. ${each.detail.charAt(0).toUpperCase()}${each.detail.slice(1)}` : ''}.`,
+      });
     };
     const reasons = c.rejections.map((each) => item(`Rejected, ${NB.words(each.rule)}`, each));
-    const failed = this.report.criteria.filter((each) => !each.pass && each.goal === this.goal.name && each.label === c.label)
+    const failed = this.report.criteria
+      .filter((each) => !each.pass && each.goal === this.goal.name && each.label === c.label)
       .map((each) => item(`Misses ${NB.criterionWords(each.criterion)}`, each));
     const classes = Object.entries(c.clearance).filter(([, found]) => found && found.witness_points_m);
     const columns = [
       { title: 'Between', cell: ([name]) => [NB.sample(NB.styleOf(name)), ` ${NB.words(name)}`] },
       { title: 'Least', unit: 'mm', numeric: true, cell: ([, found]) => NB.mm(found.minimum_m) },
-      { title: 'Which and when', cell: ([, found]) => `${[...new Set(found.pair.map(NB.words))].join(' to ')}, ${NB.words(found.phase)}${found.time_s === null ? '' : ` ${found.time_s.toFixed(2)} s`}` },
+      {
+        title: 'Which and when',
+        cell: ([, found]) =>
+          `${[...new Set(found.pair.map(NB.words))].join(' to ')}, ${NB.words(found.phase)}${found.time_s === null ? '' : ` ${found.time_s.toFixed(2)} s`}`,
+      },
     ];
-    const caption = this.own.runs.length ? 'Least clearances over the whole motion; a row shows where and when' : 'Clearances of the final posture; a row shows where';
+    const caption = this.own.runs.length
+      ? 'Least clearances over the whole motion; a row shows where and when'
+      : 'Clearances of the final posture; a row shows where';
     const table = NB.table(caption, columns, classes, { class: 'choose small full' });
     const rows = [...table.querySelectorAll('tbody tr')];
     NB.rows(rows, (index) => {
@@ -554,10 +878,19 @@ NB.RunPage = class {
     });
     NB.mark(rows, -1);
     if (rows[0]) rows[0].tabIndex = 0;
-    NB.clear(this.details, NB.el('h3', { text: c.label }),
-      NB.el('p', { class: 'small' }, c.joints_rad ? `Joints ${c.joints_rad.map((q) => `${NB.deg(q)}\u00b0`).join(', ')}; roll about the needle ${NB.deg(c.roll_rad)}\u00b0` : 'No posture.'),
+    NB.clear(
+      this.details,
+      NB.el('h3', { text: c.label }),
+      NB.el(
+        'p',
+        { class: 'small' },
+        c.joints_rad
+          ? `Joints ${c.joints_rad.map((q) => `${NB.deg(q)}\u00b0`).join(', ')}; roll about the needle ${NB.deg(c.roll_rad)}\u00b0`
+          : 'No posture.',
+      ),
       reasons.length || failed.length ? NB.el('ul', { class: 'plain small' }, reasons, failed) : null,
-      classes.length ? table : null);
+      classes.length ? table : null,
+    );
   }
 
   configurationTable() {
@@ -565,17 +898,44 @@ NB.RunPage = class {
       { title: 'Configuration', cell: (c) => c.label },
       { title: 'Status', cell: (c) => this.status(c) },
       { title: 'Rank', numeric: true, cell: (c) => (c.ranking ? String(c.ranking.rank) : '\u2013') },
-      { title: 'Pareto set', cell: (c) => (c.pareto ? 'yes' : c.dominated_by ? `no: ${c.dominated_by.label} is better` : ''), help: 'in it: no other that works is as good in everything and better in something' },
+      {
+        title: 'Pareto set',
+        cell: (c) => (c.pareto ? 'yes' : c.dominated_by ? `no: ${c.dominated_by.label} is better` : ''),
+        help: 'in it: no other that works is as good in everything and better in something',
+      },
       { title: 'Score of 100', numeric: true, cell: (c) => NB.fixed(c.ranking && 100 * c.ranking.score, 1) },
-      { title: 'First reason against', text: true, cell: (c) => (c.rejections[0] ? `${NB.words(c.rejections[0].rule)}: ${c.rejections[0].detail}` : '') },
+      {
+        title: 'First reason against',
+        text: true,
+        cell: (c) => (c.rejections[0] ? `${NB.words(c.rejections[0].rule)}: ${c.rejections[0].detail}` : ''),
+      },
       ...NB.metricColumns(this.extra.columns.table),
     ];
-    const table = NB.table(`${NB.words(this.goal.name)}: clearances are the least over the recorded motions of all engines; those that are proven hold between the samples, too`, columns, this.goal.configurations, { class: 'choose small' });
+    const table = NB.table(
+      `${NB.words(this.goal.name)}: clearances are the least over the recorded motions of all engines; those that are proven hold between the samples, too`,
+      columns,
+      this.goal.configurations,
+      { class: 'choose small' },
+    );
     this.tableRows = [...table.querySelectorAll('tbody tr')];
     NB.rows(this.tableRows, (index) => this.setConfiguration(index));
     const ranking = this.extra.charts.ranking;
-    NB.clear(this.table, table, ranking ? NB.el('details', { class: 'no-print' }, NB.el('summary', { text: 'What the scores are made of' }),
-      NB.chart(`${NB.words(this.goal.name)}: ranking`, ranking, NB.fileName(this.report.scenario.name, this.goal.name, 'ranking'))) : null);
+    NB.clear(
+      this.table,
+      table,
+      ranking
+        ? NB.el(
+            'details',
+            { class: 'no-print' },
+            NB.el('summary', { text: 'What the scores are made of' }),
+            NB.chart(
+              `${NB.words(this.goal.name)}: ranking`,
+              ranking,
+              NB.fileName(this.report.scenario.name, this.goal.name, 'ranking'),
+            ),
+          )
+        : null,
+    );
   }
 };
 
@@ -594,7 +954,11 @@ NB.longest = function (covariance) {
 
 /** Lower triangle of a covariance, `L L^T`; what rounding makes negative counts as zero. */
 NB.cholesky = function (a) {
-  const l = [[0, 0, 0], [0, 0, 0], [0, 0, 0]];
+  const l = [
+    [0, 0, 0],
+    [0, 0, 0],
+    [0, 0, 0],
+  ];
   for (let i = 0; i < 3; i++) {
     for (let j = 0; j <= i; j++) {
       let sum = a[i][j];
@@ -606,4 +970,6 @@ NB.cholesky = function (a) {
   return l;
 };
 
-NB.start((page, app) => { NB.current = new NB.RunPage(page, app); });
+NB.start((page, app) => {
+  NB.current = new NB.RunPage(page, app);
+});

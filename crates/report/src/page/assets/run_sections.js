@@ -3,8 +3,14 @@
 
 /** A colour, or its number, for each of the eight configurations; labels in the view name them, too. */
 NB.ghostColors = [
-  NB.palette.orange, NB.palette.sky, NB.palette.green, NB.palette.yellow,
-  NB.palette.blue, NB.palette.vermillion, NB.palette.purple, NB.palette.grey,
+  NB.palette.orange,
+  NB.palette.sky,
+  NB.palette.green,
+  NB.palette.yellow,
+  NB.palette.blue,
+  NB.palette.vermillion,
+  NB.palette.purple,
+  NB.palette.grey,
 ];
 
 NB.swatch = (color) => {
@@ -29,7 +35,13 @@ NB.sections = {
     const { recommended } = goal;
     return [
       recommended
-        ? NB.el('p', null, NB.el('strong', { text: `Recommended: ${recommended.label}. ` }), recommended.reason.charAt(0).toUpperCase() + recommended.reason.slice(1), '.')
+        ? NB.el(
+            'p',
+            null,
+            NB.el('strong', { text: `Recommended: ${recommended.label}. ` }),
+            recommended.reason.charAt(0).toUpperCase() + recommended.reason.slice(1),
+            '.',
+          )
         : NB.el('p', { class: 'error', text: 'Recommended: none, no configuration works.' }),
       NB.sections.route(goal, criteria),
       trueTarget ? NB.el('p', { text: `${trueTarget.charAt(0).toUpperCase()}${trueTarget.slice(1)}.` }) : [],
@@ -42,12 +54,25 @@ NB.sections = {
     const parts = [];
     if (route) {
       // The criterion where it asks for more than the margin.
-      const wanted = criteria.find((each) => each.goal === goal.name && each.criterion === 'min_clearance_mm.needle_route')?.limit ?? 0;
+      const wanted =
+        criteria.find((each) => each.goal === goal.name && each.criterion === 'min_clearance_mm.needle_route')?.limit ??
+        0;
       const part = `${NB.words(route.part)} (${route.tissue})`;
-      const where = route.distance_m < 0 ? `goes ${NB.mm(-route.distance_m, 1)} mm deep through the ${part}` : `passes ${NB.mm(route.distance_m, 1)} mm from the ${part}`;
-      parts.push(NB.el('p', { class: route.kept ? '' : 'error', text: `The planned needle${route.kept ? '' : ' is refused: it'} ${where}; it has to keep ${NB.mm(Math.max(route.margin_m, wanted), 1)} mm.` }));
+      const where =
+        route.distance_m < 0
+          ? `goes ${NB.mm(-route.distance_m, 1)} mm deep through the ${part}`
+          : `passes ${NB.mm(route.distance_m, 1)} mm from the ${part}`;
+      parts.push(
+        NB.el('p', {
+          class: route.kept ? '' : 'error',
+          text: `The planned needle${route.kept ? '' : ' is refused: it'} ${where}; it has to keep ${NB.mm(Math.max(route.margin_m, wanted), 1)} mm.`,
+        }),
+      );
     }
-    if (fissures?.length) parts.push(NB.el('p', { class: 'bad', text: `The needle crosses ${fissures.map(NB.words).join(', ')} of the lung.` }));
+    if (fissures?.length)
+      parts.push(
+        NB.el('p', { class: 'bad', text: `The needle crosses ${fissures.map(NB.words).join(', ')} of the lung.` }),
+      );
     return parts;
   },
 
@@ -56,14 +81,37 @@ NB.sections = {
     const { goals } = page.report;
     if (goals.length < 2) return null;
     const chosen = (goal) => goal.configurations.find((each) => each.label === goal.recommended?.label);
-    const table = NB.table('All goals, each with its recommended configuration', [
-      { title: 'Goal', cell: (goal) => NB.words(goal.name) },
-      { title: 'Recommended', cell: (goal) => goal.recommended?.label || 'none works' },
-      { title: 'Work', cell: (goal) => `${goal.configurations.filter((each) => each.status === 'ok').length} of ${goal.configurations.length}` },
-      { title: 'Expected tip error, rms', numeric: true, cell: (goal) => NB.length(chosen(goal)?.budget?.total.at_target.analytic.rms_m) },
-      { title: 'Least clearance', unit: 'mm', numeric: true, cell: (goal) => NB.mm(chosen(goal)?.clearance.minimum_m) },
-      { title: 'Needle to the nearest part', unit: 'mm', numeric: true, cell: (goal) => NB.mm(goal.needle_route?.distance_m) },
-    ], goals, { class: 'choose small' });
+    const table = NB.table(
+      'All goals, each with its recommended configuration',
+      [
+        { title: 'Goal', cell: (goal) => NB.words(goal.name) },
+        { title: 'Recommended', cell: (goal) => goal.recommended?.label || 'none works' },
+        {
+          title: 'Work',
+          cell: (goal) =>
+            `${goal.configurations.filter((each) => each.status === 'ok').length} of ${goal.configurations.length}`,
+        },
+        {
+          title: 'Expected tip error, rms',
+          numeric: true,
+          cell: (goal) => NB.length(chosen(goal)?.budget?.total.at_target.analytic.rms_m),
+        },
+        {
+          title: 'Least clearance',
+          unit: 'mm',
+          numeric: true,
+          cell: (goal) => NB.mm(chosen(goal)?.clearance.minimum_m),
+        },
+        {
+          title: 'Needle to the nearest part',
+          unit: 'mm',
+          numeric: true,
+          cell: (goal) => NB.mm(goal.needle_route?.distance_m),
+        },
+      ],
+      goals,
+      { class: 'choose small' },
+    );
     const rows = [...table.querySelectorAll('tbody tr')];
     NB.rows(rows, (index) => choose(index));
     return { element: table, rows };
@@ -75,16 +123,40 @@ NB.sections = {
     const retreat = (name) => c.retreat_clearance[name]?.certified_lower_bound_m ?? null;
     const columns = [
       { title: 'Between', cell: ([name]) => NB.words(name) },
-      { title: 'Has to be', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.limit_m), help: 'the limit of the scenario\u2019s criteria, else of its planning' },
-      { title: 'At most possible', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.attainable_m), help: 'least of the start, the approach and its end, which every motion takes' },
+      {
+        title: 'Has to be',
+        unit: 'mm',
+        numeric: true,
+        cell: ([, each]) => NB.mm(each.limit_m),
+        help: 'the limit of the scenario\u2019s criteria, else of its planning',
+      },
+      {
+        title: 'At most possible',
+        unit: 'mm',
+        numeric: true,
+        cell: ([, each]) => NB.mm(each.attainable_m),
+        help: 'least of the start, the approach and its end, which every motion takes',
+      },
       { title: 'Kept on the way in', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.achieved_m) },
       { title: 'Nearest in the', cell: ([, each]) => NB.words(each.limited_by) },
-      { title: 'Kept on the way back', unit: 'mm', numeric: true, cell: ([name]) => (retreat(name) === null ? '\u2013' : NB.mm(retreat(name))) },
+      {
+        title: 'Kept on the way back',
+        unit: 'mm',
+        numeric: true,
+        cell: ([name]) => (retreat(name) === null ? '\u2013' : NB.mm(retreat(name))),
+      },
     ];
-    const ends = { bound: 'no other way keeps more that counts', proof: 'no other way helps: a posture that every motion takes is too near', budget: 'the search ended by its budget: a better way may exist' };
+    const ends = {
+      bound: 'no other way keeps more that counts',
+      proof: 'no other way helps: a posture that every motion takes is too near',
+      budget: 'the search ended by its budget: a better way may exist',
+    };
     return [
       NB.table(`${c.label}: ${ends[c.margin.search]}`, columns, Object.entries(c.margin.classes), { class: 'small' }),
-      NB.el('p', { class: 'soft small', text: 'Proven lower bounds of the planned motion of the nominal arm: nothing comes nearer than this. Clearances of recorded motions, in the other tables, are what was attained, and a little more.' }),
+      NB.el('p', {
+        class: 'soft small',
+        text: 'Proven lower bounds of the planned motion of the nominal arm: nothing comes nearer than this. Clearances of recorded motions, in the other tables, are what was attained, and a little more.',
+      }),
     ];
   },
 
@@ -97,15 +169,44 @@ NB.sections = {
     const columns = [
       { title: 'Configuration', cell: (c) => c.label },
       { title: 'All', unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.total) },
-      { title: '95 % within', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.budget?.total.at_target.radius_95_m, 2), help: 'distance that 95 % of the draws stay within' },
-      { title: 'At the skin', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.budget?.total.at_skin?.analytic.rms_m, 2) },
+      {
+        title: '95 % within',
+        unit: 'mm',
+        numeric: true,
+        cell: (c) => NB.mm(c.budget?.total.at_target.radius_95_m, 2),
+        help: 'distance that 95 % of the draws stay within',
+      },
+      {
+        title: 'At the skin',
+        unit: 'mm',
+        numeric: true,
+        cell: (c) => NB.mm(c.budget?.total.at_skin?.analytic.rms_m, 2),
+      },
       { title: 'Mostly by', cell: (c) => (c.budget ? NB.words(c.budget.dominant ?? '\u2013') : c.budget_failure) },
-      ...sources.map((source) => ({ title: `By ${NB.words(source)}${NB.words(source).includes(',') ? ',' : ''} alone`, unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.sources.find((each) => each.source === source)) })),
+      ...sources.map((source) => ({
+        title: `By ${NB.words(source)}${NB.words(source).includes(',') ? ',' : ''} alone`,
+        unit: 'mm',
+        numeric: true,
+        cell: (c) => rms(c.budget?.sources.find((each) => each.source === source)),
+      })),
     ];
-    const help = 'Ellipses hold 95 %. x and y are across the needle, z along it; both panels are in mm and to one scale, the same for all configurations of the goal. The bar: each source\u2019s share of the mean square.';
+    const help =
+      'Ellipses hold 95 %. x and y are across the needle, z along it; both panels are in mm and to one scale, the same for all configurations of the goal. The bar: each source\u2019s share of the mean square.';
     return [
-      charts?.budget ? NB.chart(`${configuration.label}: where the needle goes`, charts.budget, NB.fileName(name, goal.name, configuration.label, 'budget'), help) : null,
-      NB.table('Expected distance of the tip from the target, root mean square over all arms and patients: by all sources together, and by each alone', columns, with_, { class: 'small' }),
+      charts?.budget
+        ? NB.chart(
+            `${configuration.label}: where the needle goes`,
+            charts.budget,
+            NB.fileName(name, goal.name, configuration.label, 'budget'),
+            help,
+          )
+        : null,
+      NB.table(
+        'Expected distance of the tip from the target, root mean square over all arms and patients: by all sources together, and by each alone',
+        columns,
+        with_,
+        { class: 'small' },
+      ),
     ];
   },
 
@@ -117,17 +218,41 @@ NB.sections = {
     const columns = [
       { title: 'Configuration', cell: (c) => c.label },
       { title: 'Free in all', unit: '%', numeric: true, cell: (c) => NB.percent(c.room.free_fraction) },
-      ...regions.map((name) => ({ title: `Free ${NB.regionWords[name] || NB.words(name)}`, unit: '%', numeric: true, cell: (c) => NB.percent(c.room.regions[name]) })),
-      ...sight.map((name) => ({ title: `Seen by ${name}`, unit: '%', numeric: true, cell: (c) => NB.percent(c.room.sight.find((each) => who(each) === name)?.fraction) })),
-      { title: 'Cone for the hand', unit: '\u00b0', numeric: true, cell: (c) => NB.deg(c.room.hand_cone_half_angle_rad), help: 'half-angle of the largest free cone behind the guide' },
+      ...regions.map((name) => ({
+        title: `Free ${NB.regionWords[name] || NB.words(name)}`,
+        unit: '%',
+        numeric: true,
+        cell: (c) => NB.percent(c.room.regions[name]),
+      })),
+      ...sight.map((name) => ({
+        title: `Seen by ${name}`,
+        unit: '%',
+        numeric: true,
+        cell: (c) => NB.percent(c.room.sight.find((each) => who(each) === name)?.fraction),
+      })),
+      {
+        title: 'Cone for the hand',
+        unit: '\u00b0',
+        numeric: true,
+        cell: (c) => NB.deg(c.room.hand_cone_half_angle_rad),
+        help: 'half-angle of the largest free cone behind the guide',
+      },
       { title: 'It ends at', cell: (c) => (c.room.hand_cone_blocker ? NB.words(c.room.hand_cone_blocker) : '') },
       { title: 'Elbow', cell: (c) => (c.room.elbow_up ? 'up' : 'down') },
       { title: 'Elbow above the entry', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.room.elbow_over_entry_m, 0) },
     ];
     return [
-      NB.el('p', { class: 'soft no-print', text: 'Switch on "people and sight", "free space" and "cone for the hand" to see them: blue lines of sight are free, orange ones end where they are blocked; orange cubes are taken by the arm.' }),
+      NB.el('p', {
+        class: 'soft no-print',
+        text: 'Switch on "people and sight", "free space" and "cone for the hand" to see them: blue lines of sight are free, orange ones end where they are blocked; orange cubes are taken by the arm.',
+      }),
       with_.length
-        ? NB.table('Final posture: share of the half ball about the entry point that the arm leaves free, and of the lines from eyes to entry and needle', columns, with_, { class: 'small' })
+        ? NB.table(
+            'Final posture: share of the half ball about the entry point that the arm leaves free, and of the lines from eyes to entry and needle',
+            columns,
+            with_,
+            { class: 'small' },
+          )
         : NB.el('p', { class: 'soft', text: 'Of no configuration is there a posture.' }),
     ];
   },
@@ -145,16 +270,35 @@ NB.sections = {
       { title: 'Engine', cell: (c) => c.engine || '' },
       { title: 'Value', numeric: true, cell: (c) => limits(c)[0] },
       { title: 'Limit', numeric: true, cell: (c) => limits(c)[1] },
-      { title: 'Outcome', cell: (c) => NB.el('span', { class: c.pass ? 'good' : 'bad', text: c.pass ? '\u2713 met' : isExpected.has(c) ? '\u2717 missed, as expected' : '\u2717 missed' }) },
+      {
+        title: 'Outcome',
+        cell: (c) =>
+          NB.el('span', {
+            class: c.pass ? 'good' : 'bad',
+            text: c.pass ? '\u2713 met' : isExpected.has(c) ? '\u2717 missed, as expected' : '\u2717 missed',
+          }),
+      },
       { title: 'Remark', text: true, cell: (c) => c.detail },
     ];
     const unjudged = [...columns.slice(0, 4), { title: 'Why it was not judged', text: true, cell: (c) => c.reason }];
-    return NB.section(`What was checked: ${counts}`, open.length > 0 || missed.length > 0,
+    return NB.section(
+      `What was checked: ${counts}`,
+      open.length > 0 || missed.length > 0,
       missed.length ? NB.table('Missed', columns, missed, { class: 'small' }) : null,
       open.length ? NB.table('What was to be judged and was not', unjudged, open, { class: 'small' }) : null,
       NB.sections.summary(criteria),
-      NB.el('details', { class: 'no-print' }, NB.el('summary', { text: `All ${criteria.length} one by one` }),
-        NB.table('Everything that was judged, missed ones first', columns, [...missed, ...criteria.filter((each) => each.pass)], { class: 'small' })));
+      NB.el(
+        'details',
+        { class: 'no-print' },
+        NB.el('summary', { text: `All ${criteria.length} one by one` }),
+        NB.table(
+          'Everything that was judged, missed ones first',
+          columns,
+          [...missed, ...criteria.filter((each) => each.pass)],
+          { class: 'small' },
+        ),
+      ),
+    );
   },
 
   /** A row per criterion: how often it was met, and the one that came nearest to its limit. */
@@ -162,21 +306,46 @@ NB.sections = {
     const groups = new Map();
     for (const each of criteria) groups.set(each.criterion, [...(groups.get(each.criterion) || []), each]);
     // Of those that are missed the one that is farthest off, else the one that is nearest to its limit.
-    const used = ({ value, limit, pass }) => (value === null || limit === null ? -Infinity : (pass ? -1 : 1) * Math.abs(value - limit) / (Math.abs(limit) || 1));
+    const used = ({ value, limit, pass }) =>
+      value === null || limit === null
+        ? -Infinity
+        : ((pass ? -1 : 1) * Math.abs(value - limit)) / (Math.abs(limit) || 1);
     const rows = [...groups].map(([name, all]) => ({
-      name, all, met: all.filter((each) => each.pass).length,
+      name,
+      all,
+      met: all.filter((each) => each.pass).length,
       nearest: all.reduce((best, each) => (used(each) > used(best) ? each : best)),
     }));
     rows.sort((a, b) => (a.met < a.all.length ? 0 : 1) - (b.met < b.all.length ? 0 : 1));
     const limits = (c) => (c.value === null ? ['', ''] : NB.valueAndLimit(c.value, c.limit, c.unit));
-    return NB.table('By criterion, with the value that comes nearest to its limit', [
-      { title: 'Criterion', cell: (row) => NB.criterionWords(row.name) },
-      { title: 'Met', numeric: true, cell: (row) => NB.el('span', { class: row.met === row.all.length ? 'good' : 'bad', text: `${row.met} of ${row.all.length}` }) },
-      { title: 'Nearest value', numeric: true, cell: (row) => limits(row.nearest)[0] },
-      { title: 'Limit', numeric: true, cell: (row) => limits(row.nearest)[1] },
-      { title: 'Where', cell: (row) => [NB.words(row.nearest.goal), row.nearest.label, row.nearest.engine].filter(Boolean).join(', ') },
-      { title: 'Remark', text: true, cell: (row) => (row.nearest.detail && row.name !== 'expected' ? row.nearest.detail : '') },
-    ], rows, { class: 'small' });
+    return NB.table(
+      'By criterion, with the value that comes nearest to its limit',
+      [
+        { title: 'Criterion', cell: (row) => NB.criterionWords(row.name) },
+        {
+          title: 'Met',
+          numeric: true,
+          cell: (row) =>
+            NB.el('span', {
+              class: row.met === row.all.length ? 'good' : 'bad',
+              text: `${row.met} of ${row.all.length}`,
+            }),
+        },
+        { title: 'Nearest value', numeric: true, cell: (row) => limits(row.nearest)[0] },
+        { title: 'Limit', numeric: true, cell: (row) => limits(row.nearest)[1] },
+        {
+          title: 'Where',
+          cell: (row) => [NB.words(row.nearest.goal), row.nearest.label, row.nearest.engine].filter(Boolean).join(', '),
+        },
+        {
+          title: 'Remark',
+          text: true,
+          cell: (row) => (row.nearest.detail && row.name !== 'expected' ? row.nearest.detail : ''),
+        },
+      ],
+      rows,
+      { class: 'small' },
+    );
   },
 
   requirements(report) {
@@ -186,22 +355,53 @@ NB.sections = {
     const columns = [
       { title: 'Requirement', cell: (r) => r.requirement },
       { title: 'Criterion', cell: (r) => NB.criterionWords(r.criterion) },
-      { title: 'Outcome', cell: (r) => NB.el('span', { class: r.outcome === 'met' ? 'good' : 'bad', text: words[r.outcome] }) },
+      {
+        title: 'Outcome',
+        cell: (r) => NB.el('span', { class: r.outcome === 'met' ? 'good' : 'bad', text: words[r.outcome] }),
+      },
       { title: 'Met', numeric: true, cell: (r) => String(r.met) },
       { title: 'Missed', numeric: true, cell: (r) => String(r.missed) },
       { title: 'Not judged', numeric: true, cell: (r) => String(r.not_judged) },
     ];
-    return NB.section(`Requirements (${rows.length})`, true,
-      NB.table('Requirements, the criteria that stand for them, and how often these were met', columns, rows, { class: 'small' }));
+    return NB.section(
+      `Requirements (${rows.length})`,
+      true,
+      NB.table('Requirements, the criteria that stand for them, and how often these were met', columns, rows, {
+        class: 'small',
+      }),
+    );
   },
 
   provenance(report) {
     const { provenance, notes, scenario, truth } = report;
-    return NB.el('div', null,
-      notes.length ? NB.section('Notes', true, NB.el('ul', { class: 'plain' }, notes.map((note) => NB.el('li', { text: note })))) : null,
-      truth ? NB.el('details', { class: 'section no-print' }, NB.el('summary', null, NB.el('h2', { text: 'The arm and the patient that were drawn' })),
-        NB.el('p', { class: 'soft', text: 'One draw of the scenario\u2019s imperfections, by its seed; lengths in m, angles in rad. The expected tip error is over all draws, not of this one.' }), NB.tree(truth)) : null,
-      NB.section('Where the numbers come from', false, NB.provenance(provenance, scenario.file)));
+    return NB.el(
+      'div',
+      null,
+      notes.length
+        ? NB.section(
+            'Notes',
+            true,
+            NB.el(
+              'ul',
+              { class: 'plain' },
+              notes.map((note) => NB.el('li', { text: note })),
+            ),
+          )
+        : null,
+      truth
+        ? NB.el(
+            'details',
+            { class: 'section no-print' },
+            NB.el('summary', null, NB.el('h2', { text: 'The arm and the patient that were drawn' })),
+            NB.el('p', {
+              class: 'soft',
+              text: 'One draw of the scenario\u2019s imperfections, by its seed; lengths in m, angles in rad. The expected tip error is over all draws, not of this one.',
+            }),
+            NB.tree(truth),
+          )
+        : null,
+      NB.section('Where the numbers come from', false, NB.provenance(provenance, scenario.file)),
+    );
   },
 };
 
@@ -209,32 +409,90 @@ NB.sections = {
 NB.sections.events = function (goal, configuration, charts, name) {
   const with_ = goal.configurations.filter((c) => c.events);
   if (!with_.length) return null;
-  return [...NB.sections.press(with_, configuration, charts, goal, name), ...NB.sections.stop(with_), ...NB.sections.retract(with_)];
+  return [
+    ...NB.sections.press(with_, configuration, charts, goal, name),
+    ...NB.sections.stop(with_),
+    ...NB.sections.retract(with_),
+  ];
 };
 
 NB.sections.press = function (with_, configuration, charts, goal, name) {
-  const rows = with_.flatMap((c) => c.events.press.flatMap((press, index) => (press.not_staged
-    ? [{ c, press, index, engine: '', measured: null }]
-    : Object.entries(press.engines).map(([engine, measured]) => ({ c, press, index, engine, measured })))));
+  const rows = with_.flatMap((c) =>
+    c.events.press.flatMap((press, index) =>
+      press.not_staged
+        ? [{ c, press, index, engine: '', measured: null }]
+        : Object.entries(press.engines).map(([engine, measured]) => ({ c, press, index, engine, measured })),
+    ),
+  );
   if (!rows.length) return [];
   const over = (measured, value) => measured.episodes.map(value);
   const or = (value, text) => (value === null || value === undefined ? '\u2013' : text(value));
   const fixed = (digits) => (value) => NB.fixed(value, digits);
   const columns = [
     { title: 'Configuration', cell: ({ c }) => c.label },
-    { title: 'Contact', text: true, cell: ({ press, index }) => `${index + 1}: ${press.solids.map(NB.words).join(' against ')}` },
+    {
+      title: 'Contact',
+      text: true,
+      cell: ({ press, index }) => `${index + 1}: ${press.solids.map(NB.words).join(' against ')}`,
+    },
     { title: 'Engine', cell: ({ engine, press }) => engine || `not staged: ${press.not_staged}` },
     { title: 'Friction', numeric: true, cell: ({ press }) => NB.significant(press.friction) },
     { title: 'Begins', unit: 's', numeric: true, cell: ({ measured }) => or(measured?.episodes[0]?.start_s, fixed(3)) },
-    { title: 'Speed then', unit: 'mm/s', numeric: true, cell: ({ measured }) => or(measured?.episodes[0]?.approach_speed_m_s, (speed) => NB.fixed(speed * 1e3, 1)) },
-    { title: 'Peak force', unit: 'N', numeric: true, cell: ({ measured }) => (measured ? NB.fixed(Math.max(0, ...over(measured, (each) => each.peak_force_n)), 1) : '\u2013'), help: 'of a rigid surface: engines differ in it by how stiff their contacts are' },
-    { title: 'Force at rest', unit: 'N', numeric: true, cell: ({ measured }) => or(measured?.settled_force_n, fixed(2)), help: 'what the joints\u2019 servo presses with' },
-    { title: 'Impulse', unit: 'N s', numeric: true, cell: ({ measured }) => (measured ? NB.fixed(over(measured, (each) => each.impulse_ns).reduce((a, b) => a + b, 0), 2) : '\u2013') },
-    { title: 'Off the balance of torques', numeric: true, cell: ({ measured }) => or(measured?.balance_difference, NB.share) },
-    { title: 'Deepest', numeric: true, cell: ({ measured }) => (measured ? NB.length(Math.max(0, ...over(measured, (each) => each.deepest_penetration_m))) : '\u2013') },
+    {
+      title: 'Speed then',
+      unit: 'mm/s',
+      numeric: true,
+      cell: ({ measured }) => or(measured?.episodes[0]?.approach_speed_m_s, (speed) => NB.fixed(speed * 1e3, 1)),
+    },
+    {
+      title: 'Peak force',
+      unit: 'N',
+      numeric: true,
+      cell: ({ measured }) =>
+        measured ? NB.fixed(Math.max(0, ...over(measured, (each) => each.peak_force_n)), 1) : '\u2013',
+      help: 'of a rigid surface: engines differ in it by how stiff their contacts are',
+    },
+    {
+      title: 'Force at rest',
+      unit: 'N',
+      numeric: true,
+      cell: ({ measured }) => or(measured?.settled_force_n, fixed(2)),
+      help: 'what the joints\u2019 servo presses with',
+    },
+    {
+      title: 'Impulse',
+      unit: 'N s',
+      numeric: true,
+      cell: ({ measured }) =>
+        measured
+          ? NB.fixed(
+              over(measured, (each) => each.impulse_ns).reduce((a, b) => a + b, 0),
+              2,
+            )
+          : '\u2013',
+    },
+    {
+      title: 'Off the balance of torques',
+      numeric: true,
+      cell: ({ measured }) => or(measured?.balance_difference, NB.share),
+    },
+    {
+      title: 'Deepest',
+      numeric: true,
+      cell: ({ measured }) =>
+        measured ? NB.length(Math.max(0, ...over(measured, (each) => each.deepest_penetration_m))) : '\u2013',
+    },
     { title: 'Recovers in', unit: 's', numeric: true, cell: ({ measured }) => or(measured?.recovery_s, fixed(3)) },
-    { title: 'Engines\u2019 forces differ by', numeric: true, cell: ({ press }) => or(press.force_difference, NB.share) },
-    { title: 'Engines\u2019 tips differ by', numeric: true, cell: ({ press }) => NB.length(press.tip_difference_settled_m) },
+    {
+      title: 'Engines\u2019 forces differ by',
+      numeric: true,
+      cell: ({ press }) => or(press.force_difference, NB.share),
+    },
+    {
+      title: 'Engines\u2019 tips differ by',
+      numeric: true,
+      cell: ({ press }) => NB.length(press.tip_difference_settled_m),
+    },
   ];
   const own = with_.find((c) => c === configuration);
   const table = (caption, of) => NB.table(caption, columns, of, { class: 'small contacts' });
@@ -247,15 +505,44 @@ NB.sections.press = function (with_, configuration, charts, goal, name) {
   return [
     NB.el('h3', { text: 'Contacts that were asked for' }),
     NB.el('p', { class: 'bad', text: `Forces are not those on a patient: ${means}.` }),
-    NB.el('p', { class: 'soft', text: 'After planning the obstacle is moved before the arm, which is then driven into it.' }),
-    own ? table(`${configuration.label}: contacts by engine`, rows.filter(({ c }) => c === own)) : NB.el('p', { text: `${configuration.label} does not work: nothing was staged.` }),
-    NB.el('details', { class: 'no-print' }, NB.el('summary', { text: 'Contacts of all configurations' }), table('All configurations', rows)),
-    own ? NB.el('details', { open: true }, NB.el('summary', { text: `Force and clearance over time, ${configuration.label}` }), NB.el('div', { class: 'two' }, shown)) : null,
+    NB.el('p', {
+      class: 'soft',
+      text: 'After planning the obstacle is moved before the arm, which is then driven into it.',
+    }),
+    own
+      ? table(
+          `${configuration.label}: contacts by engine`,
+          rows.filter(({ c }) => c === own),
+        )
+      : NB.el('p', { text: `${configuration.label} does not work: nothing was staged.` }),
+    NB.el(
+      'details',
+      { class: 'no-print' },
+      NB.el('summary', { text: 'Contacts of all configurations' }),
+      table('All configurations', rows),
+    ),
+    own
+      ? NB.el(
+          'details',
+          { open: true },
+          NB.el('summary', { text: `Force and clearance over time, ${configuration.label}` }),
+          NB.el('div', { class: 'two' }, shown),
+        )
+      : null,
   ];
 };
 
 NB.sections.stop = function (with_) {
-  const rows = with_.flatMap((c) => (c.events.stop ? Object.entries(c.events.stop.engines).map(([engine, measured]) => ({ c, stop: c.events.stop, engine, measured })) : []));
+  const rows = with_.flatMap((c) =>
+    c.events.stop
+      ? Object.entries(c.events.stop.engines).map(([engine, measured]) => ({
+          c,
+          stop: c.events.stop,
+          engine,
+          measured,
+        }))
+      : [],
+  );
   if (!rows.length) return [];
   const columns = [
     { title: 'Configuration', cell: ({ c }) => c.label },
@@ -264,40 +551,118 @@ NB.sections.stop = function (with_) {
     { title: 'at', unit: 's', numeric: true, cell: ({ stop }) => NB.fixed(stop.at_s, 2) },
     { title: 'Stands after', unit: 's', numeric: true, cell: ({ measured }) => NB.fixed(measured.stopping_time_s, 3) },
     { title: 'Tip goes on', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.tip_distance_m, 2) },
-    { title: 'Flange goes on', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.flange_distance_m, 2) },
+    {
+      title: 'Flange goes on',
+      unit: 'mm',
+      numeric: true,
+      cell: ({ measured }) => NB.mm(measured.flange_distance_m, 2),
+    },
     { title: 'Off the planned path', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.off_path_m, 2) },
-    { title: 'Least clearance', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.clearance.minimum_m) },
-    { title: 'proven', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.clearance.minimum_certified_m) },
-    { title: 'Worst of any moment: tip', unit: 'mm', numeric: true, cell: ({ stop }) => NB.mm(stop.envelope.worst_tip_distance_m, 2), help: 'predicted, of stops every 40 ms of the way in' },
-    { title: 'time to stand', unit: 's', numeric: true, cell: ({ stop }) => NB.fixed(stop.envelope.worst_stopping_time_s, 3) },
+    {
+      title: 'Least clearance',
+      unit: 'mm',
+      numeric: true,
+      cell: ({ measured }) => NB.mm(measured.clearance.minimum_m),
+    },
+    {
+      title: 'proven',
+      unit: 'mm',
+      numeric: true,
+      cell: ({ measured }) => NB.mm(measured.clearance.minimum_certified_m),
+    },
+    {
+      title: 'Worst of any moment: tip',
+      unit: 'mm',
+      numeric: true,
+      cell: ({ stop }) => NB.mm(stop.envelope.worst_tip_distance_m, 2),
+      help: 'predicted, of stops every 40 ms of the way in',
+    },
+    {
+      title: 'time to stand',
+      unit: 's',
+      numeric: true,
+      cell: ({ stop }) => NB.fixed(stop.envelope.worst_stopping_time_s, 3),
+    },
   ];
   const { category, brakes } = rows[0].stop;
-  const does = ['drives off and brakes on at once', 'slowed down along the path, then drives off', 'slowed down along the path, drives stay on'][category];
+  const does = [
+    'drives off and brakes on at once',
+    'slowed down along the path, then drives off',
+    'slowed down along the path, drives stay on',
+  ][category];
   return [
     NB.el('h3', { text: 'Emergency stop' }),
-    NB.el('p', { class: 'soft', text: `Category ${category} of IEC 60204-1: ${does}. It is triggered at the moment from which the tip is predicted to go farthest.` }),
+    NB.el('p', {
+      class: 'soft',
+      text: `Category ${category} of IEC 60204-1: ${does}. It is triggered at the moment from which the tip is predicted to go farthest.`,
+    }),
     NB.table('How far the arm goes on after the stop', columns, rows, { class: 'small' }),
-    brakes ? NB.el('p', { class: 'soft small', text: `Brakes are derived from published stops: ${brakes.fit}.` }) : null,
+    brakes
+      ? NB.el('p', { class: 'soft small', text: `Brakes are derived from published stops: ${brakes.fit}.` })
+      : null,
   ];
 };
 
 NB.sections.retract = function (with_) {
-  const rows = with_.flatMap((c) => Object.entries(c.events.retract).map(([engine, measured]) => ({ c, engine, measured })));
+  const rows = with_.flatMap((c) =>
+    Object.entries(c.events.retract).map(([engine, measured]) => ({ c, engine, measured })),
+  );
   if (!rows.length) return [];
   const columns = [
     { title: 'Configuration', cell: ({ c }) => c.label },
     { title: 'Engine', cell: ({ engine }) => engine },
-    { title: 'Needle in the patient', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.inserted_length_m) },
-    { title: 'Straight way back', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.straight_length_m) },
-    { title: 'Needle is out before the arm turns', cell: ({ measured }) => NB.el('span', { class: measured.needle_clears ? 'good' : 'bad', text: measured.needle_clears ? '\u2713 yes' : '\u2717 no: draw it by hand first' }) },
-    { title: 'Guide off the needle\u2019s axis', numeric: true, cell: ({ measured }) => NB.length(measured.largest_lateral_deviation_m) },
-    { title: 'Turned against it', unit: '\u00b5rad', numeric: true, cell: ({ measured }) => NB.fixed(measured.largest_angle_rad * 1e6, 3) },
+    {
+      title: 'Needle in the patient',
+      unit: 'mm',
+      numeric: true,
+      cell: ({ measured }) => NB.mm(measured.inserted_length_m),
+    },
+    {
+      title: 'Straight way back',
+      unit: 'mm',
+      numeric: true,
+      cell: ({ measured }) => NB.mm(measured.straight_length_m),
+    },
+    {
+      title: 'Needle is out before the arm turns',
+      cell: ({ measured }) =>
+        NB.el('span', {
+          class: measured.needle_clears ? 'good' : 'bad',
+          text: measured.needle_clears ? '\u2713 yes' : '\u2717 no: draw it by hand first',
+        }),
+    },
+    {
+      title: 'Guide off the needle\u2019s axis',
+      numeric: true,
+      cell: ({ measured }) => NB.length(measured.largest_lateral_deviation_m),
+    },
+    {
+      title: 'Turned against it',
+      unit: '\u00b5rad',
+      numeric: true,
+      cell: ({ measured }) => NB.fixed(measured.largest_angle_rad * 1e6, 3),
+    },
     { title: 'Touches', numeric: true, cell: ({ measured }) => String(measured.contacts.length) },
-    { title: 'Least clearance', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.clearance.minimum_m) },
-    { title: 'proven', unit: 'mm', numeric: true, cell: ({ measured }) => NB.mm(measured.clearance.minimum_certified_m) },
+    {
+      title: 'Least clearance',
+      unit: 'mm',
+      numeric: true,
+      cell: ({ measured }) => NB.mm(measured.clearance.minimum_m),
+    },
+    {
+      title: 'proven',
+      unit: 'mm',
+      numeric: true,
+      cell: ({ measured }) => NB.mm(measured.clearance.minimum_certified_m),
+    },
   ];
   return [
     NB.el('h3', { text: 'Way back' }),
-    NB.table('Straight out along the needle, then back to the start, with the needle still in the guide', columns, rows, { class: 'small' }),
+    NB.table(
+      'Straight out along the needle, then back to the start, with the needle still in the guide',
+      columns,
+      rows,
+      { class: 'small' },
+    ),
   ];
 };

@@ -16,28 +16,41 @@ NB.SearchPage = class {
     this.front = new Map((this.answer.front || []).map((member) => [member.id, member]));
     this.figures = [];
     app.classList.add('search', 'study');
-    NB.clear(app,
+    NB.clear(
+      app,
       this.headline(),
       NB.el('h2', { class: 'part', text: 'How flat it is, and what else is as good' }),
-      NB.el('p', { class: 'soft small', text: 'Each point is a candidate by all layouts that it was judged on; the line is the best of each stretch of the choice. Few layouts scatter more, so small points say less.' }),
-      NB.el('div', { class: 'figures' }, page.factors.map((factor, index) => this.flatness(factor, index))),
+      NB.el('p', {
+        class: 'soft small',
+        text: 'Each point is a candidate by all layouts that it was judged on; the line is the best of each stretch of the choice. Few layouts scatter more, so small points say less.',
+      }),
+      NB.el(
+        'div',
+        { class: 'figures' },
+        page.factors.map((factor, index) => this.flatness(factor, index)),
+      ),
       this.front.size ? NB.el('div', { class: 'figures' }, this.paretoFigure()) : null,
       NB.el('h2', { class: 'part', text: 'How it was found' }),
       NB.el('div', { class: 'figures' }, this.progressFigure(), this.spentPanel()),
       page.pictures.length ? NB.el('h2', { class: 'part', text: 'What the placements look like' }) : null,
       page.pictures.length ? NB.el('div', { class: 'panel' }, this.placements()) : null,
       NB.section('All candidates', false, this.candidateTable()),
-      NB.section('Generations', false, this.generationTable()));
+      NB.section('Generations', false, this.generationTable()),
+    );
   }
 
   /** A figure of an objective as people read it. */
   figure(value, index = 0) {
     if (value === null || value === undefined) return 'none';
     const { unit } = this.page.objectives[index] || { unit: '1' };
-    return unit === '1' ? `${NB.fixed(100 * value, 1)} %` : `${NB.fixed(value, this.page.objectives[index].moreIsBetter ? 1 : 3)} ${unit}`;
+    return unit === '1'
+      ? `${NB.fixed(100 * value, 1)} %`
+      : `${NB.fixed(value, this.page.objectives[index].moreIsBetter ? 1 : 3)} ${unit}`;
   }
 
-  share(value) { return value === null ? 'none' : `${NB.fixed(100 * value, 1)} %`; }
+  share(value) {
+    return value === null ? 'none' : `${NB.fixed(100 * value, 1)} %`;
+  }
 
   ends({ interval }, show) {
     const { low, high } = interval;
@@ -55,15 +68,40 @@ NB.SearchPage = class {
     const as_good = this.front.size
       ? `${[...this.front.values()].filter((each) => each.is_certain).length} of ${this.front.size} are on the front for certain.`
       : `${this.equals.size - 1} others cannot be told from it; ${this.undecided.size} more were dropped on fewer layouts and may be as good.`;
-    return NB.el('section', { class: 'panel answer' },
+    return NB.el(
+      'section',
+      { class: 'panel answer' },
       NB.el('p', { class: 'sentence', text: sentence[0].toUpperCase() + sentence.slice(1) }),
-      NB.el('dl', null,
-        choice.map(([factor, value]) => [NB.el('dt', { text: factor.words }), NB.el('dd', null, `${value} ${factor.unit}`, factor.key ? [' ', NB.el('code', { class: 'soft', text: factor.key })] : null)]),
-        NB.el('dt', { text: 'layouts that work' }), NB.el('dd', { text: `${this.share(answer.rate.value)}${this.ends(answer.rate, (value) => this.share(value))}` }),
-        NB.el('dt', { text: this.front.size ? 'front' : 'as good' }), NB.el('dd', { text: as_good }),
-        NB.el('dt', { text: 'by the layouts that selected it' }), NB.el('dd', { text: `${this.figure(answer.selected_by[0].value)}: of many candidates the one that looks best looks better than it is` }),
-        NB.el('dt', { text: 'room counted' }), NB.el('dd', { text: log.classes.map((name) => NB.words(name)).join(', ') })),
-      NB.el('p', { class: 'soft small', text: 'Cases are final postures: whether a motion gets there was not looked at.' }));
+      NB.el(
+        'dl',
+        null,
+        choice.map(([factor, value]) => [
+          NB.el('dt', { text: factor.words }),
+          NB.el(
+            'dd',
+            null,
+            `${value} ${factor.unit}`,
+            factor.key ? [' ', NB.el('code', { class: 'soft', text: factor.key })] : null,
+          ),
+        ]),
+        NB.el('dt', { text: 'layouts that work' }),
+        NB.el('dd', {
+          text: `${this.share(answer.rate.value)}${this.ends(answer.rate, (value) => this.share(value))}`,
+        }),
+        NB.el('dt', { text: this.front.size ? 'front' : 'as good' }),
+        NB.el('dd', { text: as_good }),
+        NB.el('dt', { text: 'by the layouts that selected it' }),
+        NB.el('dd', {
+          text: `${this.figure(answer.selected_by[0].value)}: of many candidates the one that looks best looks better than it is`,
+        }),
+        NB.el('dt', { text: 'room counted' }),
+        NB.el('dd', { text: log.classes.map((name) => NB.words(name)).join(', ') }),
+      ),
+      NB.el('p', {
+        class: 'soft small',
+        text: 'Cases are final postures: whether a motion gets there was not looked at.',
+      }),
+    );
   }
 
   kindOf(id) {
@@ -74,8 +112,11 @@ NB.SearchPage = class {
   }
 
   static looks = {
-    best: { color: '#d55e00', words: 'best' }, equal: { color: '#0072b2', words: 'cannot be told from it' },
-    certain: { color: '#0072b2', words: 'on the front for certain' }, maybe: { color: '#56b4e9', words: 'may be on the front' }, other: { color: '#9aa1aa', words: 'others' },
+    best: { color: '#d55e00', words: 'best' },
+    equal: { color: '#0072b2', words: 'cannot be told from it' },
+    certain: { color: '#0072b2', words: 'on the front for certain' },
+    maybe: { color: '#56b4e9', words: 'may be on the front' },
+    other: { color: '#9aa1aa', words: 'others' },
   };
 
   dot(context, x, y, kind, size = 3.5) {
@@ -84,17 +125,36 @@ NB.SearchPage = class {
     context.lineWidth = 1;
     context.beginPath();
     if (kind === 'best') {
-      context.moveTo(x, y - 7); context.lineTo(x + 7, y); context.lineTo(x, y + 7); context.lineTo(x - 7, y); context.closePath();
+      context.moveTo(x, y - 7);
+      context.lineTo(x + 7, y);
+      context.lineTo(x, y + 7);
+      context.lineTo(x - 7, y);
+      context.closePath();
     } else context.arc(x, y, size, 0, 2 * Math.PI);
     context.fill();
     context.stroke();
   }
 
   legend(line) {
-    const kinds = ['best', 'equal', 'certain', 'maybe', 'other'].filter((kind) => this.candidates.some((each) => this.kindOf(each.id) === kind));
-    const items = kinds.map((kind) => ({ text: NB.SearchPage.looks[kind].words, draw: (context, x, y) => this.dot(context, x, y, kind) }));
+    const kinds = ['best', 'equal', 'certain', 'maybe', 'other'].filter((kind) =>
+      this.candidates.some((each) => this.kindOf(each.id) === kind),
+    );
+    const items = kinds.map((kind) => ({
+      text: NB.SearchPage.looks[kind].words,
+      draw: (context, x, y) => this.dot(context, x, y, kind),
+    }));
     if (line) {
-      items.push({ text: line, draw: (context, x, y) => { context.strokeStyle = '#444'; context.lineWidth = 1.5; context.beginPath(); context.moveTo(x - 8, y); context.lineTo(x + 8, y); context.stroke(); } });
+      items.push({
+        text: line,
+        draw: (context, x, y) => {
+          context.strokeStyle = '#444';
+          context.lineWidth = 1.5;
+          context.beginPath();
+          context.moveTo(x - 8, y);
+          context.lineTo(x + 8, y);
+          context.stroke();
+        },
+      });
     }
     return items;
   }
@@ -126,45 +186,74 @@ NB.SearchPage = class {
       const value = candidate.choice[index][1];
       return factor.levels ? factor.levels.findIndex((level) => level === value) : value;
     };
-    const points = this.candidates.map((each) => ({ each, x: place(each), y: this.at(each) })).filter(({ y }) => y !== null);
+    const points = this.candidates
+      .map((each) => ({ each, x: place(each), y: this.at(each) }))
+      .filter(({ y }) => y !== null);
     const numeric = !factor.levels || factor.levels.every((level) => typeof level === 'number');
-    const x = factor.levels && !numeric
-      ? { low: -0.5, high: factor.levels.length - 0.5, labels: factor.levels.map(String), title: factor.words }
-      : { low: factor.range ? factor.range[0] : Math.min(...factor.levels), high: factor.range ? factor.range[1] : Math.max(...factor.levels), title: `${factor.words}${factor.unit ? ` (${factor.unit})` : ''}` };
+    const x =
+      factor.levels && !numeric
+        ? { low: -0.5, high: factor.levels.length - 0.5, labels: factor.levels.map(String), title: factor.words }
+        : {
+            low: factor.range ? factor.range[0] : Math.min(...factor.levels),
+            high: factor.range ? factor.range[1] : Math.max(...factor.levels),
+            title: `${factor.words}${factor.unit ? ` (${factor.unit})` : ''}`,
+          };
     if (factor.levels && numeric) for (const point of points) point.x = factor.levels[point.x];
-    if (!x.labels) { const room = 0.03 * (x.high - x.low) || 1; x.low -= room; x.high += room; }
+    if (!x.labels) {
+      const room = 0.03 * (x.high - x.low) || 1;
+      x.low -= room;
+      x.high += room;
+    }
     const better = this.page.objectives[0].moreIsBetter;
-    const y = { ...this.range(points.map((point) => point.y), better), title: this.axisTitle(0) };
+    const y = {
+      ...this.range(
+        points.map((point) => point.y),
+        better,
+      ),
+      title: this.axisTitle(0),
+    };
     // Only those with as many layouts as an evolution has: fewer flatter themselves.
     const least = Math.min(this.log.samples / 4, this.winner.cases);
     const bins = new Map();
     for (const point of points) {
       if (point.each.cases < least) continue;
-      const bin = factor.levels ? point.x : Math.floor(12 * (point.x - x.low) / (x.high - x.low));
+      const bin = factor.levels ? point.x : Math.floor((12 * (point.x - x.low)) / (x.high - x.low));
       const known = bins.get(bin);
       if (!known || (better ? point.y > known.y : point.y < known.y)) bins.set(bin, point);
     }
     const line = [...bins.values()].sort((a, b) => a.x - b.x);
     const most = Math.max(...points.map((point) => point.each.cases));
     const figure = new NB.Figure({
-      name: `${this.page.name}_${factor.name}`, title: factor.words, height: 260,
+      name: `${this.page.name}_${factor.name}`,
+      title: factor.words,
+      height: 260,
       label: `${this.page.objectives[0].words} over ${factor.words}`,
       legend: () => this.legend(x.labels ? null : 'best of each stretch'),
       paint: (context, width, height) => {
         const axes = new NB.Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
         context.save();
-        context.beginPath(); context.rect(axes.box.left, axes.box.top, axes.box.width, axes.box.height); context.clip();
+        context.beginPath();
+        context.rect(axes.box.left, axes.box.top, axes.box.width, axes.box.height);
+        context.clip();
         if (!x.labels && line.length > 1) {
           context.strokeStyle = '#444';
           context.lineWidth = 1.5;
           context.beginPath();
-          line.forEach((point, k) => (k ? context.lineTo(axes.px(point.x), axes.py(point.y)) : context.moveTo(axes.px(point.x), axes.py(point.y))));
+          line.forEach((point, k) =>
+            k ? context.lineTo(axes.px(point.x), axes.py(point.y)) : context.moveTo(axes.px(point.x), axes.py(point.y)),
+          );
           context.stroke();
         }
         const order = { other: 0, maybe: 1, certain: 2, equal: 2, best: 3 };
         for (const point of [...points].sort((a, b) => order[this.kindOf(a.each.id)] - order[this.kindOf(b.each.id)])) {
-          this.dot(context, axes.px(point.x), axes.py(point.y), this.kindOf(point.each.id), 1.6 + 2.6 * Math.sqrt(point.each.cases / most));
+          this.dot(
+            context,
+            axes.px(point.x),
+            axes.py(point.y),
+            this.kindOf(point.each.id),
+            1.6 + 2.6 * Math.sqrt(point.each.cases / most),
+          );
         }
         context.restore();
       },
@@ -174,33 +263,59 @@ NB.SearchPage = class {
   }
 
   paretoFigure() {
-    const points = this.candidates.map((each) => ({ each, x: this.at(each, 0), y: this.at(each, 1) })).filter(({ x, y }) => x !== null && y !== null);
+    const points = this.candidates
+      .map((each) => ({ each, x: this.at(each, 0), y: this.at(each, 1) }))
+      .filter(({ x, y }) => x !== null && y !== null);
     const [first, second] = this.page.objectives;
-    const x = { ...this.range(points.map((point) => point.x), first.moreIsBetter), title: this.axisTitle(0) };
-    const y = { ...this.range(points.map((point) => point.y), second.moreIsBetter), title: this.axisTitle(1) };
+    const x = {
+      ...this.range(
+        points.map((point) => point.x),
+        first.moreIsBetter,
+      ),
+      title: this.axisTitle(0),
+    };
+    const y = {
+      ...this.range(
+        points.map((point) => point.y),
+        second.moreIsBetter,
+      ),
+      title: this.axisTitle(1),
+    };
     const members = points.filter(({ each }) => this.front.get(each.id)?.by_estimate).sort((a, b) => a.x - b.x);
     const figure = new NB.Figure({
-      name: `${this.page.name}_front`, title: 'What cannot be improved in one without loss in the other', height: 320,
+      name: `${this.page.name}_front`,
+      title: 'What cannot be improved in one without loss in the other',
+      height: 320,
       help: 'Bars are 95 % intervals of those that were judged on fresh layouts.',
       legend: () => this.legend(),
       paint: (context, width, height) => {
         const axes = new NB.Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
         context.save();
-        context.beginPath(); context.rect(axes.box.left, axes.box.top, axes.box.width, axes.box.height); context.clip();
+        context.beginPath();
+        context.rect(axes.box.left, axes.box.top, axes.box.width, axes.box.height);
+        context.clip();
         context.strokeStyle = '#444';
         context.beginPath();
-        members.forEach((point, k) => (k ? context.lineTo(axes.px(point.x), axes.py(point.y)) : context.moveTo(axes.px(point.x), axes.py(point.y))));
+        members.forEach((point, k) =>
+          k ? context.lineTo(axes.px(point.x), axes.py(point.y)) : context.moveTo(axes.px(point.x), axes.py(point.y)),
+        );
         context.stroke();
         for (const member of this.front.values()) {
           if (!member.fresh || member.fresh.some((estimate) => estimate.value === null)) continue;
           const scale = (value, index) => (this.page.objectives[index].unit === '1' ? 100 * value : value);
-          const [a, b] = member.fresh.map((estimate, index) => ({ at: scale(estimate.value, index), low: estimate.interval.low === null ? null : scale(estimate.interval.low, index), high: estimate.interval.high === null ? null : scale(estimate.interval.high, index) }));
+          const [a, b] = member.fresh.map((estimate, index) => ({
+            at: scale(estimate.value, index),
+            low: estimate.interval.low === null ? null : scale(estimate.interval.low, index),
+            high: estimate.interval.high === null ? null : scale(estimate.interval.high, index),
+          }));
           context.strokeStyle = '#0072b2';
           context.lineWidth = 1;
           context.beginPath();
-          context.moveTo(axes.px(a.low ?? x.low), axes.py(b.at)); context.lineTo(axes.px(a.high ?? x.high), axes.py(b.at));
-          context.moveTo(axes.px(a.at), axes.py(b.low ?? y.low)); context.lineTo(axes.px(a.at), axes.py(b.high ?? y.high));
+          context.moveTo(axes.px(a.low ?? x.low), axes.py(b.at));
+          context.lineTo(axes.px(a.high ?? x.high), axes.py(b.at));
+          context.moveTo(axes.px(a.at), axes.py(b.low ?? y.low));
+          context.lineTo(axes.px(a.at), axes.py(b.high ?? y.high));
           context.stroke();
         }
         for (const point of points) this.dot(context, axes.px(point.x), axes.py(point.y), this.kindOf(point.each.id));
@@ -219,33 +334,72 @@ NB.SearchPage = class {
       cases += generation.cases;
       if (generation.stream === 'fresh') continue;
       const scale = this.page.objectives[0].unit === '1' ? 100 : 1;
-      const values = generation.candidates.map((each) => each.figures[0]).filter((value) => value !== null).map((value) => scale * value);
-      if (values.length) points.push({ x: cases, best: better ? Math.max(...values) : Math.min(...values), middle: values.sort((a, b) => a - b)[values.length >> 1], purpose: generation.purpose });
+      const values = generation.candidates
+        .map((each) => each.figures[0])
+        .filter((value) => value !== null)
+        .map((value) => scale * value);
+      if (values.length)
+        points.push({
+          x: cases,
+          best: better ? Math.max(...values) : Math.min(...values),
+          middle: values.sort((a, b) => a - b)[values.length >> 1],
+          purpose: generation.purpose,
+        });
     }
     const x = { low: 0, high: Math.max(cases, 1), title: 'cases computed' };
-    const y = { ...this.range(points.flatMap((point) => [point.best, point.middle]), better), title: this.axisTitle(0) };
+    const y = {
+      ...this.range(
+        points.flatMap((point) => [point.best, point.middle]),
+        better,
+      ),
+      title: this.axisTitle(0),
+    };
     const line = (context, axes, key, color, dash) => {
       context.strokeStyle = color;
       context.setLineDash(dash);
       context.lineWidth = 1.5;
       context.beginPath();
-      points.forEach((point, k) => (k ? context.lineTo(axes.px(point.x), axes.py(point[key])) : context.moveTo(axes.px(point.x), axes.py(point[key]))));
+      points.forEach((point, k) =>
+        k
+          ? context.lineTo(axes.px(point.x), axes.py(point[key]))
+          : context.moveTo(axes.px(point.x), axes.py(point[key])),
+      );
       context.stroke();
       context.setLineDash([]);
       // A generation alone makes no line.
       context.fillStyle = color;
-      for (const point of points) { context.beginPath(); context.arc(axes.px(point.x), axes.py(point[key]), 2.5, 0, 2 * Math.PI); context.fill(); }
+      for (const point of points) {
+        context.beginPath();
+        context.arc(axes.px(point.x), axes.py(point[key]), 2.5, 0, 2 * Math.PI);
+        context.fill();
+      }
     };
-    const key = (text, color, dash) => ({ text, draw: (context, px, py) => { context.strokeStyle = color; context.setLineDash(dash); context.lineWidth = 1.5; context.beginPath(); context.moveTo(px - 8, py); context.lineTo(px + 8, py); context.stroke(); context.setLineDash([]); } });
+    const key = (text, color, dash) => ({
+      text,
+      draw: (context, px, py) => {
+        context.strokeStyle = color;
+        context.setLineDash(dash);
+        context.lineWidth = 1.5;
+        context.beginPath();
+        context.moveTo(px - 8, py);
+        context.lineTo(px + 8, py);
+        context.stroke();
+        context.setLineDash([]);
+      },
+    });
     const figure = new NB.Figure({
-      name: `${this.page.name}_progress`, title: 'Best and middle of each generation', height: 260,
+      name: `${this.page.name}_progress`,
+      title: 'Best and middle of each generation',
+      height: 260,
       help: 'By the layouts that each had: where those become more, figures may fall.',
       legend: () => [key('best of the generation', '#d55e00', []), key('middle of the generation', '#666', [5, 3])],
       paint: (context, width, height) => {
         const axes = new NB.Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
         context.save();
-        context.beginPath(); context.rect(axes.box.left, axes.box.top, axes.box.width, axes.box.height); context.clip();
+        context.beginPath();
+        context.rect(axes.box.left, axes.box.top, axes.box.width, axes.box.height);
+        context.clip();
         line(context, axes, 'middle', '#666', [5, 3]);
         line(context, axes, 'best', '#d55e00', []);
         context.restore();
@@ -259,20 +413,57 @@ NB.SearchPage = class {
     const { log } = this;
     const byPurpose = new Map();
     for (const { purpose, cases } of log.generations) byPurpose.set(purpose, (byPurpose.get(purpose) || 0) + cases);
-    const words = { screening: 'first look over the ranges', evolution: 'evolution', halving: 'halving', final: 'last candidates, all layouts', fresh: 'winner on fresh layouts' };
-    return NB.el('section', { class: 'panel' }, NB.el('h3', { text: 'What it cost' }),
-      NB.table('Cases by what they were for', [
-        { title: 'For', cell: ([purpose]) => words[purpose] || purpose }, { title: 'Cases', numeric: true, cell: ([, cases]) => cases },
-      ], [...byPurpose, ['all', log.cases]]),
-      NB.el('p', { class: 'small', text: `${log.grid_cases ? `All choices with all layouts are ${log.grid_cases} cases. ` : ''}Reach alone ruled out ${counted(log.ruled_out, 'candidate')}, which spared ${counted(log.cases_spared, 'case')}.` }));
+    const words = {
+      screening: 'first look over the ranges',
+      evolution: 'evolution',
+      halving: 'halving',
+      final: 'last candidates, all layouts',
+      fresh: 'winner on fresh layouts',
+    };
+    return NB.el(
+      'section',
+      { class: 'panel' },
+      NB.el('h3', { text: 'What it cost' }),
+      NB.table(
+        'Cases by what they were for',
+        [
+          { title: 'For', cell: ([purpose]) => words[purpose] || purpose },
+          { title: 'Cases', numeric: true, cell: ([, cases]) => cases },
+        ],
+        [...byPurpose, ['all', log.cases]],
+      ),
+      NB.el('p', {
+        class: 'small',
+        text: `${log.grid_cases ? `All choices with all layouts are ${log.grid_cases} cases. ` : ''}Reach alone ruled out ${counted(log.ruled_out, 'candidate')}, which spared ${counted(log.cases_spared, 'case')}.`,
+      }),
+    );
   }
 
   placements() {
     return [
-      NB.el('p', { class: 'soft small', text: 'The patient as the scenario has it, the configuration with the most margin.' }),
-      NB.el('div', { class: 'placements' }, this.page.pictures.map((picture) => NB.el('figure', null,
-        NB.el('img', { src: picture.address, alt: `${picture.choice}: ${picture.configuration}` }),
-        NB.el('figcaption', { class: 'small' }, NB.el('strong', { text: this.front.size ? 'On the front: ' : picture.id === this.winner.id ? 'Best: ' : 'As good: ' }), `${picture.choice}. ${picture.configuration} at ${NB.words(picture.goal)}, margin ${NB.fixed(picture.marginMm, 1)} mm.`)))),
+      NB.el('p', {
+        class: 'soft small',
+        text: 'The patient as the scenario has it, the configuration with the most margin.',
+      }),
+      NB.el(
+        'div',
+        { class: 'placements' },
+        this.page.pictures.map((picture) =>
+          NB.el(
+            'figure',
+            null,
+            NB.el('img', { src: picture.address, alt: `${picture.choice}: ${picture.configuration}` }),
+            NB.el(
+              'figcaption',
+              { class: 'small' },
+              NB.el('strong', {
+                text: this.front.size ? 'On the front: ' : picture.id === this.winner.id ? 'Best: ' : 'As good: ',
+              }),
+              `${picture.choice}. ${picture.configuration} at ${NB.words(picture.goal)}, margin ${NB.fixed(picture.marginMm, 1)} mm.`,
+            ),
+          ),
+        ),
+      ),
     ];
   }
 
@@ -280,28 +471,66 @@ NB.SearchPage = class {
     const better = this.page.objectives[0].moreIsBetter ? 1 : -1;
     const order = (each) => (each.figures[0].value === null ? -Infinity : better * each.figures[0].value);
     const rows = [...this.candidates].sort((a, b) => b.cases - a.cases || order(b) - order(a)).slice(0, 200);
-    const kinds = { ...Object.fromEntries(Object.entries(NB.SearchPage.looks).map(([kind, { words }]) => [kind, words])), other: '' };
-    return NB.el('div', null,
-      rows.length < this.candidates.length ? NB.el('p', { class: 'soft small', text: `The first 200 of ${this.candidates.length}; search.json has all.` }) : null,
-      NB.table('Candidates, those with the most layouts first', [
-        { title: 'Number', cell: (each) => each.id },
-        ...this.page.factors.map((factor, index) => ({ title: factor.words, unit: factor.unit, numeric: !factor.levels, cell: (each) => each.choice[index][1] })),
-        { title: 'Layouts', numeric: true, cell: (each) => each.cases },
-        ...this.page.objectives.map((objective, index) => ({ title: objective.words, numeric: true, cell: (each) => this.figure(each.figures[index].value, index) })),
-        { title: 'Works', numeric: true, cell: (each) => this.share(each.rate.value) },
-        { title: '', cell: (each) => kinds[this.kindOf(each.id)] || (this.undecided.has(each.id) ? 'dropped, may be as good' : '') },
-      ], rows, { class: 'small' }));
+    const kinds = {
+      ...Object.fromEntries(Object.entries(NB.SearchPage.looks).map(([kind, { words }]) => [kind, words])),
+      other: '',
+    };
+    return NB.el(
+      'div',
+      null,
+      rows.length < this.candidates.length
+        ? NB.el('p', { class: 'soft small', text: `The first 200 of ${this.candidates.length}; search.json has all.` })
+        : null,
+      NB.table(
+        'Candidates, those with the most layouts first',
+        [
+          { title: 'Number', cell: (each) => each.id },
+          ...this.page.factors.map((factor, index) => ({
+            title: factor.words,
+            unit: factor.unit,
+            numeric: !factor.levels,
+            cell: (each) => each.choice[index][1],
+          })),
+          { title: 'Layouts', numeric: true, cell: (each) => each.cases },
+          ...this.page.objectives.map((objective, index) => ({
+            title: objective.words,
+            numeric: true,
+            cell: (each) => this.figure(each.figures[index].value, index),
+          })),
+          { title: 'Works', numeric: true, cell: (each) => this.share(each.rate.value) },
+          {
+            title: '',
+            cell: (each) =>
+              kinds[this.kindOf(each.id)] || (this.undecided.has(each.id) ? 'dropped, may be as good' : ''),
+          },
+        ],
+        rows,
+        { class: 'small' },
+      ),
+    );
   }
 
   generationTable() {
-    return NB.table('Generations, each a study of its own', [
-      { title: 'Generation', cell: (each) => `gen_${String(each.generation).padStart(3, '0')}` },
-      { title: 'For', cell: (each) => each.purpose },
-      { title: 'Candidates', numeric: true, cell: (each) => each.candidates.length },
-      { title: 'Layouts', numeric: true, cell: (each) => `${each.circumstances[0]} to ${each.circumstances[1] - 1}${each.stream === 'fresh' ? ' (fresh)' : ''}` },
-      { title: 'Cases', numeric: true, cell: (each) => each.cases },
-    ], this.log.generations, { class: 'small' });
+    return NB.table(
+      'Generations, each a study of its own',
+      [
+        { title: 'Generation', cell: (each) => `gen_${String(each.generation).padStart(3, '0')}` },
+        { title: 'For', cell: (each) => each.purpose },
+        { title: 'Candidates', numeric: true, cell: (each) => each.candidates.length },
+        {
+          title: 'Layouts',
+          numeric: true,
+          cell: (each) =>
+            `${each.circumstances[0]} to ${each.circumstances[1] - 1}${each.stream === 'fresh' ? ' (fresh)' : ''}`,
+        },
+        { title: 'Cases', numeric: true, cell: (each) => each.cases },
+      ],
+      this.log.generations,
+      { class: 'small' },
+    );
   }
 };
 
-NB.start((page, app) => { NB.current = new NB.SearchPage(page, app); });
+NB.start((page, app) => {
+  NB.current = new NB.SearchPage(page, app);
+});

@@ -24,10 +24,16 @@ NB.Statistics = class {
   isExact(name) {
     const spreads = this.summary.spreads?.filter((each) => each.metric === name) || [];
     const known = spreads.flatMap((each) => each.quantiles.map((quantile) => quantile.value));
-    return this.summary.metrics?.find((metric) => metric.name === name)?.unit === 'mm' && known.length > 0 && known.every((value) => Math.abs(value) < NB.ROUNDING_MM);
+    return (
+      this.summary.metrics?.find((metric) => metric.name === name)?.unit === 'mm' &&
+      known.length > 0 &&
+      known.every((value) => Math.abs(value) < NB.ROUNDING_MM)
+    );
   }
 
-  percents({ low, high }) { return `${NB.fixed(100 * low, 1)} to ${NB.fixed(100 * high, 1)}`; }
+  percents({ low, high }) {
+    return `${NB.fixed(100 * low, 1)} to ${NB.fixed(100 * high, 1)}`;
+  }
 
   /** A share of layouts with its interval. */
   rate(value) {
@@ -46,9 +52,25 @@ NB.Statistics = class {
   first() {
     const { answer } = this.summary;
     return [
-      answer ? NB.el('section', { class: 'panel answer' },
-        NB.el('p', { class: 'sentence', text: `${answer.sentence.charAt(0).toUpperCase()}${answer.sentence.slice(1)}.` }),
-        answer.remarks.length ? NB.el('ul', { class: 'plain' }, answer.remarks.map((remark) => NB.el('li', { text: `${remark.charAt(0).toUpperCase()}${remark.slice(1)}.` }))) : null) : null,
+      answer
+        ? NB.el(
+            'section',
+            { class: 'panel answer' },
+            NB.el('p', {
+              class: 'sentence',
+              text: `${answer.sentence.charAt(0).toUpperCase()}${answer.sentence.slice(1)}.`,
+            }),
+            answer.remarks.length
+              ? NB.el(
+                  'ul',
+                  { class: 'plain' },
+                  answer.remarks.map((remark) =>
+                    NB.el('li', { text: `${remark.charAt(0).toUpperCase()}${remark.slice(1)}.` }),
+                  ),
+                )
+              : null,
+          )
+        : null,
       this.criteria(),
       NB.el('div', { class: 'pair' }, ...this.compared(), this.configurations()),
     ].filter(Boolean);
@@ -60,21 +82,36 @@ NB.Statistics = class {
     if (!criteria.length) return null;
     const verdict = (c) => {
       const open = c.value === null || (c.confidence && c.interval === null);
-      return NB.el('span', { class: c.pass ? 'good' : 'bad', text: c.pass ? '\u2713 met' : open ? '? not judged' : '\u2717 missed' });
+      return NB.el('span', {
+        class: c.pass ? 'good' : 'bad',
+        text: c.pass ? '\u2713 met' : open ? '? not judged' : '\u2717 missed',
+      });
     };
     const has = (key) => criteria.some((c) => c[key]);
     const columns = [
       { title: 'Criterion', cell: (c) => NB.words(c.criterion.replace(/_mm$/, '')) },
       { title: 'Met', cell: verdict },
-      ...(has('of') ? [{ title: 'Of', cell: (c) => ({ best: 'best of each layout' }[c.of] || c.of || '') }] : []),
+      ...(has('of') ? [{ title: 'Of', cell: (c) => ({ best: 'best of each layout' })[c.of] || c.of || '' }] : []),
       { title: 'Value (95 %)', numeric: true, cell: (c) => this.text(c.value, c.unit, c.interval) },
-      { title: 'Limit', numeric: true, cell: (c) => `${c.criterion.startsWith('min') ? '\u2265' : '\u2264'} ${this.text(c.limit, c.unit)}` },
+      {
+        title: 'Limit',
+        numeric: true,
+        cell: (c) => `${c.criterion.startsWith('min') ? '\u2265' : '\u2264'} ${this.text(c.limit, c.unit)}`,
+      },
       ...(has('requirement') ? [{ title: 'Requirement', text: true, cell: (c) => c.requirement || '' }] : []),
       ...(has('choice') ? [{ title: 'With the best choice', cell: (c) => c.choice || '' }] : []),
-      { title: 'What was judged', text: true, cell: (c) => `${c.detail}${c.confidence ? ', by the unfavourable end of the interval' : ''}` },
+      {
+        title: 'What was judged',
+        text: true,
+        cell: (c) => `${c.detail}${c.confidence ? ', by the unfavourable end of the interval' : ''}`,
+      },
       { title: 'Worst cases', cell: (c) => this.study.caseButtons((c.cases || []).slice(0, 5)) },
     ];
-    return NB.el('section', { class: 'panel criteria' }, NB.table('Criteria of the study', columns, criteria, { class: 'small' }));
+    return NB.el(
+      'section',
+      { class: 'panel criteria' },
+      NB.table('Criteria of the study', columns, criteria, { class: 'small' }),
+    );
   }
 
   /** Figures of the choices, or of the levels that are held against each other. */
@@ -89,34 +126,57 @@ NB.Statistics = class {
     const shown = choices.slice(0, NB.MOST_CHOICES);
     const style = (choice) => (!choice.against_first || !choice.against_first.distinguishable ? '#0072b2' : '#767676');
     const rows = shown.map((choice, at) => ({
-      label: `${at + 1}. ${choice.label}`, value: choice.works.rate === null ? null : 100 * choice.works.rate, interval: this.scaled(choice.works.interval), text: this.rate(choice.works), style: style(choice),
+      label: `${at + 1}. ${choice.label}`,
+      value: choice.works.rate === null ? null : 100 * choice.works.rate,
+      interval: this.scaled(choice.works.interval),
+      text: this.rate(choice.works),
+      style: style(choice),
     }));
     const x = { low: 0, high: 100, title: 'layouts in which at least one configuration works (%)' };
-    const dot = (color) => (context, a, b) => { context.fillStyle = color; context.beginPath(); context.arc(a, b, 4.5, 0, 2 * Math.PI); context.fill(); };
+    const dot = (color) => (context, a, b) => {
+      context.fillStyle = color;
+      context.beginPath();
+      context.arc(a, b, 4.5, 0, 2 * Math.PI);
+      context.fill();
+    };
     this.study.compared = new NB.Figure({
-      name: `${this.page.name}-choices`, title: `Which ${names}, best first`, label: `Share of layouts that work, choice by choice`,
+      name: `${this.page.name}-choices`,
+      title: `Which ${names}, best first`,
+      label: `Share of layouts that work, choice by choice`,
       help: `Share of the layouts that can exist; lines are 95 % intervals of each choice by itself.${choices.length > shown.length ? ` The first ${shown.length} of ${choices.length}; the table below has more.` : ''}`,
-      height: NB.dotHeight(rows.length), paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
-      legend: () => [{ text: 'the first, and what cannot be told apart from it', draw: dot('#0072b2') }, { text: 'works less often than the first', draw: dot('#767676') }],
+      height: NB.dotHeight(rows.length),
+      paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
+      legend: () => [
+        { text: 'the first, and what cannot be told apart from it', draw: dot('#0072b2') },
+        { text: 'works less often than the first', draw: dot('#767676') },
+      ],
     });
     return this.study.compared.element;
   }
 
-  scaled(interval) { return interval ? { low: 100 * interval.low, high: 100 * interval.high } : null; }
+  scaled(interval) {
+    return interval ? { low: 100 * interval.low, high: 100 * interval.high } : null;
+  }
 
   levels(compared, at) {
     const share = compared.unit === '1';
     const factor = share ? 100 : 1;
     const rows = compared.levels.map((level) => ({
-      label: `${level.label}${level.small ? ' (small sample)' : ''}`, value: level.value === null ? null : factor * level.value,
-      interval: level.interval ? { low: factor * level.interval.low, high: factor * level.interval.high } : null, text: this.text(level.value, compared.unit, level.interval),
+      label: `${level.label}${level.small ? ' (small sample)' : ''}`,
+      value: level.value === null ? null : factor * level.value,
+      interval: level.interval ? { low: factor * level.interval.low, high: factor * level.interval.high } : null,
+      text: this.text(level.value, compared.unit, level.interval),
     }));
     const most = Math.max(...rows.map((row) => row.interval?.high ?? row.value ?? 0), 0);
-    const x = share ? { low: 0, high: 100, title: `${compared.response} (%)` } : { low: 0, high: 1.05 * most || 1, title: `${compared.response} (${compared.unit})` };
+    const x = share
+      ? { low: 0, high: 100, title: `${compared.response} (%)` }
+      : { low: 0, high: 1.05 * most || 1, title: `${compared.response} (${compared.unit})` };
     const figure = new NB.Figure({
-      name: `${this.page.name}-by-${compared.factor}`, title: `By ${NB.words(compared.factor)}: ${compared.response}`,
+      name: `${this.page.name}-by-${compared.factor}`,
+      title: `By ${NB.words(compared.factor)}: ${compared.response}`,
       help: `Over all other factors; lines are 95 % intervals.${compared.differs ? '' : ' Chance alone makes such differences in 1 of 20 studies.'}`,
-      height: NB.dotHeight(rows.length), paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
+      height: NB.dotHeight(rows.length),
+      paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
     });
     if (!at) this.study.compared = figure;
     return figure.element;
@@ -128,14 +188,23 @@ NB.Statistics = class {
     const rows = this.page.configurations.map((label, c) => {
       const found = overall?.configurations?.find((each) => each.label === label)?.success;
       const rate = found?.rate ?? this.counted(c);
-      return { label, value: 100 * rate, interval: this.scaled(found?.interval), text: found ? this.rate(found) : `${NB.fixed(100 * rate, 1)} %` };
+      return {
+        label,
+        value: 100 * rate,
+        interval: this.scaled(found?.interval),
+        text: found ? this.rate(found) : `${NB.fixed(100 * rate, 1)} %`,
+      };
     });
     const each = best ? `; intervals hold for all ${best.of} choices at once` : '';
     const x = { low: 0, high: 100, title: 'layouts in which it works (%)' };
     this.study.strip = new NB.Figure({
-      name: `${this.page.name}-configurations`, title: `How often each configuration works${best ? `, with ${best.label}` : ''}`,
-      help: overall ? `Share of the ${NB.grouped(overall.layouts ?? overall.cases)} layouts that can exist; lines are ${Math.round(100 * (this.summary.confidence || 0.95))} % intervals${each}.` : 'Share of the layouts on this page that can exist.',
-      height: NB.dotHeight(8), paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
+      name: `${this.page.name}-configurations`,
+      title: `How often each configuration works${best ? `, with ${best.label}` : ''}`,
+      help: overall
+        ? `Share of the ${NB.grouped(overall.layouts ?? overall.cases)} layouts that can exist; lines are ${Math.round(100 * (this.summary.confidence || 0.95))} % intervals${each}.`
+        : 'Share of the layouts on this page that can exist.',
+      height: NB.dotHeight(8),
+      paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
     });
     return this.study.strip.element;
   }
@@ -155,64 +224,171 @@ NB.Statistics = class {
   sections() {
     const best = this.summary.of_choice ? `, with ${this.summary.of_choice.label}` : '';
     const parts = [
-      ['notes', 'What to keep in mind', true, (notes) => NB.el('ul', { class: 'plain' }, notes.map((note) => NB.el('li', { text: String(note) })))],
+      [
+        'notes',
+        'What to keep in mind',
+        true,
+        (notes) =>
+          NB.el(
+            'ul',
+            { class: 'plain' },
+            notes.map((note) => NB.el('li', { text: String(note) })),
+          ),
+      ],
       ['choices', 'All choices', true, (ranking) => this.choiceTable(ranking)],
       ['replanned', 'What postures alone overstate', true, (found) => this.replanned(found)],
-      ['overall', `What became of the configurations${best}`, true, (overall) => [overall, ...(this.summary.goals || [])].map((counts) => this.outcomes(counts))],
+      [
+        'overall',
+        `What became of the configurations${best}`,
+        true,
+        (overall) => [overall, ...(this.summary.goals || [])].map((counts) => this.outcomes(counts)),
+      ],
       ['evidence', `Cases worth a look${best}`, true, (evidence) => this.evidence(evidence)],
       ['spreads', `Quantiles${best}`, false, (spreads) => this.spreads(spreads)],
       ['effects', `Which factor decides${best ? ', over all choices' : ''}`, false, (effects) => this.effects(effects)],
-      ['regions', `Best configuration by region${best ? ', over all choices' : ''}`, false, (regions) => this.regions(regions)],
+      [
+        'regions',
+        `Best configuration by region${best ? ', over all choices' : ''}`,
+        false,
+        (regions) => this.regions(regions),
+      ],
       ['robustness', 'How far the patient may move', false, (found) => this.robustness(found)],
-      ['methods', 'How the numbers were found', false, (methods) => NB.table('Methods and their sources', [
-        { title: 'Numbers', cell: (m) => m.numbers }, { title: 'Method', text: true, cell: (m) => m.method }, { title: 'Source', text: true, cell: (m) => m.source },
-      ], methods, { class: 'small' })],
+      [
+        'methods',
+        'How the numbers were found',
+        false,
+        (methods) =>
+          NB.table(
+            'Methods and their sources',
+            [
+              { title: 'Numbers', cell: (m) => m.numbers },
+              { title: 'Method', text: true, cell: (m) => m.method },
+              { title: 'Source', text: true, cell: (m) => m.source },
+            ],
+            methods,
+            { class: 'small' },
+          ),
+      ],
     ];
-    const sections = parts.filter(([key]) => this.summary[key] !== undefined && this.summary[key] !== null && this.summary[key].length !== 0).map(([key, title, open, make]) => NB.section(title, open, make(this.summary[key])));
-    return [...sections, NB.section('What each number is', false, this.definitions()), NB.section('Where the numbers come from', false, this.provenance())];
+    const sections = parts
+      .filter(
+        ([key]) => this.summary[key] !== undefined && this.summary[key] !== null && this.summary[key].length !== 0,
+      )
+      .map(([key, title, open, make]) => NB.section(title, open, make(this.summary[key])));
+    return [
+      ...sections,
+      NB.section('What each number is', false, this.definitions()),
+      NB.section('Where the numbers come from', false, this.provenance()),
+    ];
   }
 
   choiceTable({ choices, axes, working_configurations: k, ranked_by: by }) {
     const differs = choices.some((choice) => choice.invalid);
     const hasError = choices.some((choice) => Math.abs(choice.tip_error_mm?.value ?? 0) >= NB.ROUNDING_MM);
-    const quantile = (found) => (found ? NB.el('span', { title: found.interval ? `95 % interval ${NB.threeDigits(found.interval.low)} to ${NB.threeDigits(found.interval.high)}` : found.remark || '', text: NB.threeDigits(found.value) }) : '\u2013');
+    const quantile = (found) =>
+      found
+        ? NB.el('span', {
+            title: found.interval
+              ? `95 % interval ${NB.threeDigits(found.interval.low)} to ${NB.threeDigits(found.interval.high)}`
+              : found.remark || '',
+            text: NB.threeDigits(found.value),
+          })
+        : '\u2013';
     const against = ({ against_first: found }) => {
       if (!found) return '';
       if (!found.distinguishable) return 'not told apart';
       const points = `${NB.fixed(-100 * found.difference, 1)} points`;
-      return found.interval ? `${points} (${NB.fixed(-100 * found.interval.high, 1)} to ${NB.fixed(-100 * found.interval.low, 1)})` : points;
+      return found.interval
+        ? `${points} (${NB.fixed(-100 * found.interval.high, 1)} to ${NB.fixed(-100 * found.interval.low, 1)})`
+        : points;
     };
     const shown = choices.slice(0, 60);
-    return [NB.table(`Choices of ${axes.map((axis) => NB.words(axis.name)).join(' and ')}, by ${by}`, [
-      { title: 'Choice', cell: (c) => c.label },
-      { title: 'Works (95 %)', numeric: true, cell: (c) => this.rate(c.works), help: 'share of the layouts that can exist in which at least one configuration is ok' },
-      { title: `${k} or more work`, numeric: true, cell: (c) => this.rate(c.works_k) },
-      { title: 'Against the first', numeric: true, cell: against },
-      { title: 'Clearance, 5 %', unit: 'mm', numeric: true, cell: (c) => quantile(c.best_clearance_mm), help: '5 % of the layouts that work have less clearance, with the best configuration of each' },
-      ...(hasError ? [{ title: 'Tip error, median', unit: 'mm', numeric: true, cell: (c) => quantile(c.tip_error_mm) }] : []),
-      { title: 'Cases', numeric: true, cell: (c) => NB.grouped(c.cases) },
-      ...(differs ? [{ title: 'Cannot exist', numeric: true, cell: (c) => NB.grouped(c.invalid) }] : []),
-      { title: 'None works in', cell: (c) => this.study.caseButtons((c.failing || []).slice(0, 5)) },
-    ], shown, { class: 'small' }), choices.length > shown.length ? NB.el('p', { class: 'soft small', text: `The first ${shown.length} of ${choices.length}; summary.json has all.` }) : null];
+    return [
+      NB.table(
+        `Choices of ${axes.map((axis) => NB.words(axis.name)).join(' and ')}, by ${by}`,
+        [
+          { title: 'Choice', cell: (c) => c.label },
+          {
+            title: 'Works (95 %)',
+            numeric: true,
+            cell: (c) => this.rate(c.works),
+            help: 'share of the layouts that can exist in which at least one configuration is ok',
+          },
+          { title: `${k} or more work`, numeric: true, cell: (c) => this.rate(c.works_k) },
+          { title: 'Against the first', numeric: true, cell: against },
+          {
+            title: 'Clearance, 5 %',
+            unit: 'mm',
+            numeric: true,
+            cell: (c) => quantile(c.best_clearance_mm),
+            help: '5 % of the layouts that work have less clearance, with the best configuration of each',
+          },
+          ...(hasError
+            ? [{ title: 'Tip error, median', unit: 'mm', numeric: true, cell: (c) => quantile(c.tip_error_mm) }]
+            : []),
+          { title: 'Cases', numeric: true, cell: (c) => NB.grouped(c.cases) },
+          ...(differs ? [{ title: 'Cannot exist', numeric: true, cell: (c) => NB.grouped(c.invalid) }] : []),
+          { title: 'None works in', cell: (c) => this.study.caseButtons((c.failing || []).slice(0, 5)) },
+        ],
+        shown,
+        { class: 'small' },
+      ),
+      choices.length > shown.length
+        ? NB.el('p', {
+            class: 'soft small',
+            text: `The first ${shown.length} of ${choices.length}; summary.json has all.`,
+          })
+        : null,
+    ];
   }
 
   replanned({ cases, of, gaps }) {
-    return NB.table(`${cases} of ${NB.grouped(of)} static cases, drawn at random, with their motions planned too`, [
-      { title: 'Configuration', cell: (g) => g.of }, { title: 'Works by its posture', numeric: true, cell: (g) => g.by_postures }, { title: 'Works with a motion', numeric: true, cell: (g) => g.planned },
-      { title: 'Gap (95 %)', unit: 'points', numeric: true, cell: (g) => (g.interval ? `${NB.fixed(100 * g.gap, 1)} (${this.percents(g.interval)})` : '\u2013') },
-      { title: 'With a motion only', numeric: true, cell: (g) => g.gained },
-    ], gaps, { class: 'small' });
+    return NB.table(
+      `${cases} of ${NB.grouped(of)} static cases, drawn at random, with their motions planned too`,
+      [
+        { title: 'Configuration', cell: (g) => g.of },
+        { title: 'Works by its posture', numeric: true, cell: (g) => g.by_postures },
+        { title: 'Works with a motion', numeric: true, cell: (g) => g.planned },
+        {
+          title: 'Gap (95 %)',
+          unit: 'points',
+          numeric: true,
+          cell: (g) => (g.interval ? `${NB.fixed(100 * g.gap, 1)} (${this.percents(g.interval)})` : '\u2013'),
+        },
+        { title: 'With a motion only', numeric: true, cell: (g) => g.gained },
+      ],
+      gaps,
+      { class: 'small' },
+    );
   }
 
   outcomes(counts) {
-    const why = (c) => (c.details || []).slice(0, 3).map((detail) => `${this.reason(detail)} ${NB.fixed(100 * detail.count / (counts.layouts || 1), 1)} %`).join(', ');
+    const why = (c) =>
+      (c.details || [])
+        .slice(0, 3)
+        .map((detail) => `${this.reason(detail)} ${NB.fixed((100 * detail.count) / (counts.layouts || 1), 1)} %`)
+        .join(', ');
     const layouts = counts.layouts ?? counts.cases - counts.invalid;
-    return NB.table(`${counts.goal ? `Goal ${NB.words(counts.goal)}` : 'All goals'}: ${NB.grouped(layouts)} layouts${counts.invalid ? `, ${NB.grouped(counts.invalid)} more cannot exist` : ''}`, [
-      { title: 'Configuration', cell: (c) => c.label }, { title: 'Works (95 %)', numeric: true, cell: (c) => this.rate(c.success) },
-      { title: 'Works', numeric: true, cell: (c) => NB.grouped(c.ok) }, { title: 'Misses a criterion', numeric: true, cell: (c) => NB.grouped(c.failed) },
-      { title: 'Rejected', numeric: true, cell: (c) => NB.grouped(c.rejected) }, { title: 'Best', numeric: true, cell: (c) => NB.grouped(c.best), help: 'works, and has the largest clearance of those that do' },
-      { title: 'Mostly not, by', text: true, cell: why }, { title: 'Remark', cell: (c) => c.success?.remark || '' },
-    ], counts.configurations, { class: 'small' });
+    return NB.table(
+      `${counts.goal ? `Goal ${NB.words(counts.goal)}` : 'All goals'}: ${NB.grouped(layouts)} layouts${counts.invalid ? `, ${NB.grouped(counts.invalid)} more cannot exist` : ''}`,
+      [
+        { title: 'Configuration', cell: (c) => c.label },
+        { title: 'Works (95 %)', numeric: true, cell: (c) => this.rate(c.success) },
+        { title: 'Works', numeric: true, cell: (c) => NB.grouped(c.ok) },
+        { title: 'Misses a criterion', numeric: true, cell: (c) => NB.grouped(c.failed) },
+        { title: 'Rejected', numeric: true, cell: (c) => NB.grouped(c.rejected) },
+        {
+          title: 'Best',
+          numeric: true,
+          cell: (c) => NB.grouped(c.best),
+          help: 'works, and has the largest clearance of those that do',
+        },
+        { title: 'Mostly not, by', text: true, cell: why },
+        { title: 'Remark', cell: (c) => c.success?.remark || '' },
+      ],
+      counts.configurations,
+      { class: 'small' },
+    );
   }
 
   /** Why a configuration does not work, in words. */
@@ -223,48 +399,121 @@ NB.Statistics = class {
 
   /** A table for each number that is no rounding. */
   spreads(spreads) {
-    const shares = [...new Set(spreads.flatMap((each) => each.quantiles.map((quantile) => quantile.p)))].sort((a, b) => a - b);
+    const shares = [...new Set(spreads.flatMap((each) => each.quantiles.map((quantile) => quantile.p)))].sort(
+      (a, b) => a - b,
+    );
     const names = [...new Set(spreads.map((each) => each.metric))].filter((name) => !this.isExact(name));
     const cell = (found) => {
       if (!found) return '';
-      const interval = found.interval ? `${NB.threeDigits(found.interval.low)} to ${NB.threeDigits(found.interval.high)}` : '';
-      return [NB.threeDigits(found.value), interval ? NB.el('div', { class: 'soft interval', text: interval }) : found.remark ? NB.el('div', { class: 'soft interval', text: '\u2013', title: found.remark }) : ''];
+      const interval = found.interval
+        ? `${NB.threeDigits(found.interval.low)} to ${NB.threeDigits(found.interval.high)}`
+        : '';
+      return [
+        NB.threeDigits(found.value),
+        interval
+          ? NB.el('div', { class: 'soft interval', text: interval })
+          : found.remark
+            ? NB.el('div', { class: 'soft interval', text: '\u2013', title: found.remark })
+            : '',
+      ];
     };
-    return names.map((name) => NB.table(`${this.metric(name)}: quantiles, with their 95 % intervals below`, [
-      { title: 'Of', cell: (s) => ({ best: 'best of each layout' }[s.of] || s.of) }, { title: 'Layouts', numeric: true, cell: (s) => NB.grouped(s.count) },
-      { title: 'Mean', numeric: true, cell: (s) => NB.threeDigits(s.mean) },
-      ...shares.map((p) => ({ title: p === 0 ? 'least' : p === 1 ? 'largest' : `${NB.significant(100 * p)} %`, numeric: true, cell: (s) => cell(s.quantiles.find((quantile) => quantile.p === p)) })),
-    ], spreads.filter((each) => each.metric === name), { class: 'small' }));
+    return names.map((name) =>
+      NB.table(
+        `${this.metric(name)}: quantiles, with their 95 % intervals below`,
+        [
+          { title: 'Of', cell: (s) => ({ best: 'best of each layout' })[s.of] || s.of },
+          { title: 'Layouts', numeric: true, cell: (s) => NB.grouped(s.count) },
+          { title: 'Mean', numeric: true, cell: (s) => NB.threeDigits(s.mean) },
+          ...shares.map((p) => ({
+            title: p === 0 ? 'least' : p === 1 ? 'largest' : `${NB.significant(100 * p)} %`,
+            numeric: true,
+            cell: (s) => cell(s.quantiles.find((quantile) => quantile.p === p)),
+          })),
+        ],
+        spreads.filter((each) => each.metric === name),
+        { class: 'small' },
+      ),
+    );
   }
 
   effects(effects) {
-    const words = { any_works: 'Whether any configuration works', working: 'How many configurations work', best_clearance_mm: 'Clearance of the best configuration (mm)', least_tip_error_mm: 'Least tip error of those that work (mm)' };
-    const title = (name) => words[name] || (name.startsWith('success ') ? `Whether ${name.slice(8)} works` : NB.words(name));
-    const shown = effects.responses.filter((response) => !(response.response.endsWith('_mm') && Math.abs(response.mean ?? 0) < NB.ROUNDING_MM));
-    const share = (m) => (m.share === null ? '\u2013' : m.share <= (m.noise ?? 0) ? 'as chance' : NB.fixed(100 * m.share, 1));
-    return shown.map((response) => NB.el('div', null,
-      NB.table(`${title(response.response)}: share of its variance that a factor explains`, [
-        { title: 'Factor', cell: (m) => NB.words(effects.axes[m.axis].name) },
-        { title: 'Share', unit: '%', numeric: true, cell: share },
-        { title: 'Chance makes up to', unit: '%', numeric: true, cell: (m) => NB.fixed(m.noise === null ? NaN : 100 * m.noise, 1) },
-        { title: 'Mean over the factor', cell: (m) => NB.trend(m.bins.map((bin) => bin.mean)) },
-      ], [...response.main].sort((a, b) => (b.share || 0) - (a.share || 0)), { class: 'small' }),
-      response.interactions.some((m) => m.share > m.noise) ? NB.table(`${title(response.response)}: pairs of factors, beyond each alone`, [
-        { title: 'Factors', cell: (m) => m.axes.map((axis) => NB.words(effects.axes[axis].name)).join(' and ') },
-        { title: 'Share', unit: '%', numeric: true, cell: (m) => NB.fixed(100 * m.share, 1) },
-        { title: 'Chance makes up to', unit: '%', numeric: true, cell: (m) => NB.fixed(100 * m.noise, 1) },
-      ], response.interactions.filter((m) => m.share > m.noise), { class: 'small' }) : null));
+    const words = {
+      any_works: 'Whether any configuration works',
+      working: 'How many configurations work',
+      best_clearance_mm: 'Clearance of the best configuration (mm)',
+      least_tip_error_mm: 'Least tip error of those that work (mm)',
+    };
+    const title = (name) =>
+      words[name] || (name.startsWith('success ') ? `Whether ${name.slice(8)} works` : NB.words(name));
+    const shown = effects.responses.filter(
+      (response) => !(response.response.endsWith('_mm') && Math.abs(response.mean ?? 0) < NB.ROUNDING_MM),
+    );
+    const share = (m) =>
+      m.share === null ? '\u2013' : m.share <= (m.noise ?? 0) ? 'as chance' : NB.fixed(100 * m.share, 1);
+    return shown.map((response) =>
+      NB.el(
+        'div',
+        null,
+        NB.table(
+          `${title(response.response)}: share of its variance that a factor explains`,
+          [
+            { title: 'Factor', cell: (m) => NB.words(effects.axes[m.axis].name) },
+            { title: 'Share', unit: '%', numeric: true, cell: share },
+            {
+              title: 'Chance makes up to',
+              unit: '%',
+              numeric: true,
+              cell: (m) => NB.fixed(m.noise === null ? NaN : 100 * m.noise, 1),
+            },
+            { title: 'Mean over the factor', cell: (m) => NB.trend(m.bins.map((bin) => bin.mean)) },
+          ],
+          [...response.main].sort((a, b) => (b.share || 0) - (a.share || 0)),
+          { class: 'small' },
+        ),
+        response.interactions.some((m) => m.share > m.noise)
+          ? NB.table(
+              `${title(response.response)}: pairs of factors, beyond each alone`,
+              [
+                {
+                  title: 'Factors',
+                  cell: (m) => m.axes.map((axis) => NB.words(effects.axes[axis].name)).join(' and '),
+                },
+                { title: 'Share', unit: '%', numeric: true, cell: (m) => NB.fixed(100 * m.share, 1) },
+                { title: 'Chance makes up to', unit: '%', numeric: true, cell: (m) => NB.fixed(100 * m.noise, 1) },
+              ],
+              response.interactions.filter((m) => m.share > m.noise),
+              { class: 'small' },
+            )
+          : null,
+      ),
+    );
   }
 
   regions(regions) {
-    return regions.maps.filter((map) => map.axes.length === 1).map((map) => {
-      const axis = regions.axes[map.axes[0]];
-      return NB.table(`Over ${NB.words(axis.name)}${axis.unit ? ` (${axis.unit})` : ''}`, [
-        { title: axis.unit ? `From .. to (${axis.unit})` : 'Level', cell: ({ bin }) => (bin.low === null ? NB.words(bin.label) : bin.label) }, { title: 'Layouts', numeric: true, cell: ({ cell }) => NB.grouped(cell.layouts) },
-        { title: 'Any works', unit: '%', numeric: true, cell: ({ cell }) => NB.fixed(100 * cell.working / cell.layouts, 1) },
-        { title: 'Most often the best', cell: ({ cell }) => cell.winner || 'none stands out' },
-      ], map.cells.map((cell, at) => ({ cell, bin: axis.bins[at] })), { class: 'small' });
-    });
+    return regions.maps
+      .filter((map) => map.axes.length === 1)
+      .map((map) => {
+        const axis = regions.axes[map.axes[0]];
+        return NB.table(
+          `Over ${NB.words(axis.name)}${axis.unit ? ` (${axis.unit})` : ''}`,
+          [
+            {
+              title: axis.unit ? `From .. to (${axis.unit})` : 'Level',
+              cell: ({ bin }) => (bin.low === null ? NB.words(bin.label) : bin.label),
+            },
+            { title: 'Layouts', numeric: true, cell: ({ cell }) => NB.grouped(cell.layouts) },
+            {
+              title: 'Any works',
+              unit: '%',
+              numeric: true,
+              cell: ({ cell }) => NB.fixed((100 * cell.working) / cell.layouts, 1),
+            },
+            { title: 'Most often the best', cell: ({ cell }) => cell.winner || 'none stands out' },
+          ],
+          map.cells.map((cell, at) => ({ cell, bin: axis.bins[at] })),
+          { class: 'small' },
+        );
+      });
   }
 
   /** Smallest moves of the patient that break a configuration, no bounds. */
@@ -275,12 +524,26 @@ NB.Statistics = class {
       return `${text}${found.impossible ? '*' : ''}${found.settled ? '' : '?'}`;
     };
     const why = ({ shift, tilt }) => NB.words((shift.found || tilt.found)?.detail || '');
-    return [NB.table('Smallest moves of the patient of the base scenario that were found to break a configuration', [
-      { title: 'Goal', cell: (r) => NB.words(r.goal) }, { title: 'Configuration', cell: (r) => r.configuration },
-      { title: 'Shift', unit: 'mm', numeric: true, cell: (r) => radius(r.shift) }, { title: 'Turn', unit: 'deg', numeric: true, cell: (r) => radius(r.tilt) },
-      { title: 'Breaks', cell: why }, { title: 'Arm stays: shift', unit: 'mm', numeric: true, cell: (r) => radius(r.unaware?.shift) },
-      { title: 'Arm stays: turn', unit: 'deg', numeric: true, cell: (r) => radius(r.unaware?.tilt) },
-    ], results, { class: 'small' }), NB.el('p', { class: 'soft small', text: 'Found by search, so no bounds: a smaller one may exist. * some layouts within cannot exist and count neither way; ? nearer ones were still being found.' })];
+    return [
+      NB.table(
+        'Smallest moves of the patient of the base scenario that were found to break a configuration',
+        [
+          { title: 'Goal', cell: (r) => NB.words(r.goal) },
+          { title: 'Configuration', cell: (r) => r.configuration },
+          { title: 'Shift', unit: 'mm', numeric: true, cell: (r) => radius(r.shift) },
+          { title: 'Turn', unit: 'deg', numeric: true, cell: (r) => radius(r.tilt) },
+          { title: 'Breaks', cell: why },
+          { title: 'Arm stays: shift', unit: 'mm', numeric: true, cell: (r) => radius(r.unaware?.shift) },
+          { title: 'Arm stays: turn', unit: 'deg', numeric: true, cell: (r) => radius(r.unaware?.tilt) },
+        ],
+        results,
+        { class: 'small' },
+      ),
+      NB.el('p', {
+        class: 'soft small',
+        text: 'Found by search, so no bounds: a smaller one may exist. * some layouts within cannot exist and count neither way; ? nearer ones were still being found.',
+      }),
+    ];
   }
 
   /** What each number of a case is, and how fine it is kept here. */
@@ -289,46 +552,134 @@ NB.Statistics = class {
     const rows = [
       { words: 'works', unit: '', text: 'the configuration breaks no rule and misses no criterion of the scenario' },
       { words: 'layout', unit: '', text: 'a case that can exist: where everything stands, with one goal' },
-      { words: 'best of each layout', unit: '', text: 'of the configurations that work the one with the largest clearance' },
-      ...metrics.map((metric) => ({ words: metric.words, unit: metric.unit, text: metric.description, step: metric.column.step })),
-      ...exact.map((metric) => ({ words: metric.words, unit: metric.unit, text: `${metric.description} - nothing but rounding in this study, in which the arm is exact: not shown` })),
-      ...factors.filter((factor) => !factor.levels).map((factor) => ({ words: factor.words, unit: factor.unit, text: 'factor', step: factor.column.step })),
+      {
+        words: 'best of each layout',
+        unit: '',
+        text: 'of the configurations that work the one with the largest clearance',
+      },
+      ...metrics.map((metric) => ({
+        words: metric.words,
+        unit: metric.unit,
+        text: metric.description,
+        step: metric.column.step,
+      })),
+      ...exact.map((metric) => ({
+        words: metric.words,
+        unit: metric.unit,
+        text: `${metric.description} - nothing but rounding in this study, in which the arm is exact: not shown`,
+      })),
+      ...factors
+        .filter((factor) => !factor.levels)
+        .map((factor) => ({ words: factor.words, unit: factor.unit, text: 'factor', step: factor.column.step })),
     ];
-    return NB.table('Definitions; plots and cases of this page are rounded, the tables of statistics are not', [
-      { title: 'Number', cell: (row) => row.words }, { title: 'Unit', cell: (row) => (row.unit === '1' ? '' : row.unit) }, { title: 'What it is', text: true, cell: (row) => row.text },
-      { title: 'Kept to', numeric: true, cell: (row) => (row.step === undefined ? '' : `\u00b1 ${NB.threeDigits(row.step / 2)}`) },
-    ], rows, { class: 'small' });
+    return NB.table(
+      'Definitions; plots and cases of this page are rounded, the tables of statistics are not',
+      [
+        { title: 'Number', cell: (row) => row.words },
+        { title: 'Unit', cell: (row) => (row.unit === '1' ? '' : row.unit) },
+        { title: 'What it is', text: true, cell: (row) => row.text },
+        {
+          title: 'Kept to',
+          numeric: true,
+          cell: (row) => (row.step === undefined ? '' : `\u00b1 ${NB.threeDigits(row.step / 2)}`),
+        },
+      ],
+      rows,
+      { class: 'small' },
+    );
   }
 
   provenance() {
     const { manifest } = this.page;
     const { study_id: id, sampling, repeats } = this.summary;
     const { provenance = {}, inputs = [], seed } = manifest || {};
-    const facts = [['program', provenance.version ? `needlebench ${provenance.version} (source ${provenance.source_sha256?.slice(0, 12) ?? 'not known'})` : null], ['study file', this.page.file], ['seed of the samples', seed ?? provenance.seed],
-      ['arithmetic', provenance.arithmetic], ['sampling', sampling], ['cases of each sampled point', repeats], ['hash of all that decides the results', id]];
-    return NB.el('div', null, NB.el('dl', null, facts.filter(([, value]) => value !== null && value !== undefined).flatMap(([name, value]) => [NB.el('dt', { text: name }), NB.el('dd', { text: String(value) })])),
-      inputs.length ? NB.table('Files that went in', [
-        { title: 'Role', cell: (input) => input.role || '' }, { title: 'File', cell: (input) => input.file }, { title: 'SHA-256', cell: (input) => NB.el('code', { text: input.sha256 }) },
-      ], inputs, { class: 'small' }) : null,
-      NB.el('details', { class: 'no-print' }, NB.el('summary', { text: 'everything that study.json says' }), NB.tree(manifest)));
+    const facts = [
+      [
+        'program',
+        provenance.version
+          ? `needlebench ${provenance.version} (source ${provenance.source_sha256?.slice(0, 12) ?? 'not known'})`
+          : null,
+      ],
+      ['study file', this.page.file],
+      ['seed of the samples', seed ?? provenance.seed],
+      ['arithmetic', provenance.arithmetic],
+      ['sampling', sampling],
+      ['cases of each sampled point', repeats],
+      ['hash of all that decides the results', id],
+    ];
+    return NB.el(
+      'div',
+      null,
+      NB.el(
+        'dl',
+        null,
+        facts
+          .filter(([, value]) => value !== null && value !== undefined)
+          .flatMap(([name, value]) => [NB.el('dt', { text: name }), NB.el('dd', { text: String(value) })]),
+      ),
+      inputs.length
+        ? NB.table(
+            'Files that went in',
+            [
+              { title: 'Role', cell: (input) => input.role || '' },
+              { title: 'File', cell: (input) => input.file },
+              { title: 'SHA-256', cell: (input) => NB.el('code', { text: input.sha256 }) },
+            ],
+            inputs,
+            { class: 'small' },
+          )
+        : null,
+      NB.el(
+        'details',
+        { class: 'no-print' },
+        NB.el('summary', { text: 'everything that study.json says' }),
+        NB.tree(manifest),
+      ),
+    );
   }
 
   /** The cases that show what goes wrong, of the best configuration first. */
   evidence({ invalid = [], fewer_than: fewer = [], configurations = [] }) {
-    const line = (text, cases) => (cases.length ? [NB.el('p', { class: 'small', text }), this.study.caseButtons(cases)] : []);
-    const worst = (each) => each.worst.filter(({ metric }) => !this.isExact(metric)).flatMap(({ metric, cases }) => line(`worst ${this.metric(metric)}: ${cases.map((found) => NB.threeDigits(found.value)).join(', ')}`, cases.map((found) => found.case)));
+    const line = (text, cases) =>
+      cases.length ? [NB.el('p', { class: 'small', text }), this.study.caseButtons(cases)] : [];
+    const worst = (each) =>
+      each.worst
+        .filter(({ metric }) => !this.isExact(metric))
+        .flatMap(({ metric, cases }) =>
+          line(
+            `worst ${this.metric(metric)}: ${cases.map((found) => NB.threeDigits(found.value)).join(', ')}`,
+            cases.map((found) => found.case),
+          ),
+        );
     const of = (each) => [...line('does not work, first cases', each.not_ok || []), ...worst(each)];
     const best = configurations.find((each) => each.of === 'best');
     const others = configurations.filter((each) => each.of !== 'best');
-    return NB.el('div', null, line('no configuration works', fewer[0] || []), line('cannot exist', invalid),
+    return NB.el(
+      'div',
+      null,
+      line('no configuration works', fewer[0] || []),
+      line('cannot exist', invalid),
       best ? worst(best) : null,
-      others.length ? NB.el('details', { class: 'no-print' }, NB.el('summary', { text: 'configuration by configuration' }), others.map((each) => [NB.el('h3', { text: each.of }), of(each)])) : null);
+      others.length
+        ? NB.el(
+            'details',
+            { class: 'no-print' },
+            NB.el('summary', { text: 'configuration by configuration' }),
+            others.map((each) => [NB.el('h3', { text: each.of }), of(each)]),
+          )
+        : null,
+    );
   }
 };
 
 /** A small curve for a table. */
 NB.trend = function (values) {
-  const canvas = NB.el('canvas', { width: '140', height: '26', role: 'img', 'aria-label': values.map((value) => NB.threeDigits(value)).join(', ') });
+  const canvas = NB.el('canvas', {
+    width: '140',
+    height: '26',
+    role: 'img',
+    'aria-label': values.map((value) => NB.threeDigits(value)).join(', '),
+  });
   const context = canvas.getContext('2d');
   const known = values.filter((value) => value !== null);
   const [low, high] = [Math.min(...known), Math.max(...known)];
@@ -338,11 +689,19 @@ NB.trend = function (values) {
   context.beginPath();
   values.forEach((value, k) => {
     if (value === null) return;
-    const x = values.length > 1 ? 4 + 132 * k / (values.length - 1) : 70;
-    const y = high > low ? 22 - 18 * (value - low) / (high - low) : 13;
+    const x = values.length > 1 ? 4 + (132 * k) / (values.length - 1) : 70;
+    const y = high > low ? 22 - (18 * (value - low)) / (high - low) : 13;
     context.lineTo(x, y);
     context.fillRect(x - 1.5, y - 1.5, 3, 3);
   });
   context.stroke();
-  return NB.el('span', null, canvas, NB.el('span', { class: 'soft small', text: known.length ? ` ${NB.threeDigits(low)} to ${NB.threeDigits(high)}` : '' }));
+  return NB.el(
+    'span',
+    null,
+    canvas,
+    NB.el('span', {
+      class: 'soft small',
+      text: known.length ? ` ${NB.threeDigits(low)} to ${NB.threeDigits(high)}` : '',
+    }),
+  );
 };

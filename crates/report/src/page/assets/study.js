@@ -8,8 +8,15 @@ NB.StudyPage = class extends NB.StudyPlots {
     this.summary = page.summary || {};
     this.count = page.kept;
     // Goals have names for files.
-    const levels = (factor) => (factor.name === 'goal' && factor.levels ? factor.levels.map((level) => ({ ...level, label: NB.words(level.label) })) : factor.levels);
-    this.factors = page.factors.map((factor) => ({ ...factor, levels: levels(factor), values: NB.array(factor.column) }));
+    const levels = (factor) =>
+      factor.name === 'goal' && factor.levels
+        ? factor.levels.map((level) => ({ ...level, label: NB.words(level.label) }))
+        : factor.levels;
+    this.factors = page.factors.map((factor) => ({
+      ...factor,
+      levels: levels(factor),
+      values: NB.array(factor.column),
+    }));
     const metrics = page.metrics.map((metric) => ({ ...metric, values: NB.array(metric.column) }));
     // What rounding leaves of an exact arm is no number to be shown.
     this.exact = metrics.filter((metric) => NB.isRounding(metric));
@@ -31,7 +38,9 @@ NB.StudyPage = class extends NB.StudyPlots {
     this.build(app);
   }
 
-  metric(name) { return this.metrics.find((metric) => metric.name === name); }
+  metric(name) {
+    return this.metrics.find((metric) => metric.name === name);
+  }
 
   /** Best configuration and number of working ones, case by case: ok, with the largest clearance. */
   derive() {
@@ -51,12 +60,17 @@ NB.StudyPage = class extends NB.StudyPlots {
         if (!ok[this.outcomes[at]]) continue;
         this.working[index]++;
         const value = clearances.map((metric) => metric.values[at]).find((found) => !Number.isNaN(found)) ?? 0;
-        if (value > most || this.best[index] < 0) { most = value; this.best[index] = c; }
+        if (value > most || this.best[index] < 0) {
+          most = value;
+          this.best[index] = c;
+        }
       }
     }
   }
 
-  caseOf(index) { return this.numbers ? this.numbers[index] : index; }
+  caseOf(index) {
+    return this.numbers ? this.numbers[index] : index;
+  }
 
   indexOf(number) {
     if (!this.numbers) return number >= 0 && number < this.count ? number : -1;
@@ -64,7 +78,8 @@ NB.StudyPage = class extends NB.StudyPlots {
     while (low <= high) {
       const middle = (low + high) >> 1;
       if (this.numbers[middle] === number) return middle;
-      if (this.numbers[middle] < number) low = middle + 1; else high = middle - 1;
+      if (this.numbers[middle] < number) low = middle + 1;
+      else high = middle - 1;
     }
     return -1;
   }
@@ -73,19 +88,37 @@ NB.StudyPage = class extends NB.StudyPlots {
   head() {
     const { cases, kept } = this.page;
     const { criteria = [], verdict, not_judged: open = [], postures_only: postures } = this.summary;
-    const varied = this.factors.filter((factor) => !factor.levels || factor.levels.length > 1).map((factor) => (factor.levels ? `${factor.words} (${factor.levels.length})` : factor.words));
-    return NB.el('div', { class: 'bar' },
-      criteria.length || open.length ? NB.verdict(verdict) : NB.el('span', { class: 'chip off', text: 'no criteria: nothing is judged' }),
+    const varied = this.factors
+      .filter((factor) => !factor.levels || factor.levels.length > 1)
+      .map((factor) => (factor.levels ? `${factor.words} (${factor.levels.length})` : factor.words));
+    return NB.el(
+      'div',
+      { class: 'bar' },
+      criteria.length || open.length
+        ? NB.verdict(verdict)
+        : NB.el('span', { class: 'chip off', text: 'no criteria: nothing is judged' }),
       open.length ? NB.el('span', { class: 'error', text: `not judged: ${open.join('; ')}` }) : null,
       this.posturesChip(),
       NB.el('span', { text: `${NB.grouped(cases)} cases, each with 8 configurations; varied: ${varied.join(', ')}` }),
-      kept < cases ? NB.el('strong', { text: `The plots show ${NB.grouped(kept)} of them: one of each block of successive cases, drawn by a fixed rule, and those that the statistics name. All tables of statistics are of all cases.` }) : null,
-      postures && postures !== 'none' && this.summary.headline ? NB.el('p', { class: 'headline', text: `${this.summary.headline.charAt(0).toUpperCase()}${this.summary.headline.slice(1)}.` }) : null);
+      kept < cases
+        ? NB.el('strong', {
+            text: `The plots show ${NB.grouped(kept)} of them: one of each block of successive cases, drawn by a fixed rule, and those that the statistics name. All tables of statistics are of all cases.`,
+          })
+        : null,
+      postures && postures !== 'none' && this.summary.headline
+        ? NB.el('p', {
+            class: 'headline',
+            text: `${this.summary.headline.charAt(0).toUpperCase()}${this.summary.headline.slice(1)}.`,
+          })
+        : null,
+    );
   }
 
   /** That nothing is known of motions, to stand beside figures. */
   posturesChip() {
-    const text = { all: 'postures only: no motion is planned', some: 'some cases are postures only' }[this.summary.postures_only];
+    const text = { all: 'postures only: no motion is planned', some: 'some cases are postures only' }[
+      this.summary.postures_only
+    ];
     return text ? NB.el('span', { class: 'chip bad', text, title: this.summary.headline || null }) : null;
   }
 
@@ -102,19 +135,29 @@ NB.StudyPage = class extends NB.StudyPlots {
     this.view = this.scene?.view;
     app.append(
       ...this.statistics.first(),
-      NB.el('h2', { class: 'part', text: 'Look into the cases' }), this.controls(), this.shown,
-      NB.el('div', { class: 'explore' },
+      NB.el('h2', { class: 'part', text: 'Look into the cases' }),
+      this.controls(),
+      this.shown,
+      NB.el(
+        'div',
+        { class: 'explore' },
         NB.el('div', null, this.scatter.element, map.element, this.cellPanel),
-        NB.el('div', null, this.scene ? this.scene.element : null, this.casePanel)),
+        NB.el('div', null, this.scene ? this.scene.element : null, this.casePanel),
+      ),
       NB.el('h2', { class: 'part', text: 'How the numbers spread' }),
       NB.el('div', { class: 'bar no-print' }, this.metricSelect),
       NB.el('div', { class: 'pair' }, this.ecdf.element, this.histogram.element),
       NB.el('h2', { class: 'part', text: 'All tables' }),
-      this.tip, ...this.statistics.sections());
+      this.tip,
+      ...this.statistics.sections(),
+    );
     this.redraw();
     const asked = this.indexOf(Number(this.asked.case ?? NaN));
     const noted = this.firstNoted();
-    this.choose(asked >= 0 ? asked : Number.isNaN(noted) ? this.indices[0] ?? 0 : noted, this.state.configuration >= 0 ? this.state.configuration : null);
+    this.choose(
+      asked >= 0 ? asked : Number.isNaN(noted) ? (this.indices[0] ?? 0) : noted,
+      this.state.configuration >= 0 ? this.state.configuration : null,
+    );
     this.started = true;
     NB.address.watch((choices) => this.follow(choices));
   }
@@ -122,16 +165,27 @@ NB.StudyPage = class extends NB.StudyPlots {
   /** What the plots show at first: of the best choice, over numbers; or what the address asks for. */
   startState() {
     this.asked = NB.address.read();
-    const varying = this.factors.map((factor, index) => index).filter((index) => !this.factors[index].levels || this.factors[index].levels.length > 1);
-    const isNumber = (index) => !this.factors[index].levels || this.factors[index].levels.every((level) => level.number !== null);
+    const varying = this.factors
+      .map((factor, index) => index)
+      .filter((index) => !this.factors[index].levels || this.factors[index].levels.length > 1);
+    const isNumber = (index) =>
+      !this.factors[index].levels || this.factors[index].levels.every((level) => level.number !== null);
     const chosen = varying.filter((index) => this.factors[index].role === 'choice' && isNumber(index));
     const numbers = chosen.length > 1 ? chosen : varying.filter((index) => !this.factors[index].levels);
     const order = [...new Set([...numbers, ...varying])];
-    const state = { x: order[0] ?? 0, y: order[1] ?? order[0] ?? 0, color: 'outcome', configuration: -1, metric: (this.metrics.find((metric) => metric.measure === 'clearance') || this.metrics[0])?.name, filters: new Map() };
+    const state = {
+      x: order[0] ?? 0,
+      y: order[1] ?? order[0] ?? 0,
+      color: 'outcome',
+      configuration: -1,
+      metric: (this.metrics.find((metric) => metric.measure === 'clearance') || this.metrics[0])?.name,
+      filters: new Map(),
+    };
     const best = this.summary.choices?.choices?.[0];
     (best ? this.summary.choices.axes : []).forEach((axis, at) => {
       const factor = this.factors[axis.factor];
-      if (factor.levels && !axis.coarse && axis.factor !== state.x && axis.factor !== state.y) state.filters.set(axis.factor, best.bins[at]);
+      if (factor.levels && !axis.coarse && axis.factor !== state.x && axis.factor !== state.y)
+        state.filters.set(axis.factor, best.bins[at]);
     });
     return this.withAddress(state);
   }
@@ -142,7 +196,10 @@ NB.StudyPage = class extends NB.StudyPlots {
     const of = this.page.configurations.indexOf(this.asked.of);
     if (of >= 0) state.configuration = of;
     if (this.asked.of === 'best') state.configuration = -1;
-    for (const axis of ['x', 'y']) { const at = named(this.asked[axis]); if (at >= 0) state[axis] = at; }
+    for (const axis of ['x', 'y']) {
+      const at = named(this.asked[axis]);
+      if (at >= 0) state[axis] = at;
+    }
     const color = this.asked.colour;
     if (['outcome', 'best', 'working'].includes(color) || this.metric(color)) state.color = color;
     if (this.metric(this.asked.metric)) state.metric = this.asked.metric;
@@ -158,9 +215,17 @@ NB.StudyPage = class extends NB.StudyPlots {
   /** Writes what is shown into the address. */
   remember() {
     const { x, y, color, configuration, metric, filters } = this.state;
-    const words = { case: this.caseOf(this.chosen), x: this.factors[x].name, y: this.factors[y].name, colour: color, of: configuration < 0 ? 'best' : this.page.configurations[configuration], metric };
+    const words = {
+      case: this.caseOf(this.chosen),
+      x: this.factors[x].name,
+      y: this.factors[y].name,
+      colour: color,
+      of: configuration < 0 ? 'best' : this.page.configurations[configuration],
+      metric,
+    };
     this.factors.forEach((factor, index) => {
-      if (factor.levels && factor.levels.length > 1) words[`with.${factor.name}`] = filters.has(index) ? factor.levels[filters.get(index)].label : 'all';
+      if (factor.levels && factor.levels.length > 1)
+        words[`with.${factor.name}`] = filters.has(index) ? factor.levels[filters.get(index)].label : 'all';
     });
     NB.address.write(words);
   }
@@ -177,46 +242,146 @@ NB.StudyPage = class extends NB.StudyPlots {
   }
 
   controls() {
-    const options = this.factors.map((factor, index) => [String(index), factor.words]).filter(([index]) => !this.factors[index].levels || this.factors[index].levels.length > 1);
-    const configurations = [['-1', 'best of each layout'], ...this.page.configurations.map((label, index) => [String(index), label])];
-    const colors = [['outcome', 'what became of it'], ['best', 'best configuration'], ['working', 'how many work'], ...this.metricOptions()];
+    const options = this.factors
+      .map((factor, index) => [String(index), factor.words])
+      .filter(([index]) => !this.factors[index].levels || this.factors[index].levels.length > 1);
+    const configurations = [
+      ['-1', 'best of each layout'],
+      ...this.page.configurations.map((label, index) => [String(index), label]),
+    ];
+    const colors = [
+      ['outcome', 'what became of it'],
+      ['best', 'best configuration'],
+      ['working', 'how many work'],
+      ...this.metricOptions(),
+    ];
     this.kept = [];
     const select = (label, choices, value, set) => {
-      const control = NB.select(label, choices, value(), (chosen) => { set(chosen); this.filter(); this.redraw(); this.remember(); });
+      const control = NB.select(label, choices, value(), (chosen) => {
+        set(chosen);
+        this.filter();
+        this.redraw();
+        this.remember();
+      });
       this.kept.push([control, value]);
       return control;
     };
     const { state } = this;
-    const filters = this.factors.map((factor, index) => (factor.levels && factor.levels.length > 1
-      ? select(`${factor.words}:`, [['', 'all'], ...factor.levels.map((level, at) => [String(at), level.label])], () => String(this.state.filters.get(index) ?? ''),
-        (value) => { if (value === '') state.filters.delete(index); else state.filters.set(index, Number(value)); }) : null));
-    this.metricSelect = this.metrics.length ? select('number', this.metricOptions(), () => this.state.metric, (value) => { state.metric = value; }) : null;
-    return NB.el('div', { class: 'bar no-print', role: 'group', 'aria-label': 'What the plots show' },
-      select('across', options, () => String(this.state.x), (value) => { state.x = Number(value); }),
-      select('up', options, () => String(this.state.y), (value) => { state.y = Number(value); }),
-      select('colour', colors, () => this.state.color, (value) => { state.color = value; }),
-      select('of', configurations, () => String(this.state.configuration), (value) => { state.configuration = Number(value); }),
-      filters);
+    const filters = this.factors.map((factor, index) =>
+      factor.levels && factor.levels.length > 1
+        ? select(
+            `${factor.words}:`,
+            [['', 'all'], ...factor.levels.map((level, at) => [String(at), level.label])],
+            () => String(this.state.filters.get(index) ?? ''),
+            (value) => {
+              if (value === '') state.filters.delete(index);
+              else state.filters.set(index, Number(value));
+            },
+          )
+        : null,
+    );
+    this.metricSelect = this.metrics.length
+      ? select(
+          'number',
+          this.metricOptions(),
+          () => this.state.metric,
+          (value) => {
+            state.metric = value;
+          },
+        )
+      : null;
+    return NB.el(
+      'div',
+      { class: 'bar no-print', role: 'group', 'aria-label': 'What the plots show' },
+      select(
+        'across',
+        options,
+        () => String(this.state.x),
+        (value) => {
+          state.x = Number(value);
+        },
+      ),
+      select(
+        'up',
+        options,
+        () => String(this.state.y),
+        (value) => {
+          state.y = Number(value);
+        },
+      ),
+      select(
+        'colour',
+        colors,
+        () => this.state.color,
+        (value) => {
+          state.color = value;
+        },
+      ),
+      select(
+        'of',
+        configurations,
+        () => String(this.state.configuration),
+        (value) => {
+          state.configuration = Number(value);
+        },
+      ),
+      filters,
+    );
   }
 
-  metricOptions() { return this.metrics.map((metric) => [metric.name, this.titleOf(metric)]); }
+  metricOptions() {
+    return this.metrics.map((metric) => [metric.name, this.titleOf(metric)]);
+  }
 
   figureOfMap() {
     this.map = new NB.Figure({
-      name: `${this.page.name}-map`, title: 'Where it works', help: 'Share of the layouts in each cell that work. Click a cell for its cases.',
-      label: 'Map of the share of layouts that work over two factors', height: 400,
-      paint: (...all) => this.paintMap(...all), legend: () => this.mapItems || [],
+      name: `${this.page.name}-map`,
+      title: 'Where it works',
+      help: 'Share of the layouts in each cell that work. Click a cell for its cases.',
+      label: 'Map of the share of layouts that work over two factors',
+      height: 400,
+      paint: (...all) => this.paintMap(...all),
+      legend: () => this.mapItems || [],
     });
     return this.map;
   }
 
   makeFigures() {
     const figure = (which, title, help, label, height, paint) => {
-      this[which] = new NB.Figure({ name: `${this.page.name}-${which}`, title, help, label, height, paint, legend: () => this[`${which}Items`] || [] });
+      this[which] = new NB.Figure({
+        name: `${this.page.name}-${which}`,
+        title,
+        help,
+        label,
+        height,
+        paint,
+        legend: () => this[`${which}Items`] || [],
+      });
     };
-    figure('scatter', 'Cases', 'Each mark is a place, of one case or of several: click it for its cases, or go through the numbers beside it with the arrow keys.', 'Scatter of the cases over two factors', 400, (...all) => this.paintScatter(...all));
-    figure('ecdf', 'Share of layouts below', 'Of the layouts in which the configuration is not rejected. Click a curve for the case at that value.', 'Share of layouts below a value, configuration by configuration', 300, (...all) => this.paintEcdf(...all));
-    figure('histogram', 'Histogram', 'Of the configuration chosen above, where it is not rejected; of the best, where any works.', 'Histogram of a number', 300, (...all) => this.paintHistogram(...all));
+    figure(
+      'scatter',
+      'Cases',
+      'Each mark is a place, of one case or of several: click it for its cases, or go through the numbers beside it with the arrow keys.',
+      'Scatter of the cases over two factors',
+      400,
+      (...all) => this.paintScatter(...all),
+    );
+    figure(
+      'ecdf',
+      'Share of layouts below',
+      'Of the layouts in which the configuration is not rejected. Click a curve for the case at that value.',
+      'Share of layouts below a value, configuration by configuration',
+      300,
+      (...all) => this.paintEcdf(...all),
+    );
+    figure(
+      'histogram',
+      'Histogram',
+      'Of the configuration chosen above, where it is not rejected; of the best, where any works.',
+      'Histogram of a number',
+      300,
+      (...all) => this.paintHistogram(...all),
+    );
     this.shown = NB.el('p', { class: 'soft', role: 'status' });
     this.showCount();
     this.cellPanel = NB.el('div');
@@ -250,7 +415,10 @@ NB.StudyPage = class extends NB.StudyPlots {
       if (value < low) low = value;
       if (value > high) high = value;
     }
-    if (!(low < high)) { low -= 0.5; high += 0.5; }
+    if (!(low < high)) {
+      low -= 0.5;
+      high += 0.5;
+    }
     const bins = Math.min(Math.max(Math.floor(Math.sqrt(this.count / 40)), 4), 16);
     return { low, high, title, labels: null, bins, salt };
   }
@@ -258,7 +426,7 @@ NB.StudyPage = class extends NB.StudyPlots {
   bin(axis, factor, index) {
     const value = factor.values[index];
     if (axis.labels) return value;
-    return Math.min(Math.floor((value - axis.low) / (axis.high - axis.low) * axis.bins), axis.bins - 1);
+    return Math.min(Math.floor(((value - axis.low) / (axis.high - axis.low)) * axis.bins), axis.bins - 1);
   }
 
   filter() {
@@ -274,12 +442,17 @@ NB.StudyPage = class extends NB.StudyPlots {
   }
 
   showCount() {
-    const only = [...this.state.filters].map(([factor, level]) => `${this.factors[factor].words} ${this.factors[factor].levels[level].label}`);
-    const postures = this.summary.postures_only === 'all' ? ' Postures only: whether a motion gets there is not known.' : '';
+    const only = [...this.state.filters].map(
+      ([factor, level]) => `${this.factors[factor].words} ${this.factors[factor].levels[level].label}`,
+    );
+    const postures =
+      this.summary.postures_only === 'all' ? ' Postures only: whether a motion gets there is not known.' : '';
     this.shown.textContent = `${NB.grouped(this.indices.length)} of ${NB.grouped(this.count)} cases are shown${only.length ? `, with ${only.join(', ')}` : ''}.${postures}`;
   }
 
-  redraw() { for (const figure of [this.scatter, this.map, this.ecdf, this.histogram]) figure.draw(); }
+  redraw() {
+    for (const figure of [this.scatter, this.map, this.ecdf, this.histogram]) figure.draw();
+  }
 
   /** Row of the chosen configuration in a case; -1 where none works. */
   row(index) {
@@ -307,7 +480,9 @@ NB.StudyPage = class extends NB.StudyPlots {
       this.tip.style.left = `${Math.max(Math.min(event.pageX + 14, document.documentElement.clientWidth - this.tip.offsetWidth - 4), 0)}px`;
       this.tip.style.top = `${event.pageY + 12}px`;
     });
-    canvas.canvas.addEventListener('pointerleave', () => { this.tip.hidden = true; });
+    canvas.canvas.addEventListener('pointerleave', () => {
+      this.tip.hidden = true;
+    });
     canvas.canvas.addEventListener('click', (event) => at(event)?.choose());
   }
 
@@ -320,16 +495,25 @@ NB.StudyPage = class extends NB.StudyPlots {
       const dx = axes.px(places.x[place]) - x;
       if (dx > 12 || dx < -12) continue;
       const dy = axes.py(places.y[place]) - y;
-      if (dx * dx + dy * dy < least) { least = dx * dx + dy * dy; best = place; }
+      if (dx * dx + dy * dy < least) {
+        least = dx * dx + dy * dy;
+        best = place;
+      }
     }
     if (best < 0) return null;
     const first = places.first[best];
     if (places.counts[best] === 1) {
-      return { text: `case ${this.caseOf(first)}: ${this.outcome(first)}, ${this.working[first]} of 8 configurations work`, choose: () => this.choose(first) };
+      return {
+        text: `case ${this.caseOf(first)}: ${this.outcome(first)}, ${this.working[first]} of 8 configurations work`,
+        choose: () => this.choose(first),
+      };
     }
     const here = [...this.indices].filter((_, at) => places.of[at] === best);
     const working = here.filter((index) => this.outcome(index) === 'ok').length;
-    return { text: `${here.length} cases at this place: ${working} work`, choose: () => this.list(here, 'at this place') };
+    return {
+      text: `${here.length} cases at this place: ${working} work`,
+      choose: () => this.list(here, 'at this place'),
+    };
   }
 
   nearestOnCurve(px, py) {
@@ -342,7 +526,11 @@ NB.StudyPage = class extends NB.StudyPlots {
       if (!values.length) return;
       const at = Math.min(Math.max(Math.round(share * values.length - 0.5), 0), values.length - 1);
       const away = Math.abs(axes.px(values[at]) - px);
-      if (away < least) { least = away; best = c; where = values[at]; }
+      if (away < least) {
+        least = away;
+        best = c;
+        where = values[at];
+      }
     });
     if (best < 0) return null;
     return {
@@ -351,7 +539,10 @@ NB.StudyPage = class extends NB.StudyPlots {
         let [found, nearest] = [-1, Infinity];
         for (const index of this.indices) {
           const away = Math.abs(metric.values[best * this.count + index] - where);
-          if (away < nearest) { nearest = away; found = index; }
+          if (away < nearest) {
+            nearest = away;
+            found = index;
+          }
         }
         if (found >= 0) this.choose(found, best);
       },
@@ -361,12 +552,14 @@ NB.StudyPage = class extends NB.StudyPlots {
   cellAt(x, y) {
     if (!this.mapCells) return null;
     const { axes, nx, ny, ok, of } = this.mapCells;
-    const cx = Math.floor((x - axes.box.left) / axes.box.width * nx);
-    const cy = Math.floor((axes.box.top + axes.box.height - y) / axes.box.height * ny);
+    const cx = Math.floor(((x - axes.box.left) / axes.box.width) * nx);
+    const cy = Math.floor(((axes.box.top + axes.box.height - y) / axes.box.height) * ny);
     if (cx < 0 || cy < 0 || cx >= nx || cy >= ny) return null;
     const cell = cy * nx + cx;
     return {
-      text: of[cell] ? `${ok[cell]} of ${of[cell]} layouts work (${Math.round(100 * ok[cell] / of[cell])} %)` : 'no layouts',
+      text: of[cell]
+        ? `${ok[cell]} of ${of[cell]} layouts work (${Math.round((100 * ok[cell]) / of[cell])} %)`
+        : 'no layouts',
       choose: () => this.listCell(cx, cy),
     };
   }
@@ -374,30 +567,54 @@ NB.StudyPage = class extends NB.StudyPlots {
   listCell(cx, cy) {
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
-    this.list([...this.indices].filter((index) => this.bin(xAxis, xFactor, index) === cx && this.bin(yAxis, yFactor, index) === cy), 'in this cell');
+    this.list(
+      [...this.indices].filter(
+        (index) => this.bin(xAxis, xFactor, index) === cx && this.bin(yAxis, yFactor, index) === cy,
+      ),
+      'in this cell',
+    );
   }
 
   /** The first cases of a place or a cell, those that do not work first. */
   list(inside, where) {
     inside.sort((a, b) => Number(this.outcome(a) === 'ok') - Number(this.outcome(b) === 'ok') || a - b);
-    NB.clear(this.cellPanel, NB.el('p', { class: 'small', text: `${inside.length} cases ${where}; the first 40, those that do not work before others:` }),
-      this.caseButtons(inside.slice(0, 40).map((index) => this.caseOf(index))));
+    NB.clear(
+      this.cellPanel,
+      NB.el('p', {
+        class: 'small',
+        text: `${inside.length} cases ${where}; the first 40, those that do not work before others:`,
+      }),
+      this.caseButtons(inside.slice(0, 40).map((index) => this.caseOf(index))),
+    );
     if (inside.length) this.choose(inside[0]);
   }
 
   caseButtons(numbers) {
     const buttons = numbers.map((number) => {
       const index = this.indexOf(number);
-      return NB.el('button', { type: 'button', class: 'key', disabled: index < 0, title: index < 0 ? 'not on this page' : null, 'aria-label': `Case ${number}`, onclick: () => this.choose(index) }, String(number));
+      return NB.el(
+        'button',
+        {
+          type: 'button',
+          class: 'key',
+          disabled: index < 0,
+          title: index < 0 ? 'not on this page' : null,
+          'aria-label': `Case ${number}`,
+          onclick: () => this.choose(index),
+        },
+        String(number),
+      );
     });
-    buttons.forEach((button, at) => button.addEventListener('keydown', (event) => {
-      const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
-      const next = step && buttons[at + step];
-      if (!next || next.disabled) return;
-      event.preventDefault();
-      next.focus();
-      next.click();
-    }));
+    buttons.forEach((button, at) =>
+      button.addEventListener('keydown', (event) => {
+        const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+        const next = step && buttons[at + step];
+        if (!next || next.disabled) return;
+        event.preventDefault();
+        next.focus();
+        next.click();
+      }),
+    );
     return NB.el('div', { class: 'legend', role: 'group', 'aria-label': 'Cases' }, buttons);
   }
 
@@ -405,35 +622,70 @@ NB.StudyPage = class extends NB.StudyPlots {
     this.chosen = index;
     this.scatter.draw();
     const number = this.caseOf(index);
-    const row = configuration ?? (this.state.configuration >= 0 ? this.state.configuration : Math.max(this.best[index], 0));
+    const row =
+      configuration ?? (this.state.configuration >= 0 ? this.state.configuration : Math.max(this.best[index], 0));
     const columns = [
       { title: 'Configuration', cell: (c) => this.page.configurations[c] },
       { title: 'Outcome', cell: (c) => this.outcomeText(index, c) },
-      ...this.metrics.map((metric) => ({ title: this.titleOf(metric), numeric: true, help: metric.description, cell: (c) => NB.threeDigits(metric.values[c * this.count + index]) })),
+      ...this.metrics.map((metric) => ({
+        title: this.titleOf(metric),
+        numeric: true,
+        help: metric.description,
+        cell: (c) => NB.threeDigits(metric.values[c * this.count + index]),
+      })),
     ];
     const table = NB.table('Row: show its posture', columns, [0, 1, 2, 3, 4, 5, 6, 7], { class: 'choose small full' });
     const rows = [...table.querySelectorAll('tbody tr')];
-    NB.rows(rows, (c) => { NB.mark(rows, c); this.pose(index, c); });
+    NB.rows(rows, (c) => {
+      NB.mark(rows, c);
+      this.pose(index, c);
+    });
     NB.mark(rows, row);
     const file = /^[\w./-]+$/.test(this.page.file) ? this.page.file : `'${this.page.file.replaceAll("'", "'\\''")}'`;
     const command = `needlebench study ${file} --case ${number}`;
     const copied = NB.el('span', { class: 'soft', role: 'status' });
     const input = NB.el('input', {
-      type: 'number', min: '0', max: String(this.page.cases - 1), value: String(number), 'aria-label': 'Number of the case', style: 'width: 8em',
+      type: 'number',
+      min: '0',
+      max: String(this.page.cases - 1),
+      value: String(number),
+      'aria-label': 'Number of the case',
+      style: 'width: 8em',
       onchange: (event) => {
         const to = this.indexOf(Number(event.target.value));
-        if (to >= 0) this.choose(to); else copied.textContent = 'that case is not on this page; the command reruns any';
+        if (to >= 0) this.choose(to);
+        else copied.textContent = 'that case is not on this page; the command reruns any';
       },
     });
-    const elsewhere = this.indices.indexOf(index) < 0 ? NB.el('p', { class: 'soft small', text: 'The filters above leave this case out of the plots.' }) : null;
-    NB.clear(this.casePanel, NB.el('h3', null, 'Case ', input), elsewhere,
-      NB.el('dl', null, this.factors.flatMap((factor) => {
-        const value = factor.values[index];
-        const text = factor.levels ? factor.levels[value].label : `${NB.fixed(value, 2)} ${factor.unit}`;
-        return [NB.el('dt', { text: factor.words }), NB.el('dd', { text })];
-      })), table,
-      NB.el('p', { class: 'small' }, 'To the last digit, and with all columns: ', NB.el('code', { text: command }), ' ',
-        NB.el('button', { type: 'button', class: 'no-print', onclick: () => this.copy(command, copied) }, 'Copy'), ' ', copied));
+    const elsewhere =
+      this.indices.indexOf(index) < 0
+        ? NB.el('p', { class: 'soft small', text: 'The filters above leave this case out of the plots.' })
+        : null;
+    NB.clear(
+      this.casePanel,
+      NB.el('h3', null, 'Case ', input),
+      elsewhere,
+      NB.el(
+        'dl',
+        null,
+        this.factors.flatMap((factor) => {
+          const value = factor.values[index];
+          const text = factor.levels ? factor.levels[value].label : `${NB.fixed(value, 2)} ${factor.unit}`;
+          return [NB.el('dt', { text: factor.words }), NB.el('dd', { text })];
+        }),
+      ),
+      table,
+      NB.el(
+        'p',
+        { class: 'small' },
+        'To the last digit, and with all columns: ',
+        NB.el('code', { text: command }),
+        ' ',
+        NB.el('button', { type: 'button', class: 'no-print', onclick: () => this.copy(command, copied) }, 'Copy'),
+        ' ',
+        copied,
+      ),
+    );
     this.pose(index, row);
     if (this.started) this.remember();
   }
@@ -443,7 +695,10 @@ NB.StudyPage = class extends NB.StudyPlots {
     const style = { ok: 'good', failed: 'bad', rejected: 'off', invalid: 'off' }[outcome];
     const sign = { ok: '\u2713', failed: '\u2717', rejected: '\u2013', invalid: '\u2205' }[outcome];
     const name = { ok: 'works', failed: 'misses a criterion', rejected: 'rejected', invalid: 'cannot exist' }[outcome];
-    return [NB.el('span', { class: style, text: `${sign} ${name}` }), words ? NB.el('div', { class: 'soft', text: words }) : ''];
+    return [
+      NB.el('span', { class: style, text: `${sign} ${name}` }),
+      words ? NB.el('div', { class: 'soft', text: words }) : '',
+    ];
   }
 
   async copy(text, status) {
@@ -459,7 +714,10 @@ NB.StudyPage = class extends NB.StudyPlots {
   pose(index, c) {
     if (!this.scene) return;
     const at = this.posed.get(index);
-    const joints = at === undefined ? null : Array.from(this.poses.subarray((8 * at + c) * 6, (8 * at + c) * 6 + 6), (value) => value * Math.PI / 180);
+    const joints =
+      at === undefined
+        ? null
+        : Array.from(this.poses.subarray((8 * at + c) * 6, (8 * at + c) * 6 + 6), (value) => (value * Math.PI) / 180);
     this.scene.show(at, joints, `${this.page.configurations[c]} in case ${this.caseOf(index)}`);
   }
 };
@@ -476,4 +734,6 @@ NB.isRounding = function ({ unit, values }) {
   return any;
 };
 
-NB.start((page, app) => { NB.current = new NB.StudyPage(page, app); });
+NB.start((page, app) => {
+  NB.current = new NB.StudyPage(page, app);
+});

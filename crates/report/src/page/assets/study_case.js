@@ -8,7 +8,14 @@ NB.CaseScene = class {
     this.page = page;
     this.looks = looks;
     const codes = (name) => NB.array(looks[name]);
-    [this.arms, this.toolOf, this.thingCodes, this.places, this.bases, this.targets] = ['arms', 'toolOf', 'things', 'places', 'bases', 'targets'].map(codes);
+    [this.arms, this.toolOf, this.thingCodes, this.places, this.bases, this.targets] = [
+      'arms',
+      'toolOf',
+      'things',
+      'places',
+      'bases',
+      'targets',
+    ].map(codes);
     // Every tool is fixed to the flange; that of the case alone is seen.
     const tools = looks.tools.flatMap((tool, at) => tool.parts.map((part) => ({ ...part, group: `tool@${at}` })));
     this.view = new NB.View({ ...scene, parts: [...scene.parts, ...tools] }, 'Posture of the chosen configuration');
@@ -17,12 +24,24 @@ NB.CaseScene = class {
     this.gantry = NB.checkbox('gantry', false, () => this.again());
     this.skin = NB.checkbox('skin', true, () => this.again());
     this.note = NB.el('p', { class: 'soft small', role: 'status' });
-    this.element = NB.el('div', { class: 'panel' }, this.view.element,
-      NB.el('div', { class: 'legend no-print', role: 'group', 'aria-label': 'Parts of the picture' }, this.gantry, this.skin), this.note);
+    this.element = NB.el(
+      'div',
+      { class: 'panel' },
+      this.view.element,
+      NB.el(
+        'div',
+        { class: 'legend no-print', role: 'group', 'aria-label': 'Parts of the picture' },
+        this.gantry,
+        this.skin,
+      ),
+      this.note,
+    );
     this.made = new Map();
   }
 
-  again() { if (this.last) this.show(...this.last); }
+  again() {
+    if (this.last) this.show(...this.last);
+  }
 
   /** `at` is the place of the case among the posed ones, none of one without postures; joints in radians. */
   show(at, joints, title, about = null) {
@@ -49,7 +68,9 @@ NB.CaseScene = class {
     this.arm.pose(chain, joints);
     if (tool === null) return;
     const flange = NB.forward(chain, joints)[6];
-    const [entry, exit] = this.looks.tools[tool].guide.map((pose) => new THREE.Vector3(pose[0], pose[1], pose[2]).applyMatrix4(flange).toArray());
+    const [entry, exit] = this.looks.tools[tool].guide.map((pose) =>
+      new THREE.Vector3(pose[0], pose[1], pose[2]).applyMatrix4(flange).toArray(),
+    );
     const target = Array.from(this.targets.subarray(3 * at, 3 * at + 3));
     // From behind the guide to the target.
     const behind = entry.map((value, k) => value + 0.6 * (value - exit[k]));
@@ -65,7 +86,10 @@ NB.CaseScene = class {
     for (let slot = 0; slot < slots; slot++) {
       const kind = this.thingCodes[slots * at + slot];
       if (kind === 254) continue;
-      if (kind >= kinds.length) { this.missing++; continue; }
+      if (kind >= kinds.length) {
+        this.missing++;
+        continue;
+      }
       const group = this.thing(slot, kind);
       group.visible = true;
       group.matrix.copy(NB.matrix(this.places.subarray(7 * (slots * at + slot), 7 * (slots * at + slot) + 7)));
@@ -75,7 +99,8 @@ NB.CaseScene = class {
         mesh.visible = !hidden || hidden.querySelector('input').checked;
       }
     }
-    if (this.missing) this.note.textContent += ` ${this.missing} of the things that stand about the arm in this case are not on the page, and are not drawn.`;
+    if (this.missing)
+      this.note.textContent += ` ${this.missing} of the things that stand about the arm in this case are not on the page, and are not drawn.`;
   }
 
   /** The surfaces of a kind in a slot, made when they are first seen. */
@@ -102,11 +127,15 @@ NB.CaseScene = class {
     const base = Array.from(this.bases.subarray(7 * at, 7 * at + 7));
     const target = Array.from(this.targets.subarray(3 * at, 3 * at + 3));
     const near = Number.isNaN(target[0]) ? [] : [target.map((v) => v - 0.25), target.map((v) => v + 0.25)];
-    this.view.frame([...NB.aboutBase(base, 0.5), ...near], near.length ? NB.direction(base, target, [0, 0, -1]) : [-0.75, 0.45, -0.55]);
+    this.view.frame(
+      [...NB.aboutBase(base, 0.5), ...near],
+      near.length ? NB.direction(base, target, [0, 0, -1]) : [-0.75, 0.45, -0.55],
+    );
   }
 
   words(at, title, { has, known, own, hasTool }) {
-    if (at === undefined) return 'The posture of this case is not on the page (it holds some thousand): the command beside it makes it anew.';
+    if (at === undefined)
+      return 'The posture of this case is not on the page (it holds some thousand): the command beside it makes it anew.';
     if (!known) return 'This layout cannot exist: there is nothing to draw.';
     if (!own) return 'This case has another arm than the page holds: it is not drawn. --run makes a page of it.';
     if (!has) return `${title} has no posture. Patient and surroundings are those of this case.`;

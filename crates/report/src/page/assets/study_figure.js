@@ -14,9 +14,14 @@ NB.Figure = class {
       this.showLegend();
     });
     const saved = NB.saveButton('SVG', title, () => [`${NB.fileName(name)}.svg`, this.svg(), 'image/svg+xml']);
-    this.element = NB.el('section', { class: 'panel points' },
+    this.element = NB.el(
+      'section',
+      { class: 'panel points' },
       NB.el('div', { class: 'figure-head' }, NB.el('h3', { text: title }), saved),
-      help ? NB.el('p', { class: 'soft small', text: help }) : null, this.canvas.element, this.legendElement);
+      help ? NB.el('p', { class: 'soft small', text: help }) : null,
+      this.canvas.element,
+      this.legendElement,
+    );
     if (typeof height === 'function') {
       new ResizeObserver(() => {
         const wanted = `${this.heightAt(this.canvas.element.clientWidth)}px`;
@@ -25,26 +30,37 @@ NB.Figure = class {
     }
   }
 
-  heightAt(width) { return typeof this.height === 'function' ? this.height(width) : this.height; }
+  heightAt(width) {
+    return typeof this.height === 'function' ? this.height(width) : this.height;
+  }
 
-  draw() { this.canvas.draw(); }
+  draw() {
+    this.canvas.draw();
+  }
 
-  render() { this.canvas.render(); }
+  render() {
+    this.canvas.render();
+  }
 
-  get paintedInMs() { return this.canvas.paintedInMs; }
+  get paintedInMs() {
+    return this.canvas.paintedInMs;
+  }
 
   showLegend() {
     const items = this.legend ? this.legend() : [];
-    NB.clear(this.legendElement, items.map((item) => {
-      const canvas = NB.el('canvas', { width: item.color ? '120' : '18', height: '14', 'aria-hidden': 'true' });
-      const context = canvas.getContext('2d');
-      if (!item.color) {
-        item.draw(context, 9, 7);
-        return NB.el('span', { class: 'key' }, canvas, item.text);
-      }
-      this.scale(context, item, 0, 1, 120);
-      return NB.el('span', { class: 'key' }, `${item.text}: ${item.low}`, canvas, item.high);
-    }));
+    NB.clear(
+      this.legendElement,
+      items.map((item) => {
+        const canvas = NB.el('canvas', { width: item.color ? '120' : '18', height: '14', 'aria-hidden': 'true' });
+        const context = canvas.getContext('2d');
+        if (!item.color) {
+          item.draw(context, 9, 7);
+          return NB.el('span', { class: 'key' }, canvas, item.text);
+        }
+        this.scale(context, item, 0, 1, 120);
+        return NB.el('span', { class: 'key' }, `${item.text}: ${item.low}`, canvas, item.high);
+      }),
+    );
   }
 
   scale(context, { color }, x, y, width) {
@@ -57,9 +73,20 @@ NB.Figure = class {
   /** The figure for a column of a journal, with its legend below it. */
   svg() {
     const width = NB.COLUMN.px;
-    const legend = (this.legend ? this.legend() : []).map((item) => (item.color
-      ? { text: `${item.text}: ${item.low} to ${item.high}`, draw: (context, x, y) => this.scale(context, item, x - 15, y - 6, 30) } : item));
-    return NB.paper(this.title, this.paint, Math.min(this.heightAt(width), 0.85 * width + 40), legend.flatMap(NB.folded));
+    const legend = (this.legend ? this.legend() : []).map((item) =>
+      item.color
+        ? {
+            text: `${item.text}: ${item.low} to ${item.high}`,
+            draw: (context, x, y) => this.scale(context, item, x - 15, y - 6, 30),
+          }
+        : item,
+    );
+    return NB.paper(
+      this.title,
+      this.paint,
+      Math.min(this.heightAt(width), 0.85 * width + 40),
+      legend.flatMap(NB.folded),
+    );
   }
 };
 
@@ -69,7 +96,8 @@ NB.folded = function (item) {
   const lines = [''];
   for (const word of item.text.split(' ')) {
     const longer = `${lines.at(-1)} ${word}`.trim();
-    if (ruler.measureText(longer).width <= NB.COLUMN.px - 48) lines[lines.length - 1] = longer; else lines.push(word);
+    if (ruler.measureText(longer).width <= NB.COLUMN.px - 48) lines[lines.length - 1] = longer;
+    else lines.push(word);
   }
   return lines.map((text, at) => ({ text, draw: at ? () => {} : item.draw }));
 };
@@ -101,13 +129,19 @@ NB.dotPlot = function (context, width, height, rows, x) {
       context.lineWidth = 1.4;
       const [a, b] = [axes.px(interval.low), axes.px(interval.high)];
       context.beginPath();
-      context.moveTo(a, y); context.lineTo(b, y);
-      for (const end of [a, b]) { context.moveTo(end, y - 4); context.lineTo(end, y + 4); }
+      context.moveTo(a, y);
+      context.lineTo(b, y);
+      for (const end of [a, b]) {
+        context.moveTo(end, y - 4);
+        context.lineTo(end, y + 4);
+      }
       context.stroke();
     }
     if (known) {
       context.fillStyle = color;
-      context.beginPath(); context.arc(axes.px(value), y, 4.5, 0, 2 * Math.PI); context.fill();
+      context.beginPath();
+      context.arc(axes.px(value), y, 4.5, 0, 2 * Math.PI);
+      context.fill();
     }
     context.fillStyle = '#111';
     context.textBaseline = 'middle';

@@ -3,13 +3,30 @@
 
 /** Colours and dashes of the eight configurations. */
 NB.configurationStyles = [
-  { color: '#0072b2', dash: [] }, { color: '#e69f00', dash: [] }, { color: '#009e73', dash: [] }, { color: '#cc79a7', dash: [] },
-  { color: '#56b4e9', dash: [6, 3] }, { color: '#d55e00', dash: [6, 3] }, { color: '#000000', dash: [6, 3] }, { color: '#8a7a00', dash: [6, 3] },
+  { color: '#0072b2', dash: [] },
+  { color: '#e69f00', dash: [] },
+  { color: '#009e73', dash: [] },
+  { color: '#cc79a7', dash: [] },
+  { color: '#56b4e9', dash: [6, 3] },
+  { color: '#d55e00', dash: [6, 3] },
+  { color: '#000000', dash: [6, 3] },
+  { color: '#8a7a00', dash: [6, 3] },
 ];
 
 /** Viridis, sampled; for shares and numbers. */
 NB.viridis = function (share) {
-  const stops = [[68, 1, 84], [72, 40, 120], [62, 74, 137], [49, 104, 142], [38, 130, 142], [31, 158, 137], [53, 183, 121], [109, 205, 89], [180, 222, 44], [253, 231, 37]];
+  const stops = [
+    [68, 1, 84],
+    [72, 40, 120],
+    [62, 74, 137],
+    [49, 104, 142],
+    [38, 130, 142],
+    [31, 158, 137],
+    [53, 183, 121],
+    [109, 205, 89],
+    [180, 222, 44],
+    [253, 231, 37],
+  ];
   const at = Math.min(Math.max(share, 0), 1) * (stops.length - 1);
   const low = Math.min(Math.floor(at), stops.length - 2);
   return stops[low].map((value, k) => Math.round(value + (stops[low + 1][k] - value) * (at - low)));
@@ -21,8 +38,8 @@ NB.grouped = (value) => value.toLocaleString('en').replaceAll(',', '\u202f');
 /** Fixed scatter of points that share a level, so that they can be told apart: 0 to 1. */
 NB.jitter = (index, salt) => {
   let x = Math.imul(index + 1, 0x9e3779b1) ^ Math.imul(salt + 1, 0x85ebca6b);
-  x = Math.imul(x ^ x >>> 15, 0x2c1b3c6d);
-  return ((x ^ x >>> 13) >>> 0) / 4294967296;
+  x = Math.imul(x ^ (x >>> 15), 0x2c1b3c6d);
+  return ((x ^ (x >>> 13)) >>> 0) / 4294967296;
 };
 
 NB.rgb = ([r, g, b]) => `rgb(${r}, ${g}, ${b})`;
@@ -38,29 +55,75 @@ NB.StudyPlots = class {
   /** Kinds of cases with their colours, `of` the kind of a case, or a `scale` and the `value` of a case. */
   coloring() {
     const { color } = this.state;
-    const [blue, red, orange, grey] = [[0, 114, 178], [213, 94, 0], [230, 159, 0], [150, 150, 150]];
+    const [blue, red, orange, grey] = [
+      [0, 114, 178],
+      [213, 94, 0],
+      [230, 159, 0],
+      [150, 150, 150],
+    ];
     if (color === 'outcome') {
-      const kinds = this.state.configuration < 0
-        ? [['ok', blue, 'square', 'works'], ['none works', red, 'cross', 'none works'], ['invalid', grey, 'dot', 'cannot exist']]
-        : [['ok', blue, 'square', 'works'], ['failed', orange, 'triangle', 'misses a criterion'], ['rejected', red, 'cross', 'rejected'], ['invalid', grey, 'dot', 'cannot exist']];
+      const kinds =
+        this.state.configuration < 0
+          ? [
+              ['ok', blue, 'square', 'works'],
+              ['none works', red, 'cross', 'none works'],
+              ['invalid', grey, 'dot', 'cannot exist'],
+            ]
+          : [
+              ['ok', blue, 'square', 'works'],
+              ['failed', orange, 'triangle', 'misses a criterion'],
+              ['rejected', red, 'cross', 'rejected'],
+              ['invalid', grey, 'dot', 'cannot exist'],
+            ];
       const at = new Map(kinds.map(([name], index) => [name, index]));
       return { kinds, of: (index) => at.get(this.outcome(index)) ?? kinds.length - 1 };
     }
     if (color === 'best') {
       const hex = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
-      const kinds = [...this.page.configurations.map((label, c) => [label, hex(NB.configurationStyles[c].color), c % 2 ? 'triangle' : 'square', label]), ['none works', [190, 190, 190], 'dot', 'none works']];
+      const kinds = [
+        ...this.page.configurations.map((label, c) => [
+          label,
+          hex(NB.configurationStyles[c].color),
+          c % 2 ? 'triangle' : 'square',
+          label,
+        ]),
+        ['none works', [190, 190, 190], 'dot', 'none works'],
+      ];
       return { kinds, of: (index) => (this.best[index] < 0 ? 8 : this.best[index]) };
     }
     if (color === 'working') {
-      return { low: 0, high: 8, scale: { low: '0', high: '8', text: 'configurations that work' }, value: (index) => (this.invalid[index] ? NaN : this.working[index]) };
+      return {
+        low: 0,
+        high: 8,
+        scale: { low: '0', high: '8', text: 'configurations that work' },
+        value: (index) => (this.invalid[index] ? NaN : this.working[index]),
+      };
     }
     const metric = this.metric(color);
-    const value = (index) => { const row = this.row(index); return row < 0 ? NaN : metric.values[row]; };
+    const value = (index) => {
+      const row = this.row(index);
+      return row < 0 ? NaN : metric.values[row];
+    };
     const shown = [];
-    for (const index of this.indices) { const each = value(index); if (!Number.isNaN(each)) shown.push(each); }
+    for (const index of this.indices) {
+      const each = value(index);
+      if (!Number.isNaN(each)) shown.push(each);
+    }
     shown.sort((a, b) => a - b);
-    const [low, high] = [shown[Math.floor(0.01 * shown.length)] ?? 0, shown[Math.floor(0.99 * (shown.length - 1))] ?? 1];
-    return { low, high, value, scale: { low: `\u2264 ${NB.threeDigits(low)}`, high: `\u2265 ${NB.threeDigits(high)}`, text: this.titleOf(metric) } };
+    const [low, high] = [
+      shown[Math.floor(0.01 * shown.length)] ?? 0,
+      shown[Math.floor(0.99 * (shown.length - 1))] ?? 1,
+    ];
+    return {
+      low,
+      high,
+      value,
+      scale: {
+        low: `\u2264 ${NB.threeDigits(low)}`,
+        high: `\u2265 ${NB.threeDigits(high)}`,
+        text: this.titleOf(metric),
+      },
+    };
   }
 
   /** The places of the shown cases over two factors: cases of the same place are drawn as one mark. */
@@ -68,14 +131,19 @@ NB.StudyPlots = class {
     if (this.placed) return this.placed;
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
-    const code = ({ column, levels }, value) => (levels ? value : Math.round((value - column.low) / (column.step || 1)));
+    const code = ({ column, levels }, value) =>
+      levels ? value : Math.round((value - column.low) / (column.step || 1));
     const known = new Map();
     const first = [];
     const of = new Uint32Array(this.indices.length);
     this.indices.forEach((index, at) => {
       const key = code(xFactor, xFactor.values[index]) * 65537 + code(yFactor, yFactor.values[index]);
       let place = known.get(key);
-      if (place === undefined) { place = first.length; known.set(key, place); first.push(index); }
+      if (place === undefined) {
+        place = first.length;
+        known.set(key, place);
+        first.push(index);
+      }
       of[at] = place;
     });
     const counts = new Uint32Array(first.length);
@@ -88,14 +156,26 @@ NB.StudyPlots = class {
     };
     let most = 0;
     for (const count of counts) most = Math.max(most, count);
-    this.placed = { of, first, counts, most, x: first.map((index) => where(xAxis, xFactor, index)), y: first.map((index) => where(yAxis, yFactor, index)), grid };
+    this.placed = {
+      of,
+      first,
+      counts,
+      most,
+      x: first.map((index) => where(xAxis, xFactor, index)),
+      y: first.map((index) => where(yAxis, yFactor, index)),
+      grid,
+    };
     return this.placed;
   }
 
   /** Radius of the mark of a place: its area grows with the number of its cases. */
   radius(count, most, width) {
     if (most === 1) return 3.2;
-    const largest = this.places().grid ? Math.min(26, width / 16) : this.places().first.length > 600 ? 4.5 : Math.min(8, width / 60);
+    const largest = this.places().grid
+      ? Math.min(26, width / 16)
+      : this.places().first.length > 600
+        ? 4.5
+        : Math.min(8, width / 60);
     return Math.max(largest * Math.sqrt(count / most), 2.5);
   }
 
@@ -126,7 +206,8 @@ NB.StudyPlots = class {
     });
     const color = (place) => {
       let most = 0;
-      for (let kind = 1; kind < kinds.length; kind++) if (counts[place * kinds.length + kind] > counts[place * kinds.length + most]) most = kind;
+      for (let kind = 1; kind < kinds.length; kind++)
+        if (counts[place * kinds.length + kind] > counts[place * kinds.length + most]) most = kind;
       return kinds[most][1];
     };
     return { counts, totals, color };
@@ -140,7 +221,11 @@ NB.StudyPlots = class {
       if (!Number.isNaN(each)) lists[places.of[at]].push(each);
     });
     const middle = lists.map((list) => (list.length ? list.sort((a, b) => a - b)[list.length >> 1] : NaN));
-    return { middle, color: (place) => (Number.isNaN(middle[place]) ? [200, 200, 200] : NB.viridis((middle[place] - low) / (high - low || 1))) };
+    return {
+      middle,
+      color: (place) =>
+        Number.isNaN(middle[place]) ? [200, 200, 200] : NB.viridis((middle[place] - low) / (high - low || 1)),
+    };
   }
 
   /** A mark at each place: a shape of a single case, a pie of the shares of several. */
@@ -153,13 +238,17 @@ NB.StudyPlots = class {
         this.shape(context, kinds[kind], x, y, radius);
         return;
       }
-      const parts = kinds ? kinds.map((kind, at) => [kind[1], marks.counts[place * kinds.length + at]]) : [[marks.color(place), count]];
+      const parts = kinds
+        ? kinds.map((kind, at) => [kind[1], marks.counts[place * kinds.length + at]])
+        : [[marks.color(place), count]];
       this.pie(context, x, y, radius, parts);
       if (places.grid && radius > 12) {
         context.fillStyle = '#111';
         context.textAlign = 'left';
         context.textBaseline = 'middle';
-        const text = kinds ? `${Math.round(100 * marks.counts[place * kinds.length] / count)} %` : NB.threeDigits(marks.middle[place]);
+        const text = kinds
+          ? `${Math.round((100 * marks.counts[place * kinds.length]) / count)} %`
+          : NB.threeDigits(marks.middle[place]);
         context.fillText(text, x + radius + 4, y);
       }
     });
@@ -170,7 +259,7 @@ NB.StudyPlots = class {
     let from = -Math.PI / 2;
     for (const [color, count] of parts) {
       if (!count) continue;
-      const to = from + 2 * Math.PI * count / all;
+      const to = from + (2 * Math.PI * count) / all;
       context.fillStyle = NB.rgb(color);
       context.beginPath();
       if (count < all) context.moveTo(x, y);
@@ -181,7 +270,9 @@ NB.StudyPlots = class {
     }
     context.strokeStyle = '#fff';
     context.lineWidth = 0.8;
-    context.beginPath(); context.arc(x, y, radius, 0, 2 * Math.PI); context.stroke();
+    context.beginPath();
+    context.arc(x, y, radius, 0, 2 * Math.PI);
+    context.stroke();
   }
 
   /** A hundred thousand shapes would take too long: pixels are written one by one. */
@@ -201,7 +292,7 @@ NB.StudyPlots = class {
     const wide = Math.max(1, Math.round(0.8 * size * ratio));
     for (let place = 0; place < places.first.length; place++) {
       const [r, g, b] = marks.color(place);
-      const color = (255 << 24 | b << 16 | g << 8 | r) >>> 0;
+      const color = ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
       const x = Math.round((axes.px(places.x[place]) - box.left) * ratio);
       const y = Math.round((axes.py(places.y[place]) - box.top) * ratio);
       for (let dy = 0; dy < wide; dy++) {
@@ -219,9 +310,15 @@ NB.StudyPlots = class {
     if (at < 0) return;
     const place = places.of[at];
     const radius = this.radius(places.counts[place], places.most, 700) + 4;
-    for (const [color, wide] of [['#fff', 5], ['#000', 2.2]]) {
-      context.strokeStyle = color; context.lineWidth = wide;
-      context.beginPath(); context.arc(axes.px(places.x[place]), axes.py(places.y[place]), radius, 0, 7); context.stroke();
+    for (const [color, wide] of [
+      ['#fff', 5],
+      ['#000', 2.2],
+    ]) {
+      context.strokeStyle = color;
+      context.lineWidth = wide;
+      context.beginPath();
+      context.arc(axes.px(places.x[place]), axes.py(places.y[place]), radius, 0, 7);
+      context.stroke();
     }
   }
 
@@ -231,20 +328,36 @@ NB.StudyPlots = class {
     if (coloring.kinds) {
       coloring.kinds.forEach((kind, at) => {
         if (!marks.totals[at] && coloring.kinds.length > 5) return;
-        const draw = places.most === 1 && places.first.length <= NB.MOST_MARKS
-          ? (context, x, y) => this.shape(context, kind, x, y, 4.5)
-          : (context, x, y) => { context.fillStyle = NB.rgb(kind[1]); context.beginPath(); context.arc(x, y, 5, 0, 2 * Math.PI); context.fill(); };
-        items.push({ text: `${kind[3]}: ${group(marks.totals[at])} ${marks.totals[at] === 1 ? 'case' : 'cases'}`, draw });
+        const draw =
+          places.most === 1 && places.first.length <= NB.MOST_MARKS
+            ? (context, x, y) => this.shape(context, kind, x, y, 4.5)
+            : (context, x, y) => {
+                context.fillStyle = NB.rgb(kind[1]);
+                context.beginPath();
+                context.arc(x, y, 5, 0, 2 * Math.PI);
+                context.fill();
+              };
+        items.push({
+          text: `${kind[3]}: ${group(marks.totals[at])} ${marks.totals[at] === 1 ? 'case' : 'cases'}`,
+          draw,
+        });
       });
     } else {
       items.push({ ...coloring.scale, color: (share) => NB.rgb(NB.viridis(share)) });
-      items.push({ text: 'none works, or none has it', draw: (context, x, y) => this.pie(context, x, y, 5, [[[200, 200, 200], 1]]) });
+      items.push({
+        text: 'none works, or none has it',
+        draw: (context, x, y) => this.pie(context, x, y, 5, [[[200, 200, 200], 1]]),
+      });
     }
     if (places.most > 1) {
       let fewest = Infinity;
       for (const count of places.counts) fewest = Math.min(fewest, count);
-      const cases = fewest === places.most ? `${group(places.most)} cases` : `${group(fewest)} to ${group(places.most)} cases`;
-      items.push({ text: `${group(places.first.length)} places of ${cases} each; ${places.first.length > NB.MOST_MARKS ? 'the colour is of the most' : coloring.kinds ? 'sectors are shares of its cases' : 'the colour is of their median'}`, draw() {} });
+      const cases =
+        fewest === places.most ? `${group(places.most)} cases` : `${group(fewest)} to ${group(places.most)} cases`;
+      items.push({
+        text: `${group(places.first.length)} places of ${cases} each; ${places.first.length > NB.MOST_MARKS ? 'the colour is of the most' : coloring.kinds ? 'sectors are shares of its cases' : 'the colour is of their median'}`,
+        draw() {},
+      });
     }
     return items;
   }
@@ -262,13 +375,21 @@ NB.StudyPlots = class {
     context.lineWidth = 1.8;
     if (shape === 'cross') {
       context.beginPath();
-      context.moveTo(x - size, y - size); context.lineTo(x + size, y + size);
-      context.moveTo(x - size, y + size); context.lineTo(x + size, y - size);
+      context.moveTo(x - size, y - size);
+      context.lineTo(x + size, y + size);
+      context.moveTo(x - size, y + size);
+      context.lineTo(x + size, y - size);
       context.stroke();
     } else if (shape === 'triangle') {
-      context.beginPath(); context.moveTo(x, y - size); context.lineTo(x + size, y + size); context.lineTo(x - size, y + size); context.fill();
+      context.beginPath();
+      context.moveTo(x, y - size);
+      context.lineTo(x + size, y + size);
+      context.lineTo(x - size, y + size);
+      context.fill();
     } else if (shape === 'dot') {
-      context.beginPath(); context.arc(x, y, size * 0.6, 0, 7); context.fill();
+      context.beginPath();
+      context.arc(x, y, size * 0.6, 0, 7);
+      context.fill();
     } else context.fillRect(x - size * 0.8, y - size * 0.8, size * 1.6, size * 1.6);
   }
 
@@ -294,7 +415,11 @@ NB.StudyPlots = class {
     context.textBaseline = 'middle';
     for (let cell = 0; cell < nx * ny; cell++) {
       const [x, y] = [box.left + (cell % nx) * w, box.top + box.height - (Math.floor(cell / nx) + 1) * h];
-      if (!of[cell]) { context.fillStyle = '#f2f2f2'; context.fillRect(x, y, w, h); continue; }
+      if (!of[cell]) {
+        context.fillStyle = '#f2f2f2';
+        context.fillRect(x, y, w, h);
+        continue;
+      }
       const rate = ok[cell] / of[cell];
       const [r, g, b] = NB.viridis(rate);
       context.fillStyle = `rgb(${r}, ${g}, ${b})`;
@@ -306,11 +431,18 @@ NB.StudyPlots = class {
         if (context.measureText(text).width < w - 2) context.fillText(text, x + w / 2, y + h / 2);
       }
     }
-    const text = this.state.configuration < 0 ? 'layouts in which any configuration works (%)' : `layouts in which ${this.page.configurations[this.state.configuration]} works (%)`;
+    const text =
+      this.state.configuration < 0
+        ? 'layouts in which any configuration works (%)'
+        : `layouts in which ${this.page.configurations[this.state.configuration]} works (%)`;
     this.mapItems = [{ low: '0', high: '100', text, color: (share) => NB.rgb(NB.viridis(share)) }];
     let fewest = Infinity;
     for (const count of of) if (count) fewest = Math.min(fewest, count);
-    if (fewest < NB.FEW_CASES) this.mapItems.push({ text: `how many of how many, where a cell has fewer than ${NB.FEW_CASES} cases: no more than a hint`, draw() {} });
+    if (fewest < NB.FEW_CASES)
+      this.mapItems.push({
+        text: `how many of how many, where a cell has fewer than ${NB.FEW_CASES} cases: no more than a hint`,
+        draw() {},
+      });
   }
 
   /** Sorted values of every configuration, once for each metric and filter. */
@@ -345,11 +477,17 @@ NB.StudyPlots = class {
     if (!metric) return;
     const [low, high] = this.valueRange();
     const box = { left: 62, top: 10, width: width - 76, height: height - 52 };
-    const axes = new NB.Axes(box, { low, high, title: this.titleOf(metric) }, { low: 0, high: 100, title: 'layouts below (%)' });
+    const axes = new NB.Axes(
+      box,
+      { low, high, title: this.titleOf(metric) },
+      { low: 0, high: 100, title: 'layouts below (%)' },
+    );
     if (!context.isPaper) this.ecdfAxes = axes;
     axes.draw(context);
     context.save();
-    context.beginPath(); context.rect(box.left, box.top, box.width, box.height); context.clip();
+    context.beginPath();
+    context.rect(box.left, box.top, box.width, box.height);
+    context.clip();
     this.sort().forEach((values, c) => {
       if (!values.length) return;
       const { color, dash } = NB.configurationStyles[c];
@@ -359,25 +497,31 @@ NB.StudyPlots = class {
       context.beginPath();
       const points = Math.min(values.length, 500);
       for (let k = 0; k < points; k++) {
-        const at = points > 1 ? Math.round(k * (values.length - 1) / (points - 1)) : 0;
-        const [x, y] = [axes.px(values[at]), axes.py(100 * (at + 0.5) / values.length)];
-        if (k) context.lineTo(x, y); else context.moveTo(x, y);
+        const at = points > 1 ? Math.round((k * (values.length - 1)) / (points - 1)) : 0;
+        const [x, y] = [axes.px(values[at]), axes.py((100 * (at + 0.5)) / values.length)];
+        if (k) context.lineTo(x, y);
+        else context.moveTo(x, y);
       }
       context.stroke();
     });
     context.restore();
     context.setLineDash([]);
-    this.ecdfItems = this.page.configurations.map((label, c) => ({
-      text: `${label} (${NB.grouped(this.sort()[c].length)} layouts)`,
-      draw: (at, x, y) => {
-        const { color, dash } = NB.configurationStyles[c];
-        at.strokeStyle = color;
-        at.lineWidth = 2.5;
-        at.setLineDash(dash.map((each) => each / 2));
-        at.beginPath(); at.moveTo(x - 8, y); at.lineTo(x + 8, y); at.stroke();
-        at.setLineDash([]);
-      },
-    })).filter((_, c) => this.sort()[c].length);
+    this.ecdfItems = this.page.configurations
+      .map((label, c) => ({
+        text: `${label} (${NB.grouped(this.sort()[c].length)} layouts)`,
+        draw: (at, x, y) => {
+          const { color, dash } = NB.configurationStyles[c];
+          at.strokeStyle = color;
+          at.lineWidth = 2.5;
+          at.setLineDash(dash.map((each) => each / 2));
+          at.beginPath();
+          at.moveTo(x - 8, y);
+          at.lineTo(x + 8, y);
+          at.stroke();
+          at.setLineDash([]);
+        },
+      }))
+      .filter((_, c) => this.sort()[c].length);
   }
 
   paintHistogram(context, width, height) {
@@ -388,19 +532,27 @@ NB.StudyPlots = class {
     const bins = 40;
     const counts = new Uint32Array(bins);
     const add = (value) => {
-      const bin = Math.floor((value - low) / (high - low) * bins);
+      const bin = Math.floor(((value - low) / (high - low)) * bins);
       if (bin >= 0 && bin < bins) counts[bin]++;
     };
     if (c >= 0) this.sort()[c].forEach(add);
-    else for (const index of this.indices) { const row = this.row(index); if (row >= 0 && !Number.isNaN(metric.values[row])) add(metric.values[row]); }
+    else
+      for (const index of this.indices) {
+        const row = this.row(index);
+        if (row >= 0 && !Number.isNaN(metric.values[row])) add(metric.values[row]);
+      }
     const most = Math.max(...counts, 1);
     const box = { left: 62, top: 10, width: width - 76, height: height - 52 };
     const whose = c < 0 ? 'best of each layout' : this.page.configurations[c];
-    const axes = new NB.Axes(box, { low, high, title: `${this.titleOf(metric)}, ${whose}` }, { low: 0, high: 1.05 * most, title: 'cases' });
+    const axes = new NB.Axes(
+      box,
+      { low, high, title: `${this.titleOf(metric)}, ${whose}` },
+      { low: 0, high: 1.05 * most, title: 'cases' },
+    );
     axes.draw(context);
     context.fillStyle = c < 0 ? '#5a626d' : NB.configurationStyles[c].color;
     counts.forEach((count, bin) => {
-      const [x, next] = [axes.px(low + (high - low) * bin / bins), axes.px(low + (high - low) * (bin + 1) / bins)];
+      const [x, next] = [axes.px(low + ((high - low) * bin) / bins), axes.px(low + ((high - low) * (bin + 1)) / bins)];
       context.fillRect(x + 0.5, axes.py(count), next - x - 1, axes.py(0) - axes.py(count));
     });
   }

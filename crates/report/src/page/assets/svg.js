@@ -2,7 +2,7 @@
 'use strict';
 
 /** A column of a journal, and the size of its letters: 85 mm at 96 points to the inch, 8 pt. */
-NB.COLUMN = { mm: 85, px: 85 / 25.4 * 96, font: 8 / 72 * 96 };
+NB.COLUMN = { mm: 85, px: (85 / 25.4) * 96, font: (8 / 72) * 96 };
 
 /** What a canvas's context does, as SVG. Only what our plots use. */
 NB.SvgContext = class {
@@ -11,37 +11,69 @@ NB.SvgContext = class {
     this.parts = [];
     this.path = '';
     this.state = {
-      fillStyle: '#000', strokeStyle: '#000', lineWidth: 1, dash: [], textAlign: 'left', textBaseline: 'alphabetic',
-      font: `${NB.COLUMN.font}px Helvetica, Arial, sans-serif`, move: '', clip: '',
+      fillStyle: '#000',
+      strokeStyle: '#000',
+      lineWidth: 1,
+      dash: [],
+      textAlign: 'left',
+      textBaseline: 'alphabetic',
+      font: `${NB.COLUMN.font}px Helvetica, Arial, sans-serif`,
+      move: '',
+      clip: '',
     };
     this.stack = [];
     this.clips = 0;
     this.ruler = document.createElement('canvas').getContext('2d');
     for (const name of ['fillStyle', 'strokeStyle', 'lineWidth', 'textAlign', 'textBaseline', 'font']) {
-      Object.defineProperty(this, name, { get: () => this.state[name], set: (value) => { this.state[name] = value; } });
+      Object.defineProperty(this, name, {
+        get: () => this.state[name],
+        set: (value) => {
+          this.state[name] = value;
+        },
+      });
     }
     this.isPaper = true;
   }
 
-  save() { this.stack.push({ ...this.state }); }
+  save() {
+    this.stack.push({ ...this.state });
+  }
 
-  restore() { this.state = this.stack.pop() || this.state; }
+  restore() {
+    this.state = this.stack.pop() || this.state;
+  }
 
-  translate(x, y) { this.state.move += ` translate(${NB.short(x)} ${NB.short(y)})`; }
+  translate(x, y) {
+    this.state.move += ` translate(${NB.short(x)} ${NB.short(y)})`;
+  }
 
-  rotate(angle) { this.state.move += ` rotate(${NB.short(angle * 180 / Math.PI)})`; }
+  rotate(angle) {
+    this.state.move += ` rotate(${NB.short((angle * 180) / Math.PI)})`;
+  }
 
-  setLineDash(dash) { this.state.dash = dash; }
+  setLineDash(dash) {
+    this.state.dash = dash;
+  }
 
-  beginPath() { this.path = ''; }
+  beginPath() {
+    this.path = '';
+  }
 
-  moveTo(x, y) { this.path += `M${NB.short(x)} ${NB.short(y)}`; }
+  moveTo(x, y) {
+    this.path += `M${NB.short(x)} ${NB.short(y)}`;
+  }
 
-  lineTo(x, y) { this.path += `${this.path ? 'L' : 'M'}${NB.short(x)} ${NB.short(y)}`; }
+  lineTo(x, y) {
+    this.path += `${this.path ? 'L' : 'M'}${NB.short(x)} ${NB.short(y)}`;
+  }
 
-  closePath() { this.path += 'Z'; }
+  closePath() {
+    this.path += 'Z';
+  }
 
-  rect(x, y, w, h) { this.path += `M${NB.short(x)} ${NB.short(y)}h${NB.short(w)}v${NB.short(h)}h${NB.short(-w)}Z`; }
+  rect(x, y, w, h) {
+    this.path += `M${NB.short(x)} ${NB.short(y)}h${NB.short(w)}v${NB.short(h)}h${NB.short(-w)}Z`;
+  }
 
   arc(x, y, r, from, to) {
     const at = (angle) => [NB.short(x + r * Math.cos(angle)), NB.short(y + r * Math.sin(angle))];
@@ -57,15 +89,27 @@ NB.SvgContext = class {
   put(tag, attributes, text = '') {
     const { move, clip } = this.state;
     const all = { ...attributes, transform: move.trim() || null, 'clip-path': clip ? `url(#${clip})` : null };
-    const written = Object.entries(all).filter(([, value]) => value !== null).map(([name, value]) => ` ${name}="${NB.xml(value)}"`).join('');
+    const written = Object.entries(all)
+      .filter(([, value]) => value !== null)
+      .map(([name, value]) => ` ${name}="${NB.xml(value)}"`)
+      .join('');
     this.parts.push(text ? `<${tag}${written}>${NB.xml(text)}</${tag}>` : `<${tag}${written}/>`);
   }
 
-  fill() { if (this.path) this.put('path', { d: this.path, fill: this.state.fillStyle }); }
+  fill() {
+    if (this.path) this.put('path', { d: this.path, fill: this.state.fillStyle });
+  }
 
   stroke() {
     const { strokeStyle, lineWidth, dash } = this.state;
-    if (this.path) this.put('path', { d: this.path, fill: 'none', stroke: strokeStyle, 'stroke-width': lineWidth, 'stroke-dasharray': dash.length ? dash.join(' ') : null });
+    if (this.path)
+      this.put('path', {
+        d: this.path,
+        fill: 'none',
+        stroke: strokeStyle,
+        'stroke-width': lineWidth,
+        'stroke-dasharray': dash.length ? dash.join(' ') : null,
+      });
   }
 
   clip() {
@@ -74,7 +118,12 @@ NB.SvgContext = class {
     this.state.clip = id;
   }
 
-  fillRect(x, y, w, h) { this.put('path', { d: `M${NB.short(x)} ${NB.short(y)}h${NB.short(w)}v${NB.short(h)}h${NB.short(-w)}Z`, fill: this.state.fillStyle }); }
+  fillRect(x, y, w, h) {
+    this.put('path', {
+      d: `M${NB.short(x)} ${NB.short(y)}h${NB.short(w)}v${NB.short(h)}h${NB.short(-w)}Z`,
+      fill: this.state.fillStyle,
+    });
+  }
 
   strokeRect(x, y, w, h) {
     const path = this.path;
@@ -94,21 +143,33 @@ NB.SvgContext = class {
     const anchor = { left: 'start', center: 'middle', right: 'end' }[this.state.textAlign];
     // Not every reader of SVG knows baselines.
     const drop = { middle: 0.35, top: 0.8, bottom: -0.2, alphabetic: 0 }[this.state.textBaseline] * Number(size);
-    this.put('text', {
-      x: NB.short(x), y: NB.short(y + drop), fill: this.state.fillStyle, 'font-size': size, 'font-family': family,
-      'text-anchor': anchor, 'font-weight': /bold|600/.test(this.state.font) ? 'bold' : null,
-    }, String(text));
+    this.put(
+      'text',
+      {
+        x: NB.short(x),
+        y: NB.short(y + drop),
+        fill: this.state.fillStyle,
+        'font-size': size,
+        'font-family': family,
+        'text-anchor': anchor,
+        'font-weight': /bold|600/.test(this.state.font) ? 'bold' : null,
+      },
+      String(text),
+    );
   }
 
   svg(title) {
     const [width, height, mm] = this.size;
-    return `<svg xmlns="http://www.w3.org/2000/svg" width="${mm}mm" height="${NB.short(mm * height / width)}mm" viewBox="0 0 ${NB.short(width)} ${NB.short(height)}">\n`
-      + `<title>${NB.xml(title)}</title>\n<rect width="100%" height="100%" fill="#fff"/>\n${this.parts.join('\n')}\n</svg>\n`;
+    return (
+      `<svg xmlns="http://www.w3.org/2000/svg" width="${mm}mm" height="${NB.short((mm * height) / width)}mm" viewBox="0 0 ${NB.short(width)} ${NB.short(height)}">\n` +
+      `<title>${NB.xml(title)}</title>\n<rect width="100%" height="100%" fill="#fff"/>\n${this.parts.join('\n')}\n</svg>\n`
+    );
   }
 };
 
 NB.short = (value) => String(Math.round(value * 100) / 100);
-NB.xml = (text) => String(text).replaceAll('&', '&amp;').replaceAll('<', '&lt;').replaceAll('>', '&gt;').replaceAll('"', '&quot;');
+NB.xml = (text) =>
+  String(text).replaceAll('&', '&amp;').replaceAll('<', '&lt;').replaceAll('>', '&gt;').replaceAll('"', '&quot;');
 
 /** Saves a text or a blob as a file. */
 NB.save = function (name, content, type) {
@@ -118,13 +179,25 @@ NB.save = function (name, content, type) {
 };
 
 /** A file's name from words. */
-NB.fileName = (...words) => words.filter(Boolean).join('_').replace(/[^A-Za-z0-9.-]+/g, '_');
+NB.fileName = (...words) =>
+  words
+    .filter(Boolean)
+    .join('_')
+    .replace(/[^A-Za-z0-9.-]+/g, '_');
 
 /** A button that saves a figure; `file()` gives `[name, content, type]`. */
-NB.saveButton = (text, title, file) => NB.el('button', {
-  type: 'button', class: 'no-print save', 'aria-label': `${title}: save as ${text}`, title: `Save as ${text}`,
-  onclick: async () => NB.save(...await file()),
-}, text);
+NB.saveButton = (text, title, file) =>
+  NB.el(
+    'button',
+    {
+      type: 'button',
+      class: 'no-print save',
+      'aria-label': `${title}: save as ${text}`,
+      title: `Save as ${text}`,
+      onclick: async () => NB.save(...(await file())),
+    },
+    text,
+  );
 
 /** A plot for a column of a journal: `paint(context, width, height)` draws it, `legend` of `{ text, draw(context, x, y) }` stands below. */
 NB.paper = function (title, paint, height, legend = []) {
@@ -148,19 +221,35 @@ NB.paper = function (title, paint, height, legend = []) {
 /** A chart of the program, in a box of its own width, with a button that saves it. */
 NB.chart = function (title, svg, name, help) {
   const [, width, height] = svg.match(/viewBox="0 0 ([\d.]+) ([\d.]+)"/).map(Number);
-  const image = NB.el('img', { src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`, alt: title, width: String(Math.round(width)), height: String(Math.round(height)) });
+  const image = NB.el('img', {
+    src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`,
+    alt: title,
+    width: String(Math.round(width)),
+    height: String(Math.round(height)),
+  });
   image.style.maxWidth = `${Math.round(1.2 * width)}px`;
   image.style.minWidth = `${Math.round(Math.min(width, Math.max(440, 0.6 * width)))}px`;
-  return NB.el('figure', { class: 'chart' },
-    NB.el('figcaption', null, NB.el('span', { text: title }), NB.saveButton('SVG', title, () => [`${name}.svg`, svg, 'image/svg+xml'])),
+  return NB.el(
+    'figure',
+    { class: 'chart' },
+    NB.el(
+      'figcaption',
+      null,
+      NB.el('span', { text: title }),
+      NB.saveButton('SVG', title, () => [`${name}.svg`, svg, 'image/svg+xml']),
+    ),
     help ? NB.el('p', { class: 'soft small', text: help }) : null,
-    NB.scroll(title, image));
+    NB.scroll(title, image),
+  );
 };
 
 /** A button that saves what a view shows, labels included; `name` may be a function. */
-NB.pngButton = (view, title, name) => (view.works ? NB.saveButton('PNG', title, async () => {
-  view.snapshot();
-  const bytes = Uint8Array.from(atob(view.image.src.split(',')[1]), (character) => character.charCodeAt(0));
-  const blob = new Blob([bytes], { type: 'image/png' });
-  return [`${typeof name === 'function' ? name() : name}.png`, blob];
-}) : '');
+NB.pngButton = (view, title, name) =>
+  view.works
+    ? NB.saveButton('PNG', title, async () => {
+        view.snapshot();
+        const bytes = Uint8Array.from(atob(view.image.src.split(',')[1]), (character) => character.charCodeAt(0));
+        const blob = new Blob([bytes], { type: 'image/png' });
+        return [`${typeof name === 'function' ? name() : name}.png`, blob];
+      })
+    : '';

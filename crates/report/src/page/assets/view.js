@@ -6,7 +6,10 @@ NB.CREASE_COSINE = 0.766;
 
 NB.matrix = function ([x, y, z, qx, qy, qz, qw]) {
   return new THREE.Matrix4().compose(
-    new THREE.Vector3(x, y, z), new THREE.Quaternion(qx, qy, qz, qw), new THREE.Vector3(1, 1, 1));
+    new THREE.Vector3(x, y, z),
+    new THREE.Quaternion(qx, qy, qz, qw),
+    new THREE.Vector3(1, 1, 1),
+  );
 };
 
 /** Frame of parts that stand in the room and go where the robot's base goes, when somebody moves that. */
@@ -15,7 +18,9 @@ NB.BASE = -2;
 /** Corners of a box about a base and `reach` m out of it, which may hang or be tilted. */
 NB.aboutBase = function (base, reach) {
   const place = NB.matrix(base);
-  return [-0.2, 0.2].flatMap((x) => [-0.2, 0.2].flatMap((y) => [-0.1, reach].map((z) => new THREE.Vector3(x, y, z).applyMatrix4(place).toArray())));
+  return [-0.2, 0.2].flatMap((x) =>
+    [-0.2, 0.2].flatMap((y) => [-0.1, reach].map((z) => new THREE.Vector3(x, y, z).applyMatrix4(place).toArray())),
+  );
 };
 
 /** Poses of the six links and the flange: `base * product of joint * turn(axis, q)`. */
@@ -63,9 +68,14 @@ NB.geometry = function (surface) {
     let [x, y, z] = [0, 0, 0];
     for (let at = starts[vertex]; at < starts[vertex + 1]; at++) {
       const other = 3 * around[at];
-      const cosine = units[other] * units[3 * face] + units[other + 1] * units[3 * face + 1] + units[other + 2] * units[3 * face + 2];
+      const cosine =
+        units[other] * units[3 * face] +
+        units[other + 1] * units[3 * face + 1] +
+        units[other + 2] * units[3 * face + 2];
       if (cosine < NB.CREASE_COSINE) continue;
-      x += normals[other]; y += normals[other + 1]; z += normals[other + 2];
+      x += normals[other];
+      y += normals[other + 1];
+      z += normals[other + 2];
     }
     const size = Math.hypot(x, y, z) || 1;
     corners.set([x / size, y / size, z / size], 3 * k);
@@ -102,10 +112,13 @@ NB.View = class {
     this.element = NB.el('div', { class: 'view' }, this.image);
     this.works = NB.hasWebgl();
     if (!this.works) {
-      this.element.append(NB.el('p', {
-        class: 'no-webgl', role: 'status',
-        text: 'No 3D view: this browser has no WebGL 2 (or it is switched off). Tables and plots work all the same.',
-      }));
+      this.element.append(
+        NB.el('p', {
+          class: 'no-webgl',
+          role: 'status',
+          text: 'No 3D view: this browser has no WebGL 2 (or it is switched off). Tables and plots work all the same.',
+        }),
+      );
       return;
     }
     this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
@@ -161,7 +174,13 @@ NB.View = class {
 
   material([red, green, blue, opacity], shaded = true) {
     const color = new THREE.Color().setRGB(red, green, blue, 'srgb');
-    const settings = { color, transparent: opacity < 1, opacity, depthWrite: opacity >= 1, side: opacity < 1 ? THREE.FrontSide : THREE.DoubleSide };
+    const settings = {
+      color,
+      transparent: opacity < 1,
+      opacity,
+      depthWrite: opacity >= 1,
+      side: opacity < 1 ? THREE.FrontSide : THREE.DoubleSide,
+    };
     return shaded ? new THREE.MeshLambertMaterial(settings) : new THREE.MeshBasicMaterial(settings);
   }
 
@@ -191,7 +210,10 @@ NB.View = class {
     root.add(foot);
     const layers = new Map();
     const painted = [];
-    links.forEach((link) => { link.matrixAutoUpdate = false; root.add(link); });
+    links.forEach((link) => {
+      link.matrixAutoUpdate = false;
+      root.add(link);
+    });
     this.scene.parts.forEach((part, index) => {
       if (look && part.group !== 'robot' && part.group !== 'tool') return;
       if (part.frame < 0 && part.group !== 'collision') return;
@@ -203,8 +225,10 @@ NB.View = class {
         mesh.material.polygonOffsetFactor = 2;
         mesh.material.polygonOffsetUnits = 8;
       }
-      if (part.frame < 0) foot.add(mesh); else links[part.frame].add(mesh);
-      if (part.group === 'robot' || part.group === 'tool') painted.push({ mesh, frame: part.frame, own: mesh.material.color.clone() });
+      if (part.frame < 0) foot.add(mesh);
+      else links[part.frame].add(mesh);
+      if (part.group === 'robot' || part.group === 'tool')
+        painted.push({ mesh, frame: part.frame, own: mesh.material.color.clone() });
       if (!layers.has(part.group)) layers.set(part.group, []);
       layers.get(part.group).push(mesh);
     });
@@ -214,7 +238,9 @@ NB.View = class {
         NB.forward(chain, joints).forEach((pose, index) => links[index].matrix.copy(pose));
         root.updateMatrixWorld(true);
       },
-      stand: (pose) => { foot.matrix.copy(pose); },
+      stand: (pose) => {
+        foot.matrix.copy(pose);
+      },
       // A colour (sRGB) by frame, or null for the part's own.
       tint: (colorOf) => {
         for (const { mesh, frame, own } of painted) {
@@ -223,8 +249,12 @@ NB.View = class {
           if (color) mesh.material.color.lerp(new THREE.Color().setRGB(...color, 'srgb'), 0.7);
         }
       },
-      show: (visible) => { root.visible = visible; },
-      layer: (group, visible) => { for (const mesh of layers.get(group) || []) mesh.visible = visible; },
+      show: (visible) => {
+        root.visible = visible;
+      },
+      layer: (group, visible) => {
+        for (const mesh of layers.get(group) || []) mesh.visible = visible;
+      },
     };
   }
 
@@ -234,7 +264,10 @@ NB.View = class {
     const group = this.group(name);
     for (const child of [...group.children]) {
       group.remove(child);
-      child.traverse((each) => { each.geometry?.dispose(); each.material?.dispose(); });
+      child.traverse((each) => {
+        each.geometry?.dispose();
+        each.material?.dispose();
+      });
     }
     this.labels = this.labels.filter((label) => {
       if (label.layer === name) label.element.remove();
@@ -281,8 +314,7 @@ NB.View = class {
     const mesh = new THREE.Mesh(new THREE.SphereGeometry(1, 32, 20), this.material(color));
     const [x, y, z] = columns;
     mesh.matrixAutoUpdate = false;
-    mesh.matrix.set(
-      x[0], y[0], z[0], center[0], x[1], y[1], z[1], center[1], x[2], y[2], z[2], center[2], 0, 0, 0, 1);
+    mesh.matrix.set(x[0], y[0], z[0], center[0], x[1], y[1], z[1], center[1], x[2], y[2], z[2], center[2], 0, 0, 0, 1);
     mesh.renderOrder = 25;
     this.group(name).add(mesh);
   }
@@ -306,7 +338,10 @@ NB.View = class {
     for (const person of people) {
       const [x, y, z] = person.position;
       const tall = 0.82 * person.shortest;
-      const body = new THREE.Mesh(new THREE.CapsuleGeometry(0.12, tall - 0.24, 6, 20), this.material([0.35, 0.42, 0.62, 0.28]));
+      const body = new THREE.Mesh(
+        new THREE.CapsuleGeometry(0.12, tall - 0.24, 6, 20),
+        this.material([0.35, 0.42, 0.62, 0.28]),
+      );
       body.rotation.x = Math.PI / 2;
       body.position.set(x, y, z + tall / 2);
       body.renderOrder = 12;
@@ -345,7 +380,7 @@ NB.View = class {
     const high = [0, 1, 2].map((k) => Math.max(...points.map((point) => point[k])));
     const middle = low.map((value, k) => (value + high[k]) / 2);
     const size = Math.hypot(...low.map((value, k) => high[k] - value));
-    this.home = { middle, direction, distance: 0.46 * size / Math.tan(this.camera.fov * Math.PI / 360) };
+    this.home = { middle, direction, distance: (0.46 * size) / Math.tan((this.camera.fov * Math.PI) / 360) };
     this.reset();
   }
 
@@ -372,10 +407,15 @@ NB.View = class {
       const height = Math.min(Math.max(Math.atan2(offset.z, level) + turn[1] * step, -1.5), 1.5);
       const round = Math.atan2(offset.y, offset.x) + turn[0] * step;
       const size = offset.length();
-      offset.set(Math.cos(round) * Math.cos(height), Math.sin(round) * Math.cos(height), Math.sin(height)).multiplyScalar(size);
+      offset
+        .set(Math.cos(round) * Math.cos(height), Math.sin(round) * Math.cos(height), Math.sin(height))
+        .multiplyScalar(size);
     } else if (event.key === '+' || event.key === '=') offset.multiplyScalar(0.85);
     else if (event.key === '-') offset.multiplyScalar(1 / 0.85);
-    else if (event.key === '0') { this.reset(); return; } else return;
+    else if (event.key === '0') {
+      this.reset();
+      return;
+    } else return;
     event.preventDefault();
     this.camera.position.copy(this.controls.target).add(offset);
     this.controls.update();
@@ -415,10 +455,11 @@ NB.View = class {
       element.style.display = visible ? '' : 'none';
       if (!visible) continue;
       const [w, h] = [element.offsetWidth, element.offsetHeight];
-      const x = Math.min(Math.max((place.x + 1) / 2 * width + 10, 2), width - w - 2);
-      let y = Math.min(Math.max((1 - place.y) / 2 * height - h / 2, 2), height - h - 2);
+      const x = Math.min(Math.max(((place.x + 1) / 2) * width + 10, 2), width - w - 2);
+      let y = Math.min(Math.max(((1 - place.y) / 2) * height - h / 2, 2), height - h - 2);
       // Downwards until it covers none: what is below one may lie on another.
-      const covered = () => taken.find((box) => x < box.x + box.w && box.x < x + w && y < box.y + box.h && box.y < y + h);
+      const covered = () =>
+        taken.find((box) => x < box.x + box.w && box.x < x + w && y < box.y + box.h && box.y < y + h);
       for (let box = covered(); box; box = covered()) y = box.y + box.h + 2;
       taken.push({ x, y, w, h });
       element.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px)`;
@@ -467,13 +508,17 @@ NB.cone = function (halfAngle, length) {
   const [around, rings] = [48, 8];
   const positions = [];
   const at = (angle, step) => {
-    const turn = 2 * Math.PI * step / around;
-    return [length * Math.sin(angle) * Math.cos(turn), length * Math.sin(angle) * Math.sin(turn), -length * Math.cos(angle)];
+    const turn = (2 * Math.PI * step) / around;
+    return [
+      length * Math.sin(angle) * Math.cos(turn),
+      length * Math.sin(angle) * Math.sin(turn),
+      -length * Math.cos(angle),
+    ];
   };
   for (let step = 0; step < around; step++) {
     positions.push(0, 0, 0, ...at(halfAngle, step), ...at(halfAngle, step + 1));
     for (let ring = 0; ring < rings; ring++) {
-      const [outer, inner] = [halfAngle * (rings - ring) / rings, halfAngle * (rings - ring - 1) / rings];
+      const [outer, inner] = [(halfAngle * (rings - ring)) / rings, (halfAngle * (rings - ring - 1)) / rings];
       positions.push(...at(outer, step), ...at(inner, step), ...at(outer, step + 1));
       positions.push(...at(outer, step + 1), ...at(inner, step), ...at(inner, step + 1));
     }
