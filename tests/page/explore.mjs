@@ -16,7 +16,10 @@ import { NO_GL, SOFTWARE_GL, launch } from './browser.mjs';
 /** Postures by scenario, and by each place of the base. */
 const POSTURES = 1000;
 const POSTURES_ELSEWHERE = 100;
-/** What was asked for: 1 um. Attained: 1e-10 m, as sines differ in the last bit and the search for a distance ends elsewhere. */
+/**
+ * What was asked for: 1 um. Attained: 1e-10 m, as sines differ in the last bit and the search for a distance ends
+ * elsewhere.
+ */
 const SAME_M = 1e-9;
 /** One posture, computed and shown; the median. A frame of 60 in a second has 16. */
 const COMPUTED_MS = 4;
@@ -109,7 +112,8 @@ async function testCommand(page, scenario) {
   assert.equal(shown.length, Object.keys(classes).length);
   const least = await explore(
     page,
-    'explore.least.map((pair) => ({ name: explore.data.classes[pair.class].name, distance: pair.distance, solids: pair.solids }))',
+    'explore.least.map((pair) => ({ name: explore.data.classes[pair.class].name, distance: pair.distance, ' +
+      'solids: pair.solids }))',
   );
   least.forEach(({ name, distance, solids }, row) => {
     assert.ok(
@@ -306,7 +310,8 @@ for (let k = 0; k < words.length; k += 2) {
   await page.waitForSelector('.view.trying');
   const { worst, count } = await differ(page, postures(scenario, POSTURES));
   console.log(
-    `${name}: ${count} distances of ${POSTURES} postures, largest difference ${worst.toExponential(1)} m; in the page, code takes ${(code / 1e3).toFixed(0)} kB and the scene ${(scene / 1e3).toFixed(0)} kB`,
+    `${name}: ${count} distances of ${POSTURES} postures, largest difference ${worst.toExponential(1)} m; in the ` +
+      `page, code takes ${(code / 1e3).toFixed(0)} kB and the scene ${(scene / 1e3).toFixed(0)} kB`,
   );
   await testJoints(page, scenario);
   await page.screenshot({ path: `${out}/${name}.png` });
@@ -332,7 +337,8 @@ for (let k = 0; k < words.length; k += 2) {
     return { computed: median(computed), whole: median(whole), reached: median(reached) };
   });
   console.log(
-    `  ms: all pairs ${times.computed}, with table and picture ${times.whole}, eight configurations at ${await page.evaluate(() => NB.Explore.ROLLS)} rolls ${times.reached}`,
+    `  ms: all pairs ${times.computed}, with table and picture ${times.whole}, eight configurations at ` +
+      `${await page.evaluate(() => NB.Explore.ROLLS)} rolls ${times.reached}`,
   );
   assert.ok(times.computed <= COMPUTED_MS, `one posture takes ${times.computed} ms`);
   await testLeaving(page);

@@ -12,7 +12,9 @@ function problemsOfLayout({ tappable, narrow }) {
   const found = [];
   const name = (element) => {
     const text = (element.getAttribute('aria-label') || element.textContent || '').trim().slice(0, 40);
-    return `${element.tagName.toLowerCase()}${element.className && typeof element.className === 'string' ? `.${element.className.replaceAll(' ', '.')}` : ''} "${text}"`;
+    // Of SVG it is no text.
+    const classes = typeof element.className === 'string' ? element.className : '';
+    return `${element.tagName.toLowerCase()}${classes ? `.${classes.replaceAll(' ', '.')}` : ''} "${text}"`;
   };
   const seen = (element) =>
     element.checkVisibility({ contentVisibilityAuto: true, visibilityProperty: true }) &&

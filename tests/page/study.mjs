@@ -197,11 +197,12 @@ async function addresses(page) {
     return [factors.find((each) => each.levels && each.levels.length > 1), factors[other].name];
   });
   const level = factor.levels[1].label;
+  const choices = { case: '7', y: axis, of: 'Left-Up-Fold', colour: 'working', [`with.${factor.name}`]: level };
   await page.evaluate(
     (hash) => {
       location.hash = hash;
     },
-    `#${new URLSearchParams({ case: '7', y: axis, of: 'Left-Up-Fold', colour: 'working', [`with.${factor.name}`]: level })}`,
+    `#${new URLSearchParams(choices)}`,
   );
   await page.waitForFunction(() => NB.current.caseOf(NB.current.chosen) === 7);
   const shown = await page.evaluate(() => {

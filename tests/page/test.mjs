@@ -2,9 +2,9 @@
 //
 //   npm ci && node test.mjs --out SCREENSHOTS PAGE.html...
 //
-// Checks that pages are whole at five widths, that nothing is blank, no error is logged, nothing is asked of the network, every switch and
-// the replay work, the keyboard reaches everything, and the page still works without WebGL. Takes an
-// installed Chromium (or the one that CHROMIUM names), else the one that comes with the packages, which
+// Checks that pages are whole at five widths, that nothing is blank, no error is logged, nothing is asked of the
+// network, every switch and the replay work, the keyboard reaches everything, and the page still works without WebGL.
+// Takes an installed Chromium (or the one that CHROMIUM names), else the one that comes with the packages, which
 // CHROMIUM=packaged asks for.
 import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, statSync } from 'node:fs';

@@ -3,7 +3,8 @@
 //   npm ci && node view.mjs --out SCREENSHOTS --program NEEDLEBENCH [--marks] FOLDER LESION ENTRY
 //
 // FOLDER is changed: a session and a plan are written into it. LESION is a goal of it, ENTRY (`-111,-83,-58`, mm of
-// the scan) a place at the skin from which a needle reaches it. With --marks times are held against what a machine of its own attains.
+// the scan) a place at the skin from which a needle reaches it. With --marks times are held against what a machine of
+// its own attains.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { existsSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
@@ -343,7 +344,8 @@ console.log(`drag to numbers: median ${median.toFixed(1)} ms, 95 % ${p95.toFixed
 const reach = await page.evaluate(() => [...PLAN.planner.reachWaits].sort((a, b) => a - b));
 assert.ok(reach.length > 2, `${reach.length} answers of the robot to a drag`);
 console.log(
-  `drag to configurations: median ${reach[Math.floor(reach.length / 2)].toFixed(1)} ms, 95 % ${reach[Math.floor(0.95 * reach.length)].toFixed(1)} ms, of ${reach.length}`,
+  `drag to configurations: median ${reach[Math.floor(reach.length / 2)].toFixed(1)} ms, 95 % ` +
+    `${reach[Math.floor(0.95 * reach.length)].toFixed(1)} ms, of ${reach.length}`,
 );
 if (marks) assert.ok(median < MARKS.median && p95 < MARKS.p95, 'numbers come late');
 await page.getByRole('button', { name: 'Keep this route' }).click();

@@ -1,4 +1,5 @@
-// The entry map: the skin as the target sees it, what forbids a route, how free ones compare, and who serves the best of them.
+// The entry map: the skin as the target sees it, what forbids a route, how free ones compare, and who serves the best
+// of them.
 'use strict';
 
 PLAN.EntryMap = class {
@@ -11,7 +12,8 @@ PLAN.EntryMap = class {
       role: 'application',
       hidden: true,
       'aria-label':
-        'Entry map: directions from the target to the skin. Arrow keys move a mark over it, Enter takes the entry there.',
+        'Entry map: directions from the target to the skin. Arrow keys move a mark over it, Enter takes the ' +
+        'entry there.',
       onclick: (event) => this.clicked(event),
       onkeydown: (event) => this.key(event),
       onpointermove: (event) => this.say(this.near(this.pointed(event))),
@@ -83,7 +85,9 @@ PLAN.EntryMap = class {
     this.plan = plan;
     this.notes = answer.remarks;
     const unknown = this.planner.facts.robot_is_unknown;
-    const free = `${plan.free.toLocaleString('en')} of ${plan.tried.toLocaleString('en')} directions are free by the scan\u2019s voxels`;
+    const free =
+      `${plan.free.toLocaleString('en')} of ${plan.tried.toLocaleString('en')} directions are free by the ` +
+      'scan\u2019s voxels';
     if (!body.robot && !unknown && plan.routes.length) {
       this.show(`${free}; asking the robot for the best ${plan.routes.length} ...`);
       this.latest.ask({ aim: body.aim, robot: true });
@@ -91,7 +95,8 @@ PLAN.EntryMap = class {
     else if (unknown) this.show(`${free}. The robot is not asked: ${unknown}.`);
     else if (plan.chosen)
       this.show(
-        `${free}. Route ${plan.chosen.route + 1} is the best that the robot serves in ${plan.wanted} of 8 configurations.`,
+        `${free}. Route ${plan.chosen.route + 1} is the best that the robot serves in ${plan.wanted} of 8 ` +
+          'configurations.',
       );
     else this.show(`${free}; none of the best is served by the robot in ${plan.wanted} of 8 configurations.`);
     // How the needle that is shown is judged is known now.
@@ -171,7 +176,9 @@ PLAN.EntryMap = class {
     const { map } = this.plan;
     const { rules } = this.planner.facts.route_colours;
     const [azimuth, elevation] = this.directions[index];
-    const where = `${NB.fixed(Math.abs(azimuth), 0)}\u00b0 to the ${azimuth < 0 ? 'right' : 'left'} of the front, ${NB.fixed(Math.abs(elevation), 0)}\u00b0 ${elevation < 0 ? 'downwards' : 'upwards'}`;
+    const where =
+      `${NB.fixed(Math.abs(azimuth), 0)}\u00b0 to the ${azimuth < 0 ? 'right' : 'left'} of the front, ` +
+      `${NB.fixed(Math.abs(elevation), 0)}\u00b0 ${elevation < 0 ? 'downwards' : 'upwards'}`;
     const depth = map.depth_m[index] === null ? '' : `, ${NB.mm(map.depth_m[index], 0)} mm deep`;
     const rule = map.rule[index] === null ? null : map.rules[map.rule[index]];
     const how =
@@ -413,7 +420,12 @@ PLAN.EntryMap = class {
       NB.table('Routes that stand for those around them, the best first', columns, shown, { class: 'small' }),
       NB.el('p', {
         class: 'soft',
-        text: 'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Nearest: lower bound of the needle\u2019s distance from bone, vessels and organs. Serve: configurations that work and keep the margins with their own expected error. Clear, error across the needle (rms) and room are of the best of them; postures only, motions are not planned. Room: what arm and tool leave free of the half ball of 0.35 m about the entry.',
+        text:
+          'Odds: of a pneumothorax against a route with none of the terms; an order, no probability. Nearest: ' +
+          'lower bound of the needle\u2019s distance from bone, vessels and organs. Serve: configurations that ' +
+          'work and keep the margins with their own expected error. Clear, error across the needle (rms) and room ' +
+          'are of the best of them; postures only, motions are not planned. Room: what arm and tool leave free of ' +
+          'the half ball of 0.35 m about the entry.',
       }),
       unseen.length
         ? NB.el('p', {

@@ -76,7 +76,12 @@ PLAN.People = class {
     NB.clear(
       this.text,
       NB.el('p', {
-        text: `Space for people: ${NB.percent(room.free_fraction)} % of the half ball of 0.35 m about the entry${regions.length ? ` (${regions.join(', ')})` : ''}. Cone for the hand: ${NB.deg(room.hand_cone_half_angle_rad)}\u00b0 to each side${room.hand_cone_blocker ? `, up to ${NB.words(room.hand_cone_blocker)}` : ''}. Elbow ${room.elbow_up ? 'up' : 'down'}.`,
+        text:
+          `Space for people: ${NB.percent(room.free_fraction)} % of the half ball of 0.35 m about the ` +
+          `entry${regions.length ? ` (${regions.join(', ')})` : ''}. Cone for the hand: ` +
+          `${NB.deg(room.hand_cone_half_angle_rad)}\u00b0 to each ` +
+          `side${room.hand_cone_blocker ? `, up to ${NB.words(room.hand_cone_blocker)}` : ''}. Elbow ` +
+          `${room.elbow_up ? 'up' : 'down'}.`,
       }),
       NB.el('div', { class: 'no-print' }, table),
       NB.el('p', {

@@ -327,7 +327,8 @@ PLAN.Planner = class {
       NB.el(
         'p',
         { class: 'soft' },
-        'mm of the scan: left, posterior, superior (LPS). The entry is where the line from the target through your click leaves the skin.',
+        'mm of the scan: left, posterior, superior (LPS). The entry is where the line from the target through ' +
+          'your click leaves the skin.',
       ),
       NB.el('div', { class: 'bar no-print' }, this.planName, this.saveButton),
       this.saved,
@@ -360,7 +361,10 @@ PLAN.Planner = class {
     const names = [x < 0 ? 'right' : 'left', y < 0 ? 'anterior' : 'posterior', z < 0 ? 'inferior' : 'superior'];
     const place = [x, y, z].map((value) => NB.fixed(value, 2)).join(', ');
     this.place = answer;
-    this.readout.textContent = `Crosshair: voxel ${this.state.crosshair.join(', ')}; (${place}) mm LPS, ${names.join(', ')} of the scan\u2019s origin; ${NB.minus(String(answer.hu))} HU; ${answer.label ? NB.words(answer.label) : 'outside the body'}`;
+    this.readout.textContent =
+      `Crosshair: voxel ${this.state.crosshair.join(', ')}; (${place}) mm LPS, ${names.join(', ')} of the ` +
+      `scan\u2019s origin; ${NB.minus(String(answer.hu))} HU; ` +
+      `${answer.label ? NB.words(answer.label) : 'outside the body'}`;
   }
 
   // ---- the needle
@@ -576,7 +580,10 @@ PLAN.Planner = class {
       PLAN.routeRows([{ name: 'value', route: this.route }], 'Straight needle from the skin to the target'),
       Math.abs(this.route.entry_moved_m) > 5e-3
         ? NB.el('p', {
-            text: `You pointed ${NB.mm(Math.abs(this.route.entry_moved_m))} mm ${this.route.entry_moved_m > 0 ? 'inside' : 'outside'} the skin: the entry is on the line from there to the target.`,
+            text:
+              `You pointed ${NB.mm(Math.abs(this.route.entry_moved_m))} mm ` +
+              `${this.route.entry_moved_m > 0 ? 'inside' : 'outside'} the skin: the entry is on the line from ` +
+              'there to the target.',
           })
         : null,
     );
@@ -654,7 +661,10 @@ PLAN.Planner = class {
         });
     const tip = motion.tip
       ? NB.el('p', {
-          text: `Expected tip error at the target: ${NB.mm(motion.tip.rms_m, 2)} mm rms, ${NB.mm(motion.tip.lateral_rms_m, 2)} mm rms across the needle. The outline on the slices holds 95 % of tips, to scale.`,
+          text:
+            `Expected tip error at the target: ${NB.mm(motion.tip.rms_m, 2)} mm rms, ` +
+            `${NB.mm(motion.tip.lateral_rms_m, 2)} mm rms across the needle. The outline on the slices holds 95 % ` +
+            'of tips, to scale.',
         })
       : NB.el('p', {
           class: 'soft',
@@ -833,7 +843,9 @@ PLAN.Planner = class {
       .filter((lesion) => lesion.registration_rms_m !== null)
       .map((lesion) =>
         NB.el('p', {
-          text: `At ${NB.words(lesion.name)} the registration is off by ${NB.mm(lesion.registration_rms_m, 2)} mm rms (TRE).`,
+          text:
+            `At ${NB.words(lesion.name)} the registration is off by ${NB.mm(lesion.registration_rms_m, 2)} mm rms ` +
+            '(TRE).',
         }),
       );
     return NB.el(
@@ -842,7 +854,9 @@ PLAN.Planner = class {
       NB.el('h2', { text: 'Markers' }),
       table,
       NB.el('p', {
-        text: `They agree to ${NB.mm(registration.fre_rms_m, 2)} mm rms (FRE; ${NB.mm(registration.expected_fre_rms_m, 2)} expected), which does not tell the error at the target.`,
+        text:
+          `They agree to ${NB.mm(registration.fre_rms_m, 2)} mm rms (FRE; ` +
+          `${NB.mm(registration.expected_fre_rms_m, 2)} expected), which does not tell the error at the target.`,
       }),
       errors,
       suspects,
@@ -887,7 +901,8 @@ PLAN.Planner = class {
       { class: 'print-only signature' },
       'Printed ',
       this.printed,
-      '. Research software, not a medical device. Planned by: ______________________  Date: ______________  Signature: ______________________',
+      '. Research software, not a medical device. Planned by: ______________________  Date: ______________  ' +
+        'Signature: ______________________',
     );
   }
 

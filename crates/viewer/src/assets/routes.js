@@ -26,7 +26,9 @@ PLAN.routeRows = function (columns, caption) {
             : NB.fixed(number, 0);
       return NB.el('span', {
         class: 'bad',
-        text: `${judged.broken}: ${value(judged.value)}, ${value(judged.limit)} ${judged.is_least ? 'wanted' : 'allowed'}${unseen}`,
+        text:
+          `${judged.broken}: ${value(judged.value)}, ${value(judged.limit)} ` +
+          `${judged.is_least ? 'wanted' : 'allowed'}${unseen}`,
       });
     });
   }
@@ -50,7 +52,9 @@ PLAN.routeRows = function (columns, caption) {
       const off = known.surface_p99_m === null ? '' : ` \u00b1 ${NB.mm(known.surface_p99_m, 2)}`;
       return NB.el('span', {
         class: known.kept ? 'good' : 'bad',
-        text: `${NB.mm(known.distance_m)}${off} to ${known.words}, ${known.kept ? '' : 'too near: '}${NB.mm(known.margin_m)} wanted`,
+        text:
+          `${NB.mm(known.distance_m)}${off} to ${known.words}, ` +
+          `${known.kept ? '' : 'too near: '}${NB.mm(known.margin_m)} wanted`,
       });
     });
   }

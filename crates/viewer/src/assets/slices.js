@@ -1,7 +1,10 @@
 // Slices on canvases: along the patient's axes, and along and across the needle. Pictures are in millimetres, to scale.
 'use strict';
 
-/** Planes along the patient's axes, in the radiological convention: as seen from the feet, from the front, from the left. */
+/**
+ * Planes along the patient's axes, in the radiological convention: as seen from the feet, from the front, from the
+ * left.
+ */
 PLAN.PLANES = {
   axial: { title: 'Axial', u: 0, v: 1, w: 2, flip: false, letters: ['R', 'L', 'A', 'P'] },
   coronal: { title: 'Coronal', u: 0, v: 2, w: 1, flip: true, letters: ['R', 'L', 'S', 'I'] },
@@ -163,7 +166,8 @@ PLAN.Slice = class extends PLAN.Picture {
   constructor(plane, planner) {
     super(
       plane.title,
-      'Arrow keys move the crosshair, page up and down change the slice, plus and minus zoom, 0 shows all, T and E put target and entry at the crosshair.',
+      'Arrow keys move the crosshair, page up and down change the slice, plus and minus zoom, 0 shows all, T and ' +
+        'E put target and entry at the crosshair.',
     );
     this.plane = plane;
     this.planner = planner;
@@ -513,7 +517,8 @@ PLAN.Probe = class extends PLAN.Picture {
     const { right, down, middle, size, entry, target } = this.axes(route);
     const context = this.begin(size, [0, 0]);
     if (!context) return;
-    // All of the canvas, with at most as many pixels as it has; coarser while the needle moves, so that numbers follow it.
+    // All of the canvas, with at most as many pixels as it has; coarser while the needle moves, so that numbers follow
+    // it.
     const [w, h] = this.box;
     const [columns, rows] = [w, h].map((pixels) =>
       Math.round(Math.min(pixels, 420) * (this.planner.dragging ? 0.4 : 1)),

@@ -1,5 +1,5 @@
-// The voxels in the page: Hounsfield units on a grid along the patient's axes. i runs to the patient's left, j to the back,
-// k to the head; an index means a voxel's centre.
+// The voxels in the page: Hounsfield units on a grid along the patient's axes. i runs to the patient's left, j to the
+// back, k to the head; an index means a voxel's centre.
 'use strict';
 
 /** So many bytes from the server, as they come in; `progress(share)` is told how far it is. */

@@ -108,7 +108,9 @@ NB.AtlasPage = class {
     app.append(
       NB.el('p', {
         class: 'soft',
-        text: 'Every configuration over the roll of the guide about the needle: where it works, how near anything comes in its final posture, and what stands against it elsewhere. Motions are not planned here.',
+        text:
+          'Every configuration over the roll of the guide about the needle: where it works, how near anything ' +
+          'comes in its final posture, and what stands against it elsewhere. Motions are not planned here.',
       }),
       NB.el(
         'div',
@@ -323,7 +325,8 @@ NB.AtlasPage = class {
     if (has) this.arm.pose(this.page.scene.chain, joints);
     const rule = branch.rules[at];
     const text = rule === 255 ? '\u2713 works' : `\u2717 ${NB.words(branch.ruleNames[rule])}`;
-    this.clock.textContent = `${NB.fixed(this.roll, 1)}\u00b0 \u00b7 ${branch.label}: ${text}${has ? '' : ', no posture'}`;
+    const where = `${NB.fixed(this.roll, 1)}\u00b0 \u00b7 ${branch.label}`;
+    this.clock.textContent = `${where}: ${text}${has ? '' : ', no posture'}`;
     this.slider.setAttribute('aria-valuetext', this.clock.textContent);
     this.curves.seek(this.roll);
     this.strips.draw();
@@ -387,7 +390,8 @@ NB.AtlasPage = class {
     );
     const edge = (found) => (found ? `${NB.words(found.rule)}: ${found.detail}` : '');
     const table = NB.table(
-      `Goal ${NB.words(goal.name)}: what stands against the rolls before and after each range; best roll for ${NB.aims[goal.aim] || NB.words(goal.aim)}`,
+      `Goal ${NB.words(goal.name)}: what stands against the rolls before and after each range; best roll for ` +
+        `${NB.aims[goal.aim] || NB.words(goal.aim)}`,
       [
         { title: 'Configuration', cell: ({ branch }) => branch.label },
         {
@@ -442,8 +446,12 @@ NB.AtlasPage = class {
       ),
     );
     const working = goal.branches.filter((branch) => branch.ranges.length).length;
-    const answer = `${working} of ${goal.branches.length} configurations work${freest < 0 ? '' : `; ${goal.branches[freest].label} has most room to turn, ${NB.deg(this.turns(goal.branches[freest]), 0)} of 360\u00b0`}.`;
-    NB.clear(this.table, NB.el('p', null, NB.el('strong', { text: answer })), table);
+    let answer = `${working} of ${goal.branches.length} configurations work`;
+    if (freest >= 0) {
+      const branch = goal.branches[freest];
+      answer += `; ${branch.label} has most room to turn, ${NB.deg(this.turns(branch), 0)} of 360\u00b0`;
+    }
+    NB.clear(this.table, NB.el('p', null, NB.el('strong', { text: `${answer}.` })), table);
   }
 
   paint(context, width, height) {
@@ -532,7 +540,9 @@ NB.AtlasPage = class {
         rejecting.map(key),
         NB.el('span', {
           class: 'soft small',
-          text: `Black frame: a range that works, to the exact angle; diamond: its best roll${this.fixedMark(this.goal) === null ? '' : '; dashed line: the roll that the goal fixes'}.`,
+          text:
+            'Black frame: a range that works, to the exact angle; diamond: its best ' +
+            `roll${this.fixedMark(this.goal) === null ? '' : '; dashed line: the roll that the goal fixes'}.`,
         }),
       );
     }

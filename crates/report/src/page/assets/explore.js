@@ -148,7 +148,9 @@ NB.Explore = class {
       this.live ||= await NB.Live.start(this.data);
     } catch (error) {
       this.open.disabled = true;
-      this.status.textContent = `Clearances cannot be computed here: ${error.message}. On the command line: ${this.command(this.startJoints())}`;
+      this.status.textContent =
+        `Clearances cannot be computed here: ${error.message}. On the command line: ` +
+        `${this.command(this.startJoints())}`;
       return;
     }
     if (!this.built) this.build();
@@ -276,7 +278,9 @@ NB.Explore = class {
     this.body.append(
       NB.el('p', {
         class: 'tried-note',
-        text: 'What is shown is this posture alone, not a result of the run: nothing is simulated, and no motion to it is planned or proven. The blue ghost is the run\u2019s posture.',
+        text:
+          'What is shown is this posture alone, not a result of the run: nothing is simulated, and no motion to it ' +
+          'is planned or proven. The blue ghost is the run\u2019s posture.',
       }),
       NB.el(
         'div',
@@ -486,7 +490,9 @@ NB.Explore = class {
         .overlaps()
         .map(({ body, other, depth }) => `The ${NB.words(body)} stands ${NB.mm(depth)} mm in the ${NB.words(other)}.`),
       this.startHits
-        ? `From here, the posture that the scenario starts in collides: ${this.startHits.solids.map(NB.words).join(' and ')} overlap by ${NB.mm(-this.startHits.distance)} mm. Give another one under [start].`
+        ? 'From here, the posture that the scenario starts in collides: ' +
+          `${this.startHits.solids.map(NB.words).join(' and ')} overlap by ${NB.mm(-this.startHits.distance)} mm. ` +
+          'Give another one under [start].'
         : null,
       low < -0.001 ? `The arm reaches ${NB.mm(-low)} mm under the floor.` : null,
     ].filter(Boolean);
@@ -582,7 +588,10 @@ NB.Explore = class {
     });
   }
 
-  /** Which configurations reach the goal from here: at once from few rolls, where that is quick, and again from many when all rests. */
+  /**
+   * Which configurations reach the goal from here: at once from few rolls, where that is quick, and again from many
+   * when all rests.
+   */
   lookForConfigurations() {
     if (!(this.coarseInMs > NB.Explore.COARSE_MS)) {
       this.showReach(6, false);
@@ -652,7 +661,10 @@ NB.Explore = class {
     const note = fromBase
       ? NB.el('p', {
           class: 'small',
-          text: 'Here the goal stays where it is in the room. The scenario gives it from the robot\u2019s base (flange_pose), so there it goes along with the base: give its target and entry in the room before you move the base.',
+          text:
+            'Here the goal stays where it is in the room. The scenario gives it from the robot\u2019s base ' +
+            '(flange_pose), so there it goes along with the base: give its target and entry in the room before you ' +
+            'move the base.',
         })
       : null;
     // A button that has the focus keeps it.
@@ -810,7 +822,10 @@ NB.Explore = class {
 };
 /** Layers that show what the run has found. */
 NB.Explore.RESULTS = ['arm', 'other', 'witness', 'ellipsoids', 'cone', 'sight', 'taken'];
-/** Rolls that are looked at when all rests, what a look at fewer may take while the base moves, and radius of the ring (m). */
+/**
+ * Rolls that are looked at when all rests, what a look at fewer may take while the base moves, and radius of the
+ * ring (m).
+ */
 NB.Explore.ROLLS = 36;
 NB.Explore.COARSE_MS = 10;
 NB.Explore.RING = 0.17;

@@ -44,7 +44,11 @@ NB.TestPage = class {
     const { protocol } = report;
     app.append(
       NB.el('p', {
-        text: `The arm goes from P1 to P5 and back as ${protocol.configuration}, at ${NB.percent(protocol.speed_share)} % of its rated joint speeds, with ${NB.significant(protocol.load_kg)} kg at the flange. A tracker measures where it comes to rest; its noise has a standard deviation of ${NB.length(protocol.tracker_noise_m)} on each axis.`,
+        text:
+          `The arm goes from P1 to P5 and back as ${protocol.configuration}, at ` +
+          `${NB.percent(protocol.speed_share)} % of its rated joint speeds, with ` +
+          `${NB.significant(protocol.load_kg)} kg at the flange. A tracker measures where it comes to rest; its ` +
+          `noise has a standard deviation of ${NB.length(protocol.tracker_noise_m)} on each axis.`,
       }),
       NB.el(
         'div',
@@ -83,7 +87,8 @@ NB.TestPage = class {
             `${engine}: attained positions about the command`,
             attained,
             NB.fileName(this.report.scenario.name, 'attained', engine),
-            'Positions in the controller\u2019s base frame, all poses to one scale. AP: distance of the mean from the command; RP: mean distance from the mean and three standard deviations of it.',
+            'Positions in the controller\u2019s base frame, all poses to one scale. AP: distance of the mean ' +
+              'from the command; RP: mean distance from the mean and three standard deviations of it.',
           ),
         ),
       ),
@@ -127,7 +132,10 @@ NB.TestPage = class {
     this.poseButtons.forEach((button, at) => button.setAttribute('aria-pressed', String(at === index)));
     this.arm.pose(this.page.scene.chain, this.report.iso9283.protocol.joints_rad[index]);
     const { ap_m: ap, rp_m: rp } = Object.values(this.report.iso9283.engines)[this.engine]?.poses[index] || {};
-    this.note.textContent = `The arm stands in the commanded pose P${index + 1}. Blue points: where the measured point came to rest, their distance from the command drawn ${this.spread.toLocaleString('en')} times larger than it is${ap === undefined ? '' : ` (AP ${NB.length(ap)}, RP ${NB.length(rp)})`}.`;
+    this.note.textContent =
+      `The arm stands in the commanded pose P${index + 1}. Blue points: where the measured point came to rest, ` +
+      `their distance from the command drawn ${this.spread.toLocaleString('en')} times larger than it ` +
+      `is${ap === undefined ? '' : ` (AP ${NB.length(ap)}, RP ${NB.length(rp)})`}.`;
     NB.address.write({ pose: String(index + 1) });
     this.view.draw();
   }
@@ -231,7 +239,9 @@ NB.TestPage = class {
         ),
         each.drift
           ? NB.el('p', {
-              text: `Drift at P${each.drift.pose}: accuracy ${NB.length(each.drift.dap_m)}, repeatability ${NB.length(each.drift.drp_m)}.`,
+              text:
+                `Drift at P${each.drift.pose}: accuracy ${NB.length(each.drift.dap_m)}, repeatability ` +
+                `${NB.length(each.drift.drp_m)}.`,
             })
           : null,
       ];

@@ -653,7 +653,9 @@ NB.RunPage = class {
     const now =
       found &&
       NB.el('p', {
-        text: `Nearest ${this.shown.length ? `now, at ${this.time.toFixed(2)} s` : 'in the final posture'}: ${pairWords(found)}, ${NB.mm(found.minimum_m)} mm.`,
+        text:
+          `Nearest ${this.shown.length ? `now, at ${this.time.toFixed(2)} s` : 'in the final posture'}: ` +
+          `${pairWords(found)}, ${NB.mm(found.minimum_m)} mm.`,
       });
     const all =
       least &&
@@ -661,7 +663,8 @@ NB.RunPage = class {
       NB.el(
         'p',
         null,
-        `Least over the whole motion: ${pairWords(least)}, ${NB.mm(least.minimum_m)} mm${least.time_s === null ? '. ' : ` at ${least.time_s.toFixed(2)} s. `}`,
+        `Least over the whole motion: ${pairWords(least)}, ${NB.mm(least.minimum_m)} ` +
+          `mm${least.time_s === null ? '. ' : ` at ${least.time_s.toFixed(2)} s. `}`,
         least.time_s === null
           ? null
           : NB.el(
@@ -748,7 +751,8 @@ NB.RunPage = class {
         view.ellipsoid('ellipsoids', center, columns, color);
         view.label(
           'ellipsoids',
-          `${this.magnify === 1 ? '' : `\u00d7 ${this.magnify}: `}95 % at ${where}, longest half axis ${NB.mm(2.7955 * NB.longest(moments.covariance_m2), 1)} mm`,
+          `${this.magnify === 1 ? '' : `\u00d7 ${this.magnify}: `}95 % at ${where}, longest half axis ` +
+            `${NB.mm(2.7955 * NB.longest(moments.covariance_m2), 1)} mm`,
           center,
         );
       }
@@ -845,9 +849,10 @@ NB.RunPage = class {
     const c = this.configuration;
     const item = (before, each) => {
       const [value, limit] = NB.valueAndLimit(each.value, each.limit, each.unit);
-      return NB.el('li', {
-        text: `${before}${each.value === null ? '' : `: ${value}, limit ${limit}`}${each.engine ? ` (${each.engine})` : ''}${each.detail ? `. ${each.detail.charAt(0).toUpperCase()}${each.detail.slice(1)}` : ''}.`,
-      });
+      const measured = each.value === null ? '' : `: ${value}, limit ${limit}`;
+      const engine = each.engine ? ` (${each.engine})` : '';
+      const detail = each.detail ? `. ${each.detail.charAt(0).toUpperCase()}${each.detail.slice(1)}` : '';
+      return NB.el('li', { text: `${before}${measured}${engine}${detail}.` });
     };
     const reasons = c.rejections.map((each) => item(`Rejected, ${NB.words(each.rule)}`, each));
     const failed = this.report.criteria
@@ -860,7 +865,8 @@ NB.RunPage = class {
       {
         title: 'Which and when',
         cell: ([, found]) =>
-          `${[...new Set(found.pair.map(NB.words))].join(' to ')}, ${NB.words(found.phase)}${found.time_s === null ? '' : ` ${found.time_s.toFixed(2)} s`}`,
+          `${[...new Set(found.pair.map(NB.words))].join(' to ')}, ` +
+          `${NB.words(found.phase)}${found.time_s === null ? '' : ` ${found.time_s.toFixed(2)} s`}`,
       },
     ];
     const caption = this.own.runs.length
@@ -885,7 +891,8 @@ NB.RunPage = class {
         'p',
         { class: 'small' },
         c.joints_rad
-          ? `Joints ${c.joints_rad.map((q) => `${NB.deg(q)}\u00b0`).join(', ')}; roll about the needle ${NB.deg(c.roll_rad)}\u00b0`
+          ? `Joints ${c.joints_rad.map((q) => `${NB.deg(q)}\u00b0`).join(', ')}; roll about the needle ` +
+              `${NB.deg(c.roll_rad)}\u00b0`
           : 'No posture.',
       ),
       reasons.length || failed.length ? NB.el('ul', { class: 'plain small' }, reasons, failed) : null,
@@ -912,7 +919,8 @@ NB.RunPage = class {
       ...NB.metricColumns(this.extra.columns.table),
     ];
     const table = NB.table(
-      `${NB.words(this.goal.name)}: clearances are the least over the recorded motions of all engines; those that are proven hold between the samples, too`,
+      `${NB.words(this.goal.name)}: clearances are the least over the recorded motions of all engines; those ` +
+        'that are proven hold between the samples, too',
       columns,
       this.goal.configurations,
       { class: 'choose small' },

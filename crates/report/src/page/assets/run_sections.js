@@ -65,7 +65,9 @@ NB.sections = {
       parts.push(
         NB.el('p', {
           class: route.kept ? '' : 'error',
-          text: `The planned needle${route.kept ? '' : ' is refused: it'} ${where}; it has to keep ${NB.mm(Math.max(route.margin_m, wanted), 1)} mm.`,
+          text:
+            `The planned needle${route.kept ? '' : ' is refused: it'} ${where}; it has to keep ` +
+            `${NB.mm(Math.max(route.margin_m, wanted), 1)} mm.`,
         }),
       );
     }
@@ -155,7 +157,9 @@ NB.sections = {
       NB.table(`${c.label}: ${ends[c.margin.search]}`, columns, Object.entries(c.margin.classes), { class: 'small' }),
       NB.el('p', {
         class: 'soft small',
-        text: 'Proven lower bounds of the planned motion of the nominal arm: nothing comes nearer than this. Clearances of recorded motions, in the other tables, are what was attained, and a little more.',
+        text:
+          'Proven lower bounds of the planned motion of the nominal arm: nothing comes nearer than this. ' +
+          'Clearances of recorded motions, in the other tables, are what was attained, and a little more.',
       }),
     ];
   },
@@ -191,7 +195,8 @@ NB.sections = {
       })),
     ];
     const help =
-      'Ellipses hold 95 %. x and y are across the needle, z along it; both panels are in mm and to one scale, the same for all configurations of the goal. The bar: each source\u2019s share of the mean square.';
+      'Ellipses hold 95 %. x and y are across the needle, z along it; both panels are in mm and to one scale, ' +
+      'the same for all configurations of the goal. The bar: each source\u2019s share of the mean square.';
     return [
       charts?.budget
         ? NB.chart(
@@ -202,7 +207,8 @@ NB.sections = {
           )
         : null,
       NB.table(
-        'Expected distance of the tip from the target, root mean square over all arms and patients: by all sources together, and by each alone',
+        'Expected distance of the tip from the target, root mean square over all arms and patients: by all ' +
+          'sources together, and by each alone',
         columns,
         with_,
         { class: 'small' },
@@ -244,11 +250,14 @@ NB.sections = {
     return [
       NB.el('p', {
         class: 'soft no-print',
-        text: 'Switch on "people and sight", "free space" and "cone for the hand" to see them: blue lines of sight are free, orange ones end where they are blocked; orange cubes are taken by the arm.',
+        text:
+          'Switch on "people and sight", "free space" and "cone for the hand" to see them: blue lines of sight are ' +
+          'free, orange ones end where they are blocked; orange cubes are taken by the arm.',
       }),
       with_.length
         ? NB.table(
-            'Final posture: share of the half ball about the entry point that the arm leaves free, and of the lines from eyes to entry and needle',
+            'Final posture: share of the half ball about the entry point that the arm leaves free, and of the ' +
+              'lines from eyes to entry and needle',
             columns,
             with_,
             { class: 'small' },
@@ -395,7 +404,9 @@ NB.sections = {
             NB.el('summary', null, NB.el('h2', { text: 'The arm and the patient that were drawn' })),
             NB.el('p', {
               class: 'soft',
-              text: 'One draw of the scenario\u2019s imperfections, by its seed; lengths in m, angles in rad. The expected tip error is over all draws, not of this one.',
+              text:
+                'One draw of the scenario\u2019s imperfections, by its seed; lengths in m, angles in rad. The ' +
+                'expected tip error is over all draws, not of this one.',
             }),
             NB.tree(truth),
           )
@@ -498,7 +509,9 @@ NB.sections.press = function (with_, configuration, charts, goal, name) {
   const table = (caption, of) => NB.table(caption, columns, of, { class: 'small contacts' });
   const shown = (own?.events.press || []).map((press, index) => {
     const svg = charts?.press?.[index];
-    const title = `${configuration.label}, contact ${index + 1}: ${press.solids.map(NB.words).join(' against ')}${press.friction ? `, friction ${press.friction}` : ''}`;
+    const title =
+      `${configuration.label}, contact ${index + 1}: ` +
+      `${press.solids.map(NB.words).join(' against ')}${press.friction ? `, friction ${press.friction}` : ''}`;
     return svg ? NB.chart(title, svg, NB.fileName(name, goal.name, configuration.label, `contact-${index + 1}`)) : null;
   });
   const means = rows[0].press.force_means;
@@ -594,7 +607,9 @@ NB.sections.stop = function (with_) {
     NB.el('h3', { text: 'Emergency stop' }),
     NB.el('p', {
       class: 'soft',
-      text: `Category ${category} of IEC 60204-1: ${does}. It is triggered at the moment from which the tip is predicted to go farthest.`,
+      text:
+        `Category ${category} of IEC 60204-1: ${does}. It is triggered at the moment from which the tip is ` +
+        'predicted to go farthest.',
     }),
     NB.table('How far the arm goes on after the stop', columns, rows, { class: 'small' }),
     brakes

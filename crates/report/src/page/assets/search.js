@@ -22,7 +22,9 @@ NB.SearchPage = class {
       NB.el('h2', { class: 'part', text: 'How flat it is, and what else is as good' }),
       NB.el('p', {
         class: 'soft small',
-        text: 'Each point is a candidate by all layouts that it was judged on; the line is the best of each stretch of the choice. Few layouts scatter more, so small points say less.',
+        text:
+          'Each point is a candidate by all layouts that it was judged on; the line is the best of each stretch of ' +
+          'the choice. Few layouts scatter more, so small points say less.',
       }),
       NB.el(
         'div',
@@ -63,11 +65,16 @@ NB.SearchPage = class {
   headline() {
     const { answer, log, page } = this;
     const estimate = answer.figures[0];
-    const sentence = `${page.objectives[0].words} ${this.figure(estimate.value)}${this.ends(estimate, (value) => this.figure(value))} on ${estimate.cases} layouts that nothing was compared by`;
+    const sentence =
+      `${page.objectives[0].words} ` +
+      `${this.figure(estimate.value)}${this.ends(estimate, (value) => this.figure(value))} on ${estimate.cases} ` +
+      'layouts that nothing was compared by';
     const choice = page.factors.map((factor, index) => [factor, this.winner.choice[index][1]]);
     const as_good = this.front.size
-      ? `${[...this.front.values()].filter((each) => each.is_certain).length} of ${this.front.size} are on the front for certain.`
-      : `${this.equals.size - 1} others cannot be told from it; ${this.undecided.size} more were dropped on fewer layouts and may be as good.`;
+      ? `${[...this.front.values()].filter((each) => each.is_certain).length} of ${this.front.size} are on the ` +
+        'front for certain.'
+      : `${this.equals.size - 1} others cannot be told from it; ${this.undecided.size} more were dropped on fewer ` +
+        'layouts and may be as good.';
     return NB.el(
       'section',
       { class: 'panel answer' },
@@ -92,7 +99,9 @@ NB.SearchPage = class {
         NB.el('dd', { text: as_good }),
         NB.el('dt', { text: 'by the layouts that selected it' }),
         NB.el('dd', {
-          text: `${this.figure(answer.selected_by[0].value)}: of many candidates the one that looks best looks better than it is`,
+          text:
+            `${this.figure(answer.selected_by[0].value)}: of many candidates the one that looks best looks better ` +
+            'than it is',
         }),
         NB.el('dt', { text: 'room counted' }),
         NB.el('dd', { text: log.classes.map((name) => NB.words(name)).join(', ') }),
@@ -434,7 +443,9 @@ NB.SearchPage = class {
       ),
       NB.el('p', {
         class: 'small',
-        text: `${log.grid_cases ? `All choices with all layouts are ${log.grid_cases} cases. ` : ''}Reach alone ruled out ${counted(log.ruled_out, 'candidate')}, which spared ${counted(log.cases_spared, 'case')}.`,
+        text:
+          `${log.grid_cases ? `All choices with all layouts are ${log.grid_cases} cases. ` : ''}Reach alone ruled ` +
+          `out ${counted(log.ruled_out, 'candidate')}, which spared ${counted(log.cases_spared, 'case')}.`,
       }),
     );
   }
@@ -459,7 +470,8 @@ NB.SearchPage = class {
               NB.el('strong', {
                 text: this.front.size ? 'On the front: ' : picture.id === this.winner.id ? 'Best: ' : 'As good: ',
               }),
-              `${picture.choice}. ${picture.configuration} at ${NB.words(picture.goal)}, margin ${NB.fixed(picture.marginMm, 1)} mm.`,
+              `${picture.choice}. ${picture.configuration} at ${NB.words(picture.goal)}, margin ` +
+                `${NB.fixed(picture.marginMm, 1)} mm.`,
             ),
           ),
         ),

@@ -45,7 +45,9 @@ NB.Statistics = class {
   text(value, unit, interval) {
     const one = (each) => (unit === '1' ? `${NB.fixed(100 * each, 1)} %` : NB.measured(each, unit));
     if (value === null || value === undefined) return '\u2013';
-    return `${one(value)}${interval ? ` (${unit === '1' ? this.percents(interval) : `${one(interval.low)} to ${one(interval.high)}`})` : ''}`;
+    if (!interval) return one(value);
+    const range = unit === '1' ? this.percents(interval) : `${one(interval.low)} to ${one(interval.high)}`;
+    return `${one(value)} (${range})`;
   }
 
   /** What answers the study: its sentence, what it compares, its criteria, and the configurations. */
@@ -139,11 +141,13 @@ NB.Statistics = class {
       context.arc(a, b, 4.5, 0, 2 * Math.PI);
       context.fill();
     };
+    const isCut = choices.length > shown.length;
+    const rest = isCut ? ` The first ${shown.length} of ${choices.length}; the table below has more.` : '';
     this.study.compared = new NB.Figure({
       name: `${this.page.name}-choices`,
       title: `Which ${names}, best first`,
       label: `Share of layouts that work, choice by choice`,
-      help: `Share of the layouts that can exist; lines are 95 % intervals of each choice by itself.${choices.length > shown.length ? ` The first ${shown.length} of ${choices.length}; the table below has more.` : ''}`,
+      help: `Share of the layouts that can exist; lines are 95 % intervals of each choice by itself.${rest}`,
       height: NB.dotHeight(rows.length),
       paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
       legend: () => [
@@ -174,7 +178,9 @@ NB.Statistics = class {
     const figure = new NB.Figure({
       name: `${this.page.name}-by-${compared.factor}`,
       title: `By ${NB.words(compared.factor)}: ${compared.response}`,
-      help: `Over all other factors; lines are 95 % intervals.${compared.differs ? '' : ' Chance alone makes such differences in 1 of 20 studies.'}`,
+      help:
+        'Over all other factors; lines are 95 % ' +
+        `intervals.${compared.differs ? '' : ' Chance alone makes such differences in 1 of 20 studies.'}`,
       height: NB.dotHeight(rows.length),
       paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
     });
@@ -201,7 +207,8 @@ NB.Statistics = class {
       name: `${this.page.name}-configurations`,
       title: `How often each configuration works${best ? `, with ${best.label}` : ''}`,
       help: overall
-        ? `Share of the ${NB.grouped(overall.layouts ?? overall.cases)} layouts that can exist; lines are ${Math.round(100 * (this.summary.confidence || 0.95))} % intervals${each}.`
+        ? `Share of the ${NB.grouped(overall.layouts ?? overall.cases)} layouts that can exist; lines are ` +
+          `${Math.round(100 * (this.summary.confidence || 0.95))} % intervals${each}.`
         : 'Share of the layouts on this page that can exist.',
       height: NB.dotHeight(8),
       paint: (context, width, height) => NB.dotPlot(context, width, height, rows, x),
@@ -370,7 +377,8 @@ NB.Statistics = class {
         .join(', ');
     const layouts = counts.layouts ?? counts.cases - counts.invalid;
     return NB.table(
-      `${counts.goal ? `Goal ${NB.words(counts.goal)}` : 'All goals'}: ${NB.grouped(layouts)} layouts${counts.invalid ? `, ${NB.grouped(counts.invalid)} more cannot exist` : ''}`,
+      `${counts.goal ? `Goal ${NB.words(counts.goal)}` : 'All goals'}: ${NB.grouped(layouts)} ` +
+        `layouts${counts.invalid ? `, ${NB.grouped(counts.invalid)} more cannot exist` : ''}`,
       [
         { title: 'Configuration', cell: (c) => c.label },
         { title: 'Works (95 %)', numeric: true, cell: (c) => this.rate(c.success) },
@@ -541,7 +549,9 @@ NB.Statistics = class {
       ),
       NB.el('p', {
         class: 'soft small',
-        text: 'Found by search, so no bounds: a smaller one may exist. * some layouts within cannot exist and count neither way; ? nearer ones were still being found.',
+        text:
+          'Found by search, so no bounds: a smaller one may exist. * some layouts within cannot exist and count ' +
+          'neither way; ? nearer ones were still being found.',
       }),
     ];
   }

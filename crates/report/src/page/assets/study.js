@@ -102,7 +102,9 @@ NB.StudyPage = class extends NB.StudyPlots {
       NB.el('span', { text: `${NB.grouped(cases)} cases, each with 8 configurations; varied: ${varied.join(', ')}` }),
       kept < cases
         ? NB.el('strong', {
-            text: `The plots show ${NB.grouped(kept)} of them: one of each block of successive cases, drawn by a fixed rule, and those that the statistics name. All tables of statistics are of all cases.`,
+            text:
+              `The plots show ${NB.grouped(kept)} of them: one of each block of successive cases, drawn by a fixed ` +
+              'rule, and those that the statistics name. All tables of statistics are of all cases.',
           })
         : null,
       postures && postures !== 'none' && this.summary.headline
@@ -361,7 +363,8 @@ NB.StudyPage = class extends NB.StudyPlots {
     figure(
       'scatter',
       'Cases',
-      'Each mark is a place, of one case or of several: click it for its cases, or go through the numbers beside it with the arrow keys.',
+      'Each mark is a place, of one case or of several: click it for its cases, or go through the numbers beside ' +
+        'it with the arrow keys.',
       'Scatter of the cases over two factors',
       400,
       (...all) => this.paintScatter(...all),
@@ -447,7 +450,9 @@ NB.StudyPage = class extends NB.StudyPlots {
     );
     const postures =
       this.summary.postures_only === 'all' ? ' Postures only: whether a motion gets there is not known.' : '';
-    this.shown.textContent = `${NB.grouped(this.indices.length)} of ${NB.grouped(this.count)} cases are shown${only.length ? `, with ${only.join(', ')}` : ''}.${postures}`;
+    this.shown.textContent =
+      `${NB.grouped(this.indices.length)} of ${NB.grouped(this.count)} cases are ` +
+      `shown${only.length ? `, with ${only.join(', ')}` : ''}.${postures}`;
   }
 
   redraw() {
@@ -477,7 +482,8 @@ NB.StudyPage = class extends NB.StudyPlots {
       this.tip.hidden = !found;
       if (!found) return;
       this.tip.textContent = found.text;
-      this.tip.style.left = `${Math.max(Math.min(event.pageX + 14, document.documentElement.clientWidth - this.tip.offsetWidth - 4), 0)}px`;
+      const rightmost = document.documentElement.clientWidth - this.tip.offsetWidth - 4;
+      this.tip.style.left = `${Math.max(Math.min(event.pageX + 14, rightmost), 0)}px`;
       this.tip.style.top = `${event.pageY + 12}px`;
     });
     canvas.canvas.addEventListener('pointerleave', () => {
@@ -534,7 +540,9 @@ NB.StudyPage = class extends NB.StudyPlots {
     });
     if (best < 0) return null;
     return {
-      text: `${this.page.configurations[best]}: ${NB.fixed(100 * share, 1)} % below ${NB.threeDigits(value)} ${metric.unit === '1' ? '' : metric.unit}`,
+      text:
+        `${this.page.configurations[best]}: ${NB.fixed(100 * share, 1)} % below ${NB.threeDigits(value)} ` +
+        `${metric.unit === '1' ? '' : metric.unit}`,
       choose: () => {
         let [found, nearest] = [-1, Infinity];
         for (const index of this.indices) {

@@ -100,7 +100,9 @@ NB.CaseScene = class {
       }
     }
     if (this.missing)
-      this.note.textContent += ` ${this.missing} of the things that stand about the arm in this case are not on the page, and are not drawn.`;
+      this.note.textContent +=
+        ` ${this.missing} of the things that stand about the arm in this case are not on the page, and are not ` +
+        'drawn.';
   }
 
   /** The surfaces of a kind in a slot, made when they are first seen. */
@@ -135,10 +137,16 @@ NB.CaseScene = class {
 
   words(at, title, { has, known, own, hasTool }) {
     if (at === undefined)
-      return 'The posture of this case is not on the page (it holds some thousand): the command beside it makes it anew.';
+      return (
+        'The posture of this case is not on the page (it holds some thousand): ' +
+        'the command beside it makes it anew.'
+      );
     if (!known) return 'This layout cannot exist: there is nothing to draw.';
     if (!own) return 'This case has another arm than the page holds: it is not drawn. --run makes a page of it.';
     if (!has) return `${title} has no posture. Patient and surroundings are those of this case.`;
-    return `${title}. Arm${hasTool ? ', tool' : ''}, patient and all that stands about them are those of this case, where they stand in it.${hasTool ? '' : ' Its tool is not on the page, and is not drawn.'}`;
+    return (
+      `${title}. Arm${hasTool ? ', tool' : ''}, patient and all that stands about them are those of this case, ` +
+      `where they stand in it.${hasTool ? '' : ' Its tool is not on the page, and is not drawn.'}`
+    );
   }
 };

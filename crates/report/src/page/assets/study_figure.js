@@ -106,7 +106,10 @@ NB.folded = function (item) {
 NB.dotRow = (width) => (width < 560 ? 34 : 25);
 NB.dotHeight = (rows) => (width) => rows * NB.dotRow(width) + 54;
 
-/** Values with their intervals, one a row: `rows` of `{ label, value, interval, text, style }`, `x` of `{ low, high, title }`. */
+/**
+ * Values with their intervals, one a row: `rows` of `{ label, value, interval, text, style }`, `x` of
+ * `{ low, high, title }`.
+ */
 NB.dotPlot = function (context, width, height, rows, x) {
   const narrow = width < 560;
   const [left, right] = narrow ? [8, 14] : [Math.min(0.3 * width, 250), 150];

@@ -352,10 +352,12 @@ NB.StudyPlots = class {
     if (places.most > 1) {
       let fewest = Infinity;
       for (const count of places.counts) fewest = Math.min(fewest, count);
+      let shows = coloring.kinds ? 'sectors are shares of its cases' : 'the colour is of their median';
+      if (places.first.length > NB.MOST_MARKS) shows = 'the colour is of the most';
       const cases =
         fewest === places.most ? `${group(places.most)} cases` : `${group(fewest)} to ${group(places.most)} cases`;
       items.push({
-        text: `${group(places.first.length)} places of ${cases} each; ${places.first.length > NB.MOST_MARKS ? 'the colour is of the most' : coloring.kinds ? 'sectors are shares of its cases' : 'the colour is of their median'}`,
+        text: `${group(places.first.length)} places of ${cases} each; ${shows}`,
         draw() {},
       });
     }

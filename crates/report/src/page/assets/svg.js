@@ -79,11 +79,15 @@ NB.SvgContext = class {
     const at = (angle) => [NB.short(x + r * Math.cos(angle)), NB.short(y + r * Math.sin(angle))];
     if (to - from >= 2 * Math.PI - 1e-6) {
       const [a, b] = [at(0), at(Math.PI)];
-      this.path += `M${a.join(' ')}A${NB.short(r)} ${NB.short(r)} 0 1 1 ${b.join(' ')}A${NB.short(r)} ${NB.short(r)} 0 1 1 ${a.join(' ')}Z`;
+      this.path +=
+        `M${a.join(' ')}A${NB.short(r)} ${NB.short(r)} 0 1 1 ${b.join(' ')}A${NB.short(r)} ${NB.short(r)} 0 1 1 ` +
+        `${a.join(' ')}Z`;
       return;
     }
     const [a, b] = [at(from), at(to)];
-    this.path += `${this.path ? 'L' : 'M'}${a.join(' ')}A${NB.short(r)} ${NB.short(r)} 0 ${to - from > Math.PI ? 1 : 0} 1 ${b.join(' ')}`;
+    this.path +=
+      `${this.path ? 'L' : 'M'}${a.join(' ')}A${NB.short(r)} ${NB.short(r)} 0 ${to - from > Math.PI ? 1 : 0} 1 ` +
+      `${b.join(' ')}`;
   }
 
   put(tag, attributes, text = '') {
@@ -161,8 +165,10 @@ NB.SvgContext = class {
   svg(title) {
     const [width, height, mm] = this.size;
     return (
-      `<svg xmlns="http://www.w3.org/2000/svg" width="${mm}mm" height="${NB.short((mm * height) / width)}mm" viewBox="0 0 ${NB.short(width)} ${NB.short(height)}">\n` +
-      `<title>${NB.xml(title)}</title>\n<rect width="100%" height="100%" fill="#fff"/>\n${this.parts.join('\n')}\n</svg>\n`
+      `<svg xmlns="http://www.w3.org/2000/svg" width="${mm}mm" height="${NB.short((mm * height) / width)}mm" ` +
+      `viewBox="0 0 ${NB.short(width)} ${NB.short(height)}">\n` +
+      `<title>${NB.xml(title)}</title>\n<rect width="100%" height="100%" ` +
+      `fill="#fff"/>\n${this.parts.join('\n')}\n</svg>\n`
     );
   }
 };
@@ -199,7 +205,10 @@ NB.saveButton = (text, title, file) =>
     text,
   );
 
-/** A plot for a column of a journal: `paint(context, width, height)` draws it, `legend` of `{ text, draw(context, x, y) }` stands below. */
+/**
+ * A plot for a column of a journal: `paint(context, width, height)` draws it, `legend` of
+ * `{ text, draw(context, x, y) }` stands below.
+ */
 NB.paper = function (title, paint, height, legend = []) {
   const { px: width, font, mm } = NB.COLUMN;
   const line = 1.45 * font;
