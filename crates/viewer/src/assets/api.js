@@ -16,7 +16,7 @@ PLAN.Problem = class extends Error {
   }
 };
 
-PLAN.fetch = async function (path, options = {}) {
+PLAN.fetch = async (path, options = {}) => {
   const headers = { authorization: `Bearer ${PLAN.token}` };
   if (options.body !== undefined) headers['content-type'] = 'application/json';
   let response;
@@ -94,7 +94,7 @@ PLAN.page = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte
 PLAN.rgb = (channels) => `rgb(${channels.join()})`;
 
 /** A patch of colour and what it means. Style attributes are not allowed here; the page's own script may set them. */
-PLAN.swatch = function (color, words) {
+PLAN.swatch = (color, words) => {
   const patch = NB.el('i');
   patch.style.background = color;
   return NB.el('span', { class: 'entry-swatch' }, patch, words);

@@ -1077,7 +1077,7 @@ PLAN.Planner = class {
 PLAN.taken = ({ schema_version, version, ...state }) => state;
 
 /** Opens the case. */
-PLAN.open = async function () {
+PLAN.open = async () => {
   const app = document.getElementById('app');
   const loading = document.getElementById('loading');
   try {

@@ -98,7 +98,7 @@ PLAN.Room = class {
 };
 
 /** Joints at a time, between postures. */
-PLAN.posture = function ({ time_s: times, joints_rad: joints }, time) {
+PLAN.posture = ({ time_s: times, joints_rad: joints }, time) => {
   let next = times.findIndex((each) => each >= time);
   if (next < 0) next = times.length - 1;
   if (next === 0) return joints[0];

@@ -2,7 +2,7 @@
 'use strict';
 
 /** Routes as columns, what is known of them as rows. */
-PLAN.routeRows = function (columns, caption) {
+PLAN.routeRows = (columns, caption) => {
   const rows = [];
   const row = (title, unit, cell) =>
     rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route, column) : '\u2013')) });

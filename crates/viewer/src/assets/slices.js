@@ -585,7 +585,7 @@ PLAN.Probe = class extends PLAN.Picture {
 };
 
 /** Letters of where a direction runs, the main one first: `A` or `AL`. */
-PLAN.towards = function (direction) {
+PLAN.towards = (direction) => {
   const letters = [
     ['R', 'L'],
     ['A', 'P'],

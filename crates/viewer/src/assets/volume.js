@@ -3,7 +3,7 @@
 'use strict';
 
 /** So many bytes from the server, as they come in; `progress(share)` is told how far it is. */
-PLAN.bytes = async function (path, count, progress) {
+PLAN.bytes = async (path, count, progress) => {
   const bytes = new Uint8Array(count);
   const response = await PLAN.fetch(path);
   const reader = response.body.getReader();
@@ -69,7 +69,7 @@ PLAN.Volume = class {
 };
 
 /** Greys of Hounsfield units, as pixels: from -32768 on. */
-PLAN.greys = function ([low, high]) {
+PLAN.greys = ([low, high]) => {
   const table = new Uint32Array(65536);
   for (let code = 0; code < 65536; code++) {
     const share = (code - 32768 - low) / (high - low);
@@ -80,7 +80,7 @@ PLAN.greys = function ([low, high]) {
 };
 
 /** Paints a slice, a pixel a voxel: `pixel(at, column, line)` is the colour of the voxel at an offset. */
-PLAN.paint = function (size, { u, v, w, flip }, slice, canvas, pixel) {
+PLAN.paint = (size, { u, v, w, flip }, slice, canvas, pixel) => {
   const stride = [1, size[0], size[0] * size[1]];
   if (canvas.width !== size[u] || canvas.height !== size[v]) [canvas.width, canvas.height] = [size[u], size[v]];
   const context = canvas.getContext('2d');
@@ -96,12 +96,12 @@ PLAN.paint = function (size, { u, v, w, flip }, slice, canvas, pixel) {
 };
 
 /** A slice in greys. */
-PLAN.plane = function ({ size, hu }, plane, slice, greys, canvas) {
+PLAN.plane = ({ size, hu }, plane, slice, greys, canvas) => {
   PLAN.paint(size, plane, slice, canvas, (at) => greys[hu[at] + 32768]);
 };
 
 /** The outlines of labels in a slice: a voxel that has another beside it, in its label's colour. */
-PLAN.outlines = function (size, labels, plane, slice, colors, canvas) {
+PLAN.outlines = (size, labels, plane, slice, colors, canvas) => {
   const { u, v } = plane;
   const stride = [1, size[0], size[0] * size[1]];
   PLAN.paint(size, plane, slice, canvas, (at, column, line) => {

@@ -2,7 +2,7 @@
 'use strict';
 
 /** Colour and hatching of what works and of the rules that reject; the text under the cursor tells them apart, too. */
-NB.ruleStyle = function (colors, name) {
+NB.ruleStyle = (colors, name) => {
   const at = Object.keys(colors).indexOf(name);
   return [colors[name] || '#999999', name === 'works' || name === 'unreachable' || at < 0 ? 0 : (at % 3) + 1];
 };

@@ -20,7 +20,7 @@ NB.palette = {
 };
 
 /** An element. Attributes starting with `on` are listeners; text goes in as text, never as markup. */
-NB.el = function (tag, attributes, ...children) {
+NB.el = (tag, attributes, ...children) => {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes || {})) {
     if (value === null || value === undefined || value === false) continue;
@@ -34,13 +34,13 @@ NB.el = function (tag, attributes, ...children) {
   return element;
 };
 
-NB.clear = function (element, ...children) {
+NB.clear = (element, ...children) => {
   element.replaceChildren(...children.flat(Infinity).filter((child) => child !== null && child !== undefined));
   return element;
 };
 
 /** What an element holds as base64 of zlib, as bytes; takes the element out of the page. */
-NB.inflate = async function (id) {
+NB.inflate = async (id) => {
   const element = document.getElementById(id);
   const text = atob(element.textContent);
   element.remove();
@@ -52,7 +52,7 @@ NB.inflate = async function (id) {
 
 /** Reads the payload: the document, with `NB.array` for what it refers to. */
 NB.read = async () => NB.unpack(await NB.inflate('payload'));
-NB.unpack = function (raw) {
+NB.unpack = (raw) => {
   const length = new DataView(raw).getUint32(0, true);
   NB.raw = raw;
   NB.arrays = Math.ceil((4 + length) / 4) * 4;
@@ -60,13 +60,13 @@ NB.unpack = function (raw) {
 };
 
 /** Runs a library that the page brings along deflated. */
-NB.load = async function (id) {
+NB.load = async (id) => {
   const text = new TextDecoder().decode(await NB.inflate(id));
   document.head.append(NB.el('script', { text }));
 };
 
 /** The codes of a reference, or its values where it is quantised; NaN stands for none. */
-NB.array = function (reference) {
+NB.array = (reference) => {
   const { t, n, at, step, low, d, h, p } = reference;
   const start = NB.arrays + at;
   if (t === 'f64') return new Float64Array(NB.raw.slice(start, start + 8 * n));
@@ -95,7 +95,7 @@ NB.array = function (reference) {
 };
 
 /** Runs a page's script and says so where it cannot run. */
-NB.start = async function (build) {
+NB.start = async (build) => {
   const app = document.getElementById('app');
   try {
     if (typeof DecompressionStream === 'undefined') {
@@ -179,7 +179,7 @@ NB.address = {
 };
 
 /** A button that puts the address with its choices on the clipboard. */
-NB.copyLink = function () {
+NB.copyLink = () => {
   const button = NB.el(
     'button',
     {
@@ -209,7 +209,7 @@ NB.copyLink = function () {
 };
 
 /** A table with a caption: `columns` of `{ title, unit, numeric, cell(row) }`. */
-NB.table = function (caption, columns, rows, options = {}) {
+NB.table = (caption, columns, rows, options = {}) => {
   const head = NB.el(
     'tr',
     null,
@@ -253,7 +253,7 @@ NB.table = function (caption, columns, rows, options = {}) {
 };
 
 /** A box that scrolls sideways where its contents are wider than it, and says so. */
-NB.scroll = function (label, content) {
+NB.scroll = (label, content) => {
   const box = NB.el('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': label }, content);
   const element = NB.el('div', { class: 'scrolled' }, box);
   NB.hint(box);
@@ -261,7 +261,7 @@ NB.scroll = function (label, content) {
 };
 
 /** Tells below a box whether it scrolls sideways, and how much is hidden. */
-NB.hint = function (box) {
+NB.hint = (box) => {
   const element = box.parentElement;
   const hint = NB.el('p', { class: 'hint no-print', 'aria-hidden': 'true' });
   element.append(hint);
@@ -307,12 +307,12 @@ NB.verdict = (verdict) => {
   return NB.el('span', { class: `chip ${style}`, text });
 };
 
-NB.checkbox = function (label, checked, change) {
+NB.checkbox = (label, checked, change) => {
   const input = NB.el('input', { type: 'checkbox', checked, onchange: (event) => change(event.target.checked) });
   return NB.el('label', { class: 'check' }, input, NB.el('span', { text: label }));
 };
 
-NB.select = function (label, options, value, change) {
+NB.select = (label, options, value, change) => {
   const select = NB.el(
     'select',
     { onchange: (event) => change(event.target.value) },
@@ -322,7 +322,7 @@ NB.select = function (label, options, value, change) {
 };
 
 /** Lets arrow keys move the choice among the rows of a list; `choose(index)` is called. */
-NB.rows = function (rows, choose) {
+NB.rows = (rows, choose) => {
   rows.forEach((row, index) => {
     row.addEventListener('click', () => choose(index));
     row.addEventListener('keydown', (event) => {
@@ -339,7 +339,7 @@ NB.rows = function (rows, choose) {
     });
   });
 };
-NB.mark = function (rows, chosen) {
+NB.mark = (rows, chosen) => {
   rows.forEach((row, index) => {
     const is = index === chosen;
     row.setAttribute('aria-selected', is);
@@ -362,7 +362,7 @@ window.addEventListener('afterprint', () => {
 });
 
 /** Any document as nested lists. */
-NB.tree = function (value) {
+NB.tree = (value) => {
   if (value === null || value === undefined) return NB.el('span', { text: '\u2013' });
   if (typeof value === 'number') return NB.el('span', { text: NB.significant(value) });
   if (typeof value !== 'object') return NB.el('span', { text: String(value) });
@@ -381,8 +381,8 @@ NB.tree = function (value) {
   );
 };
 
-NB.provenance = function (provenance, file) {
-  return NB.el(
+NB.provenance = (provenance, file) =>
+  NB.el(
     'div',
     null,
     NB.el(
@@ -421,4 +421,3 @@ NB.provenance = function (provenance, file) {
       ),
     ),
   );
-};

@@ -104,7 +104,7 @@ NB.NEARNESS = [
   { key: 'near', words: 'within 50 mm of the limit', color: [0.337, 0.706, 0.914], radius: 0.002 },
   { key: 'far', words: 'farther', color: [0.46, 0.46, 0.46], radius: 0.0012 },
 ];
-NB.nearness = function (distance, limit) {
+NB.nearness = (distance, limit) => {
   const asked = limit ?? 0;
   if (distance < Math.min(0, asked)) return NB.NEARNESS[0];
   if (distance < asked) return NB.NEARNESS[1];

@@ -15,7 +15,7 @@
   const NONE = '\u2013';
 
   /** So many decimals; halves go to the even digit, as in Rust. */
-  const fixed = function (value, digits) {
+  const fixed = (value, digits) => {
     const text = Object.is(value, -0) ? `-${(0).toFixed(digits)}` : value.toFixed(digits);
     const exact = Math.abs(value) < 1e15 ? value.toFixed(Math.min(100, digits + 60)) : '';
     const point = exact.indexOf('.');
@@ -33,13 +33,13 @@
   ];
   const unitOfLength = (metres) => LENGTHS.findLast(([, length]) => Math.abs(metres) >= length) || LENGTHS[0];
 
-  const smallLength = function (metres) {
+  const smallLength = (metres) => {
     const [name, length, perMetre] = unitOfLength(metres);
     return Math.abs(metres) < length ? `< 1 ${name}` : `${fixed(metres * perMetre, 2)} ${name}`;
   };
 
   /** Digits that show on which side of a limit a value is, at least three. */
-  const digitsApart = function (value, limit) {
+  const digitsApart = (value, limit) => {
     const rounded = (number, digits) => Number(number.toExponential(digits - 1));
     const side = Math.sign(value - limit);
     let digits = 3;
@@ -51,8 +51,8 @@
   };
 
   const degrees = (radians) => (radians * 180) / Math.PI;
-  const valueAndLimit = function (value, limit, unit) {
-    const text = function (each) {
+  const valueAndLimit = (value, limit, unit) => {
+    const text = (each) => {
       if (unit === 'm') return limit !== 0 && Math.abs(limit) < 1e-3 ? smallLength(each) : `${fixed(each * 1e3, 2)} mm`;
       if (unit === 'rad') return `${fixed(degrees(each), 4)} deg`;
       if (unit === '1') return Number.isInteger(each) && Number.isInteger(limit) ? fixed(each, 0) : fixed(each, 4);
@@ -68,20 +68,20 @@
     ];
   };
 
-  const percent = function (share) {
+  const percent = (share) => {
     if (share === 0 || share === 1) return `${fixed(share * 100, 0)} %`;
     if (share > 0.9995) return '> 99.9 %';
     if (share < 0.0005) return '< 0.1 %';
     return `${fixed(share * 100, 1)} %`;
   };
 
-  const threeDigits = function (value) {
+  const threeDigits = (value) => {
     const size = Math.abs(value);
     if (size === 0) return '0';
     if (size < 1e-4) return '< 0.0001';
     return fixed(value, size >= 100 ? 0 : size >= 10 ? 1 : size >= 0.1 ? 2 : size >= 0.01 ? 3 : 4);
   };
-  const measured = function (value, unit) {
+  const measured = (value, unit) => {
     if (unit === 'mm' && value !== 0 && Math.abs(value) < 0.01) return smallLength(value * 1e-3);
     return unit === '' || unit === '1' ? threeDigits(value) : `${threeDigits(value)} ${unit}`;
   };
@@ -114,12 +114,12 @@
     Object.entries(shown).map(([name, text]) => [name, (value) => (absent(value) ? NONE : typeset(text(value)))]),
   );
   /** A value and its limit, or two dashes. */
-  NB.valueAndLimit = function (value, limit, unit) {
+  NB.valueAndLimit = (value, limit, unit) => {
     if (absent(value) || absent(limit)) return [NB.quantity(value, unit), NB.quantity(limit, unit)];
     return valueAndLimit(value, limit, unit || '1').map(typeset);
   };
   /** A value with its SI unit as people read it. */
-  NB.quantity = function (value, unit) {
+  NB.quantity = (value, unit) => {
     if (absent(value)) return NONE;
     if (unit === 'm') return NB.length(value);
     if (unit === 'rad') return `${NB.deg(value, 2)}\u00b0`;
@@ -127,7 +127,7 @@
     if (unit === 'm/rad') return `${NB.fixed(value, 2)} mm/mrad`;
     return `${NB.significant(value)} ${unit}`;
   };
-  NB.significant = function (value) {
+  NB.significant = (value) => {
     if (absent(value)) return NONE;
     if (Number.isInteger(value) && Math.abs(value) < 1e7) return NB.minus(String(value));
     return typeset(String(Number(value.toPrecision(4))));

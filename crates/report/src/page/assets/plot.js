@@ -2,7 +2,7 @@
 'use strict';
 
 /** Round numbers between two ends, about `count` of them. */
-NB.ticks = function (low, high, count) {
+NB.ticks = (low, high, count) => {
   if (!(high > low)) return [low];
   const rough = (high - low) / Math.max(count, 1);
   const power = 10 ** Math.floor(Math.log10(rough));
@@ -13,7 +13,7 @@ NB.ticks = function (low, high, count) {
   return ticks;
 };
 
-NB.tickText = function (value, step) {
+NB.tickText = (value, step) => {
   const digits = Math.max(0, Math.min(8, -Math.floor(Math.log10(step) + 1e-9)));
   return NB.minus(value.toFixed(digits));
 };
@@ -145,7 +145,7 @@ NB.classStyle = {
 NB.styleOf = (name) => NB.classStyle[name] || { color: NB.palette.black, dash: [] };
 
 /** A short sample of a line for legends. */
-NB.sample = function ({ color, dash }) {
+NB.sample = ({ color, dash }) => {
   const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
   svg.setAttribute('width', '28');
   svg.setAttribute('height', '10');
@@ -351,7 +351,7 @@ NB.Curves = class {
 };
 
 /** Linear in between; NaN beside none. */
-NB.at = function (x, y, at) {
+NB.at = (x, y, at) => {
   if (!x.length) return NaN;
   let [low, high] = [0, x.length - 1];
   if (at <= x[low]) return y[low];

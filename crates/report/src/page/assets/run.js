@@ -948,7 +948,7 @@ NB.RunPage = class {
 };
 
 /** Largest standard deviation of a covariance in any direction, by its powers. */
-NB.longest = function (covariance) {
+NB.longest = (covariance) => {
   let v = [1, 1, 1];
   let size = 0;
   for (let k = 0; k < 200; k++) {
@@ -961,7 +961,7 @@ NB.longest = function (covariance) {
 };
 
 /** Lower triangle of a covariance, `L L^T`; what rounding makes negative counts as zero. */
-NB.cholesky = function (a) {
+NB.cholesky = (a) => {
   const l = [
     [0, 0, 0],
     [0, 0, 0],

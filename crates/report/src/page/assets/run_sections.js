@@ -23,7 +23,7 @@ NB.swatch = (color) => {
 NB.listed = (texts) => texts.filter(Boolean).join('; ');
 
 /** What a criterion is about, in words: `events.press[0].max_recovery_s` is of the first contact. */
-NB.criterionWords = function (name) {
+NB.criterionWords = (name) => {
   const press = /^events\.press\[(\d+)\]\.(.*)$/.exec(name);
   if (press) return `contact ${Number(press[1]) + 1}: ${NB.words(press[2])}`;
   return NB.words(name);
@@ -417,7 +417,7 @@ NB.sections = {
 };
 
 /** Contacts, stop and way back of a goal's configurations; null where the scenario asks for none. */
-NB.sections.events = function (goal, configuration, charts, name) {
+NB.sections.events = (goal, configuration, charts, name) => {
   const with_ = goal.configurations.filter((c) => c.events);
   if (!with_.length) return null;
   return [
@@ -427,7 +427,7 @@ NB.sections.events = function (goal, configuration, charts, name) {
   ];
 };
 
-NB.sections.press = function (with_, configuration, charts, goal, name) {
+NB.sections.press = (with_, configuration, charts, goal, name) => {
   const rows = with_.flatMap((c) =>
     c.events.press.flatMap((press, index) =>
       press.not_staged
@@ -545,7 +545,7 @@ NB.sections.press = function (with_, configuration, charts, goal, name) {
   ];
 };
 
-NB.sections.stop = function (with_) {
+NB.sections.stop = (with_) => {
   const rows = with_.flatMap((c) =>
     c.events.stop
       ? Object.entries(c.events.stop.engines).map(([engine, measured]) => ({
@@ -618,7 +618,7 @@ NB.sections.stop = function (with_) {
   ];
 };
 
-NB.sections.retract = function (with_) {
+NB.sections.retract = (with_) => {
   const rows = with_.flatMap((c) =>
     Object.entries(c.events.retract).map(([engine, measured]) => ({ c, engine, measured })),
   );

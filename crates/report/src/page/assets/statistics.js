@@ -683,7 +683,7 @@ NB.Statistics = class {
 };
 
 /** A small curve for a table. */
-NB.trend = function (values) {
+NB.trend = (values) => {
   const canvas = NB.el('canvas', {
     width: '140',
     height: '26',

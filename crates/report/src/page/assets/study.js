@@ -731,7 +731,7 @@ NB.StudyPage = class extends NB.StudyPlots {
 };
 
 /** Lengths in mm that are nothing but rounding. */
-NB.isRounding = function ({ unit, values }) {
+NB.isRounding = ({ unit, values }) => {
   if (unit !== 'mm') return false;
   let any = false;
   for (const value of values) {

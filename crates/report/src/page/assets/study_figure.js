@@ -91,7 +91,7 @@ NB.Figure = class {
 };
 
 /** A line of a legend that fits a column, as several where it is long. */
-NB.folded = function (item) {
+NB.folded = (item) => {
   const ruler = new NB.SvgContext(1, 1, 1);
   const lines = [''];
   for (const word of item.text.split(' ')) {
@@ -110,7 +110,7 @@ NB.dotHeight = (rows) => (width) => rows * NB.dotRow(width) + 54;
  * Values with their intervals, one a row: `rows` of `{ label, value, interval, text, style }`, `x` of
  * `{ low, high, title }`.
  */
-NB.dotPlot = function (context, width, height, rows, x) {
+NB.dotPlot = (context, width, height, rows, x) => {
   const narrow = width < 560;
   const [left, right] = narrow ? [8, 14] : [Math.min(0.3 * width, 250), 150];
   const box = { left, top: 6, width: width - left - right, height: height - 50 };

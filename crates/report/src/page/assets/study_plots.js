@@ -14,7 +14,7 @@ NB.configurationStyles = [
 ];
 
 /** Viridis, sampled; for shares and numbers. */
-NB.viridis = function (share) {
+NB.viridis = (share) => {
   const stops = [
     [68, 1, 84],
     [72, 40, 120],

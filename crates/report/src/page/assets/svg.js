@@ -178,7 +178,7 @@ NB.xml = (text) =>
   String(text).replaceAll('&', '&amp;').replaceAll('<', '&lt;').replaceAll('>', '&gt;').replaceAll('"', '&quot;');
 
 /** Saves a text or a blob as a file. */
-NB.save = function (name, content, type) {
+NB.save = (name, content, type) => {
   const url = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
   NB.el('a', { href: url, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(url), 1000);
@@ -209,7 +209,7 @@ NB.saveButton = (text, title, file) =>
  * A plot for a column of a journal: `paint(context, width, height)` draws it, `legend` of
  * `{ text, draw(context, x, y) }` stands below.
  */
-NB.paper = function (title, paint, height, legend = []) {
+NB.paper = (title, paint, height, legend = []) => {
   const { px: width, font, mm } = NB.COLUMN;
   const line = 1.45 * font;
   const context = new NB.SvgContext(width, height + legend.length * line + (legend.length ? 6 : 0), mm);
@@ -228,7 +228,7 @@ NB.paper = function (title, paint, height, legend = []) {
 };
 
 /** A chart of the program, in a box of its own width, with a button that saves it. */
-NB.chart = function (title, svg, name, help) {
+NB.chart = (title, svg, name, help) => {
   const [, width, height] = svg.match(/viewBox="0 0 ([\d.]+) ([\d.]+)"/).map(Number);
   const image = NB.el('img', {
     src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`,

@@ -4,19 +4,18 @@
 /** Faces that meet at less than 40 degrees shade as one smooth surface. */
 NB.CREASE_COSINE = 0.766;
 
-NB.matrix = function ([x, y, z, qx, qy, qz, qw]) {
-  return new THREE.Matrix4().compose(
+NB.matrix = ([x, y, z, qx, qy, qz, qw]) =>
+  new THREE.Matrix4().compose(
     new THREE.Vector3(x, y, z),
     new THREE.Quaternion(qx, qy, qz, qw),
     new THREE.Vector3(1, 1, 1),
   );
-};
 
 /** Frame of parts that stand in the room and go where the robot's base goes, when somebody moves that. */
 NB.BASE = -2;
 
 /** Corners of a box about a base and `reach` m out of it, which may hang or be tilted. */
-NB.aboutBase = function (base, reach) {
+NB.aboutBase = (base, reach) => {
   const place = NB.matrix(base);
   return [-0.2, 0.2].flatMap((x) =>
     [-0.2, 0.2].flatMap((y) => [-0.1, reach].map((z) => new THREE.Vector3(x, y, z).applyMatrix4(place).toArray())),
@@ -24,7 +23,7 @@ NB.aboutBase = function (base, reach) {
 };
 
 /** Poses of the six links and the flange: `base * product of joint * turn(axis, q)`. */
-NB.forward = function (chain, joints) {
+NB.forward = (chain, joints) => {
   const poses = [];
   let pose = NB.matrix(chain.base);
   chain.joints.forEach((joint, index) => {
@@ -37,7 +36,7 @@ NB.forward = function (chain, joints) {
 };
 
 /** Triangles with a normal at each corner, smooth but for creases. */
-NB.geometry = function (surface) {
+NB.geometry = (surface) => {
   const codes = NB.array(surface.vertices);
   const indices = NB.array(surface.triangles);
   const count = codes.length / 3;
@@ -88,7 +87,7 @@ NB.geometry = function (surface) {
 };
 
 /** Whether this browser can draw in three dimensions; without a trace of errors if not. */
-NB.hasWebgl = function () {
+NB.hasWebgl = () => {
   try {
     const canvas = document.createElement('canvas');
     const context = canvas.getContext('webgl2');
@@ -493,7 +492,7 @@ NB.View = class {
 };
 
 /** As in the pictures: from the side of the robot that looks across to the goal, from above. */
-NB.direction = function ([x, y], target, axis) {
+NB.direction = ([x, y], target, axis) => {
   const ahead = [target[0] - x, target[1] - y];
   const size = Math.hypot(...ahead) || 1;
   const forward = [ahead[0] / size, ahead[1] / size];
@@ -503,7 +502,7 @@ NB.direction = function ([x, y], target, axis) {
 };
 
 /** A cone with a round cap about -z with its apex at the origin, as the hand's. */
-NB.cone = function (halfAngle, length) {
+NB.cone = (halfAngle, length) => {
   // Whole balls narrow down to a cone: a piece of a sphere and the mantle below it.
   const [around, rings] = [48, 8];
   const positions = [];
