@@ -11,7 +11,7 @@ import { tmpdir } from 'node:os';
 import { basename, dirname, join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { deflateSync } from 'node:zlib';
-import { NO_GL, SOFTWARE_GL, launch } from './browser.mjs';
+import { launch, NO_GL, SOFTWARE_GL } from './browser.mjs';
 
 /** Postures by scenario, and by each place of the base. */
 const POSTURES = 1000;
@@ -263,9 +263,8 @@ async function testConfigurations(page) {
     };
   }, reached);
   assert.deepEqual(at.taken, at.joints);
-  at.exit.forEach((value, k) =>
-    assert.ok(Math.abs(value - at.wanted[k]) < 1e-6, `the guide is at ${at.exit}, not ${at.wanted}`),
-  );
+  for (const [k, value] of at.exit.entries())
+    assert.ok(Math.abs(value - at.wanted[k]) < 1e-6, `the guide is at ${at.exit}, not ${at.wanted}`);
 }
 
 /** Nothing of the run is shown meanwhile, and all of it afterwards. */

@@ -105,9 +105,7 @@ async function sharesOfPlaces(page) {
   });
   const found = await page.evaluate(() => {
     const study = NB.current;
-    const levels = study.factors
-      .map((factor, index) => index)
-      .filter((index) => study.factors[index].levels?.length > 1);
+    const levels = [...study.factors.keys()].filter((index) => study.factors[index].levels?.length > 1);
     study.state.x = levels[0];
     study.state.y = levels[1] ?? levels[0];
     study.state.filters = new Map();

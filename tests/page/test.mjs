@@ -10,7 +10,7 @@ import assert from 'node:assert/strict';
 import { mkdirSync, readFileSync, statSync } from 'node:fs';
 import { resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
-import { NO_GL, SOFTWARE_GL, launch } from './browser.mjs';
+import { launch, NO_GL, SOFTWARE_GL } from './browser.mjs';
 import { testLayout } from './layout.mjs';
 import { testNumbers } from './numbers.mjs';
 import {
@@ -160,14 +160,14 @@ async function testRun(page, judge, name) {
   const worst = await page.evaluate(() => {
     const { page: data, report } = NB.current;
     let most = 0;
-    report.goals.forEach((goal, g) =>
-      goal.configurations.forEach((configuration, c) => {
+    for (const [g, goal] of report.goals.entries()) {
+      for (const [c, configuration] of goal.configurations.entries()) {
         const { flange } = data.goals[g].configurations[c];
-        if (!flange) return;
+        if (!flange) continue;
         const pose = NB.forward(data.scene.chain, configuration.joints_rad)[6].elements;
         for (let k = 0; k < 3; k++) most = Math.max(most, Math.abs(pose[12 + k] - flange[k]));
-      }),
-    );
+      }
+    }
     return most;
   });
   assert.ok(worst < 1e-9, `flange off by ${worst} m`);

@@ -9,7 +9,7 @@ import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { existsSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
 import { join, resolve } from 'node:path';
-import { NO_GL, SOFTWARE_GL, launch } from './browser.mjs';
+import { launch, NO_GL, SOFTWARE_GL } from './browser.mjs';
 
 /** Of places, mm: what they are known to in the report. */
 const SAME_MM = 1e-6;
@@ -184,9 +184,8 @@ for (const index of [
     index,
   );
   const answer = await page.evaluate(() => PLAN.planner.place);
-  millimetres(index).forEach((mm, axis) =>
-    assert.ok(Math.abs(answer.ct_mm[axis] - mm) < SAME_MM, `${answer.ct_mm} is not ${mm}`),
-  );
+  for (const [axis, mm] of millimetres(index).entries())
+    assert.ok(Math.abs(answer.ct_mm[axis] - mm) < SAME_MM, `${answer.ct_mm} is not ${mm}`);
   assert.equal(answer.hu, await page.evaluate((index) => PLAN.planner.volume.at(index), index));
 }
 await frames(page);
@@ -238,9 +237,8 @@ await settled(page);
 const route = await page.evaluate(() => PLAN.planner.route);
 assert.ok(route && !route.not_placed, JSON.stringify(route));
 const target = report.targets.find((each) => each.name === lesion).center_m;
-target.forEach((metres, axis) =>
-  assert.ok(Math.abs(route.target_m[axis] - metres) < 2e-6, 'the target is the lesion\u2019s middle'),
-);
+for (const [axis, metres] of target.entries())
+  assert.ok(Math.abs(route.target_m[axis] - metres) < 2e-6, 'the target is the lesion\u2019s middle');
 assert.ok(
   Math.abs(route.length_m - Math.hypot(...route.entry_m.map((metres, axis) => metres - route.target_m[axis]))) < 1e-12,
 );
@@ -290,7 +288,7 @@ assert.match(await page.innerText('.side'), /Expected tip error at the target: \
 await page.waitForFunction(() => PLAN.planner.people.answer);
 const { room } = await page.evaluate(() => PLAN.planner.people.answer);
 assert.ok(room.free_fraction > 0 && room.free_fraction <= 1 && room.sight.length > 0);
-assert.match(await page.innerText('.side'), /Space for people: \d+ % of the half ball[^]*What people see/);
+assert.match(await page.innerText('.side'), /Space for people: \d+ % of the half ball[\s\S]*What people see/);
 const empty = await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL());
 for (const layer of ['people and sight', 'cone for the hand']) {
   const without = await page.evaluate(() => PLAN.planner.room.view.renderer.domElement.toDataURL());

@@ -304,11 +304,8 @@ PLAN.EntryMap = class {
     write('P', w - 7, h - 9);
     write('S', 7, 10);
     write('I', 7, h - 24);
-    this.plan.routes
-      .slice(0, 8)
-      .map((route, index) => [route, index])
-      .reverse()
-      .forEach(([route, index]) => this.ring(context, this.place(route.direction_deg), String(index + 1), write));
+    for (const [index, route] of [...this.plan.routes.slice(0, 8).entries()].reverse())
+      this.ring(context, this.place(route.direction_deg), String(index + 1), write);
     const { chosen } = this.plan;
     if (chosen && chosen.route >= 8)
       this.ring(context, this.place(this.plan.routes[chosen.route].direction_deg), String(chosen.route + 1), write);
@@ -368,7 +365,7 @@ PLAN.EntryMap = class {
   showTable() {
     this.free = null;
     const { plan } = this;
-    if (!plan || !plan.routes.length) {
+    if (!plan?.routes.length) {
       NB.clear(this.table);
       return;
     }

@@ -275,17 +275,14 @@ PLAN.Planner = class {
         `Target: ${NB.words(lesion.name)}`,
       ),
     );
-    const goals =
-      this.facts.goals.length > 1
-        ? [
-            (this.goalSelect = NB.select(
-              'Goal of the scenario',
-              this.facts.goals.map(({ name }) => [name, NB.words(name)]),
-              this.state.needle.goal,
-              (goal) => this.change({ goal }),
-            )),
-          ]
-        : [];
+    if (this.facts.goals.length > 1) {
+      this.goalSelect = NB.select(
+        'Goal of the scenario',
+        this.facts.goals.map(({ name }) => [name, NB.words(name)]),
+        this.state.needle.goal,
+        (goal) => this.change({ goal }),
+      );
+    }
     this.planName = NB.el('input', {
       type: 'text',
       value: this.facts.plan_file,
@@ -300,7 +297,7 @@ PLAN.Planner = class {
       'section',
       { class: 'panel' },
       NB.el('h2', { text: 'Target and entry' }),
-      goals,
+      this.goalSelect,
       NB.el(
         'div',
         { class: 'tabs no-print' },
@@ -744,7 +741,8 @@ PLAN.Planner = class {
       NB.clear(this.comparison, NB.el('p', { class: 'soft', text: 'Keep a route to compare others with it.' }));
       return;
     }
-    const asked = (this.comparing = {});
+    const asked = {};
+    this.comparing = asked;
     const answers = await Promise.all(
       routes.map(async ({ name, needle }) => {
         const { goal, target, entry } = needle;

@@ -59,7 +59,7 @@ PLAN.Room = class {
     }
   }
 
-  needle(route, tip) {
+  needle(route) {
     if (!this.view.works) return;
     this.view.empty('needle');
     if (route) {

@@ -507,7 +507,7 @@ PLAN.Probe = class extends PLAN.Picture {
   }
 
   render() {
-    const { volume, route, greys, state, facts, tip } = this.planner;
+    const { volume, route, state, facts, tip } = this.planner;
     if (!volume) return;
     if (!route) {
       const context = this.begin([100, 60], [0, 0]);

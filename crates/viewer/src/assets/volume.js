@@ -49,9 +49,9 @@ PLAN.Volume = class {
   between(x, y, z) {
     const [n, m, l] = this.size;
     if (!(x >= 0 && y >= 0 && z >= 0 && x <= n - 1 && y <= m - 1 && z <= l - 1)) return -1000;
-    const i = Math.min(Math.floor(x), n - 2 < 0 ? 0 : n - 2),
-      j = Math.min(Math.floor(y), m - 2 < 0 ? 0 : m - 2),
-      k = Math.min(Math.floor(z), l - 2 < 0 ? 0 : l - 2);
+    const i = Math.min(Math.floor(x), Math.max(n - 2, 0)),
+      j = Math.min(Math.floor(y), Math.max(m - 2, 0)),
+      k = Math.min(Math.floor(z), Math.max(l - 2, 0));
     const di = n > 1 ? 1 : 0,
       dj = m > 1 ? n : 0,
       dk = l > 1 ? n * m : 0;

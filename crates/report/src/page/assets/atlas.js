@@ -87,6 +87,7 @@ NB.AtlasPage = class {
     this.clock = NB.el('span', { class: 'clock', role: 'status' });
     this.side = NB.el('div', { class: 'panel' });
     this.table = NB.el('div');
+    this.title = NB.el('h3');
     const present = new Set(page.scene.parts.map((part) => part.group));
     const layerNames = {
       robot: 'robot',
@@ -156,7 +157,7 @@ NB.AtlasPage = class {
             NB.el(
               'div',
               { class: 'figure-head' },
-              (this.title = NB.el('h3')),
+              this.title,
               NB.saveButton('SVG', 'Clearance over roll', () => [
                 `${this.fileName('clearance')}.svg`,
                 this.curves.svg(this.title.textContent),

@@ -129,7 +129,7 @@ NB.TestPage = class {
 
   setPose(index) {
     this.poseIndex = index;
-    this.poseButtons.forEach((button, at) => button.setAttribute('aria-pressed', String(at === index)));
+    for (const [at, button] of this.poseButtons.entries()) button.setAttribute('aria-pressed', String(at === index));
     this.arm.pose(this.page.scene.chain, this.report.iso9283.protocol.joints_rad[index]);
     const { ap_m: ap, rp_m: rp } = Object.values(this.report.iso9283.engines)[this.engine]?.poses[index] || {};
     this.note.textContent =

@@ -858,7 +858,7 @@ NB.RunPage = class {
     const failed = this.report.criteria
       .filter((each) => !each.pass && each.goal === this.goal.name && each.label === c.label)
       .map((each) => item(`Misses ${NB.criterionWords(each.criterion)}`, each));
-    const classes = Object.entries(c.clearance).filter(([, found]) => found && found.witness_points_m);
+    const classes = Object.entries(c.clearance).filter(([, found]) => found?.witness_points_m);
     const columns = [
       { title: 'Between', cell: ([name]) => [NB.sample(NB.styleOf(name)), ` ${NB.words(name)}`] },
       { title: 'Least', unit: 'mm', numeric: true, cell: ([, found]) => NB.mm(found.minimum_m) },

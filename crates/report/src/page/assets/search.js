@@ -193,7 +193,7 @@ NB.SearchPage = class {
   flatness(factor, index) {
     const place = (candidate) => {
       const value = candidate.choice[index][1];
-      return factor.levels ? factor.levels.findIndex((level) => level === value) : value;
+      return factor.levels ? factor.levels.indexOf(value) : value;
     };
     const points = this.candidates
       .map((each) => ({ each, x: place(each), y: this.at(each) }))
@@ -249,9 +249,7 @@ NB.SearchPage = class {
           context.strokeStyle = '#444';
           context.lineWidth = 1.5;
           context.beginPath();
-          line.forEach((point, k) =>
-            k ? context.lineTo(axes.px(point.x), axes.py(point.y)) : context.moveTo(axes.px(point.x), axes.py(point.y)),
-          );
+          for (const point of line) context.lineTo(axes.px(point.x), axes.py(point.y));
           context.stroke();
         }
         const order = { other: 0, maybe: 1, certain: 2, equal: 2, best: 3 };
@@ -306,9 +304,7 @@ NB.SearchPage = class {
         context.clip();
         context.strokeStyle = '#444';
         context.beginPath();
-        members.forEach((point, k) =>
-          k ? context.lineTo(axes.px(point.x), axes.py(point.y)) : context.moveTo(axes.px(point.x), axes.py(point.y)),
-        );
+        for (const point of members) context.lineTo(axes.px(point.x), axes.py(point.y));
         context.stroke();
         for (const member of this.front.values()) {
           if (!member.fresh || member.fresh.some((estimate) => estimate.value === null)) continue;
@@ -368,11 +364,7 @@ NB.SearchPage = class {
       context.setLineDash(dash);
       context.lineWidth = 1.5;
       context.beginPath();
-      points.forEach((point, k) =>
-        k
-          ? context.lineTo(axes.px(point.x), axes.py(point[key]))
-          : context.moveTo(axes.px(point.x), axes.py(point[key])),
-      );
+      for (const point of points) context.lineTo(axes.px(point.x), axes.py(point[key]));
       context.stroke();
       context.setLineDash([]);
       // A generation alone makes no line.

@@ -126,7 +126,7 @@ NB.Statistics = class {
   choices({ choices, axes }) {
     const names = axes.map((axis) => NB.words(axis.name)).join(', ');
     const shown = choices.slice(0, NB.MOST_CHOICES);
-    const style = (choice) => (!choice.against_first || !choice.against_first.distinguishable ? '#0072b2' : '#767676');
+    const style = (choice) => (!choice.against_first?.distinguishable ? '#0072b2' : '#767676');
     const rows = shown.map((choice, at) => ({
       label: `${at + 1}. ${choice.label}`,
       value: choice.works.rate === null ? null : 100 * choice.works.rate,

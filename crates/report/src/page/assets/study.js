@@ -167,9 +167,9 @@ NB.StudyPage = class extends NB.StudyPlots {
   /** What the plots show at first: of the best choice, over numbers; or what the address asks for. */
   startState() {
     this.asked = NB.address.read();
-    const varying = this.factors
-      .map((factor, index) => index)
-      .filter((index) => !this.factors[index].levels || this.factors[index].levels.length > 1);
+    const varying = [...this.factors.keys()].filter(
+      (index) => !this.factors[index].levels || this.factors[index].levels.length > 1,
+    );
     const isNumber = (index) =>
       !this.factors[index].levels || this.factors[index].levels.every((level) => level.number !== null);
     const chosen = varying.filter((index) => this.factors[index].role === 'choice' && isNumber(index));
@@ -613,7 +613,7 @@ NB.StudyPage = class extends NB.StudyPlots {
         String(number),
       );
     });
-    buttons.forEach((button, at) =>
+    for (const [at, button] of buttons.entries()) {
       button.addEventListener('keydown', (event) => {
         const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
         const next = step && buttons[at + step];
@@ -621,8 +621,8 @@ NB.StudyPage = class extends NB.StudyPlots {
         event.preventDefault();
         next.focus();
         next.click();
-      }),
-    );
+      });
+    }
     return NB.el('div', { class: 'legend', role: 'group', 'aria-label': 'Cases' }, buttons);
   }
 

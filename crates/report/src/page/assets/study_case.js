@@ -53,7 +53,7 @@ NB.CaseScene = class {
     const hasTool = tool < this.looks.tools.length;
     this.note.textContent = this.words(at, title, { has, known, own, hasTool });
     if (!this.view.works) return;
-    this.looks.tools.forEach((_, each) => this.arm.layer(`tool@${each}`, each === tool));
+    for (const each of this.looks.tools.keys()) this.arm.layer(`tool@${each}`, each === tool);
     this.arm.show(has && own);
     this.view.empty('needle');
     this.missing = 0;

@@ -234,7 +234,7 @@ NB.View = class {
     return {
       root,
       pose: (chain, joints) => {
-        NB.forward(chain, joints).forEach((pose, index) => links[index].matrix.copy(pose));
+        for (const [index, pose] of NB.forward(chain, joints).entries()) links[index].matrix.copy(pose);
         root.updateMatrixWorld(true);
       },
       stand: (pose) => {

@@ -1,7 +1,8 @@
 // Bundles three.js for the report page: `npm ci && npm run build`. The output is committed, so that
 // building needlebench needs no Node.
-import { build } from 'esbuild';
+
 import { copyFile, readFile } from 'node:fs/promises';
+import { build } from 'esbuild';
 
 const { version } = JSON.parse(await readFile('node_modules/three/package.json', 'utf8'));
 await build({

@@ -1,6 +1,7 @@
 // The parts of three.js that the report page uses; esbuild leaves out the rest.
 export {
   AmbientLight,
+  BoxGeometry,
   BufferAttribute,
   BufferGeometry,
   CapsuleGeometry,
@@ -14,7 +15,6 @@ export {
   Group,
   HemisphereLight,
   InstancedMesh,
-  BoxGeometry,
   Matrix4,
   Mesh,
   MeshBasicMaterial,
