@@ -164,7 +164,7 @@ async function testBase(page, scenario, name) {
   const ring = await page.evaluate(() => {
     const { explore, view } = NB.current;
     const [x, y, z] = explore.pose().elements.slice(12, 15);
-    const place = new THREE.Vector3(x + NB.Explore.RING - 0.01, y, z).project(view.camera);
+    const place = new THREE.Vector3(x + Explore.RING - 0.01, y, z).project(view.camera);
     const box = view.renderer.domElement.getBoundingClientRect();
     return [box.left + ((place.x + 1) / 2) * box.width, box.top + ((1 - place.y) / 2) * box.height];
   });
@@ -329,7 +329,7 @@ for (let k = 0; k < words.length; k += 2) {
       whole.push(explore.evaluatedInMs);
     }
     for (let k = 0; k < 5; k++) {
-      explore.showReach(NB.Explore.ROLLS, true);
+      explore.showReach(Explore.ROLLS, true);
       reached.push(explore.reachedInMs);
     }
     const median = (list) => Math.round(100 * list.sort((a, b) => a - b)[list.length >> 1]) / 100;
@@ -337,7 +337,7 @@ for (let k = 0; k < words.length; k += 2) {
   });
   console.log(
     `  ms: all pairs ${times.computed}, with table and picture ${times.whole}, eight configurations at ` +
-      `${await page.evaluate(() => NB.Explore.ROLLS)} rolls ${times.reached}`,
+      `${await page.evaluate(() => Explore.ROLLS)} rolls ${times.reached}`,
   );
   assert.ok(times.computed <= COMPUTED_MS, `one posture takes ${times.computed} ms`);
   await testLeaving(page);

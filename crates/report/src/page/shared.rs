@@ -18,10 +18,10 @@ pub const THREE: &str = include_str!("assets/three.bundle.js");
 pub const CORE: &str = include_str!("assets/core.js");
 /// Numbers as people read them.
 pub const NUMBER: &str = include_str!("assets/number.js");
-/// `NB.View`: a cell in three dimensions.
+/// `View`: a cell in three dimensions.
 pub const VIEW: &str = include_str!("assets/view.js");
 
-/// The cell of a scenario for `NB.View`, and words for its parts, as bytes that `NB.unpack` takes.
+/// The cell of a scenario for `View`, and words for its parts, as bytes that `NB.unpack` takes.
 pub fn scene(resolved: &ResolvedScenario) -> Vec<u8> {
     let mut pack = Pack::default();
     let document = json!({
@@ -32,7 +32,7 @@ pub fn scene(resolved: &ResolvedScenario) -> Vec<u8> {
     pack.bytes(&document)
 }
 
-/// The people at a goal, what they see past a posture, and where the guide is, for `NB.View`.
+/// The people at a goal, what they see past a posture, and where the guide is, for `View`.
 pub fn people(
     resolved: &ResolvedScenario,
     model: &RoomModel<'_>,

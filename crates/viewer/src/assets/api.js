@@ -7,14 +7,14 @@ const PLAN = {};
 PLAN.token = location.hash.slice(1);
 
 /** An answer that is none: what is wrong, and what to do. */
-PLAN.Problem = class extends Error {
+class Problem extends Error {
   constructor(status, body) {
     super(body.error || `the server answered with status ${status}`);
     this.status = status;
     this.hint = body.hint || '';
     this.body = body;
   }
-};
+}
 
 PLAN.fetch = async (path, options = {}) => {
   const headers = { authorization: `Bearer ${PLAN.token}` };
@@ -28,7 +28,7 @@ PLAN.fetch = async (path, options = {}) => {
       cache: 'no-store',
     });
   } catch {
-    throw new PLAN.Problem(0, {
+    throw new Problem(0, {
       error: 'the server does not answer',
       hint: 'start `needlebench view` again and open the address that it prints; what was kept is there again',
     });
@@ -40,7 +40,7 @@ PLAN.fetch = async (path, options = {}) => {
     } catch {
       /* no sentence */
     }
-    throw new PLAN.Problem(response.status, body);
+    throw new Problem(response.status, body);
   }
   return response;
 };
@@ -48,7 +48,7 @@ PLAN.fetch = async (path, options = {}) => {
 PLAN.ask = async (path, options) => (await PLAN.fetch(path, options)).json();
 
 /** Asks for the latest question alone: while one is answered, only the newest that came since waits. */
-PLAN.Latest = class {
+class Latest {
   constructor(path, answered) {
     this.path = path;
     this.answered = answered;
@@ -85,7 +85,7 @@ PLAN.Latest = class {
     }
     this.busy = false;
   }
-};
+}
 PLAN.page = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte.toString(16).padStart(2, '0')).join(
   '',
 );

@@ -2,7 +2,7 @@
 // of them.
 'use strict';
 
-PLAN.EntryMap = class {
+class EntryMap {
   /** `planner` has the needle and is told of entries that are picked. */
   constructor(planner) {
     this.planner = planner;
@@ -29,7 +29,7 @@ PLAN.EntryMap = class {
     this.legend = NB.el('p', { class: 'entry-legend' });
     this.table = NB.el('div');
     this.remarks = NB.el('div');
-    this.latest = new PLAN.Latest('entries', (answer, body) => this.answered(answer, body));
+    this.latest = new Latest('entries', (answer, body) => this.answered(answer, body));
     // On paper the needle's own row says how the rules judge it.
     this.element = NB.el(
       'section',
@@ -54,7 +54,7 @@ PLAN.EntryMap = class {
   needleChanged() {
     const { needle } = this.planner.state;
     this.button.disabled = !needle.target;
-    if (this.of !== undefined && this.of !== PLAN.EntryMap.key(needle)) {
+    if (this.of !== undefined && this.of !== EntryMap.key(needle)) {
       this.latest.forget();
       this.of = undefined;
       this.plan = null;
@@ -66,14 +66,14 @@ PLAN.EntryMap = class {
   find() {
     const { goal, target } = this.planner.state.needle;
     if (!target) return;
-    this.of = PLAN.EntryMap.key({ goal, target });
+    this.of = EntryMap.key({ goal, target });
     this.plan = null;
     this.show('Judging directions ...');
     this.latest.ask({ aim: { goal, target }, robot: false });
   }
 
   answered(answer, body) {
-    if (this.of !== PLAN.EntryMap.key(body.aim)) return;
+    if (this.of !== EntryMap.key(body.aim)) return;
     if (answer.problem) this.planner.complain(answer.problem);
     if (answer.refused) {
       this.plan = null;
@@ -432,4 +432,4 @@ PLAN.EntryMap = class {
         : null,
     );
   }
-};
+}

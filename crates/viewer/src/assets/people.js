@@ -1,10 +1,10 @@
 // What the chosen configuration leaves to the people in the room: space, sight, and a cone for the hand.
 'use strict';
 
-PLAN.People = class {
+class People {
   constructor(planner) {
     this.planner = planner;
-    this.latest = new PLAN.Latest('people', (answer) => this.answered(answer));
+    this.latest = new Latest('people', (answer) => this.answered(answer));
     this.text = NB.el('div');
     this.layers = { people: false, cone: false };
     this.boxes = NB.el(
@@ -102,4 +102,4 @@ PLAN.People = class {
     else view.empty('cone');
     view.draw();
   }
-};
+}

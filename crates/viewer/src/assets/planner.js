@@ -4,7 +4,7 @@
 PLAN.WINDOWS = { lung: [-1350, 150], soft: [-160, 240], bone: [-500, 1300] };
 PLAN.WINDOW_NAMES = { lung: 'Lung (\u2212600/1500)', soft: 'Soft (40/400)', bone: 'Bone (400/1800)' };
 
-PLAN.Planner = class {
+class Planner {
   constructor(facts, session, page, app) {
     this.facts = facts;
     this.page = page;
@@ -27,14 +27,14 @@ PLAN.Planner = class {
     };
     if (session.version === 0) this.state.needle = this.firstNeedle();
     this.greys = PLAN.greys(this.state.window_hu);
-    this.quick = new PLAN.Latest('route', (answer, body, took) => this.routed(answer, body, took));
-    this.bounds = new PLAN.Latest('reach', (answer, body, took) => this.bounded(answer, body, took));
-    this.exact = new PLAN.Latest('reach', (answer) => this.reached(answer));
-    this.entryMap = new PLAN.EntryMap(this);
-    this.planned = new PLAN.Latest('motion', (answer, body) => this.moved(answer, body));
-    this.people = new PLAN.People(this);
-    this.simulation = new PLAN.Simulation(this);
-    this.where = new PLAN.Latest('place', (answer) => this.placed(answer));
+    this.quick = new Latest('route', (answer, body, took) => this.routed(answer, body, took));
+    this.bounds = new Latest('reach', (answer, body, took) => this.bounded(answer, body, took));
+    this.exact = new Latest('reach', (answer) => this.reached(answer));
+    this.entryMap = new EntryMap(this);
+    this.planned = new Latest('motion', (answer, body) => this.moved(answer, body));
+    this.people = new People(this);
+    this.simulation = new Simulation(this);
+    this.where = new Latest('place', (answer) => this.placed(answer));
     this.latencies = [];
     this.reachWaits = [];
     this.build();
@@ -64,10 +64,10 @@ PLAN.Planner = class {
   build() {
     this.status = NB.el('p', { class: 'status', role: 'status', 'aria-live': 'polite' });
     this.banner = NB.el('div', { class: 'banner', role: 'alert' });
-    this.slices = Object.values(PLAN.PLANES).map((plane) => new PLAN.Slice(plane, this));
-    this.probes = ['along', 'across'].map((kind) => new PLAN.Probe(kind, this));
+    this.slices = Object.values(PLAN.PLANES).map((plane) => new Slice(plane, this));
+    this.probes = ['along', 'across'].map((kind) => new Probe(kind, this));
     this.readout = NB.el('p', { class: 'readout', role: 'status', 'aria-live': 'polite' });
-    this.room = new PLAN.Room(this.page, this.facts);
+    this.room = new Room(this.page, this.facts);
     const heading = NB.el(
       'header',
       { class: 'top' },
@@ -1069,7 +1069,7 @@ PLAN.Planner = class {
       this.redo();
     }
   }
-};
+}
 
 /** What of a session is the page's own. */
 PLAN.taken = ({ schema_version, version, ...state }) => state;
@@ -1080,7 +1080,7 @@ PLAN.open = async () => {
   const loading = document.getElementById('loading');
   try {
     if (!/^[0-9a-f]{32}$/.test(PLAN.token))
-      throw new PLAN.Problem(401, {
+      throw new Problem(401, {
         error: 'the address lacks its token',
         hint: 'open the whole address that `needlebench view` prints',
       });
@@ -1093,11 +1093,11 @@ PLAN.open = async () => {
     const page = NB.unpack(scene);
     for (const [name, words] of Object.entries(page.words || {})) NB.dictionary.set(name, words);
     document.title = `needlebench: plan of ${facts.name}`;
-    const coming = PLAN.Volume.load(facts.size, facts.spacing_m, (share) => {
+    const coming = Volume.load(facts.size, facts.spacing_m, (share) => {
       loading.textContent = `Reading the volume: ${Math.round(100 * share)} %`;
     });
     const volume = await coming;
-    const planner = new PLAN.Planner(facts, session, page, app);
+    const planner = new Planner(facts, session, page, app);
     PLAN.planner = planner;
     planner.volume = volume;
     planner.draw();
@@ -1114,7 +1114,7 @@ PLAN.open = async () => {
       NB.el('p', { class: 'error', role: 'alert', text: `This patient cannot be shown: ${error.message}.` }),
       error.hint ? NB.el('p', { text: error.hint }) : null,
     );
-    if (!(error instanceof PLAN.Problem)) throw error;
+    if (!(error instanceof Problem)) throw error;
   }
 };
 document.addEventListener('DOMContentLoaded', PLAN.open);

@@ -1,11 +1,11 @@
 // The room in three dimensions: patient, robot in the chosen configuration, needle, and its motion.
 'use strict';
 
-PLAN.Room = class {
+class Room {
   constructor(page, facts) {
     this.page = page;
     this.facts = facts;
-    this.view = new NB.View(page.scene, 'Room with patient and robot');
+    this.view = new View(page.scene, 'Room with patient and robot');
     this.known = facts.robot_is_unknown === null;
     if (!this.view.works) return;
     this.arm = this.view.arm('arm');
@@ -95,7 +95,7 @@ PLAN.Room = class {
     if (this.playing) cancelAnimationFrame(this.playing);
     this.playing = 0;
   }
-};
+}
 
 /** Joints at a time, between postures. */
 PLAN.posture = ({ time_s: times, joints_rad: joints }, time) => {

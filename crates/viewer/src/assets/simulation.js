@@ -5,7 +5,7 @@
 PLAN.withoutGoals = (leftOut) =>
   leftOut.length ? ` It is without ${leftOut.map(NB.words).join(', ')}: no entry was chosen there.` : '';
 
-PLAN.Simulation = class {
+class Simulation {
   constructor(planner) {
     this.planner = planner;
     this.engine = 'both';
@@ -98,4 +98,4 @@ PLAN.Simulation = class {
         }
       }, 500);
   }
-};
+}

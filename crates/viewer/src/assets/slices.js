@@ -25,7 +25,7 @@ PLAN.COLORS = {
 PLAN.SIGMAS_95 = 2.7955;
 
 /** A canvas in millimetres that is sharp on every screen, with lettering and a scale. */
-PLAN.Picture = class {
+class Picture {
   constructor(title, help) {
     this.title = title;
     this.canvas = NB.el('canvas', { tabindex: '0', role: 'application', 'aria-label': `${title} slice. ${help}` });
@@ -159,10 +159,10 @@ PLAN.Picture = class {
       context.stroke();
     }
   }
-};
+}
 
 /** A slice along the patient's axes. `planner` has the volume and what is shown; it is told of clicks and drags. */
-PLAN.Slice = class extends PLAN.Picture {
+class Slice extends Picture {
   constructor(plane, planner) {
     super(
       plane.title,
@@ -459,10 +459,10 @@ PLAN.Slice = class extends PLAN.Picture {
     else return;
     event.preventDefault();
   }
-};
+}
 
 /** Slices along the needle, interpolated between voxels: in line with it, and across it at a depth. */
-PLAN.Probe = class extends PLAN.Picture {
+class Probe extends Picture {
   constructor(kind, planner) {
     super(
       kind === 'along' ? 'In line with the needle' : 'Across the needle',
@@ -582,7 +582,7 @@ PLAN.Probe = class extends PLAN.Picture {
     }
     context.putImageData(image, 0, 0);
   }
-};
+}
 
 /** Letters of where a direction runs, the main one first: `A` or `AL`. */
 PLAN.towards = (direction) => {

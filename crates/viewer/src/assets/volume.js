@@ -20,7 +20,7 @@ PLAN.bytes = async (path, count, progress) => {
   return bytes;
 };
 
-PLAN.Volume = class {
+class Volume {
   constructor(size, spacing, hu) {
     this.size = size;
     this.spacing = spacing.map((metres) => metres * 1e3); // mm
@@ -30,7 +30,7 @@ PLAN.Volume = class {
   /** As it comes in; `progress(share)` is told how far it is. */
   static async load(size, spacing, progress) {
     const bytes = await PLAN.bytes('volume', 2 * size[0] * size[1] * size[2], progress);
-    return new PLAN.Volume(size, spacing, new Int16Array(bytes.buffer));
+    return new Volume(size, spacing, new Int16Array(bytes.buffer));
   }
 
   holds(index) {
@@ -66,7 +66,7 @@ PLAN.Volume = class {
       (hu[at + dk + dj] * (1 - u) + hu[at + dk + dj + di] * u) * v;
     return low * (1 - w) + high * w;
   }
-};
+}
 
 /** Greys of Hounsfield units, as pixels: from -32768 on. */
 PLAN.greys = ([low, high]) => {

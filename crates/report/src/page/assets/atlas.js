@@ -16,7 +16,7 @@ NB.aims = {
   balanced: 'all aims together',
 };
 
-NB.AtlasPage = class {
+class AtlasPage {
   constructor(page, app) {
     this.page = page;
     this.layers = {
@@ -36,16 +36,16 @@ NB.AtlasPage = class {
       collision: false,
       needle: true,
     };
-    this.view = new NB.View(page.scene, `Cell of ${page.scenario}`);
+    this.view = new View(page.scene, `Cell of ${page.scenario}`);
     this.arm = this.view.arm('arm');
-    this.curves = new NB.Curves({
+    this.curves = new Curves({
       height: 240,
       label: 'Clearance of each class over the roll',
       xTitle: 'roll (deg)',
       yTitle: 'clearance (mm)',
       seek: (roll) => this.setRoll(roll),
     });
-    this.strips = new NB.Canvas(300, 'Which configuration works at which roll', (...all) => this.paint(...all));
+    this.strips = new Canvas(300, 'Which configuration works at which roll', (...all) => this.paint(...all));
     this.stripLegend = NB.el('div', { class: 'legend' });
     const pick = (event) => {
       if (!(event.buttons & 1) || !this.axes) return;
@@ -459,7 +459,7 @@ NB.AtlasPage = class {
     const { goal } = this;
     const left = width < 420 ? 106 : 150;
     const box = { left, top: 8, width: width - left - 16, height: height - 50 };
-    const axes = new NB.Axes(
+    const axes = new Axes(
       box,
       { low: 0, high: 360, title: 'roll (deg)' },
       { low: -0.5, high: 7.5, title: '', labels: goal.branches.map((branch) => branch.label).reverse() },
@@ -585,8 +585,8 @@ NB.AtlasPage = class {
     }
     context.restore();
   }
-};
+}
 
 NB.start((page, app) => {
-  NB.current = new NB.AtlasPage(page, app);
+  NB.current = new AtlasPage(page, app);
 });

@@ -3,12 +3,12 @@
 'use strict';
 
 /** The program's clearances and configurations. Lengths in m, angles in rad unless they say otherwise. */
-NB.Live = class {
+class Live {
   /** Rejects where the browser runs no WebAssembly. */
   static async start(data) {
     if (typeof WebAssembly === 'undefined') throw new Error('this browser has no WebAssembly, or it is switched off');
     const { instance } = await WebAssembly.instantiate(NB.array(data.code).slice(), {});
-    const live = new NB.Live();
+    const live = new Live();
     live.code = instance.exports;
     live.data = data;
     const scene = NB.array(data.scene);
@@ -82,7 +82,7 @@ NB.Live = class {
   reach(goal, rolls) {
     return this.rows(this.code.reach(goal, rolls), 11).map((row, index) => ({
       label: this.data.configurations[index],
-      outcome: NB.Live.OUTCOMES[row[0]],
+      outcome: Live.OUTCOMES[row[0]],
       roll: row[1],
       surplus: row[2],
       joints: Number.isNaN(row[3]) ? null : [...row.subarray(3, 9)],
@@ -94,8 +94,9 @@ NB.Live = class {
   mountSurface() {
     return this.rows(this.code.mount_surface(), 9).flatMap((row) => [...row]);
   }
-};
-NB.Live.OUTCOMES = ['unreachable', 'merged', 'joint_limit', 'singular', 'too_near', 'misses', 'works'];
+
+  static OUTCOMES = ['unreachable', 'merged', 'joint_limit', 'singular', 'too_near', 'misses', 'works'];
+}
 
 /** How near is near, by what is asked: colours that people with any colour vision tell apart. */
 NB.NEARNESS = [
@@ -114,7 +115,7 @@ NB.nearness = (distance, limit) => {
 NB.JOINTS = ['Shoulder pan', 'Shoulder lift', 'Elbow', 'Wrist 1', 'Wrist 2', 'Wrist 3'];
 
 /** The panel, and the arm that it moves. `run` is the page: its view, its arms and what they show. */
-NB.Explore = class {
+class Explore {
   constructor(run) {
     this.run = run;
     this.data = run.page.explore;
@@ -145,7 +146,7 @@ NB.Explore = class {
     if (this.active) return;
     this.run.pause();
     try {
-      this.live ||= await NB.Live.start(this.data);
+      this.live ||= await Live.start(this.data);
     } catch (error) {
       this.open.disabled = true;
       this.status.textContent =
@@ -157,7 +158,7 @@ NB.Explore = class {
     this.active = true;
     this.bar.hidden = true;
     this.body.hidden = false;
-    this.were = NB.Explore.RESULTS.map((name) => [name, this.view.group(name).visible]);
+    this.were = Explore.RESULTS.map((name) => [name, this.view.group(name).visible]);
     this.from ||= this.view.arm('tried-from', { color: [0.34, 0.71, 0.91], opacity: 0.22 });
     this.arm ||= this.view.arm('tried');
     this.resetAll();
@@ -593,7 +594,7 @@ NB.Explore = class {
    * when all rests.
    */
   lookForConfigurations() {
-    if (!(this.coarseInMs > NB.Explore.COARSE_MS)) {
+    if (!(this.coarseInMs > Explore.COARSE_MS)) {
       this.showReach(6, false);
       this.coarseInMs = this.reachedInMs;
     } else {
@@ -603,7 +604,7 @@ NB.Explore = class {
     }
     clearTimeout(this.later);
     this.later = setTimeout(() => {
-      if (this.active) this.showReach(NB.Explore.ROLLS, true);
+      if (this.active) this.showReach(Explore.ROLLS, true);
     }, 200);
   }
 
@@ -716,7 +717,7 @@ NB.Explore = class {
   applyLayers() {
     if (!this.active) return;
     const { view, run } = this;
-    for (const name of NB.Explore.RESULTS) view.group(name).visible = false;
+    for (const name of Explore.RESULTS) view.group(name).visible = false;
     for (const name of ['tried', 'tried-from', 'tried-lines', 'tried-handle']) view.group(name).visible = true;
     view.group('tried-mount').visible = run.layers.mount;
     for (const name of ['robot', 'tool', 'collision', 'corridor']) this.arm.layer(name, run.layers[name]);
@@ -728,7 +729,7 @@ NB.Explore = class {
     const { view } = this;
     view.empty('tried-handle');
     const [x, y, z] = new THREE.Vector3().setFromMatrixPosition(this.pose()).toArray();
-    const [around, inner, outer] = [64, NB.Explore.RING - 0.02, NB.Explore.RING];
+    const [around, inner, outer] = [64, Explore.RING - 0.02, Explore.RING];
     const positions = [];
     for (let step = 0; step < around; step++) {
       const [a, b] = [step, step + 1].map((k) => (2 * Math.PI * k) / around);
@@ -773,7 +774,7 @@ NB.Explore = class {
     const at = this.active && this.under(event);
     return (
       Boolean(at) &&
-      Math.hypot(at[0] - this.base.position[0] * 1e-3, at[1] - this.base.position[1] * 1e-3) <= NB.Explore.RING + 0.01
+      Math.hypot(at[0] - this.base.position[0] * 1e-3, at[1] - this.base.position[1] * 1e-3) <= Explore.RING + 0.01
     );
   }
 
@@ -819,13 +820,14 @@ NB.Explore = class {
       });
     }
   }
-};
-/** Layers that show what the run has found. */
-NB.Explore.RESULTS = ['arm', 'other', 'witness', 'ellipsoids', 'cone', 'sight', 'taken'];
-/**
- * Rolls that are looked at when all rests, what a look at fewer may take while the base moves, and radius of the
- * ring (m).
- */
-NB.Explore.ROLLS = 36;
-NB.Explore.COARSE_MS = 10;
-NB.Explore.RING = 0.17;
+
+  /** Layers that show what the run has found. */
+  static RESULTS = ['arm', 'other', 'witness', 'ellipsoids', 'cone', 'sight', 'taken'];
+  /**
+   * Rolls that are looked at when all rests, what a look at fewer may take while the base moves, and radius of the
+   * ring (m).
+   */
+  static ROLLS = 36;
+  static COARSE_MS = 10;
+  static RING = 0.17;
+}

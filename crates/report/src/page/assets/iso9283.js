@@ -1,7 +1,7 @@
 // The page of a run without goals: a test by ISO 9283, or a run that excites every joint.
 'use strict';
 
-NB.TestPage = class {
+class TestPage {
   constructor(page, app, view, shown) {
     this.page = page;
     this.view = view;
@@ -247,4 +247,4 @@ NB.TestPage = class {
       ];
     });
   }
-};
+}

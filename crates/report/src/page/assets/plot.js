@@ -19,7 +19,7 @@ NB.tickText = (value, step) => {
 };
 
 /** A canvas that fills its box and is sharp on any screen; `paint(context, width, height)`. */
-NB.Canvas = class {
+class Canvas {
   constructor(height, label, paint) {
     this.canvas = NB.el('canvas', { role: 'img', 'aria-label': label });
     this.element = NB.el('div', { class: 'plot', style: `height:${height}px` }, this.canvas);
@@ -51,10 +51,10 @@ NB.Canvas = class {
     this.paint(context, width, height);
     this.paintedInMs = performance.now() - started;
   }
-};
+}
 
 /** Axes of a plot: maps values to pixels and draws frame, ticks and titles. */
-NB.Axes = class {
+class Axes {
   constructor(box, x, y) {
     Object.assign(this, { box, x, y });
   }
@@ -127,7 +127,7 @@ NB.Axes = class {
     while (cut.length > 1 && context.measureText(`${cut}\u2026`).width > width) cut = cut.slice(0, -1);
     return `${cut}\u2026`;
   }
-};
+}
 
 /** Colour and dash of each class of clearance. */
 NB.classStyle = {
@@ -167,7 +167,7 @@ NB.sample = ({ color, dash }) => {
 };
 
 /** Curves over one variable with a cursor that follows and leads. */
-NB.Curves = class {
+class Curves {
   /** `options`: height, label, xTitle, yTitle, seek(x). */
   constructor(options) {
     this.options = options;
@@ -176,7 +176,7 @@ NB.Curves = class {
     this.hidden = new Set();
     this.cursor = null;
     this.whole = false;
-    this.canvas = new NB.Canvas(options.height, options.label, (...all) => this.paint(...all));
+    this.canvas = new Canvas(options.height, options.label, (...all) => this.paint(...all));
     this.legend = NB.el('div', { class: 'legend', role: 'group', 'aria-label': 'Curves' });
     this.element = NB.el('div', { class: 'curves' }, this.canvas.element, this.legend);
     const seek = (event) => {
@@ -282,7 +282,7 @@ NB.Curves = class {
     }
     const pad = 0.06 * (high - low);
     const box = { left: 58, top: 18, width: width - 72, height: height - 58 };
-    const axes = new NB.Axes(
+    const axes = new Axes(
       box,
       { low: this.range[0], high: this.range[1], title: this.options.xTitle },
       { low: low - pad, high: high + pad, title: this.options.yTitle },
@@ -348,7 +348,7 @@ NB.Curves = class {
     }
     context.restore();
   }
-};
+}
 
 /** Linear in between; NaN beside none. */
 NB.at = (x, y, at) => {

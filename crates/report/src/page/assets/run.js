@@ -1,7 +1,7 @@
 // The page of a run.
 'use strict';
 
-NB.RunPage = class {
+class RunPage {
   constructor(page, app) {
     this.page = page;
     this.report = page.report;
@@ -32,7 +32,7 @@ NB.RunPage = class {
     this.time = 0;
     this.speed = 1;
     app.append(this.head());
-    this.view = new NB.View(page.scene, `Cell of ${this.report.scenario.name}`);
+    this.view = new View(page.scene, `Cell of ${this.report.scenario.name}`);
     if (this.report.goals.length) this.build(app);
     else this.buildWithoutGoals(app);
     app.append(
@@ -113,7 +113,7 @@ NB.RunPage = class {
     );
     this.goalTable = NB.sections.goals(this, (index) => this.setGoal(index));
     this.answer = NB.el('div', { class: 'answer' });
-    this.explore = new NB.Explore(this);
+    this.explore = new Explore(this);
     // On paper, the table below says the same.
     this.side = NB.el('div', { class: 'panel no-print' });
     this.details = NB.el('div', { class: 'panel' });
@@ -123,7 +123,7 @@ NB.RunPage = class {
     this.people = NB.el('div');
     this.events = NB.el('div');
     this.now = NB.el('div', { class: 'now small', role: 'status', 'aria-live': 'off' });
-    this.curves = new NB.Curves({
+    this.curves = new Curves({
       height: 250,
       label: 'Clearance of each class over the time of the motion',
       xTitle: 'time (s)',
@@ -179,7 +179,7 @@ NB.RunPage = class {
   }
 
   buildWithoutGoals(app) {
-    this.test = new NB.TestPage(this.page, app, this.view, this.layers);
+    this.test = new TestPage(this.page, app, this.view, this.layers);
   }
 
   fileName(...words) {
@@ -945,7 +945,7 @@ NB.RunPage = class {
         : null,
     );
   }
-};
+}
 
 /** Largest standard deviation of a covariance in any direction, by its powers. */
 NB.longest = (covariance) => {
@@ -979,5 +979,5 @@ NB.cholesky = (a) => {
 };
 
 NB.start((page, app) => {
-  NB.current = new NB.RunPage(page, app);
+  NB.current = new RunPage(page, app);
 });

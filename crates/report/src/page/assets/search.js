@@ -4,7 +4,7 @@
 /** A number of things. */
 const counted = (number, thing) => `${number} ${thing}${number === 1 ? '' : 's'}`;
 
-NB.SearchPage = class {
+class SearchPage {
   constructor(page, app) {
     this.page = page;
     this.log = page.search;
@@ -129,7 +129,7 @@ NB.SearchPage = class {
   };
 
   dot(context, x, y, kind, size = 3.5) {
-    context.fillStyle = NB.SearchPage.looks[kind].color;
+    context.fillStyle = SearchPage.looks[kind].color;
     context.strokeStyle = '#fff';
     context.lineWidth = 1;
     context.beginPath();
@@ -149,7 +149,7 @@ NB.SearchPage = class {
       this.candidates.some((each) => this.kindOf(each.id) === kind),
     );
     const items = kinds.map((kind) => ({
-      text: NB.SearchPage.looks[kind].words,
+      text: SearchPage.looks[kind].words,
       draw: (context, x, y) => this.dot(context, x, y, kind),
     }));
     if (line) {
@@ -232,14 +232,14 @@ NB.SearchPage = class {
     }
     const line = [...bins.values()].sort((a, b) => a.x - b.x);
     const most = Math.max(...points.map((point) => point.each.cases));
-    const figure = new NB.Figure({
+    const figure = new Figure({
       name: `${this.page.name}_${factor.name}`,
       title: factor.words,
       height: 260,
       label: `${this.page.objectives[0].words} over ${factor.words}`,
       legend: () => this.legend(x.labels ? null : 'best of each stretch'),
       paint: (context, width, height) => {
-        const axes = new NB.Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
+        const axes = new Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
         context.save();
         context.beginPath();
@@ -289,14 +289,14 @@ NB.SearchPage = class {
       title: this.axisTitle(1),
     };
     const members = points.filter(({ each }) => this.front.get(each.id)?.by_estimate).sort((a, b) => a.x - b.x);
-    const figure = new NB.Figure({
+    const figure = new Figure({
       name: `${this.page.name}_front`,
       title: 'What cannot be improved in one without loss in the other',
       height: 320,
       help: 'Bars are 95 % intervals of those that were judged on fresh layouts.',
       legend: () => this.legend(),
       paint: (context, width, height) => {
-        const axes = new NB.Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
+        const axes = new Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
         context.save();
         context.beginPath();
@@ -388,14 +388,14 @@ NB.SearchPage = class {
         context.setLineDash([]);
       },
     });
-    const figure = new NB.Figure({
+    const figure = new Figure({
       name: `${this.page.name}_progress`,
       title: 'Best and middle of each generation',
       height: 260,
       help: 'By the layouts that each had: where those become more, figures may fall.',
       legend: () => [key('best of the generation', '#d55e00', []), key('middle of the generation', '#666', [5, 3])],
       paint: (context, width, height) => {
-        const axes = new NB.Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
+        const axes = new Axes({ left: 66, top: 8, width: width - 76, height: height - 52 }, x, y);
         axes.draw(context);
         context.save();
         context.beginPath();
@@ -476,7 +476,7 @@ NB.SearchPage = class {
     const order = (each) => (each.figures[0].value === null ? -Infinity : better * each.figures[0].value);
     const rows = [...this.candidates].sort((a, b) => b.cases - a.cases || order(b) - order(a)).slice(0, 200);
     const kinds = {
-      ...Object.fromEntries(Object.entries(NB.SearchPage.looks).map(([kind, { words }]) => [kind, words])),
+      ...Object.fromEntries(Object.entries(SearchPage.looks).map(([kind, { words }]) => [kind, words])),
       other: '',
     };
     return NB.el(
@@ -533,8 +533,8 @@ NB.SearchPage = class {
       { class: 'small' },
     );
   }
-};
+}
 
 NB.start((page, app) => {
-  NB.current = new NB.SearchPage(page, app);
+  NB.current = new SearchPage(page, app);
 });

@@ -7,7 +7,7 @@ NB.ROUNDING_MM = 1e-6;
 /** Choices that the figure has; the table has more. */
 NB.MOST_CHOICES = 12;
 
-NB.Statistics = class {
+class Statistics {
   constructor(study) {
     this.study = study;
     this.page = study.page;
@@ -143,7 +143,7 @@ NB.Statistics = class {
     };
     const isCut = choices.length > shown.length;
     const rest = isCut ? ` The first ${shown.length} of ${choices.length}; the table below has more.` : '';
-    this.study.compared = new NB.Figure({
+    this.study.compared = new Figure({
       name: `${this.page.name}-choices`,
       title: `Which ${names}, best first`,
       label: `Share of layouts that work, choice by choice`,
@@ -175,7 +175,7 @@ NB.Statistics = class {
     const x = share
       ? { low: 0, high: 100, title: `${compared.response} (%)` }
       : { low: 0, high: 1.05 * most || 1, title: `${compared.response} (${compared.unit})` };
-    const figure = new NB.Figure({
+    const figure = new Figure({
       name: `${this.page.name}-by-${compared.factor}`,
       title: `By ${NB.words(compared.factor)}: ${compared.response}`,
       help:
@@ -203,7 +203,7 @@ NB.Statistics = class {
     });
     const each = best ? `; intervals hold for all ${best.of} choices at once` : '';
     const x = { low: 0, high: 100, title: 'layouts in which it works (%)' };
-    this.study.strip = new NB.Figure({
+    this.study.strip = new Figure({
       name: `${this.page.name}-configurations`,
       title: `How often each configuration works${best ? `, with ${best.label}` : ''}`,
       help: overall
@@ -680,7 +680,7 @@ NB.Statistics = class {
         : null,
     );
   }
-};
+}
 
 /** A small curve for a table. */
 NB.trend = (values) => {

@@ -1,7 +1,7 @@
 // The page of a study.
 'use strict';
 
-NB.StudyPage = class extends NB.StudyPlots {
+class StudyPage extends StudyPlots {
   constructor(page, app) {
     super();
     this.page = page;
@@ -129,11 +129,11 @@ NB.StudyPage = class extends NB.StudyPlots {
     this.state = this.startState();
     this.filter();
     this.tip = NB.el('div', { class: 'tip', hidden: true });
-    this.statistics = new NB.Statistics(this);
+    this.statistics = new Statistics(this);
     const map = this.figureOfMap();
     this.makeFigures();
     this.casePanel = NB.el('div', { class: 'panel' });
-    this.scene = this.page.scene ? new NB.CaseScene(this.page) : null;
+    this.scene = this.page.scene ? new CaseScene(this.page) : null;
     this.view = this.scene?.view;
     app.append(
       ...this.statistics.first(),
@@ -336,7 +336,7 @@ NB.StudyPage = class extends NB.StudyPlots {
   }
 
   figureOfMap() {
-    this.map = new NB.Figure({
+    this.map = new Figure({
       name: `${this.page.name}-map`,
       title: 'Where it works',
       help: 'Share of the layouts in each cell that work. Click a cell for its cases.',
@@ -350,7 +350,7 @@ NB.StudyPage = class extends NB.StudyPlots {
 
   makeFigures() {
     const figure = (which, title, help, label, height, paint) => {
-      this[which] = new NB.Figure({
+      this[which] = new Figure({
         name: `${this.page.name}-${which}`,
         title,
         help,
@@ -728,7 +728,7 @@ NB.StudyPage = class extends NB.StudyPlots {
         : Array.from(this.poses.subarray((8 * at + c) * 6, (8 * at + c) * 6 + 6), (value) => (value * Math.PI) / 180);
     this.scene.show(at, joints, `${this.page.configurations[c]} in case ${this.caseOf(index)}`);
   }
-};
+}
 
 /** Lengths in mm that are nothing but rounding. */
 NB.isRounding = ({ unit, values }) => {
@@ -743,5 +743,5 @@ NB.isRounding = ({ unit, values }) => {
 };
 
 NB.start((page, app) => {
-  NB.current = new NB.StudyPage(page, app);
+  NB.current = new StudyPage(page, app);
 });

@@ -1,7 +1,7 @@
 // A case of a study in three dimensions: the arm, and what stands about it in that case.
 'use strict';
 
-NB.CaseScene = class {
+class CaseScene {
   /** `page` is the document; its `looks` say which tool and which things each posed case has, and where. */
   constructor(page) {
     const { scene, looks } = page;
@@ -18,7 +18,7 @@ NB.CaseScene = class {
     ].map(codes);
     // Every tool is fixed to the flange; that of the case alone is seen.
     const tools = looks.tools.flatMap((tool, at) => tool.parts.map((part) => ({ ...part, group: `tool@${at}` })));
-    this.view = new NB.View({ ...scene, parts: [...scene.parts, ...tools] }, 'Posture of the chosen configuration');
+    this.view = new View({ ...scene, parts: [...scene.parts, ...tools] }, 'Posture of the chosen configuration');
     this.view.element.classList.add('case-view');
     this.arm = this.view.arm('arm');
     this.gantry = NB.checkbox('gantry', false, () => this.again());
@@ -149,4 +149,4 @@ NB.CaseScene = class {
       `where they stand in it.${hasTool ? '' : ' Its tool is not on the page, and is not drawn.'}`
     );
   }
-};
+}

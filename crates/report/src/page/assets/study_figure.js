@@ -5,11 +5,11 @@
  *
  * `paint(context, width, height)` draws it, `height` is a number or a function of the width; `legend()` gives
  * `{ text, draw(context, x, y) }`, or `{ low, high, text, color(share) }` of a scale. */
-NB.Figure = class {
+class Figure {
   constructor({ name, title, help, label, height, paint, legend }) {
     Object.assign(this, { name, title, label, height, paint, legend });
     this.legendElement = NB.el('div', { class: 'legend' });
-    this.canvas = new NB.Canvas(this.heightAt(700), label || title, (context, width, all) => {
+    this.canvas = new Canvas(this.heightAt(700), label || title, (context, width, all) => {
       paint(context, width, all);
       this.showLegend();
     });
@@ -88,11 +88,11 @@ NB.Figure = class {
       legend.flatMap(NB.folded),
     );
   }
-};
+}
 
 /** A line of a legend that fits a column, as several where it is long. */
 NB.folded = (item) => {
-  const ruler = new NB.SvgContext(1, 1, 1);
+  const ruler = new SvgContext(1, 1, 1);
   const lines = [''];
   for (const word of item.text.split(' ')) {
     const longer = `${lines.at(-1)} ${word}`.trim();
@@ -114,7 +114,7 @@ NB.dotPlot = (context, width, height, rows, x) => {
   const narrow = width < 560;
   const [left, right] = narrow ? [8, 14] : [Math.min(0.3 * width, 250), 150];
   const box = { left, top: 6, width: width - left - right, height: height - 50 };
-  const axes = new NB.Axes(box, x, { low: -0.5, high: rows.length - 0.5, title: '', labels: [] });
+  const axes = new Axes(box, x, { low: -0.5, high: rows.length - 0.5, title: '', labels: [] });
   axes.draw(context);
   const pitch = box.height / Math.max(rows.length, 1);
   rows.forEach(({ label, value, interval, text, style }, at) => {

@@ -51,7 +51,7 @@ NB.MOST_MARKS = 4000;
 NB.FEW_CASES = 20;
 
 /** What a study's page draws: colours, scatter, map, shares, histogram. */
-NB.StudyPlots = class {
+class StudyPlots {
   /** Kinds of cases with their colours, `of` the kind of a case, or a `scale` and the `value` of a case. */
   coloring() {
     const { color } = this.state;
@@ -183,7 +183,7 @@ NB.StudyPlots = class {
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const left = yAxis.labels ? Math.min(150, 0.3 * width) : 62;
     const box = { left, top: 10, width: width - left - 14, height: height - 52 };
-    const axes = new NB.Axes(box, this.padded(xAxis), this.padded(yAxis));
+    const axes = new Axes(box, this.padded(xAxis), this.padded(yAxis));
     if (!context.isPaper) this.scatterAxes = axes;
     axes.draw(context);
     const coloring = this.coloring();
@@ -400,7 +400,7 @@ NB.StudyPlots = class {
     const left = yAxis.labels ? Math.min(150, 0.3 * width) : 62;
     const box = { left, top: 10, width: width - left - 14, height: height - 52 };
     const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
-    const axes = new NB.Axes(box, xAxis, yAxis);
+    const axes = new Axes(box, xAxis, yAxis);
     const [nx, ny] = [xAxis.bins, yAxis.bins];
     const [ok, of] = [new Uint32Array(nx * ny), new Uint32Array(nx * ny)];
     for (const index of this.indices) {
@@ -479,7 +479,7 @@ NB.StudyPlots = class {
     if (!metric) return;
     const [low, high] = this.valueRange();
     const box = { left: 62, top: 10, width: width - 76, height: height - 52 };
-    const axes = new NB.Axes(
+    const axes = new Axes(
       box,
       { low, high, title: this.titleOf(metric) },
       { low: 0, high: 100, title: 'layouts below (%)' },
@@ -546,7 +546,7 @@ NB.StudyPlots = class {
     const most = Math.max(...counts, 1);
     const box = { left: 62, top: 10, width: width - 76, height: height - 52 };
     const whose = c < 0 ? 'best of each layout' : this.page.configurations[c];
-    const axes = new NB.Axes(
+    const axes = new Axes(
       box,
       { low, high, title: `${this.titleOf(metric)}, ${whose}` },
       { low: 0, high: 1.05 * most, title: 'cases' },
@@ -558,4 +558,4 @@ NB.StudyPlots = class {
       context.fillRect(x + 0.5, axes.py(count), next - x - 1, axes.py(0) - axes.py(count));
     });
   }
-};
+}

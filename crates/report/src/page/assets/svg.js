@@ -5,7 +5,7 @@
 NB.COLUMN = { mm: 85, px: (85 / 25.4) * 96, font: (8 / 72) * 96 };
 
 /** What a canvas's context does, as SVG. Only what our plots use. */
-NB.SvgContext = class {
+class SvgContext {
   constructor(width, height, mm) {
     this.size = [width, height, mm];
     this.parts = [];
@@ -171,7 +171,7 @@ NB.SvgContext = class {
       `fill="#fff"/>\n${this.parts.join('\n')}\n</svg>\n`
     );
   }
-};
+}
 
 NB.short = (value) => String(Math.round(value * 100) / 100);
 NB.xml = (text) =>
@@ -212,7 +212,7 @@ NB.saveButton = (text, title, file) =>
 NB.paper = (title, paint, height, legend = []) => {
   const { px: width, font, mm } = NB.COLUMN;
   const line = 1.45 * font;
-  const context = new NB.SvgContext(width, height + legend.length * line + (legend.length ? 6 : 0), mm);
+  const context = new SvgContext(width, height + legend.length * line + (legend.length ? 6 : 0), mm);
   paint(context, width, height);
   context.setLineDash([]);
   legend.forEach((item, at) => {

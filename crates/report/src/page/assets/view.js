@@ -98,7 +98,7 @@ NB.hasWebgl = () => {
   }
 };
 
-NB.View = class {
+class View {
   /** `label` says what the picture shows. */
   constructor(scene, label) {
     this.scene = scene;
@@ -489,7 +489,7 @@ NB.View = class {
     }
     this.image.src = canvas.toDataURL('image/png');
   }
-};
+}
 
 /** As in the pictures: from the side of the robot that looks across to the goal, from above. */
 NB.direction = ([x, y], target, axis) => {
