@@ -602,7 +602,8 @@ class Statistics {
   provenance() {
     const { manifest } = this.page;
     const { study_id: id, sampling, repeats } = this.summary;
-    const { provenance = {}, inputs = [], seed } = manifest || {};
+    const { provenance = {}, inputs = {}, seed } = manifest || {};
+    const files = Object.entries(inputs);
     const facts = [
       [
         'program',
@@ -627,15 +628,14 @@ class Statistics {
           .filter(([, value]) => value !== null && value !== undefined)
           .flatMap(([name, value]) => [NB.el('dt', { text: name }), NB.el('dd', { text: String(value) })]),
       ),
-      inputs.length
+      files.length
         ? NB.table(
             'Files that went in',
             [
-              { title: 'Role', cell: (input) => input.role || '' },
-              { title: 'File', cell: (input) => input.file },
-              { title: 'SHA-256', cell: (input) => NB.el('code', { text: input.sha256 }) },
+              { title: 'File', cell: ([file]) => file },
+              { title: 'SHA-256', cell: ([, sha256]) => NB.el('code', { text: sha256 }) },
             ],
-            inputs,
+            files,
             { class: 'small' },
           )
         : null,
