@@ -1,9 +1,9 @@
 // What all pages share: reading the payload, building elements, writing numbers.
 'use strict';
 
-const NB = {};
+const NB = /** @type {Needlebench} */ ({});
 
-/** Seconds between opening the page and its first picture; for tests. */
+/** Milliseconds at which the page was opened and first drawn; for tests. */
 NB.timing = { opened: performance.now() };
 
 /** Okabe and Ito's colours, which people with any colour vision tell apart. */
@@ -24,24 +24,34 @@ NB.el = (tag, attributes, ...children) => {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes || {})) {
     if (value === null || value === undefined || value === false) continue;
-    if (name.startsWith('on')) element.addEventListener(name.slice(2), value);
-    else if (name === 'text') element.textContent = value;
+    if (name.startsWith('on')) element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
+    else if (name === 'text') element.textContent = String(value);
     else if (name === 'value' || name === 'checked' || name === 'disabled' || name === 'selected')
-      element[name] = value;
-    else element.setAttribute(name, value === true ? '' : value);
+      Object.assign(element, { [name]: value });
+    else element.setAttribute(name, value === true ? '' : String(value));
   }
-  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined));
+  element.append(...NB.present(children));
   return element;
 };
 
+/** What there is among children, nested or not. */
+NB.present = (children) => {
+  const all = /** @type {unknown[]} */ (children).flat(Infinity);
+  return /** @type {(Node | string)[]} */ (all.filter((child) => child !== null && child !== undefined));
+};
+
+/** Other contents. */
 NB.clear = (element, ...children) => {
-  element.replaceChildren(...children.flat(Infinity).filter((child) => child !== null && child !== undefined));
+  element.replaceChildren(...NB.present(children));
   return element;
 };
+
+/** An element that the page has from its start. */
+NB.byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
 
 /** What an element holds as base64 of zlib, as bytes; takes the element out of the page. */
 NB.inflate = async (id) => {
-  const element = document.getElementById(id);
+  const element = NB.byId(id);
   const text = atob(element.textContent);
   element.remove();
   const compressed = new Uint8Array(text.length);
@@ -67,7 +77,7 @@ NB.load = async (id) => {
 
 /** The codes of a reference, or its values where it is quantised; NaN stands for none. */
 NB.array = (reference) => {
-  const { t, n, at, step, low, d, h, p } = reference;
+  const { t, n, at, step, low = 0, d, h, p } = reference;
   const start = NB.arrays + at;
   if (t === 'f64') return new Float64Array(NB.raw.slice(start, start + 8 * n));
   let codes = new { u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, f32: Float32Array }[t](NB.raw, start, n);
@@ -96,7 +106,7 @@ NB.array = (reference) => {
 
 /** Runs a page's script and says so where it cannot run. */
 NB.start = async (build) => {
-  const app = document.getElementById('app');
+  const app = NB.byId('app');
   try {
     if (typeof DecompressionStream === 'undefined') {
       throw new Error('this browser is too old: it has no DecompressionStream (from 2023 on, all have)');
@@ -164,7 +174,7 @@ NB.address = {
     NB.address.timer = setTimeout(() => {
       const kept = Object.entries(all).filter(([, value]) => value !== null && value !== undefined && value !== '');
       NB.address.pending = {};
-      NB.address.written = `#${new URLSearchParams(kept)}`;
+      NB.address.written = `#${new URLSearchParams(kept.map(([name, value]) => [name, String(value)]))}`;
       if (location.hash !== NB.address.written) history.replaceState(null, '', NB.address.written);
     }, 150);
   },
@@ -187,6 +197,7 @@ NB.copyLink = () => {
       class: 'no-print',
       title: 'Address of this page with what is chosen now',
       onclick: () => {
+        /** @param {string} text */
         const said = (text) => {
           button.textContent = text;
           setTimeout(() => {
@@ -262,7 +273,7 @@ NB.scroll = (label, content) => {
 
 /** Tells below a box whether it scrolls sideways, and how much is hidden. */
 NB.hint = (box) => {
-  const element = box.parentElement;
+  const element = /** @type {HTMLElement} */ (box.parentElement);
   const hint = NB.el('p', { class: 'hint no-print', 'aria-hidden': 'true' });
   element.append(hint);
   const look = () => {
@@ -272,7 +283,7 @@ NB.hint = (box) => {
     element.classList.toggle('more', rest > 1);
     if (!hides) return;
     const edge = box.getBoundingClientRect().right;
-    const heads = [...(box.querySelector('thead tr')?.cells || [])];
+    const heads = [...box.querySelectorAll('thead tr > *')];
     const beyond = heads.filter((cell) => cell.getBoundingClientRect().right > edge + 1).length;
     hint.textContent =
       rest <= 1
@@ -284,7 +295,7 @@ NB.hint = (box) => {
   box.addEventListener('scroll', look, { passive: true });
   const observer = new ResizeObserver(look);
   observer.observe(box);
-  observer.observe(box.firstElementChild);
+  if (box.firstElementChild) observer.observe(box.firstElementChild);
 };
 
 /** A fold-out section. */
@@ -298,6 +309,7 @@ NB.section = (title, open, ...children) =>
 
 /** A verdict as a chip: only `pass` is good. */
 NB.verdict = (verdict) => {
+  /** @type {{ [verdict: string]: string[] }} */
   const words = {
     pass: ['good', '\u2713 passed'],
     fail: ['bad', '\u2717 failed'],
@@ -309,7 +321,8 @@ NB.verdict = (verdict) => {
 
 NB.checkbox = (label, checked, change) => {
   const input = NB.el('input', { type: 'checkbox', checked, onchange: (event) => change(event.target.checked) });
-  return NB.el('label', { class: 'check' }, input, NB.el('span', { text: label }));
+  const labelled = NB.el('label', { class: 'check' }, input, NB.el('span', { text: label }));
+  return /** @type {Labelled<HTMLInputElement>} */ (labelled);
 };
 
 NB.select = (label, options, value, change) => {
@@ -318,7 +331,8 @@ NB.select = (label, options, value, change) => {
     { onchange: (event) => change(event.target.value) },
     options.map(([key, text]) => NB.el('option', { value: key, selected: key === value, text })),
   );
-  return NB.el('label', { class: 'field' }, NB.el('span', { text: label }), select);
+  const labelled = NB.el('label', { class: 'field' }, NB.el('span', { text: label }), select);
+  return /** @type {Labelled<HTMLSelectElement>} */ (labelled);
 };
 
 /** Lets arrow keys move the choice among the rows of a list; `choose(index)` is called. */
@@ -326,13 +340,13 @@ NB.rows = (rows, choose) => {
   rows.forEach((row, index) => {
     row.addEventListener('click', () => choose(index));
     row.addEventListener('keydown', (event) => {
-      const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+      const step = event.key === 'ArrowDown' ? 1 : event.key === 'ArrowUp' ? -1 : 0;
       let to = null;
       if (step) to = Math.min(Math.max(index + step, 0), rows.length - 1);
       else if (event.key === 'Home') to = 0;
       else if (event.key === 'End') to = rows.length - 1;
       else if (event.key === 'Enter' || event.key === ' ') to = index;
-      if (to === null || event.target.closest('input, button')) return;
+      if (to === null || /** @type {Element} */ (event.target).closest('input, button')) return;
       event.preventDefault();
       choose(to);
       rows[to].focus();
@@ -342,20 +356,32 @@ NB.rows = (rows, choose) => {
 NB.mark = (rows, chosen) => {
   rows.forEach((row, index) => {
     const is = index === chosen;
-    row.setAttribute('aria-selected', is);
+    row.setAttribute('aria-selected', String(is));
     row.tabIndex = is ? 0 : -1;
   });
 };
 
+/** What arrow keys do in a list. */
+NB.ARROWS = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
+
+/** Rows of a table, less its head. */
+NB.tableRows = (table) => [...table.querySelectorAll('tbody')].flatMap((body) => [...body.rows]);
+
+/** What is drawn on a canvas with. */
+NB.context = (canvas, options) => /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', options));
+
+/** Details elements of a kind. */
+NB.folds = (kind) => /** @type {NodeListOf<HTMLDetailsElement>} */ (document.querySelectorAll(`details${kind}`));
+
 /** Every details element but those that are not for paper is open there, and nothing scrolls. */
 window.addEventListener('beforeprint', () => {
-  for (const details of document.querySelectorAll('details:not([open]):not(.no-print)')) {
+  for (const details of NB.folds(':not([open]):not(.no-print)')) {
     details.dataset.closed = 'true';
     details.open = true;
   }
 });
 window.addEventListener('afterprint', () => {
-  for (const details of document.querySelectorAll('details[data-closed]')) {
+  for (const details of NB.folds('[data-closed]')) {
     delete details.dataset.closed;
     details.open = false;
   }

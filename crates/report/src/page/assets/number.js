@@ -3,7 +3,10 @@
 'use strict';
 
 {
-  /** Pages have signs that terminals may lack: minus, micro, degree; and no minus before zero. */
+  /**
+   * Pages have signs that terminals may lack: minus, micro, degree; and no minus before zero.
+   * @param {string} text
+   */
   const typeset = (text) =>
     text
       .replace(/^-(?=0(\.0+)?( |$))/, '')
@@ -11,10 +14,15 @@
       .replace(/ um$/, ' \u00b5m')
       .replace(/ deg$/, '\u00b0')
       .replace(/e-/, 'e\u2212');
+  /** @param {number | null | undefined} value @returns {value is null | undefined} */
   const absent = (value) => value === null || value === undefined || Number.isNaN(value);
   const NONE = '\u2013';
 
-  /** So many decimals; halves go to the even digit, as in Rust. */
+  /**
+   * So many decimals; halves go to the even digit, as in Rust.
+   * @param {number} value
+   * @param {number} digits
+   */
   const fixed = (value, digits) => {
     const text = Object.is(value, -0) ? `-${(0).toFixed(digits)}` : value.toFixed(digits);
     const exact = Math.abs(value) < 1e15 ? value.toFixed(Math.min(100, digits + 60)) : '';
@@ -25,21 +33,29 @@
     return Number(cut.at(-1)) % 2 === 0 ? cut : text;
   };
 
+  /** @type {[name: string, length: number, perMetre: number][]} */
   const LENGTHS = [
     ['pm', 1e-12, 1e12],
     ['nm', 1e-9, 1e9],
     ['um', 1e-6, 1e6],
     ['mm', 1e-3, 1e3],
   ];
+  /** @param {number} metres */
   const unitOfLength = (metres) => LENGTHS.findLast(([, length]) => Math.abs(metres) >= length) || LENGTHS[0];
 
+  /** @param {number} metres */
   const smallLength = (metres) => {
     const [name, length, perMetre] = unitOfLength(metres);
     return Math.abs(metres) < length ? `< 1 ${name}` : `${fixed(metres * perMetre, 2)} ${name}`;
   };
 
-  /** Digits that show on which side of a limit a value is, at least three. */
+  /**
+   * Digits that show on which side of a limit a value is, at least three.
+   * @param {number} value
+   * @param {number} limit
+   */
   const digitsApart = (value, limit) => {
+    /** @param {number} number @param {number} digits */
     const rounded = (number, digits) => Number(number.toExponential(digits - 1));
     const side = Math.sign(value - limit);
     let digits = 3;
@@ -50,8 +66,11 @@
       : value.toExponential(digits - 1).replace('e+', 'e');
   };
 
+  /** @param {number} radians */
   const degrees = (radians) => (radians * 180) / Math.PI;
+  /** @param {number} value @param {number} limit @param {string} unit */
   const valueAndLimit = (value, limit, unit) => {
+    /** @param {number} each */
     const text = (each) => {
       if (unit === 'm') return limit !== 0 && Math.abs(limit) < 1e-3 ? smallLength(each) : `${fixed(each * 1e3, 2)} mm`;
       if (unit === 'rad') return `${fixed(degrees(each), 4)} deg`;
@@ -68,6 +87,7 @@
     ];
   };
 
+  /** @param {number} share */
   const percent = (share) => {
     if (share === 0 || share === 1) return `${fixed(share * 100, 0)} %`;
     if (share > 0.9995) return '> 99.9 %';
@@ -75,17 +95,20 @@
     return `${fixed(share * 100, 1)} %`;
   };
 
+  /** @param {number} value */
   const threeDigits = (value) => {
     const size = Math.abs(value);
     if (size === 0) return '0';
     if (size < 1e-4) return '< 0.0001';
     return fixed(value, size >= 100 ? 0 : size >= 10 ? 1 : size >= 0.1 ? 2 : size >= 0.01 ? 3 : 4);
   };
+  /** @param {number} value @param {string} unit */
   const measured = (value, unit) => {
     if (unit === 'mm' && value !== 0 && Math.abs(value) < 0.01) return smallLength(value * 1e-3);
     return unit === '' || unit === '1' ? threeDigits(value) : `${threeDigits(value)} ${unit}`;
   };
 
+  /** @type {Record<Formats, (value: number) => string>} */
   const shown = {
     millimetres: (value) => fixed(value * 1e3, 1),
     length: smallLength,
@@ -110,9 +133,15 @@
   NB.measured = (value, unit) => (absent(value) ? NONE : typeset(measured(value, unit)));
   /** A length in the unit that suits it. */
   NB.length = (metres) => (absent(metres) ? NONE : metres === 0 ? '0' : typeset(smallLength(metres)));
-  NB.formats = Object.fromEntries(
-    Object.entries(shown).map(([name, text]) => [name, (value) => (absent(value) ? NONE : typeset(text(value)))]),
-  );
+  /** @param {(value: number) => string} text @returns {(value: number | null | undefined) => string} */
+  const orDash = (text) => (value) => (absent(value) ? NONE : typeset(text(value)));
+  NB.formats = {
+    millimetres: orDash(shown.millimetres),
+    length: orDash(shown.length),
+    number: orDash(shown.number),
+    percent: orDash(shown.percent),
+    degrees: orDash(shown.degrees),
+  };
   /** A value and its limit, or two dashes. */
   NB.valueAndLimit = (value, limit, unit) => {
     if (absent(value) || absent(limit)) return [NB.quantity(value, unit), NB.quantity(limit, unit)];

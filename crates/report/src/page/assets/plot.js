@@ -3,14 +3,13 @@
 
 /** Round numbers between two ends, about `count` of them. */
 NB.ticks = (low, high, count) => {
-  if (!(high > low)) return [low];
+  if (!(high > low)) return { at: [low], step: 1 };
   const rough = (high - low) / Math.max(count, 1);
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((each) => each * power).find((each) => each >= rough) || 10 * power;
-  const ticks = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) ticks.push(k * step);
-  ticks.step = step;
-  return ticks;
+  const at = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) at.push(k * step);
+  return { at, step };
 };
 
 NB.tickText = (value, step) => {
@@ -20,6 +19,7 @@ NB.tickText = (value, step) => {
 
 /** A canvas that fills its box and is sharp on any screen; `paint(context, width, height)`. */
 class Canvas {
+  /** @param {number} height @param {string} label @param {Paint} paint */
   constructor(height, label, paint) {
     this.canvas = NB.el('canvas', { role: 'img', 'aria-label': label });
     this.element = NB.el('div', { class: 'plot', style: `height:${height}px` }, this.canvas);
@@ -44,7 +44,7 @@ class Canvas {
     }
     const started = performance.now();
     // Software canvases: the scatter writes pixels itself.
-    const context = this.canvas.getContext('2d', { willReadFrequently: true });
+    const context = NB.context(this.canvas, { willReadFrequently: true });
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     context.font = '12px system-ui, sans-serif';
@@ -55,26 +55,45 @@ class Canvas {
 
 /** Axes of a plot: maps values to pixels and draws frame, ticks and titles. */
 class Axes {
+  /** @param {Box} box @param {AxisRange} x @param {AxisRange} y */
   constructor(box, x, y) {
-    Object.assign(this, { box, x, y });
+    this.box = box;
+    this.x = x;
+    this.y = y;
   }
 
+  /** @param {number} value */
   px(value) {
     return this.box.left + ((value - this.x.low) / (this.x.high - this.x.low)) * this.box.width;
   }
 
+  /** @param {number} value */
   py(value) {
     return this.box.top + (1 - (value - this.y.low) / (this.y.high - this.y.low)) * this.box.height;
   }
 
+  /** @param {number} px */
   xAt(px) {
     return this.x.low + ((px - this.box.left) / this.box.width) * (this.x.high - this.x.low);
   }
 
+  /** @param {number} py */
   yAt(py) {
     return this.y.low + (1 - (py - this.box.top) / this.box.height) * (this.y.high - this.y.low);
   }
 
+  /**
+   * Where an axis has ticks, and their texts: about `count` of them where it has no labels.
+   * @param {AxisRange} axis
+   * @param {number} count
+   */
+  ticks({ low, high, labels }, count) {
+    if (labels) return labels.map((text, at) => ({ at, text }));
+    const { at, step } = NB.ticks(low, high, count);
+    return at.map((each) => ({ at: each, text: NB.tickText(each, step) }));
+  }
+
+  /** @param {Painter} context */
   draw(context) {
     const { left, top, width, height } = this.box;
     context.save();
@@ -83,31 +102,23 @@ class Axes {
     context.lineWidth = 1;
     context.textBaseline = 'middle';
     context.textAlign = 'right';
-    const yTicks = this.y.labels
-      ? this.y.labels.map((_, index) => index)
-      : NB.ticks(this.y.low, this.y.high, height / 38);
-    for (const tick of yTicks) {
-      const at = Math.round(this.py(tick)) + 0.5;
+    for (const { at: value, text } of this.ticks(this.y, height / 38)) {
+      const at = Math.round(this.py(value)) + 0.5;
       context.beginPath();
       context.moveTo(left, at);
       context.lineTo(left + width, at);
       context.stroke();
-      const text = this.y.labels ? this.y.labels[tick] : NB.tickText(tick, yTicks.step || 1);
       context.fillText(this.fit(context, text, left - 26), left - 6, at);
     }
     context.textAlign = 'center';
     context.textBaseline = 'top';
-    const xTicks = this.x.labels
-      ? this.x.labels.map((_, index) => index)
-      : NB.ticks(this.x.low, this.x.high, width / 60);
     const space = this.x.labels ? width / this.x.labels.length - 6 : 60;
-    for (const tick of xTicks) {
-      const at = Math.round(this.px(tick)) + 0.5;
+    for (const { at: value, text } of this.ticks(this.x, width / 60)) {
+      const at = Math.round(this.px(value)) + 0.5;
       context.beginPath();
       context.moveTo(at, top);
       context.lineTo(at, top + height);
       context.stroke();
-      const text = this.x.labels ? this.x.labels[tick] : NB.tickText(tick, xTicks.step || 1);
       context.fillText(this.fit(context, text, space), at, top + height + 5);
     }
     context.strokeStyle = '#8a9099';
@@ -121,6 +132,7 @@ class Axes {
     context.restore();
   }
 
+  /** @param {Painter} context @param {string} text @param {number} width */
   fit(context, text, width) {
     let cut = String(text);
     if (context.measureText(cut).width <= width) return cut;
@@ -160,7 +172,7 @@ NB.sample = ({ color, dash }) => {
     'stroke-width': 2.5,
     'stroke-dasharray': dash.join(' '),
   })) {
-    line.setAttribute(name, value);
+    line.setAttribute(name, String(value));
   }
   svg.append(line);
   return svg;
@@ -168,17 +180,29 @@ NB.sample = ({ color, dash }) => {
 
 /** Curves over one variable with a cursor that follows and leads. */
 class Curves {
-  /** `options`: height, label, xTitle, yTitle, seek(x). */
+  /**
+   * `options`: height, label, xTitle, yTitle, seek(x).
+   * @param {CurvesOptions} options
+   */
   constructor(options) {
     this.options = options;
+    /** @type {Curve[]} */
     this.curves = [];
+    /** @type {Band[]} */
     this.bands = [];
+    /** @type {Set<string>} */
     this.hidden = new Set();
     this.cursor = null;
     this.whole = false;
+    /** @type {[from: number, to: number]} */
+    this.range = [0, 1];
+    // The first curve of each name, and its value at the cursor.
+    /** @type {Map<string, { curve: Curve, value: HTMLElement }>} */
+    this.named = new Map();
     this.canvas = new Canvas(options.height, options.label, (...all) => this.paint(...all));
     this.legend = NB.el('div', { class: 'legend', role: 'group', 'aria-label': 'Curves' });
     this.element = NB.el('div', { class: 'curves' }, this.canvas.element, this.legend);
+    /** @param {PointerEvent} event */
     const seek = (event) => {
       if (!this.axes || !(event.buttons & 1)) return;
       const x = this.axes.xAt(event.clientX - this.canvas.canvas.getBoundingClientRect().left);
@@ -188,18 +212,22 @@ class Curves {
     this.canvas.canvas.addEventListener('pointermove', seek);
   }
 
-  /** `curves` of `{ name, group, x, y, color, dash, width }`; `bands` of `{ from, to, text, color }`. */
+  /**
+   * `curves` of `{ name, group, x, y, color, dash, width }`; `bands` of `{ from, to, text, color }`.
+   * @param {Curve[]} curves
+   * @param {Band[]} bands
+   * @param {[from: number, to: number]} range
+   */
   set(curves, bands, range) {
     this.curves = curves;
     this.bands = bands;
     this.range = range;
-    this.values = new Map();
-    const names = [...new Set(curves.map((curve) => curve.name))];
+    this.named.clear();
+    for (const curve of curves)
+      if (!this.named.has(curve.name)) this.named.set(curve.name, { curve, value: NB.el('span', { class: 'value' }) });
     NB.clear(
       this.legend,
-      names.map((name) => {
-        const value = NB.el('span', { class: 'value' });
-        this.values.set(name, value);
+      [...this.named].map(([name, { curve, value }]) => {
         const button = NB.el(
           'button',
           {
@@ -213,7 +241,7 @@ class Curves {
               this.draw();
             },
           },
-          NB.sample(curves.find((curve) => curve.name === name)),
+          NB.sample(curve),
           NB.words(name),
           value,
         );
@@ -227,37 +255,40 @@ class Curves {
     this.draw();
   }
 
-  /** The curves as they are shown, for a paper. */
+  /**
+   * The curves as they are shown, for a paper.
+   * @param {string} title
+   */
   svg(title) {
-    const names = [...new Set(this.curves.map((curve) => curve.name))].filter((name) => !this.hidden.has(name));
-    const legend = names.map((name) => {
-      const { color, dash } = this.curves.find((curve) => curve.name === name);
-      return {
-        text: NB.words(name),
-        draw: (context, x, y) => {
-          context.strokeStyle = color;
-          context.lineWidth = 1.8;
-          context.setLineDash(dash);
-          context.beginPath();
-          context.moveTo(x - 14, y);
-          context.lineTo(x + 14, y);
-          context.stroke();
-        },
-      };
-    });
+    const shown = [...this.named].filter(([name]) => !this.hidden.has(name));
+    /** @type {Mark[]} */
+    const legend = shown.map(([name, { curve }]) => ({
+      text: NB.words(name),
+      draw: (context, x, y) => {
+        context.strokeStyle = curve.color;
+        context.lineWidth = 1.8;
+        context.setLineDash(curve.dash);
+        context.beginPath();
+        context.moveTo(x - 14, y);
+        context.lineTo(x + 14, y);
+        context.stroke();
+      },
+    }));
     const svg = NB.paper(title, (...all) => this.paint(...all), 220, legend);
     // The axes were those of the paper.
     this.draw();
     return svg;
   }
 
-  /** The values of the first curve of each name at the cursor. */
+  /**
+   * The values of the first curve of each name at the cursor.
+   * @param {number | null} x
+   */
   seek(x) {
     this.cursor = x;
-    for (const [name, element] of this.values || []) {
-      const curve = this.curves.find((each) => each.name === name);
-      const y = NB.at(curve.x, curve.y, x);
-      element.textContent = Number.isNaN(y) ? '' : `${NB.fixed(y, 1)} ${this.options.unit || 'mm'}`;
+    for (const { curve, value } of this.named.values()) {
+      const y = x === null ? NaN : NB.at(curve.x, curve.y, x);
+      value.textContent = Number.isNaN(y) ? '' : `${NB.fixed(y, 1)} ${this.options.unit || 'mm'}`;
     }
     this.draw();
   }
@@ -266,6 +297,7 @@ class Curves {
     this.canvas.draw();
   }
 
+  /** @param {Painter} context @param {number} width @param {number} height */
   paint(context, width, height) {
     const shown = this.curves.filter((curve) => !this.hidden.has(curve.name));
     let [low, high] = [0, 1];

@@ -6,10 +6,14 @@ NB.COLUMN = { mm: 85, px: (85 / 25.4) * 96, font: (8 / 72) * 96 };
 
 /** What a canvas's context does, as SVG. Only what our plots use. */
 class SvgContext {
+  /** @param {number} width @param {number} height @param {number} mm */
   constructor(width, height, mm) {
+    /** @type {[width: number, height: number, mm: number]} */
     this.size = [width, height, mm];
+    /** @type {string[]} */
     this.parts = [];
     this.path = '';
+    /** @type {PaperState} */
     this.state = {
       fillStyle: '#000',
       strokeStyle: '#000',
@@ -21,14 +25,17 @@ class SvgContext {
       move: '',
       clip: '',
     };
+    /** @type {PaperState[]} */
     this.stack = [];
     this.clips = 0;
-    this.ruler = document.createElement('canvas').getContext('2d');
-    for (const name of ['fillStyle', 'strokeStyle', 'lineWidth', 'textAlign', 'textBaseline', 'font']) {
+    this.ruler = NB.context(NB.el('canvas'));
+    /** @type {(keyof PaperState)[]} */
+    const settings = ['fillStyle', 'strokeStyle', 'lineWidth', 'textAlign', 'textBaseline', 'font'];
+    for (const name of settings) {
       Object.defineProperty(this, name, {
         get: () => this.state[name],
         set: (value) => {
-          this.state[name] = value;
+          Object.assign(this.state, { [name]: value });
         },
       });
     }
@@ -43,14 +50,17 @@ class SvgContext {
     this.state = this.stack.pop() || this.state;
   }
 
+  /** @param {number} x @param {number} y */
   translate(x, y) {
     this.state.move += ` translate(${NB.short(x)} ${NB.short(y)})`;
   }
 
+  /** @param {number} angle */
   rotate(angle) {
     this.state.move += ` rotate(${NB.short((angle * 180) / Math.PI)})`;
   }
 
+  /** @param {number[]} dash */
   setLineDash(dash) {
     this.state.dash = dash;
   }
@@ -59,10 +69,12 @@ class SvgContext {
     this.path = '';
   }
 
+  /** @param {number} x @param {number} y */
   moveTo(x, y) {
     this.path += `M${NB.short(x)} ${NB.short(y)}`;
   }
 
+  /** @param {number} x @param {number} y */
   lineTo(x, y) {
     this.path += `${this.path ? 'L' : 'M'}${NB.short(x)} ${NB.short(y)}`;
   }
@@ -71,11 +83,14 @@ class SvgContext {
     this.path += 'Z';
   }
 
+  /** @param {number} x @param {number} y @param {number} w @param {number} h */
   rect(x, y, w, h) {
     this.path += `M${NB.short(x)} ${NB.short(y)}h${NB.short(w)}v${NB.short(h)}h${NB.short(-w)}Z`;
   }
 
+  /** @param {number} x @param {number} y @param {number} r @param {number} from @param {number} to */
   arc(x, y, r, from, to) {
+    /** @param {number} angle */
     const at = (angle) => [NB.short(x + r * Math.cos(angle)), NB.short(y + r * Math.sin(angle))];
     if (to - from >= 2 * Math.PI - 1e-6) {
       const [a, b] = [at(0), at(Math.PI)];
@@ -90,6 +105,7 @@ class SvgContext {
       `${b.join(' ')}`;
   }
 
+  /** @param {string} tag @param {object} attributes */
   put(tag, attributes, text = '') {
     const { move, clip } = this.state;
     const all = { ...attributes, transform: move.trim() || null, 'clip-path': clip ? `url(#${clip})` : null };
@@ -122,6 +138,7 @@ class SvgContext {
     this.state.clip = id;
   }
 
+  /** @param {number} x @param {number} y @param {number} w @param {number} h */
   fillRect(x, y, w, h) {
     this.put('path', {
       d: `M${NB.short(x)} ${NB.short(y)}h${NB.short(w)}v${NB.short(h)}h${NB.short(-w)}Z`,
@@ -129,6 +146,7 @@ class SvgContext {
     });
   }
 
+  /** @param {number} x @param {number} y @param {number} w @param {number} h */
   strokeRect(x, y, w, h) {
     const path = this.path;
     this.beginPath();
@@ -137,16 +155,21 @@ class SvgContext {
     this.path = path;
   }
 
+  /** @param {string} text */
   measureText(text) {
     this.ruler.font = this.state.font;
     return this.ruler.measureText(text);
   }
 
+  /** @param {string} text @param {number} x @param {number} y */
   fillText(text, x, y) {
-    const [, size, family] = this.state.font.match(/([\d.]+)px (.*)$/);
-    const anchor = { left: 'start', center: 'middle', right: 'end' }[this.state.textAlign];
+    const [, size, family] = /** @type {string[]} */ (this.state.font.match(/([\d.]+)px (.*)$/));
+    /** @type {{ [align: string]: string }} */
+    const anchors = { left: 'start', center: 'middle', right: 'end' };
     // Not every reader of SVG knows baselines.
-    const drop = { middle: 0.35, top: 0.8, bottom: -0.2, alphabetic: 0 }[this.state.textBaseline] * Number(size);
+    /** @type {{ [baseline: string]: number }} */
+    const drops = { middle: 0.35, top: 0.8, bottom: -0.2, alphabetic: 0 };
+    const drop = drops[this.state.textBaseline] * Number(size);
     this.put(
       'text',
       {
@@ -155,13 +178,14 @@ class SvgContext {
         fill: this.state.fillStyle,
         'font-size': size,
         'font-family': family,
-        'text-anchor': anchor,
+        'text-anchor': anchors[this.state.textAlign],
         'font-weight': /bold|600/.test(this.state.font) ? 'bold' : null,
       },
       String(text),
     );
   }
 
+  /** @param {string} title */
   svg(title) {
     const [width, height, mm] = this.size;
     return (
@@ -229,7 +253,7 @@ NB.paper = (title, paint, height, legend = []) => {
 
 /** A chart of the program, in a box of its own width, with a button that saves it. */
 NB.chart = (title, svg, name, help) => {
-  const [, width, height] = svg.match(/viewBox="0 0 ([\d.]+) ([\d.]+)"/).map(Number);
+  const [, width, height] = /** @type {string[]} */ (svg.match(/viewBox="0 0 ([\d.]+) ([\d.]+)"/)).map(Number);
   const image = NB.el('img', {
     src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`,
     alt: title,

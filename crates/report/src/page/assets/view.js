@@ -4,10 +4,10 @@
 /** Faces that meet at less than 40 degrees shade as one smooth surface. */
 NB.CREASE_COSINE = 0.766;
 
-NB.matrix = ([x, y, z, qx, qy, qz, qw]) =>
+NB.matrix = (pose) =>
   new THREE.Matrix4().compose(
-    new THREE.Vector3(x, y, z),
-    new THREE.Quaternion(qx, qy, qz, qw),
+    new THREE.Vector3().fromArray(pose),
+    new THREE.Quaternion().fromArray(pose, 3),
     new THREE.Vector3(1, 1, 1),
   );
 
@@ -27,7 +27,7 @@ NB.forward = (chain, joints) => {
   const poses = [];
   let pose = NB.matrix(chain.base);
   chain.joints.forEach((joint, index) => {
-    const turn = new THREE.Matrix4().makeRotationAxis(new THREE.Vector3(...joint.axis), joints[index]);
+    const turn = new THREE.Matrix4().makeRotationAxis(new THREE.Vector3().fromArray(joint.axis), joints[index]);
     pose = pose.clone().multiply(NB.matrix(joint.pose)).multiply(turn);
     poses.push(pose);
   });
@@ -99,12 +99,19 @@ NB.hasWebgl = () => {
 };
 
 class View {
-  /** `label` says what the picture shows. */
+  /**
+   * `label` says what the picture shows.
+   * @param {Scene} scene
+   * @param {string} label
+   */
   constructor(scene, label) {
     this.scene = scene;
+    /** @type {Map<string, THREE.Group>} */
     this.groups = new Map();
+    /** @type {{ layer: string, element: HTMLElement, at: THREE.Vector3 }[]} */
     this.labels = [];
     // Surfaces that go where the base goes, with their layers.
+    /** @type {{ mesh: ViewMesh, group: string }[]} */
     this.tied = [];
     this.image = NB.el('img', { class: 'print-only view-image', alt: label });
     this.overlay = NB.el('div', { class: 'labels', 'aria-hidden': 'true' });
@@ -120,6 +127,7 @@ class View {
       );
       return;
     }
+    /** @type {THREE.WebGLRenderer} */
     this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
     this.renderer.setClearColor(0xf7f8fa);
@@ -128,15 +136,20 @@ class View {
     canvas.setAttribute('role', 'application');
     canvas.setAttribute('aria-label', `${label}. Arrow keys turn the view, plus and minus zoom, 0 resets.`);
     this.element.append(canvas, this.overlay);
+    /** @type {THREE.Scene} */
     this.world = new THREE.Scene();
+    /** @type {THREE.PerspectiveCamera} */
     this.camera = new THREE.PerspectiveCamera(35, 1, 0.02, 30);
     this.camera.up.set(0, 0, 1);
+    /** @type {THREE.OrbitControls} */
     this.controls = new THREE.OrbitControls(this.camera, canvas);
     this.controls.addEventListener('change', () => this.draw());
     this.world.add(new THREE.HemisphereLight(0xffffff, 0x8d8d94, 2.1));
+    /** @type {THREE.DirectionalLight} */
     this.lamp = new THREE.DirectionalLight(0xffffff, 1.5);
     this.world.add(this.lamp, this.lamp.target);
     this.addFloor();
+    /** @type {THREE.BufferGeometry[]} */
     this.geometries = scene.parts.map((part) => NB.geometry(part.surface));
     scene.parts.forEach((part, index) => {
       if (part.frame >= 0 || part.group === 'collision') return;
@@ -156,21 +169,27 @@ class View {
     this.group('floor').add(grid);
   }
 
-  /** A layer that is shown and hidden as one. */
+  /**
+   * A layer that is shown and hidden as one.
+   * @param {string} name
+   */
   group(name) {
-    if (!this.groups.has(name)) {
-      const group = this.works ? new THREE.Group() : { visible: true };
+    let group = this.groups.get(name);
+    if (!group) {
+      group = new THREE.Group();
       this.groups.set(name, group);
       if (this.works) this.world.add(group);
     }
-    return this.groups.get(name);
+    return group;
   }
 
+  /** @param {string} name @param {boolean} visible */
   show(name, visible) {
     this.group(name).visible = visible;
     this.draw();
   }
 
+  /** @param {Colour} color @param {boolean} [shaded] */
   material([red, green, blue, opacity], shaded = true) {
     const color = new THREE.Color().setRGB(red, green, blue, 'srgb');
     const settings = {
@@ -183,13 +202,18 @@ class View {
     return shaded ? new THREE.MeshLambertMaterial(settings) : new THREE.MeshBasicMaterial(settings);
   }
 
+  /** @param {number} index @param {Colour} color */
   mesh(index, color) {
     const mesh = new THREE.Mesh(this.geometries[index], this.material(color));
     if (color[3] < 1) mesh.renderOrder = this.scene.parts[index].group.split('@')[0] === 'skin' ? 20 : 10;
     return mesh;
   }
 
-  /** A surface of the document besides those of the cell. */
+  /**
+   * A surface of the document besides those of the cell.
+   * @param {Surface} surface
+   * @param {Colour} color
+   */
   surface(surface, color) {
     const mesh = new THREE.Mesh(NB.geometry(surface), this.material(color));
     mesh.renderOrder = 15;
@@ -199,6 +223,9 @@ class View {
   /**
    * A copy of the arm with its tool: `pose` it, `stand` its base elsewhere, `tint` its links, `show` it or a `layer` of
    * it; `look` sets colour and opacity.
+   * @param {string} name
+   * @param {{ color?: Colour, opacity: number } | null} [look]
+   * @returns {ArmView}
    */
   arm(name, look = null) {
     if (!this.works) return { pose() {}, stand() {}, tint() {}, show() {}, layer() {} };
@@ -207,7 +234,9 @@ class View {
     const foot = new THREE.Group();
     foot.matrixAutoUpdate = false;
     root.add(foot);
+    /** @type {Map<string, ViewMesh[]>} */
     const layers = new Map();
+    /** @type {{ mesh: ViewMesh, frame: number, own: THREE.Color }[]} */
     const painted = [];
     links.forEach((link) => {
       link.matrixAutoUpdate = false;
@@ -228,8 +257,7 @@ class View {
       else links[part.frame].add(mesh);
       if (part.group === 'robot' || part.group === 'tool')
         painted.push({ mesh, frame: part.frame, own: mesh.material.color.clone() });
-      if (!layers.has(part.group)) layers.set(part.group, []);
-      layers.get(part.group).push(mesh);
+      layers.set(part.group, [...(layers.get(part.group) || []), mesh]);
     });
     return {
       root,
@@ -245,7 +273,7 @@ class View {
         for (const { mesh, frame, own } of painted) {
           mesh.material.color.copy(own);
           const color = colorOf(frame);
-          if (color) mesh.material.color.lerp(new THREE.Color().setRGB(...color, 'srgb'), 0.7);
+          if (color) mesh.material.color.lerp(new THREE.Color().setRGB(color[0], color[1], color[2], 'srgb'), 0.7);
         }
       },
       show: (visible) => {
@@ -257,15 +285,19 @@ class View {
     };
   }
 
-  /** Takes everything out of a layer. */
+  /**
+   * Takes everything out of a layer.
+   * @param {string} name
+   */
   empty(name) {
     if (!this.works) return;
     const group = this.group(name);
     for (const child of [...group.children]) {
       group.remove(child);
       child.traverse((each) => {
-        each.geometry?.dispose();
-        each.material?.dispose();
+        if (!(each instanceof THREE.Mesh)) return;
+        each.geometry.dispose();
+        each.material.dispose();
       });
     }
     this.labels = this.labels.filter((label) => {
@@ -274,17 +306,29 @@ class View {
     });
   }
 
-  /** What is marked is seen through all that stands before it. */
+  /**
+   * What is marked is seen through all that stands before it.
+   * @template {THREE.MeshBasicMaterial | THREE.MeshLambertMaterial} M
+   * @param {M} material
+   */
   marked(material) {
     material.depthTest = false;
     material.transparent = true;
     return material;
   }
 
-  /** A straight line as a thin rod. */
+  /**
+   * A straight line as a thin rod.
+   * @param {string} name
+   * @param {Point} from
+   * @param {Point} to
+   * @param {number} radius
+   * @param {Colour} color
+   * @param {boolean} [isMark]
+   */
   rod(name, from, to, radius, color, isMark = false) {
     if (!this.works) return;
-    const [a, b] = [new THREE.Vector3(...from), new THREE.Vector3(...to)];
+    const [a, b] = [new THREE.Vector3().fromArray(from), new THREE.Vector3().fromArray(to)];
     const along = b.clone().sub(a);
     const length = Math.max(along.length(), 1e-6);
     const mesh = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, length, 10), this.material(color, false));
@@ -295,10 +339,11 @@ class View {
     this.group(name).add(mesh);
   }
 
+  /** @param {string} name @param {Point} at @param {number} radius @param {Colour} color @param {boolean} [isMark] */
   ball(name, at, radius, color, isMark = false) {
     if (!this.works) return;
     const mesh = new THREE.Mesh(new THREE.SphereGeometry(radius, 20, 14), this.material(color));
-    mesh.position.set(...at);
+    mesh.position.fromArray(at);
     mesh.renderOrder = color[3] < 1 ? 12 : 0;
     if (isMark) {
       this.marked(mesh.material);
@@ -307,7 +352,13 @@ class View {
     this.group(name).add(mesh);
   }
 
-  /** Unit ball under a matrix (columns are the images of the axes) about a centre. */
+  /**
+   * Unit ball under a matrix (columns are the images of the axes) about a centre.
+   * @param {string} name
+   * @param {Point} center
+   * @param {Point[]} columns
+   * @param {Colour} color
+   */
   ellipsoid(name, center, columns, color) {
     if (!this.works) return;
     const mesh = new THREE.Mesh(new THREE.SphereGeometry(1, 32, 20), this.material(color));
@@ -318,19 +369,29 @@ class View {
     this.group(name).add(mesh);
   }
 
+  /** @param {string} name @param {THREE.Group | THREE.Mesh} object */
   add(name, object) {
     if (this.works) this.group(name).add(object);
   }
 
-  /** A text beside a point. */
+  /**
+   * A text beside a point.
+   * @param {string} name
+   * @param {string} text
+   * @param {Point} at
+   */
   label(name, text, at) {
-    if (!this.works) return;
+    if (!this.works) return null;
     const element = NB.el('span', { class: 'label', text });
     this.overlay.append(element);
-    this.labels.push({ layer: name, element, at: new THREE.Vector3(...at) });
+    this.labels.push({ layer: name, element, at: new THREE.Vector3().fromArray(at) });
+    return element;
   }
 
-  /** People as they stand, with the eyes of each stature, in the layer `people`; lines of sight belong to it. */
+  /**
+   * People as they stand, with the eyes of each stature, in the layer `people`; lines of sight belong to it.
+   * @param {Person[]} people
+   */
   people(people) {
     this.empty('people');
     if (!this.works) return;
@@ -353,16 +414,30 @@ class View {
     this.group('people').add(this.group('sight'));
   }
 
-  /** Lines of sight, seven numbers each: eye, end, and 1 where it is blocked there. */
+  /**
+   * Lines of sight, seven numbers each: eye, end, and 1 where it is blocked there.
+   * @param {Numbers} lines
+   */
   sight(lines) {
     this.empty('sight');
     for (let k = 0; k < lines.length; k += 7) {
       const color = lines[k + 6] ? [0.84, 0.37, 0, 1] : [0, 0.45, 0.7, 1];
-      this.rod('sight', lines.slice(k, k + 3), lines.slice(k + 3, k + 6), lines[k + 6] ? 0.0022 : 0.0015, color);
+      this.rod(
+        'sight',
+        Array.from(lines.slice(k, k + 3)),
+        Array.from(lines.slice(k + 3, k + 6)),
+        lines[k + 6] ? 0.0022 : 0.0015,
+        color,
+      );
     }
   }
 
-  /** The cone that is free for the hand behind the guide, in the layer `cone`. */
+  /**
+   * The cone that is free for the hand behind the guide, in the layer `cone`.
+   * @param {Pose} guideEntry
+   * @param {number} halfAngle
+   * @param {number} length
+   */
   handCone(guideEntry, halfAngle, length) {
     this.empty('cone');
     if (!this.works) return;
@@ -372,7 +447,11 @@ class View {
     this.add('cone', cone);
   }
 
-  /** Looks at a box of points from a direction. */
+  /**
+   * Looks at a box of points from a direction.
+   * @param {Point[]} points
+   * @param {Point} direction
+   */
   frame(points, direction) {
     if (!this.works) return;
     const low = [0, 1, 2].map((k) => Math.min(...points.map((point) => point[k])));
@@ -387,19 +466,27 @@ class View {
     if (this.works && this.home) this.look(this.home.direction, this.home.distance, this.home.middle);
   }
 
-  /** Looks along a direction at a point. */
+  /**
+   * Looks along a direction at a point.
+   * @param {Point} direction
+   * @param {number} distance
+   * @param {Point | null} [middle]
+   */
   look(direction, distance, middle = null) {
     if (!this.works) return;
-    if (middle) this.controls.target.set(...middle);
-    const along = new THREE.Vector3(...direction).normalize();
+    if (middle) this.controls.target.fromArray(middle);
+    const along = new THREE.Vector3().fromArray(direction).normalize();
     this.camera.position.copy(this.controls.target).addScaledVector(along, -distance);
     this.controls.update();
     this.draw();
   }
 
+  /** @param {KeyboardEvent} event */
   key(event) {
     const offset = this.camera.position.clone().sub(this.controls.target);
-    const turn = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    /** @type {{ [key: string]: number[] | undefined }} */
+    const turns = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+    const turn = turns[event.key];
     if (turn) {
       const step = Math.PI / 24;
       const level = Math.hypot(offset.x, offset.y);
@@ -447,6 +534,7 @@ class View {
 
   placeLabels() {
     const { clientWidth: width, clientHeight: height } = this.element;
+    /** @type {{ x: number, y: number, w: number, h: number }[]} */
     const taken = [];
     for (const { layer, element, at } of this.labels) {
       const place = at.clone().project(this.camera);
@@ -472,7 +560,7 @@ class View {
     const canvas = NB.el('canvas', null);
     const source = this.renderer.domElement;
     [canvas.width, canvas.height] = [source.width, source.height];
-    const context = canvas.getContext('2d');
+    const context = NB.context(canvas);
     context.drawImage(source, 0, 0);
     const scale = source.width / this.element.clientWidth;
     context.scale(scale, scale);
@@ -480,7 +568,7 @@ class View {
     context.textBaseline = 'middle';
     for (const { element } of this.labels) {
       if (element.style.display === 'none') continue;
-      const [x, y] = element.style.transform.match(/[-\d.]+/g).map(Number);
+      const [x, y] = (element.style.transform.match(/[-\d.]+/g) || []).map(Number);
       const [w, h] = [element.offsetWidth || 100, element.offsetHeight || 18];
       context.fillStyle = 'rgba(255, 255, 255, 0.85)';
       context.fillRect(x, y, w, h);
@@ -506,6 +594,7 @@ NB.cone = (halfAngle, length) => {
   // Whole balls narrow down to a cone: a piece of a sphere and the mantle below it.
   const [around, rings] = [48, 8];
   const positions = [];
+  /** @param {number} angle @param {number} step */
   const at = (angle, step) => {
     const turn = (2 * Math.PI * step) / around;
     return [
