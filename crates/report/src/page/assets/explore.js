@@ -4,36 +4,53 @@
 
 /** The program's clearances and configurations. Lengths in m, angles in rad unless they say otherwise. */
 class Live {
-  /** Rejects where the browser runs no WebAssembly. */
+  /** @param {LiveCode} code @param {ExploreData} data */
+  constructor(code, data) {
+    this.code = code;
+    this.data = data;
+  }
+
+  /**
+   * Rejects where the browser runs no WebAssembly.
+   * @param {ExploreData} data
+   */
   static async start(data) {
     if (typeof WebAssembly === 'undefined') throw new Error('this browser has no WebAssembly, or it is switched off');
     const { instance } = await WebAssembly.instantiate(NB.array(data.code).slice(), {});
-    const live = new Live();
-    live.code = instance.exports;
-    live.data = data;
+    const live = new Live(/** @type {LiveCode} */ (instance.exports), data);
     const scene = NB.array(data.scene);
     live.bytes(live.code.input(scene.length), scene.length).set(scene);
     if (!live.code.load()) throw new Error('the scene in this page cannot be read');
     return live;
   }
 
+  /** @param {number} at @param {number} count */
   bytes(at, count) {
     return new Uint8Array(this.code.memory.buffer, at, count);
   }
 
+  /** @param {number[]} numbers */
   put(numbers) {
     this.bytes(this.code.input(8 * numbers.length), 8 * numbers.length).set(
       new Uint8Array(Float64Array.from(numbers).buffer),
     );
   }
 
-  /** Rows of so many numbers, of an answer with `count` numbers. */
+  /**
+   * Rows of so many numbers, of an answer with `count` numbers.
+   * @param {number} count
+   * @param {number} width
+   */
   rows(count, width) {
     const all = new Float64Array(this.code.memory.buffer, this.code.results(), count).slice();
     return Array.from({ length: count / width }, (_, row) => all.subarray(row * width, (row + 1) * width));
   }
 
-  /** Clearance of every pair at joint positions, in the document's order. */
+  /**
+   * Clearance of every pair at joint positions, in the document's order.
+   * @param {number[]} joints
+   * @returns {LivePair[]}
+   */
   pairs(joints) {
     this.put(joints);
     return this.rows(this.code.pairs(), 9).map((row, index) => {
@@ -49,16 +66,22 @@ class Live {
     });
   }
 
+  /** @param {number} body @param {number} index */
   solid(body, index) {
     return this.data.bodies[body].solids[index];
   }
 
+  /** @param {number[]} joints */
   lowest(joints) {
     this.put(joints);
     return this.code.lowest();
   }
 
-  /** Moves the base: mm, and roll, pitch, yaw in degrees. Says why its mount cannot carry it there, or null. */
+  /**
+   * Moves the base: mm, and roll, pitch, yaw in degrees. Says why its mount cannot carry it there, or null.
+   * @param {Point} position
+   * @param {number[]} rpy
+   */
   placeBase(position, rpy) {
     this.put([...position, ...rpy]);
     const length = this.code.place_base();
@@ -78,7 +101,12 @@ class Live {
     }));
   }
 
-  /** All eight configurations at a goal, each at the best of so many rolls. */
+  /**
+   * All eight configurations at a goal, each at the best of so many rolls.
+   * @param {number} goal
+   * @param {number} rolls
+   * @returns {LivePosture[]}
+   */
   reach(goal, rolls) {
     return this.rows(this.code.reach(goal, rolls), 11).map((row, index) => ({
       label: this.data.configurations[index],
@@ -116,6 +144,27 @@ NB.JOINTS = ['Shoulder pan', 'Shoulder lift', 'Elbow', 'Wrist 1', 'Wrist 2', 'Wr
 
 /** The panel, and the arm that it moves. `run` is the page: its view, its arms and what they show. */
 class Explore {
+  // From the first posture that is tried.
+  /** @type {Live} */ live;
+  /** @type {ArmView} */ arm;
+  /** @type {ArmView} */ from;
+  /** @type {Base} */ base;
+  /** @type {number[]} */ joints;
+  /** @type {number[]} */ fromJoints;
+  /** @type {LivePair[]} */ pairs;
+  /** @type {LivePair[]} */ least;
+  /** @type {LivePosture[]} */ found;
+  /** @type {[layer: string, visible: boolean][]} */ were;
+  /** @type {HTMLInputElement[]} */ sliders;
+  /** @type {HTMLInputElement[]} */ numbers;
+  /** @type {{ name: string, unit: string, get: () => number, input: HTMLInputElement }[]} */ baseFields;
+  /** @type {HTMLElement} */ problems;
+  /** @type {HTMLElement} */ classes;
+  /** @type {HTMLElement} */ reached;
+  /** @type {HTMLElement} */ text;
+  /** @type {HTMLElement} */ copied;
+
+  /** @param {RunPage} run */
   constructor(run) {
     this.run = run;
     this.data = run.page.explore;
@@ -211,7 +260,9 @@ class Explore {
 
   build() {
     this.built = true;
+    /** @param {number} rad */
     const degrees = (rad) => (rad * 180) / Math.PI;
+    /** @param {string} label @param {Attributes<'input'>} attributes @param {(value: number) => void} change */
     const field = (label, attributes, change) =>
       NB.el('input', {
         type: 'number',
@@ -226,6 +277,7 @@ class Explore {
     this.numbers = [];
     const joints = NB.JOINTS.map((name, joint) => {
       const [low, high] = this.data.joints[joint].map(degrees);
+      /** @param {number} value */
       const set = (value) => this.setJoint(joint, (Math.min(Math.max(value, low), high) * Math.PI) / 180);
       const ends = { min: low.toFixed(1), max: high.toFixed(1) };
       this.sliders[joint] = NB.el('input', {
@@ -245,36 +297,33 @@ class Explore {
         NB.el('span', { class: 'unit', text: '\u00b0' }),
       );
     });
-    this.baseFields = [
-      ...['x', 'y', 'height'].map((name, k) => [
-        name,
-        'mm',
-        () => this.base.position[k],
-        (value) => {
-          this.base.position[k] = value;
-        },
-      ]),
-      ...['roll', 'pitch', 'yaw'].map((name, k) => [
-        name,
-        '\u00b0',
-        () => this.base.rpy[k],
-        (value) => {
-          this.base.rpy[k] = value;
-        },
-      ]),
-    ].map(([name, unit, get, set]) => {
+    /** @type {[name: string, unit: string, of: keyof Base, k: number][]} */
+    const places = [
+      ['x', 'mm', 'position', 0],
+      ['y', 'mm', 'position', 1],
+      ['height', 'mm', 'position', 2],
+      ['roll', '\u00b0', 'rpy', 0],
+      ['pitch', '\u00b0', 'rpy', 1],
+      ['yaw', '\u00b0', 'rpy', 2],
+    ];
+    this.baseFields = places.map(([name, unit, of, k]) => {
       const input = field(
         `Base, ${name}, ${unit === 'mm' ? 'millimetres' : 'degrees'}`,
         { step: unit === 'mm' ? '10' : '5' },
-        (value) => this.moveBase(() => set(value)),
+        (value) => {
+          this.moveBase(() => {
+            this.base[of][k] = value;
+          });
+        },
       );
-      return { name, unit, get, input };
+      return { name, unit, get: () => this.base[of][k], input };
     });
     this.problems = NB.el('div', { role: 'alert' });
     this.classes = NB.el('div');
     this.reached = NB.el('div');
     this.text = NB.el('pre', { class: 'small', tabindex: '0', 'aria-label': 'The same on the command line' });
     this.copied = NB.el('span', { class: 'soft', role: 'status' });
+    /** @param {string} text @param {() => void} click */
     const button = (text, click, extra = {}) => NB.el('button', { type: 'button', onclick: click, ...extra }, text);
     this.body.append(
       NB.el('p', {
@@ -364,13 +413,17 @@ class Explore {
     });
   }
 
+  /** @param {number} joint @param {number} value */
   setJoint(joint, value) {
     this.joints[joint] = value;
     this.write(joint);
     this.evaluate();
   }
 
-  /** Moves the base; where its mount cannot carry it, all stays and the reason is said. */
+  /**
+   * Moves the base; where its mount cannot carry it, all stays and the reason is said.
+   * @param {() => void} change
+   */
   moveBase(change) {
     const before = { position: [...this.base.position], rpy: [...this.base.rpy] };
     change();
@@ -386,20 +439,31 @@ class Explore {
     this.lookForConfigurations();
   }
 
-  /** The deepest overlap at joint positions, of bodies that are not meant to touch; null for none. */
+  /**
+   * The deepest overlap at joint positions, of bodies that are not meant to touch; null for none.
+   * @param {number[]} joints
+   * @returns {LivePair | null}
+   */
   worstHit(joints) {
     const hits = this.live.pairs(joints).filter((pair) => pair.distance < 0 && this.data.classes[pair.class].unwanted);
-    return hits.reduce((worst, pair) => (worst && worst.distance <= pair.distance ? worst : pair), null);
+    return hits.reduce(
+      (worst, pair) => (worst && worst.distance <= pair.distance ? worst : pair),
+      /** @type {LivePair | null} */ (null),
+    );
   }
 
-  /** Writes the state into the controls; a joint's own control is being moved. */
+  /**
+   * Writes the state into the controls; a joint's own control is being moved.
+   * @param {number | null} [moved]
+   */
   write(moved = null) {
     this.joints.forEach((q, joint) => {
       const degrees = (q * 180) / Math.PI;
-      if (joint !== moved || document.activeElement !== this.sliders[joint]) this.sliders[joint].value = degrees;
+      if (joint !== moved || document.activeElement !== this.sliders[joint])
+        this.sliders[joint].value = String(degrees);
       this.numbers[joint].value = degrees.toFixed(2);
     });
-    for (const { get, input } of this.baseFields) input.value = Number(get().toFixed(3));
+    for (const { get, input } of this.baseFields) input.value = String(Number(get().toFixed(3)));
   }
 
   get goalIndex() {
@@ -442,11 +506,12 @@ class Explore {
     if (moved) {
       const corners = this.live.mountSurface();
       if (corners.length) {
-        const color = view.scene.parts.find((part) => part.group === 'mount').color.slice(0, 3);
+        const color = view.scene.parts.find((part) => part.group === 'mount')?.color.slice(0, 3) || [0.5, 0.5, 0.5];
         // Walls and ceilings, which would hide the cell, are faint: they have the large triangles.
+        /** @type {number[][]} */
         const parts = [[], []];
         for (let at = 0; at < corners.length; at += 9) {
-          const [a, b, c] = [0, 3, 6].map((k) => new THREE.Vector3(...corners.slice(at + k, at + k + 3)));
+          const [a, b, c] = [0, 3, 6].map((k) => new THREE.Vector3().fromArray(corners, at + k));
           const area = b.sub(a).cross(c.sub(a)).length() / 2;
           parts[area > 0.12 ? 1 : 0].push(...corners.slice(at, at + 9));
         }
@@ -470,9 +535,10 @@ class Explore {
     const pairs = this.live.pairs(this.joints);
     this.computedInMs = performance.now() - started;
     this.pairs = pairs;
+    /** @type {Map<number, LivePair>} */
     const least = new Map();
     for (const pair of pairs)
-      if (!least.has(pair.class) || pair.distance < least.get(pair.class).distance) least.set(pair.class, pair);
+      if (pair.distance < (least.get(pair.class)?.distance ?? Infinity)) least.set(pair.class, pair);
     this.least = [...least.values()].sort((a, b) => a.class - b.class);
     this.showClasses();
     this.showProblems();
@@ -506,12 +572,15 @@ class Explore {
       );
   }
 
+  /** @param {LivePair} pair */
   limit(pair) {
     return this.data.classes[pair.class].judged;
   }
 
   showClasses() {
+    /** @param {LivePair} pair */
     const name = (pair) => this.data.classes[pair.class].name;
+    /** @type {Column<LivePair>[]} */
     const columns = [
       { title: 'Clearance of this posture', cell: (pair) => NB.words(name(pair)) },
       {
@@ -539,6 +608,7 @@ class Explore {
     );
   }
 
+  /** @param {number} distance @param {number | null} limit */
   judgement(distance, limit) {
     if (limit === null) return NB.el('span', { class: 'soft', text: 'no limit' });
     return distance >= limit
@@ -558,12 +628,13 @@ class Explore {
       const nearness = NB.nearness(pair.distance, this.limit(pair));
       const unwanted = this.data.classes[pair.class].unwanted;
       if (!labelled.has(pair.index) && (!unwanted || nearness.key === 'far')) continue;
-      view.rod('tried-lines', ...pair.points, nearness.radius, [...nearness.color, 1], true);
+      const [from, to] = pair.points;
+      view.rod('tried-lines', from, to, nearness.radius, [...nearness.color, 1], true);
       if (nearness.key === 'far') continue;
       for (const point of pair.points)
         view.ball('tried-lines', point, 2 * nearness.radius, [...nearness.color, 1], true);
       if (!labelled.has(pair.index)) continue;
-      const middle = pair.points[0].map((value, k) => (value + pair.points[1][k]) / 2);
+      const middle = from.map((value, k) => (value + to[k]) / 2);
       view.label('tried-lines', `${pair.solids.map(NB.words).join(' and ')}: ${NB.mm(pair.distance)} mm`, middle);
     }
     view.group('tried-lines').visible = true;
@@ -594,7 +665,7 @@ class Explore {
    * when all rests.
    */
   lookForConfigurations() {
-    if (!(this.coarseInMs > Explore.COARSE_MS)) {
+    if (!((this.coarseInMs ?? 0) > Explore.COARSE_MS)) {
       this.showReach(6, false);
       this.coarseInMs = this.reachedInMs;
     } else {
@@ -608,12 +679,14 @@ class Explore {
     }, 200);
   }
 
+  /** @param {number} rolls @param {boolean} isLast */
   showReach(rolls, isLast) {
     const { free, fromBase } = this.data.goals[this.goalIndex];
     const started = performance.now();
     this.found = this.live.reach(this.goalIndex, rolls);
     this.reachedInMs = performance.now() - started;
     if (!this.found.length) return;
+    /** @type {{ [outcome: string]: [style: string, words: string] }} */
     const words = {
       works: ['good', '\u2713 limits kept'],
       misses: ['bad', '\u2717 limit missed'],
@@ -623,11 +696,13 @@ class Explore {
       merged: ['off', '\u2013 same as another'],
       unreachable: ['off', '\u2013 out of reach'],
     };
+    /** @param {LivePosture} posture */
     const between = ({ pair, distance }) => {
       if (pair === null) return '';
-      const [a, b] = this.data.pairs[pair].map((body) => NB.words(this.data.bodies[body].name));
+      const [a, b] = this.data.pairs[pair].slice(0, 2).map((body) => NB.words(this.data.bodies[body].name));
       return `${a} and ${b}, ${NB.mm(distance)} mm`;
     };
+    /** @type {Column<LivePosture>[]} */
     const columns = [
       { title: 'From this base', cell: (each) => each.label },
       {
@@ -669,14 +744,15 @@ class Explore {
         })
       : null;
     // A button that has the focus keeps it.
-    const focused = [...this.reached.querySelectorAll('button')].indexOf(document.activeElement);
+    const focused = [...this.reached.querySelectorAll('button')].findIndex((each) => each === document.activeElement);
     NB.clear(this.reached, NB.el('h3', { text: 'What if the robot stood here?' }), table, note);
     if (focused >= 0) this.reached.querySelectorAll('button')[focused]?.focus();
     this.reached.dataset.rolls = isLast ? 'all' : 'few';
   }
 
+  /** @param {LivePosture} posture */
   take({ joints }) {
-    this.joints = [...joints];
+    if (joints) this.joints = [...joints];
     this.write();
     this.evaluate();
   }
@@ -685,15 +761,18 @@ class Explore {
     return this.joints.map((q) => String(q)).join(',');
   }
 
+  /** @param {number[]} joints */
   command(joints) {
     return `needlebench clearance ${this.run.report.scenario.file} --joints ${joints.join(',')}`;
   }
 
   toml() {
+    /** @param {number[]} values */
     const list = (values) => `[${values.map((value) => Number(value.toFixed(6))).join(', ')}]`;
     return `[robot]\nbase_position_mm = ${list(this.base.position)}\nbase_rpy_deg = ${list(this.base.rpy)}`;
   }
 
+  /** @param {string} text */
   async copy(text) {
     try {
       await navigator.clipboard.writeText(text);
@@ -703,8 +782,8 @@ class Explore {
       const range = document.createRange();
       this.text.textContent = text;
       range.selectNodeContents(this.text);
-      getSelection().removeAllRanges();
-      getSelection().addRange(range);
+      getSelection()?.removeAllRanges();
+      getSelection()?.addRange(range);
       this.copied.textContent = 'selected: copy it with Ctrl+C';
     }
     clearTimeout(this.copiedUntil);
@@ -733,6 +812,7 @@ class Explore {
     const positions = [];
     for (let step = 0; step < around; step++) {
       const [a, b] = [step, step + 1].map((k) => (2 * Math.PI * k) / around);
+      /** @param {number} radius @param {number} angle */
       const at = (radius, angle) => [x + radius * Math.cos(angle), y + radius * Math.sin(angle), z];
       positions.push(
         ...at(inner, a),
@@ -754,7 +834,10 @@ class Explore {
     view.group('tried-handle').visible = this.active;
   }
 
-  /** Where a pointer is on the level of the base, m; null where the view is along it. */
+  /**
+   * Where a pointer is on the level of the base, m; null where the view is along it.
+   * @param {PointerEvent} event
+   */
   under(event) {
     const { view } = this;
     const box = view.renderer.domElement.getBoundingClientRect();
@@ -770,22 +853,29 @@ class Explore {
     return along > 0 ? [eye.x + along * way.x, eye.y + along * way.y] : null;
   }
 
+  /** @param {PointerEvent} event */
   isOnRing(event) {
-    const at = this.active && this.under(event);
-    return (
-      Boolean(at) &&
-      Math.hypot(at[0] - this.base.position[0] * 1e-3, at[1] - this.base.position[1] * 1e-3) <= Explore.RING + 0.01
-    );
+    const at = this.active ? this.under(event) : null;
+    if (!at) return false;
+    const [x, y] = this.base.position.map((mm) => mm * 1e-3);
+    return Math.hypot(at[0] - x, at[1] - y) <= Explore.RING + 0.01;
   }
 
   grabBase() {
     if (!this.view.works) return;
     const canvas = this.view.renderer.domElement;
+    /**
+     * @param {'pointerdown' | 'pointermove' | 'pointerup' | 'pointercancel'} type
+     * @param {(event: PointerEvent) => void} handle
+     */
     const listen = (type, handle) => this.view.element.addEventListener(type, handle, { capture: true });
+    /** @type {number[] | null} */
     let held = null;
     listen('pointerdown', (event) => {
       if (event.target !== canvas || event.button !== 0 || !this.isOnRing(event)) return;
-      const [x, y] = this.under(event);
+      const at = this.under(event);
+      if (!at) return;
+      const [x, y] = at;
       held = [x * 1e3 - this.base.position[0], y * 1e3 - this.base.position[1]];
       canvas.setPointerCapture(event.pointerId);
       canvas.focus();
@@ -811,7 +901,7 @@ class Explore {
       });
       const held0 = held;
     });
-    for (const type of ['pointerup', 'pointercancel']) {
+    for (const type of /** @type {const} */ (['pointerup', 'pointercancel'])) {
       listen(type, (event) => {
         if (!held) return;
         held = null;

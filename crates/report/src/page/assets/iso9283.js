@@ -2,6 +2,20 @@
 'use strict';
 
 class TestPage {
+  /** @type {TestCharts} */ test;
+  /** @type {TestReport} */ measured;
+  /** @type {number} */ engine;
+  /** @type {number} */ poseIndex;
+  /** @type {HTMLButtonElement[]} */ poseButtons;
+  /** @type {HTMLElement} */ note;
+  /** @type {number} */ spread;
+
+  /**
+   * @param {RunDocument} page
+   * @param {HTMLElement} app
+   * @param {View} view
+   * @param {{ [name: string]: boolean }} shown
+   */
   constructor(page, app, view, shown) {
     this.page = page;
     this.view = view;
@@ -9,10 +23,11 @@ class TestPage {
     this.arm = view.arm('arm');
     for (const [name, on] of Object.entries(shown)) view.show(name, on);
     for (const group of ['collision', 'corridor']) this.arm.layer(group, false);
-    if (page.iso9283) this.buildTest(app);
+    if (page.iso9283 && page.report.iso9283) this.buildTest(app, page.iso9283, page.report.iso9283);
     else this.buildOther(app);
   }
 
+  /** @param {HTMLElement} app */
   buildOther(app) {
     this.arm.pose(this.page.scene.chain, this.page.start);
     this.view.frame(NB.aboutBase(this.page.scene.chain.base, 0.55), [-0.75, 0.45, -0.55]);
@@ -28,12 +43,11 @@ class TestPage {
     );
   }
 
-  buildTest(app) {
-    const {
-      view,
-      page: { iso9283: test },
-      report: { iso9283: report },
-    } = this;
+  /** @param {HTMLElement} app @param {TestCharts} test @param {TestReport} report */
+  buildTest(app, test, report) {
+    const { view } = this;
+    this.test = test;
+    this.measured = report;
     this.engine = 0;
     const engines = test.engines.map((each) => each.engine);
     this.poseButtons = test.commanded.map((_, index) =>
@@ -123,28 +137,26 @@ class TestPage {
 
   /** Power of ten by which the spread is drawn larger, so that it is seen beside the arm. */
   spreadFactor() {
-    const most = Math.max(...Object.values(this.report.iso9283.engines).map((each) => each.ap_m + each.rp_m), 1e-12);
+    const most = Math.max(...Object.values(this.measured.engines).map((each) => each.ap_m + each.rp_m), 1e-12);
     return 10 ** Math.max(0, Math.floor(Math.log10(0.05 / most)));
   }
 
+  /** @param {number} index */
   setPose(index) {
     this.poseIndex = index;
     for (const [at, button] of this.poseButtons.entries()) button.setAttribute('aria-pressed', String(at === index));
-    this.arm.pose(this.page.scene.chain, this.report.iso9283.protocol.joints_rad[index]);
-    const { ap_m: ap, rp_m: rp } = Object.values(this.report.iso9283.engines)[this.engine]?.poses[index] || {};
+    this.arm.pose(this.page.scene.chain, this.measured.protocol.joints_rad[index]);
+    const attained = Object.values(this.measured.engines)[this.engine]?.poses[index];
     this.note.textContent =
       `The arm stands in the commanded pose P${index + 1}. Blue points: where the measured point came to rest, ` +
       `their distance from the command drawn ${this.spread.toLocaleString('en')} times larger than it ` +
-      `is${ap === undefined ? '' : ` (AP ${NB.length(ap)}, RP ${NB.length(rp)})`}.`;
+      `is${attained ? ` (AP ${NB.length(attained.ap_m)}, RP ${NB.length(attained.rp_m)})` : ''}.`;
     NB.address.write({ pose: String(index + 1) });
     this.view.draw();
   }
 
   drawSpread() {
-    const {
-      view,
-      page: { iso9283: test },
-    } = this;
+    const { view, test } = this;
     view.empty('attained');
     const run = test.engines[this.engine];
     test.commanded.forEach((at, index) => {
@@ -163,10 +175,12 @@ class TestPage {
   }
 
   results() {
-    const rows = Object.entries(this.report.iso9283.engines);
+    const rows = Object.entries(this.measured.engines);
+    /** @param {TestMeasured} each @param {'time_s' | 'overshoot_m'} key */
     const worst = (each, key) => {
       const all = each.stabilisation.map((s) => s[key]);
-      return all.some((v) => v === null) ? null : Math.max(...all);
+      const known = all.filter((value) => value !== null);
+      return known.length < all.length ? null : Math.max(...known);
     };
     return NB.table(
       'The worst of all poses',
@@ -196,7 +210,7 @@ class TestPage {
 
   /** What has to be known to read the numbers, before anybody reads them. */
   remarks() {
-    const remarks = Object.entries(this.report.iso9283.engines).filter(([, each]) => each.remark);
+    const remarks = Object.entries(this.measured.engines).filter(([, each]) => each.remark);
     return [...new Set(remarks.map(([, each]) => each.remark))].map((remark) => {
       const of = remarks.filter(([, each]) => each.remark === remark).map(([engine]) => engine);
       return NB.el('p', { class: 'bad', text: `${of.join(' and ')}: ${remark}.` });
@@ -204,7 +218,8 @@ class TestPage {
   }
 
   tables() {
-    return Object.entries(this.report.iso9283.engines).map(([engine, each]) => {
+    return Object.entries(this.measured.engines).map(([engine, each]) => {
+      /** @type {PoseRow[]} */
       const rows = each.poses.map((pose) => ({
         pose,
         settled: each.stabilisation.find((s) => s.pose === pose.pose),
@@ -220,7 +235,7 @@ class TestPage {
             ...['x', 'y', 'z'].map((axis, k) => ({
               title: `AP ${axis}`,
               numeric: true,
-              cell: ({ pose }) => NB.length(pose.ap_xyz_m[k]),
+              cell: (/** @type {PoseRow} */ { pose }) => NB.length(pose.ap_xyz_m[k]),
             })),
             { title: 'RP', numeric: true, cell: ({ pose }) => NB.length(pose.rp_m) },
             { title: 'vAP', numeric: true, cell: ({ direction }) => NB.length(direction?.vap_m) },

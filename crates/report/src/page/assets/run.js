@@ -2,10 +2,46 @@
 'use strict';
 
 class RunPage {
+  /** @type {number} */ goalIndex;
+  /** @type {number} */ configurationIndex;
+  /** @type {ArmView} */ arm;
+  /** @type {ArmView} */ other;
+  /** @type {{ name: string, arm: ArmView | null }[]} */ ghostArms;
+  /** @type {HTMLButtonElement[]} */ goalButtons;
+  /** @type {{ element: HTMLElement, rows: HTMLElement[] } | null} */ goalTable;
+  /** @type {Explore} */ explore;
+  /** @type {Curves} */ curves;
+  /** @type {HTMLElement} */ answer;
+  /** @type {HTMLElement} */ side;
+  /** @type {HTMLElement} */ details;
+  /** @type {HTMLElement} */ table;
+  /** @type {HTMLElement} */ margins;
+  /** @type {HTMLElement} */ budget;
+  /** @type {HTMLElement} */ budgetSection;
+  /** @type {HTMLElement} */ people;
+  /** @type {HTMLElement} */ events;
+  /** @type {HTMLElement} */ now;
+  /** @type {HTMLElement[]} */ sideRows;
+  /** @type {HTMLElement[]} */ tableRows;
+  /** @type {HTMLButtonElement} */ playButton;
+  /** @type {HTMLInputElement} */ slider;
+  /** @type {HTMLElement} */ clock;
+  /** @type {HTMLSelectElement} */ engineSelect;
+  /** @type {HTMLElement} */ apart;
+  /** @type {Nearest | null} */ pinned;
+  /** @type {MotionRun[][]} */ pairs;
+  /** @type {MotionRun[]} */ shown;
+  /** @type {number[] | null} */ joints;
+  /** @type {number} */ end;
+  /** @type {boolean} */ playing;
+
+  /** @param {RunDocument} page @param {HTMLElement} app */
   constructor(page, app) {
     this.page = page;
     this.report = page.report;
+    /** @type {Set<number>} */
     this.ghosts = new Set();
+    /** @type {{ [name: string]: boolean }} */
     this.layers = {
       robot: true,
       tool: true,
@@ -44,7 +80,10 @@ class RunPage {
     NB.address.watch((choices) => this.fromAddress(choices));
   }
 
-  /** Shows what the page's address asks for: goal, configuration, time. */
+  /**
+   * Shows what the page's address asks for: goal, configuration, time.
+   * @param {AddressChoices} choices
+   */
   fromAddress({ goal, configuration, time }) {
     if (!this.report.goals.length) return;
     const at = this.report.goals.findIndex((each) => each.name === goal);
@@ -82,14 +121,12 @@ class RunPage {
     );
   }
 
+  /** @param {HTMLElement} app */
   build(app) {
     const view = this.view;
     this.arm = view.arm('arm');
     this.other = view.arm('other', { color: [0.9, 0.62, 0], opacity: 0.35 });
-    this.ghostArms = Array.from({ length: 8 }, (_, index) => {
-      const made = { name: `ghost${index}`, arm: null };
-      return made;
-    });
+    this.ghostArms = Array.from({ length: 8 }, (_, index) => ({ name: `ghost${index}`, arm: null }));
     const goals = this.report.goals;
     this.goalButtons = goals.map((goal, index) =>
       NB.el(
@@ -100,7 +137,7 @@ class RunPage {
           'aria-checked': 'false',
           onclick: () => this.setGoal(index),
           onkeydown: (event) => {
-            const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+            const step = NB.ARROWS[event.key];
             if (!step) return;
             event.preventDefault();
             const to = (index + step + goals.length) % goals.length;
@@ -178,24 +215,31 @@ class RunPage {
     this.setGoal(0);
   }
 
+  /** @param {HTMLElement} app */
   buildWithoutGoals(app) {
     this.test = new TestPage(this.page, app, this.view, this.layers);
   }
 
+  /** @param {...string} words */
   fileName(...words) {
     return NB.fileName(this.report.scenario.name, this.goal.name, this.configuration.label, ...words);
   }
 
-  /** Base and shoulders of the arm, and points of the goal. */
+  /**
+   * Base and shoulders of the arm, and points of the goal.
+   * @param {Point[]} points
+   */
   framed(points) {
     return [...NB.aboutBase(this.page.scene.chain.base, 0.55), ...points];
   }
 
+  /** @param {Point} target @param {Point} axis */
   direction(target, axis) {
     return NB.direction(this.page.scene.chain.base, target, axis);
   }
 
   viewBar() {
+    /** @param {string} name @param {() => Viewpoint} make */
     const look = (name, make) => NB.el('button', { type: 'button', onclick: () => this.aim(make()) }, name);
     const entry = () => this.goal.entry_m || this.goal.target_m;
     return NB.el(
@@ -217,12 +261,14 @@ class RunPage {
     );
   }
 
+  /** @param {Viewpoint} viewpoint */
   aim({ direction, distance, middle }) {
     const home = this.view.home;
     if (home) this.view.look(direction, distance || home.distance, middle || home.middle);
   }
 
   layerPanel() {
+    /** @param {string} name @param {string} text */
     const box = (name, text) =>
       NB.checkbox(text, this.layers[name], (on) => {
         this.layers[name] = on;
@@ -348,10 +394,11 @@ class RunPage {
     return this.extra.configurations[this.configurationIndex];
   }
 
+  /** @param {number} index */
   setGoal(index) {
     this.goalIndex = index;
     this.goalButtons.forEach((button, at) => {
-      button.setAttribute('aria-checked', at === index);
+      button.setAttribute('aria-checked', String(at === index));
       button.tabIndex = at === index ? 0 : -1;
     });
     const view = this.view;
@@ -378,8 +425,9 @@ class RunPage {
       [0.25, 0.25, 0.3],
     ].map((offset) => offset.map((value, k) => target[k] + value));
     view.frame(this.framed(around), this.direction(target, axis));
-    const first = this.goal.recommended
-      ? this.goal.configurations.findIndex((each) => each.label === this.goal.recommended.label)
+    const { recommended } = this.goal;
+    const first = recommended
+      ? this.goal.configurations.findIndex((each) => each.label === recommended.label)
       : Math.max(
           0,
           this.goal.configurations.findIndex((each) => each.joints_rad),
@@ -389,6 +437,7 @@ class RunPage {
     this.applyLayers();
   }
 
+  /** @param {number} index */
   setConfiguration(index) {
     this.pause();
     this.configurationIndex = index;
@@ -436,6 +485,7 @@ class RunPage {
     NB.clear(this.events, NB.sections.events(goal, configuration, charts, name) || []);
   }
 
+  /** @param {MotionRun} run @returns {DecodedRun} */
   decode(run) {
     if (!run.decoded) {
       run.decoded = {
@@ -477,7 +527,7 @@ class RunPage {
         color: at ? `${NB.styleOf(name).color}55` : NB.styleOf(name).color,
       }));
     });
-    this.end = has ? Math.max(...this.shown.map((run) => this.decode(run).time.at(-1))) : 1;
+    this.end = has ? Math.max(...this.shown.map((run) => this.decode(run).time.at(-1) ?? 0)) : 1;
     const tints = ['#f1f4f7', '#e6ecf2'];
     const bands = has
       ? this.configuration.motion.map((phase, at) => ({
@@ -492,7 +542,10 @@ class RunPage {
     this.seek(has ? this.end : 0);
   }
 
-  /** Poses the arms at a time of the motion, or in the final posture where there is none. */
+  /**
+   * Poses the arms at a time of the motion, or in the final posture where there is none.
+   * @param {number} time
+   */
   seek(time) {
     this.explore.leave();
     this.time = time;
@@ -528,6 +581,7 @@ class RunPage {
     this.playing = true;
     this.playButton.textContent = '\u275a\u275a Pause';
     let last = performance.now();
+    /** @param {number} now */
     const step = (now) => {
       if (!this.playing) return;
       const time = Math.min(this.time + ((now - last) / 1e3) * this.speed, this.end);
@@ -561,34 +615,39 @@ class RunPage {
 
   /** Postures of other configurations, each in its colour and with its name. */
   drawGhosts() {
+    /** @param {string} hex */
     const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255);
     this.view.empty('ghost labels');
     this.ghostArms.forEach((ghost, index) => {
       const configuration = this.goal.configurations[index];
       const joints = configuration?.joints_rad;
-      const on = this.ghosts.has(index) && Boolean(joints);
+      const on = this.ghosts.has(index) && joints ? joints : null;
       const color = NB.ghostColors[index];
       if (on && !ghost.arm) ghost.arm = this.view.arm(ghost.name, { color: rgb(color), opacity: 0.45 });
       if (!ghost.arm) return;
-      ghost.arm.show(on);
+      ghost.arm.show(Boolean(on));
       if (!on) return;
-      ghost.arm.pose(this.page.scene.chain, joints);
+      ghost.arm.pose(this.page.scene.chain, on);
       if (!this.view.works) return;
       // Beside the wrist, where those that share an elbow are apart.
-      const at = NB.forward(this.page.scene.chain, joints)[3].elements.slice(12, 15);
-      this.view.label('ghost labels', configuration.label, at);
-      const { element } = this.view.labels.at(-1);
-      element.style.borderLeft = `6px solid ${color}`;
+      const at = NB.forward(this.page.scene.chain, on)[3].elements.slice(12, 15);
+      const label = this.view.label('ghost labels', configuration.label, at);
+      if (label) label.style.borderLeft = `6px solid ${color}`;
     });
     this.view.draw();
   }
 
-  /** What is nearest at a time of the motion that is shown, or in the final posture; null where nothing is known. */
+  /**
+   * What is nearest at a time of the motion that is shown, or in the final posture; null where nothing is known.
+   * @param {number} time
+   * @returns {Nearest | null}
+   */
   nearestAt(time) {
     const run = this.shown[0];
     if (!run) return this.leastOf(this.configuration);
     const { curveTime, curves } = this.decode(run);
     const { nearest } = this.decode(run.nearest ? run : this.own.runs[0]);
+    if (!nearest) return null;
     let after = nearest.time.findIndex((each) => each >= time);
     if (after < 0) after = nearest.time.length - 1;
     const before = Math.max(after - 1, 0);
@@ -598,12 +657,14 @@ class RunPage {
     if (pair === undefined || pair === 255) return null;
     // Between two samples of one pair its points move steadily; of two pairs the nearer sample's is shown.
     const same = nearest.pair[before] === nearest.pair[after];
+    /** @param {number} axis */
     const point = (axis) =>
       same
         ? nearest.points[axis][before] + share * (nearest.points[axis][after] - nearest.points[axis][before])
         : nearest.points[axis][at];
     const name = nearest.classes[pair];
     const curve = curves.find(([each]) => each === name);
+    if (!curve) return null;
     return {
       name,
       pair: nearest.names[pair],
@@ -613,13 +674,16 @@ class RunPage {
     };
   }
 
-  /** The least clearance over the whole motion of arm and tool from what stands around them. */
+  /**
+   * The least clearance over the whole motion of arm and tool from what stands around them.
+   * @param {ConfigurationReport} configuration
+   * @returns {Nearest | null}
+   */
   leastOf(configuration) {
-    const all = Object.entries(configuration.clearance).filter(
-      ([name, found]) => found?.witness_points_m && this.page.classesAround.includes(name),
-    );
-    const least = all.reduce((best, each) => (!best || each[1].minimum_m < best[1].minimum_m ? each : best), null);
-    return least && { name: least[0], ...least[1] };
+    const all = NB.byClass(configuration.clearance).filter(([name]) => this.page.classesAround.includes(name));
+    if (!all.length) return null;
+    const [name, found] = all.reduce((best, each) => (each[1].minimum_m < best[1].minimum_m ? each : best));
+    return { name, ...found };
   }
 
   /** What is nearest at the time that is shown; a row of the table pins the least of its class, at its time. */
@@ -627,6 +691,7 @@ class RunPage {
     const view = this.view;
     view.empty('witness');
     const found = this.pinned || this.nearestAt(this.time);
+    /** @param {{ pair: string[] }} each */
     const pairWords = (each) => [...new Set(each.pair.map(NB.words))].join(' to ');
     if (found && view.works) {
       const color = new THREE.Color(NB.styleOf(found.name).color);
@@ -648,6 +713,7 @@ class RunPage {
     view.draw();
   }
 
+  /** @param {Nearest | null} found @param {(each: { pair: string[] }) => string} pairWords */
   sayNearest(found, pairWords) {
     const least = this.leastOf(this.configuration);
     const now =
@@ -674,7 +740,7 @@ class RunPage {
                 class: 'no-print save',
                 onclick: () => {
                   this.pause();
-                  this.seek(Math.min(least.time_s, this.end));
+                  this.seek(Math.min(least.time_s ?? this.end, this.end));
                 },
               },
               'Go there',
@@ -697,8 +763,8 @@ class RunPage {
     view.people(people);
     if (sector && view.works) {
       const half = new THREE.Mesh(NB.cone(Math.PI / 2, sector.radius), view.material([0, 0.62, 0.45, 0.16]));
-      half.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, -1), new THREE.Vector3(...sector.outwards));
-      half.position.set(...sector.center);
+      half.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, -1), new THREE.Vector3().fromArray(sector.outwards));
+      half.position.fromArray(sector.center);
       half.renderOrder = 18;
       view.add('space', half);
     }
@@ -711,14 +777,14 @@ class RunPage {
     view.sight([]);
     view.empty('cone');
     const { room } = this.own;
-    if (room && view.works) {
+    const measured = this.configuration.room;
+    if (room && measured && view.works) {
       view.sight(NB.array(room.sight));
       if (room.taken) view.add('taken', view.surface(room.taken, [0.84, 0.37, 0, 0.35]));
-      const { hand_cone_half_angle_rad: angle, hand_cone_length_m: length } = this.configuration.room;
-      view.handCone(room.guideEntry, angle, length);
+      view.handCone(room.guideEntry, measured.hand_cone_half_angle_rad, measured.hand_cone_length_m);
     }
     // It belongs to a layer with other things in it.
-    view.group('space').add?.(view.group('taken'));
+    view.group('space').add(view.group('taken'));
     view.draw();
   }
 
@@ -729,14 +795,12 @@ class RunPage {
     const total = this.configuration.budget?.total;
     if (total && view.works) {
       const turn = new THREE.Matrix4().makeRotationFromQuaternion(
-        new THREE.Quaternion(...this.extra.guideExit.slice(3)),
+        new THREE.Quaternion().fromArray(this.extra.guideExit, 3),
       );
-      const entry = this.goal.entry_m;
-      for (const [where, at, color] of [
-        ['target', this.goal.target_m, [0, 0.45, 0.7, 0.55]],
-        ['skin', entry, [0.84, 0.37, 0, 0.55]],
+      for (const { where, at, color, moments } of [
+        { where: 'target', at: this.goal.target_m, color: [0, 0.45, 0.7, 0.55], moments: total.at_target.analytic },
+        { where: 'skin', at: this.goal.entry_m, color: [0.84, 0.37, 0, 0.55], moments: total.at_skin?.analytic },
       ]) {
-        const moments = total[`at_${where}`]?.analytic;
         if (!at || !moments) continue;
         const spread = NB.cholesky(moments.covariance_m2);
         const scale = 2.7955 * this.magnify;
@@ -746,7 +810,7 @@ class RunPage {
             .multiplyScalar(scale)
             .toArray(),
         );
-        const bias = new THREE.Vector3(...moments.bias_m).applyMatrix4(turn).multiplyScalar(this.magnify);
+        const bias = new THREE.Vector3().fromArray(moments.bias_m).applyMatrix4(turn).multiplyScalar(this.magnify);
         const center = at.map((value, k) => value + bias.getComponent(k));
         view.ellipsoid('ellipsoids', center, columns, color);
         view.label(
@@ -760,6 +824,7 @@ class RunPage {
     view.draw();
   }
 
+  /** @param {ConfigurationReport} configuration */
   status(configuration) {
     const recommended = this.goal.recommended?.label === configuration.label;
     const words = {
@@ -794,6 +859,7 @@ class RunPage {
   }
 
   sideTable() {
+    /** @type {Column<ConfigurationReport>[]} */
     const columns = [
       { title: 'Configuration', cell: (c) => c.label },
       {
@@ -825,7 +891,7 @@ class RunPage {
     const table = NB.table('Choose a configuration (\u2605 recommended)', columns, this.goal.configurations, {
       class: 'choose small full',
     });
-    this.sideRows = [...table.querySelectorAll('tbody tr')];
+    this.sideRows = NB.tableRows(table);
     NB.rows(this.sideRows, (index) => this.setConfiguration(index));
     const all = NB.el(
       'button',
@@ -847,6 +913,7 @@ class RunPage {
 
   showDetails() {
     const c = this.configuration;
+    /** @param {string} before @param {CriterionResult | Rejection} each */
     const item = (before, each) => {
       const [value, limit] = NB.valueAndLimit(each.value, each.limit, each.unit);
       const measured = each.value === null ? '' : `: ${value}, limit ${limit}`;
@@ -858,7 +925,8 @@ class RunPage {
     const failed = this.report.criteria
       .filter((each) => !each.pass && each.goal === this.goal.name && each.label === c.label)
       .map((each) => item(`Misses ${NB.criterionWords(each.criterion)}`, each));
-    const classes = Object.entries(c.clearance).filter(([, found]) => found?.witness_points_m);
+    const classes = NB.byClass(c.clearance);
+    /** @type {Column<[name: string, found: ClassMinimum]>[]} */
     const columns = [
       { title: 'Between', cell: ([name]) => [NB.sample(NB.styleOf(name)), ` ${NB.words(name)}`] },
       { title: 'Least', unit: 'mm', numeric: true, cell: ([, found]) => NB.mm(found.minimum_m) },
@@ -873,7 +941,7 @@ class RunPage {
       ? 'Least clearances over the whole motion; a row shows where and when'
       : 'Clearances of the final posture; a row shows where';
     const table = NB.table(caption, columns, classes, { class: 'choose small full' });
-    const rows = [...table.querySelectorAll('tbody tr')];
+    const rows = NB.tableRows(table);
     NB.rows(rows, (index) => {
       const [name, found] = classes[index];
       NB.mark(rows, index);
@@ -901,6 +969,7 @@ class RunPage {
   }
 
   configurationTable() {
+    /** @type {Column<ConfigurationReport>[]} */
     const columns = [
       { title: 'Configuration', cell: (c) => c.label },
       { title: 'Status', cell: (c) => this.status(c) },
@@ -925,7 +994,7 @@ class RunPage {
       this.goal.configurations,
       { class: 'choose small' },
     );
-    this.tableRows = [...table.querySelectorAll('tbody tr')];
+    this.tableRows = NB.tableRows(table);
     NB.rows(this.tableRows, (index) => this.setConfiguration(index));
     const ranking = this.extra.charts.ranking;
     NB.clear(

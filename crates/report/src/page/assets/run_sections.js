@@ -29,396 +29,424 @@ NB.criterionWords = (name) => {
   return NB.words(name);
 };
 
-NB.sections = {
-  /** What to choose, and why, before all else. */
-  answer(goal, criteria, trueTarget) {
-    const { recommended } = goal;
-    return [
-      recommended
-        ? NB.el(
-            'p',
-            null,
-            NB.el('strong', { text: `Recommended: ${recommended.label}. ` }),
-            recommended.reason.charAt(0).toUpperCase() + recommended.reason.slice(1),
-            '.',
-          )
-        : NB.el('p', { class: 'error', text: 'Recommended: none, no configuration works.' }),
-      NB.sections.route(goal, criteria),
-      trueTarget ? NB.el('p', { text: `${trueTarget.charAt(0).toUpperCase()}${trueTarget.slice(1)}.` }) : [],
-    ];
-  },
+/** The classes of a report's clearances. */
+NB.byClass = (clearances) => {
+  const all = Object.entries(/** @type {{ [name: string]: ClassMinimum | undefined }} */ (clearances));
+  return /** @type {[string, ClassMinimum][]} */ (all.filter(([, found]) => found?.witness_points_m));
+};
 
-  /** How the planned needle keeps away from bone, vessels and organs; red where it does not. */
-  route(goal, criteria) {
-    const { needle_route: route, fissures_crossed: fissures } = goal;
-    const parts = [];
-    if (route) {
-      // The criterion where it asks for more than the margin.
-      const wanted =
-        criteria.find((each) => each.goal === goal.name && each.criterion === 'min_clearance_mm.needle_route')?.limit ??
-        0;
-      const part = `${NB.words(route.part)} (${route.tissue})`;
-      const where =
-        route.distance_m < 0
-          ? `goes ${NB.mm(-route.distance_m, 1)} mm deep through the ${part}`
-          : `passes ${NB.mm(route.distance_m, 1)} mm from the ${part}`;
-      parts.push(
-        NB.el('p', {
-          class: route.kept ? '' : 'error',
-          text:
-            `The planned needle${route.kept ? '' : ' is refused: it'} ${where}; it has to keep ` +
-            `${NB.mm(Math.max(route.margin_m, wanted), 1)} mm.`,
-        }),
-      );
-    }
-    if (fissures?.length)
-      parts.push(
-        NB.el('p', { class: 'bad', text: `The needle crosses ${fissures.map(NB.words).join(', ')} of the lung.` }),
-      );
-    return parts;
-  },
+NB.sections = /** @type {RunSections} */ (
+  /** @type {Partial<RunSections>} */ ({
+    /** What to choose, and why, before all else. */
+    answer(goal, criteria, trueTarget) {
+      const { recommended } = goal;
+      return [
+        recommended
+          ? NB.el(
+              'p',
+              null,
+              NB.el('strong', { text: `Recommended: ${recommended.label}. ` }),
+              recommended.reason.charAt(0).toUpperCase() + recommended.reason.slice(1),
+              '.',
+            )
+          : NB.el('p', { class: 'error', text: 'Recommended: none, no configuration works.' }),
+        NB.sections.route(goal, criteria),
+        trueTarget ? NB.el('p', { text: `${trueTarget.charAt(0).toUpperCase()}${trueTarget.slice(1)}.` }) : [],
+      ];
+    },
 
-  /** All goals at a glance, where there are several. */
-  goals(page, choose) {
-    const { goals } = page.report;
-    if (goals.length < 2) return null;
-    const chosen = (goal) => goal.configurations.find((each) => each.label === goal.recommended?.label);
-    const table = NB.table(
-      'All goals, each with its recommended configuration',
-      [
-        { title: 'Goal', cell: (goal) => NB.words(goal.name) },
-        { title: 'Recommended', cell: (goal) => goal.recommended?.label || 'none works' },
-        {
-          title: 'Work',
-          cell: (goal) =>
-            `${goal.configurations.filter((each) => each.status === 'ok').length} of ${goal.configurations.length}`,
-        },
-        {
-          title: 'Expected tip error, rms',
-          numeric: true,
-          cell: (goal) => NB.length(chosen(goal)?.budget?.total.at_target.analytic.rms_m),
-        },
-        {
-          title: 'Least clearance',
-          unit: 'mm',
-          numeric: true,
-          cell: (goal) => NB.mm(chosen(goal)?.clearance.minimum_m),
-        },
-        {
-          title: 'Needle to the nearest part',
-          unit: 'mm',
-          numeric: true,
-          cell: (goal) => NB.mm(goal.needle_route?.distance_m),
-        },
-      ],
-      goals,
-      { class: 'choose small' },
-    );
-    const rows = [...table.querySelectorAll('tbody tr')];
-    NB.rows(rows, (index) => choose(index));
-    return { element: table, rows };
-  },
-
-  /** What the planned motion keeps of the clearance that its postures allow, and the way back. */
-  margins(c) {
-    if (!c.margin) return NB.el('p', { class: 'soft', text: `${c.label} has no planned motion.` });
-    const retreat = (name) => c.retreat_clearance[name]?.certified_lower_bound_m ?? null;
-    const columns = [
-      { title: 'Between', cell: ([name]) => NB.words(name) },
-      {
-        title: 'Has to be',
-        unit: 'mm',
-        numeric: true,
-        cell: ([, each]) => NB.mm(each.limit_m),
-        help: 'the limit of the scenario\u2019s criteria, else of its planning',
-      },
-      {
-        title: 'At most possible',
-        unit: 'mm',
-        numeric: true,
-        cell: ([, each]) => NB.mm(each.attainable_m),
-        help: 'least of the start, the approach and its end, which every motion takes',
-      },
-      { title: 'Kept on the way in', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.achieved_m) },
-      { title: 'Nearest in the', cell: ([, each]) => NB.words(each.limited_by) },
-      {
-        title: 'Kept on the way back',
-        unit: 'mm',
-        numeric: true,
-        cell: ([name]) => (retreat(name) === null ? '\u2013' : NB.mm(retreat(name))),
-      },
-    ];
-    const ends = {
-      bound: 'no other way keeps more that counts',
-      proof: 'no other way helps: a posture that every motion takes is too near',
-      budget: 'the search ended by its budget: a better way may exist',
-    };
-    return [
-      NB.table(`${c.label}: ${ends[c.margin.search]}`, columns, Object.entries(c.margin.classes), { class: 'small' }),
-      NB.el('p', {
-        class: 'soft small',
-        text:
-          'Proven lower bounds of the planned motion of the nominal arm: nothing comes nearer than this. ' +
-          'Clearances of recorded motions, in the other tables, are what was attained, and a little more.',
-      }),
-    ];
-  },
-
-  /** Where the needle goes over all arms and patients, in all and by source. */
-  budget(goal, configuration, charts, name) {
-    const with_ = goal.configurations.filter((c) => c.budget || c.budget_failure);
-    if (!with_.length) return null;
-    const sources = [...new Set(with_.flatMap((c) => (c.budget?.sources || []).map((each) => each.source)))];
-    const rms = (part) => NB.mm(part?.at_target.analytic.rms_m, 2);
-    const columns = [
-      { title: 'Configuration', cell: (c) => c.label },
-      { title: 'All', unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.total) },
-      {
-        title: '95 % within',
-        unit: 'mm',
-        numeric: true,
-        cell: (c) => NB.mm(c.budget?.total.at_target.radius_95_m, 2),
-        help: 'distance that 95 % of the draws stay within',
-      },
-      {
-        title: 'At the skin',
-        unit: 'mm',
-        numeric: true,
-        cell: (c) => NB.mm(c.budget?.total.at_skin?.analytic.rms_m, 2),
-      },
-      { title: 'Mostly by', cell: (c) => (c.budget ? NB.words(c.budget.dominant ?? '\u2013') : c.budget_failure) },
-      ...sources.map((source) => ({
-        title: `By ${NB.words(source)}${NB.words(source).includes(',') ? ',' : ''} alone`,
-        unit: 'mm',
-        numeric: true,
-        cell: (c) => rms(c.budget?.sources.find((each) => each.source === source)),
-      })),
-    ];
-    const help =
-      'Ellipses hold 95 %. x and y are across the needle, z along it; both panels are in mm and to one scale, ' +
-      'the same for all configurations of the goal. The bar: each source\u2019s share of the mean square.';
-    return [
-      charts?.budget
-        ? NB.chart(
-            `${configuration.label}: where the needle goes`,
-            charts.budget,
-            NB.fileName(name, goal.name, configuration.label, 'budget'),
-            help,
-          )
-        : null,
-      NB.table(
-        'Expected distance of the tip from the target, root mean square over all arms and patients: by all ' +
-          'sources together, and by each alone',
-        columns,
-        with_,
-        { class: 'small' },
-      ),
-    ];
-  },
-
-  people(goal) {
-    const with_ = goal.configurations.filter((c) => c.room);
-    const regions = [...new Set(with_.flatMap((c) => Object.keys(c.room.regions)))];
-    const who = (each) => `${NB.words(each.person)}, ${each.stature_m.toFixed(2)} m`;
-    const sight = [...new Set(with_.flatMap((c) => c.room.sight.map(who)))];
-    const columns = [
-      { title: 'Configuration', cell: (c) => c.label },
-      { title: 'Free in all', unit: '%', numeric: true, cell: (c) => NB.percent(c.room.free_fraction) },
-      ...regions.map((name) => ({
-        title: `Free ${NB.regionWords[name] || NB.words(name)}`,
-        unit: '%',
-        numeric: true,
-        cell: (c) => NB.percent(c.room.regions[name]),
-      })),
-      ...sight.map((name) => ({
-        title: `Seen by ${name}`,
-        unit: '%',
-        numeric: true,
-        cell: (c) => NB.percent(c.room.sight.find((each) => who(each) === name)?.fraction),
-      })),
-      {
-        title: 'Cone for the hand',
-        unit: '\u00b0',
-        numeric: true,
-        cell: (c) => NB.deg(c.room.hand_cone_half_angle_rad),
-        help: 'half-angle of the largest free cone behind the guide',
-      },
-      { title: 'It ends at', cell: (c) => (c.room.hand_cone_blocker ? NB.words(c.room.hand_cone_blocker) : '') },
-      { title: 'Elbow', cell: (c) => (c.room.elbow_up ? 'up' : 'down') },
-      { title: 'Elbow above the entry', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.room.elbow_over_entry_m, 0) },
-    ];
-    return [
-      NB.el('p', {
-        class: 'soft no-print',
-        text:
-          'Switch on "people and sight", "free space" and "cone for the hand" to see them: blue lines of sight are ' +
-          'free, orange ones end where they are blocked; orange cubes are taken by the arm.',
-      }),
-      with_.length
-        ? NB.table(
-            'Final posture: share of the half ball about the entry point that the arm leaves free, and of the ' +
-              'lines from eyes to entry and needle',
-            columns,
-            with_,
-            { class: 'small' },
-          )
-        : NB.el('p', { class: 'soft', text: 'Of no configuration is there a posture.' }),
-    ];
-  },
-
-  /** What was checked: what was missed first and in full, what was met by criterion, and all of it folded. */
-  criteria({ report, counts, missedAsExpected }) {
-    const { criteria, not_judged: open } = report;
-    const isExpected = new Set(missedAsExpected.map((index) => criteria[index]));
-    const missed = criteria.filter((each) => !each.pass);
-    const limits = (c) => NB.valueAndLimit(c.value, c.limit, c.unit);
-    const columns = [
-      { title: 'Criterion', cell: (c) => NB.criterionWords(c.criterion) },
-      { title: 'Goal', cell: (c) => NB.words(c.goal) },
-      { title: 'Configuration', cell: (c) => c.label || 'all' },
-      { title: 'Engine', cell: (c) => c.engine || '' },
-      { title: 'Value', numeric: true, cell: (c) => limits(c)[0] },
-      { title: 'Limit', numeric: true, cell: (c) => limits(c)[1] },
-      {
-        title: 'Outcome',
-        cell: (c) =>
-          NB.el('span', {
-            class: c.pass ? 'good' : 'bad',
-            text: c.pass ? '\u2713 met' : isExpected.has(c) ? '\u2717 missed, as expected' : '\u2717 missed',
+    /** How the planned needle keeps away from bone, vessels and organs; red where it does not. */
+    route(goal, criteria) {
+      const { needle_route: route, fissures_crossed: fissures } = goal;
+      const parts = [];
+      if (route) {
+        // The criterion where it asks for more than the margin.
+        const wanted =
+          criteria.find((each) => each.goal === goal.name && each.criterion === 'min_clearance_mm.needle_route')
+            ?.limit ?? 0;
+        const part = `${NB.words(route.part)} (${route.tissue})`;
+        const where =
+          route.distance_m < 0
+            ? `goes ${NB.mm(-route.distance_m, 1)} mm deep through the ${part}`
+            : `passes ${NB.mm(route.distance_m, 1)} mm from the ${part}`;
+        parts.push(
+          NB.el('p', {
+            class: route.kept ? '' : 'error',
+            text:
+              `The planned needle${route.kept ? '' : ' is refused: it'} ${where}; it has to keep ` +
+              `${NB.mm(Math.max(route.margin_m, wanted), 1)} mm.`,
           }),
-      },
-      { title: 'Remark', text: true, cell: (c) => c.detail },
-    ];
-    const unjudged = [...columns.slice(0, 4), { title: 'Why it was not judged', text: true, cell: (c) => c.reason }];
-    return NB.section(
-      `What was checked: ${counts}`,
-      open.length > 0 || missed.length > 0,
-      missed.length ? NB.table('Missed', columns, missed, { class: 'small' }) : null,
-      open.length ? NB.table('What was to be judged and was not', unjudged, open, { class: 'small' }) : null,
-      NB.sections.summary(criteria),
-      NB.el(
-        'details',
-        { class: 'no-print' },
-        NB.el('summary', { text: `All ${criteria.length} one by one` }),
+        );
+      }
+      if (fissures?.length)
+        parts.push(
+          NB.el('p', { class: 'bad', text: `The needle crosses ${fissures.map(NB.words).join(', ')} of the lung.` }),
+        );
+      return parts;
+    },
+
+    /** All goals at a glance, where there are several. */
+    goals(page, choose) {
+      const { goals } = page.report;
+      if (goals.length < 2) return null;
+      /** @param {GoalReport} goal */
+      const chosen = (goal) => goal.configurations.find((each) => each.label === goal.recommended?.label);
+      const table = NB.table(
+        'All goals, each with its recommended configuration',
+        [
+          { title: 'Goal', cell: (goal) => NB.words(goal.name) },
+          { title: 'Recommended', cell: (goal) => goal.recommended?.label || 'none works' },
+          {
+            title: 'Work',
+            cell: (goal) =>
+              `${goal.configurations.filter((each) => each.status === 'ok').length} of ${goal.configurations.length}`,
+          },
+          {
+            title: 'Expected tip error, rms',
+            numeric: true,
+            cell: (goal) => NB.length(chosen(goal)?.budget?.total.at_target.analytic.rms_m),
+          },
+          {
+            title: 'Least clearance',
+            unit: 'mm',
+            numeric: true,
+            cell: (goal) => NB.mm(chosen(goal)?.clearance.minimum_m),
+          },
+          {
+            title: 'Needle to the nearest part',
+            unit: 'mm',
+            numeric: true,
+            cell: (goal) => NB.mm(goal.needle_route?.distance_m),
+          },
+        ],
+        goals,
+        { class: 'choose small' },
+      );
+      const rows = NB.tableRows(table);
+      NB.rows(rows, (index) => choose(index));
+      return { element: table, rows };
+    },
+
+    /** What the planned motion keeps of the clearance that its postures allow, and the way back. */
+    margins(c) {
+      if (!c.margin) return NB.el('p', { class: 'soft', text: `${c.label} has no planned motion.` });
+      /** @param {string} name */
+      const retreat = (name) => c.retreat_clearance[name]?.certified_lower_bound_m ?? null;
+      /** @type {Column<[name: string, margin: Margin['classes'][string]]>[]} */
+      const columns = [
+        { title: 'Between', cell: ([name]) => NB.words(name) },
+        {
+          title: 'Has to be',
+          unit: 'mm',
+          numeric: true,
+          cell: ([, each]) => NB.mm(each.limit_m),
+          help: 'the limit of the scenario\u2019s criteria, else of its planning',
+        },
+        {
+          title: 'At most possible',
+          unit: 'mm',
+          numeric: true,
+          cell: ([, each]) => NB.mm(each.attainable_m),
+          help: 'least of the start, the approach and its end, which every motion takes',
+        },
+        { title: 'Kept on the way in', unit: 'mm', numeric: true, cell: ([, each]) => NB.mm(each.achieved_m) },
+        { title: 'Nearest in the', cell: ([, each]) => NB.words(each.limited_by) },
+        {
+          title: 'Kept on the way back',
+          unit: 'mm',
+          numeric: true,
+          cell: ([name]) => (retreat(name) === null ? '\u2013' : NB.mm(retreat(name))),
+        },
+      ];
+      const ends = {
+        bound: 'no other way keeps more that counts',
+        proof: 'no other way helps: a posture that every motion takes is too near',
+        budget: 'the search ended by its budget: a better way may exist',
+      };
+      return [
+        NB.table(`${c.label}: ${ends[c.margin.search]}`, columns, Object.entries(c.margin.classes), { class: 'small' }),
+        NB.el('p', {
+          class: 'soft small',
+          text:
+            'Proven lower bounds of the planned motion of the nominal arm: nothing comes nearer than this. ' +
+            'Clearances of recorded motions, in the other tables, are what was attained, and a little more.',
+        }),
+      ];
+    },
+
+    /** Where the needle goes over all arms and patients, in all and by source. */
+    budget(goal, configuration, charts, name) {
+      const with_ = goal.configurations.filter((c) => c.budget || c.budget_failure);
+      if (!with_.length) return null;
+      const sources = [...new Set(with_.flatMap((c) => (c.budget?.sources || []).map((each) => each.source)))];
+      /** @param {BudgetPart | null | undefined} part */
+      const rms = (part) => NB.mm(part?.at_target.analytic.rms_m, 2);
+      /** @type {Column<ConfigurationReport>[]} */
+      const columns = [
+        { title: 'Configuration', cell: (c) => c.label },
+        { title: 'All', unit: 'mm', numeric: true, cell: (c) => rms(c.budget?.total) },
+        {
+          title: '95 % within',
+          unit: 'mm',
+          numeric: true,
+          cell: (c) => NB.mm(c.budget?.total.at_target.radius_95_m, 2),
+          help: 'distance that 95 % of the draws stay within',
+        },
+        {
+          title: 'At the skin',
+          unit: 'mm',
+          numeric: true,
+          cell: (c) => NB.mm(c.budget?.total.at_skin?.analytic.rms_m, 2),
+        },
+        { title: 'Mostly by', cell: (c) => (c.budget ? NB.words(c.budget.dominant ?? '\u2013') : c.budget_failure) },
+        ...sources.map((source) => ({
+          title: `By ${NB.words(source)}${NB.words(source).includes(',') ? ',' : ''} alone`,
+          unit: 'mm',
+          numeric: true,
+          cell: (/** @type {ConfigurationReport} */ c) => rms(c.budget?.sources.find((each) => each.source === source)),
+        })),
+      ];
+      const help =
+        'Ellipses hold 95 %. x and y are across the needle, z along it; both panels are in mm and to one scale, ' +
+        'the same for all configurations of the goal. The bar: each source\u2019s share of the mean square.';
+      return [
+        charts?.budget
+          ? NB.chart(
+              `${configuration.label}: where the needle goes`,
+              charts.budget,
+              NB.fileName(name, goal.name, configuration.label, 'budget'),
+              help,
+            )
+          : null,
         NB.table(
-          'Everything that was judged, missed ones first',
+          'Expected distance of the tip from the target, root mean square over all arms and patients: by all ' +
+            'sources together, and by each alone',
           columns,
-          [...missed, ...criteria.filter((each) => each.pass)],
+          with_,
           { class: 'small' },
         ),
-      ),
-    );
-  },
+      ];
+    },
 
-  /** A row per criterion: how often it was met, and the one that came nearest to its limit. */
-  summary(criteria) {
-    const groups = new Map();
-    for (const each of criteria) groups.set(each.criterion, [...(groups.get(each.criterion) || []), each]);
-    // Of those that are missed the one that is farthest off, else the one that is nearest to its limit.
-    const used = ({ value, limit, pass }) =>
-      value === null || limit === null
-        ? -Infinity
-        : ((pass ? -1 : 1) * Math.abs(value - limit)) / (Math.abs(limit) || 1);
-    const rows = [...groups].map(([name, all]) => ({
-      name,
-      all,
-      met: all.filter((each) => each.pass).length,
-      nearest: all.reduce((best, each) => (used(each) > used(best) ? each : best)),
-    }));
-    rows.sort((a, b) => (a.met < a.all.length ? 0 : 1) - (b.met < b.all.length ? 0 : 1));
-    const limits = (c) => (c.value === null ? ['', ''] : NB.valueAndLimit(c.value, c.limit, c.unit));
-    return NB.table(
-      'By criterion, with the value that comes nearest to its limit',
-      [
-        { title: 'Criterion', cell: (row) => NB.criterionWords(row.name) },
-        {
-          title: 'Met',
+    people(goal) {
+      const with_ = /** @type {WithRoom[]} */ (goal.configurations.filter((c) => c.room));
+      const regions = [...new Set(with_.flatMap((c) => Object.keys(c.room.regions)))];
+      /** @param {Sight} each */
+      const who = (each) => `${NB.words(each.person)}, ${each.stature_m.toFixed(2)} m`;
+      const sight = [...new Set(with_.flatMap((c) => c.room.sight.map(who)))];
+      /** @type {Column<WithRoom>[]} */
+      const columns = [
+        { title: 'Configuration', cell: (c) => c.label },
+        { title: 'Free in all', unit: '%', numeric: true, cell: (c) => NB.percent(c.room.free_fraction) },
+        ...regions.map((name) => ({
+          title: `Free ${NB.regionWords[name] || NB.words(name)}`,
+          unit: '%',
           numeric: true,
-          cell: (row) =>
+          cell: (/** @type {WithRoom} */ c) => NB.percent(c.room.regions[name]),
+        })),
+        ...sight.map((name) => ({
+          title: `Seen by ${name}`,
+          unit: '%',
+          numeric: true,
+          cell: (/** @type {WithRoom} */ c) => NB.percent(c.room.sight.find((each) => who(each) === name)?.fraction),
+        })),
+        {
+          title: 'Cone for the hand',
+          unit: '\u00b0',
+          numeric: true,
+          cell: (c) => NB.deg(c.room.hand_cone_half_angle_rad),
+          help: 'half-angle of the largest free cone behind the guide',
+        },
+        { title: 'It ends at', cell: (c) => (c.room.hand_cone_blocker ? NB.words(c.room.hand_cone_blocker) : '') },
+        { title: 'Elbow', cell: (c) => (c.room.elbow_up ? 'up' : 'down') },
+        { title: 'Elbow above the entry', unit: 'mm', numeric: true, cell: (c) => NB.mm(c.room.elbow_over_entry_m, 0) },
+      ];
+      return [
+        NB.el('p', {
+          class: 'soft no-print',
+          text:
+            'Switch on "people and sight", "free space" and "cone for the hand" to see them: blue lines of sight are ' +
+            'free, orange ones end where they are blocked; orange cubes are taken by the arm.',
+        }),
+        with_.length
+          ? NB.table(
+              'Final posture: share of the half ball about the entry point that the arm leaves free, and of the ' +
+                'lines from eyes to entry and needle',
+              columns,
+              with_,
+              { class: 'small' },
+            )
+          : NB.el('p', { class: 'soft', text: 'Of no configuration is there a posture.' }),
+      ];
+    },
+
+    /** What was checked: what was missed first and in full, what was met by criterion, and all of it folded. */
+    criteria({ report, counts, missedAsExpected }) {
+      const { criteria, not_judged: open } = report;
+      const isExpected = new Set(missedAsExpected.map((index) => criteria[index]));
+      const missed = criteria.filter((each) => !each.pass);
+      /** @param {CriterionResult} c */
+      const limits = (c) => NB.valueAndLimit(c.value, c.limit, c.unit);
+      /** @type {Column<CriterionResult | NotJudged>[]} */
+      const what = [
+        { title: 'Criterion', cell: (c) => NB.criterionWords(c.criterion) },
+        { title: 'Goal', cell: (c) => NB.words(c.goal) },
+        { title: 'Configuration', cell: (c) => c.label || 'all' },
+        { title: 'Engine', cell: (c) => c.engine || '' },
+      ];
+      /** @type {Column<CriterionResult>[]} */
+      const columns = [
+        ...what,
+        { title: 'Value', numeric: true, cell: (c) => limits(c)[0] },
+        { title: 'Limit', numeric: true, cell: (c) => limits(c)[1] },
+        {
+          title: 'Outcome',
+          cell: (c) =>
             NB.el('span', {
-              class: row.met === row.all.length ? 'good' : 'bad',
-              text: `${row.met} of ${row.all.length}`,
+              class: c.pass ? 'good' : 'bad',
+              text: c.pass ? '\u2713 met' : isExpected.has(c) ? '\u2717 missed, as expected' : '\u2717 missed',
             }),
         },
-        { title: 'Nearest value', numeric: true, cell: (row) => limits(row.nearest)[0] },
-        { title: 'Limit', numeric: true, cell: (row) => limits(row.nearest)[1] },
-        {
-          title: 'Where',
-          cell: (row) => [NB.words(row.nearest.goal), row.nearest.label, row.nearest.engine].filter(Boolean).join(', '),
-        },
-        {
-          title: 'Remark',
-          text: true,
-          cell: (row) => (row.nearest.detail && row.name !== 'expected' ? row.nearest.detail : ''),
-        },
-      ],
-      rows,
-      { class: 'small' },
-    );
-  },
+        { title: 'Remark', text: true, cell: (c) => c.detail },
+      ];
+      /** @type {Column<NotJudged>[]} */
+      const unjudged = [...what, { title: 'Why it was not judged', text: true, cell: (c) => c.reason }];
+      return NB.section(
+        `What was checked: ${counts}`,
+        open.length > 0 || missed.length > 0,
+        missed.length ? NB.table('Missed', columns, missed, { class: 'small' }) : null,
+        open.length ? NB.table('What was to be judged and was not', unjudged, open, { class: 'small' }) : null,
+        NB.sections.summary(criteria),
+        NB.el(
+          'details',
+          { class: 'no-print' },
+          NB.el('summary', { text: `All ${criteria.length} one by one` }),
+          NB.table(
+            'Everything that was judged, missed ones first',
+            columns,
+            [...missed, ...criteria.filter((each) => each.pass)],
+            { class: 'small' },
+          ),
+        ),
+      );
+    },
 
-  requirements(report) {
-    const rows = report.trace || [];
-    if (!rows.length) return null;
-    const words = { met: '\u2713 met', missed: '\u2717 missed', not_judged: 'not judged' };
-    const columns = [
-      { title: 'Requirement', cell: (r) => r.requirement },
-      { title: 'Criterion', cell: (r) => NB.criterionWords(r.criterion) },
-      {
-        title: 'Outcome',
-        cell: (r) => NB.el('span', { class: r.outcome === 'met' ? 'good' : 'bad', text: words[r.outcome] }),
-      },
-      { title: 'Met', numeric: true, cell: (r) => String(r.met) },
-      { title: 'Missed', numeric: true, cell: (r) => String(r.missed) },
-      { title: 'Not judged', numeric: true, cell: (r) => String(r.not_judged) },
-    ];
-    return NB.section(
-      `Requirements (${rows.length})`,
-      true,
-      NB.table('Requirements, the criteria that stand for them, and how often these were met', columns, rows, {
-        class: 'small',
-      }),
-    );
-  },
+    /** A row per criterion: how often it was met, and the one that came nearest to its limit. */
+    summary(criteria) {
+      /** @type {Map<string, CriterionResult[]>} */
+      const groups = new Map();
+      for (const each of criteria) groups.set(each.criterion, [...(groups.get(each.criterion) || []), each]);
+      // Of those that are missed the one that is farthest off, else the one that is nearest to its limit.
+      /** @param {CriterionResult} result */
+      const used = ({ value, limit, pass }) =>
+        value === null || limit === null
+          ? -Infinity
+          : ((pass ? -1 : 1) * Math.abs(value - limit)) / (Math.abs(limit) || 1);
+      const rows = [...groups].map(([name, all]) => ({
+        name,
+        all,
+        met: all.filter((each) => each.pass).length,
+        nearest: all.reduce((best, each) => (used(each) > used(best) ? each : best)),
+      }));
+      rows.sort((a, b) => (a.met < a.all.length ? 0 : 1) - (b.met < b.all.length ? 0 : 1));
+      /** @param {CriterionResult} c */
+      const limits = (c) => (c.value === null ? ['', ''] : NB.valueAndLimit(c.value, c.limit, c.unit));
+      return NB.table(
+        'By criterion, with the value that comes nearest to its limit',
+        [
+          { title: 'Criterion', cell: (row) => NB.criterionWords(row.name) },
+          {
+            title: 'Met',
+            numeric: true,
+            cell: (row) =>
+              NB.el('span', {
+                class: row.met === row.all.length ? 'good' : 'bad',
+                text: `${row.met} of ${row.all.length}`,
+              }),
+          },
+          { title: 'Nearest value', numeric: true, cell: (row) => limits(row.nearest)[0] },
+          { title: 'Limit', numeric: true, cell: (row) => limits(row.nearest)[1] },
+          {
+            title: 'Where',
+            cell: (row) =>
+              [NB.words(row.nearest.goal), row.nearest.label, row.nearest.engine].filter(Boolean).join(', '),
+          },
+          {
+            title: 'Remark',
+            text: true,
+            cell: (row) => (row.nearest.detail && row.name !== 'expected' ? row.nearest.detail : ''),
+          },
+        ],
+        rows,
+        { class: 'small' },
+      );
+    },
 
-  provenance(report) {
-    const { provenance, notes, scenario, truth } = report;
-    return NB.el(
-      'div',
-      null,
-      notes.length
-        ? NB.section(
-            'Notes',
-            true,
-            NB.el(
-              'ul',
-              { class: 'plain' },
-              notes.map((note) => NB.el('li', { text: note })),
-            ),
-          )
-        : null,
-      truth
-        ? NB.el(
-            'details',
-            { class: 'section no-print' },
-            NB.el('summary', null, NB.el('h2', { text: 'The arm and the patient that were drawn' })),
-            NB.el('p', {
-              class: 'soft',
-              text:
-                'One draw of the scenario\u2019s imperfections, by its seed; lengths in m, angles in rad. The ' +
-                'expected tip error is over all draws, not of this one.',
-            }),
-            NB.tree(truth),
-          )
-        : null,
-      NB.section('Where the numbers come from', false, NB.provenance(provenance, scenario.file)),
-    );
-  },
-};
+    requirements(report) {
+      const rows = report.trace || [];
+      if (!rows.length) return null;
+      /** @type {{ [outcome: string]: string }} */
+      const words = { met: '\u2713 met', missed: '\u2717 missed', not_judged: 'not judged' };
+      /** @type {Column<RequirementTrace>[]} */
+      const columns = [
+        { title: 'Requirement', cell: (r) => r.requirement },
+        { title: 'Criterion', cell: (r) => NB.criterionWords(r.criterion) },
+        {
+          title: 'Outcome',
+          cell: (r) => NB.el('span', { class: r.outcome === 'met' ? 'good' : 'bad', text: words[r.outcome] }),
+        },
+        { title: 'Met', numeric: true, cell: (r) => String(r.met) },
+        { title: 'Missed', numeric: true, cell: (r) => String(r.missed) },
+        { title: 'Not judged', numeric: true, cell: (r) => String(r.not_judged) },
+      ];
+      return NB.section(
+        `Requirements (${rows.length})`,
+        true,
+        NB.table('Requirements, the criteria that stand for them, and how often these were met', columns, rows, {
+          class: 'small',
+        }),
+      );
+    },
+
+    provenance(report) {
+      const { provenance, notes, scenario, truth } = report;
+      return NB.el(
+        'div',
+        null,
+        notes.length
+          ? NB.section(
+              'Notes',
+              true,
+              NB.el(
+                'ul',
+                { class: 'plain' },
+                notes.map((note) => NB.el('li', { text: note })),
+              ),
+            )
+          : null,
+        truth
+          ? NB.el(
+              'details',
+              { class: 'section no-print' },
+              NB.el('summary', null, NB.el('h2', { text: 'The arm and the patient that were drawn' })),
+              NB.el('p', {
+                class: 'soft',
+                text:
+                  'One draw of the scenario\u2019s imperfections, by its seed; lengths in m, angles in rad. The ' +
+                  'expected tip error is over all draws, not of this one.',
+              }),
+              NB.tree(truth),
+            )
+          : null,
+        NB.section('Where the numbers come from', false, NB.provenance(provenance, scenario.file)),
+      );
+    },
+  })
+);
 
 /** Contacts, stop and way back of a goal's configurations; null where the scenario asks for none. */
 NB.sections.events = (goal, configuration, charts, name) => {
-  const with_ = goal.configurations.filter((c) => c.events);
+  const with_ = /** @type {WithEvents[]} */ (goal.configurations.filter((c) => c.events));
   if (!with_.length) return null;
   return [
     ...NB.sections.press(with_, configuration, charts, goal, name),
@@ -429,16 +457,20 @@ NB.sections.events = (goal, configuration, charts, name) => {
 
 NB.sections.press = (with_, configuration, charts, goal, name) => {
   const rows = with_.flatMap((c) =>
-    c.events.press.flatMap((press, index) =>
-      press.not_staged
-        ? [{ c, press, index, engine: '', measured: null }]
-        : Object.entries(press.engines).map(([engine, measured]) => ({ c, press, index, engine, measured })),
-    ),
+    c.events.press.flatMap((press, index) => {
+      /** @type {[engine: string, measured: PressMeasured | null][]} */
+      const staged = press.not_staged ? [['', null]] : Object.entries(press.engines);
+      return staged.map(([engine, measured]) => ({ c, press, index, engine, measured }));
+    }),
   );
   if (!rows.length) return [];
+  /** @param {PressMeasured} measured @param {(episode: PressMeasured['episodes'][number]) => number} value */
   const over = (measured, value) => measured.episodes.map(value);
+  /** @param {number | null | undefined} value @param {(value: number) => string} text */
   const or = (value, text) => (value === null || value === undefined ? '\u2013' : text(value));
+  /** @param {number} digits @returns {(value: number) => string} */
   const fixed = (digits) => (value) => NB.fixed(value, digits);
+  /** @type {Column<PressRow>[]} */
   const columns = [
     { title: 'Configuration', cell: ({ c }) => c.label },
     {
@@ -506,6 +538,7 @@ NB.sections.press = (with_, configuration, charts, goal, name) => {
     },
   ];
   const own = with_.find((c) => c === configuration);
+  /** @param {string} caption @param {PressRow[]} of */
   const table = (caption, of) => NB.table(caption, columns, of, { class: 'small contacts' });
   const shown = (own?.events.press || []).map((press, index) => {
     const svg = charts?.press?.[index];
@@ -546,17 +579,12 @@ NB.sections.press = (with_, configuration, charts, goal, name) => {
 };
 
 NB.sections.stop = (with_) => {
-  const rows = with_.flatMap((c) =>
-    c.events.stop
-      ? Object.entries(c.events.stop.engines).map(([engine, measured]) => ({
-          c,
-          stop: c.events.stop,
-          engine,
-          measured,
-        }))
-      : [],
-  );
+  const rows = with_.flatMap((c) => {
+    const { stop } = c.events;
+    return stop ? Object.entries(stop.engines).map(([engine, measured]) => ({ c, stop, engine, measured })) : [];
+  });
   if (!rows.length) return [];
+  /** @type {Column<StopRow>[]} */
   const columns = [
     { title: 'Configuration', cell: ({ c }) => c.label },
     { title: 'Engine', cell: ({ engine }) => engine },
@@ -623,6 +651,7 @@ NB.sections.retract = (with_) => {
     Object.entries(c.events.retract).map(([engine, measured]) => ({ c, engine, measured })),
   );
   if (!rows.length) return [];
+  /** @type {Column<RetractRow>[]} */
   const columns = [
     { title: 'Configuration', cell: ({ c }) => c.label },
     { title: 'Engine', cell: ({ engine }) => engine },
