@@ -17,8 +17,17 @@ NB.aims = {
 };
 
 class AtlasPage {
+  /** @type {number} */ goalIndex;
+  /** @type {HTMLTableRowElement[]} */ sideRows;
+  /** @type {HTMLTableCellElement[]} */ sideCells;
+  /** @type {Axes | undefined} */ axes;
+  /** @type {Map<string, RuleStyle>} */ used;
+  /** @type {string | undefined} */ legendNames;
+
+  /** @param {AtlasDocument} page @param {HTMLElement} app */
   constructor(page, app) {
     this.page = page;
+    /** @type {{ [name: string]: boolean }} */
     this.layers = {
       robot: true,
       tool: true,
@@ -47,6 +56,7 @@ class AtlasPage {
     });
     this.strips = new Canvas(300, 'Which configuration works at which roll', (...all) => this.paint(...all));
     this.stripLegend = NB.el('div', { class: 'legend' });
+    /** @param {PointerEvent} event */
     const pick = (event) => {
       if (!(event.buttons & 1) || !this.axes) return;
       const box = this.strips.canvas.getBoundingClientRect();
@@ -64,7 +74,7 @@ class AtlasPage {
           role: 'radio',
           onclick: () => this.setGoal(index),
           onkeydown: (event) => {
-            const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+            const step = NB.ARROWS[event.key];
             if (!step) return;
             event.preventDefault();
             const to = (index + step + page.goals.length) % page.goals.length;
@@ -197,7 +207,10 @@ class AtlasPage {
     NB.address.watch((choices) => this.fromAddress(choices));
   }
 
-  /** Shows what the page's address asks for: goal, configuration, roll in degrees. */
+  /**
+   * Shows what the page's address asks for: goal, configuration, roll in degrees.
+   * @param {AddressChoices} choices
+   */
   fromAddress({ goal, configuration, roll }) {
     const at = this.page.goals.findIndex((each) => each.name === goal);
     if (at >= 0 && at !== this.goalIndex) this.setGoal(at);
@@ -206,6 +219,7 @@ class AtlasPage {
     if (roll !== undefined && Number.isFinite(Number(roll))) this.setRoll(Number(roll));
   }
 
+  /** @param {...string} words */
   fileName(...words) {
     return NB.fileName(this.page.scenario, this.goal.name, this.branch.label, ...words);
   }
@@ -226,6 +240,7 @@ class AtlasPage {
     return this.decode(this.goal.branches[this.branchIndex]);
   }
 
+  /** @param {Branch} branch @returns {DecodedBranch} */
   decode(branch) {
     if (!branch.decoded) {
       branch.decoded = {
@@ -241,10 +256,11 @@ class AtlasPage {
     return { ...branch, ...branch.decoded };
   }
 
+  /** @param {number} index */
   setGoal(index) {
     this.goalIndex = index;
     this.goalButtons.forEach((button, at) => {
-      button.setAttribute('aria-checked', at === index);
+      button.setAttribute('aria-checked', String(at === index));
       button.tabIndex = at === index ? 0 : -1;
     });
     const { view, goal } = this;
@@ -277,14 +293,13 @@ class AtlasPage {
     this.sideTable();
     this.rangeTable();
     const best = this.freest(goal);
-    const range = goal.branches[Math.max(best, 0)].ranges.reduce(
-      (a, b) => (!a || b.width_rad > a.width_rad ? b : a),
-      undefined,
-    );
+    const { ranges } = goal.branches[Math.max(best, 0)];
+    const [range] = [...ranges].sort((a, b) => b.width_rad - a.width_rad);
     this.setBranch(Math.max(best, 0));
     this.setRoll(range ? (range.best[goal.aim].roll_rad * 180) / Math.PI : 0);
   }
 
+  /** @param {number} index */
   setBranch(index) {
     this.branchIndex = index;
     NB.mark(this.sideRows, index);
@@ -302,7 +317,10 @@ class AtlasPage {
     this.setRoll(this.roll);
   }
 
-  /** A range as pieces of 0 to 360 degrees. */
+  /**
+   * A range as pieces of 0 to 360 degrees.
+   * @param {RollRange} range
+   */
   pieces(range) {
     if (range.is_whole_circle) return [[0, 360]];
     const from = ((((range.from_rad * 180) / Math.PI) % 360) + 360) % 360;
@@ -315,6 +333,7 @@ class AtlasPage {
       : [[from, to]];
   }
 
+  /** @param {number} roll */
   setRoll(roll) {
     const { goal, branch } = this;
     const at = ((Math.round((roll / 360) * goal.rolls) % goal.rolls) + goal.rolls) % goal.rolls;
@@ -345,6 +364,7 @@ class AtlasPage {
   }
 
   sideTable() {
+    /** @param {Branch} branch */
     const total = (branch) => this.turns(branch);
     const table = NB.table(
       'Choose a configuration',
@@ -356,7 +376,7 @@ class AtlasPage {
       this.goal.branches,
       { class: 'choose small full' },
     );
-    this.sideRows = [...table.querySelectorAll('tbody tr')];
+    this.sideRows = NB.tableRows(table);
     this.sideCells = this.sideRows.map((row) => row.cells[1]);
     NB.rows(this.sideRows, (index) => this.setBranch(index));
     NB.clear(
@@ -368,12 +388,18 @@ class AtlasPage {
     );
   }
 
-  /** How far a configuration can turn about the needle, over all its ranges. */
+  /**
+   * How far a configuration can turn about the needle, over all its ranges.
+   * @param {Branch | DecodedBranch} branch
+   */
   turns(branch) {
     return branch.ranges.reduce((sum, range) => sum + (range.is_whole_circle ? 2 * Math.PI : range.width_rad), 0);
   }
 
-  /** The configuration with most room to turn, the first of equals; -1 where none works. */
+  /**
+   * The configuration with most room to turn, the first of equals; -1 where none works.
+   * @param {AtlasGoal} goal
+   */
   freest(goal) {
     return goal.branches.reduce(
       (best, branch, at) =>
@@ -384,11 +410,11 @@ class AtlasPage {
 
   rangeTable() {
     const { goal } = this;
-    const rows = goal.branches.flatMap((branch, index) =>
-      branch.ranges.length
-        ? branch.ranges.map((range) => ({ branch, range, index }))
-        : [{ branch, range: null, index }],
-    );
+    const rows = goal.branches.flatMap((branch, index) => {
+      const ranges = branch.ranges.length ? branch.ranges : [null];
+      return ranges.map((range) => ({ branch, range, index }));
+    });
+    /** @param {RollRange['before'] | undefined} found */
     const edge = (found) => (found ? `${NB.words(found.rule)}: ${found.detail}` : '');
     const table = NB.table(
       `Goal ${NB.words(goal.name)}: what stands against the rolls before and after each range; best roll for ` +
@@ -432,7 +458,7 @@ class AtlasPage {
       rows,
       { class: 'choose small' },
     );
-    const elements = [...table.querySelectorAll('tbody tr')];
+    const elements = NB.tableRows(table);
     NB.rows(elements, (at) => {
       NB.mark(elements, at);
       this.setBranch(rows[at].index);
@@ -455,6 +481,7 @@ class AtlasPage {
     NB.clear(this.table, NB.el('p', null, NB.el('strong', { text: `${answer}.` })), table);
   }
 
+  /** @param {Painter} context @param {number} width @param {number} height */
   paint(context, width, height) {
     const { goal } = this;
     const left = width < 420 ? 106 : 150;
@@ -466,6 +493,7 @@ class AtlasPage {
     );
     this.axes = axes;
     axes.draw(context);
+    /** @type {Map<string, RuleStyle>} */
     const used = new Map();
     const h = (box.height / 8) * 0.7;
     goal.branches.forEach((each, row) => {
@@ -515,9 +543,10 @@ class AtlasPage {
     context.moveTo(at, box.top);
     context.lineTo(at, box.top + box.height);
     context.stroke();
-    if (this.fixedMark(goal) !== null) {
+    const mark = this.fixedMark(goal);
+    if (mark !== null) {
       context.setLineDash([4, 3]);
-      const fixed = axes.px(this.fixedMark(goal));
+      const fixed = axes.px(mark);
       context.beginPath();
       context.moveTo(fixed, box.top);
       context.lineTo(fixed, box.top + box.height);
@@ -528,9 +557,10 @@ class AtlasPage {
     const names = [...used.keys()].join();
     if (names !== this.legendNames) {
       this.legendNames = names;
+      /** @param {[name: string, style: RuleStyle]} rule */
       const key = ([name, style]) => {
         const canvas = NB.el('canvas', { width: '26', height: '14', 'aria-hidden': 'true' });
-        this.block(canvas.getContext('2d'), style, 0, 0, 26, 14);
+        this.block(NB.context(canvas), style, 0, 0, 26, 14);
         return NB.el('span', { class: 'key' }, canvas, NB.words(name));
       };
       const rejecting = [...used].filter(([name]) => name !== 'works');
@@ -551,7 +581,9 @@ class AtlasPage {
 
   stripsSvg() {
     const title = `${NB.words(this.goal.name)}: what works at which roll`;
+    /** @param {string} name */
     const words = (name) => (name === 'works' ? 'works' : `rejected by: ${NB.words(name)}`);
+    /** @type {Mark[]} */
     const legend = [...this.used].map(([name, style]) => ({
       text: words(name),
       draw: (context, x, y) => this.block(context, style, x - 13, y - 6, 26, 12),
@@ -561,10 +593,19 @@ class AtlasPage {
     return svg;
   }
 
+  /** @param {AtlasGoal} goal */
   fixedMark(goal) {
     return goal.fixedRoll === null ? null : ((((goal.fixedRoll * 180) / Math.PI) % 360) + 360) % 360;
   }
 
+  /**
+   * @param {Painter} context
+   * @param {RuleStyle} style
+   * @param {number} x
+   * @param {number} y
+   * @param {number} width
+   * @param {number} height
+   */
   block(context, [color, hatch], x, y, width, height) {
     context.save();
     context.fillStyle = color;
@@ -574,7 +615,7 @@ class AtlasPage {
     context.clip();
     context.strokeStyle = 'rgba(255, 255, 255, 0.75)';
     context.lineWidth = 1.3;
-    const lines = { 1: [1], 2: [-1], 3: [1, -1] }[hatch] || [];
+    const lines = [[], [1], [-1], [1, -1]][hatch];
     for (const side of lines) {
       for (let from = Math.floor(x / 9) * 9 - height; from < x + width + height; from += 9) {
         context.beginPath();

@@ -1,10 +1,15 @@
 // The page of a search: where the best choice lies, how flat it is there, and what else is as good.
 'use strict';
 
-/** A number of things. */
+/**
+ * A number of things.
+ * @param {number} number
+ * @param {string} thing
+ */
 const counted = (number, thing) => `${number} ${thing}${number === 1 ? '' : 's'}`;
 
 class SearchPage {
+  /** @param {SearchDocument} page @param {HTMLElement} app */
   constructor(page, app) {
     this.page = page;
     this.log = page.search;
@@ -14,6 +19,7 @@ class SearchPage {
     this.equals = new Set(this.answer.equals);
     this.undecided = new Set(this.answer.undecided);
     this.front = new Map((this.answer.front || []).map((member) => [member.id, member]));
+    /** @type {Figure[]} */
     this.figures = [];
     app.classList.add('search', 'study');
     NB.clear(
@@ -41,7 +47,11 @@ class SearchPage {
     );
   }
 
-  /** A figure of an objective as people read it. */
+  /**
+   * A figure of an objective as people read it.
+   * @param {number | null | undefined} value
+   * @param {number} [index]
+   */
   figure(value, index = 0) {
     if (value === null || value === undefined) return 'none';
     const { unit } = this.page.objectives[index] || { unit: '1' };
@@ -50,14 +60,15 @@ class SearchPage {
       : `${NB.fixed(value, this.page.objectives[index].moreIsBetter ? 1 : 3)} ${unit}`;
   }
 
+  /** @param {number | null} value */
   share(value) {
     return value === null ? 'none' : `${NB.fixed(100 * value, 1)} %`;
   }
 
+  /** @param {Estimate} estimate @param {(value: number) => string} show */
   ends({ interval }, show) {
     const { low, high } = interval;
-    if (low === null && high === null) return '';
-    if (low === null) return ` (97.5 % sure: at most ${show(high)})`;
+    if (low === null) return high === null ? '' : ` (97.5 % sure: at most ${show(high)})`;
     if (high === null) return ` (97.5 % sure: at least ${show(low)})`;
     return ` (95 % interval ${show(low)} to ${show(high)})`;
   }
@@ -69,7 +80,6 @@ class SearchPage {
       `${page.objectives[0].words} ` +
       `${this.figure(estimate.value)}${this.ends(estimate, (value) => this.figure(value))} on ${estimate.cases} ` +
       'layouts that nothing was compared by';
-    const choice = page.factors.map((factor, index) => [factor, this.winner.choice[index][1]]);
     const as_good = this.front.size
       ? `${[...this.front.values()].filter((each) => each.is_certain).length} of ${this.front.size} are on the ` +
         'front for certain.'
@@ -82,12 +92,12 @@ class SearchPage {
       NB.el(
         'dl',
         null,
-        choice.map(([factor, value]) => [
+        page.factors.map((factor, index) => [
           NB.el('dt', { text: factor.words }),
           NB.el(
             'dd',
             null,
-            `${value} ${factor.unit}`,
+            `${this.winner.choice[index][1]} ${factor.unit}`,
             factor.key ? [' ', NB.el('code', { class: 'soft', text: factor.key })] : null,
           ),
         ]),
@@ -113,13 +123,16 @@ class SearchPage {
     );
   }
 
+  /** @param {number} id @returns {CandidateKind} */
   kindOf(id) {
     if (id === this.winner.id) return 'best';
-    if (this.front.has(id)) return this.front.get(id).is_certain ? 'certain' : 'maybe';
+    const member = this.front.get(id);
+    if (member) return member.is_certain ? 'certain' : 'maybe';
     if (this.equals.has(id)) return 'equal';
     return 'other';
   }
 
+  /** @type {Record<CandidateKind, { color: string, words: string }>} */
   static looks = {
     best: { color: '#d55e00', words: 'best' },
     equal: { color: '#0072b2', words: 'cannot be told from it' },
@@ -128,6 +141,7 @@ class SearchPage {
     other: { color: '#9aa1aa', words: 'others' },
   };
 
+  /** @param {Painter} context @param {number} x @param {number} y @param {CandidateKind} kind @param {number} [size] */
   dot(context, x, y, kind, size = 3.5) {
     context.fillStyle = SearchPage.looks[kind].color;
     context.strokeStyle = '#fff';
@@ -144,11 +158,13 @@ class SearchPage {
     context.stroke();
   }
 
+  /** @param {string | null} [line] @returns {Mark[]} */
   legend(line) {
-    const kinds = ['best', 'equal', 'certain', 'maybe', 'other'].filter((kind) =>
-      this.candidates.some((each) => this.kindOf(each.id) === kind),
-    );
-    const items = kinds.map((kind) => ({
+    /** @type {CandidateKind[]} */
+    const kinds = ['best', 'equal', 'certain', 'maybe', 'other'];
+    const seen = kinds.filter((kind) => this.candidates.some((each) => this.kindOf(each.id) === kind));
+    /** @type {Mark[]} */
+    const items = seen.map((kind) => ({
       text: SearchPage.looks[kind].words,
       draw: (context, x, y) => this.dot(context, x, y, kind),
     }));
@@ -168,10 +184,14 @@ class SearchPage {
     return items;
   }
 
-  /** Ends of an axis around values; what is far below the best would flatten all else. */
+  /**
+   * Ends of an axis around values; what is far below the best would flatten all else.
+   * @param {number[]} values
+   * @param {boolean} moreIsBetter
+   */
   range(values, moreIsBetter) {
     const sorted = [...values].sort((a, b) => a - b);
-    let [low, high] = [sorted[0], sorted.at(-1)];
+    let [low, high] = [sorted[0], sorted[sorted.length - 1]];
     const [poor, good] = [0.4, 0.6].map((share) => sorted[Math.round(share * (sorted.length - 1))]);
     if (moreIsBetter) low = Math.max(low, poor - 1.5 * (high - poor));
     else high = Math.min(high, good + 1.5 * (good - low));
@@ -179,35 +199,37 @@ class SearchPage {
     return { low: low - room, high: high + room };
   }
 
+  /** @param {number} index */
   axisTitle(index) {
     const { words, unit } = this.page.objectives[index];
     return unit === '1' ? `${words} (%)` : `${words} (${unit})`;
   }
 
+  /** @param {Candidate} candidate @param {number} [index] */
   at(candidate, index = 0) {
     const { value } = candidate.figures[index];
     if (value === null) return null;
     return this.page.objectives[index].unit === '1' ? 100 * value : value;
   }
 
+  /** @param {SearchFactor} factor @param {number} index */
   flatness(factor, index) {
-    const place = (candidate) => {
-      const value = candidate.choice[index][1];
-      return factor.levels ? factor.levels.indexOf(value) : value;
-    };
-    const points = this.candidates
-      .map((each) => ({ each, x: place(each), y: this.at(each) }))
-      .filter(({ y }) => y !== null);
-    const numeric = !factor.levels || factor.levels.every((level) => typeof level === 'number');
-    const x =
-      factor.levels && !numeric
-        ? { low: -0.5, high: factor.levels.length - 0.5, labels: factor.levels.map(String), title: factor.words }
-        : {
-            low: factor.range ? factor.range[0] : Math.min(...factor.levels),
-            high: factor.range ? factor.range[1] : Math.max(...factor.levels),
-            title: `${factor.words}${factor.unit ? ` (${factor.unit})` : ''}`,
-          };
-    if (factor.levels && numeric) for (const point of points) point.x = factor.levels[point.x];
+    const levels = factor.levels?.every((level) => typeof level === 'number') ? null : factor.levels;
+    // Of numbers, the number itself; of other levels, which one it is.
+    const points = this.candidates.flatMap((each) => {
+      const [, value] = each.choice[index];
+      const y = this.at(each);
+      return y === null ? [] : [{ each, x: levels ? levels.indexOf(value) : Number(value), y }];
+    });
+    const ends = factor.range || (factor.levels || []).map(Number);
+    /** @type {AxisRange} */
+    const x = levels
+      ? { low: -0.5, high: levels.length - 0.5, labels: levels.map(String), title: factor.words }
+      : {
+          low: Math.min(...ends),
+          high: Math.max(...ends),
+          title: `${factor.words}${factor.unit ? ` (${factor.unit})` : ''}`,
+        };
     if (!x.labels) {
       const room = 0.03 * (x.high - x.low) || 1;
       x.low -= room;
@@ -223,6 +245,7 @@ class SearchPage {
     };
     // Only those with as many layouts as an evolution has: fewer flatter themselves.
     const least = Math.min(this.log.samples / 4, this.winner.cases);
+    /** @type {Map<number, (typeof points)[number]>} */
     const bins = new Map();
     for (const point of points) {
       if (point.each.cases < least) continue;
@@ -270,9 +293,10 @@ class SearchPage {
   }
 
   paretoFigure() {
-    const points = this.candidates
-      .map((each) => ({ each, x: this.at(each, 0), y: this.at(each, 1) }))
-      .filter(({ x, y }) => x !== null && y !== null);
+    const points = this.candidates.flatMap((each) => {
+      const [x, y] = [this.at(each, 0), this.at(each, 1)];
+      return x === null || y === null ? [] : [{ each, x, y }];
+    });
     const [first, second] = this.page.objectives;
     const x = {
       ...this.range(
@@ -307,13 +331,15 @@ class SearchPage {
         for (const point of members) context.lineTo(axes.px(point.x), axes.py(point.y));
         context.stroke();
         for (const member of this.front.values()) {
-          if (!member.fresh || member.fresh.some((estimate) => estimate.value === null)) continue;
-          const scale = (value, index) => (this.page.objectives[index].unit === '1' ? 100 * value : value);
-          const [a, b] = member.fresh.map((estimate, index) => ({
+          /** @param {number | null} value @param {number} index */
+          const scale = (value, index) =>
+            value !== null && this.page.objectives[index].unit === '1' ? 100 * value : value;
+          const [a, b] = (member.fresh || []).map((estimate, index) => ({
             at: scale(estimate.value, index),
-            low: estimate.interval.low === null ? null : scale(estimate.interval.low, index),
-            high: estimate.interval.high === null ? null : scale(estimate.interval.high, index),
+            low: scale(estimate.interval.low, index),
+            high: scale(estimate.interval.high, index),
           }));
+          if (!a || !b || a.at === null || b.at === null) continue;
           context.strokeStyle = '#0072b2';
           context.lineWidth = 1;
           context.beginPath();
@@ -333,6 +359,7 @@ class SearchPage {
 
   progressFigure() {
     let cases = 0;
+    /** @type {{ x: number, best: number, middle: number }[]} */
     const points = [];
     const better = this.page.objectives[0].moreIsBetter;
     for (const generation of this.log.generations) {
@@ -348,7 +375,6 @@ class SearchPage {
           x: cases,
           best: better ? Math.max(...values) : Math.min(...values),
           middle: values.sort((a, b) => a - b)[values.length >> 1],
-          purpose: generation.purpose,
         });
     }
     const x = { low: 0, high: Math.max(cases, 1), title: 'cases computed' };
@@ -359,6 +385,13 @@ class SearchPage {
       ),
       title: this.axisTitle(0),
     };
+    /**
+     * @param {Painter} context
+     * @param {Axes} axes
+     * @param {'best' | 'middle'} key
+     * @param {string} color
+     * @param {number[]} dash
+     */
     const line = (context, axes, key, color, dash) => {
       context.strokeStyle = color;
       context.setLineDash(dash);
@@ -375,6 +408,7 @@ class SearchPage {
         context.fill();
       }
     };
+    /** @param {string} text @param {string} color @param {number[]} dash @returns {Mark} */
     const key = (text, color, dash) => ({
       text,
       draw: (context, px, py) => {
@@ -412,8 +446,10 @@ class SearchPage {
 
   spentPanel() {
     const { log } = this;
+    /** @type {Map<string, number>} */
     const byPurpose = new Map();
     for (const { purpose, cases } of log.generations) byPurpose.set(purpose, (byPurpose.get(purpose) || 0) + cases);
+    /** @type {{ [purpose: string]: string }} */
     const words = {
       screening: 'first look over the ranges',
       evolution: 'evolution',
@@ -473,11 +509,13 @@ class SearchPage {
 
   candidateTable() {
     const better = this.page.objectives[0].moreIsBetter ? 1 : -1;
+    /** @param {Candidate} each */
     const order = (each) => (each.figures[0].value === null ? -Infinity : better * each.figures[0].value);
     const rows = [...this.candidates].sort((a, b) => b.cases - a.cases || order(b) - order(a)).slice(0, 200);
-    const kinds = {
-      ...Object.fromEntries(Object.entries(SearchPage.looks).map(([kind, { words }]) => [kind, words])),
-      other: '',
+    /** @param {Candidate} each */
+    const kind = (each) => {
+      const known = this.kindOf(each.id);
+      return known === 'other' ? '' : SearchPage.looks[known].words;
     };
     return NB.el(
       'div',
@@ -493,19 +531,18 @@ class SearchPage {
             title: factor.words,
             unit: factor.unit,
             numeric: !factor.levels,
-            cell: (each) => each.choice[index][1],
+            cell: (/** @type {Candidate} */ each) => each.choice[index][1],
           })),
           { title: 'Layouts', numeric: true, cell: (each) => each.cases },
           ...this.page.objectives.map((objective, index) => ({
             title: objective.words,
             numeric: true,
-            cell: (each) => this.figure(each.figures[index].value, index),
+            cell: (/** @type {Candidate} */ each) => this.figure(each.figures[index].value, index),
           })),
           { title: 'Works', numeric: true, cell: (each) => this.share(each.rate.value) },
           {
             title: '',
-            cell: (each) =>
-              kinds[this.kindOf(each.id)] || (this.undecided.has(each.id) ? 'dropped, may be as good' : ''),
+            cell: (each) => kind(each) || (this.undecided.has(each.id) ? 'dropped, may be as good' : ''),
           },
         ],
         rows,
