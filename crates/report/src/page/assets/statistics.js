@@ -8,41 +8,58 @@ NB.ROUNDING_MM = 1e-6;
 NB.MOST_CHOICES = 12;
 
 class Statistics {
+  /** @param {StudyPage} study */
   constructor(study) {
     this.study = study;
     this.page = study.page;
     this.summary = study.summary;
   }
 
-  /** A metric of the summary in words. */
+  /**
+   * A metric of the summary in words.
+   * @param {string} name
+   */
   metric(name) {
     const found = this.summary.metrics?.find((metric) => metric.name === name);
     return found ? this.study.titleOf(found) : NB.words(name);
   }
 
-  /** Whether a metric of the summary is nothing but rounding. */
+  /**
+   * Whether a metric of the summary is nothing but rounding.
+   * @param {string} name
+   */
   isExact(name) {
     const spreads = this.summary.spreads?.filter((each) => each.metric === name) || [];
     const known = spreads.flatMap((each) => each.quantiles.map((quantile) => quantile.value));
     return (
       this.summary.metrics?.find((metric) => metric.name === name)?.unit === 'mm' &&
       known.length > 0 &&
-      known.every((value) => Math.abs(value) < NB.ROUNDING_MM)
+      known.every((value) => Math.abs(value ?? 0) < NB.ROUNDING_MM)
     );
   }
 
+  /** @param {Interval} interval */
   percents({ low, high }) {
     return `${NB.fixed(100 * low, 1)} to ${NB.fixed(100 * high, 1)}`;
   }
 
-  /** A share of layouts with its interval. */
+  /**
+   * A share of layouts with its interval.
+   * @param {Rate | null | undefined} value
+   */
   rate(value) {
     if (!value || value.rate === null || value.rate === undefined) return '\u2013';
     return `${NB.fixed(100 * value.rate, 1)} %${value.interval ? ` (${this.percents(value.interval)})` : ''}`;
   }
 
-  /** A value of a study with its unit and its interval; shares are of 1. */
+  /**
+   * A value of a study with its unit and its interval; shares are of 1.
+   * @param {number | null | undefined} value
+   * @param {string} unit
+   * @param {Interval | null} [interval]
+   */
   text(value, unit, interval) {
+    /** @param {number} each */
     const one = (each) => (unit === '1' ? `${NB.fixed(100 * each, 1)} %` : NB.measured(each, unit));
     if (value === null || value === undefined) return '\u2013';
     if (!interval) return one(value);
@@ -75,13 +92,14 @@ class Statistics {
         : null,
       this.criteria(),
       NB.el('div', { class: 'pair' }, ...this.compared(), this.configurations()),
-    ].filter(Boolean);
+    ].filter((each) => each !== null);
   }
 
   /** Criteria with values, limits, verdicts and the requirements that they stand for. */
   criteria() {
     const { criteria = [] } = this.summary;
     if (!criteria.length) return null;
+    /** @param {StudyCriterion} c */
     const verdict = (c) => {
       const open = c.value === null || (c.confidence && c.interval === null);
       return NB.el('span', {
@@ -89,19 +107,32 @@ class Statistics {
         text: c.pass ? '\u2713 met' : open ? '? not judged' : '\u2717 missed',
       });
     };
+    /** @param {'of' | 'requirement' | 'choice'} key */
     const has = (key) => criteria.some((c) => c[key]);
+    /** @type {Column<StudyCriterion>[]} */
     const columns = [
       { title: 'Criterion', cell: (c) => NB.words(c.criterion.replace(/_mm$/, '')) },
       { title: 'Met', cell: verdict },
-      ...(has('of') ? [{ title: 'Of', cell: (c) => ({ best: 'best of each layout' })[c.of] || c.of || '' }] : []),
+      ...(has('of')
+        ? [
+            {
+              title: 'Of',
+              cell: (/** @type {StudyCriterion} */ c) => (c.of === 'best' ? 'best of each layout' : c.of || ''),
+            },
+          ]
+        : []),
       { title: 'Value (95 %)', numeric: true, cell: (c) => this.text(c.value, c.unit, c.interval) },
       {
         title: 'Limit',
         numeric: true,
         cell: (c) => `${c.criterion.startsWith('min') ? '\u2265' : '\u2264'} ${this.text(c.limit, c.unit)}`,
       },
-      ...(has('requirement') ? [{ title: 'Requirement', text: true, cell: (c) => c.requirement || '' }] : []),
-      ...(has('choice') ? [{ title: 'With the best choice', cell: (c) => c.choice || '' }] : []),
+      ...(has('requirement')
+        ? [{ title: 'Requirement', text: true, cell: (/** @type {StudyCriterion} */ c) => c.requirement || '' }]
+        : []),
+      ...(has('choice')
+        ? [{ title: 'With the best choice', cell: (/** @type {StudyCriterion} */ c) => c.choice || '' }]
+        : []),
       {
         title: 'What was judged',
         text: true,
@@ -123,9 +154,11 @@ class Statistics {
     return (this.summary.answer?.compared || []).map((compared, at) => this.levels(compared, at));
   }
 
+  /** @param {ChoiceRanking} ranking */
   choices({ choices, axes }) {
     const names = axes.map((axis) => NB.words(axis.name)).join(', ');
     const shown = choices.slice(0, NB.MOST_CHOICES);
+    /** @param {Choice} choice */
     const style = (choice) => (!choice.against_first?.distinguishable ? '#0072b2' : '#767676');
     const rows = shown.map((choice, at) => ({
       label: `${at + 1}. ${choice.label}`,
@@ -135,6 +168,7 @@ class Statistics {
       style: style(choice),
     }));
     const x = { low: 0, high: 100, title: 'layouts in which at least one configuration works (%)' };
+    /** @param {string} color @returns {Mark['draw']} */
     const dot = (color) => (context, a, b) => {
       context.fillStyle = color;
       context.beginPath();
@@ -158,10 +192,12 @@ class Statistics {
     return this.study.compared.element;
   }
 
+  /** @param {Interval | null | undefined} interval */
   scaled(interval) {
     return interval ? { low: 100 * interval.low, high: 100 * interval.high } : null;
   }
 
+  /** @param {ComparedLevels} compared @param {number} at */
   levels(compared, at) {
     const share = compared.unit === '1';
     const factor = share ? 100 : 1;
@@ -216,6 +252,7 @@ class Statistics {
     return this.study.strip.element;
   }
 
+  /** @param {number} c */
   counted(c) {
     const { count, invalid, outcomes, outcomeOf } = this.study;
     let [ok, of] = [0, 0];
@@ -230,68 +267,63 @@ class Statistics {
   /** All tables, folded but for what most readers look for. */
   sections() {
     const best = this.summary.of_choice ? `, with ${this.summary.of_choice.label}` : '';
-    const parts = [
-      [
-        'notes',
-        'What to keep in mind',
-        true,
-        (notes) =>
-          NB.el(
-            'ul',
-            { class: 'plain' },
-            notes.map((note) => NB.el('li', { text: String(note) })),
-          ),
-      ],
-      ['choices', 'All choices', true, (ranking) => this.choiceTable(ranking)],
-      ['replanned', 'What postures alone overstate', true, (found) => this.replanned(found)],
-      [
-        'overall',
-        `What became of the configurations${best}`,
-        true,
-        (overall) => [overall, ...(this.summary.goals || [])].map((counts) => this.outcomes(counts)),
-      ],
-      ['evidence', `Cases worth a look${best}`, true, (evidence) => this.evidence(evidence)],
-      ['spreads', `Quantiles${best}`, false, (spreads) => this.spreads(spreads)],
-      ['effects', `Which factor decides${best ? ', over all choices' : ''}`, false, (effects) => this.effects(effects)],
-      [
-        'regions',
-        `Best configuration by region${best ? ', over all choices' : ''}`,
-        false,
-        (regions) => this.regions(regions),
-      ],
-      ['robustness', 'How far the patient may move', false, (found) => this.robustness(found)],
-      [
-        'methods',
-        'How the numbers were found',
-        false,
-        (methods) =>
-          NB.table(
-            'Methods and their sources',
-            [
-              { title: 'Numbers', cell: (m) => m.numbers },
-              { title: 'Method', text: true, cell: (m) => m.method },
-              { title: 'Source', text: true, cell: (m) => m.source },
-            ],
-            methods,
-            { class: 'small' },
-          ),
-      ],
-    ];
-    const sections = parts
-      .filter(
-        ([key]) => this.summary[key] !== undefined && this.summary[key] !== null && this.summary[key].length !== 0,
-      )
-      .map(([key, title, open, make]) => NB.section(title, open, make(this.summary[key])));
+    /**
+     * A section of what there is.
+     * @template T
+     * @param {T | null | undefined} value
+     * @param {string} title
+     * @param {boolean} open
+     * @param {(value: T) => Child} make
+     */
+    const part = (value, title, open, make) => {
+      const isEmpty = value === null || value === undefined || (Array.isArray(value) && !value.length);
+      return isEmpty ? [] : [NB.section(title, open, make(value))];
+    };
+    const { summary } = this;
     return [
-      ...sections,
+      ...part(summary.notes, 'What to keep in mind', true, (notes) =>
+        NB.el(
+          'ul',
+          { class: 'plain' },
+          notes.map((note) => NB.el('li', { text: String(note) })),
+        ),
+      ),
+      ...part(summary.choices, 'All choices', true, (ranking) => this.choiceTable(ranking)),
+      ...part(summary.replanned, 'What postures alone overstate', true, (found) => this.replanned(found)),
+      ...part(summary.overall, `What became of the configurations${best}`, true, (overall) =>
+        [overall, ...(this.summary.goals || [])].map((counts) => this.outcomes(counts)),
+      ),
+      ...part(summary.evidence, `Cases worth a look${best}`, true, (evidence) => this.evidence(evidence)),
+      ...part(summary.spreads, `Quantiles${best}`, false, (spreads) => this.spreads(spreads)),
+      ...part(summary.effects, `Which factor decides${best ? ', over all choices' : ''}`, false, (effects) =>
+        this.effects(effects),
+      ),
+      ...part(summary.regions, `Best configuration by region${best ? ', over all choices' : ''}`, false, (regions) =>
+        this.regions(regions),
+      ),
+      ...part(summary.robustness, 'How far the patient may move', false, (found) => this.robustness(found)),
+      ...part(summary.methods, 'How the numbers were found', false, (methods) =>
+        NB.table(
+          'Methods and their sources',
+          [
+            { title: 'Numbers', cell: (m) => m.numbers },
+            { title: 'Method', text: true, cell: (m) => m.method },
+            { title: 'Source', text: true, cell: (m) => m.source },
+          ],
+          methods,
+          { class: 'small' },
+        ),
+      ),
       NB.section('What each number is', false, this.definitions()),
       NB.section('Where the numbers come from', false, this.provenance()),
     ];
   }
 
+  /** @param {ChoiceRanking} ranking */
   choiceTable({ choices, axes, working_configurations: k, ranked_by: by }) {
     const differs = choices.some((choice) => choice.invalid);
     const hasError = choices.some((choice) => Math.abs(choice.tip_error_mm?.value ?? 0) >= NB.ROUNDING_MM);
+    /** @param {Quantile | null} found */
     const quantile = (found) =>
       found
         ? NB.el('span', {
@@ -301,6 +333,7 @@ class Statistics {
             text: NB.threeDigits(found.value),
           })
         : '\u2013';
+    /** @param {Choice} choice */
     const against = ({ against_first: found }) => {
       if (!found) return '';
       if (!found.distinguishable) return 'not told apart';
@@ -331,10 +364,19 @@ class Statistics {
             help: '5 % of the layouts that work have less clearance, with the best configuration of each',
           },
           ...(hasError
-            ? [{ title: 'Tip error, median', unit: 'mm', numeric: true, cell: (c) => quantile(c.tip_error_mm) }]
+            ? [
+                {
+                  title: 'Tip error, median',
+                  unit: 'mm',
+                  numeric: true,
+                  cell: (/** @type {Choice} */ c) => quantile(c.tip_error_mm),
+                },
+              ]
             : []),
           { title: 'Cases', numeric: true, cell: (c) => NB.grouped(c.cases) },
-          ...(differs ? [{ title: 'Cannot exist', numeric: true, cell: (c) => NB.grouped(c.invalid) }] : []),
+          ...(differs
+            ? [{ title: 'Cannot exist', numeric: true, cell: (/** @type {Choice} */ c) => NB.grouped(c.invalid) }]
+            : []),
           { title: 'None works in', cell: (c) => this.study.caseButtons((c.failing || []).slice(0, 5)) },
         ],
         shown,
@@ -349,6 +391,7 @@ class Statistics {
     ];
   }
 
+  /** @param {Replanned} replanned */
   replanned({ cases, of, gaps }) {
     return NB.table(
       `${cases} of ${NB.grouped(of)} static cases, drawn at random, with their motions planned too`,
@@ -369,7 +412,9 @@ class Statistics {
     );
   }
 
+  /** @param {Counts} counts */
   outcomes(counts) {
+    /** @param {ConfigurationCounts} c */
     const why = (c) =>
       (c.details || [])
         .slice(0, 3)
@@ -399,18 +444,25 @@ class Statistics {
     );
   }
 
-  /** Why a configuration does not work, in words. */
+  /**
+   * Why a configuration does not work, in words.
+   * @param {{ detail: string }} found
+   */
   reason({ detail }) {
     const known = this.page.outcomeNames.find(([, name]) => name === detail);
     return known ? known[2] : NB.words(detail);
   }
 
-  /** A table for each number that is no rounding. */
+  /**
+   * A table for each number that is no rounding.
+   * @param {Spread[]} spreads
+   */
   spreads(spreads) {
     const shares = [...new Set(spreads.flatMap((each) => each.quantiles.map((quantile) => quantile.p)))].sort(
       (a, b) => a - b,
     );
     const names = [...new Set(spreads.map((each) => each.metric))].filter((name) => !this.isExact(name));
+    /** @param {Quantile | undefined} found */
     const cell = (found) => {
       if (!found) return '';
       const interval = found.interval
@@ -429,13 +481,13 @@ class Statistics {
       NB.table(
         `${this.metric(name)}: quantiles, with their 95 % intervals below`,
         [
-          { title: 'Of', cell: (s) => ({ best: 'best of each layout' })[s.of] || s.of },
+          { title: 'Of', cell: (s) => (s.of === 'best' ? 'best of each layout' : s.of) },
           { title: 'Layouts', numeric: true, cell: (s) => NB.grouped(s.count) },
           { title: 'Mean', numeric: true, cell: (s) => NB.threeDigits(s.mean) },
           ...shares.map((p) => ({
             title: p === 0 ? 'least' : p === 1 ? 'largest' : `${NB.significant(100 * p)} %`,
             numeric: true,
-            cell: (s) => cell(s.quantiles.find((quantile) => quantile.p === p)),
+            cell: (/** @type {Spread} */ s) => cell(s.quantiles.find((quantile) => quantile.p === p)),
           })),
         ],
         spreads.filter((each) => each.metric === name),
@@ -444,18 +496,22 @@ class Statistics {
     );
   }
 
+  /** @param {Effects} effects */
   effects(effects) {
+    /** @type {{ [response: string]: string }} */
     const words = {
       any_works: 'Whether any configuration works',
       working: 'How many configurations work',
       best_clearance_mm: 'Clearance of the best configuration (mm)',
       least_tip_error_mm: 'Least tip error of those that work (mm)',
     };
+    /** @param {string} name */
     const title = (name) =>
       words[name] || (name.startsWith('success ') ? `Whether ${name.slice(8)} works` : NB.words(name));
     const shown = effects.responses.filter(
       (response) => !(response.response.endsWith('_mm') && Math.abs(response.mean ?? 0) < NB.ROUNDING_MM),
     );
+    /** @param {Effects['responses'][number]['main'][number]} m */
     const share = (m) =>
       m.share === null ? '\u2013' : m.share <= (m.noise ?? 0) ? 'as chance' : NB.fixed(100 * m.share, 1);
     return shown.map((response) =>
@@ -497,6 +553,7 @@ class Statistics {
     );
   }
 
+  /** @param {Regions} regions */
   regions(regions) {
     return regions.maps
       .filter((map) => map.axes.length === 1)
@@ -524,13 +581,18 @@ class Statistics {
       });
   }
 
-  /** Smallest moves of the patient that break a configuration, no bounds. */
+  /**
+   * Smallest moves of the patient that break a configuration, no bounds.
+   * @param {RobustnessResult[]} results
+   */
   robustness(results) {
+    /** @param {SmallestFound | null | undefined} found */
     const radius = (found) => {
       if (!found) return '\u2013';
       const text = found.found ? NB.fixed(found.found.radius, 1) : `none to ${NB.significant(found.limit)}`;
       return `${text}${found.impossible ? '*' : ''}${found.settled ? '' : '?'}`;
     };
+    /** @param {RobustnessResult} result */
     const why = ({ shift, tilt }) => NB.words((shift.found || tilt.found)?.detail || '');
     return [
       NB.table(
@@ -559,6 +621,7 @@ class Statistics {
   /** What each number of a case is, and how fine it is kept here. */
   definitions() {
     const { metrics, exact, factors } = this.study;
+    /** @type {{ words: string, unit: string, text: string, step?: number }[]} */
     const rows = [
       { words: 'works', unit: '', text: 'the configuration breaks no rule and misses no criterion of the scenario' },
       { words: 'layout', unit: '', text: 'a case that can exist: where everything stands, with one goal' },
@@ -604,6 +667,7 @@ class Statistics {
     const { study_id: id, sampling, repeats } = this.summary;
     const { provenance = {}, inputs = {}, seed } = manifest || {};
     const files = Object.entries(inputs);
+    /** @type {[name: string, value: string | number | null | undefined][]} */
     const facts = [
       [
         'program',
@@ -648,10 +712,15 @@ class Statistics {
     );
   }
 
-  /** The cases that show what goes wrong, of the best configuration first. */
+  /**
+   * The cases that show what goes wrong, of the best configuration first.
+   * @param {Evidence} evidence
+   */
   evidence({ invalid = [], fewer_than: fewer = [], configurations = [] }) {
+    /** @param {string} text @param {number[]} cases */
     const line = (text, cases) =>
       cases.length ? [NB.el('p', { class: 'small', text }), this.study.caseButtons(cases)] : [];
+    /** @param {CasesOf} each */
     const worst = (each) =>
       each.worst
         .filter(({ metric }) => !this.isExact(metric))
@@ -661,6 +730,7 @@ class Statistics {
             cases.map((found) => found.case),
           ),
         );
+    /** @param {CasesOf} each */
     const of = (each) => [...line('does not work, first cases', each.not_ok || []), ...worst(each)];
     const best = configurations.find((each) => each.of === 'best');
     const others = configurations.filter((each) => each.of !== 'best');
@@ -690,7 +760,7 @@ NB.trend = (values) => {
     role: 'img',
     'aria-label': values.map((value) => NB.threeDigits(value)).join(', '),
   });
-  const context = canvas.getContext('2d');
+  const context = NB.context(canvas);
   const known = values.filter((value) => value !== null);
   const [low, high] = [Math.min(...known), Math.max(...known)];
   context.strokeStyle = '#0072b2';

@@ -2,12 +2,33 @@
 'use strict';
 
 class StudyPage extends StudyPlots {
+  /** @type {AddressChoices} */ asked;
+  /** @type {HTMLElement} */ tip;
+  /** @type {Statistics} */ statistics;
+  /** @type {HTMLElement} */ casePanel;
+  /** @type {HTMLElement} */ cellPanel;
+  /** @type {CaseScene | null} */ scene;
+  /** @type {View | undefined} */ view;
+  /** @type {[control: Labelled<HTMLSelectElement>, value: () => string][]} */ kept;
+  /** @type {HTMLElement | null} */ metricSelect;
+  /** @type {Figure} */ map;
+  /** @type {Figure} */ scatter;
+  /** @type {Figure} */ ecdf;
+  /** @type {Figure} */ histogram;
+  // Of the statistics.
+  /** @type {Figure | undefined} */ compared;
+  /** @type {Figure} */ strip;
+  /** @type {HTMLElement | undefined} */ shown;
+
+  /** @param {StudyDocument} page @param {HTMLElement} app */
   constructor(page, app) {
     super();
     this.page = page;
+    /** @type {StudySummary} */
     this.summary = page.summary || {};
     this.count = page.kept;
     // Goals have names for files.
+    /** @param {StudyFactor} factor */
     const levels = (factor) =>
       factor.name === 'goal' && factor.levels
         ? factor.levels.map((level) => ({ ...level, label: NB.words(level.label) }))
@@ -38,6 +59,7 @@ class StudyPage extends StudyPlots {
     this.build(app);
   }
 
+  /** @param {string | undefined} name */
   metric(name) {
     return this.metrics.find((metric) => metric.name === name);
   }
@@ -68,10 +90,12 @@ class StudyPage extends StudyPlots {
     }
   }
 
+  /** @param {number} index */
   caseOf(index) {
     return this.numbers ? this.numbers[index] : index;
   }
 
+  /** @param {number} number */
   indexOf(number) {
     if (!this.numbers) return number >= 0 && number < this.count ? number : -1;
     let [low, high] = [0, this.count - 1];
@@ -95,7 +119,7 @@ class StudyPage extends StudyPlots {
       'div',
       { class: 'bar' },
       criteria.length || open.length
-        ? NB.verdict(verdict)
+        ? NB.verdict(String(verdict))
         : NB.el('span', { class: 'chip off', text: 'no criteria: nothing is judged' }),
       open.length ? NB.el('span', { class: 'error', text: `not judged: ${open.join('; ')}` }) : null,
       this.posturesChip(),
@@ -118,12 +142,12 @@ class StudyPage extends StudyPlots {
 
   /** That nothing is known of motions, to stand beside figures. */
   posturesChip() {
-    const text = { all: 'postures only: no motion is planned', some: 'some cases are postures only' }[
-      this.summary.postures_only
-    ];
+    const words = { all: 'postures only: no motion is planned', some: 'some cases are postures only', none: '' };
+    const text = words[this.summary.postures_only || 'none'];
     return text ? NB.el('span', { class: 'chip bad', text, title: this.summary.headline || null }) : null;
   }
 
+  /** @param {HTMLElement} app */
   build(app) {
     this.axesOf = this.factors.map((factor, index) => this.axis(factor, index));
     this.state = this.startState();
@@ -133,13 +157,14 @@ class StudyPage extends StudyPlots {
     const map = this.figureOfMap();
     this.makeFigures();
     this.casePanel = NB.el('div', { class: 'panel' });
-    this.scene = this.page.scene ? new CaseScene(this.page) : null;
+    const { scene, looks } = this.page;
+    this.scene = scene && looks ? new CaseScene(scene, looks) : null;
     this.view = this.scene?.view;
     app.append(
       ...this.statistics.first(),
       NB.el('h2', { class: 'part', text: 'Look into the cases' }),
       this.controls(),
-      this.shown,
+      ...NB.present([this.shown]),
       NB.el(
         'div',
         { class: 'explore' },
@@ -170,6 +195,7 @@ class StudyPage extends StudyPlots {
     const varying = [...this.factors.keys()].filter(
       (index) => !this.factors[index].levels || this.factors[index].levels.length > 1,
     );
+    /** @param {number} index */
     const isNumber = (index) =>
       !this.factors[index].levels || this.factors[index].levels.every((level) => level.number !== null);
     const chosen = varying.filter((index) => this.factors[index].role === 'choice' && isNumber(index));
@@ -183,8 +209,8 @@ class StudyPage extends StudyPlots {
       metric: (this.metrics.find((metric) => metric.measure === 'clearance') || this.metrics[0])?.name,
       filters: new Map(),
     };
-    const best = this.summary.choices?.choices?.[0];
-    (best ? this.summary.choices.axes : []).forEach((axis, at) => {
+    const { choices: [best] = [], axes = [] } = this.summary.choices || {};
+    (best ? axes : []).forEach((axis, at) => {
       const factor = this.factors[axis.factor];
       if (factor.levels && !axis.coarse && axis.factor !== state.x && axis.factor !== state.y)
         state.filters.set(axis.factor, best.bins[at]);
@@ -192,13 +218,17 @@ class StudyPage extends StudyPlots {
     return this.withAddress(state);
   }
 
-  /** A state with what the address says of it. */
+  /**
+   * A state with what the address says of it.
+   * @param {StudyState} state
+   */
   withAddress(state) {
+    /** @param {string} name */
     const named = (name) => this.factors.findIndex((factor) => factor.name === name);
     const of = this.page.configurations.indexOf(this.asked.of);
     if (of >= 0) state.configuration = of;
     if (this.asked.of === 'best') state.configuration = -1;
-    for (const axis of ['x', 'y']) {
+    for (const axis of /** @type {const} */ (['x', 'y'])) {
       const at = named(this.asked[axis]);
       if (at >= 0) state[axis] = at;
     }
@@ -217,8 +247,9 @@ class StudyPage extends StudyPlots {
   /** Writes what is shown into the address. */
   remember() {
     const { x, y, color, configuration, metric, filters } = this.state;
+    /** @type {{ [name: string]: string | number | undefined }} */
     const words = {
-      case: this.caseOf(this.chosen),
+      case: this.caseOf(this.chosen ?? 0),
       x: this.factors[x].name,
       y: this.factors[y].name,
       colour: color,
@@ -227,16 +258,19 @@ class StudyPage extends StudyPlots {
     };
     this.factors.forEach((factor, index) => {
       if (factor.levels && factor.levels.length > 1)
-        words[`with.${factor.name}`] = filters.has(index) ? factor.levels[filters.get(index)].label : 'all';
+        words[`with.${factor.name}`] = factor.levels[filters.get(index) ?? -1]?.label ?? 'all';
     });
     NB.address.write(words);
   }
 
-  /** Shows what an address that was typed or gone back to asks for. */
+  /**
+   * Shows what an address that was typed or gone back to asks for.
+   * @param {AddressChoices} choices
+   */
   follow(choices) {
     this.asked = choices;
     this.state = this.withAddress(this.state);
-    for (const [control, value] of this.kept) control.querySelector('select').value = value();
+    for (const [control, value] of this.kept) control.control.value = value();
     this.filter();
     this.redraw();
     const index = this.indexOf(Number(this.asked.case ?? NaN));
@@ -244,13 +278,16 @@ class StudyPage extends StudyPlots {
   }
 
   controls() {
-    const options = this.factors
-      .map((factor, index) => [String(index), factor.words])
-      .filter(([index]) => !this.factors[index].levels || this.factors[index].levels.length > 1);
+    /** @type {[key: string, text: string][]} */
+    const options = this.factors.flatMap((factor, index) =>
+      !factor.levels || factor.levels.length > 1 ? [[String(index), factor.words]] : [],
+    );
+    /** @type {[key: string, text: string][]} */
     const configurations = [
       ['-1', 'best of each layout'],
-      ...this.page.configurations.map((label, index) => [String(index), label]),
+      ...this.page.configurations.map((label, index) => /** @type {[string, string]} */ ([String(index), label])),
     ];
+    /** @type {[key: string, text: string][]} */
     const colors = [
       ['outcome', 'what became of it'],
       ['best', 'best configuration'],
@@ -258,6 +295,12 @@ class StudyPage extends StudyPlots {
       ...this.metricOptions(),
     ];
     this.kept = [];
+    /**
+     * @param {string} label
+     * @param {[key: string, text: string][]} choices
+     * @param {() => string} value
+     * @param {(chosen: string) => void} set
+     */
     const select = (label, choices, value, set) => {
       const control = NB.select(label, choices, value(), (chosen) => {
         set(chosen);
@@ -273,7 +316,10 @@ class StudyPage extends StudyPlots {
       factor.levels && factor.levels.length > 1
         ? select(
             `${factor.words}:`,
-            [['', 'all'], ...factor.levels.map((level, at) => [String(at), level.label])],
+            [
+              ['', 'all'],
+              ...factor.levels.map((level, at) => /** @type {[string, string]} */ ([String(at), level.label])),
+            ],
             () => String(this.state.filters.get(index) ?? ''),
             (value) => {
               if (value === '') state.filters.delete(index);
@@ -286,7 +332,7 @@ class StudyPage extends StudyPlots {
       ? select(
           'number',
           this.metricOptions(),
-          () => this.state.metric,
+          () => this.state.metric ?? '',
           (value) => {
             state.metric = value;
           },
@@ -331,6 +377,7 @@ class StudyPage extends StudyPlots {
     );
   }
 
+  /** @returns {[key: string, text: string][]} */
   metricOptions() {
     return this.metrics.map((metric) => [metric.name, this.titleOf(metric)]);
   }
@@ -349,42 +396,34 @@ class StudyPage extends StudyPlots {
   }
 
   makeFigures() {
-    const figure = (which, title, help, label, height, paint) => {
-      this[which] = new Figure({
-        name: `${this.page.name}-${which}`,
-        title,
-        help,
-        label,
-        height,
-        paint,
-        legend: () => this[`${which}Items`] || [],
-      });
-    };
-    figure(
-      'scatter',
-      'Cases',
-      'Each mark is a place, of one case or of several: click it for its cases, or go through the numbers beside ' +
+    this.scatter = new Figure({
+      name: `${this.page.name}-scatter`,
+      title: 'Cases',
+      help:
+        'Each mark is a place, of one case or of several: click it for its cases, or go through the numbers beside ' +
         'it with the arrow keys.',
-      'Scatter of the cases over two factors',
-      400,
-      (...all) => this.paintScatter(...all),
-    );
-    figure(
-      'ecdf',
-      'Share of layouts below',
-      'Of the layouts in which the configuration is not rejected. Click a curve for the case at that value.',
-      'Share of layouts below a value, configuration by configuration',
-      300,
-      (...all) => this.paintEcdf(...all),
-    );
-    figure(
-      'histogram',
-      'Histogram',
-      'Of the configuration chosen above, where it is not rejected; of the best, where any works.',
-      'Histogram of a number',
-      300,
-      (...all) => this.paintHistogram(...all),
-    );
+      label: 'Scatter of the cases over two factors',
+      height: 400,
+      paint: (...all) => this.paintScatter(...all),
+      legend: () => this.scatterItems || [],
+    });
+    this.ecdf = new Figure({
+      name: `${this.page.name}-ecdf`,
+      title: 'Share of layouts below',
+      help: 'Of the layouts in which the configuration is not rejected. Click a curve for the case at that value.',
+      label: 'Share of layouts below a value, configuration by configuration',
+      height: 300,
+      paint: (...all) => this.paintEcdf(...all),
+      legend: () => this.ecdfItems || [],
+    });
+    this.histogram = new Figure({
+      name: `${this.page.name}-histogram`,
+      title: 'Histogram',
+      help: 'Of the configuration chosen above, where it is not rejected; of the best, where any works.',
+      label: 'Histogram of a number',
+      height: 300,
+      paint: (...all) => this.paintHistogram(...all),
+    });
     this.shown = NB.el('p', { class: 'soft', role: 'status' });
     this.showCount();
     this.cellPanel = NB.el('div');
@@ -401,12 +440,18 @@ class StudyPage extends StudyPlots {
     return index >= 0 ? index : NaN;
   }
 
+  /** @param {{ words: string, unit: string }} metric */
   titleOf(metric) {
     const unit = { um: '\u00b5m', 'm^3': 'm\u00b3', 1: '' }[metric.unit] ?? metric.unit;
     return `${metric.words}${unit ? ` (${unit})` : ''}`;
   }
 
-  /** Range, title and bins of a factor. */
+  /**
+   * Range, title and bins of a factor.
+   * @param {ShownFactor} factor
+   * @param {number} salt
+   * @returns {StudyAxis}
+   */
   axis(factor, salt) {
     const title = `${factor.words}${factor.unit ? ` (${factor.unit})` : ''}`;
     if (factor.levels) {
@@ -426,6 +471,7 @@ class StudyPage extends StudyPlots {
     return { low, high, title, labels: null, bins, salt };
   }
 
+  /** @param {StudyAxis} axis @param {ShownFactor} factor @param {number} index */
   bin(axis, factor, index) {
     const value = factor.values[index];
     if (axis.labels) return value;
@@ -441,12 +487,13 @@ class StudyPage extends StudyPlots {
     this.indices = Uint32Array.from(indices);
     this.sorted = null;
     this.placed = null;
-    if (this.shown) this.showCount();
+    this.showCount();
   }
 
   showCount() {
+    if (!this.shown) return;
     const only = [...this.state.filters].map(
-      ([factor, level]) => `${this.factors[factor].words} ${this.factors[factor].levels[level].label}`,
+      ([factor, level]) => `${this.factors[factor].words} ${this.factors[factor].levels?.[level].label}`,
     );
     const postures =
       this.summary.postures_only === 'all' ? ' Postures only: whether a motion gets there is not known.' : '';
@@ -459,20 +506,29 @@ class StudyPage extends StudyPlots {
     for (const figure of [this.scatter, this.map, this.ecdf, this.histogram]) figure.draw();
   }
 
-  /** Row of the chosen configuration in a case; -1 where none works. */
+  /**
+   * Row of the chosen configuration in a case; -1 where none works.
+   * @param {number} index
+   */
   row(index) {
     const c = this.state.configuration < 0 ? this.best[index] : this.state.configuration;
     return c < 0 ? -1 : c * this.count + index;
   }
 
+  /** @param {number} index */
   outcome(index) {
     if (this.invalid[index]) return 'invalid';
     if (this.state.configuration < 0) return this.working[index] ? 'ok' : 'none works';
     return this.outcomeOf[this.outcomes[this.state.configuration * this.count + index]];
   }
 
-  /** Pointer: `find` gives `{ text, choose }`. */
+  /**
+   * Pointer: `find` gives `{ text, choose }`.
+   * @param {Canvas} canvas
+   * @param {(x: number, y: number) => { text: string, choose(): void } | null} find
+   */
   listen(canvas, find) {
+    /** @param {MouseEvent} event */
     const at = (event) => {
       const box = canvas.canvas.getBoundingClientRect();
       return find(event.clientX - box.left, event.clientY - box.top);
@@ -492,6 +548,7 @@ class StudyPage extends StudyPlots {
     canvas.canvas.addEventListener('click', (event) => at(event)?.choose());
   }
 
+  /** @param {number} x @param {number} y */
   nearestPlace(x, y) {
     const axes = this.scatterAxes;
     if (!axes) return null;
@@ -522,6 +579,7 @@ class StudyPage extends StudyPlots {
     };
   }
 
+  /** @param {number} px @param {number} py */
   nearestOnCurve(px, py) {
     const axes = this.ecdfAxes;
     const metric = this.metric(this.state.metric);
@@ -557,6 +615,7 @@ class StudyPage extends StudyPlots {
     };
   }
 
+  /** @param {number} x @param {number} y */
   cellAt(x, y) {
     if (!this.mapCells) return null;
     const { axes, nx, ny, ok, of } = this.mapCells;
@@ -572,6 +631,7 @@ class StudyPage extends StudyPlots {
     };
   }
 
+  /** @param {number} cx @param {number} cy */
   listCell(cx, cy) {
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
@@ -583,7 +643,11 @@ class StudyPage extends StudyPlots {
     );
   }
 
-  /** The first cases of a place or a cell, those that do not work first. */
+  /**
+   * The first cases of a place or a cell, those that do not work first.
+   * @param {number[]} inside
+   * @param {string} where
+   */
   list(inside, where) {
     inside.sort((a, b) => Number(this.outcome(a) === 'ok') - Number(this.outcome(b) === 'ok') || a - b);
     NB.clear(
@@ -597,6 +661,7 @@ class StudyPage extends StudyPlots {
     if (inside.length) this.choose(inside[0]);
   }
 
+  /** @param {number[]} numbers */
   caseButtons(numbers) {
     const buttons = numbers.map((number) => {
       const index = this.indexOf(number);
@@ -615,7 +680,7 @@ class StudyPage extends StudyPlots {
     });
     for (const [at, button] of buttons.entries()) {
       button.addEventListener('keydown', (event) => {
-        const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+        const step = NB.ARROWS[event.key];
         const next = step && buttons[at + step];
         if (!next || next.disabled) return;
         event.preventDefault();
@@ -626,12 +691,14 @@ class StudyPage extends StudyPlots {
     return NB.el('div', { class: 'legend', role: 'group', 'aria-label': 'Cases' }, buttons);
   }
 
+  /** @param {number} index @param {number | null} [configuration] */
   choose(index, configuration = null) {
     this.chosen = index;
     this.scatter.draw();
     const number = this.caseOf(index);
     const row =
       configuration ?? (this.state.configuration >= 0 ? this.state.configuration : Math.max(this.best[index], 0));
+    /** @type {Column<number>[]} */
     const columns = [
       { title: 'Configuration', cell: (c) => this.page.configurations[c] },
       { title: 'Outcome', cell: (c) => this.outcomeText(index, c) },
@@ -639,11 +706,11 @@ class StudyPage extends StudyPlots {
         title: this.titleOf(metric),
         numeric: true,
         help: metric.description,
-        cell: (c) => NB.threeDigits(metric.values[c * this.count + index]),
+        cell: (/** @type {number} */ c) => NB.threeDigits(metric.values[c * this.count + index]),
       })),
     ];
     const table = NB.table('Row: show its posture', columns, [0, 1, 2, 3, 4, 5, 6, 7], { class: 'choose small full' });
-    const rows = [...table.querySelectorAll('tbody tr')];
+    const rows = NB.tableRows(table);
     NB.rows(rows, (c) => {
       NB.mark(rows, c);
       this.pose(index, c);
@@ -698,6 +765,7 @@ class StudyPage extends StudyPlots {
     if (this.started) this.remember();
   }
 
+  /** @param {number} index @param {number} c */
   outcomeText(index, c) {
     const [outcome, , words] = this.page.outcomeNames[this.outcomes[c * this.count + index]];
     const style = { ok: 'good', failed: 'bad', rejected: 'off', invalid: 'off' }[outcome];
@@ -709,6 +777,7 @@ class StudyPage extends StudyPlots {
     ];
   }
 
+  /** @param {string} text @param {HTMLElement} status */
   async copy(text, status) {
     try {
       await navigator.clipboard.writeText(text);
@@ -718,7 +787,11 @@ class StudyPage extends StudyPlots {
     }
   }
 
-  /** The posture of a row, where it is on the page. */
+  /**
+   * The posture of a row, where it is on the page.
+   * @param {number} index
+   * @param {number} c
+   */
   pose(index, c) {
     if (!this.scene) return;
     const at = this.posed.get(index);

@@ -2,20 +2,22 @@
 'use strict';
 
 class CaseScene {
-  /** `page` is the document; its `looks` say which tool and which things each posed case has, and where. */
-  constructor(page) {
-    const { scene, looks } = page;
-    this.page = page;
+  /** @type {[at: number | undefined, joints: number[] | null, title: string]} */ last;
+
+  /**
+   * `looks` say which tool and which things each posed case has, and where.
+   * @param {Scene} scene
+   * @param {Looks} looks
+   */
+  constructor(scene, looks) {
+    this.scene = scene;
     this.looks = looks;
-    const codes = (name) => NB.array(looks[name]);
-    [this.arms, this.toolOf, this.thingCodes, this.places, this.bases, this.targets] = [
-      'arms',
-      'toolOf',
-      'things',
-      'places',
-      'bases',
-      'targets',
-    ].map(codes);
+    this.arms = NB.array(looks.arms);
+    this.toolOf = NB.array(looks.toolOf);
+    this.thingCodes = NB.array(looks.things);
+    this.places = NB.array(looks.places);
+    this.bases = NB.array(looks.bases);
+    this.targets = NB.array(looks.targets);
     // Every tool is fixed to the flange; that of the case alone is seen.
     const tools = looks.tools.flatMap((tool, at) => tool.parts.map((part) => ({ ...part, group: `tool@${at}` })));
     this.view = new View({ ...scene, parts: [...scene.parts, ...tools] }, 'Posture of the chosen configuration');
@@ -36,17 +38,25 @@ class CaseScene {
       ),
       this.note,
     );
+    /** @type {Map<string, THREE.Group>} */
     this.made = new Map();
+    this.missing = 0;
   }
 
   again() {
     if (this.last) this.show(...this.last);
   }
 
-  /** `at` is the place of the case among the posed ones, none of one without postures; joints in radians. */
-  show(at, joints, title, about = null) {
-    this.last = [at, joints, title, about];
-    const has = Boolean(joints) && joints.every((value) => !Number.isNaN(value));
+  /**
+   * `at` is the place of the case among the posed ones, none of one without postures; joints in radians.
+   * @param {number | undefined} at
+   * @param {number[] | null} joints
+   * @param {string} title
+   */
+  show(at, joints, title) {
+    this.last = [at, joints, title];
+    const posed = joints?.every((value) => !Number.isNaN(value)) ? joints : null;
+    const has = Boolean(posed);
     const known = at !== undefined && !Number.isNaN(this.bases[7 * at]);
     const own = known && this.arms[at] === 1;
     const tool = known ? this.toolOf[at] : 255;
@@ -57,14 +67,15 @@ class CaseScene {
     this.arm.show(has && own);
     this.view.empty('needle');
     this.missing = 0;
-    this.things(at, known);
-    if (has && own) this.posture(at, joints, hasTool ? tool : null);
+    this.things(known ? at : undefined);
+    if (posed && own) this.posture(at, posed, hasTool ? tool : null);
     if (known && !this.framed) this.frame(at);
     this.view.draw();
   }
 
+  /** @param {number} at @param {number[]} joints @param {number | null} tool */
   posture(at, joints, tool) {
-    const chain = { ...this.page.scene.chain, base: Array.from(this.bases.subarray(7 * at, 7 * at + 7)) };
+    const chain = { ...this.scene.chain, base: Array.from(this.bases.subarray(7 * at, 7 * at + 7)) };
     this.arm.pose(chain, joints);
     if (tool === null) return;
     const flange = NB.forward(chain, joints)[6];
@@ -78,11 +89,14 @@ class CaseScene {
     if (!Number.isNaN(target[0])) this.view.ball('needle', target, 0.004, [0.84, 0.37, 0, 1], true);
   }
 
-  /** The things of a case, each where it stands in it. */
-  things(at, known) {
+  /**
+   * The things of a case, each where it stands in it.
+   * @param {number | undefined} at
+   */
+  things(at) {
     const { slots, kinds } = this.looks;
     for (const group of this.made.values()) group.visible = false;
-    if (!known) return;
+    if (at === undefined) return;
     for (let slot = 0; slot < slots; slot++) {
       const kind = this.thingCodes[slots * at + slot];
       if (kind === 254) continue;
@@ -95,8 +109,8 @@ class CaseScene {
       group.matrix.copy(NB.matrix(this.places.subarray(7 * (slots * at + slot), 7 * (slots * at + slot) + 7)));
       group.matrixWorldNeedsUpdate = true;
       for (const mesh of group.children) {
-        const hidden = { gantry: this.gantry, skin: this.skin }[mesh.name];
-        mesh.visible = !hidden || hidden.querySelector('input').checked;
+        const hidden = mesh.name === 'gantry' ? this.gantry : mesh.name === 'skin' ? this.skin : null;
+        mesh.visible = !hidden || hidden.control.checked;
       }
     }
     if (this.missing)
@@ -105,11 +119,16 @@ class CaseScene {
         'drawn.';
   }
 
-  /** The surfaces of a kind in a slot, made when they are first seen. */
+  /**
+   * The surfaces of a kind in a slot, made when they are first seen.
+   * @param {number} slot
+   * @param {number} kind
+   */
   thing(slot, kind) {
     const key = `${slot}:${kind}`;
-    if (!this.made.has(key)) {
-      const group = new THREE.Group();
+    let group = this.made.get(key);
+    if (!group) {
+      group = new THREE.Group();
       group.matrixAutoUpdate = false;
       for (const part of this.looks.kinds[kind]) {
         const mesh = this.view.surface(part.surface, part.color);
@@ -120,10 +139,13 @@ class CaseScene {
       this.view.add('things', group);
       this.made.set(key, group);
     }
-    return this.made.get(key);
+    return group;
   }
 
-  /** Looks at arm and target from where the robot's side is seen. */
+  /**
+   * Looks at arm and target from where the robot's side is seen.
+   * @param {number} at
+   */
   frame(at) {
     this.framed = true;
     const base = Array.from(this.bases.subarray(7 * at, 7 * at + 7));
@@ -135,6 +157,11 @@ class CaseScene {
     );
   }
 
+  /**
+   * @param {number | undefined} at
+   * @param {string} title
+   * @param {{ has: boolean, known: boolean, own: boolean, hasTool: boolean }} what
+   */
   words(at, title, { has, known, own, hasTool }) {
     if (at === undefined)
       return (

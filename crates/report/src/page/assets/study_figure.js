@@ -6,8 +6,13 @@
  * `paint(context, width, height)` draws it, `height` is a number or a function of the width; `legend()` gives
  * `{ text, draw(context, x, y) }`, or `{ low, high, text, color(share) }` of a scale. */
 class Figure {
+  /** @param {FigureOptions} options */
   constructor({ name, title, help, label, height, paint, legend }) {
-    Object.assign(this, { name, title, label, height, paint, legend });
+    this.name = name;
+    this.title = title;
+    this.height = height;
+    this.paint = paint;
+    this.legend = legend;
     this.legendElement = NB.el('div', { class: 'legend' });
     this.canvas = new Canvas(this.heightAt(700), label || title, (context, width, all) => {
       paint(context, width, all);
@@ -30,6 +35,7 @@ class Figure {
     }
   }
 
+  /** @param {number} width */
   heightAt(width) {
     return typeof this.height === 'function' ? this.height(width) : this.height;
   }
@@ -52,7 +58,7 @@ class Figure {
       this.legendElement,
       items.map((item) => {
         const canvas = NB.el('canvas', { width: item.color ? '120' : '18', height: '14', 'aria-hidden': 'true' });
-        const context = canvas.getContext('2d');
+        const context = NB.context(canvas);
         if (!item.color) {
           item.draw(context, 9, 7);
           return NB.el('span', { class: 'key' }, canvas, item.text);
@@ -63,6 +69,7 @@ class Figure {
     );
   }
 
+  /** @param {Painter} context @param {Scale} scale @param {number} x @param {number} y @param {number} width */
   scale(context, { color }, x, y, width) {
     for (let k = 0; k < width; k += 2) {
       context.fillStyle = color((k + 0.5) / width);
@@ -73,6 +80,7 @@ class Figure {
   /** The figure for a column of a journal, with its legend below it. */
   svg() {
     const width = NB.COLUMN.px;
+    /** @type {Mark[]} */
     const legend = (this.legend ? this.legend() : []).map((item) =>
       item.color
         ? {

@@ -52,7 +52,10 @@ NB.FEW_CASES = 20;
 
 /** What a study's page draws: colours, scatter, map, shares, histogram. */
 class StudyPlots {
-  /** Kinds of cases with their colours, `of` the kind of a case, or a `scale` and the `value` of a case. */
+  /**
+   * Kinds of cases with their colours, `of` the kind of a case, or a `scale` and the `value` of a case.
+   * @returns {Coloring}
+   */
   coloring() {
     const { color } = this.state;
     const [blue, red, orange, grey] = [
@@ -62,6 +65,7 @@ class StudyPlots {
       [150, 150, 150],
     ];
     if (color === 'outcome') {
+      /** @type {CaseKind[]} */
       const kinds =
         this.state.configuration < 0
           ? [
@@ -79,16 +83,16 @@ class StudyPlots {
       return { kinds, of: (index) => at.get(this.outcome(index)) ?? kinds.length - 1 };
     }
     if (color === 'best') {
+      /** @param {string} text */
       const hex = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16));
-      const kinds = [
-        ...this.page.configurations.map((label, c) => [
-          label,
-          hex(NB.configurationStyles[c].color),
-          c % 2 ? 'triangle' : 'square',
-          label,
-        ]),
-        ['none works', [190, 190, 190], 'dot', 'none works'],
-      ];
+      /** @type {CaseKind[]} */
+      const kinds = this.page.configurations.map((label, c) => [
+        label,
+        hex(NB.configurationStyles[c].color),
+        c % 2 ? 'triangle' : 'square',
+        label,
+      ]);
+      kinds.push(['none works', [190, 190, 190], 'dot', 'none works']);
       return { kinds, of: (index) => (this.best[index] < 0 ? 8 : this.best[index]) };
     }
     if (color === 'working') {
@@ -100,9 +104,10 @@ class StudyPlots {
       };
     }
     const metric = this.metric(color);
+    /** @param {number} index */
     const value = (index) => {
       const row = this.row(index);
-      return row < 0 ? NaN : metric.values[row];
+      return row < 0 || !metric ? NaN : metric.values[row];
     };
     const shown = [];
     for (const index of this.indices) {
@@ -121,19 +126,24 @@ class StudyPlots {
       scale: {
         low: `\u2264 ${NB.threeDigits(low)}`,
         high: `\u2265 ${NB.threeDigits(high)}`,
-        text: this.titleOf(metric),
+        text: metric ? this.titleOf(metric) : color,
       },
     };
   }
 
-  /** The places of the shown cases over two factors: cases of the same place are drawn as one mark. */
+  /**
+   * The places of the shown cases over two factors: cases of the same place are drawn as one mark.
+   * @returns {Places}
+   */
   places() {
     if (this.placed) return this.placed;
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const [xFactor, yFactor] = [this.factors[this.state.x], this.factors[this.state.y]];
+    /** @param {ShownFactor} factor @param {number} value */
     const code = ({ column, levels }, value) =>
-      levels ? value : Math.round((value - column.low) / (column.step || 1));
+      levels ? value : Math.round((value - (column.low ?? 0)) / (column.step || 1));
     const known = new Map();
+    /** @type {number[]} */
     const first = [];
     const of = new Uint32Array(this.indices.length);
     this.indices.forEach((index, at) => {
@@ -150,6 +160,7 @@ class StudyPlots {
     for (const place of of) counts[place]++;
     // Level by level there is one place each: no scatter is wanted, the mark says how many cases it is of.
     const grid = Boolean(xAxis.labels && yAxis.labels);
+    /** @param {StudyAxis} axis @param {ShownFactor} factor @param {number} index */
     const where = (axis, factor, index) => {
       const value = factor.values[index];
       return axis.labels && !grid ? value + 0.6 * (NB.jitter(index, axis.salt) - 0.5) : value;
@@ -168,7 +179,12 @@ class StudyPlots {
     return this.placed;
   }
 
-  /** Radius of the mark of a place: its area grows with the number of its cases. */
+  /**
+   * Radius of the mark of a place: its area grows with the number of its cases.
+   * @param {number} count
+   * @param {number} most
+   * @param {number} width
+   */
   radius(count, most, width) {
     if (most === 1) return 3.2;
     const largest = this.places().grid
@@ -179,6 +195,7 @@ class StudyPlots {
     return Math.max(largest * Math.sqrt(count / most), 2.5);
   }
 
+  /** @param {Painter} context @param {number} width @param {number} height */
   paintScatter(context, width, height) {
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const left = yAxis.labels ? Math.min(150, 0.3 * width) : 62;
@@ -195,7 +212,12 @@ class StudyPlots {
     this.scatterItems = this.legendOf(coloring, places, marks);
   }
 
-  /** How many cases of each kind every place has. */
+  /**
+   * How many cases of each kind every place has.
+   * @param {Places} places
+   * @param {{ kinds: CaseKind[], of(index: number): number }} coloring
+   * @returns {PlaceMarks}
+   */
   shares(places, { kinds, of }) {
     const counts = new Uint32Array(kinds.length * places.first.length);
     const totals = new Uint32Array(kinds.length);
@@ -204,17 +226,24 @@ class StudyPlots {
       counts[places.of[at] * kinds.length + kind]++;
       totals[kind]++;
     });
+    /** @param {number} place */
     const color = (place) => {
       let most = 0;
       for (let kind = 1; kind < kinds.length; kind++)
         if (counts[place * kinds.length + kind] > counts[place * kinds.length + most]) most = kind;
       return kinds[most][1];
     };
-    return { counts, totals, color };
+    return { counts, totals, color, middle: [] };
   }
 
-  /** The median of the cases of every place. */
+  /**
+   * The median of the cases of every place.
+   * @param {Places} places
+   * @param {{ low: number, high: number, value(index: number): number }} coloring
+   * @returns {PlaceMarks}
+   */
   medians(places, { low, high, value }) {
+    /** @type {number[][]} */
     const lists = places.first.map(() => []);
     this.indices.forEach((index, at) => {
       const each = value(index);
@@ -222,13 +251,23 @@ class StudyPlots {
     });
     const middle = lists.map((list) => (list.length ? list.sort((a, b) => a - b)[list.length >> 1] : NaN));
     return {
+      counts: new Uint32Array(),
+      totals: new Uint32Array(),
       middle,
       color: (place) =>
         Number.isNaN(middle[place]) ? [200, 200, 200] : NB.viridis((middle[place] - low) / (high - low || 1)),
     };
   }
 
-  /** A mark at each place: a shape of a single case, a pie of the shares of several. */
+  /**
+   * A mark at each place: a shape of a single case, a pie of the shares of several.
+   * @param {Painter} context
+   * @param {Axes} axes
+   * @param {Places} places
+   * @param {PlaceMarks} marks
+   * @param {Coloring} coloring
+   * @param {number} width
+   */
   marks(context, axes, places, marks, { kinds }, width) {
     places.first.forEach((_, place) => {
       const [x, y, count] = [axes.px(places.x[place]), axes.py(places.y[place]), places.counts[place]];
@@ -238,6 +277,7 @@ class StudyPlots {
         this.shape(context, kinds[kind], x, y, radius);
         return;
       }
+      /** @type {[color: Bytes, count: number][]} */
       const parts = kinds
         ? kinds.map((kind, at) => [kind[1], marks.counts[place * kinds.length + at]])
         : [[marks.color(place), count]];
@@ -254,6 +294,13 @@ class StudyPlots {
     });
   }
 
+  /**
+   * @param {Painter} context
+   * @param {number} x
+   * @param {number} y
+   * @param {number} radius
+   * @param {[color: Bytes, count: number][]} parts
+   */
   pie(context, x, y, radius, parts) {
     const all = parts.reduce((sum, [, count]) => sum + count, 0);
     let from = -Math.PI / 2;
@@ -275,10 +322,17 @@ class StudyPlots {
     context.stroke();
   }
 
-  /** A hundred thousand shapes would take too long: pixels are written one by one. */
+  /**
+   * A hundred thousand shapes would take too long: pixels are written one by one.
+   * @param {Painter} context
+   * @param {Box} box
+   * @param {Axes} axes
+   * @param {Places} places
+   * @param {PlaceMarks} marks
+   */
   pixels(context, box, axes, places, marks) {
     const size = 2;
-    if (context.isPaper) {
+    if (!(context instanceof CanvasRenderingContext2D)) {
       places.first.forEach((_, place) => {
         context.fillStyle = NB.rgb(marks.color(place));
         context.fillRect(axes.px(places.x[place]), axes.py(places.y[place]), 1, 1);
@@ -304,15 +358,20 @@ class StudyPlots {
     context.putImageData(image, Math.round(box.left * ratio), Math.round(box.top * ratio));
   }
 
-  /** A ring about the place of the chosen case. */
+  /**
+   * A ring about the place of the chosen case.
+   * @param {Painter} context
+   * @param {Axes} axes
+   * @param {Places} places
+   */
   ring(context, axes, places) {
-    const at = this.indices.indexOf(this.chosen);
+    const at = this.indices.indexOf(this.chosen ?? -1);
     if (at < 0) return;
     const place = places.of[at];
     const radius = this.radius(places.counts[place], places.most, 700) + 4;
-    for (const [color, wide] of [
-      ['#fff', 5],
-      ['#000', 2.2],
+    for (const { color, wide } of [
+      { color: '#fff', wide: 5 },
+      { color: '#000', wide: 2.2 },
     ]) {
       context.strokeStyle = color;
       context.lineWidth = wide;
@@ -322,12 +381,16 @@ class StudyPlots {
     }
   }
 
+  /** @param {Coloring} coloring @param {Places} places @param {PlaceMarks} marks @returns {(Mark | Scale)[]} */
   legendOf(coloring, places, marks) {
+    /** @type {(Mark | Scale)[]} */
     const items = [];
+    /** @param {number} value */
     const group = (value) => NB.grouped(value);
     if (coloring.kinds) {
       coloring.kinds.forEach((kind, at) => {
         if (!marks.totals[at] && coloring.kinds.length > 5) return;
+        /** @type {Mark['draw']} */
         const draw =
           places.most === 1 && places.first.length <= NB.MOST_MARKS
             ? (context, x, y) => this.shape(context, kind, x, y, 4.5)
@@ -364,6 +427,7 @@ class StudyPlots {
     return items;
   }
 
+  /** @param {StudyAxis} axis */
   padded(axis) {
     const pad = axis.labels ? 0 : 0.03 * (axis.high - axis.low);
     // Marks of a level are spread so that they can be seen: they all have its value.
@@ -371,6 +435,7 @@ class StudyPlots {
     return { ...axis, title, low: axis.low - pad, high: axis.high + pad };
   }
 
+  /** @param {Painter} context @param {CaseKind} kind @param {number} x @param {number} y @param {number} size */
   shape(context, [, color, shape], x, y, size) {
     context.fillStyle = NB.rgb(color);
     context.strokeStyle = context.fillStyle;
@@ -395,6 +460,7 @@ class StudyPlots {
     } else context.fillRect(x - size * 0.8, y - size * 0.8, size * 1.6, size * 1.6);
   }
 
+  /** @param {Painter} context @param {number} width @param {number} height */
   paintMap(context, width, height) {
     const [xAxis, yAxis] = [this.axesOf[this.state.x], this.axesOf[this.state.y]];
     const left = yAxis.labels ? Math.min(150, 0.3 * width) : 62;
@@ -437,17 +503,22 @@ class StudyPlots {
       this.state.configuration < 0
         ? 'layouts in which any configuration works (%)'
         : `layouts in which ${this.page.configurations[this.state.configuration]} works (%)`;
-    this.mapItems = [{ low: '0', high: '100', text, color: (share) => NB.rgb(NB.viridis(share)) }];
+    /** @type {(Mark | Scale)[]} */
+    const items = [{ low: '0', high: '100', text, color: (share) => NB.rgb(NB.viridis(share)) }];
+    this.mapItems = items;
     let fewest = Infinity;
     for (const count of of) if (count) fewest = Math.min(fewest, count);
     if (fewest < NB.FEW_CASES)
-      this.mapItems.push({
+      items.push({
         text: `how many of how many, where a cell has fewer than ${NB.FEW_CASES} cases: no more than a hint`,
         draw() {},
       });
   }
 
-  /** Sorted values of every configuration, once for each metric and filter. */
+  /**
+   * Sorted values of every configuration, once for each metric and filter.
+   * @returns {Float32Array[]}
+   */
   sort() {
     if (this.sorted) return this.sorted;
     const metric = this.metric(this.state.metric);
@@ -457,7 +528,7 @@ class StudyPlots {
       let n = 0;
       for (const index of this.indices) {
         const at = c * this.count + index;
-        if (counted[this.outcomes[at]] && !Number.isNaN(metric.values[at])) values[n++] = metric.values[at];
+        if (metric && counted[this.outcomes[at]] && !Number.isNaN(metric.values[at])) values[n++] = metric.values[at];
       }
       return values.subarray(0, n).sort();
     });
@@ -474,6 +545,7 @@ class StudyPlots {
     return low < high ? [low, high] : [0, 1];
   }
 
+  /** @param {Painter} context @param {number} width @param {number} height */
   paintEcdf(context, width, height) {
     const metric = this.metric(this.state.metric);
     if (!metric) return;
@@ -511,7 +583,7 @@ class StudyPlots {
     this.ecdfItems = this.page.configurations
       .map((label, c) => ({
         text: `${label} (${NB.grouped(this.sort()[c].length)} layouts)`,
-        draw: (at, x, y) => {
+        draw: (/** @type {Painter} */ at, /** @type {number} */ x, /** @type {number} */ y) => {
           const { color, dash } = NB.configurationStyles[c];
           at.strokeStyle = color;
           at.lineWidth = 2.5;
@@ -526,6 +598,7 @@ class StudyPlots {
       .filter((_, c) => this.sort()[c].length);
   }
 
+  /** @param {Painter} context @param {number} width @param {number} height */
   paintHistogram(context, width, height) {
     const metric = this.metric(this.state.metric);
     if (!metric) return;
@@ -533,6 +606,7 @@ class StudyPlots {
     const c = this.state.configuration;
     const bins = 40;
     const counts = new Uint32Array(bins);
+    /** @param {number} value */
     const add = (value) => {
       const bin = Math.floor(((value - low) / (high - low)) * bins);
       if (bin >= 0 && bin < bins) counts[bin]++;
