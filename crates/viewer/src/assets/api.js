@@ -1,13 +1,14 @@
 // What the page asks of its server, and how it waits for answers.
 'use strict';
 
-const PLAN = {};
+const PLAN = /** @type {Planning} */ ({});
 
 /** The secret of the address, which browsers send to nobody. */
 PLAN.token = location.hash.slice(1);
 
 /** An answer that is none: what is wrong, and what to do. */
 class Problem extends Error {
+  /** @param {number} status @param {ProblemBody} body */
   constructor(status, body) {
     super(body.error || `the server answered with status ${status}`);
     this.status = status;
@@ -17,6 +18,7 @@ class Problem extends Error {
 }
 
 PLAN.fetch = async (path, options = {}) => {
+  /** @type {{ [name: string]: string }} */
   const headers = { authorization: `Bearer ${PLAN.token}` };
   if (options.body !== undefined) headers['content-type'] = 'application/json';
   let response;
@@ -34,6 +36,7 @@ PLAN.fetch = async (path, options = {}) => {
     });
   }
   if (!response.ok) {
+    /** @type {ProblemBody} */
     let body = {};
     try {
       body = await response.json();
@@ -47,14 +50,23 @@ PLAN.fetch = async (path, options = {}) => {
 
 PLAN.ask = async (path, options) => (await PLAN.fetch(path, options)).json();
 
-/** Asks for the latest question alone: while one is answered, only the newest that came since waits. */
+/**
+ * Asks for the latest question alone: while one is answered, only the newest that came since waits.
+ * @template {keyof Questions} Kind
+ */
 class Latest {
+  /** @param {Kind} path @param {WhenAnswered<Kind>} answered */
   constructor(path, answered) {
     this.path = path;
     this.answered = answered;
     this.turn = 0;
+    /** @type {(Questions[Kind][0] & { page: string, turn: number }) | null} */
+    this.next = null;
+    this.asked = 0;
+    this.busy = false;
   }
 
+  /** @param {Questions[Kind][0]} body */
   ask(body) {
     this.turn++;
     this.next = { ...body, page: PLAN.page, turn: this.turn };

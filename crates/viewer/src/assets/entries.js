@@ -3,9 +3,29 @@
 'use strict';
 
 class EntryMap {
-  /** `planner` has the needle and is told of entries that are picked. */
+  /**
+   * `planner` has the needle and is told of entries that are picked.
+   * @param {Planner} planner
+   */
   constructor(planner) {
     this.planner = planner;
+    /** @type {RoutePlan | null} */
+    this.plan = null;
+    /** @type {{ message: string }[]} */
+    this.notes = [];
+    /** @type {string | undefined} */
+    this.of = undefined;
+    /** @type {number[] | null} */
+    this.at = null;
+    /** @type {number[][]} */
+    this.directions = [];
+    /** @type {{ index: Index, color: string }[] | null} */
+    this.free = null;
+    /** @type {HTMLCanvasElement | null} */
+    this.image = null;
+    this.drawn = '';
+    this.leastOdds = 1;
+    /** @type {HTMLCanvasElement} */
     this.canvas = NB.el('canvas', {
       class: 'entry-map',
       tabindex: '0',
@@ -45,7 +65,10 @@ class EntryMap {
     );
   }
 
-  /** What the map is of. */
+  /**
+   * What the map is of.
+   * @param {NeedleChoice} needle
+   */
   static key({ goal, target }) {
     return JSON.stringify([goal, target]);
   }
@@ -72,6 +95,7 @@ class EntryMap {
     this.latest.ask({ aim: { goal, target }, robot: false });
   }
 
+  /** @param {Answered<EntriesAnswer>} answer @param {Questions['entries'][0]} body */
   answered(answer, body) {
     if (this.of !== EntryMap.key(body.aim)) return;
     if (answer.problem) this.planner.complain(answer.problem);
@@ -103,7 +127,11 @@ class EntryMap {
     this.planner.askRoute();
   }
 
-  /** Everything anew. */
+  /**
+   * Everything anew.
+   * @param {string} status
+   * @param {string} [kind]
+   */
   show(status, kind = 'soft') {
     this.status.textContent = status;
     this.status.className = kind;
@@ -111,9 +139,8 @@ class EntryMap {
     this.at = null;
     this.said.textContent = '';
     this.leastOdds = this.plan ? Math.min(...this.plan.map.odds_ratio.filter((odds) => odds !== null)) : 1;
-    this.directions = this.plan
-      ? this.plan.map.azimuth_deg.map((azimuth, index) => [azimuth, this.plan.map.elevation_deg[index]])
-      : [];
+    const { azimuth_deg: azimuths = [], elevation_deg: elevations = [] } = this.plan?.map || {};
+    this.directions = azimuths.map((azimuth, index) => [azimuth, elevations[index]]);
     this.showLegend();
     this.showTable();
     NB.clear(
@@ -146,33 +173,39 @@ class EntryMap {
 
   // ---- the picture: azimuth to the right, the sine of the elevation up, so that equal areas are equal solid angles
 
+  /** @param {number[]} direction */
   place([azimuth, elevation]) {
     const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
     return [(w * (azimuth + 180)) / 360, (h * (1 - Math.sin((elevation * Math.PI) / 180))) / 2];
   }
 
+  /** @param {MouseEvent} event */
   pointed(event) {
     const box = this.canvas.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
   }
 
-  /** The free direction next to a place of the picture, or else any. */
+  /**
+   * The free direction next to a place of the picture, or else any.
+   * @param {number[]} place
+   */
   near([x, y]) {
     if (!this.plan) return null;
     const { rule } = this.plan.map;
-    let best = null;
+    let best = { index: -1, worth: Infinity };
     for (let index = 0; index < this.directions.length; index++) {
       const [u, v] = this.place(this.directions[index]);
       const off = Math.hypot(u - x, v - y);
       // A free one a few pixels away is meant.
       const worth = rule[index] === null ? off - 3 : off;
-      if (!best || worth < best.worth) best = { index, worth };
+      if (worth < best.worth) best = { index, worth };
     }
-    return best.index;
+    return best.index < 0 ? null : best.index;
   }
 
+  /** @param {number | null} index */
   say(index) {
-    if (index === null || index === undefined) return;
+    if (index === null || !this.plan) return;
     const { map } = this.plan;
     const { rules } = this.planner.facts.route_colours;
     const [azimuth, elevation] = this.directions[index];
@@ -180,7 +213,8 @@ class EntryMap {
       `${NB.fixed(Math.abs(azimuth), 0)}\u00b0 to the ${azimuth < 0 ? 'right' : 'left'} of the front, ` +
       `${NB.fixed(Math.abs(elevation), 0)}\u00b0 ${elevation < 0 ? 'downwards' : 'upwards'}`;
     const depth = map.depth_m[index] === null ? '' : `, ${NB.mm(map.depth_m[index], 0)} mm deep`;
-    const rule = map.rule[index] === null ? null : map.rules[map.rule[index]];
+    const broken = map.rule[index];
+    const rule = broken === null ? null : map.rules[broken];
     const how =
       rule === null
         ? `free, odds \u00d7${NB.fixed(map.odds_ratio[index], 2)}`
@@ -188,6 +222,7 @@ class EntryMap {
     this.said.textContent = `${where}${depth}: ${how}`;
   }
 
+  /** @param {string} rule @param {number | null} value @param {number | null} limit */
   found(rule, value, limit) {
     if (value === null || !['bone', 'vessel', 'organ', 'throw', 'needle_too_short'].includes(rule)) return '';
     return rule === 'needle_too_short'
@@ -195,13 +230,17 @@ class EntryMap {
       : `, ${NB.mm(value)} mm of ${NB.mm(limit)} mm wanted`;
   }
 
+  /** @param {MouseEvent} event */
   clicked(event) {
     this.take(this.near(this.pointed(event)));
   }
 
+  /** @param {KeyboardEvent} event */
   key(event) {
     if (!this.plan) return;
-    const steps = { ArrowLeft: [-2, 0], ArrowRight: [2, 0], ArrowUp: [0, 2], ArrowDown: [0, -2] }[event.key];
+    /** @type {{ [key: string]: number[] | undefined }} */
+    const moves = { ArrowLeft: [-2, 0], ArrowRight: [2, 0], ArrowUp: [0, 2], ArrowDown: [0, -2] };
+    const steps = moves[event.key];
     if (steps) {
       event.preventDefault();
       const [azimuth, elevation] = this.at || [0, 0];
@@ -214,51 +253,69 @@ class EntryMap {
     }
   }
 
-  /** Takes the entry in a direction of the map. */
+  /**
+   * Takes the entry in a direction of the map.
+   * @param {number | null} index
+   */
   take(index) {
-    if (index === null) return;
+    if (index === null || !this.plan) return;
     this.say(index);
     const depth = this.plan.map.depth_m[index];
     if (depth === null) return;
     this.enter(this.directions[index], depth);
   }
 
-  /** The place so deep from the target in a direction, m of the scan. */
-  onSkin([azimuth, elevation], depth) {
+  /**
+   * The place so deep from the target in a direction, m of the scan.
+   * @param {RoutePlan} plan
+   * @param {number[]} direction
+   * @param {number} depth
+   */
+  onSkin(plan, [azimuth, elevation], depth) {
     const [a, e] = [azimuth, elevation].map((degrees) => (degrees * Math.PI) / 180);
     const outwards = [Math.cos(e) * Math.sin(a), -Math.cos(e) * Math.cos(a), Math.sin(e)];
-    const { target_in_phantom_m: target, phantom_origin_in_ct_m: origin } = this.plan;
+    const { target_in_phantom_m: target, phantom_origin_in_ct_m: origin } = plan;
     return target.map((value, axis) => value + origin[axis] + depth * outwards[axis]);
   }
 
-  /** Colour of a free direction: by how many times the least odds it has, up to twice. */
-  shade(index) {
+  /**
+   * Colour of a free direction: by how many times the least odds it has, up to twice.
+   * @param {RoutePlan} plan
+   * @param {number} index
+   */
+  shade(plan, index) {
     const { free } = this.planner.facts.route_colours;
-    const share = Math.min(Math.max(Math.log2(this.plan.map.odds_ratio[index] / this.leastOdds), 0), 1);
+    const share = Math.min(Math.max(Math.log2((plan.map.odds_ratio[index] ?? 0) / this.leastOdds), 0), 1);
     return PLAN.rgb(free[0].map((value, channel) => Math.round(value + (free[1][channel] - value) * share)));
   }
 
+  /** @param {number[]} direction @param {number} depth @param {string | null} [configuration] */
   enter(direction, depth, configuration) {
-    const place_m = this.onSkin(direction, depth);
+    if (!this.plan) return;
+    const place_m = this.onSkin(this.plan, direction, depth);
     this.planner.change({ entry: { place_m }, ...(configuration ? { configuration } : {}) });
     this.planner.look(this.planner.within(this.planner.indexOf(place_m).map(Math.round)));
   }
 
-  render() {
-    const { map } = this.plan;
+  /** @param {RoutePlan} plan */
+  render(plan) {
+    const { map } = plan;
     const { rules } = this.planner.facts.route_colours;
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
     const image = document.createElement('canvas');
     [image.width, image.height] = [Math.round(w * ratio), Math.round(h * ratio)];
-    const context = image.getContext('2d');
+    const context = NB.context(image);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.fillStyle = '#f7f7f7';
     context.fillRect(0, 0, w, h);
     // An even grid: each has the same area, and a little more so that no paper shows.
     const across = 1.25 * Math.sqrt((w * h) / this.directions.length);
+    /** @param {number} index */
     const color = (index) =>
-      map.rule[index] === null ? this.shade(index) : PLAN.rgb(rules[map.rules[map.rule[index]]]?.[1] || [0, 0, 0]);
+      map.rule[index] === null
+        ? this.shade(plan, index)
+        : PLAN.rgb(rules[map.rules[map.rule[index]]]?.[1] || [0, 0, 0]);
     // Free ones last: none of them is to be hidden.
     for (const freeOnes of [false, true]) {
       this.directions.forEach((direction, index) => {
@@ -276,15 +333,16 @@ class EntryMap {
     if (!this.plan || !w || !h) return;
     const size = `${w} ${h}`;
     if (!this.image || this.drawn !== size) {
-      this.image = this.render();
+      this.image = this.render(this.plan);
       this.drawn = size;
     }
     [this.canvas.width, this.canvas.height] = [this.image.width, this.image.height];
-    const context = this.canvas.getContext('2d');
+    const context = NB.context(this.canvas);
     context.drawImage(this.image, 0, 0);
     const ratio = this.image.width / w;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.font = '12px system-ui, sans-serif';
+    /** @param {string} words @param {number} x @param {number} y @param {CanvasTextAlign} [align] */
     const write = (words, x, y, align = 'center') => {
       context.textAlign = align;
       context.textBaseline = 'middle';
@@ -294,12 +352,9 @@ class EntryMap {
       context.fillStyle = '#000';
       context.fillText(words, x, y);
     };
-    for (const [azimuth, letter] of [
-      [-90, 'R'],
-      [0, 'A'],
-      [90, 'L'],
-    ])
-      write(letter, this.place([azimuth, 0])[0], h - 9);
+    write('R', this.place([-90, 0])[0], h - 9);
+    write('A', this.place([0, 0])[0], h - 9);
+    write('L', this.place([90, 0])[0], h - 9);
     write('P', 7, h - 9);
     write('P', w - 7, h - 9);
     write('S', 7, 10);
@@ -321,6 +376,12 @@ class EntryMap {
     if (this.at) this.cross(context, this.place(this.at), '#fff', '#000');
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {number[]} place
+   * @param {string} words
+   * @param {(words: string, x: number, y: number) => void} write
+   */
   ring(context, [x, y], words, write) {
     context.strokeStyle = '#000';
     context.lineWidth = 1.5;
@@ -330,10 +391,11 @@ class EntryMap {
     write(words, x + 10, y - 6);
   }
 
+  /** @param {CanvasRenderingContext2D} context @param {number[]} place @param {string} outer @param {string} inner */
   cross(context, [x, y], outer, inner) {
-    for (const [style, width] of [
-      [outer, 5],
-      [inner, 2.5],
+    for (const { style, width } of [
+      { style: outer, width: 5 },
+      { style: inner, width: 2.5 },
     ]) {
       context.strokeStyle = style;
       context.lineWidth = width;
@@ -346,15 +408,22 @@ class EntryMap {
     }
   }
 
-  /** Free entries near a slice, as dots: `draw(index, color)`. */
+  /**
+   * Free entries near a slice, as dots: `draw(index, color)`.
+   * @param {number} axis
+   * @param {number} slice
+   * @param {number} within_mm
+   * @param {(index: Index, color: string) => void} draw
+   */
   entriesNear(axis, slice, within_mm, draw) {
     if (!this.plan) return;
     const { map } = this.plan;
-    this.free ??= this.directions.flatMap((direction, index) =>
-      map.rule[index] === null
-        ? [{ index: this.planner.indexOf(this.onSkin(direction, map.depth_m[index])), color: this.shade(index) }]
-        : [],
-    );
+    const { plan } = this;
+    this.free ??= this.directions.flatMap((direction, index) => {
+      const depth = map.depth_m[index];
+      if (map.rule[index] !== null || depth === null) return [];
+      return [{ index: this.planner.indexOf(this.onSkin(plan, direction, depth)), color: this.shade(plan, index) }];
+    });
     const spacing = 1e3 * this.planner.facts.spacing_m[axis];
     for (const entry of this.free)
       if (Math.abs(entry.index[axis] - slice) * spacing <= within_mm) draw(entry.index, entry.color);
@@ -373,13 +442,18 @@ class EntryMap {
     const shown = plan.routes
       .map((route, index) => ({ route, index }))
       .filter(({ index }) => index < 8 || index === chosen);
+    /** @param {{ route: PlannedRoute }} row */
     const best = ({ route }) => route.configurations.find(({ label }) => label === route.best);
     const asked = plan.routes.some(({ configurations }) => configurations.length);
+    /** @param {PlannedRoute} route */
     const nearest = (route) => {
-      const known = route.margins.filter(({ part, distance_m }) => part !== null && distance_m !== null);
-      const least = known.reduce((best, each) => (!best || each.distance_m < best.distance_m ? each : best), null);
+      const known = route.margins.flatMap(({ part, distance_m, obstacle }) =>
+        part === null || distance_m === null ? [] : [{ distance_m, obstacle }],
+      );
+      const [least] = known.sort((a, b) => a.distance_m - b.distance_m);
       return least ? `${NB.mm(least.distance_m)} ${NB.words(least.obstacle)}` : 'far';
     };
+    /** @type {Column<{ route: PlannedRoute, index: number }>[]} */
     const columns = [
       {
         title: 'Route',

@@ -2,10 +2,14 @@
 'use strict';
 
 class People {
+  /** @param {Planner} planner */
   constructor(planner) {
     this.planner = planner;
     this.latest = new Latest('people', (answer) => this.answered(answer));
+    /** @type {PeopleAnswer | null} */
+    this.answer = null;
     this.text = NB.el('div');
+    /** @type {{ [layer: string]: boolean }} */
     this.layers = { people: false, cone: false };
     this.boxes = NB.el(
       'span',
@@ -19,7 +23,10 @@ class People {
     );
   }
 
-  /** Of a posture at the needle; none while there is no motion to it. */
+  /**
+   * Of a posture at the needle; none while there is no motion to it.
+   * @param {number[] | null} joints
+   */
   ask(joints) {
     this.forget();
     if (joints) this.latest.ask({ aim: this.planner.aim(), joints_rad: joints });
@@ -32,6 +39,7 @@ class People {
     this.show();
   }
 
+  /** @param {Answered<PeopleAnswer>} answer */
   answered(answer) {
     if (answer.problem) {
       this.planner.complain(answer.problem);
@@ -94,11 +102,11 @@ class People {
   draw() {
     const { view } = this.planner.room;
     if (!view.works) return;
-    const shown = this.answer?.view;
+    const { view: shown, room } = this.answer || {};
     view.people(shown && this.layers.people ? shown.people : []);
     view.sight(shown && this.layers.people ? shown.sight : []);
-    if (shown && this.layers.cone)
-      view.handCone(shown.guideEntry, this.answer.room.hand_cone_half_angle_rad, this.answer.room.hand_cone_length_m);
+    if (shown && room && this.layers.cone)
+      view.handCone(shown.guideEntry, room.hand_cone_half_angle_rad, room.hand_cone_length_m);
     else view.empty('cone');
     view.draw();
   }

@@ -5,17 +5,71 @@ PLAN.WINDOWS = { lung: [-1350, 150], soft: [-160, 240], bone: [-500, 1300] };
 PLAN.WINDOW_NAMES = { lung: 'Lung (\u2212600/1500)', soft: 'Soft (40/400)', bone: 'Bone (400/1800)' };
 
 class Planner {
+  // Set as soon as there is a planner.
+  /** @type {Volume} */ volume;
+  /** @type {Uint16Array | undefined} */ labels;
+  /** @type {Map<number, number>} */ labelColors;
+  /** @type {boolean | undefined} */ showsLabels;
+  /** @type {PlaceAnswer} */ place;
+  /** @type {RouteAnswer | null} */ route;
+  /** @type {ReachAnswer | null} */ reach;
+  /** @type {Refusal | null} */ refused;
+  /** @type {(MotionAnswer & { refused?: undefined }) | { refused: Refusal } | null} */ motion;
+  /** @type {TipError | null} */ tip;
+  /** @type {object} */ comparing;
+  /** @type {string | null} */ complaint;
+  /** @type {number | undefined} */ keeping;
+  /** @type {boolean | undefined} */ dragging;
+  /** @type {boolean | undefined} */ conflict;
+  /** @type {boolean | undefined} */ writing;
+  /** @type {boolean | undefined} */ again;
+  // The page.
+  /** @type {Room} */ room;
+  /** @type {Slice[]} */ slices;
+  /** @type {Probe[]} */ probes;
+  /** @type {{ [name: string]: HTMLButtonElement }} */ tools;
+  /** @type {{ [name: string]: HTMLButtonElement }} */ windows;
+  /** @type {Map<string, Labelled<HTMLInputElement>>} */ markerBoxes;
+  /** @type {Labelled<HTMLSelectElement> | undefined} */ goalSelect;
+  /** @type {Labelled<HTMLInputElement>} */ labelsBox;
+  /** @type {HTMLInputElement} */ planName;
+  /** @type {HTMLInputElement} */ routeName;
+  /** @type {HTMLTextAreaElement} */ notes;
+  /** @type {HTMLButtonElement} */ undoButton;
+  /** @type {HTMLButtonElement} */ redoButton;
+  /** @type {HTMLButtonElement} */ saveButton;
+  /** @type {HTMLButtonElement} */ playButton;
+  /** @type {HTMLElement} */ status;
+  /** @type {HTMLElement} */ banner;
+  /** @type {HTMLElement} */ readout;
+  /** @type {HTMLElement} */ numbers;
+  /** @type {HTMLElement} */ configurations;
+  /** @type {HTMLElement} */ comparison;
+  /** @type {HTMLElement} */ labelLegend;
+  /** @type {HTMLElement} */ kept;
+  /** @type {HTMLElement} */ targetText;
+  /** @type {HTMLElement} */ entryText;
+  /** @type {HTMLElement} */ saved;
+  /** @type {HTMLElement} */ clock;
+  /** @type {HTMLElement} */ notesOnPaper;
+  /** @type {HTMLElement} */ printed;
+
+  /** @param {CaseFacts} facts @param {Session} session @param {PlanDocument} page @param {HTMLElement} app */
   constructor(facts, session, page, app) {
     this.facts = facts;
     this.page = page;
     this.app = app;
     this.version = session.version;
+    /** @type {Undoable[]} */
     this.undone = [];
+    /** @type {Undoable[]} */
     this.done = [];
     this.tool = 'crosshair';
+    /** @type {{ target: Index | null, entry: Index | null }} */
     this.shown = { target: null, entry: null };
-    this.probe = { turn: 0, depth: 0 };
+    this.probe = { turn: 0, depth: 0, set: false };
     const middle = facts.size.map((count) => Math.floor(count / 2));
+    /** @type {PlanState} */
     this.state = {
       notes: '',
       window_hu: PLAN.WINDOWS.lung,
@@ -35,15 +89,21 @@ class Planner {
     this.people = new People(this);
     this.simulation = new Simulation(this);
     this.where = new Latest('place', (answer) => this.placed(answer));
+    /** @type {number[]} */
     this.latencies = [];
+    /** @type {number[]} */
     this.reachWaits = [];
     this.build();
   }
 
-  /** The scenario's own first goal. */
+  /**
+   * The scenario's own first goal.
+   * @returns {NeedleChoice}
+   */
   firstNeedle() {
     const goal = this.facts.goals[0];
     if (!goal) return this.facts.lesions[0] ? { target: { lesion: this.facts.lesions[0].name } } : {};
+    /** @type {NeedleChoice} */
     const needle = { goal: goal.name };
     if (goal.lesion) needle.target = { lesion: goal.lesion };
     else if (goal.target_m) needle.target = { place_m: goal.target_m };
@@ -51,10 +111,12 @@ class Planner {
     return needle;
   }
 
+  /** @param {Index} index */
   within(index) {
     return index.map((value, axis) => Math.min(Math.max(value, 0), this.facts.size[axis] - 1));
   }
 
+  /** @param {Point} place */
   indexOf(place) {
     return place.map((metres, axis) => (metres - this.facts.first_voxel_m[axis]) / this.facts.spacing_m[axis]);
   }
@@ -65,7 +127,7 @@ class Planner {
     this.status = NB.el('p', { class: 'status', role: 'status', 'aria-live': 'polite' });
     this.banner = NB.el('div', { class: 'banner', role: 'alert' });
     this.slices = Object.values(PLAN.PLANES).map((plane) => new Slice(plane, this));
-    this.probes = ['along', 'across'].map((kind) => new Probe(kind, this));
+    this.probes = [new Probe('along', this), new Probe('across', this)];
     this.readout = NB.el('p', { class: 'readout', role: 'status', 'aria-live': 'polite' });
     this.room = new Room(this.page, this.facts);
     const heading = NB.el(
@@ -212,13 +274,16 @@ class Planner {
       button.setAttribute('aria-checked', String(String(PLAN.WINDOWS[name]) === String(this.state.window_hu)));
   }
 
-  /** Outlines of what each voxel was taken for; the labels come when they are first wanted. */
+  /**
+   * Outlines of what each voxel was taken for; the labels come when they are first wanted.
+   * @param {boolean} wanted
+   */
   async showLabels(wanted) {
     this.showsLabels = wanted;
     const { labels } = this.facts;
-    const palette = ['sky', 'green', 'orange', 'purple', 'yellow', 'vermillion', 'blue', 'grey'].map(
-      (name) => NB.palette[name],
-    );
+    const { sky, green, orange, purple, yellow, vermillion, blue, grey } = NB.palette;
+    const palette = [sky, green, orange, purple, yellow, vermillion, blue, grey];
+    /** @param {number} at */
     const color = (at) => palette[at % palette.length];
     if (wanted && !this.labels) {
       this.labelLegend.textContent = 'Reading labels ...';
@@ -233,7 +298,7 @@ class Planner {
         );
       } catch (error) {
         this.complain(error);
-        this.labelsBox.querySelector('input').checked = false;
+        this.labelsBox.control.checked = false;
         NB.clear(this.labelLegend);
         return;
       }
@@ -251,6 +316,7 @@ class Planner {
     this.draw();
   }
 
+  /** @param {number[]} window_hu */
   setWindow(window_hu) {
     this.state.window_hu = window_hu;
     this.greys = PLAN.greys(window_hu);
@@ -279,7 +345,7 @@ class Planner {
       this.goalSelect = NB.select(
         'Goal of the scenario',
         this.facts.goals.map(({ name }) => [name, NB.words(name)]),
-        this.state.needle.goal,
+        this.state.needle.goal ?? '',
         (goal) => this.change({ goal }),
       );
     }
@@ -334,7 +400,11 @@ class Planner {
 
   // ---- the crosshair
 
-  /** Moves the crosshair to a voxel. */
+  /**
+   * Moves the crosshair to a voxel.
+   * @param {Index} index
+   * @param {boolean} [keep]
+   */
   look(index, keep = true) {
     this.state.crosshair = index;
     this.where.ask({ index });
@@ -342,6 +412,7 @@ class Planner {
     if (keep) this.keepSoon();
   }
 
+  /** @param {number} axis @param {number} by */
   step(axis, by) {
     if (!this.volume) return;
     const index = this.state.crosshair.slice();
@@ -349,11 +420,10 @@ class Planner {
     this.look(this.within(index));
   }
 
+  /** @param {Answered<PlaceAnswer>} answer */
   placed(answer) {
-    if (answer.problem) {
-      this.complain(answer.problem);
-      return;
-    }
+    if (answer.problem) this.complain(answer.problem);
+    if (answer.refused) return;
     const [x, y, z] = answer.ct_mm;
     const names = [x < 0 ? 'right' : 'left', y < 0 ? 'anterior' : 'posterior', z < 0 ? 'inferior' : 'superior'];
     const place = [x, y, z].map((value) => NB.fixed(value, 2)).join(', ');
@@ -366,6 +436,7 @@ class Planner {
 
   // ---- the needle
 
+  /** @param {string} what @param {Index} index */
   put(what, index) {
     if (!this.volume) return;
     this.change({ [what]: { index: index.slice() } });
@@ -374,6 +445,7 @@ class Planner {
     this.look(this.within(index.map(Math.round)));
   }
 
+  /** @param {NeedleChoice} needle */
   change(needle) {
     this.remember();
     this.state.needle = { ...this.state.needle, ...needle };
@@ -388,6 +460,7 @@ class Planner {
     this.reachWaits = [];
   }
 
+  /** @param {'target' | 'entry'} what @param {Index} index */
   drag(what, index) {
     this.state.needle = { ...this.state.needle, [what]: { index } };
     this.shown = { ...this.shown, [what]: index };
@@ -401,11 +474,13 @@ class Planner {
     this.keepSoon();
   }
 
+  /** @returns {NeedleAim | null} */
   aim() {
     const { goal, target, entry } = this.state.needle;
     return target && entry ? { goal, target, entry } : null;
   }
 
+  /** @param {PlaceAim | null | undefined} aim */
   pointOf(aim) {
     if (!aim) return null;
     if (aim.index) return aim.index;
@@ -421,8 +496,7 @@ class Planner {
     this.planned.forget();
     this.people.forget();
     this.room.stop();
-    if (this.goalSelect)
-      this.goalSelect.querySelector('select').value = this.state.needle.goal || this.facts.goals[0].name;
+    if (this.goalSelect) this.goalSelect.control.value = this.state.needle.goal || this.facts.goals[0].name;
     if (this.aim()) this.askRoute();
     else {
       this.route = null;
@@ -446,6 +520,7 @@ class Planner {
     if (!this.facts.robot_is_unknown) this.bounds.ask({ aim, quick: true });
   }
 
+  /** @param {Answered<RouteAnswer>} answer @param {object} _ @param {number} took */
   routed(answer, _, took) {
     if (this.dragging) this.latencies.push(took);
     if (!this.aim()) return;
@@ -472,12 +547,14 @@ class Planner {
     }
   }
 
+  /** @param {Answered<ReachAnswer>} answer @param {Questions['reach'][0]} body @param {number} took */
   bounded(answer, body, took) {
     if (this.dragging) this.reachWaits.push(took);
     this.reached(answer);
     if (!this.dragging && this.aim() && !answer.problem) this.exact.ask({ aim: body.aim });
   }
 
+  /** @param {Answered<ReachAnswer>} answer */
   reached(answer) {
     if (answer.problem) {
       this.complain(answer.problem);
@@ -488,10 +565,12 @@ class Planner {
     const label = this.state.needle.configuration;
     const known = this.reach?.preview?.configurations.find((each) => each.label === label);
     if (known?.joints_rad && !this.dragging) this.room.pose(known.joints_rad);
-    if (label && !this.dragging && this.aim() && this.reach?.preview && !this.reach.quick)
-      this.planned.ask({ aim: this.aim(), configuration: label });
+    const aim = this.aim();
+    if (label && !this.dragging && aim && this.reach?.preview && !this.reach.quick)
+      this.planned.ask({ aim, configuration: label });
   }
 
+  /** @param {Answered<MotionAnswer>} answer @param {Questions['motion'][0]} body */
   moved(answer, body) {
     if (answer.problem) {
       this.complain(answer.problem);
@@ -499,12 +578,13 @@ class Planner {
     }
     if (body.configuration !== this.state.needle.configuration || this.dragging) return;
     this.motion = answer.refused ? { refused: answer.refused } : answer;
-    this.tip = answer.tip || null;
-    this.people.ask(answer.end_joints_rad);
+    this.tip = answer.refused ? null : answer.tip;
+    this.people.ask(answer.refused ? null : answer.end_joints_rad);
     this.showReach();
     this.draw();
   }
 
+  /** @param {string} configuration */
   choose(configuration) {
     this.remember();
     this.state.needle = { ...this.state.needle, configuration };
@@ -518,6 +598,7 @@ class Planner {
     this.keepSoon();
   }
 
+  /** @param {'along' | 'across'} kind @param {number} step */
   turnProbe(kind, step) {
     if (!this.route) return;
     this.probe.set = true;
@@ -535,6 +616,7 @@ class Planner {
 
   // ---- numbers
 
+  /** @param {Point} place */
   millimetres(place) {
     return `(${place.map((metres) => NB.mm(metres, 2)).join(', ')}) mm`;
   }
@@ -594,7 +676,7 @@ class Planner {
       );
       return;
     }
-    const { preview } = this.reach || {};
+    const { preview, quick, reasons = [] } = this.reach || {};
     if (!preview) {
       NB.clear(
         this.configurations,
@@ -603,7 +685,7 @@ class Planner {
       return;
     }
     const chosen = this.state.needle.configuration;
-    const counted = this.reach.quick
+    const counted = quick
       ? `At least ${preview.working} of 8 can reach it: 12 directions about the needle each; all of them follow`
       : `${preview.working} of 8 can reach it, by their postures`;
     const list = NB.table(
@@ -615,7 +697,7 @@ class Planner {
           cell: ({ each }) =>
             NB.el('span', {
               class: each.works ? 'good' : 'bad',
-              text: each.works ? 'yes' : this.reach.quick ? 'not yet' : 'no',
+              text: each.works ? 'yes' : quick ? 'not yet' : 'no',
             }),
         },
         { title: 'Nearest', unit: 'mm', numeric: true, cell: ({ each }) => NB.mm(each.nearest?.distance_m) },
@@ -625,7 +707,7 @@ class Planner {
           cell: ({ each, reason }) => (each.works ? (each.nearest?.pair || []).map(NB.words).join(' \u2013 ') : reason),
         },
       ],
-      preview.configurations.map((each, index) => ({ each, reason: this.reach.reasons[index] })),
+      preview.configurations.map((each, index) => ({ each, reason: reasons[index] })),
       {
         class: 'choose small',
         row: ({ each }) => ({
@@ -634,9 +716,9 @@ class Planner {
         }),
       },
     );
-    const rows = [...list.querySelectorAll('tbody tr')];
+    const rows = NB.tableRows(list);
     NB.rows(rows, (index) => this.choose(preview.configurations[index].label));
-    const focused = [...this.configurations.querySelectorAll('tbody tr')].indexOf(document.activeElement);
+    const focused = NB.tableRows(this.configurations).findIndex((row) => row === document.activeElement);
     NB.clear(this.configurations, list, this.chosenText());
     if (focused >= 0) rows[focused].focus();
   }
@@ -644,7 +726,7 @@ class Planner {
   chosenText() {
     const { motion } = this;
     const chosen = this.state.needle.configuration;
-    this.playButton.disabled = !motion?.time_s?.length;
+    this.playButton.disabled = !motion || motion.refused !== undefined || !motion.time_s.length;
     if (!chosen)
       return NB.el('p', { class: 'soft', text: 'Choose one to see its motion and the error that is to be expected.' });
     if (!motion) return NB.el('p', { class: 'soft', text: `Planning the motion of ${chosen} ...` });
@@ -679,6 +761,7 @@ class Planner {
         type: 'button',
         disabled: true,
         onclick: () => {
+          if (!this.motion || this.motion.refused) return;
           this.room.play(this.motion, (time, whole) => {
             this.clock.textContent = `${NB.fixed(time, 1)} of ${NB.fixed(whole, 1)} s`;
           });
@@ -800,7 +883,7 @@ class Planner {
 
   markersPanel() {
     const { markers, registration } = this.facts;
-    if (!markers.length)
+    if (!markers.length || !registration)
       return NB.el(
         'section',
         { class: 'panel' },
@@ -820,8 +903,7 @@ class Planner {
         }),
       ]),
     );
-    for (const [name, box] of this.markerBoxes)
-      box.querySelector('input').setAttribute('aria-label', `Show ${NB.words(name)}`);
+    for (const [name, box] of this.markerBoxes) box.control.setAttribute('aria-label', `Show ${NB.words(name)}`);
     const table = NB.table(
       'Residuals of the registration',
       [
@@ -864,7 +946,8 @@ class Planner {
   showMarkers() {
     for (const { name } of this.facts.markers) {
       const visible = !this.state.hidden_markers.includes(name);
-      this.markerBoxes.get(name).querySelector('input').checked = visible;
+      const box = this.markerBoxes.get(name);
+      if (box) box.control.checked = visible;
       this.room.marker(name, visible);
     }
     this.draw();
@@ -929,6 +1012,7 @@ class Planner {
     this.back(this.undone, this.done);
   }
 
+  /** @param {Undoable[]} from @param {Undoable[]} to */
   back(from, to) {
     if (!from.length) return;
     to.push(this.undoable());
@@ -973,7 +1057,8 @@ class Planner {
       if (this.complaint === 'keeping') this.calm();
     } catch (error) {
       this.kept.textContent = 'not kept';
-      if (error.status === 409) this.meet(error);
+      const theirs = error instanceof Problem && error.status === 409 && error.body.session;
+      if (theirs) this.meet(error, theirs);
       else
         this.complain(error, 'keeping', NB.el('button', { type: 'button', onclick: () => this.keep() }, 'Try again'));
     }
@@ -984,9 +1069,12 @@ class Planner {
     }
   }
 
-  /** Another tab was first: nothing is lost either way. */
-  meet(error) {
-    const theirs = error.body.session;
+  /**
+   * Another tab was first: nothing is lost either way.
+   * @param {Problem} error
+   * @param {Session} theirs
+   */
+  meet(error, theirs) {
     this.conflict = true;
     this.complain(
       error,
@@ -1028,6 +1116,7 @@ class Planner {
     );
   }
 
+  /** @param {{ message: string, hint?: string | null }} error @param {string} [about] @param {...Child} buttons */
   complain(error, about = 'other', ...buttons) {
     this.complaint = about;
     NB.clear(this.banner, NB.el('p', null, NB.el('strong', { text: `${error.message}. ` }), error.hint || ''), buttons);
@@ -1056,8 +1145,13 @@ class Planner {
     }
   }
 
+  /** @param {KeyboardEvent} event */
   key(event) {
-    if (!(event.ctrlKey || event.metaKey) || event.target.closest('input[type="text"], textarea')) return;
+    if (
+      !(event.ctrlKey || event.metaKey) ||
+      /** @type {Element} */ (event.target).closest('input[type="text"], textarea')
+    )
+      return;
     const name = event.key.toLowerCase();
     if (name === 'z') {
       event.preventDefault();
@@ -1076,8 +1170,8 @@ PLAN.taken = ({ schema_version, version, ...state }) => state;
 
 /** Opens the case. */
 PLAN.open = async () => {
-  const app = document.getElementById('app');
-  const loading = document.getElementById('loading');
+  const app = NB.byId('app');
+  const loading = NB.byId('loading');
   try {
     if (!/^[0-9a-f]{32}$/.test(PLAN.token))
       throw new Problem(401, {

@@ -2,18 +2,21 @@
 'use strict';
 
 class Room {
+  /** @param {PlanDocument} page @param {CaseFacts} facts */
   constructor(page, facts) {
     this.page = page;
     this.facts = facts;
     this.view = new View(page.scene, 'Room with patient and robot');
     this.known = facts.robot_is_unknown === null;
+    this.playing = 0;
+    this.place = facts.world_from_phantom && NB.matrix(facts.world_from_phantom);
     if (!this.view.works) return;
+    /** @type {ArmView} */
     this.arm = this.view.arm('arm');
     this.view.show('corridor', false);
     this.arm.layer('collision', false);
     this.arm.layer('corridor', false);
     this.pose(page.start);
-    this.place = facts.world_from_phantom && NB.matrix(facts.world_from_phantom);
     for (const lesion of facts.lesions)
       this.view.ball('lesions', this.world(lesion.center_m), 0.5 * (lesion.diameter_m || 0.01), [0.8, 0.47, 0.65, 1]);
     for (const marker of facts.markers)
@@ -30,12 +33,16 @@ class Room {
     this.home();
   }
 
-  /** A place of ct in the world. */
+  /**
+   * A place of ct in the world.
+   * @param {Point} ct
+   */
   world(ct) {
     const phantom = PLAN.add(ct, this.facts.phantom_origin_m, -1);
-    return new THREE.Vector3(...phantom).applyMatrix4(this.place).toArray();
+    return this.place ? new THREE.Vector3().fromArray(phantom).applyMatrix4(this.place).toArray() : phantom;
   }
 
+  /** @param {RouteAnswer | null} [route] */
   home(route = null) {
     if (!this.view.works || !this.place) return;
     const middle = route
@@ -52,6 +59,7 @@ class Room {
     this.view.frame(this.known ? [...NB.aboutBase(base, 0.55), ...near] : near, NB.direction(base, at, [0, 0, -1]));
   }
 
+  /** @param {number[] | null} joints */
   pose(joints) {
     if (this.view.works && joints) {
       this.arm.pose(this.page.scene.chain, joints);
@@ -59,6 +67,7 @@ class Room {
     }
   }
 
+  /** @param {RouteAnswer | null} route */
   needle(route) {
     if (!this.view.works) return;
     this.view.empty('needle');
@@ -72,11 +81,16 @@ class Room {
     this.view.draw();
   }
 
+  /** @param {string} name @param {boolean} visible */
   marker(name, visible) {
     if (this.view.works) this.view.show(`marker ${name}`, visible);
   }
 
-  /** Plays a motion; `told(time, whole)` follows it. */
+  /**
+   * Plays a motion; `told(time, whole)` follows it.
+   * @param {MotionAnswer} motion
+   * @param {(time: number, whole: number) => void} told
+   */
   play(motion, told) {
     this.stop();
     if (!this.view.works || !motion.time_s.length) return;

@@ -3,9 +3,11 @@
 
 /** Routes as columns, what is known of them as rows. */
 PLAN.routeRows = (columns, caption) => {
+  /** @type {{ title: string, unit: string, cells: Child[] }[]} */
   const rows = [];
+  /** @param {string} title @param {string} unit @param {(route: RouteAnswer) => Child} cell */
   const row = (title, unit, cell) =>
-    rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route, column) : '\u2013')) });
+    rows.push({ title, unit, cells: columns.map((column) => (column.route ? cell(column.route) : '\u2013')) });
   if (columns.some(({ route }) => route?.judged)) {
     row('By the rules of routes', '', (route) => {
       const { judged } = route;
@@ -18,6 +20,7 @@ PLAN.routeRows = (columns, caption) => {
           class: unseen ? 'bad' : 'good',
           text: `free, odds \u00d7${NB.fixed(judged.odds_ratio, 2)}${unseen}`,
         });
+      /** @param {number | null} number */
       const value = (number) =>
         judged.unit === 'm'
           ? `${NB.mm(number)} mm`
@@ -71,12 +74,16 @@ PLAN.routeRows = (columns, caption) => {
       unit: 'of 8',
       cells: columns.map(({ reach }) => (reach?.preview ? String(reach.preview.working) : '\u2013')),
     });
+  /** @type {Column<(typeof rows)[number]>[]} */
   const heads = [
     {
       title: 'Quantity',
       cell: ({ title, unit }) => [title, NB.el('span', { class: 'unit', text: unit ? ` ${unit}` : '' })],
     },
-    ...columns.map(({ name }, index) => ({ title: name, cell: ({ cells }) => cells[index] })),
+    ...columns.map(({ name }, index) => ({
+      title: name,
+      cell: (/** @type {{ cells: Child[] }} */ { cells }) => cells[index],
+    })),
   ];
   return NB.table(caption, heads, rows, { class: 'small route' });
 };

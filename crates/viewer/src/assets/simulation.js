@@ -6,9 +6,17 @@ PLAN.withoutGoals = (leftOut) =>
   leftOut.length ? ` It is without ${leftOut.map(NB.words).join(', ')}: no entry was chosen there.` : '';
 
 class Simulation {
+  // Where it is known where the robot is.
+  /** @type {HTMLButtonElement} */ startButton;
+  /** @type {HTMLButtonElement} */ cancelButton;
+  /** @type {HTMLAnchorElement} */ reportLink;
+
+  /** @param {Planner} planner */
   constructor(planner) {
     this.planner = planner;
     this.engine = 'both';
+    this.isPlan = false;
+    this.running = false;
     this.said = NB.el('p', { role: 'status', class: 'break' });
     if (planner.facts.robot_is_unknown) {
       this.element = this.panel(NB.el('p', { text: 'Needs to know where the robot is.' }));
@@ -55,11 +63,15 @@ class Simulation {
     );
   }
 
+  /** @param {...Child} parts */
   panel(...parts) {
     return NB.el('section', { class: 'panel no-print' }, NB.el('h2', { text: 'Simulation' }), parts);
   }
 
-  /** Whether there is a plan that can be run. */
+  /**
+   * Whether there is a plan that can be run.
+   * @param {boolean} isPlan
+   */
   allow(isPlan) {
     this.isPlan = isPlan;
     if (this.startButton) this.startButton.disabled = !isPlan || this.running;
@@ -76,6 +88,7 @@ class Simulation {
     }
   }
 
+  /** @param {SimulationProgress} progress @param {boolean} [quiet] */
   told(progress, quiet = false) {
     this.running = progress.state === 'running';
     this.allow(this.isPlan);

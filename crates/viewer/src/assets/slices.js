@@ -26,15 +26,37 @@ PLAN.SIGMAS_95 = 2.7955;
 
 /** A canvas in millimetres that is sharp on every screen, with lettering and a scale. */
 class Picture {
+  /** @param {string} title @param {string} help */
   constructor(title, help) {
     this.title = title;
     this.canvas = NB.el('canvas', { tabindex: '0', role: 'application', 'aria-label': `${title} slice. ${help}` });
     this.caption = NB.el('span', { class: 'slice-title', text: title });
     this.element = NB.el('figure', { class: 'slice' }, this.canvas, NB.el('figcaption', null, this.caption));
     this.zoom = 1;
+    /** @type {number[] | null} */
     this.middle = null;
+    // Pixels of a millimetre, where (0, 0) is, and width and height of the canvas.
+    this.scale = 1;
+    this.origin = [0, 0];
+    this.box = [0, 0];
+    this.asked = 0;
+    // What the picture shows already.
+    this.drawn = '';
     new ResizeObserver(() => this.draw()).observe(this.canvas);
   }
+
+  /**
+   * Whether something else is to be drawn than what is.
+   * @param {string} what
+   */
+  isNew(what) {
+    const isNew = this.drawn !== what;
+    this.drawn = what;
+    return isNew;
+  }
+
+  /** Each kind of picture has its own. */
+  render() {}
 
   /** Draws once before the next frame, however often it is asked. */
   draw() {
@@ -45,6 +67,7 @@ class Picture {
     });
   }
 
+  /** @param {number[]} size @param {number[]} middle */
   begin([width, height], middle) {
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
@@ -52,22 +75,25 @@ class Picture {
     if (this.canvas.width !== Math.round(w * ratio) || this.canvas.height !== Math.round(h * ratio)) {
       [this.canvas.width, this.canvas.height] = [Math.round(w * ratio), Math.round(h * ratio)];
     }
-    const context = this.canvas.getContext('2d');
+    const context = NB.context(this.canvas);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.fillStyle = '#000';
     context.fillRect(0, 0, w, h);
-    // Pixels of a millimetre.
     this.scale = Math.min(w / width, h / height) * this.zoom;
     this.origin = [w / 2 - middle[0] * this.scale, h / 2 - middle[1] * this.scale];
     this.box = [w, h];
     return context;
   }
 
-  /** A place of the picture, mm, on the canvas. */
+  /**
+   * A place of the picture, mm, on the canvas.
+   * @param {number[]} place
+   */
   onCanvas([x, y]) {
     return [this.origin[0] + x * this.scale, this.origin[1] + y * this.scale];
   }
 
+  /** @param {MouseEvent} event */
   inPicture(event) {
     const box = this.canvas.getBoundingClientRect();
     return [
@@ -76,35 +102,57 @@ class Picture {
     ];
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {number[]} a
+   * @param {number[]} b
+   * @param {string} color
+   * @param {number} width
+   * @param {number[]} [dashes]
+   */
   line(context, a, b, color, width, dashes = []) {
     context.setLineDash(dashes);
-    for (const [style, size] of [
+    for (const [style, size] of /** @type {[string, number][]} */ ([
       ['rgba(0, 0, 0, 0.7)', width + 2],
       [color, width],
-    ]) {
+    ])) {
       context.strokeStyle = style;
       context.lineWidth = size;
       context.beginPath();
-      context.moveTo(...a);
-      context.lineTo(...b);
+      context.moveTo(a[0], a[1]);
+      context.lineTo(b[0], b[1]);
       context.stroke();
     }
     context.setLineDash([]);
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {number[]} at
+   * @param {number} radius
+   * @param {string} color
+   * @param {number} [width]
+   */
   ring(context, at, radius, color, width = 1.5) {
-    for (const [style, size] of [
+    for (const [style, size] of /** @type {[string, number][]} */ ([
       ['rgba(0, 0, 0, 0.7)', width + 2],
       [color, width],
-    ]) {
+    ])) {
       context.strokeStyle = style;
       context.lineWidth = size;
       context.beginPath();
-      context.arc(...at, Math.max(radius, 0.5), 0, 2 * Math.PI);
+      context.arc(at[0], at[1], Math.max(radius, 0.5), 0, 2 * Math.PI);
       context.stroke();
     }
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {string} words
+   * @param {number[]} place
+   * @param {string} [color]
+   * @param {CanvasTextAlign} [align]
+   */
   text(context, words, [x, y], color = '#fff', align = 'left') {
     context.font = '12px system-ui, sans-serif';
     context.textAlign = align;
@@ -116,6 +164,7 @@ class Picture {
     context.fillText(words, x, y);
   }
 
+  /** @param {CanvasRenderingContext2D} context @param {string[]} letters */
   letters(context, [left, right, top, bottom]) {
     const [w, h] = this.box;
     context.save();
@@ -126,6 +175,7 @@ class Picture {
     context.restore();
   }
 
+  /** @param {CanvasRenderingContext2D} context */
   ruler(context) {
     const [w, h] = this.box;
     const length = [100, 50, 20, 10, 5].find((mm) => mm * this.scale < 0.3 * w) || 2;
@@ -134,8 +184,17 @@ class Picture {
     this.text(context, `${length} mm`, [to, h - 24], '#fff', 'right');
   }
 
-  /** The outline of the 95 % ellipsoid on a plane of two unit vectors (axes of ct): mm of the plane. */
+  /**
+   * The outline of the 95 % ellipsoid on a plane of two unit vectors (axes of ct): mm of the plane.
+   * @param {CanvasRenderingContext2D} context
+   * @param {number[]} at
+   * @param {number[][]} covariance
+   * @param {number[]} a
+   * @param {number[]} b
+   * @param {string} color
+   */
   ellipse(context, at, covariance, a, b, color) {
+    /** @param {number[]} p @param {number[]} q */
     const of = (p, q) =>
       PLAN.dot(
         p,
@@ -148,14 +207,14 @@ class Picture {
       (variance) => PLAN.SIGMAS_95 * 1e3 * Math.sqrt(Math.max(variance, 0)) * this.scale,
     );
     const turn = 0.5 * Math.atan2(2 * xy, xx - yy);
-    for (const [style, size] of [
+    for (const [style, size] of /** @type {[string, number][]} */ ([
       ['rgba(0, 0, 0, 0.7)', 3.5],
       [color, 1.75],
-    ]) {
+    ])) {
       context.strokeStyle = style;
       context.lineWidth = size;
       context.beginPath();
-      context.ellipse(...at, Math.max(radii[0], 0.5), Math.max(radii[1], 0.5), turn, 0, 2 * Math.PI);
+      context.ellipse(at[0], at[1], Math.max(radii[0], 0.5), Math.max(radii[1], 0.5), turn, 0, 2 * Math.PI);
       context.stroke();
     }
   }
@@ -163,6 +222,7 @@ class Picture {
 
 /** A slice along the patient's axes. `planner` has the volume and what is shown; it is told of clicks and drags. */
 class Slice extends Picture {
+  /** @param {Plane} plane @param {Planner} planner */
   constructor(plane, planner) {
     super(
       plane.title,
@@ -172,17 +232,31 @@ class Slice extends Picture {
     this.plane = plane;
     this.planner = planner;
     this.image = document.createElement('canvas');
+    this.outline = document.createElement('canvas');
+    /** @type {number | undefined} */
+    this.outlined = undefined;
+    /** @type {'target' | 'entry' | 'crosshair' | null} */
+    this.held = null;
+    this.from = [0, 0];
+    this.moved = false;
     this.listen();
   }
 
-  /** Picture (mm) of an index: to the right and down from the corner of the first pixel. */
+  /**
+   * Picture (mm) of an index: to the right and down from the corner of the first pixel.
+   * @param {Index} index
+   */
   place(index) {
     const { u, v, flip } = this.plane;
     const { size, spacing } = this.planner.volume;
     return [(index[u] + 0.5) * spacing[u], (flip ? size[v] - 0.5 - index[v] : index[v] + 0.5) * spacing[v]];
   }
 
-  /** Index of a place of the picture, in the slice that is shown. */
+  /**
+   * Index of a place of the picture, in the slice that is shown.
+   * @param {number[]} place
+   * @param {number} depth
+   */
   index([x, y], depth) {
     const { u, v, w, flip } = this.plane;
     const { size, spacing } = this.planner.volume;
@@ -193,6 +267,7 @@ class Slice extends Picture {
     return index;
   }
 
+  /** @param {MouseEvent} event */
   voxel(event) {
     const { w } = this.plane;
     const index = this.index(this.inPicture(event), this.planner.state.crosshair[w]);
@@ -208,18 +283,17 @@ class Slice extends Picture {
     const context = this.begin(extent, this.middle || [extent[0] / 2, extent[1] / 2]);
     if (!context) return;
     const slice = state.crosshair[w];
-    if (this.drawn !== `${slice} ${state.window_hu}`) {
-      PLAN.plane(volume, this.plane, slice, greys, this.image);
-      this.drawn = `${slice} ${state.window_hu}`;
-    }
+    if (this.isNew(`${slice} ${state.window_hu}`)) PLAN.plane(volume, this.plane, slice, greys, this.image);
     context.imageSmoothingEnabled = true;
     context.imageSmoothingQuality = 'high';
-    context.drawImage(this.image, ...this.onCanvas([0, 0]), extent[0] * this.scale, extent[1] * this.scale);
+    const [x, y] = this.onCanvas([0, 0]);
+    context.drawImage(this.image, x, y, extent[0] * this.scale, extent[1] * this.scale);
     this.outlines(context, slice, extent);
     this.balls(context, slice);
     this.entries(context, slice);
     this.crosshair(context);
     if (route) this.needle(context, route, slice);
+    /** @param {Index | null} index @param {string} color @param {string} label */
     const handle = (index, color, label) => {
       if (!index) return;
       const at = this.onCanvas(this.place(index));
@@ -234,21 +308,30 @@ class Slice extends Picture {
     this.caption.textContent = `${this.title} ${slice + 1} of ${size[w]}`;
   }
 
-  /** What each voxel was taken for, where somebody wants to see it. */
+  /**
+   * What each voxel was taken for, where somebody wants to see it.
+   * @param {CanvasRenderingContext2D} context
+   * @param {number} slice
+   * @param {number[]} extent
+   */
   outlines(context, slice, extent) {
     const { labels, labelColors, volume, showsLabels } = this.planner;
     if (!labels || !showsLabels) return;
-    this.outline ??= document.createElement('canvas');
     if (this.outlined !== slice) {
       PLAN.outlines(volume.size, labels, this.plane, slice, labelColors, this.outline);
       this.outlined = slice;
     }
     context.imageSmoothingEnabled = false;
-    context.drawImage(this.outline, ...this.onCanvas([0, 0]), extent[0] * this.scale, extent[1] * this.scale);
+    const [x, y] = this.onCanvas([0, 0]);
+    context.drawImage(this.outline, x, y, extent[0] * this.scale, extent[1] * this.scale);
     context.imageSmoothingEnabled = true;
   }
 
-  /** Free entries of the map that are within 2 mm of the slice. */
+  /**
+   * Free entries of the map that are within 2 mm of the slice.
+   * @param {CanvasRenderingContext2D} context
+   * @param {number} slice
+   */
   entries(context, slice) {
     this.planner.entryMap.entriesNear(this.plane.w, slice, 2, (index, color) => {
       const [x, y] = this.onCanvas(this.place(index));
@@ -262,12 +345,17 @@ class Slice extends Picture {
     });
   }
 
-  /** Lesions and markers where the slice cuts them. */
+  /**
+   * Lesions and markers where the slice cuts them.
+   * @param {CanvasRenderingContext2D} context
+   * @param {number} slice
+   */
   balls(context, slice) {
     const { facts, volume, state } = this.planner;
     const { w } = this.plane;
+    /** @param {Lesion | Marker} ball @param {string} color @param {string} name */
     const cut = (ball, color, name) => {
-      const radius = 0.5e3 * ball.diameter_m;
+      const radius = 0.5e3 * (ball.diameter_m ?? 0);
       const off = (ball.index[w] - slice) * volume.spacing[w];
       if (!(radius > Math.abs(off))) return;
       const at = this.onCanvas(this.place(ball.index));
@@ -280,6 +368,7 @@ class Slice extends Picture {
       if (!state.hidden_markers.includes(marker.name)) cut(marker, PLAN.COLORS.marker, NB.words(marker.name));
   }
 
+  /** @param {CanvasRenderingContext2D} context */
   crosshair(context) {
     const [x, y] = this.onCanvas(this.place(this.planner.state.crosshair));
     const [w, h] = this.box;
@@ -305,17 +394,23 @@ class Slice extends Picture {
       ],
     ]) {
       context.beginPath();
-      context.moveTo(...a);
-      context.lineTo(...b);
+      context.moveTo(a[0], a[1]);
+      context.lineTo(b[0], b[1]);
       context.stroke();
     }
   }
 
-  /** Dashed where it runs before or behind the slice, and as thick as it is where it runs within. */
+  /**
+   * Dashed where it runs before or behind the slice, and as thick as it is where it runs within.
+   * @param {CanvasRenderingContext2D} context
+   * @param {RouteAnswer} route
+   * @param {number} slice
+   */
   needle(context, route, slice) {
     const { w } = this.plane;
     const { volume, facts, tip } = this.planner;
     const [from, to] = [route.entry_index, route.target_index];
+    /** @param {number} share */
     const at = (share) => this.onCanvas(this.place(PLAN.add(from, PLAN.add(to, from, -1), share)));
     this.line(context, at(-15e-3 / route.length_m), at(1), PLAN.COLORS.needle, 1, [5, 4]);
     const half = Math.max(0.5, 1 / volume.spacing[w]);
@@ -388,13 +483,16 @@ class Slice extends Picture {
         planner.beginDrag();
       }
       // In the plane; its depth stays.
-      const depth = planner.shown[this.held][this.plane.w];
+      const depth = planner.shown[this.held]?.[this.plane.w] ?? 0;
       planner.drag(this.held, planner.within(this.index(this.inPicture(event), depth)));
     });
     const end = () => {
       if (this.held && this.held !== 'crosshair') {
         if (this.moved) planner.endDrag();
-        else planner.look(planner.within(planner.shown[this.held].map(Math.round)));
+        else {
+          const at = planner.shown[this.held];
+          if (at) planner.look(planner.within(at.map(Math.round)));
+        }
       }
       this.held = null;
     };
@@ -413,9 +511,14 @@ class Slice extends Picture {
     canvas.addEventListener('keydown', (event) => this.key(event));
   }
 
-  /** `target` or `entry`, if one is under the pointer. */
+  /**
+   * `target` or `entry`, if one is under the pointer.
+   * @param {PointerEvent} event
+   * @returns {'target' | 'entry' | null}
+   */
   handleAt(event) {
     const box = this.canvas.getBoundingClientRect();
+    /** @param {Index | null} index */
     const near = (index) => {
       if (!index) return false;
       const at = this.onCanvas(this.place(index));
@@ -423,33 +526,41 @@ class Slice extends Picture {
       return Math.hypot(at[0] - event.clientX + box.left, at[1] - event.clientY + box.top) < reach;
     };
     const { shown } = this.planner;
-    return ['entry', 'target'].find((name) => near(shown[name])) || null;
+    return near(shown.entry) ? 'entry' : near(shown.target) ? 'target' : null;
   }
 
-  /** About a place of the picture that stays where it is; 0 shows all. */
+  /**
+   * About a place of the picture that stays where it is; 0 shows all.
+   * @param {number} factor
+   * @param {number[] | null} [about]
+   */
   zoomBy(factor, about = null) {
     const { u, v } = this.plane;
     const { size, spacing } = this.planner.volume;
     const whole = [(size[u] * spacing[u]) / 2, (size[v] * spacing[v]) / 2];
-    const zoom = factor === 0 ? 1 : Math.min(Math.max(this.zoom * factor, 1), 12);
+    const { zoom: before, middle: seen } = this;
+    const zoom = factor === 0 ? 1 : Math.min(Math.max(before * factor, 1), 12);
     const at = about || this.place(this.planner.state.crosshair);
-    const middle = this.middle || whole;
-    this.middle = zoom === 1 ? null : middle.map((value, axis) => at[axis] + ((value - at[axis]) * this.zoom) / zoom);
+    const middle = seen || whole;
+    this.middle = zoom === 1 ? null : middle.map((value, axis) => at[axis] + ((value - at[axis]) * before) / zoom);
     this.zoom = zoom;
     this.draw();
   }
 
+  /** @param {KeyboardEvent} event */
   key(event) {
     const { planner, plane } = this;
     if (!planner.volume || event.ctrlKey || event.metaKey || event.altKey) return;
-    const move = {
+    /** @type {{ [key: string]: number[] | undefined }} */
+    const moves = {
       ArrowLeft: [plane.u, -1],
       ArrowRight: [plane.u, 1],
       ArrowUp: [plane.v, plane.flip ? 1 : -1],
       ArrowDown: [plane.v, plane.flip ? -1 : 1],
       PageUp: [plane.w, 1],
       PageDown: [plane.w, -1],
-    }[event.key];
+    };
+    const move = moves[event.key];
     if (move) planner.step(move[0], move[1] * (event.shiftKey ? 10 : 1));
     else if (event.key === '+' || event.key === '=') this.zoomBy(1.2);
     else if (event.key === '-') this.zoomBy(1 / 1.2);
@@ -463,6 +574,7 @@ class Slice extends Picture {
 
 /** Slices along the needle, interpolated between voxels: in line with it, and across it at a depth. */
 class Probe extends Picture {
+  /** @param {'along' | 'across'} kind @param {Planner} planner */
   constructor(kind, planner) {
     super(
       kind === 'along' ? 'In line with the needle' : 'Across the needle',
@@ -474,15 +586,19 @@ class Probe extends Picture {
     this.planner = planner;
     this.image = document.createElement('canvas');
     this.canvas.addEventListener('keydown', (event) => {
-      const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      const step = event.key === 'ArrowLeft' ? -1 : event.key === 'ArrowRight' ? 1 : 0;
       if (!step) return;
       event.preventDefault();
       planner.turnProbe(this.kind, step);
     });
   }
 
-  /** Unit vectors of ct: to the right, down, and where the middle is, mm from the first voxel. */
+  /**
+   * Unit vectors of ct: to the right, down, and where the middle is, mm from the first voxel.
+   * @param {RouteAnswer} route
+   */
   axes(route) {
+    /** @param {Index} index */
     const mm = (index) => index.map((value, axis) => value * this.planner.volume.spacing[axis]);
     const [entry, target] = [mm(route.entry_index), mm(route.target_index)];
     const along = PLAN.unit(PLAN.add(target, entry, -1));
@@ -524,12 +640,10 @@ class Probe extends Picture {
       Math.round(Math.min(pixels, 420) * (this.planner.dragging ? 0.4 : 1)),
     );
     const key = `${columns} ${rows} ${w} ${h} ${this.scale} ${right} ${down} ${middle} ${state.window_hu}`;
-    if (this.drawn !== key) {
-      this.sample(right, down, middle, [w / this.scale, h / this.scale], [columns, rows]);
-      this.drawn = key;
-    }
+    if (this.isNew(key)) this.sample(right, down, middle, [w / this.scale, h / this.scale], [columns, rows]);
     context.imageSmoothingEnabled = true;
     context.drawImage(this.image, 0, 0, w, h);
+    /** @param {number[]} mm */
     const flat = (mm) => {
       const off = PLAN.add(mm, middle, -1);
       return this.onCanvas([PLAN.dot(off, right), PLAN.dot(off, down)]);
@@ -563,12 +677,19 @@ class Probe extends Picture {
         : `${this.title} at ${NB.fixed(this.planner.probe.depth, 1)} mm from the skin`;
   }
 
+  /**
+   * @param {number[]} right
+   * @param {number[]} down
+   * @param {number[]} middle
+   * @param {number[]} size
+   * @param {number[]} pixels
+   */
   sample(right, down, middle, [width, height], [columns, rows]) {
     const { volume, greys } = this.planner;
     const { spacing } = volume;
     if (this.image.width !== columns || this.image.height !== rows)
       [this.image.width, this.image.height] = [columns, rows];
-    const context = this.image.getContext('2d');
+    const context = NB.context(this.image);
     const image = context.createImageData(columns, rows);
     const pixels = new Uint32Array(image.data.buffer);
     const step = right.map((value, axis) => (value * width) / columns / spacing[axis]);
@@ -591,11 +712,11 @@ PLAN.towards = (direction) => {
     ['A', 'P'],
     ['I', 'S'],
   ];
-  const sides = direction.map((value, axis) => [Math.abs(value), letters[axis][value > 0 ? 1 : 0]]);
+  const sides = direction.map((value, axis) => ({ size: Math.abs(value), letter: letters[axis][value > 0 ? 1 : 0] }));
   return sides
-    .filter(([size]) => size > 0.35)
-    .sort((a, b) => b[0] - a[0])
-    .map(([, letter]) => letter)
+    .filter(({ size }) => size > 0.35)
+    .sort((a, b) => b.size - a.size)
+    .map(({ letter }) => letter)
     .slice(0, 2)
     .join('');
 };

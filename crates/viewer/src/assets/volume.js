@@ -6,7 +6,7 @@
 PLAN.bytes = async (path, count, progress) => {
   const bytes = new Uint8Array(count);
   const response = await PLAN.fetch(path);
-  const reader = response.body.getReader();
+  const reader = /** @type {ReadableStream<Uint8Array<ArrayBuffer>>} */ (response.body).getReader();
   let at = 0;
   for (;;) {
     const { done, value } = await reader.read();
@@ -21,23 +21,33 @@ PLAN.bytes = async (path, count, progress) => {
 };
 
 class Volume {
+  /** @param {number[]} size @param {number[]} spacing @param {Int16Array} hu */
   constructor(size, spacing, hu) {
     this.size = size;
     this.spacing = spacing.map((metres) => metres * 1e3); // mm
     this.hu = hu;
   }
 
-  /** As it comes in; `progress(share)` is told how far it is. */
+  /**
+   * As it comes in; `progress(share)` is told how far it is.
+   * @param {number[]} size
+   * @param {number[]} spacing
+   * @param {(share: number) => void} progress
+   */
   static async load(size, spacing, progress) {
     const bytes = await PLAN.bytes('volume', 2 * size[0] * size[1] * size[2], progress);
     return new Volume(size, spacing, new Int16Array(bytes.buffer));
   }
 
+  /** @param {Index} index */
   holds(index) {
     return index.every((value, axis) => value >= -0.5 && value < this.size[axis] - 0.5);
   }
 
-  /** Voxel by voxel: the nearest one's value, or nothing outside. */
+  /**
+   * Voxel by voxel: the nearest one's value, or nothing outside.
+   * @param {Index} index
+   */
   at(index) {
     const [i, j, k] = index.map(Math.round);
     const [n, m, l] = this.size;
@@ -45,7 +55,12 @@ class Volume {
     return this.hu[(k * m + j) * n + i];
   }
 
-  /** Between the eight voxels around; -1000 outside. */
+  /**
+   * Between the eight voxels around; -1000 outside.
+   * @param {number} x
+   * @param {number} y
+   * @param {number} z
+   */
   between(x, y, z) {
     const [n, m, l] = this.size;
     if (!(x >= 0 && y >= 0 && z >= 0 && x <= n - 1 && y <= m - 1 && z <= l - 1)) return -1000;
@@ -83,7 +98,7 @@ PLAN.greys = ([low, high]) => {
 PLAN.paint = (size, { u, v, w, flip }, slice, canvas, pixel) => {
   const stride = [1, size[0], size[0] * size[1]];
   if (canvas.width !== size[u] || canvas.height !== size[v]) [canvas.width, canvas.height] = [size[u], size[v]];
-  const context = canvas.getContext('2d');
+  const context = NB.context(canvas);
   const image = context.createImageData(size[u], size[v]);
   const pixels = new Uint32Array(image.data.buffer);
   let to = 0;

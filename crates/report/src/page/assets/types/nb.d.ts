@@ -365,23 +365,13 @@ interface RunSections {
   route(goal: GoalReport, criteria: CriterionResult[]): Child;
   goals(run: RunPage, choose: (index: number) => void): { element: HTMLElement; rows: HTMLElement[] } | null;
   margins(c: ConfigurationReport): Child;
-  budget(
-    goal: GoalReport,
-    configuration: ConfigurationReport,
-    charts: ConfigurationCharts | null,
-    name: string,
-  ): Child;
+  budget(goal: GoalReport, configuration: ConfigurationReport, charts: ConfigurationCharts | null, name: string): Child;
   people(goal: GoalReport): Child;
   criteria(page: RunDocument): HTMLElement;
   summary(criteria: CriterionResult[]): HTMLElement;
   requirements(report: Report): HTMLElement | null;
   provenance(report: Report): HTMLElement;
-  events(
-    goal: GoalReport,
-    configuration: ConfigurationReport,
-    charts: ConfigurationCharts | null,
-    name: string,
-  ): Child;
+  events(goal: GoalReport, configuration: ConfigurationReport, charts: ConfigurationCharts | null, name: string): Child;
   press(
     configurations: WithEvents[],
     configuration: ConfigurationReport,
