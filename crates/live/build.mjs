@@ -18,8 +18,11 @@ const TARGET = 'wasm32-unknown-unknown';
 const root = resolve(dirname(fileURLToPath(import.meta.url)), '../..');
 const asset = join(root, 'crates/report/src/page/assets/live.wasm');
 const record = `${asset}.json`;
-const run = (program, words, options = {}) => execFileSync(program, words, { cwd: root, encoding: 'utf8', ...options });
+/** @param {string} program @param {string[]} words @param {object} [options] */
+const run = (program, words, options = {}) =>
+  String(execFileSync(program, words, { cwd: root, encoding: 'utf8', ...options }));
 
+/** @param {string} folder @returns {string[]} */
 function files(folder) {
   return readdirSync(folder)
     .sort()

@@ -17,6 +17,9 @@ async function executable() {
 
 const browser = await executable();
 
-/** A running Chromium with further arguments. */
+/**
+ * A running Chromium with further arguments.
+ * @param {string[]} args
+ */
 export const launch = (args) =>
   chromium.launch({ executablePath: browser.path, args: ['--no-sandbox', ...browser.args, ...args] });

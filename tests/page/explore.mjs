@@ -13,6 +13,9 @@ import { pathToFileURL } from 'node:url';
 import { deflateSync } from 'node:zlib';
 import { launch, NO_GL, SOFTWARE_GL } from './browser.mjs';
 
+/** @typedef {import('playwright-core').Page} Page */
+/** @typedef {import('playwright-core').Browser} Browser */
+
 /** Postures by scenario, and by each place of the base. */
 const POSTURES = 1000;
 const POSTURES_ELSEWHERE = 100;
@@ -27,6 +30,7 @@ const COMPUTED_MS = 4;
 const MOST_BYTES = 350e3;
 
 const words = process.argv.slice(2);
+/** @param {string} name @param {string | null} [otherwise] */
 const option = (name, otherwise = null) => {
   const at = words.indexOf(name);
   return at >= 0 ? resolve(words.splice(at, 2)[1]) : otherwise;
@@ -38,16 +42,24 @@ mkdirSync(out, { recursive: true });
 const folder = mkdtempSync(join(tmpdir(), 'explore-'));
 process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
 
+/** @param {string} binary @param {...string} rest */
 const ask = (binary, ...rest) => execFileSync(binary, rest, { encoding: 'utf8', maxBuffer: 1 << 28, stdio: 'pipe' });
+/** @param {string} scenario @param {number} count @returns {{ joints: number[], distances_m: number[] }[]} */
 const postures = (scenario, count) =>
   ask(example, scenario, String(count))
     .trim()
     .split('\n')
     .map((line) => JSON.parse(line));
+/** @param {Page} page */
 const settle = (page) =>
   page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 
-/** The scenario with its base elsewhere, as a file that finds its models. */
+/**
+ * The scenario with its base elsewhere, as a file that finds its models.
+ * @param {string} scenario
+ * @param {string} toml
+ * @param {string} name
+ */
 function elsewhere(scenario, toml, name) {
   const text = readFileSync(scenario, 'utf8').replaceAll('../models/', `${resolve(dirname(scenario), '../models')}/`);
   const lines = toml.split('\n').slice(1);
@@ -59,10 +71,17 @@ function elsewhere(scenario, toml, name) {
   return file;
 }
 
+/**
+ * @param {Browser} running
+ * @param {string} file
+ * @param {{ width: number, height: number }} [size]
+ * @param {() => void} [script]
+ */
 async function open(running, file, size = { width: 1400, height: 1000 }, script = null) {
   const page = await running.newPage({ viewport: size });
   // A picture takes long without a graphics card, and longer beside other programs.
   page.setDefaultTimeout(120_000);
+  /** @type {string[]} */
   const problems = [];
   page.on('console', (message) => {
     if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`);
@@ -77,7 +96,11 @@ async function open(running, file, size = { width: 1400, height: 1000 }, script 
   return { page, problems };
 }
 
-/** The largest difference of all pairs, m. */
+/**
+ * The largest difference of all pairs, m.
+ * @param {Page} page
+ * @param {{ joints: number[], distances_m: number[] }[]} expected
+ */
 async function differ(page, expected) {
   const found = await page.evaluate(
     (all) => all.map((joints) => NB.current.explore.live.pairs(joints).map((pair) => pair.distance)),
@@ -96,10 +119,16 @@ async function differ(page, expected) {
   return { worst, count };
 }
 
+/** @param {Page} page @param {string} run @returns {Promise<any>} */
 const explore = (page, run) => page.evaluate(`(() => { const explore = NB.current.explore; return ${run}; })()`);
+/** @param {string} text */
 const mm = (text) => Number(text.replace('\u2212', '-'));
 
-/** The table of classes against `needlebench clearance`, with the command that the page gives. */
+/**
+ * The table of classes against `needlebench clearance`, with the command that the page gives.
+ * @param {Page} page
+ * @param {string} scenario
+ */
 async function testCommand(page, scenario) {
   const command = await explore(page, 'explore.command(explore.joints)');
   const list = command.match(/ --joints (\S+)$/)[1];
@@ -110,6 +139,7 @@ async function testCommand(page, scenario) {
     .locator('tbody tr')
     .evaluateAll((rows) => rows.map((row) => [...row.children].map((cell) => cell.textContent)));
   assert.equal(shown.length, Object.keys(classes).length);
+  /** @type {{ name: string, distance: number, solids: string[] }[]} */
   const least = await explore(
     page,
     'explore.least.map((pair) => ({ name: explore.data.classes[pair.class].name, distance: pair.distance, ' +
@@ -125,6 +155,7 @@ async function testCommand(page, scenario) {
   });
 }
 
+/** @param {Page} page @param {string} scenario */
 async function testJoints(page, scenario) {
   const sliders = page.locator('.explore input[type=range]');
   assert.equal(await sliders.count(), 6);
@@ -153,7 +184,12 @@ async function testJoints(page, scenario) {
   assert.equal(await explore(page, 'explore.joints[2]'), before);
 }
 
-/** Drags the ring, and types; then the scenario with that base has to give the same. */
+/**
+ * Drags the ring, and types; then the scenario with that base has to give the same.
+ * @param {Page} page
+ * @param {string} scenario
+ * @param {string} name
+ */
 async function testBase(page, scenario, name) {
   await page.evaluate(() => {
     window.scrollTo(0, 0);
@@ -170,7 +206,7 @@ async function testBase(page, scenario, name) {
   });
   const camera = () => page.evaluate(() => NB.current.view.camera.position.toArray());
   const [home, eye] = [await explore(page, 'explore.base.position'), await camera()];
-  await page.mouse.move(...ring);
+  await page.mouse.move(ring[0], ring[1]);
   await page.mouse.down();
   for (let step = 1; step <= 6; step++) {
     await page.mouse.move(ring[0] + 6 * step, ring[1] - 4 * step);
@@ -235,9 +271,13 @@ async function testBase(page, scenario, name) {
   return worst;
 }
 
-/** The eight configurations, and the one that is taken. */
+/**
+ * The eight configurations, and the one that is taken.
+ * @param {Page} page
+ */
 async function testConfigurations(page) {
   await page.waitForFunction(() => document.querySelector('[data-rolls=all]'), null, { timeout: 30_000 });
+  /** @type {LivePosture[]} */
   const found = await explore(page, 'explore.found');
   assert.equal(found.length, 8);
   // At the run's own base, what the run has found to work keeps its limits at some roll, too.
@@ -267,7 +307,10 @@ async function testConfigurations(page) {
     assert.ok(Math.abs(value - at.wanted[k]) < 1e-6, `the guide is at ${at.exit}, not ${at.wanted}`);
 }
 
-/** Nothing of the run is shown meanwhile, and all of it afterwards. */
+/**
+ * Nothing of the run is shown meanwhile, and all of it afterwards.
+ * @param {Page} page
+ */
 async function testLeaving(page) {
   assert.ok(await page.locator('.tried-sign').isVisible());
   const shown = () =>
@@ -294,7 +337,7 @@ for (let k = 0; k < words.length; k += 2) {
   const running = await launch(SOFTWARE_GL);
   const { page, problems } = await open(running, file);
   const brought = await page.evaluate(() =>
-    ['code', 'scene'].map((part) => [...NB.array(NB.current.page.explore[part])]),
+    [NB.current.page.explore.code, NB.current.page.explore.scene].map((part) => [...NB.array(part)]),
   );
   const [code, scene] = brought.map((bytes) => Math.ceil((deflateSync(Uint8Array.from(bytes)).length * 4) / 3));
   assert.ok(code + scene <= MOST_BYTES, `code and scene add ${code + scene} bytes to the page`);
@@ -320,7 +363,7 @@ for (let k = 0; k < words.length; k += 2) {
   await testConfigurations(page);
   const times = await page.evaluate(() => {
     const { explore } = NB.current;
-    const [computed, whole, reached] = [[], [], []];
+    const [computed, whole, reached] = Array.from({ length: 3 }, () => /** @type {number[]} */ ([]));
     const start = [...explore.joints];
     for (let k = 0; k < 60; k++) {
       explore.joints = start.map((q, joint) => q + 0.01 * k * (joint % 2 ? 1 : -1));
@@ -332,6 +375,7 @@ for (let k = 0; k < words.length; k += 2) {
       explore.showReach(Explore.ROLLS, true);
       reached.push(explore.reachedInMs);
     }
+    /** @param {number[]} list */
     const median = (list) => Math.round(100 * list.sort((a, b) => a - b)[list.length >> 1]) / 100;
     return { computed: median(computed), whole: median(whole), reached: median(reached) };
   });
@@ -362,7 +406,7 @@ for (let k = 0; k < words.length; k += 2) {
   await testCommand(flat.page, scenario);
   assert.deepEqual(flat.problems, []);
   const old = await open(without, file, undefined, () => {
-    delete window.WebAssembly;
+    Reflect.deleteProperty(window, 'WebAssembly');
   });
   await old.page.getByRole('button', { name: 'Try a posture' }).click();
   const said = await old.page.locator('.explore [role=status]').first().textContent();

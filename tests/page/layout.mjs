@@ -1,25 +1,37 @@
 // How a page looks at the widths of a telephone, a tablet, laptops and a large screen: by rectangles and pixels.
 import assert from 'node:assert/strict';
 
+/** @typedef {import('playwright-core').Page} Page */
+/** @typedef {import('playwright-core').Locator} Locator */
+/** @typedef {(judge: Page, locator: Locator, name: string, least?: number) => Promise<void>} NotBlank */
+
 export const WIDTHS = [390, 768, 1024, 1400, 1920];
 /** Least height of what a finger touches on narrow screens, px. */
 const TAPPABLE = 32;
 const NARROW = 1024;
 
-/** Runs in the page: everything that is cut, covered or too small, in words. */
+/**
+ * Runs in the page: everything that is cut, covered or too small, in words.
+ * @param {{ tappable: number, narrow: number }} limits
+ */
 function problemsOfLayout({ tappable, narrow }) {
   const width = document.documentElement.clientWidth;
+  /** @type {string[]} */
   const found = [];
+  /** @param {Element} element */
   const name = (element) => {
     const text = (element.getAttribute('aria-label') || element.textContent || '').trim().slice(0, 40);
     // Of SVG it is no text.
     const classes = typeof element.className === 'string' ? element.className : '';
     return `${element.tagName.toLowerCase()}${classes ? `.${classes.replaceAll(' ', '.')}` : ''} "${text}"`;
   };
+  /** @param {Element} element */
   const seen = (element) =>
     element.checkVisibility({ contentVisibilityAuto: true, visibilityProperty: true }) &&
     !element.closest('.visually-hidden');
+  /** @param {Element} element */
   const box = (element) => element.getBoundingClientRect();
+  /** @param {DOMRect} rect */
   const size = (rect) => rect.width > 0.5 && rect.height > 0.5;
   if (document.documentElement.scrollWidth > width)
     found.push(`the page is ${document.documentElement.scrollWidth} px wide`);
@@ -93,7 +105,7 @@ function problemsOfLayout({ tappable, narrow }) {
   for (const control of document.body.querySelectorAll(
     'button, select, summary, input[type=checkbox], input[type=range]',
   )) {
-    if (!seen(control) || control.disabled) continue;
+    if (!seen(control) || control.matches(':disabled')) continue;
     const target = control.closest('label') || control;
     if (control.closest('.scroll')) continue;
     target.scrollIntoView({ block: 'center' });
@@ -110,7 +122,11 @@ function problemsOfLayout({ tappable, narrow }) {
   return [...new Set(found)];
 }
 
-/** Colours in the last columns of pixels of a picture: a page that is cut has more than its background there. */
+/**
+ * Colours in the last columns of pixels of a picture: a page that is cut has more than its background there.
+ * @param {Page} judge
+ * @param {Buffer} png
+ */
 const edgeColors = (judge, png) =>
   judge.evaluate(async (data) => {
     const image = new Image();
@@ -128,10 +144,14 @@ const edgeColors = (judge, png) =>
 /** Widths at which columns come and go, and some between. */
 const STILL_AT = [390, 400, 470, 600, 610, 700, 860, 1000];
 
-/** Heights of the page over a dozen frames, after it had time to settle. */
+/**
+ * Heights of the page over a dozen frames, after it had time to settle.
+ * @param {Page} page
+ */
 async function heights(page) {
   await page.waitForTimeout(250);
   return page.evaluate(async () => {
+    /** @type {number[]} */
     const seen = [];
     for (let frame = 0; frame < 12; frame++) {
       await new Promise((next) => {
@@ -143,10 +163,15 @@ async function heights(page) {
   });
 }
 
-/** Asserts that a page is whole at every width, folded and unfolded; `look(width)` is called at each. */
+/**
+ * Asserts that a page is whole at every width, folded and unfolded; `look(width)` is called at each.
+ * @param {Page} page
+ * @param {{ judge: Page, notBlank: NotBlank, settle: (page: Page) => Promise<unknown>, shot: (width: number) => string }} tools
+ */
 export async function testLayout(page, { judge, notBlank, settle, shot }) {
   const before = page.viewportSize();
   const open = await page.evaluate(() => [...document.querySelectorAll('details')].map((each) => each.open));
+  /** @type {string[]} */
   const wrong = [];
   for (const width of WIDTHS) {
     await page.setViewportSize({ width, height: 900 });

@@ -2,12 +2,19 @@
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 
+/** @typedef {import('playwright-core').Page} Page */
+
 /** Sheets of paper that the page of any shipped scenario takes. */
 export const MOST_SHEETS = 8;
 
+/** @param {Page} page @param {string} selector */
 const text = (page, selector) => page.locator(selector).first().textContent();
 
-/** The label and the sentence tell what holds at the slider's time, and the least only at its own. */
+/**
+ * The label and the sentence tell what holds at the slider's time, and the least only at its own.
+ * @param {Page} page
+ * @param {(page: Page) => Promise<unknown>} settle
+ */
 export async function testNearest(page, settle) {
   const times = await page.evaluate(() => [0, 0.31, 0.77, 1].map((share) => share * NB.current.end));
   for (const time of times) {
@@ -47,7 +54,11 @@ export async function testNearest(page, settle) {
   assert.doesNotMatch(moved, /^least /);
 }
 
-/** Ghosts have their own colours, and the names of their configurations stand at them. */
+/**
+ * Ghosts have their own colours, and the names of their configurations stand at them.
+ * @param {Page} page
+ * @param {(page: Page) => Promise<unknown>} settle
+ */
 export async function testGhosts(page, settle) {
   await page.getByRole('button', { name: 'All as ghosts' }).click();
   await settle(page);
@@ -63,7 +74,11 @@ export async function testGhosts(page, settle) {
   await page.getByRole('button', { name: 'No ghosts' }).click();
 }
 
-/** What is chosen stands in the address, and the address brings it back, from disk and after a reload. */
+/**
+ * What is chosen stands in the address, and the address brings it back, from disk and after a reload.
+ * @param {Page} page
+ * @param {(page: Page) => Promise<unknown>} settle
+ */
 export async function testAddress(page, settle) {
   const wanted = await page.evaluate(() => {
     const run = NB.current;
@@ -73,6 +88,7 @@ export async function testAddress(page, settle) {
     run.seek(1);
     return { goal: run.goal.name, configuration: run.configuration.label, time: '1.00' };
   });
+  /** @param {object} choices */
   const stands = (choices) =>
     JSON.stringify(Object.fromEntries([...new URLSearchParams(location.hash.slice(1))].sort())) ===
     JSON.stringify(choices);
@@ -98,8 +114,12 @@ export async function testAddress(page, settle) {
   assert.equal(await page.evaluate(() => NB.current.goalIndex), 0);
 }
 
-/** Figures are saved as SVG for a column of 85 mm, and the view as PNG. */
+/**
+ * Figures are saved as SVG for a column of 85 mm, and the view as PNG.
+ * @param {Page} page
+ */
 export async function testSaving(page) {
+  /** @param {string} name */
   const save = async (name) => {
     const [download] = await Promise.all([
       page.waitForEvent('download'),
@@ -116,24 +136,33 @@ export async function testSaving(page) {
   assert.equal(view.bytes.subarray(1, 4).toString(), 'PNG');
 }
 
-/** Every chart of the program is drawn, and fits its frame. */
+/**
+ * Every chart of the program is drawn, and fits its frame.
+ * @param {Page} page
+ */
 export async function testCharts(page) {
   await page.evaluate(() => {
     for (const each of document.querySelectorAll('details')) each.open = true;
   });
   const charts = await page.evaluate(() =>
     Promise.all(
-      [...document.querySelectorAll('.chart img')].map(async (image) => {
-        await image.decode();
-        return [image.alt, image.naturalWidth];
-      }),
+      [...document.images]
+        .filter((image) => image.closest('.chart'))
+        .map(async (image) => {
+          await image.decode();
+          return { title: image.alt, width: image.naturalWidth };
+        }),
     ),
   );
-  for (const [title, width] of charts) assert.ok(title && width > 100, `${title} is not drawn`);
-  return charts.map(([title]) => title);
+  for (const { title, width } of charts) assert.ok(title && width > 100, `${title} is not drawn`);
+  return charts.map(({ title }) => title);
 }
 
-/** A test by ISO 9283: each pose can be looked at, with where the arm came to rest. */
+/**
+ * A test by ISO 9283: each pose can be looked at, with where the arm came to rest.
+ * @param {Page} page
+ * @param {(page: Page) => Promise<string>} picture
+ */
 export async function testPoses(page, picture) {
   const pictures = new Set();
   for (const name of ['P1', 'P2', 'P3', 'P4', 'P5']) {
@@ -146,7 +175,10 @@ export async function testPoses(page, picture) {
   assert.ok(charts.length >= 4, `${charts.length} charts`);
 }
 
-/** Sections that a scenario with events has. */
+/**
+ * Sections that a scenario with events has.
+ * @param {Page} page
+ */
 export async function testEvents(page) {
   const asked = await page.evaluate(() => NB.current.goal.configurations.some((each) => each.events));
   if (!asked) return;
@@ -161,5 +193,8 @@ export async function testEvents(page) {
   );
 }
 
-/** Sheets of a PDF file. */
+/**
+ * Sheets of a PDF file.
+ * @param {Buffer} pdf
+ */
 export const sheets = (pdf) => (pdf.toString('latin1').match(/\/Type\s*\/Page(?!s)/g) || []).length;

@@ -2,10 +2,18 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 
+/** @typedef {import('playwright-core').Page} Page */
+/** @typedef {import('playwright-core').Locator} Locator */
+/** @typedef {(judge: Page, locator: Locator, name: string, least?: number) => Promise<void>} NotBlank */
+
 const REDRAW_MS = 100;
+/** @type {('scatter' | 'map' | 'ecdf' | 'histogram' | 'strip')[]} */
 const FIGURES = ['scatter', 'map', 'ecdf', 'histogram', 'strip'];
 
-/** The answer stands first, with its figure and interval, and criteria have values, limits and requirements. */
+/**
+ * The answer stands first, with its figure and interval, and criteria have values, limits and requirements.
+ * @param {Page} page
+ */
 async function answerFirst(page) {
   const found = await page.evaluate(() => {
     const answer = document.querySelector('#app .answer');
@@ -40,7 +48,10 @@ async function answerFirst(page) {
   }
 }
 
-/** No number with a power of ten, and no section that is named after a key. */
+/**
+ * No number with a power of ten, and no section that is named after a key.
+ * @param {Page} page
+ */
 async function readable(page) {
   const { text, titles } = await page.evaluate(() => ({
     text: [...document.querySelectorAll('#app .panel, #app table')]
@@ -54,7 +65,10 @@ async function readable(page) {
     assert.ok(!titles.includes(name), `a section is called "${name}"`);
 }
 
-/** The picture of a case has the tool of that case, and no other. */
+/**
+ * The picture of a case has the tool of that case, and no other.
+ * @param {Page} page
+ */
 async function ownTool(page) {
   const cases = await page.evaluate(() => {
     const { scene, posed } = NB.current;
@@ -68,19 +82,21 @@ async function ownTool(page) {
     const { seen, picture } = await page.evaluate(() => {
       const { scene, view } = NB.current;
       const seen = scene.looks.tools.map((_, at) => {
+        /** @type {boolean[]} */
         const before = [];
         view.world.traverse((mesh) => {
-          if (mesh.isMesh) before.push(mesh.visible);
+          if (mesh instanceof THREE.Mesh) before.push(mesh.visible);
         });
         scene.arm.layer(`tool@${at}`, false);
+        /** @type {boolean[]} */
         const after = [];
         view.world.traverse((mesh) => {
-          if (mesh.isMesh) after.push(mesh.visible);
+          if (mesh instanceof THREE.Mesh) after.push(mesh.visible);
         });
         const shown = before.some((each, k) => each && !after[k]);
         let k = 0;
         view.world.traverse((mesh) => {
-          if (mesh.isMesh) mesh.visible = before[k++];
+          if (mesh instanceof THREE.Mesh) mesh.visible = before[k++];
         });
         return shown;
       });
@@ -98,11 +114,12 @@ async function ownTool(page) {
   return cases.length;
 }
 
-/** Cases of one place are one mark, which says how many work. */
+/**
+ * Cases of one place are one mark, which says how many work.
+ * @param {Page} page
+ */
 async function sharesOfPlaces(page) {
-  await page.evaluate(() => {
-    NB.before = { ...NB.current.state };
-  });
+  await page.evaluate(() => Reflect.set(window, 'stateBefore', { ...NB.current.state }));
   const found = await page.evaluate(() => {
     const study = NB.current;
     const levels = [...study.factors.keys()].filter((index) => study.factors[index].levels?.length > 1);
@@ -124,7 +141,7 @@ async function sharesOfPlaces(page) {
       const radius = study.radius(counts[place], study.places().most, study.scatter.canvas.canvas.clientWidth);
       const [x, y] = [axes.px(study.places().x[place]), axes.py(study.places().y[place])];
       const box = [x - radius, y - radius, 2 * radius, 2 * radius].map((value) => Math.round(value * ratio));
-      const { data } = context.getImageData(...box);
+      const { data } = context.getImageData(box[0], box[1], box[2], box[3]);
       let [blue, all] = [0, 0];
       for (let k = 0; k < data.length; k += 4) {
         const [px, py] = [((k / 4) % box[2]) - box[2] / 2, Math.floor(k / 4 / box[2]) - box[3] / 2];
@@ -140,16 +157,19 @@ async function sharesOfPlaces(page) {
     assert.ok(Math.abs(share - drawn) < 0.08, `a place in which ${share} work is drawn as ${drawn}`);
   }
   await page.evaluate(() => {
-    Object.assign(NB.current.state, NB.before);
+    Object.assign(NB.current.state, Reflect.get(window, 'stateBefore'));
     NB.current.filter();
     NB.current.redraw();
   });
   return found.length;
 }
 
-/** Every figure is saved as SVG for a column of 85 mm with letters of 8 pt, and has titles on its axes. */
+/**
+ * Every figure is saved as SVG for a column of 85 mm with letters of 8 pt, and has titles on its axes.
+ * @param {Page} page
+ */
 async function figures(page) {
-  for (const which of [...FIGURES, 'compared']) {
+  for (const which of /** @type {const} */ ([...FIGURES, 'compared'])) {
     const found = await page.evaluate((name) => {
       const figure = NB.current[name];
       if (!figure) return null;
@@ -177,7 +197,10 @@ async function figures(page) {
   assert.ok(readFileSync(await download.path(), 'utf8').startsWith('<svg'));
 }
 
-/** What is shown stands in the address, and an address shows it again. */
+/**
+ * What is shown stands in the address, and an address shows it again.
+ * @param {Page} page
+ */
 async function addresses(page) {
   const wanted = await page.evaluate(() => {
     const study = NB.current;
@@ -225,7 +248,13 @@ async function addresses(page) {
   assert.ok(shown.selects.every(Boolean), 'lists show something else than the plots');
 }
 
-/** `tools` are those of test.mjs: `{ notBlank, settle }`. */
+/**
+ * `tools` are those of test.mjs: `{ notBlank, settle }`.
+ * @param {Page} page
+ * @param {Page} judge
+ * @param {string} name
+ * @param {{ notBlank: NotBlank, settle: (page: Page) => Promise<unknown>, out: string }} tools
+ */
 export async function testStudy(page, judge, name, { notBlank, settle, out }) {
   await answerFirst(page);
   await readable(page);
@@ -248,12 +277,12 @@ export async function testStudy(page, judge, name, { notBlank, settle, out }) {
           figure.render();
           runs.push(figure.paintedInMs);
         }
-        return [which, Math.round(runs.sort((a, b) => a - b)[3] * 10) / 10];
+        return { which, ms: Math.round(runs.sort((a, b) => a - b)[3] * 10) / 10 };
       }),
     FIGURES,
   );
-  console.log(`  redraws, ms: ${times.map((each) => each.join(' ')).join(', ')}`);
-  for (const [which, ms] of times) assert.ok(ms < REDRAW_MS, `${which} takes ${ms} ms`);
+  console.log(`  redraws, ms: ${times.map(({ which, ms }) => `${which} ${ms}`).join(', ')}`);
+  for (const { which, ms } of times) assert.ok(ms < REDRAW_MS, `${which} takes ${ms} ms`);
   console.log(`  ${await ownTool(page)} tools drawn, ${await sharesOfPlaces(page)} places with their shares`);
   await figures(page);
   await addresses(page);
@@ -267,7 +296,7 @@ export async function testStudy(page, judge, name, { notBlank, settle, out }) {
     const place = cases.findIndex((index) => index !== study.chosen);
     return [box.x + study.scatterAxes.px(x[place]), box.y + study.scatterAxes.py(y[place])];
   });
-  await page.mouse.click(...spot);
+  await page.mouse.click(spot[0], spot[1]);
   assert.notEqual(await page.evaluate(() => NB.current.chosen), first, 'a click on a mark chooses no case');
   const number = await page.evaluate(() => NB.current.caseOf(NB.current.chosen));
   const command = await page.locator('.explore code').first().textContent();
@@ -275,7 +304,9 @@ export async function testStudy(page, judge, name, { notBlank, settle, out }) {
   assert.equal(await page.locator('.explore .choose tbody tr').count(), 8);
   // Every choice of every list draws without errors.
   for (const select of await page.locator('select').all()) {
-    const values = await select.locator('option').evaluateAll((options) => options.map((option) => option.value));
+    const values = await select
+      .locator('option')
+      .evaluateAll((options) => options.map((option) => /** @type {HTMLOptionElement} */ (option).value));
     for (const value of values) {
       await select.selectOption(value);
       await settle(page);
@@ -287,7 +318,7 @@ export async function testStudy(page, judge, name, { notBlank, settle, out }) {
     const box = NB.current.map.canvas.canvas.getBoundingClientRect();
     return [box.x + box.width / 2, box.y + box.height / 2];
   });
-  await page.mouse.click(...map);
+  await page.mouse.click(map[0], map[1]);
   const listed = page.locator('.explore .legend button.key');
   assert.ok((await listed.count()) > 0, 'a cell of the map lists no cases');
   await listed.first().focus();

@@ -26,8 +26,14 @@ import {
 } from './run.mjs';
 import { testStudy } from './study.mjs';
 
+/** @typedef {import('playwright-core').Page} Page */
+/** @typedef {import('playwright-core').Locator} Locator */
+/** @typedef {import('playwright-core').Browser} Browser */
+
 // A study's hundred thousand cases take a moment to unpack.
+/** @type {{ [kind: string]: number }} */
 const FIRST_VIEW_MS = { run: 2000, atlas: 2000, study: 4000, search: 2000, replay: 2000 };
+/** @type {{ [kind: string]: number }} */
 const MOST_BYTES = { run: 3e6, atlas: 3e6, study: 10e6, search: 3e6, replay: 3e6 };
 const SIZE = { width: 1280, height: 900 };
 
@@ -36,11 +42,16 @@ const at = words.indexOf('--out');
 const out = resolve(at >= 0 ? words.splice(at, 2)[1] : 'screenshots');
 mkdirSync(out, { recursive: true });
 
-/** A page that fails on every error and every request that leaves the file. */
+/**
+ * A page that fails on every error and every request that leaves the file.
+ * @param {Browser} running
+ * @param {string} file
+ */
 async function open(running, file) {
   const page = await running.newPage({ viewport: SIZE });
   // Pictures are drawn in software, on machines that may have other things to do.
   page.setDefaultTimeout(120_000);
+  /** @type {string[]} */
   const problems = [];
   page.on('console', (message) => {
     if (['error', 'warning'].includes(message.type())) problems.push(`${message.type()}: ${message.text()}`);
@@ -55,7 +66,11 @@ async function open(running, file) {
   return { page, problems, timing };
 }
 
-/** Colours of a picture: how many, and the share of the most frequent one. */
+/**
+ * Colours of a picture: how many, and the share of the most frequent one.
+ * @param {Page} judge
+ * @param {Buffer} png
+ */
 async function colors(judge, png) {
   return judge.evaluate(async (data) => {
     const image = new Image();
@@ -72,19 +87,26 @@ async function colors(judge, png) {
   }, png.toString('base64'));
 }
 
+/** @param {Page} judge @param {Locator} locator @param {string} name @param {number} [least] */
 async function notBlank(judge, locator, name, least = 12) {
   const { count, most } = await colors(judge, await locator.screenshot());
   assert.ok(count >= least && most < 0.97, `${name} is blank: ${count} colours, ${(100 * most).toFixed(1)} % of one`);
 }
 
+/** @param {Page} page */
 const settle = (page) =>
   page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+/** @param {Page} page */
 const picture = async (page) => {
   await settle(page);
   return page.evaluate(() => NB.current.view.renderer.domElement.toDataURL());
 };
 
-/** Whether the picture becomes another one; it is drawn when there is time for it. */
+/**
+ * Whether the picture becomes another one; it is drawn when there is time for it.
+ * @param {Page} page
+ * @param {string} before
+ */
 async function changes(page, before) {
   for (let look = 0; look < 50; look++) {
     if ((await picture(page)) !== before) return true;
@@ -93,18 +115,21 @@ async function changes(page, before) {
   return false;
 }
 
-/** Tab reaches every control, and shows where it is. */
+/**
+ * Tab reaches every control, and shows where it is.
+ * @param {Page} page
+ */
 async function walk(page) {
   await page.evaluate(() => {
     window.scrollTo(0, 0);
-    document.activeElement?.blur?.();
+    if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
   });
   const seen = new Set();
   for (let step = 0; step < 400; step++) {
     await page.keyboard.press('Tab');
     const found = await page.evaluate(() => {
       const element = document.activeElement;
-      if (!element || element === document.body) return null;
+      if (!(element instanceof HTMLElement) || element === document.body) return null;
       element.dataset.walked ||= String(document.querySelectorAll('[data-walked]').length);
       const style = getComputedStyle(element);
       return {
@@ -121,11 +146,15 @@ async function walk(page) {
     assert.ok(found.name.trim(), `${found.tag} has no name`);
   }
   const missed = await page.evaluate(() =>
-    [...document.querySelectorAll('button, select, input, summary, [tabindex="0"]')]
+    [
+      .../** @type {NodeListOf<HTMLElement>} */ (
+        document.querySelectorAll('button, select, input, summary, [tabindex="0"]')
+      ),
+    ]
       .filter(
         (element) =>
           element.checkVisibility({ contentVisibilityAuto: true, visibilityProperty: true }) &&
-          !element.disabled &&
+          !element.matches(':disabled') &&
           element.tabIndex >= 0 &&
           !element.dataset.walked,
       )
@@ -135,7 +164,10 @@ async function walk(page) {
   return seen.size;
 }
 
-/** Switches every checkbox under "Show" there and back: the picture has to change and to come back. */
+/**
+ * Switches every checkbox under "Show" there and back: the picture has to change and to come back.
+ * @param {Page} page
+ */
 async function toggles(page) {
   const labels = await page.evaluate(() =>
     [...document.querySelectorAll('[aria-label="Parts of the picture"] .check')].map((label) => label.textContent),
@@ -154,6 +186,7 @@ async function toggles(page) {
   return labels.length;
 }
 
+/** @param {Page} page @param {Page} judge @param {string} name */
 async function testRun(page, judge, name) {
   await notBlank(judge, page.locator('.view canvas'), 'the 3D view', 200);
   // Our own forward kinematics against the program's.
@@ -245,13 +278,14 @@ async function testRun(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-room.png` });
 }
 
+/** @param {Page} page @param {Page} judge @param {string} name */
 async function testAtlas(page, judge, name) {
   await notBlank(judge, page.locator('.view canvas'), 'the 3D view', 200);
   await notBlank(judge, page.locator('.plot canvas').nth(0), 'the strips');
   await notBlank(judge, page.locator('.plot canvas').nth(1), 'the curves');
   await testNumbers(page);
   const asked = await page.evaluate(() => ({
-    goal: NB.current.page.goals.at(-1).name,
+    goal: NB.current.page.goals[NB.current.page.goals.length - 1].name,
     configuration: NB.current.goal.branches[2].label,
     roll: '90',
   }));
@@ -289,11 +323,16 @@ async function testAtlas(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-strips.png` });
 }
 
-/** The answer stands first with its interval, every choice has its figure, and placements are pictures. */
+/**
+ * The answer stands first with its interval, every choice has its figure, and placements are pictures.
+ * @param {Page} page
+ * @param {Page} judge
+ * @param {string} name
+ */
 async function testSearch(page, judge, name) {
   const found = await page.evaluate(() => ({
     sentence: document.querySelector('#app .answer .sentence')?.textContent,
-    stray: document.querySelector('#app').innerText.includes('null'),
+    stray: NB.byId('app').innerText.includes('null'),
     figures: [...document.querySelectorAll('#app .points h3')].map((each) => each.textContent),
     factors: NB.current.page.factors.map((each) => each.words),
     pictures: document.querySelectorAll('.placements img').length,
@@ -323,6 +362,7 @@ async function testSearch(page, judge, name) {
   await page.screenshot({ path: `${out}/${name}-all.png`, fullPage: true });
 }
 
+/** @type {{ [kind: string]: (page: Page, judge: Page, name: string) => Promise<void> }} */
 const tests = {
   run: testRun,
   search: testSearch,
@@ -351,7 +391,7 @@ for (const given of words) {
   const { page, problems } = await open(running, file);
   await page.screenshot({ path: `${out}/${name}-first.png` });
   await page.screenshot({ path: `${out}/${name}-whole.png`, fullPage: true });
-  assert.equal(await page.evaluate(() => window.attacked), undefined, 'a name became a script');
+  assert.equal(await page.evaluate(() => Reflect.get(window, 'attacked')), undefined, 'a name became a script');
   assert.equal(await page.locator('img[src="x"]').count(), 0, 'a name became an element');
   const layout = await open(running, file);
   await testLayout(layout.page, { judge, notBlank, settle, shot: (width) => `${out}/${name}-${width}.png` });
@@ -367,7 +407,7 @@ for (const given of words) {
   if (await page.locator('.view').count()) {
     await page.emulateMedia({ media: 'print' });
     assert.ok(
-      await page.evaluate(() => document.querySelector('.view-image').src.startsWith('data:image/png')),
+      await page.evaluate(() => document.querySelector('.view-image').getAttribute('src').startsWith('data:image/png')),
       'no picture for paper',
     );
     assert.equal(await page.locator('.view canvas').isVisible(), false);

@@ -11,6 +11,8 @@ import { existsSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { launch, NO_GL, SOFTWARE_GL } from './browser.mjs';
 
+/** @typedef {import('playwright-core').Page} Page */
+
 /** Of places, mm: what they are known to in the report. */
 const SAME_MM = 1e-6;
 /** Median and 95 % of what a drag waits for its numbers, ms, and the first view. */
@@ -23,10 +25,12 @@ const WIDTHS = [
 ];
 
 const words = process.argv.slice(2);
+/** @param {string} name @param {string} [otherwise] */
 const option = (name, otherwise = null) => {
   const at = words.indexOf(name);
   return at >= 0 ? words.splice(at, 2)[1] : otherwise;
 };
+/** @param {string} name */
 const has = (name) => {
   const at = words.indexOf(name);
   if (at >= 0) words.splice(at, 1);
@@ -67,11 +71,14 @@ async function serve() {
 const running = await launch(SOFTWARE_GL);
 process.on('exit', () => running.close());
 for (const signal of ['SIGINT', 'SIGTERM']) process.on(signal, () => process.exit(1));
+/** @type {Set<string>} */
 const allowed = new Set();
 
+/** @param {string} url */
 async function open(url, browser = running, size = { width: 1600, height: 1000 }) {
   const page = await browser.newPage({ viewport: size });
   page.setDefaultTimeout(60_000);
+  /** @type {string[]} */
   const problems = [];
   page.on('console', (message) => {
     const text = `${message.type()}: ${message.text()}`;
@@ -92,6 +99,7 @@ async function open(url, browser = running, size = { width: 1600, height: 1000 }
   return { page, problems };
 }
 
+/** @param {Page} page */
 const settled = (page) =>
   page.waitForFunction(
     () =>
@@ -104,32 +112,51 @@ const settled = (page) =>
       !PLAN.planner.people.latest.busy &&
       !PLAN.planner.where.busy,
   );
+/**
+ * @type {{ size: number[], first_voxel_m: number[], spacing_m: number[], targets: { name: string, center_m: number[] }[], lesions: { name: string }[] }}
+ */
 const report = JSON.parse(readFileSync(join(folder, 'report.json'), 'utf8'));
+/** @param {number[]} index */
 const millimetres = (index) =>
   index.map((value, axis) => 1e3 * (report.first_voxel_m[axis] + report.spacing_m[axis] * value));
 const entry = entryMm
   .split(',')
-  .map((mm, axis) => Math.round((1e-3 * mm - report.first_voxel_m[axis]) / report.spacing_m[axis]));
+  .map((mm, axis) => Math.round((1e-3 * Number(mm) - report.first_voxel_m[axis]) / report.spacing_m[axis]));
+/** @param {Page} page @param {string} title */
 const canvas = (page, title) => page.locator(`canvas[aria-label^="${title} slice"]`);
 
-/** Where a voxel is on a slice's canvas. */
+/**
+ * Where a voxel is on a slice's canvas.
+ * @param {Page} page
+ * @param {number} plane
+ * @param {number[]} index
+ */
 const spot = (page, plane, index) =>
   page.evaluate(
-    ([plane, index]) => {
+    ({ plane, index }) => {
       const slice = PLAN.planner.slices[plane];
       return slice.onCanvas(slice.place(index));
     },
-    [plane, index],
+    { plane, index },
   );
 
-/** Clicks a voxel of a slice that shows it. */
+/**
+ * Clicks a voxel of a slice that shows it.
+ * @param {Page} page
+ * @param {number} plane
+ * @param {number[]} index
+ */
 async function click(page, plane, index) {
   const title = ['Axial', 'Coronal', 'Sagittal'][plane];
   const [x, y] = await spot(page, plane, index);
   await canvas(page, title).click({ position: { x, y } });
 }
 
-/** Brings the crosshair to a voxel by clicks: a sagittal slice shows every height, an axial one the rest. */
+/**
+ * Brings the crosshair to a voxel by clicks: a sagittal slice shows every height, an axial one the rest.
+ * @param {Page} page
+ * @param {number[]} index
+ */
 async function pointTo(page, index) {
   const now = await page.evaluate(() => PLAN.planner.state.crosshair);
   await click(page, 1, [index[0], now[1], index[2]]);
@@ -137,10 +164,11 @@ async function pointTo(page, index) {
   assert.deepEqual(await page.evaluate(() => PLAN.planner.state.crosshair), index, 'a click is on its voxel');
 }
 
+/** @param {Page} page @param {number} plane @param {number[]} index */
 async function pixel(page, plane, index) {
   const [x, y] = await spot(page, plane, index);
   return page.evaluate(
-    ([plane, x, y]) => {
+    ({ plane, x, y }) => {
       const { canvas } = PLAN.planner.slices[plane];
       const ratio = canvas.width / canvas.clientWidth;
       // From a copy: reading a canvas slows its own drawing down.
@@ -148,10 +176,11 @@ async function pixel(page, plane, index) {
       copy.drawImage(canvas, -Math.round(x * ratio), -Math.round(y * ratio));
       return [...copy.getImageData(0, 0, 1, 1).data.slice(0, 3)];
     },
-    [plane, x, y],
+    { plane, x, y },
   );
 }
 
+/** @param {Page} page */
 const frames = (page) =>
   page.evaluate(
     () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))),
@@ -202,6 +231,7 @@ for (const [name, [low, high]] of Object.entries({
     (at) => [-1, 0, 1].flatMap((i) => [-1, 0, 1].map((j) => PLAN.planner.volume.at([at[0] + i, at[1] + j, at[2]]))),
     at,
   );
+  /** @param {number} hu */
   const grey = (hu) => 255 * Math.min(Math.max((hu - low) / (high - low), 0), 1);
   const seen = (await pixel(page, 0, at))[0];
   assert.ok(
@@ -277,10 +307,15 @@ for (let row = 0; row < working; row++) {
   await settled(page);
 }
 if (working === 0) await page.keyboard.press('Enter');
-await page.waitForFunction(() => PLAN.planner.motion?.time_s?.length > 2);
+await page.waitForFunction(
+  () => PLAN.planner.motion && 'time_s' in PLAN.planner.motion && PLAN.planner.motion.time_s.length > 2,
+);
 await settled(page);
-const motion = await page.evaluate(() => ({ ...PLAN.planner.motion, label: PLAN.planner.state.needle.configuration }));
-assert.equal(motion.configuration, motion.label);
+const { motion, chosen } = await page.evaluate(() => ({
+  motion: /** @type {MotionAnswer} */ (PLAN.planner.motion),
+  chosen: PLAN.planner.state.needle.configuration,
+}));
+assert.equal(motion.configuration, chosen);
 assert.ok(motion.tip, `no expected error: ${motion.tip_unknown}`);
 assert.match(await page.innerText('.side'), /Expected tip error at the target: \d+\.\d\d mm rms/);
 
@@ -396,13 +431,20 @@ const labels = new Uint16Array(
 );
 const plan = await page.evaluate(() => PLAN.planner.entryMap.plan);
 const names = Object.fromEntries(
-  JSON.parse(readFileSync(join(folder, 'labels.json'), 'utf8')).labels.map(({ label, name }) => [label, name]),
+  JSON.parse(readFileSync(join(folder, 'labels.json'), 'utf8')).labels.map(
+    (/** @type {{ label: number, name: string }} */ { label, name }) => [label, name],
+  ),
 );
+/** @param {number[]} direction */
 const outwards = ([azimuth, elevation]) => {
   const [a, e] = [azimuth, elevation].map((degrees) => (degrees * Math.PI) / 180);
   return [Math.cos(e) * Math.sin(a), -Math.cos(e) * Math.cos(a), Math.sin(e)];
 };
-/** What a needle passes, in steps of a tenth of a millimetre, from the skin to the target. */
+/**
+ * What a needle passes, in steps of a tenth of a millimetre, from the skin to the target.
+ * @param {number[]} direction
+ * @param {number} depth_m
+ */
 function passed(direction, depth_m) {
   const found = [];
   const way = outwards(direction);
@@ -520,7 +562,14 @@ for (const [width, height] of WIDTHS) {
 await page.setViewportSize({ width: 1600, height: 1000 });
 const nameless = await page.evaluate(() =>
   [...document.querySelectorAll('button, input, select, textarea, canvas[tabindex]')]
-    .filter((each) => !(each.getAttribute('aria-label') || each.textContent.trim() || each.labels?.length))
+    .filter(
+      (each) =>
+        !(
+          each.getAttribute('aria-label') ||
+          each.textContent.trim() ||
+          /** @type {HTMLInputElement} */ (each).labels?.length
+        ),
+    )
     .map((each) => each.outerHTML),
 );
 assert.deepEqual(nameless, []);
@@ -559,7 +608,7 @@ await page.waitForFunction(() => PLAN.planner.simulation.running);
 await page.getByRole('button', { name: 'Cancel' }).click();
 await page.waitForFunction(() => /cancelled/.test(PLAN.planner.simulation.said.textContent));
 
-const heap = await page.evaluate(() => performance.memory?.usedJSHeapSize ?? 0);
+const heap = await page.evaluate(() => /** @type {any} */ (performance).memory?.usedJSHeapSize ?? 0);
 console.log(`heap ${Math.round(heap / 1e6)} MB`);
 await settled(page);
 assert.deepEqual(problems, []);

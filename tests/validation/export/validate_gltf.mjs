@@ -3,6 +3,7 @@ import { readFile } from 'node:fs/promises';
 
 import validator from 'gltf-validator';
 
+/** @type {{ [file: string]: object }} */
 const answers = {};
 for (const file of process.argv.slice(2)) {
   const report = await validator.validateBytes(new Uint8Array(await readFile(file)), { maxIssues: 100 });

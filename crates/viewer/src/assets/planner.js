@@ -18,7 +18,7 @@ class Planner {
   /** @type {TipError | null} */ tip;
   /** @type {object} */ comparing;
   /** @type {string | null} */ complaint;
-  /** @type {number | undefined} */ keeping;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */ keeping;
   /** @type {boolean | undefined} */ dragging;
   /** @type {boolean | undefined} */ conflict;
   /** @type {boolean | undefined} */ writing;

@@ -173,6 +173,7 @@ interface TipError {
 }
 
 interface MotionAnswer {
+  configuration: string;
   rejections: { words: string; detail: string }[];
   time_s: number[];
   joints_rad: number[][];
@@ -219,12 +220,16 @@ interface RouteMap {
 interface PlannedRoute {
   direction_deg: number[];
   depth_m: number;
+  /** For tests. */
+  depth_in_lung_m: number;
+  pleural_crossings: number;
   margins: { obstacle: string; part: string | null; distance_m: number | null }[];
   risk: { odds_ratio: number };
   working: number;
   best: string | null;
   configurations: {
     label: string;
+    works: boolean;
     clearance_m: number | null;
     free_fraction: number | null;
     error: { target_lateral_rms_m: number } | null;

@@ -45,6 +45,8 @@ interface Chain {
 interface Scene {
   chain: Chain;
   parts: Part[];
+  /** Entry and exit of the tool's guide, from the flange; for tests. */
+  guide: Pose[];
   needleLength: number;
 }
 

@@ -225,8 +225,9 @@ interface Needlebench {
   // The page's script knows which document it is.
   // biome-ignore lint/suspicious/noExplicitAny: read from outside
   start(build: (page: any, app: HTMLElement) => void): Promise<void>;
-  /** What the page is of; for tests. */
-  current: object;
+  /** The page; for tests, each of which knows which one it has opened. */
+  get current(): RunPage & AtlasPage & SearchPage & StudyPage;
+  set current(page: RunPage | AtlasPage | SearchPage | StudyPage);
   metricColumns<Row extends { metrics: { [key: string]: number } }>(columns: MetricColumn[]): Column<Row>[];
   words(name: string | null | undefined): string;
   dictionary: Map<string, string>;
@@ -236,7 +237,7 @@ interface Needlebench {
     write(choices: { [name: string]: string | number | null | undefined }): void;
     watch(apply: (choices: AddressChoices) => void): void;
     pending: { [name: string]: string | number | null | undefined };
-    timer?: number;
+    timer?: ReturnType<typeof setTimeout>;
     written?: string;
   };
   copyLink(): HTMLButtonElement;
