@@ -4,6 +4,13 @@ import assert from 'node:assert/strict';
 /** @typedef {import('playwright-core').Page} Page */
 /** @typedef {import('playwright-core').Locator} Locator */
 /** @typedef {(judge: Page, locator: Locator, name: string, least?: number) => Promise<void>} NotBlank */
+/**
+ * @typedef {object} LayoutTools
+ * @property {Page} judge
+ * @property {NotBlank} notBlank
+ * @property {(page: Page) => Promise<unknown>} settle
+ * @property {(width: number) => string} shot file of a screenshot
+ */
 
 export const WIDTHS = [390, 768, 1024, 1400, 1920];
 /** Least height of what a finger touches on narrow screens, px. */
@@ -166,7 +173,7 @@ async function heights(page) {
 /**
  * Asserts that a page is whole at every width, folded and unfolded; `look(width)` is called at each.
  * @param {Page} page
- * @param {{ judge: Page, notBlank: NotBlank, settle: (page: Page) => Promise<unknown>, shot: (width: number) => string }} tools
+ * @param {LayoutTools} tools
  */
 export async function testLayout(page, { judge, notBlank, settle, shot }) {
   const before = page.viewportSize();

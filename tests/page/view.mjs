@@ -113,8 +113,14 @@ const settled = (page) =>
       !PLAN.planner.where.busy,
   );
 /**
- * @type {{ size: number[], first_voxel_m: number[], spacing_m: number[], targets: { name: string, center_m: number[] }[], lesions: { name: string }[] }}
+ * @typedef {object} BuildReport
+ * @property {number[]} size
+ * @property {number[]} first_voxel_m
+ * @property {number[]} spacing_m
+ * @property {{ name: string, center_m: number[] }[]} targets
+ * @property {{ name: string }[]} lesions
  */
+/** @type {BuildReport} */
 const report = JSON.parse(readFileSync(join(folder, 'report.json'), 'utf8'));
 /** @param {number[]} index */
 const millimetres = (index) =>

@@ -718,7 +718,7 @@ class Planner {
     );
     const rows = NB.tableRows(list);
     NB.rows(rows, (index) => this.choose(preview.configurations[index].label));
-    const focused = NB.tableRows(this.configurations).findIndex((row) => row === document.activeElement);
+    const focused = NB.tableRows(this.configurations).findIndex((row) => row.matches(':focus'));
     NB.clear(this.configurations, list, this.chosenText());
     if (focused >= 0) rows[focused].focus();
   }

@@ -744,7 +744,7 @@ class Explore {
         })
       : null;
     // A button that has the focus keeps it.
-    const focused = [...this.reached.querySelectorAll('button')].findIndex((each) => each === document.activeElement);
+    const focused = [...this.reached.querySelectorAll('button')].findIndex((each) => each.matches(':focus'));
     NB.clear(this.reached, NB.el('h3', { text: 'What if the robot stood here?' }), table, note);
     if (focused >= 0) this.reached.querySelectorAll('button')[focused]?.focus();
     this.reached.dataset.rolls = isLast ? 'all' : 'few';
