@@ -4,6 +4,8 @@ use std::io::{Read, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use rayon::prelude::*;
+
 use super::dataset::Pixels;
 use super::file::{self, Bytes};
 use super::image::{ImageFile, Slice, named};
@@ -339,53 +341,24 @@ where
     F: Fn(&Slice, &mut Kept, &mut [i16], &mut Tally) -> Result<(), ImagingError> + Sync,
 {
     let mut hu: Vec<i16> = zeroed(plane * slices.len())?;
-    let threads = threads.clamp(1, slices.len());
-    let mut parts: Vec<Vec<(usize, &mut [i16])>> = (0..threads).map(|_| Vec::new()).collect();
-    for (at, out) in hu.chunks_mut(plane).enumerate() {
-        parts[at % threads].push((at, out));
-    }
-    let work = |part: Vec<(usize, &mut [i16])>| {
+    // Slices of one file stay together, so that each thread opens it once.
+    let each = slices.len().div_ceil(threads.max(1));
+    let parts = slices.par_chunks(each).zip(hu.par_chunks_mut(plane * each));
+    let work = |(slices, hu): (&[Slice], &mut [i16])| {
         let mut tally = Tally::default();
         let mut kept = Kept::default();
-        for (at, out) in part {
-            let outcome = if cancel.load(Ordering::Relaxed) {
-                Err(ImagingError::Interrupted)
-            } else {
-                read(&slices[at], &mut kept, out, &mut tally)
-            };
-            if let Err(problem) = outcome {
-                return Err((at, problem));
+        for (slice, out) in slices.iter().zip(hu.chunks_mut(plane)) {
+            if cancel.load(Ordering::Relaxed) {
+                return Err(ImagingError::Interrupted);
             }
+            read(slice, &mut kept, out, &mut tally)?;
         }
         Ok(tally)
     };
-    let outcomes: Vec<Result<Tally, (usize, ImagingError)>> = if threads == 1 {
-        parts.into_iter().map(work).collect()
-    } else {
-        std::thread::scope(|scope| {
-            let running: Vec<_> = parts
-                .into_iter()
-                .map(|part| scope.spawn(|| work(part)))
-                .collect();
-            let join = |thread: std::thread::ScopedJoinHandle<'_, _>| {
-                thread
-                    .join()
-                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-            };
-            running.into_iter().map(join).collect()
-        })
-    };
+    let outcomes: Vec<Result<Tally, ImagingError>> = parts.map(work).collect();
     let mut tally = Tally::default();
-    let mut problem: Option<(usize, ImagingError)> = None;
     for outcome in outcomes {
-        match outcome {
-            Ok(part) => tally.add(&part),
-            Err(new) if problem.as_ref().is_none_or(|(at, _)| new.0 < *at) => problem = Some(new),
-            Err(_) => {}
-        }
+        tally.add(&outcome?);
     }
-    match problem {
-        Some((_, problem)) => Err(problem),
-        None => Ok((hu, tally)),
-    }
+    Ok((hu, tally))
 }
