@@ -1,137 +1,78 @@
-//! Bytes of shapes and meshes, which give the same bits back: little-endian numbers, counts as 64 bits.
+//! Values as bytes, which give the same bits back: those of `postcard`, all of them.
 
-use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use needlebench_kinematics::Pose;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
-use crate::triangle_mesh::TriangleMesh;
-
-/// What is appended to bytes.
-pub trait Encode {
-    /// Appends it.
-    fn encode(&self, bytes: &mut Vec<u8>);
+/// The bytes of a value.
+///
+/// # Panics
+/// For a value that `serde` cannot write, such as a sequence of unknown length: none of ours.
+pub fn encode(value: &impl Serialize) -> Vec<u8> {
+    postcard::to_allocvec(value).expect("memory takes all")
 }
 
-impl Encode for f64 {
-    fn encode(&self, bytes: &mut Vec<u8>) {
-        bytes.extend(self.to_le_bytes());
-    }
+/// The value of bytes; `None` where they end too early, go on behind it, or are none of these.
+pub fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
+    let (value, rest) = postcard::take_from_bytes(bytes).ok()?;
+    rest.is_empty().then_some(value)
 }
 
-impl Encode for usize {
-    fn encode(&self, bytes: &mut Vec<u8>) {
-        bytes.extend((*self as u64).to_le_bytes());
-    }
-}
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
 
-impl Encode for u32 {
-    fn encode(&self, bytes: &mut Vec<u8>) {
-        bytes.extend(self.to_le_bytes());
-    }
-}
+    use nalgebra::Vector3;
+    use needlebench_kinematics::Pose;
 
-impl Encode for Vector3<f64> {
-    fn encode(&self, bytes: &mut Vec<u8>) {
-        bytes.extend(self.iter().flat_map(|number| number.to_le_bytes()));
-    }
-}
+    use super::*;
+    use crate::mesh::SolidMesh;
+    use crate::sample_solids::{cuboid, ell};
+    use crate::shape::{Shape, Solid};
+    use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 
-impl Encode for TriangleMesh {
-    fn encode(&self, bytes: &mut Vec<u8>) {
-        bytes.reserve(16 + 24 * self.vertices_m.len() + 12 * self.triangles.len());
-        self.vertices_m.len().encode(bytes);
-        self.triangles.len().encode(bytes);
-        for vertex in &self.vertices_m {
-            vertex.coords.encode(bytes);
-        }
-        for index in self.triangles.iter().flatten() {
-            index.encode(bytes);
-        }
-    }
-}
-
-impl Encode for Pose {
-    fn encode(&self, bytes: &mut Vec<u8>) {
-        self.translation.vector.encode(bytes);
-        for number in self.rotation.coords.iter() {
-            number.encode(bytes);
-        }
-    }
-}
-
-/// Takes from the front of bytes; `None` where they end too early, or are none of these.
-pub struct Reader<'a>(pub &'a [u8]);
-
-impl Reader<'_> {
-    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (taken, rest) = self.0.split_first_chunk()?;
-        self.0 = rest;
-        Some(*taken)
-    }
-
-    /// One byte.
-    pub fn byte(&mut self) -> Option<u8> {
-        self.take().map(|[byte]| byte)
-    }
-
-    /// A number.
-    pub fn number(&mut self) -> Option<f64> {
-        self.take().map(f64::from_le_bytes)
-    }
-
-    /// An index of 32 bits.
-    pub fn index(&mut self) -> Option<u32> {
-        self.take().map(u32::from_le_bytes)
-    }
-
-    /// A count.
-    pub fn count(&mut self) -> Option<usize> {
-        self.take()
-            .and_then(|bytes| usize::try_from(u64::from_le_bytes(bytes)).ok())
-    }
-
-    /// Three numbers.
-    pub fn vector(&mut self) -> Option<Vector3<f64>> {
-        Some(Vector3::new(self.number()?, self.number()?, self.number()?))
-    }
-
-    /// `count` things of at least `bytes_each`, of which there may not be as many.
-    pub fn list<T>(
-        &mut self,
-        count: usize,
-        bytes_each: usize,
-        mut read: impl FnMut(&mut Self) -> Option<T>,
-    ) -> Option<Vec<T>> {
-        if count.checked_mul(bytes_each)? > self.0.len() {
-            return None;
-        }
-        let mut list = Vec::with_capacity(count);
-        for _ in 0..count {
-            list.push(read(self)?);
-        }
-        Some(list)
-    }
-
-    /// A pose, with the bits of its unit quaternion.
-    pub fn pose(&mut self) -> Option<Pose> {
-        let translation = Translation3::from(self.vector()?);
-        let [i, j, k, w] = [
-            self.number()?,
-            self.number()?,
-            self.number()?,
-            self.number()?,
+    #[test]
+    fn every_shape_comes_back_bit_for_bit() {
+        let shapes = [
+            Shape::Sphere { radius_m: 0.1 },
+            Shape::Cylinder {
+                radius_m: 0.1,
+                half_length_m: 0.3,
+            },
+            Shape::Capsule {
+                radius_m: 0.2,
+                half_length_m: 1.0 / 3.0,
+            },
+            Shape::Cuboid {
+                half_extents_m: Vector3::new(0.1, 0.2, 0.7),
+            },
+            Shape::Convex(Arc::new(ConvexMesh(cuboid([0.1, 0.2, 0.3])))),
+            Shape::Mesh(Arc::new(SolidMesh::new(ell()))),
         ];
-        let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
-        Some(Pose::from_parts(translation, rotation))
+        let solids: Vec<Solid> = shapes
+            .into_iter()
+            .map(|shape| Solid {
+                name: String::new(),
+                shape,
+                parent_from_shape: Pose::new(
+                    Vector3::new(0.1, 0.2, 0.3),
+                    Vector3::new(1.0, 2.0, 0.5),
+                ),
+            })
+            .collect();
+        let bytes = encode(&solids);
+        assert_eq!(decode(&bytes), Some(solids));
+        for end in 0..bytes.len() {
+            assert_eq!(decode::<Vec<Solid>>(&bytes[..end]), None);
+        }
+        assert_eq!(decode::<Vec<Solid>>(&[&bytes[..], &[0]].concat()), None);
+        assert_eq!(decode::<Shape>(&[9; 200]), None);
     }
 
-    /// A mesh.
-    pub fn mesh(&mut self) -> Option<TriangleMesh> {
-        let (vertices, triangles) = (self.count()?, self.count()?);
-        Some(TriangleMesh {
-            vertices_m: self.list(vertices, 24, |reader| reader.vector().map(Point3::from))?,
-            triangles: self.list(triangles, 12, |reader| {
-                Some([reader.index()?, reader.index()?, reader.index()?])
-            })?,
-        })
+    #[test]
+    fn a_length_beyond_the_bytes_takes_no_memory() {
+        assert_eq!(
+            decode::<TriangleMesh>(&[255, 255, 255, 255, 255, 255, 255, 127]),
+            None
+        );
     }
 }

@@ -111,7 +111,6 @@ pub mod sample_solids;
 mod segment;
 mod separation;
 mod shape;
-mod shape_encoding;
 mod surface;
 mod tessellate;
 mod topology;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 use needlebench_kinematics::Pose;
+use serde::{Deserialize, Serialize};
 
 use crate::mesh::{SolidMesh, as_convex};
 use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
@@ -12,7 +13,7 @@ use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 const MOST_CONVEX_VERTICES: usize = 2000;
 
 /// A solid in its own frame; primitives are centred on it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Shape {
     /// Ball about the origin.
     Sphere {
@@ -75,7 +76,7 @@ impl Shape {
 }
 
 /// A shape at a place of its parent frame (a link, the tool, the phantom or the world).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Solid {
     /// Unique within the cell, e.g. `upper_arm.1`, `skin`, `rib_left_4.2`.
     pub name: String,

@@ -1,9 +1,10 @@
 //! Surfaces made of triangles.
 
 use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
 
 /// A closed triangle mesh.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TriangleMesh {
     /// Vertices, m.
     pub vertices_m: Vec<Point3<f64>>,
@@ -22,5 +23,5 @@ impl TriangleMesh {
 }
 
 /// A convex polyhedron: a closed triangle mesh of which every vertex is an extreme point.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ConvexMesh(pub TriangleMesh);

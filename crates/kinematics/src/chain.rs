@@ -6,6 +6,7 @@ use crate::{JOINT_COUNT, Joints, Pose};
 
 /// One revolute joint: `parent_from_child(q) = parent_from_joint * rotation(axis, q)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ChainJoint {
     /// Pose of the joint (and of the child link at `q = 0`) in its parent link.
     pub parent_from_joint: Pose,
@@ -15,6 +16,7 @@ pub struct ChainJoint {
 
 /// The arm's chain from `base_link` to the flange.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Chain {
     /// The joints from base to flange; the first one's parent is `base_link`.
     pub joints: [ChainJoint; JOINT_COUNT],

@@ -20,6 +20,7 @@ pub const MAX_TURNS: i32 = 1_000_000;
 /// A revolute joint of a URDF gives its `lower` and `upper`; a continuous joint, which has neither,
 /// gives `-inf` and `inf`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct JointLimit {
     /// Lowest position, rad; `-inf` for an unlimited joint.
     pub lower_rad: f64,
@@ -80,6 +81,7 @@ pub(crate) fn nearest_whole(turns: f64) -> i32 {
 
 /// Limits of all joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct JointLimits(pub [JointLimit; JOINT_COUNT]);
 
 impl JointLimits {

@@ -168,7 +168,7 @@ impl Tool {
 }
 
 /// What a collision body is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BodyKind {
     /// The arm's fixed link.
@@ -194,7 +194,7 @@ pub enum BodyKind {
 }
 
 /// What a collision body moves with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Frame {
     /// Fixed; solids are given in the world.
     World,
@@ -203,7 +203,7 @@ pub enum Frame {
 }
 
 /// A rigid group of solids.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CollisionBody {
     /// Unique name: `upper_arm`, `tool`, `guide_tube`, `phantom`, `table` ...
     pub name: String,
@@ -298,7 +298,7 @@ impl ClearanceClass {
 }
 
 /// Two bodies of which the distance matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BodyPair {
     /// Index into [`Cell::bodies`]; always a moving body.
     pub a: usize,

@@ -1,15 +1,15 @@
 //! Boxes along axes of their own.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
-use crate::encoding::{Encode, Reader};
 use crate::placement::Placement;
 
 /// By how much a ray may miss a box by rounding and still count, relative and in m.
 const RAY_SLACK: f64 = 1e-9;
 
 /// A box along axes of its own.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OrientedBox {
     /// Middle, m.
     pub centre: Vector3<f64>,
@@ -85,20 +85,6 @@ impl OrientedBox {
             half,
             inverse_squared,
         }
-    }
-
-    /// Its bytes: [`OrientedBox::decoded`] makes the same of them.
-    pub(crate) fn encode(&self, bytes: &mut Vec<u8>) {
-        self.centre.encode(bytes);
-        for half in &self.half {
-            half.encode(bytes);
-        }
-    }
-
-    pub(crate) fn decoded(reader: &mut Reader<'_>) -> Option<Self> {
-        let centre = reader.vector()?;
-        let half = [reader.vector()?, reader.vector()?, reader.vector()?];
-        Some(Self::from_half(centre, half))
     }
 
     /// Seen from the parent of the frame that the box is given in.

@@ -15,7 +15,7 @@ use std::time::SystemTime;
 use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
 
-use crate::encoding::{Encode, Reader};
+use crate::encoding::encode;
 use crate::tree::TriangleTree;
 use crate::triangle_mesh::TriangleMesh;
 
@@ -27,16 +27,16 @@ pub(super) struct Kind<T> {
     pub version: &'static [u8],
     /// Meshes with fewer triangles are not worth a file.
     pub worth_keeping: usize,
-    pub encode: fn(&T, &TriangleMesh) -> Vec<u8>,
-    pub decode: fn(&mut Reader<'_>, &TriangleMesh) -> Option<T>,
+    pub encode: fn(&T) -> Vec<u8>,
+    pub decode: fn(&[u8], &TriangleMesh) -> Option<T>,
 }
 
 /// Trees of triangles.
 const TREES: Kind<TriangleTree> = Kind {
     folder: "trees",
-    version: b"needlebench tree 1\n",
+    version: b"needlebench tree 2\n",
     worth_keeping: 10_000,
-    encode: |tree, _| tree.encoded(),
+    encode: TriangleTree::encoded,
     decode: TriangleTree::decoded,
 };
 
@@ -65,13 +65,13 @@ fn kept_in<T>(folder: &Path, kind: &Kind<T>, mesh: &TriangleMesh, make: impl FnO
     }
     let made = make();
     // Nothing is lost but the time that it would have saved.
-    let _ = keep(folder, &path, &sealed(kind, mesh, &made));
+    let _ = keep(folder, &path, &sealed(kind, &made));
     made
 }
 
 /// Version, hash of the rest, the rest.
-fn sealed<T>(kind: &Kind<T>, mesh: &TriangleMesh, thing: &T) -> Vec<u8> {
-    let rest = (kind.encode)(thing, mesh);
+fn sealed<T>(kind: &Kind<T>, thing: &T) -> Vec<u8> {
+    let rest = (kind.encode)(thing);
     [kind.version, &Sha256::digest(&rest), &rest].concat()
 }
 
@@ -81,9 +81,7 @@ fn opened<T>(kind: &Kind<T>, mesh: &TriangleMesh, bytes: &[u8]) -> Option<T> {
     if Sha256::digest(rest).as_slice() != hash {
         return None;
     }
-    let mut reader = Reader(rest);
-    let thing = (kind.decode)(&mut reader, mesh)?;
-    reader.0.is_empty().then_some(thing)
+    (kind.decode)(rest, mesh)
 }
 
 /// Writes a file that others may look for at the same time: whole or not at all.
@@ -117,10 +115,8 @@ fn make_room(folder: &Path, most_bytes: u64) -> io::Result<()> {
 
 /// Name of the file of a mesh: a hash of what it is made of.
 fn name_of(version: &[u8], mesh: &TriangleMesh) -> String {
-    let mut bytes = version.to_vec();
-    mesh.encode(&mut bytes);
     let mut name = String::with_capacity(64);
-    for byte in Sha256::digest(bytes) {
+    for byte in Sha256::digest([version, &encode(mesh)].concat()) {
         write!(name, "{byte:02x}").expect("a string takes all");
     }
     name
@@ -217,8 +213,8 @@ pub(super) mod tests {
 
     /// Beginning of the hash of the file of a thing, in hexadecimal digits. A file that no longer says what is
     /// made now would be a wrong answer: who changes what is made changes its version, and this.
-    pub fn hash_of<T>(kind: &Kind<T>, mesh: &TriangleMesh, thing: &T) -> String {
-        let hash = Sha256::digest(sealed(kind, mesh, thing));
+    pub fn hash_of<T>(kind: &Kind<T>, thing: &T) -> String {
+        let hash = Sha256::digest(sealed(kind, thing));
         let mut text = String::new();
         for byte in &hash[..8] {
             write!(text, "{byte:02x}").unwrap();
@@ -230,7 +226,7 @@ pub(super) mod tests {
     fn the_version_of_trees_changes_with_them() {
         let mesh = ell();
         let tree = TriangleTree::new(&mesh);
-        assert_eq!(hash_of(&TREES, &mesh, &tree), "cc62928852c1b945");
+        assert_eq!(hash_of(&TREES, &tree), "cc62928852c1b945");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! How well convex pieces stand for a solid.
 
 use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
 
 use super::surface_index::SurfaceIndex;
 use crate::measure::{area_m2, area_vector, corners};
@@ -10,7 +11,7 @@ use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 const SAMPLES: f64 = 20_000.0;
 
 /// How far convex pieces are from the solid that they stand for; measured on samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fidelity {
     /// Convex pieces.
     pub pieces: usize,

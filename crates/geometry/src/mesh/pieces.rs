@@ -1,14 +1,16 @@
 //! Convex pieces of a solid, kept from one run to the next.
 
+use serde::{Deserialize, Serialize};
+
 use super::cache::{Kind, kept};
 use super::decompose::decompose;
 use super::fidelity::Fidelity;
 use super::surface_index::SurfaceIndex;
-use crate::encoding::{Encode, Reader};
+use crate::encoding::{decode, encode};
 use crate::triangle_mesh::ConvexMesh;
 
 /// Convex pieces that together stand for a solid.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ConvexPieces {
     /// The pieces; none if neither the solid nor a part of it has a hull with a volume.
     pub hulls: Vec<ConvexMesh>,
@@ -18,10 +20,10 @@ pub struct ConvexPieces {
 
 const PIECES: Kind<ConvexPieces> = Kind {
     folder: "pieces",
-    version: b"needlebench pieces 3\n",
+    version: b"needlebench pieces 4\n",
     worth_keeping: 500,
-    encode: |pieces, _| encoded_pieces(pieces),
-    decode: |reader, _| decoded_pieces(reader),
+    encode: |pieces| encode(pieces),
+    decode: |bytes, _| decode(bytes),
 };
 
 /// Pieces of a solid and how well they stand for it.
@@ -31,45 +33,6 @@ pub(super) fn pieces_of(solid: &SurfaceIndex) -> ConvexPieces {
         let fidelity = Fidelity::measure(solid, &hulls);
         ConvexPieces { hulls, fidelity }
     })
-}
-
-/// Fidelity, number of pieces, pieces.
-fn encoded_pieces(pieces: &ConvexPieces) -> Vec<u8> {
-    let Fidelity {
-        pieces: _,
-        overhang_m,
-        mean_overhang_m,
-        uncovered_m,
-        spacing_m,
-    } = pieces.fidelity;
-    let mut bytes = Vec::new();
-    for number in [overhang_m, mean_overhang_m, uncovered_m, spacing_m] {
-        number.encode(&mut bytes);
-    }
-    pieces.hulls.len().encode(&mut bytes);
-    for hull in &pieces.hulls {
-        hull.0.encode(&mut bytes);
-    }
-    bytes
-}
-
-fn decoded_pieces(reader: &mut Reader<'_>) -> Option<ConvexPieces> {
-    let [overhang_m, mean_overhang_m, uncovered_m, spacing_m] = [
-        reader.number()?,
-        reader.number()?,
-        reader.number()?,
-        reader.number()?,
-    ];
-    let count = reader.count()?;
-    let hulls = reader.list(count, 16, |reader| reader.mesh().map(ConvexMesh))?;
-    let fidelity = Fidelity {
-        pieces: hulls.len(),
-        overhang_m,
-        mean_overhang_m,
-        uncovered_m,
-        spacing_m,
-    };
-    Some(ConvexPieces { hulls, fidelity })
 }
 
 #[cfg(test)]
@@ -92,6 +55,6 @@ mod tests {
     fn the_version_changes_with_the_pieces() {
         let solid = SurfaceIndex::new(ell());
         let pieces = pieces_of(&solid);
-        assert_eq!(hash_of(&PIECES, solid.mesh(), &pieces), "55828a7291e64a72");
+        assert_eq!(hash_of(&PIECES, &pieces), "55828a7291e64a72");
     }
 }

@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
 use super::fidelity::Fidelity;
 use super::pieces::{ConvexPieces, pieces_of};
 use super::surface_index::SurfaceIndex;
@@ -16,6 +18,19 @@ use crate::triangle_mesh::{ConvexMesh, TriangleMesh};
 pub struct SolidMesh {
     index: SurfaceIndex,
     pieces: OnceLock<ConvexPieces>,
+}
+
+/// As its surface: the pieces are the engines'.
+impl Serialize for SolidMesh {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.surface().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for SolidMesh {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        TriangleMesh::deserialize(deserializer).map(Self::new)
+    }
 }
 
 impl PartialEq for SolidMesh {

@@ -7,9 +7,10 @@
 use std::cmp::Ordering;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::bounds::OrientedBox;
-use crate::encoding::{Encode, Reader};
+use crate::encoding::{decode, encode};
 use crate::topology::{connected_parts, weld};
 use crate::triangle_mesh::TriangleMesh;
 
@@ -17,7 +18,7 @@ use crate::triangle_mesh::TriangleMesh;
 const LEAF_TRIANGLES: usize = 4;
 
 /// A box around some triangles.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Node {
     block: OrientedBox,
     /// Leaf: its first triangle. Else: the second child; the first one follows its parent.
@@ -77,36 +78,12 @@ impl TriangleTree {
 
     /// Its bytes: with those of the mesh all of it.
     pub(crate) fn encoded(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(104 * self.nodes.len() + 4 * self.numbers.len() + 64);
-        for count in [self.nodes.len(), self.numbers.len(), self.anchors.len()] {
-            count.encode(&mut bytes);
-        }
-        for node in &self.nodes {
-            node.block.encode(&mut bytes);
-            node.next.encode(&mut bytes);
-            node.count.encode(&mut bytes);
-        }
-        for number in &self.numbers {
-            number.encode(&mut bytes);
-        }
-        for anchor in &self.anchors {
-            anchor.encode(&mut bytes);
-        }
-        bytes
+        encode(&(&self.nodes, &self.numbers, &self.anchors))
     }
 
     /// The tree of a mesh from what [`TriangleTree::encoded`] made of it.
-    pub(crate) fn decoded(reader: &mut Reader<'_>, mesh: &TriangleMesh) -> Option<Self> {
-        let [nodes, triangles, anchors] = [reader.count()?, reader.count()?, reader.count()?];
-        let nodes = reader.list(nodes, 104, |reader| {
-            Some(Node {
-                block: OrientedBox::decoded(reader)?,
-                next: reader.index()?,
-                count: reader.index()?,
-            })
-        })?;
-        let numbers = reader.list(triangles, 4, Reader::index)?;
-        let anchors = reader.list(anchors, 24, Reader::vector)?;
+    pub(crate) fn decoded(bytes: &[u8], mesh: &TriangleMesh) -> Option<Self> {
+        let (nodes, numbers, anchors): (_, Vec<u32>, _) = decode(bytes)?;
         let corners = numbers.iter().map(|&number| match number {
             number if number == NOTHING.number => Some(NOTHING.corners),
             number => corners_of(mesh, mesh.triangles.get(number as usize)?),

@@ -10,6 +10,7 @@ use nalgebra::{Point3, UnitQuaternion, UnitVector3, Vector3};
 use needlebench_geometry::Solid;
 use needlebench_kinematics::Pose;
 use needlebench_kinematics::ik::Configuration;
+use serde::{Deserialize, Serialize};
 
 use super::phantom::{Corners, PlacedPhantom};
 use crate::scenario::{EVERY_CONFIGURATION, GoalSection};
@@ -23,7 +24,7 @@ pub(crate) use by_points::target_inside;
 use checks::{check_place, check_target};
 
 /// Angle of the guide about the needle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Roll {
     /// Turning the guide changes nothing for the needle; the plan chooses.
     Free,
