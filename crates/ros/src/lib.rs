@@ -1,10 +1,10 @@
 //! Messages of ROS 2 in MCAP files: written and read, without ROS.
 //!
 //! [`McapWriter`] makes a file of messages, [`messages`] reads one. The messages are those of ROS's own
-//! packages ([`message`]), in the same fields and order; on the wire they are CDR ([`cdr`]). What they
-//! say of a robot is the business of others.
+//! packages ([`message`]), in the same fields and order; on the wire they are CDR. What they say
+//! of a robot is the business of others.
 
-pub mod cdr;
+mod cdr;
 mod container;
 pub mod message;
 

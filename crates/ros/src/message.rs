@@ -6,26 +6,21 @@ mod marker;
 
 pub use marker::{Colour, Marker, MarkerArray, MarkerShape};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use crate::cdr::{Decoder, Encoder};
+use crate::cdr;
 
-/// A type of message that can be written.
-pub trait Message {
+/// A type of message that can be written: its fields are those of its definition, in order.
+pub trait Message: Serialize + Sized {
     /// Name with package, e.g. `std_msgs/msg/String`.
     const TYPE: &'static str;
 
     /// Its definition and those of all types in it, as MCAP's `ros2msg` has them.
     fn definition() -> String;
 
-    /// Writes its fields.
-    fn encode(&self, cdr: &mut Encoder);
-
     /// Its bytes.
     fn to_cdr(&self) -> Vec<u8> {
-        let mut cdr = Encoder::default();
-        self.encode(&mut cdr);
-        cdr.finish()
+        cdr::encode(self)
     }
 }
 
@@ -49,11 +44,11 @@ const QUATERNION: (&str, &str) = (
 );
 
 /// `builtin_interfaces/msg/Time`.
-#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Stamp {
     /// Seconds.
-    pub sec: i64,
+    pub sec: i32,
     /// Nanoseconds besides.
     #[serde(alias = "nsec")]
     pub nanosec: u32,
@@ -66,25 +61,19 @@ impl Stamp {
     /// Of a time in nanoseconds.
     pub fn of_ns(time_ns: u64) -> Self {
         Self {
-            sec: i64::try_from(time_ns / NS).unwrap_or(i64::MAX),
+            sec: i32::try_from(time_ns / NS).unwrap_or(i32::MAX),
             nanosec: u32::try_from(time_ns % NS).unwrap_or_default(),
         }
     }
 
     /// Seconds; none where nobody set it.
     pub fn seconds(self) -> Option<f64> {
-        (self != Self::default()).then(|| self.sec as f64 + f64::from(self.nanosec) * 1e-9)
-    }
-
-    fn encode(self, cdr: &mut Encoder) {
-        // ROS has 32 bits of it.
-        cdr.i32(i32::try_from(self.sec).unwrap_or(i32::MAX));
-        cdr.u32(self.nanosec);
+        (self != Self::default()).then(|| f64::from(self.sec) + f64::from(self.nanosec) * 1e-9)
     }
 }
 
 /// `std_msgs/msg/Header`.
-#[derive(Debug, Default, Clone, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Default, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Header {
     /// When.
@@ -93,15 +82,8 @@ pub struct Header {
     pub frame_id: String,
 }
 
-impl Header {
-    fn encode(&self, cdr: &mut Encoder) {
-        self.stamp.encode(cdr);
-        cdr.string(&self.frame_id);
-    }
-}
-
 /// `sensor_msgs/msg/JointState`.
-#[derive(Debug, Default, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct JointState {
     /// When; its frame is empty.
@@ -136,23 +118,7 @@ impl JointState {
         if encoding == "json" {
             return Ok(serde_json::from_slice(data)?);
         }
-        Self::from_cdr(data).ok_or(NotAMessage::CutOff)
-    }
-
-    fn from_cdr(data: &[u8]) -> Option<Self> {
-        let mut cdr = Decoder::new(data)?;
-        let stamp = Stamp {
-            sec: i64::from(cdr.i32()?),
-            nanosec: cdr.u32()?,
-        };
-        let frame_id = cdr.string()?;
-        Some(Self {
-            header: Header { stamp, frame_id },
-            name: cdr.strings()?,
-            position: cdr.doubles()?,
-            velocity: cdr.doubles()?,
-            effort: cdr.doubles()?,
-        })
+        cdr::decode(data).ok_or(NotAMessage::CutOff)
     }
 }
 
@@ -165,18 +131,10 @@ impl Message for JointState {
             &[HEADER, TIME],
         )
     }
-
-    fn encode(&self, cdr: &mut Encoder) {
-        self.header.encode(cdr);
-        cdr.strings(self.name.iter().map(String::as_str));
-        for values in [&self.position, &self.velocity, &self.effort] {
-            cdr.doubles(values);
-        }
-    }
 }
 
 /// `std_msgs/msg/String`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Text(pub String);
 
 impl Message for Text {
@@ -185,14 +143,10 @@ impl Message for Text {
     fn definition() -> String {
         "string data\n".to_owned()
     }
-
-    fn encode(&self, cdr: &mut Encoder) {
-        cdr.string(&self.0);
-    }
 }
 
 /// `std_msgs/msg/Float64`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Number(pub f64);
 
 impl Message for Number {
@@ -201,14 +155,10 @@ impl Message for Number {
     fn definition() -> String {
         "float64 data\n".to_owned()
     }
-
-    fn encode(&self, cdr: &mut Encoder) {
-        cdr.f64(self.0);
-    }
 }
 
 /// A place and a direction.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pose {
     /// x, y, z, m.
     pub position: [f64; 3],
@@ -216,16 +166,8 @@ pub struct Pose {
     pub quat_xyzw: [f64; 4],
 }
 
-impl Pose {
-    fn encode(&self, cdr: &mut Encoder) {
-        for value in self.position.iter().chain(&self.quat_xyzw) {
-            cdr.f64(*value);
-        }
-    }
-}
-
 /// `geometry_msgs/msg/TransformStamped`: the place of a child frame in its parent.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TransformStamped {
     /// When, and the parent.
     pub header: Header,
@@ -236,7 +178,7 @@ pub struct TransformStamped {
 }
 
 /// `tf2_msgs/msg/TFMessage`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TfMessage(pub Vec<TransformStamped>);
 
 impl Message for TfMessage {
@@ -260,15 +202,6 @@ impl Message for TfMessage {
                 QUATERNION,
             ],
         )
-    }
-
-    fn encode(&self, cdr: &mut Encoder) {
-        cdr.count(self.0.len());
-        for each in &self.0 {
-            each.header.encode(cdr);
-            cdr.string(&each.child_frame_id);
-            each.parent_from_child.encode(cdr);
-        }
     }
 }
 

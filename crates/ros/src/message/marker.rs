@@ -1,19 +1,12 @@
 //! `visualization_msgs/msg/MarkerArray`.
 
+use serde::{Serialize, Serializer};
+
 use super::{Header, Message, Pose, QUATERNION, TIME, VECTOR3, with_types};
-use crate::cdr::Encoder;
 
 /// Red, green, blue and opacity, 0 to 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Colour(pub [f32; 4]);
-
-impl Colour {
-    fn encode(self, cdr: &mut Encoder) {
-        for part in self.0 {
-            cdr.f32(part);
-        }
-    }
-}
 
 /// What a marker shows.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +44,9 @@ impl MarkerShape {
     }
 }
 
+/// The constant of the message's `action`.
+const ADD: i32 = 0;
+
 /// `visualization_msgs/msg/Marker`: added, for ever.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marker {
@@ -69,7 +65,7 @@ pub struct Marker {
 }
 
 /// `visualization_msgs/msg/MarkerArray`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MarkerArray(pub Vec<Marker>);
 
 const MARKER: &str = "\
@@ -144,57 +140,30 @@ impl Message for MarkerArray {
             ],
         )
     }
-
-    fn encode(&self, cdr: &mut Encoder) {
-        cdr.count(self.0.len());
-        for marker in &self.0 {
-            marker.encode(cdr);
-        }
-    }
 }
 
-impl Marker {
-    fn encode(&self, cdr: &mut Encoder) {
-        self.header.encode(cdr);
-        cdr.string(&self.ns);
-        cdr.i32(self.id);
-        cdr.i32(self.shape.constant());
-        // Add.
-        cdr.i32(0);
-        self.pose.encode(cdr);
-        for part in self.shape.scale() {
-            cdr.f64(part);
-        }
-        self.colour.encode(cdr);
-        // Lifetime: for ever.
-        cdr.i32(0);
-        cdr.u32(0);
-        // It moves with its frame.
-        cdr.bool(true);
-        let points = match &self.shape {
-            MarkerShape::Triangles(points) => points.as_slice(),
-            _ => &[],
+impl Serialize for Marker {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let (points, text) = match &self.shape {
+            MarkerShape::Triangles(points) => (points.as_slice(), ""),
+            MarkerShape::Text(text, _) => (&[][..], text.as_str()),
+            _ => (&[][..], ""),
         };
-        cdr.count(points.len());
-        for value in points.iter().flatten() {
-            cdr.f64(*value);
-        }
-        // One colour for all.
-        cdr.count(0);
-        // No texture.
-        cdr.string("");
-        Header::default().encode(cdr);
-        cdr.string("");
-        cdr.count(0);
-        cdr.count(0);
-        match &self.shape {
-            MarkerShape::Text(text, _) => cdr.string(text),
-            _ => cdr.string(""),
-        }
-        // No mesh of a file.
-        cdr.string("");
-        cdr.string("");
-        cdr.count(0);
-        cdr.bool(false);
+        let nothing: &[u8] = &[];
+        (
+            (&self.header, &self.ns, self.id),
+            (self.shape.constant(), ADD),
+            (self.pose, self.shape.scale(), self.colour),
+            // For ever, and it moves with its frame.
+            ((0_i32, 0_u32), true),
+            // One colour for all.
+            (points, nothing),
+            // No texture.
+            ("", (Header::default(), "", nothing), nothing),
+            text,
+            // No mesh of a file.
+            ("", ("", nothing), false),
+        )
+            .serialize(serializer)
     }
 }
