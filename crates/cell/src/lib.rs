@@ -24,6 +24,7 @@
 //! | `log_columns`, `marker_list` | which column of a recorded log is what; where markers are |
 
 pub mod arm;
+mod delimited;
 mod engine_name;
 mod excitation_text;
 pub mod family;
@@ -54,6 +55,7 @@ mod toml_value;
 mod words;
 
 pub use arm::{Arm, Recognition};
+pub use delimited::Separator;
 pub use excitation_text::ExcitationText;
 pub use family::{
     Change, KeyPath, MovedPhantom, PhantomMove, PhantomMoves, ScenarioFamily, Setting,

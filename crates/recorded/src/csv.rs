@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use needlebench_cell::{Finding, LogColumns, nearest_name, open_input};
+use needlebench_cell::{Finding, LogColumns, Separator, nearest_name, open_input};
 use sha2::{Digest, Sha256};
 
 use crate::raw::RawLog;
@@ -31,52 +31,6 @@ struct Slot {
     quantity: Quantity,
     index: usize,
     to_si: f64,
-}
-
-/// How the cells of a line are told apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Separator {
-    Byte(u8),
-    Blanks,
-}
-
-impl Separator {
-    fn of_header(header: &str) -> Self {
-        [b';', b'\t', b',']
-            .into_iter()
-            .find(|byte| header.as_bytes().contains(byte))
-            .map_or(Self::Blanks, Self::Byte)
-    }
-
-    /// Numbers may have a comma for a point.
-    fn allows_decimal_comma(self) -> bool {
-        self != Self::Byte(b',')
-    }
-
-    fn words(self) -> &'static str {
-        match self {
-            Self::Byte(b';') => "semicolons",
-            Self::Byte(b'\t') => "tabs",
-            Self::Byte(_) => "commas",
-            Self::Blanks => "blanks",
-        }
-    }
-
-    fn names(self, header: &str) -> Vec<&str> {
-        match self {
-            Self::Byte(byte) => {
-                let header = header.trim_end_matches(char::from(byte));
-                header
-                    .split(char::from(byte))
-                    .map(|cell| cell.trim_matches(|c: char| c.is_whitespace() || c == '"'))
-                    .collect()
-            }
-            Self::Blanks => header
-                .split_whitespace()
-                .map(|cell| cell.trim_matches('"'))
-                .collect(),
-        }
-    }
 }
 
 /// What each line is.
@@ -210,8 +164,12 @@ impl Reader<'_> {
         let header = header.expect("just found");
         let header_line = lines.number;
         let separator = Separator::of_header(&header);
-        let names = separator.names(&header);
-        if separator != Separator::Byte(b',') {
+        let mut names: Vec<&str> = separator.cells(&header).collect();
+        // A separator at the end of every line.
+        while names.last().is_some_and(|name| name.is_empty()) {
+            names.pop();
+        }
+        if separator.allows_decimal_comma() {
             self.raw.notes.push(format!(
                 "values are separated by {}; a comma in a number counts as its point",
                 separator.words()
@@ -299,12 +257,11 @@ impl Reader<'_> {
     fn cells(&mut self, text: &str, numbers: &mut [f64], table: &Table<'_>, line: usize) -> usize {
         let mut count = 0;
         let mut last_is_empty = false;
-        let mut take = |cell: &str| {
+        for cell in table.separator.cells(text) {
             let at = table.wanted.get(count).copied().flatten();
             count += 1;
-            let cell = cell.trim_matches(|c: char| c.is_ascii_whitespace() || c == '"');
             last_is_empty = cell.is_empty();
-            let Some(at) = at else { return };
+            let Some(at) = at else { continue };
             let slot = &table.slots[at];
             let value = number(cell, table.separator.allows_decimal_comma());
             if value.is_none() && self.findings.len() < MOST_FINDINGS {
@@ -315,10 +272,6 @@ impl Reader<'_> {
                 self.findings.push(finding);
             }
             numbers[at] = value.map_or(f64::NAN, |value| value * slot.to_si);
-        };
-        match table.separator {
-            Separator::Byte(byte) => text.split(char::from(byte)).for_each(&mut take),
-            Separator::Blanks => text.split_ascii_whitespace().for_each(&mut take),
         }
         // A separator at the end of every line.
         if last_is_empty && count == table.names.len() + 1 {
@@ -355,7 +308,7 @@ impl Reader<'_> {
             found.insert((Quantity::Time, 0), column);
         }
         let mut slots = Vec::new();
-        for quantity in Quantity::ALL {
+        for quantity in Quantity::all() {
             let columns: Vec<Option<&usize>> = (0..quantity.width())
                 .map(|index| found.get(&(quantity, index)))
                 .collect();
@@ -401,7 +354,7 @@ impl Reader<'_> {
     /// Joints that are counted from 1 to 6.
     fn count_from_zero(&mut self, found: &mut BTreeMap<(Quantity, usize), usize>) {
         let mut shifted = Vec::new();
-        for quantity in Quantity::ALL.into_iter().filter(|each| each.width() > 1) {
+        for quantity in Quantity::all().filter(|each| each.width() > 1) {
             let has = |index| found.contains_key(&(quantity, index));
             if has(quantity.width()) && !has(0) {
                 shifted.push(quantity);

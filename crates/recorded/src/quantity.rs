@@ -45,97 +45,83 @@ pub enum Quantity {
     RobotCurrent,
 }
 
+/// What the numbers of a quantity are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Numbers {
+    /// Times: s if nothing else is said.
+    Times,
+    /// Angles, or angles per time: rad if nothing else is said.
+    Angles,
+    /// In SI.
+    Measured,
+    /// Of the row itself: without them it is of as much use.
+    OfTheRow,
+}
+
+/// All quantities in their order: name in UR's real-time data exchange (of what that has not, the word of a table of
+/// columns), number of columns, and what their numbers are.
+const HEADINGS: [(Quantity, &str, usize, Numbers); 20] = {
+    use Numbers::{Angles, Measured, OfTheRow, Times};
+    use Quantity::*;
+    [
+        (Time, "timestamp", 1, Times),
+        (TargetQ, "target_q", 6, Angles),
+        (TargetQd, "target_qd", 6, Angles),
+        (TargetQdd, "target_qdd", 6, Angles),
+        (TargetMoment, "target_moment", 6, Measured),
+        (TargetCurrent, "target_current", 6, Measured),
+        (ActualQ, "actual_q", 6, Angles),
+        (ActualQd, "actual_qd", 6, Angles),
+        (ActualCurrent, "actual_current", 6, Measured),
+        (ActualTorque, "actual_torque", 6, Measured),
+        (ActualTcp, "actual_TCP_pose", 6, Measured),
+        (Payload, "payload", 1, Measured),
+        (PayloadCog, "payload_cog", 3, Measured),
+        (PayloadInertia, "payload_inertia", 6, Measured),
+        (RobotMode, "robot_mode", 1, OfTheRow),
+        (SafetyMode, "safety_mode", 1, OfTheRow),
+        (JointMode, "joint_mode", 6, OfTheRow),
+        (RobotStatusBits, "robot_status_bits", 1, OfTheRow),
+        (Temperature, "joint_temperatures", 6, OfTheRow),
+        (RobotCurrent, "actual_robot_current", 1, OfTheRow),
+    ]
+};
+
 impl Quantity {
     /// All of them.
-    pub const ALL: [Self; 20] = [
-        Self::Time,
-        Self::TargetQ,
-        Self::TargetQd,
-        Self::TargetQdd,
-        Self::TargetMoment,
-        Self::TargetCurrent,
-        Self::ActualQ,
-        Self::ActualQd,
-        Self::ActualCurrent,
-        Self::ActualTorque,
-        Self::ActualTcp,
-        Self::Payload,
-        Self::PayloadCog,
-        Self::PayloadInertia,
-        Self::RobotMode,
-        Self::SafetyMode,
-        Self::JointMode,
-        Self::RobotStatusBits,
-        Self::Temperature,
-        Self::RobotCurrent,
-    ];
+    pub fn all() -> impl Iterator<Item = Self> {
+        HEADINGS.into_iter().map(|(quantity, ..)| quantity)
+    }
 
     /// Name in UR's real-time data exchange; of what that has not, the word of a table of columns.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Time => "timestamp",
-            Self::TargetQ => "target_q",
-            Self::TargetQd => "target_qd",
-            Self::TargetQdd => "target_qdd",
-            Self::TargetMoment => "target_moment",
-            Self::TargetCurrent => "target_current",
-            Self::ActualQ => "actual_q",
-            Self::ActualQd => "actual_qd",
-            Self::ActualCurrent => "actual_current",
-            Self::ActualTorque => "actual_torque",
-            Self::ActualTcp => "actual_TCP_pose",
-            Self::Payload => "payload",
-            Self::PayloadCog => "payload_cog",
-            Self::PayloadInertia => "payload_inertia",
-            Self::RobotMode => "robot_mode",
-            Self::SafetyMode => "safety_mode",
-            Self::JointMode => "joint_mode",
-            Self::RobotStatusBits => "robot_status_bits",
-            Self::Temperature => "joint_temperatures",
-            Self::RobotCurrent => "actual_robot_current",
-        }
+        HEADINGS[self as usize].1
     }
 
     /// Number of columns.
     pub fn width(self) -> usize {
-        match self {
-            Self::Time
-            | Self::Payload
-            | Self::RobotMode
-            | Self::SafetyMode
-            | Self::RobotStatusBits
-            | Self::RobotCurrent => 1,
-            Self::PayloadCog => 3,
-            _ => 6,
-        }
+        HEADINGS[self as usize].2
+    }
+
+    fn numbers(self) -> Numbers {
+        HEADINGS[self as usize].3
     }
 
     /// Whether a row without it is of no use; the others tell of the row itself.
     pub fn is_measured(self) -> bool {
-        !matches!(
-            self,
-            Self::RobotMode
-                | Self::SafetyMode
-                | Self::JointMode
-                | Self::RobotStatusBits
-                | Self::Temperature
-                | Self::RobotCurrent
-        )
+        self.numbers() != Numbers::OfTheRow
     }
 
     /// Whether its numbers are angles, or angles per time.
     pub fn is_angular(self) -> bool {
-        matches!(
-            self,
-            Self::TargetQ | Self::TargetQd | Self::TargetQdd | Self::ActualQ | Self::ActualQd
-        )
+        self.numbers() == Numbers::Angles
     }
 
     /// The quantity of a key in a table of columns.
     pub fn of_key(key: &str) -> Option<Self> {
         match key {
             "time" => Some(Self::Time),
-            _ => Self::ALL.into_iter().find(|each| each.name() == key),
+            _ => Self::all().find(|each| each.name() == key),
         }
     }
 
@@ -146,10 +132,7 @@ impl Quantity {
         if matches!(name.as_str(), "timestamp" | "time" | "t") {
             return Some((Self::Time, 0));
         }
-        let whole = |name: &str| {
-            let mut all = Self::ALL.into_iter();
-            all.find(|each| each.name().eq_ignore_ascii_case(name))
-        };
+        let whole = |name: &str| Self::all().find(|each| each.name().eq_ignore_ascii_case(name));
         if let Some(quantity) = whole(&name).filter(|each| each.width() == 1) {
             return Some((quantity, 0));
         }
@@ -163,6 +146,13 @@ impl Quantity {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn headings_are_in_the_order_of_the_quantities() {
+        for (place, quantity) in Quantity::all().enumerate() {
+            assert_eq!(quantity as usize, place);
+        }
+    }
 
     #[test]
     fn columns_are_known_however_their_index_is_written() {

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 use needlebench_cell::{Finding, nearest_name};
 
 use super::Commanded;
-use super::log_units::{LogUnits, RotationColumns};
+use super::log_units::{Dimension, LogUnits, RotationColumns, to_si};
 use super::number::parse_shifted;
 use super::table::{HEADER_HINT, Heading, Table};
 use super::timestamp::seconds_of;
@@ -141,7 +141,7 @@ impl Columns {
         let mut length = [(0, 1.0); 3];
         for (axis, found) in length.iter_mut().enumerate() {
             if let Some(&column) = of.get(&Role::Position(axis)) {
-                match length_unit(table, column, units.length) {
+                match unit_of(table, column, Dimension::Length, units.length) {
                     Ok(unit) => *found = unit,
                     Err(finding) => findings.push(finding),
                 }
@@ -164,8 +164,8 @@ impl Columns {
             }
         }
         if let Some(&column) = of.get(&Role::Rotation(0)) {
-            match angle_unit(table, column, units.angle) {
-                Ok(factor) => angle = factor,
+            match unit_of(table, column, Dimension::Angle, units.angle) {
+                Ok((_, factor)) => angle = factor,
                 Err(finding) => findings.push(finding),
             }
             if units.rotation.is_none() {
@@ -348,11 +348,11 @@ impl Columns {
             return vec![None; count];
         };
         let unit = table.headings[column].unit.as_deref();
+        let unit = unit.and_then(|unit| to_si(unit, Dimension::Time));
         let times: Vec<Option<f64>> = (0..count)
             .map(|row| match unit {
-                Some("s") => parse_shifted(&table.number(row, column), 0),
-                Some("ms") => parse_shifted(&table.number(row, column), -3),
-                _ => seconds_of(table.cell(row, column)),
+                Some((places, _)) => parse_shifted(&table.number(row, column), places),
+                None => seconds_of(table.cell(row, column)),
             })
             .map(|time_s| time_s.filter(|time_s| time_s.is_finite()))
             .collect();
@@ -410,49 +410,31 @@ fn missing(table: &Table<'_>, name: &str, ignored: &[String]) -> Finding {
         })
 }
 
-/// Power of ten and factor from a column's unit to metres.
-fn length_unit(
+/// Power of ten and factor from the unit of a column, or else that which was given, to SI.
+fn unit_of(
     table: &Table<'_>,
     column: usize,
+    of: Dimension,
     given: Option<&'static str>,
 ) -> Result<(i32, f64), Finding> {
     let heading = &table.headings[column];
     let name = &table.text[heading.span.clone()];
-    match heading.unit.as_deref().or(given) {
-        Some("m") => Ok((0, 1.0)),
-        Some("mm") => Ok((-3, 1.0)),
-        Some("um" | "µm") => Ok((-6, 1.0)),
-        Some("in" | "inch") => Ok((0, 0.0254)),
-        Some(unit) => Err(table
-            .column_finding(column, format!("`{unit}` is no unit of length in `{name}`"))
-            .hint("m, mm, um or in")),
-        None => Err(table
-            .column_finding(column, format!("`{name}` does not say its unit"))
-            .hint(format!("write it as `{name}_mm`, or give --length-unit mm"))),
-    }
-}
-
-/// Factor from a column's unit to radians.
-fn angle_unit(
-    table: &Table<'_>,
-    column: usize,
-    given: Option<&'static str>,
-) -> Result<f64, Finding> {
-    let heading = &table.headings[column];
-    let name = &table.text[heading.span.clone()];
-    match heading.unit.as_deref().or(given) {
-        Some("rad") => Ok(1.0),
-        Some("mrad") => Ok(1e-3),
-        Some("deg" | "°") => Ok(1.0_f64.to_radians()),
-        Some(unit) => Err(table
-            .column_finding(column, format!("`{unit}` is no unit of angle in `{name}`"))
-            .hint("deg, rad or mrad")),
-        None => Err(table
+    let (what, units, usual) = match of {
+        Dimension::Angle => ("angle", "deg, rad or mrad", "deg"),
+        _ => ("length", "m, mm, um or in", "mm"),
+    };
+    let Some(unit) = heading.unit.as_deref().or(given) else {
+        return Err(table
             .column_finding(column, format!("`{name}` does not say its unit"))
             .hint(format!(
-                "write it as `{name}_deg`, or give --angle-unit deg"
-            ))),
-    }
+                "write it as `{name}_{usual}`, or give --{what}-unit {usual}"
+            )));
+    };
+    to_si(unit, of).ok_or_else(|| {
+        table
+            .column_finding(column, format!("`{unit}` is no unit of {what} in `{name}`"))
+            .hint(units)
+    })
 }
 
 /// Text of a cell that is a finite number.

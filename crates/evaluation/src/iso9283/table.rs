@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use needlebench_cell::Finding;
+use needlebench_cell::{Finding, Separator};
+
+use super::log_units::is_unit;
 
 /// Starts of lines that are comments: needlebench's own, SpatialAnalyzer's, MATLAB's.
 const COMMENTS: [&str; 3] = ["#", "//", "%"];
@@ -39,10 +41,10 @@ impl<'a> Table<'a> {
                 Finding::new(file, "the file has no header").hint(HEADER_HINT),
             ]);
         };
-        let separator = [';', '\t', ',']
-            .into_iter()
-            .find(|each| text[header.clone()].contains(*each))
-            .unwrap_or(',');
+        let separator = match Separator::of_header(&text[header.clone()]) {
+            Separator::Blanks => Separator::Comma,
+            other => other,
+        };
         let headings: Vec<Heading> = cells(text, header.clone(), separator)
             .into_iter()
             .map(|span| heading(text, span))
@@ -91,7 +93,7 @@ impl<'a> Table<'a> {
                 text,
                 headings,
                 rows,
-                decimal_comma: separator != ',',
+                decimal_comma: separator.allows_decimal_comma(),
             })
         } else {
             Err(findings)
@@ -154,38 +156,17 @@ fn lines(text: &str) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// Cells of a line, without the blanks and quotes around them.
-fn cells(text: &str, line: Range<usize>, separator: char) -> Vec<Range<usize>> {
-    let mut quoted = false;
-    let mut cells = Vec::new();
-    let mut start = line.start;
-    let ends = text[line.clone()]
-        .char_indices()
-        .filter(|(_, c)| {
-            quoted ^= *c == '"';
-            *c == separator && !quoted
-        })
-        .map(|(index, _)| line.start + index)
-        .collect::<Vec<usize>>();
-    for end in ends.into_iter().chain([line.end]) {
-        cells.push(trimmed(text, start..end));
-        start = end + separator.len_utf8();
-    }
-    cells
-}
-
-fn trimmed(text: &str, span: Range<usize>) -> Range<usize> {
-    let outer = &text[span.clone()];
-    let inner = outer.trim_matches(|c: char| c.is_whitespace() || c == '"');
-    let offset = inner.as_ptr() as usize - outer.as_ptr() as usize;
-    span.start + offset..span.start + offset + inner.len()
+/// Where the cells of a line are.
+fn cells(text: &str, line: Range<usize>, separator: Separator) -> Vec<Range<usize>> {
+    let place = |cell: &str| {
+        let start = cell.as_ptr() as usize - text.as_ptr() as usize;
+        start..start + cell.len()
+    };
+    separator.cells(&text[line]).map(place).collect()
 }
 
 /// `x_mm`, `x [mm]`, `x (mm)`, `x/mm` and `x mm` are all x in mm.
 fn heading(text: &str, span: Range<usize>) -> Heading {
-    const UNITS: [&str; 12] = [
-        "mm", "m", "um", "µm", "in", "inch", "s", "ms", "deg", "rad", "mrad", "°",
-    ];
     let whole = text[span.clone()].to_lowercase();
     let tidy = |name: &str| {
         let words: Vec<&str> = name
@@ -200,7 +181,7 @@ fn heading(text: &str, span: Range<usize>) -> Heading {
     let (name, unit) = match bracketed {
         Some((name, unit)) => (name, Some(unit.trim())),
         None => match whole.rsplit_once(['_', ' ', '/']) {
-            Some((name, unit)) if UNITS.contains(&unit.trim()) => (name, Some(unit.trim())),
+            Some((name, unit)) if is_unit(unit.trim()) => (name, Some(unit.trim())),
             _ => (whole.as_str(), None),
         },
     };
@@ -218,7 +199,7 @@ mod tests {
     #[test]
     fn units_are_read_however_they_are_written() {
         for text in ["X_mm", "x [mm]", "x (mm)", "X/mm", "x mm", "\"X [mm]\""] {
-            let span = trimmed(text, 0..text.len());
+            let span = cells(text, 0..text.len(), Separator::Comma).remove(0);
             let found = heading(text, span);
             assert_eq!(
                 (found.name.as_str(), found.unit.as_deref()),
