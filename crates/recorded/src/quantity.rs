@@ -62,6 +62,7 @@ enum Numbers {
 /// columns), number of columns, and what their numbers are.
 const HEADINGS: [(Quantity, &str, usize, Numbers); 20] = {
     use Numbers::{Angles, Measured, OfTheRow, Times};
+    #[expect(clippy::enum_glob_use, reason = "the table names all of them")]
     use Quantity::*;
     [
         (Time, "timestamp", 1, Times),
