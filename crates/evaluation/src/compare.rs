@@ -257,7 +257,7 @@ pub fn compare(
         .into_iter()
         .filter_map(StoredReport::incomplete)
         .collect();
-    let mut notes = former_notes(a, b);
+    let mut notes = Vec::new();
     let mut metrics = goals
         .iter()
         .flat_map(|goal| &goal.configurations)
@@ -268,7 +268,6 @@ pub fn compare(
     for threshold in &options.thresholds {
         let found = threshold_failures(&goals, threshold);
         failures.extend(found.failures);
-        notes.extend(threshold.note.clone());
         notes.extend(found.note);
     }
     let verdict = Verdict::of(!failures.is_empty(), !incomplete.is_empty());
@@ -294,19 +293,6 @@ fn engines(goals: &[MatchedGoals<'_>]) -> BTreeSet<String> {
         .flatten()
         .filter_map(|configuration| configuration.get("engines")?.as_object())
         .flat_map(|engines| engines.keys().cloned())
-        .collect()
-}
-
-fn former_notes(a: &StoredReport, b: &StoredReport) -> Vec<String> {
-    let former = [a, b].into_iter().filter(|report| report.is_former());
-    former
-        .map(|report| {
-            format!(
-                "{} is of an older version: its numbers are compared by the keys that they have today; \
-                 what it ranked by as `tip_error` with a budget was `tip_rms`",
-                report.source()
-            )
-        })
         .collect()
 }
 

@@ -1,4 +1,4 @@
-//! Reports that were stored, by this version or another one.
+//! Reports that were stored.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use needlebench_cell::{Finding, printable, printable_line};
 use serde_json::{Value, json};
 
-use crate::metric::{MetricKey, former_report};
+use crate::metric::MetricKey;
 use crate::report::{Report, SCHEMA_VERSION, Verdict};
 
 /// A configuration of a study's case.
@@ -24,8 +24,8 @@ pub struct StoredConfiguration {
 
 /// A report as its documented keys, with where it comes from.
 ///
-/// Keys that a report lacks were not measured by the version that wrote it; only those that say
-/// what it is about have to be there.
+/// What a report lacks was not measured; only those keys that say what it is about, and what was
+/// measured of each configuration, have to be there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredReport {
     source: String,
@@ -215,12 +215,16 @@ impl StoredReport {
                 return Err(missing(format!("goals[{index}].configurations")));
             };
             for (at, each) in configurations.iter().enumerate() {
-                for key in ["label", "status"] {
-                    if each.get(key).and_then(Value::as_str).is_none() {
-                        return Err(missing(format!(
-                            "goals[{index}].configurations[{at}].{key}"
-                        )));
-                    }
+                let has = |key: &str, is: fn(&Value) -> bool| each.get(key).is_some_and(is);
+                let is_there = [
+                    ("label", has("label", Value::is_string)),
+                    ("status", has("status", Value::is_string)),
+                    ("metrics", has("metrics", Value::is_object)),
+                ];
+                if let Some((key, _)) = is_there.into_iter().find(|(_, is_there)| !is_there) {
+                    return Err(missing(format!(
+                        "goals[{index}].configurations[{at}].{key}"
+                    )));
                 }
             }
         }
@@ -242,13 +246,10 @@ impl StoredReport {
         self.report.pointer(pointer)
     }
 
-    /// What was measured of a configuration of its goals, by metrics' keys; of reports before those had
-    /// keys as they are today's.
+    /// What was measured of a configuration of its goals, by metrics' keys.
     pub(crate) fn measured(configuration: &Value) -> BTreeMap<String, f64> {
-        let Some(metrics) = configuration.get("metrics").and_then(Value::as_object) else {
-            return former_report(configuration);
-        };
-        let numbers = metrics.iter();
+        let metrics = configuration.get("metrics").and_then(Value::as_object);
+        let numbers = metrics.into_iter().flatten();
         numbers
             .filter_map(|(key, value)| Some((key.clone(), value.as_f64()?)))
             .collect()
@@ -270,8 +271,8 @@ impl StoredReport {
             .any(|metrics| metrics.get(key).is_some())
     }
 
-    /// Why it is not complete, if it is not: by its verdict, by what was not judged, and of versions without
-    /// such a verdict by engines that failed.
+    /// Why it is not complete, if it is not: by its verdict, by what was not judged, and by engines that
+    /// failed.
     pub(crate) fn incomplete(&self) -> Option<String> {
         let count = |key: &str| {
             self.report
@@ -297,15 +298,6 @@ impl StoredReport {
             ),
         };
         Some(format!("{} is not complete: {why}", self.source))
-    }
-
-    /// Whether it was written before metrics had keys.
-    pub(crate) fn is_former(&self) -> bool {
-        let mut configurations = self
-            .goals()
-            .filter_map(|(_, goal)| goal.get("configurations")?.as_array())
-            .flatten();
-        configurations.any(|each| each.get("metrics").is_none())
     }
 
     /// Goals with their names, in the report's order.

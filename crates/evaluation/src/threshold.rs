@@ -52,8 +52,6 @@ pub struct Threshold {
     pub text: String,
     /// Unit that the limit was given in, with its size in SI.
     pub unit: (&'static str, f64),
-    /// What the name was before, if it was given by a former one.
-    pub note: Option<String>,
 }
 
 /// A limit of a loss.
@@ -122,7 +120,7 @@ impl Threshold {
             Some((name, percent)) => (name.trim(), Some(percent.trim())),
             None => (rest, None),
         };
-        let (subject, note) = subject(name, percent, compared, engines)?;
+        let subject = subject(name, percent, compared, engines)?;
         let quantity = match &subject {
             Subject::Metric(metric, _) => metric.metric().quantity,
             Subject::Rate(_) => Quantity::Ratio,
@@ -135,7 +133,6 @@ impl Threshold {
             subject,
             key: key.trim().to_owned(),
             text: limit.trim().to_owned(),
-            note,
         })
     }
 
@@ -169,30 +166,25 @@ fn subject(
     percent: Option<&str>,
     compared: Compared<'_>,
     engines: &[&str],
-) -> Result<(Subject, Option<String>), ThresholdError> {
+) -> Result<Subject, ThresholdError> {
     let rates = match compared {
         Compared::Runs => &[],
         Compared::Studies(rates) => rates,
     };
     if let Some(rate) = rates.iter().find(|rate| rate.name == name) {
         return match percent {
-            None => Ok((Subject::Rate(*rate), None)),
+            None => Ok(Subject::Rate(*rate)),
             Some(_) => Err(wrong(
                 format!("{name} has no quantiles"),
                 format!("leave out the `@`: {name}=0.02"),
             )),
         };
     }
-    let found = MetricKey::named(name, engines);
-    let former = || MetricKey::formerly(name);
-    let Some(metric) = found.clone().or_else(former) else {
+    let Some(metric) = MetricKey::named(name, engines) else {
         return Err(unknown(name, rates, engines));
     };
-    let note = found
-        .is_none()
-        .then(|| format!("`{name}` is called `{}` now", metric.key()));
     let quantile = quantile(&metric, percent, compared)?;
-    Ok((Subject::Metric(metric, quantile), note))
+    Ok(Subject::Metric(metric, quantile))
 }
 
 fn unknown(name: &str, rates: &[Rate], engines: &[&str]) -> ThresholdError {
@@ -437,9 +429,6 @@ mod tests {
         assert_eq!(found.of.as_deref(), Some("Right-Up-Fold"));
         assert_eq!(parse("success_rate", "0").of.as_deref(), Some(EVERY));
         assert_eq!(parse("working_layouts", "2%").of, None);
-        let found = parse("tip_lateral", "1mm");
-        let note = "`tip_lateral` is called `lateral_error` now";
-        assert_eq!(found.note.as_deref(), Some(note));
     }
 
     #[test]

@@ -374,7 +374,7 @@ fn limitations(out: &mut String, document: &Credibility) -> std::fmt::Result {
             }
             None => writeln!(
                 out,
-                "- {name}: which values of the arm are assumed is not in its report, which is of an older version"
+                "- {name}: which values of the arm are assumed is not in its report"
             )?,
         }
         for note in &run.notes {

@@ -394,11 +394,11 @@ mod tests {
         "not_judged": [{"criterion": "c"}], "notes": ["n"], "assumed": {"rotors.source": "assumed: x"},
         "provenance": {"version": "1", "truth": "nominal"},
         "goals": [{"name": "g", "configurations": [
-          {"label": "Right-Up-Fold", "status": "ok", "engine_difference": {"peak_tip_m": 2e-8, "settled_tip_m": 1e-15},
+          {"label": "Right-Up-Fold", "status": "ok", "metrics": {}, "engine_difference": {"peak_tip_m": 2e-8, "settled_tip_m": 1e-15},
            "referee": {"rapier": {"documented_order": 1.0, "order": 1.02,
              "convergence": [{"timestep_s": 1e-3, "peak_tip_m": 4e-7}, {"timestep_s": 5e-4, "peak_tip_m": 2e-7}],
              "held_torques": {"order": 0.98, "convergence": [{"timestep_s": 1e-3, "peak_tip_m": 7e-7}]}}}},
-          {"label": "Left-Up-Fold", "status": "ok", "engine_difference": {"peak_tip_m": 3e-8, "settled_tip_m": 0.0},
+          {"label": "Left-Up-Fold", "status": "ok", "metrics": {}, "engine_difference": {"peak_tip_m": 3e-8, "settled_tip_m": 0.0},
            "referee": {"rapier": {"documented_order": 1.0, "order": null,
              "convergence": [{"timestep_s": 1e-3, "peak_tip_m": 5e-7}, {"timestep_s": 5e-4, "peak_tip_m": 1e-7}],
              "held_torques": null}}}]}]}"#;

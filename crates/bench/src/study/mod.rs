@@ -4,7 +4,6 @@ mod assignment;
 mod case;
 mod dynamic;
 mod evaluator;
-mod former;
 mod identity;
 mod launch;
 mod margin;
@@ -24,7 +23,6 @@ pub use case::StudyCase;
 pub use dynamic::{CaseCost, DynamicCase, ENGINE_FAILURE, dynamic_case, dynamic_rows};
 pub use evaluator::StudyEvaluator;
 pub(crate) use evaluator::counted_classes;
-pub use former::FormerResults;
 pub use identity::Identity;
 pub use launch::{
     Launch, LaunchFile, LaunchPlan, LaunchRequest, LaunchStep, Launcher, advice, launch_plan,

@@ -244,8 +244,6 @@ pub struct Metric {
     pub statistics: Statistics,
     /// The same in static cases.
     pub static_statistics: Statistics,
-    /// Names that it had in older versions, in studies too.
-    pub formerly: &'static [&'static str],
     /// Where in the report it stands.
     pub source: Source,
 }
@@ -294,7 +292,6 @@ impl Metric {
             each_engine: false,
             statistics: Statistics::NONE,
             static_statistics: Statistics::NONE,
-            formerly: &[],
             source,
         }
     }
@@ -490,13 +487,6 @@ impl Metric {
     pub(super) const fn static_statistics(self, static_statistics: Statistics) -> Self {
         Self {
             static_statistics,
-            ..self
-        }
-    }
-
-    pub(super) const fn formerly(self, names: &'static [&'static str]) -> Self {
-        Self {
-            formerly: names,
             ..self
         }
     }

@@ -91,12 +91,6 @@ impl MetricKey {
         Self::all(engines).find(|each| each.key() == name || each.column() == name)
     }
 
-    /// The metric that had a name in older versions.
-    pub fn formerly(name: &str) -> Option<Self> {
-        let found = metrics().find(|metric| metric.formerly.contains(&name));
-        found.map(Self::of_run)
-    }
-
     /// The metric, whatever it is of.
     pub fn metric(&self) -> &'static Metric {
         self.metric

@@ -10,7 +10,6 @@
 
 mod entry;
 mod key;
-mod legacy;
 mod quantity;
 mod readers;
 mod resolution;
@@ -21,7 +20,6 @@ pub use entry::{
     Statistics,
 };
 pub use key::{MetricKey, measured};
-pub use legacy::{FORMER_COLUMNS, FormerColumn, FormerRow, former_report};
 pub use quantity::{Quantity, Unit};
 pub use resolution::{Resolved, resolve};
 pub use table::{GROUPS, Group};
@@ -47,11 +45,7 @@ mod tests {
         for metric in metrics() {
             let fixed = metric.static_key.filter(|key| *key != metric.key);
             let all = [Some(metric.key), fixed];
-            for name in all
-                .into_iter()
-                .flatten()
-                .chain(metric.formerly.iter().copied())
-            {
+            for name in all.into_iter().flatten() {
                 assert!(names.insert(name), "{name} is the name of two metrics");
             }
         }

@@ -6,15 +6,20 @@ use needlebench_evaluation::compare::{
 use needlebench_evaluation::{Compared, StoredReport, Threshold};
 use serde_json::{Value, json};
 
-/// A report of an older version: one goal, two configurations, few metrics.
+/// A report: one goal, two configurations, few metrics.
 fn report() -> Value {
     let configuration = |label: &str, status: &str, clearance_m: f64| {
         json!({
             "label": label,
             "status": status,
             "rejections": [],
-            "engines": {"rapier": {"tip_position_error_m": 1e-4}},
-            "clearance": {"robot_phantom": {"minimum_m": clearance_m}, "minimum_m": clearance_m},
+            "engines": {"rapier": {}},
+            "metrics": {
+                "tip_error": 1e-4,
+                "tip_error_rapier": 1e-4,
+                "clearance_attained": clearance_m,
+                "arm_to_skin_attained": clearance_m,
+            },
         })
     };
     json!({
@@ -61,8 +66,8 @@ fn first<'a>(found: &'a Comparison, key: &str) -> &'a MetricComparison {
     metrics.find(|metric| metric.metric == key).unwrap()
 }
 
-/// The report as this version writes it: with metrics by their keys.
-fn with_keys(metrics: &Value) -> Value {
+/// The report with other metrics in each configuration.
+fn with_metrics(metrics: &Value) -> Value {
     let mut made = report();
     let list = made.pointer_mut("/goals/0/configurations").unwrap();
     for each in list.as_array_mut().unwrap() {
@@ -78,7 +83,7 @@ fn with(report: &Value, pointer: &str, value: Value) -> Value {
     changed
 }
 
-const CLEARANCE: &str = "/goals/0/configurations/0/clearance/robot_phantom/minimum_m";
+const CLEARANCE: &str = "/goals/0/configurations/0/metrics/clearance_attained";
 const STATUS: &str = "/goals/0/configurations/0/status";
 
 #[test]
@@ -96,7 +101,6 @@ fn result_is_the_same_as_itself() {
                 "tip_error",
                 "tip_error_rapier",
                 "clearance_attained",
-                "least_clearance_attained",
                 "arm_to_skin_attained"
             ]
         );
@@ -123,19 +127,16 @@ fn loss_fails_beyond_its_threshold_and_no_sooner() {
     let found = compared(&report(), &worse, &limits(&[("clearance", "1mm")]));
     let failure = &found.failures[0];
     assert_eq!(failure.label.as_deref(), Some("Right-Up-Fold"));
-    // The older version knew no proven bound here.
+    // No bound was proven.
     assert_eq!(failure.metric.as_deref(), Some("clearance_attained"));
     assert_eq!(
         failure.detail,
         "clearance, nearest: 20.0 mm to 18.0 mm, worse by 2 mm, allowed 1mm"
     );
-    let said = |part: &str| found.notes.iter().any(|note| note.contains(part));
-    assert!(
-        said("threshold clearance: `clearance` was not measured: compared by `clearance_attained`"),
-        "{:?}",
-        found.notes
-    );
-    assert!(said("a is of an older version"), "{:?}", found.notes);
+    assert_eq!(found.notes.len(), 1, "{:?}", found.notes);
+    let note =
+        "threshold clearance: `clearance` was not measured: compared by `clearance_attained`";
+    assert!(found.notes[0].starts_with(note), "{:?}", found.notes);
     // A gain is no loss.
     assert!(compared(&worse, &report(), &limits(&[("clearance", "0mm")])).pass);
 }
@@ -152,7 +153,7 @@ fn differences_within_the_resolution_are_the_same() {
     let found = compared(&report(), &better, &CompareOptions::default());
     assert_eq!(first(&found, "clearance_attained").outcome, Change::Better);
     // Less of an error is better.
-    let pointer = "/goals/0/configurations/0/engines/rapier/tip_position_error_m";
+    let pointer = "/goals/0/configurations/0/metrics/tip_error";
     let found = compared(
         &report(),
         &with(&report(), pointer, json!(1e-3)),
@@ -209,7 +210,10 @@ fn what_is_missing_in_one_result_is_said() {
 
 #[test]
 fn metric_that_is_no_longer_measured_fails_its_threshold() {
-    let blind = with(&report(), "/goals/0/configurations/0/engines", json!({}));
+    let mut blind = report();
+    let metrics = blind.pointer_mut("/goals/0/configurations/0/metrics");
+    let metrics = metrics.unwrap().as_object_mut().unwrap();
+    metrics.retain(|key, _| !key.starts_with("tip_error"));
     let found = compared(&report(), &blind, &limits(&[("tip_error", "1mm")]));
     let details: Vec<&str> = found
         .failures
@@ -232,9 +236,10 @@ fn metric_that_is_no_longer_measured_fails_its_threshold() {
 }
 
 #[test]
-fn metrics_of_todays_reports_are_read_by_their_keys_alone() {
-    let a = with_keys(&json!({"clearance": 0.02, "clearance_attained": 0.03, "unheard_of": 1.0}));
-    let b = with_keys(&json!({"clearance": 0.01, "clearance_attained": 0.03}));
+fn metrics_are_read_by_their_keys_alone() {
+    let a =
+        with_metrics(&json!({"clearance": 0.02, "clearance_attained": 0.03, "unheard_of": 1.0}));
+    let b = with_metrics(&json!({"clearance": 0.01, "clearance_attained": 0.03}));
     let found = compared(&a, &b, &limits(&[("clearance", "5mm")]));
     assert_eq!(found.notes, Vec::<String>::new());
     assert_eq!(found.failures.len(), 2);
@@ -259,36 +264,14 @@ fn metrics_of_todays_reports_are_read_by_their_keys_alone() {
 fn what_the_first_result_has_is_never_replaced_by_something_else() {
     let both = json!({"clearance": 0.02, "clearance_attained": 0.03});
     let (a, b) = (
-        with_keys(&both),
-        with_keys(&json!({"clearance_attained": 0.03})),
+        with_metrics(&both),
+        with_metrics(&json!({"clearance_attained": 0.03})),
     );
     let found = compared(&a, &b, &limits(&[("clearance", "5mm")]));
     let mut details = found.failures.iter().map(|each| &each.detail);
     let says = details.any(|detail| detail.contains("is no longer measured"));
     assert!(says, "{:?}", found.failures);
     assert_eq!(found.notes, Vec::<String>::new());
-}
-
-#[test]
-fn an_older_report_is_read_by_todays_keys() {
-    let mut older = report();
-    let configuration = older.pointer_mut("/goals/0/configurations/0").unwrap();
-    configuration["budget"] = json!({"total": {"at_target": {"analytic": {"rms_m": 2e-3}}}});
-    configuration["clearance"]["robot_phantom"]["certified_lower_bound_m"] = json!(0.015);
-    configuration["clearance"]["robot_phantom"]["engine"] = json!("rapier");
-    configuration["margins"] = json!({"wrist_sine": 0.3, "elbow_sine": 0.2});
-    let found = compared(&older, &older, &CompareOptions::default());
-    for (key, value) in [
-        ("clearance", 0.015),
-        ("clearance_attained", 0.02),
-        ("arm_to_skin", 0.015),
-        // What was called the tip error where there was a budget.
-        ("tip_rms", 2e-3),
-        ("tip_error", 1e-4),
-        ("singularity_margin", 0.2),
-    ] {
-        assert_eq!(first(&found, key).a, Some(value), "{key}");
-    }
 }
 
 #[test]
@@ -368,6 +351,11 @@ fn text_that_is_no_report_is_refused_with_its_place() {
             "no newer one than 1",
         ),
         ("{\"schema_version\": 1, \"goals\": [{}]}", "goals[0].name"),
+        (
+            "{\"schema_version\": 1, \"goals\": [{\"name\": \"g\", \"configurations\": \
+             [{\"label\": \"Right-Up-Fold\", \"status\": \"ok\"}]}]}",
+            "`goals[0].configurations[0].metrics` is missing",
+        ),
         (
             "{\"schema_version\": 1, \"results\": [{\"scenario\": {\"name\": \"a\"}}, \
              {\"scenario\": {\"name\": \"b\"}}]}",

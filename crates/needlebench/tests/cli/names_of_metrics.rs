@@ -1,11 +1,8 @@
-//! One name is one number, in runs and in studies, of this version and of older ones.
-
-use std::collections::BTreeSet;
+//! One name is one number, in runs and in studies.
 
 use needlebench_evaluation::metric::MetricKey;
-use serde_json::Value;
 
-use crate::support::{Bench, SMALL, with_edit};
+use crate::support::{Bench, SMALL};
 
 const IMPERFECT: &str = "
 [engines]
@@ -75,77 +72,6 @@ fn a_case_and_its_run_have_the_same_number_under_the_same_name() {
 }
 
 #[test]
-fn studies_of_an_older_version_are_compared_by_todays_names() {
-    for (mode, name, said) in [
-        (
-            "static",
-            include_bytes!("former/static.parquet").as_slice(),
-            "`clearance_mm` as `clearance_static_mm`",
-        ),
-        (
-            "planned",
-            include_bytes!("former/planned.parquet").as_slice(),
-            "`certified_clearance_mm` as `clearance_planned_mm`",
-        ),
-        (
-            "dynamic",
-            include_bytes!("former/dynamic.parquet").as_slice(),
-            "`clearance_mm` as `clearance_attained_mm`",
-        ),
-    ] {
-        // The patient who lay there then, whose needle passes a rib.
-        let then = [
-            (
-                "[155.0, -609.5, 0]",
-                "[146.0, -597.5, 0]\nmodel = \"male-p50\"",
-            ),
-            ("top_height_mm = 763.5", "top_height_mm = 739.5"),
-        ];
-        let then = then.iter().fold(SMALL.to_owned(), |text, (from, to)| {
-            with_edit(&text, from, to)
-        });
-        // And what the drives of a UR3 were assumed to be.
-        let more = "[planning.needle_route]\noff = [\"bone\", \"vessel\", \"organ\"]\n[engines]\nrun = [\"rapier\"]\n\
-                    [controller]\nstiffness_nm_rad = [2000, 2000, 2000, 2000, 2000, 2000]\n\
-                    damping_nms_rad = [60, 60, 60, 60, 60, 60]\n\
-                    armature_kgm2 = [0.1, 0.1, 0.1, 0.1, 0.1, 0.1]\n";
-        let bench = Bench::with_scenario(&format!("{then}{more}"));
-        bench.write("former.parquet", name);
-        bench.write("study.toml", study(mode));
-        let arguments = ["study", "study.toml", "--quiet", "--no-page"];
-        bench.run(&arguments).exits_with(0);
-        let now = format!("out/{mode}");
-        let mut arguments = vec!["compare", "former.parquet", &now];
-        for limit in ["clearance=1um", "self_clearance=1um", "tip_error=1um"] {
-            arguments.extend(["--max-loss", limit]);
-        }
-        let answer = bench.run(&arguments).exits_with(0).stdout;
-        assert!(
-            answer.contains("former.parquet is of an older version"),
-            "{answer}"
-        );
-        assert!(answer.contains(said), "{answer}");
-        assert!(answer.contains("the same 2 cases in both"), "{answer}");
-        // Nothing has changed but the names.
-        let found = bench.run(&[&arguments[..], &["--json"]].concat()).json();
-        let differences = found["paired"]["differences"].as_array().unwrap();
-        assert!(differences.len() > 8, "{differences:#?}");
-        for each in differences {
-            let mean = each["mean"].as_f64().unwrap();
-            assert!(mean.abs() < 1e-4, "{each:#}");
-        }
-        for (threshold, family) in [
-            ("clearance=1um", "clearance"),
-            ("self_clearance=1um", "self_clearance"),
-        ] {
-            let is_itself = mode == "dynamic" && family == "clearance";
-            let note = format!("threshold {family}: `{family}` was not measured");
-            assert_eq!(answer.contains(&note), !is_itself, "{threshold} {answer}");
-        }
-    }
-}
-
-#[test]
 fn a_name_that_static_studies_lack_is_answered_by_their_own_and_said() {
     let bench = Bench::with_scenario(SMALL);
     bench.write("study.toml", study("static"));
@@ -164,64 +90,6 @@ fn a_name_that_static_studies_lack_is_answered_by_their_own_and_said() {
     // Whoever says more says exactly what is meant.
     let answer = compare("clearance_attained@5=1mm").exits_with(1).stdout;
     assert!(answer.contains("neither study has values"), "{answer}");
-    let answer = compare("certified_clearance=1mm").exits_with(0).stdout;
-    assert!(
-        answer.contains("note: `certified_clearance` is called `clearance` now"),
-        "{answer}"
-    );
-}
-
-#[test]
-fn a_report_without_keys_has_the_numbers_of_one_with_them() {
-    let bench = Bench::with_scenario(SMALL);
-    let report = bench.run(&["run", "s.toml", "--engine", "rapier", "--json"]);
-    let report = report.exits_with(0).stdout;
-    bench.write("now.json", &report);
-    let mut former: Value = serde_json::from_str(&report).unwrap();
-    for each in former["goals"][0]["configurations"].as_array_mut().unwrap() {
-        each.as_object_mut().unwrap().remove("metrics");
-    }
-    bench.write("former.json", former.to_string());
-    let found = bench.run(&["compare", "former.json", "now.json", "--json"]);
-    let found = found.exits_with(0).json();
-    assert!(
-        found["notes"][0]
-            .as_str()
-            .unwrap()
-            .contains("former.json is of an older version")
-    );
-    let mut known = BTreeSet::new();
-    for each in found["goals"][0]["configurations"].as_array().unwrap() {
-        for metric in each["metrics"].as_array().unwrap() {
-            let name = metric["metric"].as_str().unwrap();
-            if metric["a"].is_null() {
-                // What older versions did not measure.
-                assert_eq!(metric["outcome"], "new", "{metric:#}");
-            } else {
-                assert_eq!(metric["a"], metric["b"], "{metric:#}");
-                known.insert(name.to_owned());
-            }
-        }
-    }
-    for name in [
-        "clearance",
-        "clearance_attained",
-        "arm_to_skin",
-        "least_clearance",
-        "needle_corridor",
-        "needle_route",
-        "tip_error",
-        "tip_error_rapier",
-        "depth_error",
-        "motion_time",
-        "peak_torque",
-        "joint_margin",
-        "singularity_margin",
-        "free_fraction",
-        "q3",
-    ] {
-        assert!(known.contains(name), "{name} is not in {known:?}");
-    }
 }
 
 #[test]

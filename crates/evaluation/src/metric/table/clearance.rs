@@ -175,9 +175,7 @@ pub(super) const CLEARANCE: &[Metric] = {
                 .table(9, "clearance\n(mm)")
                 .summary(2, "Clearance (mm)")
                 .page_side(1, "Clearance"),
-            (Certified, Simulated) => metric
-                .formerly(&["certified_clearance"])
-                .page(12, "Proven clearance"),
+            (Certified, Simulated) => metric.page(12, "Proven clearance"),
             _ => metric,
         };
         ranked(in_case(metric, 0, "clear\nmm"), "clearance_mm")

@@ -270,8 +270,7 @@ pub(super) const SIMULATED: &[Metric] = &[
     .known(Value, ThisDraw, Simulated)
     .better(Less, NEEDLE_RESOLUTION_M)
     .show(Show::SmallLength)
-    .statistics(Statistics::BY_CASE.criterion("max_tip_lateral_mm"))
-    .formerly(&["tip_lateral"]),
+    .statistics(Statistics::BY_CASE.criterion("max_tip_lateral_mm")),
     Metric::new(
         "depth_error",
         "depth error",

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use needlebench_bench::study::FormerResults;
 use needlebench_cell::Finding;
 use needlebench_engine::{ENGINES, engine_names};
 use needlebench_evaluation::metric::MetricKey;
@@ -29,13 +28,8 @@ pub(super) fn case_of_study(path: &Path, case: Option<u64>) -> Result<StoredRepo
             return Err(refused(message, "say which: `--case N`".to_owned()));
         }
     };
-    let former = results.is_former().then(|| FormerResults::new(&results));
-    let table: &dyn Results = match &former {
-        Some(former) => former,
-        None => &results,
-    };
     let mut found = None;
-    let visited = table.visit(&mut |values, result| {
+    let visited = results.visit(&mut |values, result| {
         if result.case == case {
             found = Some((values[0], result.rows.clone()));
         }
@@ -47,9 +41,9 @@ pub(super) fn case_of_study(path: &Path, case: Option<u64>) -> Result<StoredRepo
         return Err(refused(message, hint));
     };
     let name = format!("{source}, case {case}");
-    let goal = goal_name(table, goal);
+    let goal = goal_name(&results, goal);
     let engines = engine_names(ENGINES);
-    let columns = table.columns().iter();
+    let columns = results.columns().iter();
     let keys: Vec<Option<MetricKey>> = columns
         .map(|column| MetricKey::named(&column.key, &engines))
         .collect();
@@ -64,7 +58,7 @@ pub(super) fn case_of_study(path: &Path, case: Option<u64>) -> Result<StoredRepo
 }
 
 /// The goal is the first factor.
-fn goal_name(results: &dyn Results, value: FactorValue) -> String {
+fn goal_name(results: &ParquetResults, value: FactorValue) -> String {
     let goal = &results.factors()[0];
     match (&goal.kind, value) {
         (FactorKind::Levels(levels), FactorValue::Level(level)) => levels[level].label.clone(),

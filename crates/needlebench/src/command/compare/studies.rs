@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use needlebench_bench::study::FormerResults;
 use needlebench_cell::Finding;
 use needlebench_evaluation::metric::resolve;
 use needlebench_evaluation::{Compared, Loss, Rate, Subject, Threshold};
@@ -93,16 +92,11 @@ fn compared(
     prepared: &Prepared,
 ) -> Result<StudyComparison, ResultsError> {
     let names = [&arguments.a, &arguments.b].map(|path| shown(path));
-    let [a, b] = &prepared.results;
-    let former = [a, b].map(|results| results.is_former().then(|| FormerResults::new(results)));
     let side = |at: usize| ComparedStudy {
         source: &names[at],
         name: prepared.results[at].study_name(),
         study_id: prepared.results[at].study_id(),
-        results: match &former[at] {
-            Some(former) => former,
-            None => &prepared.results[at],
-        },
+        results: &prepared.results[at],
     };
     let given = &prepared.given.thresholds;
     let quantiles: Vec<f64> = given
@@ -113,14 +107,9 @@ fn compared(
         })
         .collect();
     let pair = StudyPair::read(side(0), side(1), &quantiles)?;
-    let mut notes: Vec<String> = former
-        .iter()
-        .zip(&names)
-        .filter_map(|(former, name)| Some(former.as_ref()?.note(name)))
-        .collect();
+    let mut notes = Vec::new();
     let mut thresholds = Vec::new();
     for threshold in given {
-        notes.extend(threshold.note.clone());
         let (of_study, note) = on_columns(threshold, &pair);
         notes.extend(note);
         thresholds.push(of_study);
