@@ -18,9 +18,7 @@ pub struct Factor {
     pub unit: String,
     /// Whether it is ours to choose.
     pub role: Role,
-    /// Whether its values are a sample: drawn by the sampling, or seeds of draws. A continuum always is;
-    /// tables of older versions do not say it of levels.
-    #[serde(default)]
+    /// Whether its values are a sample: drawn by the sampling, or seeds of draws. A continuum always is.
     pub sampled: bool,
     /// Its values.
     pub kind: FactorKind,

@@ -29,30 +29,6 @@ use crate::{
     CaseResult, Factor, FactorKind, FactorValue, MetricColumn, Outcome, Results, ResultsError,
 };
 
-/// Version of tables whose columns have no keys.
-const FORMER_VERSION: u32 = 1;
-/// Version of tables without a sum of the whole file.
-const UNSEALED_VERSION: u32 = 2;
-
-/// Columns beside factors and metrics: case, configuration, outcome, detail.
-const FIXED_COLUMNS: usize = 4;
-
-/// A column of which nothing but its name is known.
-fn unknown(name: &str) -> MetricColumn {
-    MetricColumn {
-        name: name.to_owned(),
-        key: name.to_owned(),
-        words: name.to_owned(),
-        description: String::new(),
-        unit: String::new(),
-        more_is_better: None,
-        spread: false,
-        by_case: false,
-        measure: None,
-        criterion: None,
-    }
-}
-
 /// A complete `results.parquet`. Its row groups are read one at a time, each checked against the sum
 /// that was written with it.
 pub struct ParquetResults {
@@ -64,7 +40,6 @@ pub struct ParquetResults {
     provenance: serde_json::Value,
     factors: Vec<Factor>,
     metrics: Vec<MetricColumn>,
-    is_former: bool,
     columns: Vec<Column>,
     cases: u64,
     checks: Vec<u32>,
@@ -87,26 +62,16 @@ impl ParquetResults {
         let version = get(VERSION_KEY).ok_or_else(|| {
             fail("is a Parquet file, but no results of a study of needlebench".to_owned())
         })?;
-        let is = |known: u32| version == known.to_string();
-        let is_former = is(FORMER_VERSION);
-        if !is(TABLE_VERSION) && !is(UNSEALED_VERSION) && !is_former {
+        if version != TABLE_VERSION.to_string() {
             return Err(fail(format!(
                 "has schema version {version}; this program reads version {TABLE_VERSION}"
             )));
         }
-        match get(SUM_KEY) {
-            Some(stored) => {
-                let whole = seal::is_whole(&file, stored);
-                let whole = whole.map_err(|error| fail(format!("cannot be read: {error}")))?;
-                if !whole {
-                    return Err(fail(format!("is damaged: its SHA-256 is another\n{HEAL}")));
-                }
-            }
-            // Those before had none.
-            None if is(TABLE_VERSION) => {
-                return Err(fail(format!("is damaged: it has no SHA-256\n{HEAL}")));
-            }
-            None => {}
+        let sum =
+            get(SUM_KEY).ok_or_else(|| fail(format!("is damaged: it has no SHA-256\n{HEAL}")))?;
+        let whole = seal::is_whole(&file, sum);
+        if !whole.map_err(|error| fail(format!("cannot be read: {error}")))? {
+            return Err(fail(format!("is damaged: its SHA-256 is another\n{HEAL}")));
         }
         let need =
             |key: &str| get(key).ok_or_else(|| fail(format!("has no {key} in its metadata")));
@@ -118,19 +83,13 @@ impl ParquetResults {
             serde_json::from_str(need(CRC_KEY)?).map_err(|_| garbled(CRC_KEY))?;
         let provenance =
             serde_json::from_str(need(PROVENANCE_KEY)?).map_err(|_| garbled(PROVENANCE_KEY))?;
-        let metrics: Vec<MetricColumn> = if is_former {
-            let fields = file_metadata.schema().get_fields();
-            let metrics = fields.get(factors.len() + FIXED_COLUMNS..).unwrap_or(&[]);
-            metrics.iter().map(|field| unknown(field.name())).collect()
-        } else {
-            serde_json::from_str(need(METRICS_KEY)?).map_err(|_| garbled(METRICS_KEY))?
-        };
+        let metrics: Vec<MetricColumn> =
+            serde_json::from_str(need(METRICS_KEY)?).map_err(|_| garbled(METRICS_KEY))?;
         let results = Self {
             id: need(ID_KEY)?.to_owned(),
             name: need(NAME_KEY)?.to_owned(),
             columns: schema::columns(&factors, &metrics),
             metrics,
-            is_former,
             path: path.to_owned(),
             provenance,
             factors,
@@ -157,7 +116,6 @@ impl ParquetResults {
             name: manifest.name.clone(),
             columns: schema::columns(&manifest.factors, &manifest.columns),
             metrics: manifest.columns.clone(),
-            is_former: false,
             path: path.to_owned(),
             provenance: manifest.provenance.clone(),
             factors: manifest.factors.clone(),
@@ -201,11 +159,6 @@ impl ParquetResults {
     /// Where the results come from.
     pub fn provenance(&self) -> &serde_json::Value {
         &self.provenance
-    }
-
-    /// Whether it was written before columns had keys: their names are all that is known of them.
-    pub fn is_former(&self) -> bool {
-        self.is_former
     }
 
     pub(crate) fn table_columns(&self) -> &[Column] {

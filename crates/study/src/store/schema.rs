@@ -32,7 +32,7 @@ pub(crate) const CRC_KEY: &str = "needlebench.row_group_crc32";
 /// Key of the metadata: SHA-256 of the whole file.
 pub(crate) const SUM_KEY: &str = "needlebench.sha256";
 
-/// Version of tables, which from 3 on have a sum of the whole file.
+/// Version of tables.
 pub(crate) const TABLE_VERSION: u32 = 3;
 
 /// What a column holds.
