@@ -28,7 +28,7 @@
 //! CRC, so no record of another study is ever taken for one of this.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Write};
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 
@@ -306,12 +306,7 @@ pub(crate) fn scan_blocks(
     let failed = || StudyError::io("read", path);
     let length = file.metadata().map_err(failed())?.len();
     let key = Key::of(manifest, shard);
-    let mut source = Source {
-        file: BufReader::with_capacity(1 << 16, file),
-        length,
-        position: 0,
-        payload: Vec::new(),
-    };
+    let mut source = Source::new(file, length);
     let header = check_header(&mut source, &key, path)?;
     let mut extent = Extent {
         damages: Vec::new(),
@@ -412,6 +407,7 @@ fn check_header(source: &mut Source, key: &Key, path: &Path) -> Result<HeaderSta
 }
 
 /// A journal being read.
+#[derive(Debug)]
 struct Source {
     file: BufReader<File>,
     length: u64,
@@ -420,6 +416,15 @@ struct Source {
 }
 
 impl Source {
+    fn new(file: File, length: u64) -> Self {
+        Self {
+            file: BufReader::with_capacity(1 << 16, file),
+            length,
+            position: 0,
+            payload: Vec::new(),
+        }
+    }
+
     /// Reads bytes that are there.
     fn read(&mut self, at: u64, bytes: &mut [u8]) -> io::Result<()> {
         let step = i64::try_from(at).and_then(|at| Ok(at - i64::try_from(self.position)?));
@@ -429,7 +434,7 @@ impl Source {
         Ok(())
     }
 
-    /// The record at an offset, if there is a whole and sound one.
+    /// The record at an offset, if there is a whole and sound one; its payload is kept until the next is read.
     fn record(&mut self, at: u64, key: &Key) -> io::Result<Option<Record>> {
         let mut header = [0; RECORD_HEADER];
         let Some(left) = self.length.checked_sub(at + RECORD_HEADER as u64) else {
@@ -488,7 +493,7 @@ pub(crate) struct CheckedJournal {
 #[derive(Debug)]
 pub(crate) struct BlockReader {
     path: PathBuf,
-    file: File,
+    source: Source,
     key: Key,
 }
 
@@ -499,16 +504,17 @@ impl BlockReader {
     pub(crate) fn open(journal: &CheckedJournal, manifest: &Manifest) -> Result<Self, StudyError> {
         let path = journal.folder.join(JOURNAL_FILE);
         let file = File::open(&path).map_err(StudyError::io("open", &path))?;
-        if let Some(length) = journal.length {
+        if journal.length.is_some() {
             lock_to_read(&file, &journal.folder)?;
-            let now = file.metadata().map_err(StudyError::io("read", &path))?;
-            if now.len() != length {
-                let change = format!("has grown from {length} to {} bytes", now.len());
-                return Err(StudyError::Changed { path, change });
-            }
+        }
+        let now = file.metadata().map_err(StudyError::io("read", &path))?;
+        let now = now.len();
+        if let Some(length) = journal.length.filter(|length| *length != now) {
+            let change = format!("has grown from {length} to {now} bytes");
+            return Err(StudyError::Changed { path, change });
         }
         Ok(Self {
-            file,
+            source: Source::new(file, now),
             path,
             key: Key::of(manifest, journal.shard),
         })
@@ -520,23 +526,12 @@ impl BlockReader {
         place: NonZeroU64,
         manifest: &Manifest,
     ) -> Result<Columns, StudyError> {
-        let mut header = [0; RECORD_HEADER];
-        let mut payload = Vec::new();
-        let mut read = || -> io::Result<Option<Record>> {
-            self.file.seek(SeekFrom::Start(place.get()))?;
-            self.file.read_exact(&mut header)?;
-            let Some(record) = Record::parse(&header, &self.key) else {
-                return Ok(None);
-            };
-            payload.resize(record.length as usize, 0);
-            self.file.read_exact(&mut payload)?;
-            Ok(Some(record).filter(|record| crc32fast::hash(&payload) == record.crc))
-        };
-        let record = read().map_err(StudyError::io("read", &self.path))?;
+        let record = self.source.record(place.get(), &self.key);
         record
+            .map_err(StudyError::io("read", &self.path))?
             .and_then(|record| {
                 codec::unpack(
-                    &payload,
+                    &self.source.payload,
                     record.raw_length as usize,
                     record.cases as usize,
                     &manifest.factors,

@@ -1,4 +1,6 @@
 //! Work in parallel, results in order.
+//!
+//! Not through `rayon`: it collects all results, and these are written while others are made, few of which may wait.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};

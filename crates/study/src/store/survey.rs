@@ -1,11 +1,10 @@
 //! How far the shards of a study are, while they are computed or afterwards.
 
 use std::collections::BTreeMap;
-use std::fs::TryLockError;
 use std::path::PathBuf;
 
 use super::error::{LOCK, StudyError};
-use super::journal::{JOURNAL_FILE, open, scan_blocks};
+use super::journal::{JOURNAL_FILE, lock_to_read, open, scan_blocks};
 use super::manifest::{Manifest, Shard, Status};
 use super::ordered::in_order;
 use super::shards::{EmptyFolder, ShardFolder, shard_folders};
@@ -185,13 +184,13 @@ fn look(
     }
     let file = open(&path)?;
     // For this moment alone: who wants to write tries again.
-    let is_written = match file.try_lock_shared() {
+    let is_written = match lock_to_read(&file, &folder.path) {
         Ok(()) => {
             file.unlock().map_err(StudyError::io(LOCK, &path))?;
             false
         }
-        Err(TryLockError::WouldBlock) => true,
-        Err(TryLockError::Error(error)) => return Err(StudyError::io(LOCK, &path)(error)),
+        Err(StudyError::Locked { .. }) => true,
+        Err(error) => return Err(error),
     };
     if folder.status == Status::Complete && !is_written {
         return Ok((ShardState::Done, None));
