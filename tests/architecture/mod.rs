@@ -11,8 +11,9 @@ use serde_json::Value;
 /// Every crate under `crates/`, the Python package, and the crates of the workspace that it may depend on.
 ///
 /// Data flows one way: a new edge is a decision, and belongs here first.
-const LAYERS: [(&str, &[&str]); 23] = [
+const LAYERS: [(&str, &[&str]); 24] = [
     ("elementary", &[]),
+    ("parallel", &[]),
     ("kinematics", &[]),
     ("geometry", &["kinematics"]),
     ("cell", &["geometry", "kinematics"]),
@@ -20,13 +21,16 @@ const LAYERS: [(&str, &[&str]); 23] = [
     ("live", &["clearance", "cell", "geometry", "kinematics"]),
     ("planning", &["clearance", "cell", "geometry", "kinematics"]),
     ("engine", &["cell", "geometry", "kinematics"]),
-    ("render", &["geometry", "kinematics"]),
+    ("render", &["geometry", "kinematics", "parallel"]),
     ("uncertainty", &["engine", "cell", "kinematics"]),
     ("study", &["cell", "kinematics"]),
     ("ros", &[]),
     ("recorded", &["ros", "cell", "kinematics"]),
-    ("imaging", &["geometry", "kinematics"]),
-    ("routing", &["imaging", "cell", "geometry", "kinematics"]),
+    ("imaging", &["geometry", "kinematics", "parallel"]),
+    (
+        "routing",
+        &["imaging", "cell", "geometry", "kinematics", "parallel"],
+    ),
     (
         "evaluation",
         &[
@@ -54,6 +58,7 @@ const LAYERS: [(&str, &[&str]); 23] = [
             "cell",
             "geometry",
             "kinematics",
+            "parallel",
         ],
     ),
     (
@@ -88,6 +93,7 @@ const LAYERS: [(&str, &[&str]); 23] = [
             "cell",
             "geometry",
             "kinematics",
+            "parallel",
         ],
     ),
     (
@@ -154,7 +160,8 @@ const LAYERS: [(&str, &[&str]); 23] = [
 ];
 
 /// Dependencies that one crate alone has, hidden behind its own types.
-const OWNERS: [(&str, &str); 19] = [
+const OWNERS: [(&str, &str); 20] = [
+    ("rayon", "parallel"),
     ("pyo3", "python"),
     ("numpy", "python"),
     ("rapier3d-f64", "engine"),

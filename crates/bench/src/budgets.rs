@@ -1,12 +1,12 @@
 //! The fifth stage: error budgets.
 
 use needlebench_cell::Expected;
+use needlebench_parallel::in_parallel;
 use needlebench_planning::{ConfigurationPlan, GoalPlan};
 use needlebench_uncertainty::budget::{
     BudgetCase, ErrorBudget, Moments, PointBudget, Samples, SourceBudget, budget, total_budget,
 };
 
-use crate::parallel::in_parallel;
 use crate::setup::Setup;
 
 /// Error budgets by goal and configuration, for every configuration with a motion; with what went

@@ -8,10 +8,10 @@ use needlebench_engine::Servo;
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::ik::{Configuration, Kinematics};
 use needlebench_kinematics::trajectory::JointTrajectory;
+use needlebench_parallel::in_parallel;
 use needlebench_planning::{ConfigurationPlan, Member, Planner};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
 
-use crate::parallel::in_parallel;
 use crate::preview::{GoalPreview, preview_of};
 use crate::servo_of;
 

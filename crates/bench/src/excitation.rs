@@ -19,12 +19,12 @@ use needlebench_evaluation::report::{ClearanceReport, EngineFailure, Report};
 use needlebench_evaluation::{
     EngineDifference, certified_clearance, pairs, recorded_clearance, sample_indices,
 };
+use needlebench_parallel::in_parallel;
 use needlebench_planning::excitation::{ExcitationError, ExcitationPlan};
 
 use crate::assemble::notes;
 use crate::control::Control;
 use crate::iso9283::{empty_report, unplanned};
-use crate::parallel::in_parallel;
 use crate::rtde::{RtdeLog, RtdeSource};
 use crate::scenario_run::{ExcitationRun, RealArm, RunError, ScenarioRun};
 use crate::setup::Setup;

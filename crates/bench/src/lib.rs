@@ -24,7 +24,6 @@ mod events;
 pub mod excitation;
 mod iso9283;
 pub mod motion;
-mod parallel;
 mod plan;
 pub mod preview;
 pub mod progress;

@@ -1,9 +1,9 @@
 //! The first stage: plans of all goals, and which motions are worth a simulation.
 
+use needlebench_parallel::in_parallel;
 use needlebench_planning::{ConfigurationPlan, GoalPlan, Rule};
 
 use crate::control::Control;
-use crate::parallel::in_parallel;
 use crate::setup::Setup;
 
 /// One motion to simulate.

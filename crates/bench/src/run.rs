@@ -11,6 +11,7 @@ use needlebench_clearance::ClearanceModel;
 use needlebench_engine::{Engine, EngineIdentity, EnginePool, engine_names};
 use needlebench_evaluation::report::EngineFailure;
 use needlebench_evaluation::trace::trace;
+use needlebench_parallel::in_parallel;
 use needlebench_planning::GoalPlan;
 
 use crate::adjudication::Adjudicator;
@@ -20,7 +21,6 @@ use crate::control::Control;
 use crate::events::{self, EventRun};
 use crate::excitation;
 use crate::iso9283;
-use crate::parallel::in_parallel;
 use crate::plan::{Job, jobs, plan_goals};
 use crate::progress::{Progress, Silent};
 use crate::rtde::RtdeSource;

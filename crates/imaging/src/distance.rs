@@ -6,12 +6,13 @@
 //! (Felzenszwalb and Huttenlocher, *Distance transforms of sampled functions*, Theory of Computing 8, 2012). Counts and
 //! results share one array of 16 bits, so that a field takes two bytes a voxel of its box.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::Point3;
 
 use crate::ImagingError;
 use crate::grid::VoxelGrid;
+use crate::in_slices::in_slices;
 use crate::mask::{IndexBox, Mask};
 use crate::spacing::{orthogonal, whole};
 
@@ -278,32 +279,18 @@ fn distances(
     spacing_m: [f64; 3],
     options: &DistanceOptions<'_>,
 ) -> Result<Vec<i16>, ImagingError> {
-    let [nx, ny, nz] = mask.size();
+    let [nx, ny, _] = mask.size();
     let far = whole(options.cap_m / spacing_m[2]).min(i16::MAX as usize - 2) + 2;
     let far = i16::try_from(far).unwrap_or(i16::MAX);
     let mut steps = counts_along_k(mask, far);
-    let slices_each = nz.div_ceil(options.threads.max(1));
-    let part = |slices: &mut [i16]| -> Result<(), ImagingError> {
-        let mut work = InSlice::new([nx, ny], to, spacing_m, options.cap_m);
-        for slice in slices.chunks_exact_mut(nx * ny) {
-            if options.cancel.load(Ordering::Relaxed) {
-                return Err(ImagingError::Interrupted);
-            }
-            work.finish(slice);
-        }
-        Ok(())
-    };
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = steps
-            .chunks_mut(nx * ny * slices_each)
-            .map(|slices| scope.spawn(|| part(slices)))
-            .collect();
-        threads.into_iter().try_for_each(|thread| {
-            thread
-                .join()
-                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        })
-    })?;
+    in_slices(
+        &mut steps,
+        nx * ny,
+        options.threads,
+        options.cancel,
+        || InSlice::new([nx, ny], to, spacing_m, options.cap_m),
+        |own, _, slice| own.finish(slice),
+    )?;
     Ok(steps)
 }
 

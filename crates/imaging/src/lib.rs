@@ -11,6 +11,7 @@ mod distance;
 mod error;
 mod grid;
 mod histogram;
+mod in_slices;
 pub mod markers;
 mod mask;
 mod morphology;

@@ -1,12 +1,12 @@
 //! From a volume to surfaces, in one call.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use nalgebra::Point3;
 use needlebench_geometry::TriangleMesh;
 use needlebench_geometry::mesh::{SurfaceIndex, check_closed, volume_m3};
+use needlebench_parallel::in_parallel;
 use serde::Serialize;
 
 use crate::error::{ImagingError, Remark};
@@ -516,9 +516,6 @@ struct Made {
     size: Option<LesionSize>,
 }
 
-/// Where a thread leaves what became of a surface: none while it is not made.
-type Slot = Mutex<Option<Result<Option<Made>, ImagingError>>>;
-
 /// All surfaces, on so many threads; the largest first.
 fn make_all(
     volume: &Volume,
@@ -527,30 +524,15 @@ fn make_all(
     cancel: &AtomicBool,
     progress: Progress<'_>,
 ) -> Result<Vec<Option<Made>>, ImagingError> {
-    let next = AtomicUsize::new(0);
-    let done: Vec<Slot> = jobs.iter().map(|_| Mutex::new(None)).collect();
-    let work = || {
-        while let Some((job, slot)) = {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            jobs.get(at).zip(done.get(at))
-        } {
-            let made = make(volume, job, cancel);
-            let share = next.load(Ordering::Relaxed).min(jobs.len()) as f64 / jobs.len() as f64;
-            progress(&format!("surface of {}", job.name), 0.4 + 0.5 * share);
-            if let Ok(mut slot) = slot.lock() {
-                *slot = Some(made);
-            }
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..threads.min(jobs.len()) {
-            scope.spawn(work);
-        }
-        work();
+    let begun = AtomicUsize::new(0);
+    let made = in_parallel(threads, jobs, |job| {
+        begun.fetch_add(1, Ordering::Relaxed);
+        let made = make(volume, job, cancel);
+        let share = begun.load(Ordering::Relaxed) as f64 / jobs.len() as f64;
+        progress(&format!("surface of {}", job.name), 0.4 + 0.5 * share);
+        made
     });
-    done.into_iter()
-        .map(|slot| slot.into_inner().ok().flatten().unwrap_or(Ok(None)))
-        .collect()
+    made.into_iter().collect()
 }
 
 fn make(volume: &Volume, job: &Job<'_>, cancel: &AtomicBool) -> Result<Option<Made>, ImagingError> {

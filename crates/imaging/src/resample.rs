@@ -1,9 +1,10 @@
 //! Volumes on a grid whose axes are those of the patient.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::in_slices::in_slices;
 use crate::{AIR_HU, ImagingError, NotAGrid, Orientation, Remark, Volume, VoxelGrid};
 
 /// Deviation of a step from an axis, as a share of it, up to which axes are only turned round or in another order:
@@ -146,29 +147,12 @@ fn interpolated(
     hu.resize(count, AIR_HU);
     let [columns, rows, _] = grid.size();
     let plane = columns * rows;
-    let threads = threads.max(1);
-    let mut parts: Vec<Vec<(usize, &mut [i16])>> = (0..threads).map(|_| Vec::new()).collect();
-    for (k, out) in hu.chunks_mut(plane).enumerate() {
-        parts[k % threads].push((k, out));
-    }
-    let work = |part: Vec<(usize, &mut [i16])>| {
-        for (k, out) in part {
-            if cancel.load(Ordering::Relaxed) {
-                return;
-            }
-            for (j, row) in out.chunks_mut(columns).enumerate() {
-                fill_row(volume, grid, [j, k], row);
-            }
+    let fill = |(): &mut (), k: usize, slice: &mut [i16]| {
+        for (j, row) in slice.chunks_mut(columns).enumerate() {
+            fill_row(volume, grid, [j, k], row);
         }
     };
-    std::thread::scope(|scope| {
-        for part in parts {
-            scope.spawn(|| work(part));
-        }
-    });
-    if cancel.load(Ordering::Relaxed) {
-        return Err(ImagingError::Interrupted);
-    }
+    in_slices(&mut hu, plane, threads, cancel, || (), fill)?;
     Ok(hu)
 }
 

@@ -1,7 +1,8 @@
 //! The renderer: visibility first, then light for what is seen.
 
 use std::num::NonZero;
-use std::ops::RangeFrom;
+
+use needlebench_parallel::in_parts;
 
 use crate::camera::{Camera, View};
 use crate::color::{self, Encoder, Light};
@@ -159,64 +160,57 @@ impl Frame {
         let mut pixels = vec![[0; 3]; view.width_px * view.height_px];
         // Pixels do not depend on each other, so the number of threads shows in the time only.
         let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
-        let band_rows = view.height_px.div_ceil(threads);
-        std::thread::scope(|scope| {
-            for (band, pixels) in pixels.chunks_mut(band_rows * view.width_px).enumerate() {
-                scope.spawn(move || {
-                    let rows = band * band_rows..;
-                    self.resolve_rows(view, lamps, floor, encoder, rows, pixels);
-                });
-            }
-        });
+        let row = |(): &mut (), y: usize, row: &mut [[u8; 3]]| {
+            self.resolve_row(view, lamps, floor, encoder, y, row);
+        };
+        in_parts(threads, &mut pixels, view.width_px, || (), row);
         pixels
     }
 
-    fn resolve_rows(
+    fn resolve_row(
         &self,
         view: &View,
         lamps: &Lamps,
         floor: Option<&FloorView<'_>>,
         encoder: &Encoder,
-        rows: RangeFrom<usize>,
-        pixels: &mut [[u8; 3]],
+        y: usize,
+        row: &mut [[u8; 3]],
     ) {
         let background = BACKGROUND.map(color::light);
         let mut pixel = Pixel::default();
-        for (y, row) in rows.zip(pixels.chunks_exact_mut(view.width_px)) {
-            let along = (y as f32 + 0.5) / view.height_px as f32;
-            let behind = background[0] * (1.0 - along) + background[1] * along;
-            for (x, shown_pixel) in row.iter_mut().enumerate() {
-                let samples = self.samples(x, y);
-                let nearest = samples.map(|sample| self.nearest[sample]);
-                let farthest = nearest
-                    .iter()
-                    .map(|near| near.nearness)
-                    .fold(f32::INFINITY, f32::min);
-                let center_px = [x as f64 + 0.5, y as f64 + 0.5];
-                let looked = Looked {
-                    frame: self,
-                    view,
-                    lamps,
-                    behind,
-                    floor: floor.and_then(|floor| floor.look(center_px, farthest)),
-                };
-                pixel.lit.clear();
-                let outlines = self.outlines(&samples, x + 1 == view.width_px);
-                let alike = nearest
-                    .iter()
-                    .all(|near| near.primitive == nearest[0].primitive)
-                    && outlines == [false; SAMPLES]
-                    && self.same_fragments(&samples);
-                let shown = if alike { 1 } else { SAMPLES };
-                let sum: Light = (0..shown)
-                    .map(|place| {
-                        let at_px = sample_place(x, y, place);
-                        looked.light(samples[place], at_px, outlines[place], &mut pixel)
-                    })
-                    .sum();
-                let light = sum / shown as f32;
-                *shown_pixel = encoder.encode(&light);
-            }
+        let along = (y as f32 + 0.5) / view.height_px as f32;
+        let behind = background[0] * (1.0 - along) + background[1] * along;
+        for (x, shown_pixel) in row.iter_mut().enumerate() {
+            let samples = self.samples(x, y);
+            let nearest = samples.map(|sample| self.nearest[sample]);
+            let farthest = nearest
+                .iter()
+                .map(|near| near.nearness)
+                .fold(f32::INFINITY, f32::min);
+            let center_px = [x as f64 + 0.5, y as f64 + 0.5];
+            let looked = Looked {
+                frame: self,
+                view,
+                lamps,
+                behind,
+                floor: floor.and_then(|floor| floor.look(center_px, farthest)),
+            };
+            pixel.lit.clear();
+            let outlines = self.outlines(&samples, x + 1 == view.width_px);
+            let alike = nearest
+                .iter()
+                .all(|near| near.primitive == nearest[0].primitive)
+                && outlines == [false; SAMPLES]
+                && self.same_fragments(&samples);
+            let shown = if alike { 1 } else { SAMPLES };
+            let sum: Light = (0..shown)
+                .map(|place| {
+                    let at_px = sample_place(x, y, place);
+                    looked.light(samples[place], at_px, outlines[place], &mut pixel)
+                })
+                .sum();
+            let light = sum / shown as f32;
+            *shown_pixel = encoder.encode(&light);
         }
     }
 

@@ -3,11 +3,15 @@
 use std::cmp::Ordering;
 
 use nalgebra::UnitVector3;
+use needlebench_parallel::in_parallel;
 
 use crate::anatomy::{Anatomy, Exit, LungPassage, Obstacle, Ray, angle_rad};
 use crate::directions::{around, evenly};
 use crate::risk::Risk;
 use crate::rules::{Refusal, RouteRule, RouteRules};
+
+/// Neighbouring directions that one thread judges before it takes others.
+const TOGETHER: usize = 64;
 
 /// A direction that harms nothing, before the robot is asked.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,28 +96,14 @@ pub fn search(
 ) -> Searched {
     let directions: Vec<UnitVector3<f64>> = evenly(count).collect();
     let order = neighbours_together(&directions);
-    let each = directions.len().div_ceil(threads.max(1)).max(1);
-    let mut judged: Vec<(usize, Candidate)> = std::thread::scope(|scope| {
-        let directions = &directions;
-        let parts: Vec<_> = order
-            .chunks(each)
-            .map(|part| {
-                scope.spawn(move || {
-                    let go_on = part.iter().take_while(|_| !stop());
-                    go_on
-                        .map(|&index| (index, judge(anatomy, rules, &directions[index])))
-                        .collect::<Vec<_>>()
-                })
-            })
-            .collect();
-        parts
-            .into_iter()
-            .flat_map(|part| {
-                part.join()
-                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-            })
-            .collect()
+    let parts: Vec<&[usize]> = order.chunks(TOGETHER).collect();
+    let judged = in_parallel(threads, &parts, |part| {
+        let go_on = part.iter().take_while(|_| !stop());
+        go_on
+            .map(|&index| (index, judge(anatomy, rules, &directions[index])))
+            .collect::<Vec<_>>()
     });
+    let mut judged: Vec<(usize, Candidate)> = judged.into_iter().flatten().collect();
     judged.sort_by_key(|(index, _)| *index);
     Searched {
         candidates: judged.into_iter().map(|(_, candidate)| candidate).collect(),

@@ -8,11 +8,10 @@ use needlebench_cell::{Goal, ResolvedScenario};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::NotUrGeometry;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_parallel::in_parallel;
 use needlebench_planning::{Aim, Family, Member, Planner, route_rejection};
 
 pub use report::{AtlasReport, BranchReport, GoalAtlasReport};
-
-use crate::parallel::in_parallel;
 
 /// All members of a goal's eight families on a grid of rolls, and their ranges.
 #[derive(Debug)]

@@ -5,10 +5,10 @@ use needlebench_cell::scenario::{PressSection, StopSection};
 use needlebench_engine::Brakes;
 use needlebench_evaluation::events::stopping_envelope;
 use needlebench_kinematics::trajectory::{JointTrajectory, Phase};
+use needlebench_parallel::in_parallel;
 use needlebench_planning::{GoalPlan, PressError, PressPlan, stage_press};
 
 use super::{EventRun, StagedStop};
-use crate::parallel::in_parallel;
 use crate::plan::{Job, working};
 use crate::real_cell::RealCell;
 use crate::setup::Setup;

@@ -17,11 +17,11 @@ use needlebench_evaluation::report::{
     CriterionResult, EngineFailure, Report, SCHEMA_VERSION, ScenarioSummary, Verdict,
 };
 use needlebench_evaluation::{EngineDifference, pairs};
+use needlebench_parallel::in_parallel;
 use needlebench_planning::iso9283::{ProtocolError, ProtocolPlan};
 
 use crate::assemble::{assumed, notes};
 use crate::control::Control;
-use crate::parallel::in_parallel;
 use crate::provenance::provenance;
 use crate::scenario_run::{ProtocolRun, RealArm, RunError, ScenarioRun};
 use crate::setup::Setup;

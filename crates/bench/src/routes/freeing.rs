@@ -7,13 +7,13 @@ use needlebench_cell::scenario::GoalSection;
 use needlebench_cell::{Change, KeyPath, Overrides, ResolvedScenario, ScenarioFamily, Setting};
 use needlebench_clearance::ClearanceModel;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_parallel::in_parallel;
 use needlebench_planning::Planner;
 
 use super::RouteTask;
 use super::joint::ROLLS;
 use super::report::{Freed, Freeing, RoutePlan};
 use crate::Control;
-use crate::parallel::in_parallel;
 use crate::suggest::SuggestError;
 
 /// Step of a base or a table that is moved, mm.

@@ -8,6 +8,7 @@ use needlebench_evaluation::first_missed_by_posture;
 use needlebench_evaluation::report::ConfigurationReport;
 use needlebench_evaluation::room::RoomModel;
 use needlebench_kinematics::ik::Configuration;
+use needlebench_parallel::in_parallel;
 use needlebench_planning::{Candidate, Member, Merit, Planner, judge_route};
 use needlebench_routing::{Obstacle, RouteRules};
 use needlebench_uncertainty::budget::{BudgetCase, Moments, analytic_total};
@@ -15,7 +16,6 @@ use serde::Serialize;
 
 use super::{Rounded, RouteTask};
 use crate::Control;
-use crate::parallel::in_parallel;
 use crate::real_cell::servo_of;
 use crate::study::set_clearances;
 use crate::suggest::SuggestError;

@@ -19,6 +19,7 @@ mod report;
 use needlebench_cell::scenario::{GoalSection, RouteSection};
 use needlebench_cell::{Finding, GoalPlacer, ResolvedScenario};
 use needlebench_imaging::ImagingError;
+use needlebench_parallel::in_parallel;
 use needlebench_routing::{
     Anatomy, Route, RouteRules, Searched, SolidAnatomy, VoxelAnatomy, VoxelOptions, angles_rad,
     apart, judge, outwards, refined, search,
@@ -26,7 +27,6 @@ use needlebench_routing::{
 
 use crate::Control;
 use crate::ct::BuiltFolder;
-use crate::parallel::in_parallel;
 use crate::suggest::SuggestError;
 use joint::{Asked, ask};
 

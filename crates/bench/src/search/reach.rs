@@ -1,12 +1,12 @@
 //! A first look at cases: which of them no configuration comes to the needle in.
 
 use needlebench_kinematics::ik::Kinematics;
+use needlebench_parallel::in_parallel;
 use needlebench_planning::out_of_reach_m;
 use needlebench_study::CaseDesign as _;
 use needlebench_study::search::{Generation, GenerationDesign};
 
 use super::PreparedSearch;
-use crate::parallel::in_parallel;
 use crate::study::StudyCase;
 
 /// By candidate and circumstance the most that the margin can be, mm, where no configuration reaches; none

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use needlebench_cell::study::StudyMode;
 use needlebench_kinematics::random::SplitMix64;
+use needlebench_parallel::in_parallel;
 use needlebench_study::statistics::{ChoiceRanking, Gap, ReplannedCase, gaps};
 use needlebench_study::{Outcome, Results, ResultsError};
 use serde::Serialize;
@@ -13,7 +14,6 @@ use super::case::StudyCase;
 use super::planned::planned_rows;
 use super::prepare::PreparedStudy;
 use crate::ct::{LastScan, scanned};
-use crate::parallel::in_parallel;
 use crate::progress::Progress;
 
 /// Keeps the draw of cases apart from that of the samples, which have the same seed.

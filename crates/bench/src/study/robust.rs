@@ -5,10 +5,10 @@ use std::sync::atomic::AtomicBool;
 use needlebench_cell::Finding;
 use needlebench_cell::study::{ResolvedStudy, RobustnessSection};
 use needlebench_kinematics::ik::Configuration;
+use needlebench_parallel::in_parallel;
 use serde::Serialize;
 
 use super::robustness::{Robustness, RobustnessSettings, robustness};
-use crate::parallel::in_parallel;
 use crate::progress::Progress;
 
 /// How far the phantom of the base scenario may move before a configuration breaks.

@@ -17,6 +17,7 @@ use nalgebra::Point3;
 use needlebench_cell::scenario::GoalSection;
 use needlebench_cell::{Goal, GoalPlacer, PlacedPhantom, ResolvedScenario, direction};
 use needlebench_clearance::ClearanceModel;
+use needlebench_parallel::in_parallel;
 use needlebench_planning::{Planner, crossed_fissures, judged_tissues};
 use needlebench_study::Outcome;
 use serde::Serialize;
@@ -24,7 +25,6 @@ use serde::Serialize;
 use super::grid::{around, directions};
 use super::{Refused, SuggestError, counted};
 use crate::control::Control;
-use crate::parallel::in_parallel;
 use crate::preview::{ConfigurationPreview, goal_preview};
 use crate::study::planned_rows;
 

@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use needlebench_cell::{
     Change, ClearanceClass, Finding, KeyPath, ResolvedScenario, ScenarioFamily, Setting,
 };
+use needlebench_parallel::in_parallel;
 use needlebench_study::Outcome;
 use serde::Serialize;
 
@@ -18,7 +19,6 @@ use super::grid::{BasePlace, places};
 use super::{Refused, SuggestError, counted};
 use crate::Runnable;
 use crate::control::Control;
-use crate::parallel::in_parallel;
 use crate::preview::Preview;
 use crate::study::{CaseRow, StaticWorker, planned_rows};
 

@@ -1,11 +1,12 @@
 //! Places that may hold a marker: bumps of the silhouette with about a marker's mass.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::Point3;
 
 use super::bits::{Bits, Groups, Run, disc};
 use super::{DENSE_SHARE, DensePart, MarkerModel, Rejected};
+use crate::in_slices::in_slices;
 use crate::{ImagingError, Volume};
 
 /// Air is below: halfway between it and water.
@@ -113,32 +114,10 @@ impl<'a> Scan<'a> {
         threads: usize,
         cancel: &AtomicBool,
     ) -> Result<Vec<Vec<SeenRun>>, ImagingError> {
-        let count = self.volume.grid.size()[2];
-        let share = count.div_ceil(threads.clamp(1, count));
-        let part = |from: usize| -> Vec<Vec<SeenRun>> {
-            (from..(from + share).min(count))
-                .take_while(|_| !cancel.load(Ordering::Relaxed))
-                .map(|k| self.slice(k))
-                .collect()
-        };
-        let slices: Vec<_> = if share >= count {
-            part(0)
-        } else {
-            std::thread::scope(|scope| {
-                let part = &part;
-                let workers: Vec<_> = (0..count)
-                    .step_by(share)
-                    .map(|from| scope.spawn(move || part(from)))
-                    .collect();
-                workers
-                    .into_iter()
-                    .flat_map(|worker| worker.join().unwrap_or_default())
-                    .collect()
-            })
-        };
-        if slices.len() < count {
-            return Err(ImagingError::Interrupted);
-        }
+        let mut slices: Vec<Vec<SeenRun>> = Vec::new();
+        slices.resize_with(self.volume.grid.size()[2], Vec::new);
+        let look = |(): &mut (), k: usize, runs: &mut [Vec<SeenRun>]| runs[0] = self.slice(k);
+        in_slices(&mut slices, 1, threads, cancel, || (), look)?;
         Ok(slices)
     }
 

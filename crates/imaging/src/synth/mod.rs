@@ -20,7 +20,6 @@
 )]
 
 mod blur;
-mod in_slices;
 mod noise;
 mod raster;
 mod scanner;
@@ -32,9 +31,9 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
+use crate::in_slices::{in_slices, room_for};
 use crate::{AIR_HU, ImagingError, LabelMap, Volume, VoxelGrid};
 use blur::{Blur, InPlane, blur_pixels, centred_gaussian};
-use in_slices::{in_slices, room_for};
 use noise::{NoiseBuffers, NoiseSource};
 use raster::{Cell, Contents, Raster, Stack};
 pub use scanner::{Kernel, Noise, Overshoot, ScanPreset, Scanner, SliceProfile, Streaks};

@@ -1,11 +1,9 @@
 //! Pictures and charts of a run's goals.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use needlebench_cell::ResolvedScenario;
 use needlebench_evaluation::report::GoalReport;
 use needlebench_evaluation::room::RoomModel;
+use needlebench_parallel::in_parallel;
 
 use super::error::FilesError;
 use super::folder::Folder;
@@ -106,33 +104,21 @@ impl<'a> Pictures<'a> {
         let goal = &self.resolved.goals[index];
         let camera = goal_camera(self.resolved, goal);
         let room = RoomPictures::new(self.resolved, &self.backdrop, &self.room, index);
-        let next = AtomicUsize::new(0);
-        let drawn: Mutex<Vec<(usize, [Option<Image>; 2])>> = Mutex::new(Vec::new());
-        let work = || {
-            while let Some((at, configuration)) = {
-                let at = next.fetch_add(1, Ordering::Relaxed);
-                report.configurations.get(at).map(|each| (at, each))
-            } {
-                let pictures = [
-                    configuration_picture(
-                        self.resolved,
-                        &self.backdrop,
-                        &camera,
-                        goal,
-                        configuration,
-                    ),
-                    room.draw(configuration),
-                ];
-                drawn.lock().expect("no thread panics").push((at, pictures));
-            }
-        };
-        std::thread::scope(|scope| {
-            for _ in 0..self.jobs.min(report.configurations.len()).max(1) {
-                scope.spawn(work);
+        let all = report.configurations.iter();
+        let all: Vec<_> = all.flat_map(|each| [(each, false), (each, true)]).collect();
+        let drawn = in_parallel(self.jobs, &all, |(configuration, is_room)| {
+            if *is_room {
+                room.draw(configuration)
+            } else {
+                configuration_picture(self.resolved, &self.backdrop, &camera, goal, configuration)
             }
         });
-        let mut drawn = drawn.into_inner().expect("no thread panics");
-        drawn.sort_by_key(|(at, _)| *at);
-        drawn.into_iter().map(|(_, pictures)| pictures).collect()
+        let mut drawn = drawn.into_iter();
+        let mut next = || drawn.next().flatten();
+        report
+            .configurations
+            .iter()
+            .map(|_| [next(), next()])
+            .collect()
     }
 }

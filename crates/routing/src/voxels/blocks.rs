@@ -1,5 +1,7 @@
 //! Where in the voxels the body is at all, coarsely: rays skip what cannot have what they look for.
 
+use needlebench_parallel::in_parts;
+
 /// Voxels along each side of a block.
 pub(super) const BLOCK: usize = 8;
 
@@ -33,26 +35,20 @@ impl Blocks {
             std::array::from_fn(|class| u8::try_from(class).map_or(0, |class| side(class) as u8));
         let layer = size[0] * size[1];
         let mut sides = vec![0; layer * size[2]];
-        let each = size[2].div_ceil(threads.max(1)).max(1);
-        std::thread::scope(|scope| {
-            for (part, sides) in sides.chunks_mut(each * layer).enumerate() {
-                scope.spawn(move || {
-                    let from = part * each * BLOCK;
-                    let to = (from + sides.len() / layer * BLOCK).min(nz);
-                    for k in from..to {
-                        for j in 0..ny {
-                            let row = &voxels[(k * ny + j) * nx..][..nx];
-                            let at = (k - from) / BLOCK * layer + j / BLOCK * size[0];
-                            for (block, voxels) in sides[at..].iter_mut().zip(row.chunks(BLOCK)) {
-                                for &class in voxels {
-                                    *block |= side_of[usize::from(class)];
-                                }
-                            }
+        let of_layer = |(): &mut (), part: usize, sides: &mut [u8]| {
+            for k in part * BLOCK..((part + 1) * BLOCK).min(nz) {
+                for j in 0..ny {
+                    let row = &voxels[(k * ny + j) * nx..][..nx];
+                    let sides = &mut sides[j / BLOCK * size[0]..];
+                    for (block, voxels) in sides.iter_mut().zip(row.chunks(BLOCK)) {
+                        for &class in voxels {
+                            *block |= side_of[usize::from(class)];
                         }
                     }
-                });
+                }
             }
-        });
+        };
+        in_parts(threads, &mut sides, layer, || (), of_layer);
         Self {
             size,
             sides,
