@@ -186,7 +186,7 @@ impl Chain {
 }
 
 /// A linear vector over an angular one.
-fn stacked(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+pub(crate) fn stacked(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(
         linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
     )

@@ -15,7 +15,7 @@ use std::sync::LazyLock;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch};
 
-use super::super::numerical::{Lanes, Numerical, Placed};
+use super::super::numerical::{Numerical, Placed};
 use crate::ik::fused::Fused as _;
 use crate::{JOINT_COUNT, Joints, Pose, UrGeometry};
 
@@ -24,6 +24,9 @@ static LEVEL: LazyLock<Level> = LazyLock::new(Level::new);
 
 /// Postures of a block.
 pub(super) const BLOCK: usize = 8;
+
+/// One value for each.
+pub(super) type Lanes = [f64; BLOCK];
 
 /// One wanted pose seen from one shoulder.
 pub(super) struct Chart<'a> {

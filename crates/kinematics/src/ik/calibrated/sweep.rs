@@ -7,8 +7,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::super::numerical::{Lanes, Placed, sin_cos};
-use super::chart::{BLOCK, Block, Chart};
+use super::super::numerical::{Placed, sin_cos};
+use super::chart::{BLOCK, Block, Chart, Lanes};
 use crate::{Joints, UrGeometry};
 
 /// Samples of half a loop, a multiple of half a block.

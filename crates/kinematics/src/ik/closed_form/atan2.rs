@@ -8,7 +8,7 @@ use crate::ik::fused::Fused as _;
 
 /// Minimax coefficients of `2 (atan t - t) / t^3` in powers of `t^2` on `[0, tan(pi/8)]`, by the
 /// Remez exchange in 60 digits; relative error of the resulting arc tangent 3.5e-17.
-const TWICE_ATAN: [f64; 10] = [
+pub(in crate::ik) const TWICE_ATAN: [f64; 10] = [
     -0.666666666666603,
     0.3999999999817792,
     -0.28571428390523384,

@@ -17,6 +17,7 @@ use bytemuck::{CheckedBitPattern, NoUninit};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch};
 
+pub(super) use atan2::TWICE_ATAN;
 pub(super) use careful::defect;
 pub(super) use clamped::clamped;
 pub use family::FreeWrist;

@@ -7,7 +7,11 @@
 //! second derivative along the step; and, where steps shrink by a steady factor as they do towards
 //! a double root, the sum of the geometric series instead of its first term.
 
-use super::kernel::{Kernel, Lanes, State, Target, cross};
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+use super::kernel::{Kernel, State, Target};
+use crate::Joints;
+use crate::chain::stacked;
 
 /// How a descent is steered.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,8 +20,6 @@ pub(super) struct Steering {
     pub rad_per_m: f64,
     /// Longest step, rad.
     pub longest_step_rad: f64,
-    /// Whether steps near the pose are corrected to second order.
-    pub second_order: bool,
     /// Steps in which the squared error has to fall to [`MILESTONE`] of itself, or the descent is
     /// given up, while far from the pose.
     pub patience_far: u32,
@@ -30,7 +32,7 @@ pub(super) struct Steering {
 /// Where a descent ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct End {
-    pub q: Lanes,
+    pub q: Joints,
     pub residual_m: f64,
     pub residual_rad: f64,
     pub steps: u32,
@@ -73,70 +75,57 @@ const POLISHING: f64 = 0.1;
 const LEAST_DAMPING: f64 = 1e-16;
 
 pub(super) struct Factor {
-    lower: [[f64; 6]; 6],
-    inverse: [f64; 6],
+    lower: Matrix6<f64>,
+    inverse: Vector6<f64>,
 }
 
 /// `J^T J` with lengths weighted.
 #[inline(always)]
-pub(super) fn normal_matrix(rows: &[Lanes; 6], weight: f64) -> [Lanes; 6] {
-    let mut matrix = [[0.0; 8]; 6];
-    for (i, row) in matrix.iter_mut().enumerate() {
-        for (l, entry) in row.iter_mut().enumerate() {
-            let linear =
-                rows[0][i] * rows[0][l] + rows[1][i] * rows[1][l] + rows[2][i] * rows[2][l];
-            let angular =
-                rows[3][i] * rows[3][l] + rows[4][i] * rows[4][l] + rows[5][i] * rows[5][l];
-            *entry = weight * linear + angular;
-        }
-    }
-    matrix
+pub(super) fn normal_matrix(jacobian: &Matrix6<f64>, weight: f64) -> Matrix6<f64> {
+    let (linear, angular) = (jacobian.fixed_rows::<3>(0), jacobian.fixed_rows::<3>(3));
+    linear.tr_mul(&linear) * weight + angular.tr_mul(&angular)
 }
 
 /// `J^T e` with lengths weighted.
 #[inline(always)]
-pub(super) fn gradient(rows: &[Lanes; 6], e: &[f64; 6], weight: f64) -> Lanes {
-    std::array::from_fn(|l| {
-        let linear = rows[0][l] * e[0] + rows[1][l] * e[1] + rows[2][l] * e[2];
-        let angular = rows[3][l] * e[3] + rows[4][l] * e[4] + rows[5][l] * e[5];
-        weight * linear + angular
-    })
+pub(super) fn gradient(jacobian: &Matrix6<f64>, e: &Vector6<f64>, weight: f64) -> Joints {
+    let (linear, angular) = (jacobian.fixed_rows::<3>(0), jacobian.fixed_rows::<3>(3));
+    linear.tr_mul(&e.fixed_rows::<3>(0)) * weight + angular.tr_mul(&e.fixed_rows::<3>(3))
 }
 
 impl Factor {
     /// `L D L^T` of `matrix + damping I`.
     #[inline(always)]
-    pub(super) fn new(matrix: &[Lanes; 6], damping: f64) -> Self {
-        let mut rest = *matrix;
-        let (mut lower, mut inverse) = ([[0.0; 6]; 6], [0.0; 6]);
+    pub(super) fn new(matrix: &Matrix6<f64>, damping: f64) -> Self {
+        let mut lower = *matrix;
+        let mut inverse = Vector6::zeros();
         for k in 0..6 {
-            inverse[k] = 1.0 / (rest[k][k] + damping);
+            inverse[k] = 1.0 / (lower[(k, k)] + damping);
             for i in k + 1..6 {
-                let factor = rest[k][i] * inverse[k];
-                lower[i][k] = factor;
-                #[expect(clippy::needless_range_loop, reason = "rows i and k of one matrix")]
+                let factor = lower[(i, k)] * inverse[k];
                 for j in i..6 {
-                    rest[i][j] -= factor * rest[k][j];
+                    lower[(j, i)] -= factor * lower[(j, k)];
                 }
+            }
+            for i in k + 1..6 {
+                lower[(i, k)] *= inverse[k];
             }
         }
         Self { lower, inverse }
     }
 
     #[inline(always)]
-    pub(super) fn solve(&self, right: &Lanes) -> Lanes {
+    pub(super) fn solve(&self, right: &Joints) -> Joints {
         let mut y = *right;
         for k in 0..6 {
             for i in k + 1..6 {
-                y[i] -= self.lower[i][k] * y[k];
+                y[i] -= self.lower[(i, k)] * y[k];
             }
         }
-        for (entry, inverse) in y.iter_mut().zip(&self.inverse) {
-            *entry *= inverse;
-        }
+        y.component_mul_assign(&self.inverse);
         for k in (0..6).rev() {
             for i in 0..k {
-                y[i] -= self.lower[k][i] * y[k];
+                y[i] -= self.lower[(k, i)] * y[k];
             }
         }
         y
@@ -145,48 +134,29 @@ impl Factor {
 
 /// Second derivative of the pose along a joint direction: `d (dJ/dq d) d`.
 #[inline(always)]
-pub(super) fn curvature(rows: &[Lanes; 6], d: &Lanes) -> [f64; 6] {
-    // Angular velocity of the link before each joint.
-    let mut before = [[0.0; 8]; 3];
-    for k in 0..3 {
-        let mut sum = 0.0;
-        for j in 0..6 {
-            before[k][j] = sum;
-            sum += rows[3 + k][j] * d[j];
-        }
+pub(super) fn curvature(jacobian: &Matrix6<f64>, d: &Joints) -> Vector6<f64> {
+    let (mut linear, mut angular) = (Vector3::zeros(), Vector3::zeros());
+    // Angular velocity of the link before the joint.
+    let mut before = Vector3::zeros();
+    for (column, &d) in jacobian.column_iter().zip(d) {
+        let (lever, axis) = (column.fixed_rows::<3>(0), column.fixed_rows::<3>(3));
+        linear += (before * 2.0 + axis * d).cross(&lever) * d;
+        angular += before.cross(&axis) * d;
+        before += axis * d;
     }
-    let mut total = [0.0; 6];
-    for j in 0..6 {
-        let axis = [rows[3][j], rows[4][j], rows[5][j]];
-        let lever = [rows[0][j], rows[1][j], rows[2][j]];
-        let omega = [before[0][j], before[1][j], before[2][j]];
-        let both: [f64; 3] = std::array::from_fn(|k| 2.0 * omega[k] + d[j] * axis[k]);
-        let (linear, angular) = (cross(&both, &lever), cross(&omega, &axis));
-        for k in 0..3 {
-            total[k] += d[j] * linear[k];
-            total[3 + k] += d[j] * angular[k];
-        }
-    }
-    total
+    stacked(&linear, &angular)
 }
 
-fn squares(e: &[f64; 6]) -> (f64, f64) {
-    (
-        e[0] * e[0] + e[1] * e[1] + e[2] * e[2],
-        e[3] * e[3] + e[4] * e[4] + e[5] * e[5],
-    )
-}
-
-#[inline(always)]
-pub(super) fn product(a: &Lanes, b: &Lanes) -> f64 {
-    (0..6).map(|i| a[i] * b[i]).sum()
+fn squares(e: &Vector6<f64>) -> (f64, f64) {
+    let part = |row| e.fixed_rows::<3>(row).norm_squared();
+    (part(0), part(3))
 }
 
 /// A posture and its error.
 struct Point {
-    q: Lanes,
+    q: Joints,
     state: State,
-    error: [f64; 6],
+    error: Vector6<f64>,
     /// Weighted squared error, and the greater of its two parts unweighted.
     cost: f64,
     worst: f64,
@@ -194,7 +164,7 @@ struct Point {
 
 impl Point {
     #[inline(always)]
-    fn new(kernel: &Kernel, target: &Target, q: Lanes, weight: f64) -> Self {
+    fn new(kernel: &Kernel, target: &Target, q: Joints, weight: f64) -> Self {
         let state = kernel.state(&q);
         let error = state.error(target);
         let (linear, angular) = squares(&error);
@@ -205,6 +175,16 @@ impl Point {
             cost: weight * linear + angular,
             worst: linear.max(angular),
         }
+    }
+
+    /// `J^T J` and `J^T e`.
+    #[inline(always)]
+    fn normal_equations(&self, weight: f64) -> (Matrix6<f64>, Joints) {
+        let jacobian = &self.state.jacobian;
+        (
+            normal_matrix(jacobian, weight),
+            gradient(jacobian, &self.error, weight),
+        )
     }
 
     fn end(&self, steps: u32, reached: bool) -> End {
@@ -221,15 +201,18 @@ impl Point {
 
 /// Descends from `start`; within rounding of the pose once the tolerance is reached.
 #[inline(always)]
-pub(super) fn descend(kernel: &Kernel, target: &Target, start: &Lanes, steering: &Steering) -> End {
+pub(super) fn descend(
+    kernel: &Kernel,
+    target: &Target,
+    start: &Joints,
+    steering: &Steering,
+) -> End {
     let weight = steering.rad_per_m * steering.rad_per_m;
     let content = steering.tolerance * steering.tolerance;
     let mut here = Point::new(kernel, target, *start, weight);
     let mut damping = DAMPING;
     // The last step, zero where it tells nothing of the next.
-    let mut previous = [0.0; 8];
-    let mut matrix = normal_matrix(&here.state.rows, weight);
-    let mut right = gradient(&here.state.rows, &here.error, weight);
+    let mut previous = Joints::zeros();
     let mut milestone = MILESTONE * here.cost;
     let mut since = 0;
     for count in 0..steering.steps {
@@ -237,33 +220,27 @@ pub(super) fn descend(kernel: &Kernel, target: &Target, start: &Lanes, steering:
         if reached && here.worst <= ROUNDING_SQUARED {
             return here.end(count, true);
         }
+        let (matrix, right) = here.normal_equations(weight);
         let factor = Factor::new(&matrix, damping * here.cost + LEAST_DAMPING);
         let mut step = factor.solve(&right);
-        let length_squared = product(&step, &step);
+        let length_squared = step.norm_squared();
         let longest = steering.longest_step_rad;
         if length_squared > longest * longest {
-            let scale = longest / length_squared.sqrt();
-            step = step.map(|s| s * scale);
-        } else if steering.second_order && here.cost < NEAR {
-            let bend = curvature(&here.state.rows, &step).map(|h| -0.5 * h);
-            let correction = factor.solve(&gradient(&here.state.rows, &bend, weight));
+            step *= longest / length_squared.sqrt();
+        } else if here.cost < NEAR {
+            let bend = curvature(&here.state.jacobian, &step) * -0.5;
+            let correction = factor.solve(&gradient(&here.state.jacobian, &bend, weight));
             // Where the correction outgrows the step, the expansion says nothing.
-            if product(&correction, &correction) < length_squared {
-                for i in 0..6 {
-                    step[i] += correction[i];
-                }
+            if correction.norm_squared() < length_squared {
+                step += correction;
             }
         }
         let stretch = stretch(&step, &previous);
         if stretch > 1.0 {
-            step = step.map(|s| s * stretch);
+            step *= stretch;
         }
-        let step_squared = product(&step, &step);
-        let mut q = here.q;
-        for i in 0..6 {
-            q[i] += step[i];
-        }
-        let next = Point::new(kernel, target, q, weight);
+        let step_squared = step.norm_squared();
+        let next = Point::new(kernel, target, here.q + step, weight);
         if reached {
             let done = next.worst > POLISHING * here.worst;
             if next.worst < here.worst {
@@ -272,20 +249,16 @@ pub(super) fn descend(kernel: &Kernel, target: &Target, start: &Lanes, steering:
             if done {
                 return here.end(count + 1, true);
             }
-            previous = if stretch > 1.0 { [0.0; 8] } else { step };
-            matrix = normal_matrix(&here.state.rows, weight);
-            right = gradient(&here.state.rows, &here.error, weight);
+            previous = if stretch > 1.0 { Joints::zeros() } else { step };
             continue;
         }
         let uphill = here.cost < NEAR && next.cost < UPHILL * step_squared * step_squared;
         if next.cost < here.cost || uphill {
-            previous = if stretch > 1.0 { [0.0; 8] } else { step };
+            previous = if stretch > 1.0 { Joints::zeros() } else { step };
             here = next;
-            matrix = normal_matrix(&here.state.rows, weight);
-            right = gradient(&here.state.rows, &here.error, weight);
         } else {
             damping *= MORE_DAMPING;
-            previous = [0.0; 8];
+            previous = Joints::zeros();
             if next.cost.is_nan() {
                 return here.end(count + 1, false);
             }
@@ -311,9 +284,9 @@ pub(super) fn descend(kernel: &Kernel, target: &Target, start: &Lanes, steering:
 ///
 /// Towards a double root, plain steps shrink by 1/2 and those of second order by 3/8.
 #[inline(always)]
-fn stretch(step: &Lanes, previous: &Lanes) -> f64 {
-    let (new, old) = (product(step, step), product(previous, previous));
-    let along = product(step, previous);
+fn stretch(step: &Joints, previous: &Joints) -> f64 {
+    let (new, old) = (step.norm_squared(), previous.norm_squared());
+    let along = step.dot(previous);
     // Products rather than quotients: without a previous step nothing is inside.
     let steady = new > 0.08 * old && new < 0.36 * old;
     if steady && along > 0.0 && along * along > 0.9 * new * old {
@@ -327,7 +300,7 @@ fn stretch(step: &Lanes, previous: &Lanes) -> f64 {
 pub(super) fn least_squares(
     kernel: &Kernel,
     target: &Target,
-    start: &Lanes,
+    start: &Joints,
     rad_per_m: f64,
     steps: u32,
 ) -> End {
@@ -335,18 +308,13 @@ pub(super) fn least_squares(
     let mut here = Point::new(kernel, target, *start, weight);
     let mut damping = 1e-3;
     for count in 0..steps {
-        let matrix = normal_matrix(&here.state.rows, weight);
-        let right = gradient(&here.state.rows, &here.error, weight);
+        let (matrix, right) = here.normal_equations(weight);
         let step = Factor::new(&matrix, damping).solve(&right);
-        let size = product(&step, &step).sqrt();
+        let size = step.norm();
         if size < 1e-12 || size.is_nan() {
             return here.end(count, false);
         }
-        let mut q = here.q;
-        for i in 0..6 {
-            q[i] += step[i];
-        }
-        let next = Point::new(kernel, target, q, weight);
+        let next = Point::new(kernel, target, here.q + step, weight);
         if next.cost < here.cost {
             // At a minimum that is no solution, the cost settles before the joints do.
             let settled = here.cost - next.cost < 1e-14 * here.cost;

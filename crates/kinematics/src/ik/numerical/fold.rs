@@ -5,8 +5,11 @@
 //! The quadratic equation has both solutions, however near to one another, where Newton's method
 //! from one side crawls.
 
-use super::descent::{Factor, curvature, gradient, normal_matrix, product};
-use super::kernel::{Kernel, Lanes, State, Target};
+use nalgebra::{Matrix6, Vector6};
+
+use super::descent::{Factor, curvature, gradient, normal_matrix};
+use super::kernel::{Kernel, State, Target};
+use crate::Joints;
 
 /// Rounds towards the place where the two meet.
 const ROUNDS: u32 = 7;
@@ -30,9 +33,9 @@ const JUST_MISSES: f64 = 1e-8;
 pub(super) fn fold(
     kernel: &Kernel,
     target: &Target,
-    start: &Lanes,
+    start: &Joints,
     rad_per_m: f64,
-) -> Option<[Lanes; 2]> {
+) -> Option<[Joints; 2]> {
     let weight = rad_per_m * rad_per_m;
     let mut q = *start;
     for _ in 0..ROUNDS {
@@ -44,7 +47,7 @@ pub(super) fn fold(
         if meet.is_nan() || meet.abs() > FARTHEST_RAD {
             return None;
         }
-        let off = product(&across, &across).sqrt().max(meet.abs());
+        let off = across.norm().max(meet.abs());
         let root_squared = flat.sigma * flat.sigma + 2.0 * flat.kappa * flat.along(&error);
         // Where the two nearly coincide, the equation has to be right to more digits.
         let apart = root_squared > (off * flat.kappa).powi(2);
@@ -53,84 +56,60 @@ pub(super) fn fold(
                 return None;
             }
             let root = root_squared.max(0.0).sqrt();
-            let back = flat.across(&flat.bend.map(|x| -0.5 * x));
+            let back = flat.across(&(flat.bend * -0.5));
             return Some([1.0, -1.0].map(|sign| {
                 let t = (-flat.sigma + sign * root) / flat.kappa;
-                std::array::from_fn(|i| q[i] + across[i] + t * flat.v[i] + t * t * back[i])
+                q + across + flat.v * t + back * (t * t)
             }));
         }
-        for i in 0..6 {
-            q[i] += across[i] + meet * flat.v[i];
-        }
+        q += across + flat.v * meet;
     }
     None
 }
 
 /// The two directions of the joints that move the flange least, rad.
 #[inline(always)]
-pub(super) fn flattest_plane(kernel: &Kernel, q: &Lanes, rad_per_m: f64) -> Option<[Lanes; 2]> {
-    let mut matrix = normal_matrix(&kernel.state(q).rows, rad_per_m * rad_per_m);
+pub(super) fn flattest_plane(kernel: &Kernel, q: &Joints, rad_per_m: f64) -> Option<[Joints; 2]> {
+    let mut matrix = normal_matrix(&kernel.state(q).jacobian, rad_per_m * rad_per_m);
     let first = flattest(&matrix)?;
-    for i in 0..6 {
-        for j in 0..6 {
-            matrix[i][j] += first[i] * first[j];
-        }
-    }
+    matrix += first * first.transpose();
     Some([first, flattest(&matrix)?])
 }
 
 /// The flattest direction of a posture.
 struct Flat {
-    rows: [Lanes; 6],
+    jacobian: Matrix6<f64>,
     weight: f64,
     /// Of the joints, and of the flange with lengths weighted by the root of the weight.
-    v: Lanes,
-    u: [f64; 6],
+    v: Joints,
+    u: Vector6<f64>,
     sigma: f64,
     kappa: f64,
     /// Second derivative of the flange's pose along `v`.
-    bend: [f64; 6],
+    bend: Vector6<f64>,
     steep: Factor,
 }
 
 impl Flat {
     #[inline(always)]
     fn new(state: &State, weight: f64) -> Option<Self> {
-        let rows = state.rows;
+        let jacobian = state.jacobian;
         let root = weight.sqrt();
-        let scale = [root, root, root, 1.0, 1.0, 1.0];
-        let mut matrix = normal_matrix(&rows, weight);
+        let scale = Vector6::new(root, root, root, 1.0, 1.0, 1.0);
+        let mut matrix = normal_matrix(&jacobian, weight);
         let v = flattest(&matrix)?;
-        let mut left = [[0.0; 8]; 6];
-        for i in 0..6 {
-            for j in i..6 {
-                let entry = scale[i] * scale[j] * product(&rows[i], &rows[j]);
-                left[i][j] = entry;
-                left[j][i] = entry;
-            }
-        }
-        let u_lanes = flattest(&left)?;
-        let mut u = [0.0; 6];
-        u.copy_from_slice(&u_lanes[..6]);
-        let bend = curvature(&rows, &v);
-        let (mut sigma, mut kappa) = (0.0, 0.0);
-        for i in 0..6 {
-            let along = u[i] * scale[i];
-            sigma += along * product(&rows[i], &v);
-            kappa += along * bend[i];
-        }
-        for i in 0..6 {
-            for j in 0..6 {
-                matrix[i][j] += v[i] * v[j];
-            }
-        }
+        let left = (jacobian * jacobian.transpose()).component_mul(&(scale * scale.transpose()));
+        let u = flattest(&left)?;
+        let bend = curvature(&jacobian, &v);
+        let along = u.component_mul(&scale);
+        matrix += v * v.transpose();
         Some(Self {
-            rows,
+            jacobian,
             weight,
             v,
             u,
-            sigma,
-            kappa,
+            sigma: along.dot(&(jacobian * v)),
+            kappa: along.dot(&bend),
             bend,
             steep: Factor::new(&matrix, 0.0),
         })
@@ -138,17 +117,14 @@ impl Flat {
 
     /// The step that takes the error off but for the flattest direction.
     #[inline(always)]
-    fn across(&self, error: &[f64; 6]) -> Lanes {
-        let mut step = self.steep.solve(&gradient(&self.rows, error, self.weight));
-        let along = product(&step, &self.v);
-        for (entry, v) in step.iter_mut().zip(&self.v) {
-            *entry -= along * v;
-        }
-        step
+    fn across(&self, error: &Vector6<f64>) -> Joints {
+        let gradient = gradient(&self.jacobian, error, self.weight);
+        let step = self.steep.solve(&gradient);
+        step - self.v * step.dot(&self.v)
     }
 
     /// The error in the flattest direction.
-    fn along(&self, error: &[f64; 6]) -> f64 {
+    fn along(&self, error: &Vector6<f64>) -> f64 {
         let root = self.weight.sqrt();
         (0..6)
             .map(|i| self.u[i] * error[i] * if i < 3 { root } else { 1.0 })
@@ -158,19 +134,17 @@ impl Flat {
 
 /// Unit vector of the least eigenvalue, by inverse iteration.
 #[inline(always)]
-fn flattest(matrix: &[Lanes; 6]) -> Option<Lanes> {
+fn flattest(matrix: &Matrix6<f64>) -> Option<Joints> {
     let factor = Factor::new(matrix, DAMPING);
-    let mut vector = [1.0, -0.9, 0.8, 1.1, -0.7, 1.2, 0.0, 0.0];
+    let mut vector = Joints::new(1.0, -0.9, 0.8, 1.1, -0.7, 1.2);
     for _ in 0..2 {
         vector = factor.solve(&vector);
-        let length = product(&vector, &vector).sqrt();
+        let length = vector.norm();
         // Written so that NaN fails too.
         if !(length > 0.0 && length.is_finite()) {
             return None;
         }
-        vector = vector.map(|x| x / length);
-        vector[6] = 0.0;
-        vector[7] = 0.0;
+        vector /= length;
     }
     Some(vector)
 }

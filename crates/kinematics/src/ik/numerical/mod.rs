@@ -10,28 +10,19 @@ mod kernel;
 mod tests;
 
 use std::f64::consts::PI;
-use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Matrix6, Vector6};
 
+use crate::chain::stacked;
 use crate::random::SplitMix64;
 use crate::{Chain, JOINT_COUNT, Joints, Pose, rotation_vector};
 use descent::{End, Steering, descend, least_squares};
 use fold::{flattest_plane, fold};
-use kernel::{Kernel, joints, lanes};
+use kernel::Kernel;
 
-pub(super) use kernel::{Lanes, Placed, Target, sin_cos};
-
-/// Vector instructions of this machine, at most those of four doubles: a chain is no wider.
-static LEVEL: LazyLock<Level> = LazyLock::new(|| {
-    let level = Level::new();
-    #[cfg(target_arch = "x86_64")]
-    let level = level.as_avx2().map_or(level, Simd::level);
-    level
-});
+pub(super) use kernel::{Placed, Target, sin_cos};
 
 /// Which iteration [`gauss_newton`] takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,9 +130,7 @@ pub struct NumericalResult {
 pub(crate) fn pose_error(target: &Pose, actual: &Pose) -> Vector6<f64> {
     let linear = target.translation.vector - actual.translation.vector;
     let angular = rotation_vector(&(target.rotation * actual.rotation.inverse()));
-    Vector6::new(
-        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
-    )
+    stacked(&linear, &angular)
 }
 
 /// A chain prepared for numerical inverse kinematics.
@@ -201,7 +190,6 @@ impl Numerical {
             steering: Steering {
                 rad_per_m: self.rad_per_m(),
                 longest_step_rad: 0.5,
-                second_order: true,
                 patience_far: 8,
                 steps: 50,
                 tolerance: options.tolerance,
@@ -209,9 +197,7 @@ impl Numerical {
             spread_rad: 0.2,
             about_start: true,
             max_iterations: options.max_iterations,
-            deadline: options
-                .max_time
-                .and_then(|time| Instant::now().checked_add(time)),
+            deadline: deadline(options.max_time),
             seed: 1,
         };
         self.solve(base_link_from_flange, guess, &effort)
@@ -233,7 +219,6 @@ impl Numerical {
             steering: Steering {
                 rad_per_m: self.rad_per_m(),
                 longest_step_rad: PI,
-                second_order: true,
                 patience_far: 3,
                 steps: 50,
                 tolerance: options.tolerance,
@@ -241,9 +226,7 @@ impl Numerical {
             spread_rad: PI,
             about_start: false,
             max_iterations: options.max_iterations,
-            deadline: options
-                .max_time
-                .and_then(|time| Instant::now().checked_add(time)),
+            deadline: deadline(options.max_time),
             seed: options.seed,
         };
         self.solve(base_link_from_flange, start, &effort)
@@ -259,7 +242,7 @@ impl Numerical {
     ) -> NumericalResult {
         const STEPS: u32 = 200;
         let target = self.kernel.target(base_link_from_flange);
-        let end = least_squares(&self.kernel, &target, &lanes(start), rad_per_m, STEPS);
+        let end = least_squares(&self.kernel, &target, start, rad_per_m, STEPS);
         let stop = if end.residual() <= 1e-9 {
             Stop::Converged
         } else if end.residual().is_nan() {
@@ -282,15 +265,13 @@ impl Numerical {
         let steering = Steering {
             rad_per_m: self.rad_per_m(),
             longest_step_rad: 0.5,
-            second_order: true,
             patience_far: 8,
             steps: 20,
             tolerance: 1e-9,
         };
-        let start = lanes(start);
-        let end = dispatch!(*LEVEL, simd => once(simd, &self.kernel, target, &start, &steering));
+        let end = descend(&self.kernel, target, start, &steering);
         end.reached.then(|| Refined {
-            joints: joints(&end.q),
+            joints: end.q,
             residual_m: end.residual_m,
             residual_rad: end.residual_rad,
         })
@@ -309,23 +290,19 @@ impl Numerical {
 
     /// Starts near the two solutions that meet at a singularity near a posture.
     pub(super) fn fold(&self, target: &Target, start: &Joints) -> Option<[Joints; 2]> {
-        let (start, rad_per_m) = (lanes(start), self.rad_per_m());
-        let found =
-            dispatch!(*LEVEL, simd => folded(simd, &self.kernel, target, &start, rad_per_m))?;
-        Some(found.map(|q| joints(&q)))
+        fold(&self.kernel, target, start, self.rad_per_m())
     }
 
     /// The two directions of the joints that move the flange least, rad.
     pub(super) fn flattest_plane(&self, q: &Joints) -> Option<[Joints; 2]> {
-        let found = flattest_plane(&self.kernel, &lanes(q), self.rad_per_m())?;
-        Some(found.map(|direction| joints(&direction)))
+        flattest_plane(&self.kernel, q, self.rad_per_m())
     }
 
     /// Residuals of postures, m and rad.
     pub(super) fn residuals(&self, target: &Target, q: &Joints) -> (f64, f64) {
-        let e = self.kernel.state(&lanes(q)).error(target);
-        let norm = |part: &[f64]| part.iter().map(|v| v * v).sum::<f64>().sqrt();
-        (norm(&e[..3]), norm(&e[3..]))
+        let error = self.kernel.state(q).error(target);
+        let norm = |row| error.fixed_rows::<3>(row).norm();
+        (norm(0), norm(3))
     }
 
     /// Metres and radians made comparable: 9.2 rad/m on the UR3, which took the fewest steps; half
@@ -336,8 +313,38 @@ impl Numerical {
 
     fn solve(&self, pose: &Pose, start: &Joints, effort: &Effort) -> NumericalResult {
         let target = self.kernel.target(pose);
-        let start = lanes(start);
-        dispatch!(*LEVEL, simd => restarted(simd, &self.kernel, &target, &start, effort))
+        let mut random = SplitMix64::new(effort.seed);
+        let (mut q, mut iterations, mut restarts) = (*start, 0, 0);
+        let mut best: Option<End> = None;
+        loop {
+            let mut steering = effort.steering;
+            steering.steps = steering.steps.min(effort.max_iterations - iterations);
+            let end = descend(&self.kernel, &target, &q, &steering);
+            iterations += end.steps;
+            if best.is_none_or(|best| end.reached || end.residual() < best.residual()) {
+                best = Some(end);
+            }
+            let best = best.unwrap_or(end);
+            let stop = if end.reached {
+                Some(Stop::Converged)
+            } else if end.residual().is_nan() {
+                Some(Stop::NotFinite)
+            } else if iterations >= effort.max_iterations {
+                Some(Stop::IterationLimit)
+            } else if effort.deadline.is_some_and(|end| Instant::now() >= end) {
+                Some(Stop::TimeLimit)
+            } else {
+                None
+            };
+            if let Some(stop) = stop {
+                return result(&best, iterations, restarts, stop);
+            }
+            restarts += 1;
+            q = start.map(|joint| {
+                let centre = if effort.about_start { joint } else { 0.0 };
+                centre + random.uniform(-effort.spread_rad, effort.spread_rad)
+            });
+        }
     }
 }
 
@@ -351,79 +358,19 @@ pub fn gauss_newton(
     Numerical::new(chain).gauss_newton(base_link_from_flange, guess, options)
 }
 
+fn deadline(max_time: Option<Duration>) -> Option<Instant> {
+    Instant::now().checked_add(max_time?)
+}
+
 fn result(end: &End, iterations: u32, restarts: u32, stop: Stop) -> NumericalResult {
     NumericalResult {
-        joints: joints(&end.q),
+        joints: end.q,
         iterations,
         restarts,
         residual_m: end.residual_m,
         residual_rad: end.residual_rad,
         converged: stop == Stop::Converged,
         stop,
-    }
-}
-
-#[inline(always)]
-fn folded<S: Simd>(
-    _simd: S,
-    kernel: &Kernel,
-    target: &Target,
-    start: &Lanes,
-    rad_per_m: f64,
-) -> Option<[Lanes; 2]> {
-    fold(kernel, target, start, rad_per_m)
-}
-
-#[inline(always)]
-fn once<S: Simd>(
-    _simd: S,
-    kernel: &Kernel,
-    target: &Target,
-    start: &Lanes,
-    steering: &Steering,
-) -> End {
-    descend(kernel, target, start, steering)
-}
-
-#[inline(always)]
-fn restarted<S: Simd>(
-    simd: S,
-    kernel: &Kernel,
-    target: &Target,
-    start: &Lanes,
-    effort: &Effort,
-) -> NumericalResult {
-    let mut random = SplitMix64::new(effort.seed);
-    let (mut q, mut iterations, mut restarts) = (*start, 0, 0);
-    let mut best: Option<End> = None;
-    loop {
-        let mut steering = effort.steering;
-        steering.steps = steering.steps.min(effort.max_iterations - iterations);
-        let end = once(simd, kernel, target, &q, &steering);
-        iterations += end.steps;
-        if best.is_none_or(|best| end.reached || end.residual() < best.residual()) {
-            best = Some(end);
-        }
-        let best = best.unwrap_or(end);
-        let stop = if end.reached {
-            Some(Stop::Converged)
-        } else if end.residual().is_nan() {
-            Some(Stop::NotFinite)
-        } else if iterations >= effort.max_iterations {
-            Some(Stop::IterationLimit)
-        } else if effort.deadline.is_some_and(|end| Instant::now() >= end) {
-            Some(Stop::TimeLimit)
-        } else {
-            None
-        };
-        if let Some(stop) = stop {
-            return result(&best, iterations, restarts, stop);
-        }
-        restarts += 1;
-        for i in 0..JOINT_COUNT {
-            let centre = if effort.about_start { start[i] } else { 0.0 };
-            q[i] = centre + random.uniform(-effort.spread_rad, effort.spread_rad);
-        }
     }
 }
 
@@ -445,9 +392,7 @@ fn undamped(
     let mut q = *guess;
     let mut error = evaluate(&q);
     let mut best = (q, error, 0);
-    let deadline = options
-        .max_time
-        .and_then(|time| Instant::now().checked_add(time));
+    let deadline = deadline(options.max_time);
     let mut stop = Stop::IterationLimit;
     for iteration in 1..=options.max_iterations {
         // Below this, steps only stir rounding errors.
