@@ -1,12 +1,10 @@
 //! The Python environment of the MuJoCo harness, made on first use in the user's cache folder.
 
 mod command;
-mod guard;
 mod install;
-mod installed;
 mod python;
-mod wanted;
-mod wheels;
+mod seal;
+mod staging;
 
 use std::env;
 use std::ffi::OsString;
@@ -16,52 +14,53 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use sha2::{Digest, Sha256};
+use needlebench_cell::sha256_hex;
 
-pub use command::CommandFailure;
-use guard::{Guard, Staging};
+pub use install::{DownloadedWheels, WheelPlatform, WheelsFor, download_wheels};
 use python::Python;
-pub use python::{PythonVersion, RejectedPython};
-pub use wanted::{WheelPlatform, WheelsFor};
-pub use wheels::{DownloadedWheels, download_wheels};
+pub use python::PythonVersion;
+use seal::Found;
+use staging::{Guard, Staging};
 
-/// The MuJoCo that `requirements.lock` pins.
+/// The MuJoCo that the locks pin.
 const MUJOCO_VERSION: &str = "4.0.0";
 
-const REQUIREMENTS: &str = include_str!("../../harness/requirements.lock");
+macro_rules! harness_file {
+    ($name:literal) => {
+        (
+            $name,
+            include_str!(concat!("../../harness/needlebench_harness/", $name)),
+        )
+    };
+}
 
 /// The harness package, carried in the program so that an installed binary needs no source tree.
 const SOURCES: [(&str, &str); 5] = [
-    (
-        "__init__.py",
-        include_str!("../../harness/needlebench_harness/__init__.py"),
-    ),
-    (
-        "__main__.py",
-        include_str!("../../harness/needlebench_harness/__main__.py"),
-    ),
-    (
-        "plant.py",
-        include_str!("../../harness/needlebench_harness/plant.py"),
-    ),
-    (
-        "protocol.py",
-        include_str!("../../harness/needlebench_harness/protocol.py"),
-    ),
-    (
-        "server.py",
-        include_str!("../../harness/needlebench_harness/server.py"),
-    ),
+    harness_file!("__init__.py"),
+    harness_file!("__main__.py"),
+    harness_file!("plant.py"),
+    harness_file!("protocol.py"),
+    harness_file!("server.py"),
 ];
-
-/// Holds the environment's full key once everything else is in place.
-const STAMP: &str = "complete";
 
 /// Waiting for another set-up is bounded by the time that it may itself take, and some.
 const GUARD_LIMIT: Duration = Duration::from_mins(20);
 
 /// The first import compiles what it needs of numpy.
 const VERIFY_LIMIT: Duration = Duration::from_mins(2);
+
+/// Whether each file of packages is the one that its wheel had, by their records (PyPA, "Recording installed
+/// projects").
+const CHECK_RECORDS: &str = "import base64, hashlib, importlib.metadata, sys
+for package in sys.argv[1:]:
+    for file in importlib.metadata.files(package):
+        if file.hash:
+            digest = hashlib.new(file.hash.mode, file.locate().read_bytes()).digest()
+            if base64.urlsafe_b64encode(digest).decode().rstrip('=') != file.hash.value:
+                raise SystemExit(f'{file} is not what its wheel has')";
+
+const SAY_VERSION: &str =
+    "import mujoco, needlebench_harness.server; print(mujoco.mj_versionString())";
 
 /// A Python that can run the harness.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -126,13 +125,12 @@ pub enum EnvironmentError {
     },
     /// No suitable Python on the search path.
     #[error(
-        "MuJoCo needs Python 3.11 or newer, 64 bit, and there is none on PATH; {}\n\
-         hint: install one, or set NEEDLEBENCH_PYTHON to its path",
-        tried(rejected)
+        "MuJoCo needs Python 3.11 or newer, 64 bit, and there is none on PATH; {tried}\n\
+         hint: install one, or set NEEDLEBENCH_PYTHON to its path"
     )]
     NoPython {
-        /// What was found and will not do.
-        rejected: Vec<RejectedPython>,
+        /// What was found and why it will not do.
+        tried: String,
     },
     /// The Python that the user chose will not do.
     #[error(
@@ -148,79 +146,22 @@ pub enum EnvironmentError {
     },
     /// The program's copy of pip is not the one that was vendored.
     #[error(
-        "the program's copy of pip is damaged: its SHA-256 is {got}, not {expected}\n\
+        "the program's copy of pip is damaged: its SHA-256 is {got}, not the vendored file's\n\
          hint: build or install needlebench again"
     )]
     DamagedPip {
-        /// Hash of the vendored file.
-        expected: &'static str,
         /// Hash of what the program carries.
         got: String,
     },
-    /// Python cannot make a virtual environment.
-    #[error(
-        "`{} -m venv` failed: {failure}\n\
-         hint: this Python is incomplete; install the full one (on Debian the package python3-venv), \
-         or set NEEDLEBENCH_PYTHON to another",
-        python.display()
-    )]
-    Venv {
-        /// The Python that was used.
-        python: PathBuf,
-        /// What went wrong.
-        failure: CommandFailure,
-    },
-    /// The packages could not be installed.
-    #[error(
-        "installing MuJoCo {MUJOCO_VERSION} failed: {failure}\n\
-         hint: pip uses your own configuration (index, proxy, certificates). Without a network, run\n  \
-         needlebench doctor --download wheels {wanted}\n\
-         on a machine that has one, copy the folder `wheels` here, and run\n  \
-         needlebench doctor --prepare --wheels wheels"
-    )]
-    Install {
-        /// What went wrong.
-        failure: CommandFailure,
-        /// Which wheels this machine needs.
-        wanted: WheelsFor,
-    },
-    /// A folder of wheels does not hold those that this machine needs.
-    #[error(
-        "installing MuJoCo {MUJOCO_VERSION} from {} failed: {reason}\n\
-         hint: needlebench doctor --download wheels {wanted}\n\
-         gives the wheels for this machine, on one with a network; copy the whole folder here",
-        folder.display()
-    )]
-    Wheels {
-        /// The folder.
-        folder: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-        /// Which wheels this machine needs.
-        wanted: WheelsFor,
-    },
-    /// The wheels could not be fetched.
-    #[error(
-        "downloading the wheels of MuJoCo {MUJOCO_VERSION} failed: {failure}\n\
-         hint: pip uses your own configuration (index, proxy, certificates); MuJoCo {MUJOCO_VERSION} is made \
-         for Python {}",
-        python::made_for()
-    )]
-    Download {
-        /// What went wrong.
-        failure: CommandFailure,
-    },
-    /// The installed packages do not work.
-    #[error(
-        "MuJoCo was installed in {} but does not work: {reason}\n\
-         hint: set NEEDLEBENCH_PYTHON to another Python of 3.11 or newer",
-        folder.display()
-    )]
-    Verify {
-        /// The environment.
-        folder: PathBuf,
+    /// A stage of the set-up failed.
+    #[error("{what} failed: {reason}\nhint: {hint}")]
+    Failed {
+        /// What was being done.
+        what: String,
         /// What went wrong.
         reason: String,
+        /// How to mend it.
+        hint: String,
     },
     /// Another process has been making the same environment for too long.
     #[error(
@@ -229,19 +170,11 @@ pub enum EnvironmentError {
         path.display()
     )]
     Busy {
-        /// The environment.
+        /// The folder of environments.
         path: PathBuf,
         /// How long was waited, s.
         seconds: u64,
     },
-}
-
-fn tried(rejected: &[RejectedPython]) -> String {
-    if rejected.is_empty() {
-        return "found none at all".to_owned();
-    }
-    let list: String = rejected.iter().map(ToString::to_string).collect();
-    format!("tried:{list}")
 }
 
 fn unwritable(path: &Path, source: io::Error) -> EnvironmentError {
@@ -256,14 +189,20 @@ fn unwritable(path: &Path, source: io::Error) -> EnvironmentError {
 /// `progress` receives a line per stage. With `NEEDLEBENCH_HARNESS_COMMAND` set (see
 /// [`HarnessProcess::start`](super::HarnessProcess::start)) there is nothing to make.
 pub fn ensure(progress: &mut dyn FnMut(&str)) -> Result<Environment, EnvironmentError> {
-    if let Some(words) = harness_override() {
-        let python = PathBuf::from(&words[0]);
-        return Ok(Environment {
-            python,
+    prepared(&EnvironmentOptions::from_process(), progress)
+}
+
+fn prepared(
+    options: &EnvironmentOptions,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Environment, EnvironmentError> {
+    match harness_override() {
+        Some(words) => Ok(Environment {
+            python: PathBuf::from(&words[0]),
             folder: None,
-        });
+        }),
+        None => ensure_with(options, progress),
     }
-    ensure_with(&EnvironmentOptions::from_process(), progress)
 }
 
 /// An environment that was made ahead.
@@ -288,35 +227,17 @@ pub fn prepare(
         ..EnvironmentOptions::from_process()
     };
     let mut made = false;
-    let environment = match harness_override() {
-        Some(_) => ensure(progress)?,
-        None => ensure_with(&options, &mut |text| {
-            made = true;
-            progress(text);
-        })?,
-    };
-    if made && environment.folder.is_some() {
-        // Hashes are kept from now on, so that whoever may only read it need not take them at every start.
-        ensure_with(&options, progress)?;
-    }
-    let size_bytes = environment.folder.as_deref().map(size_of_files);
+    let environment = prepared(&options, &mut |text| {
+        made = true;
+        progress(text);
+    })?;
+    let files = |folder| seal::files(folder).unwrap_or_default();
+    let size = |folder| files(folder).iter().map(|(_, about)| about.len()).sum();
     Ok(Prepared {
+        size_bytes: environment.folder.as_deref().map(size),
         environment,
-        size_bytes,
         made,
     })
-}
-
-/// Sum over all files below a folder, bytes; links count for nothing.
-fn size_of_files(folder: &Path) -> u64 {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries
-        .map(|entry| match entry.metadata() {
-            Ok(about) if about.is_dir() => size_of_files(&entry.path()),
-            Ok(about) if about.is_file() => about.len(),
-            _ => 0,
-        })
-        .sum()
 }
 
 /// [`ensure`] with explicit options.
@@ -337,111 +258,77 @@ pub fn ensure_with(
     let key = key(&python);
     let target = cache.join(format!("harness-{}", &key[..16]));
     let environment = Environment {
-        python: install::venv_python(&target.join("venv")),
+        python: install::venv_python(&target),
         folder: Some(target.clone()),
     };
-    if state(&target, &key) == State::Complete {
+    if seal::look(&target, &key) == Found::Complete {
         return Ok(environment);
     }
-    fs::create_dir_all(&cache).map_err(|source| unwritable(&cache, source))?;
-    let guard = Guard::acquire(&target, GUARD_LIMIT, || {
+    let failed = |source| unwritable(&cache, source);
+    fs::create_dir_all(&cache).map_err(failed)?;
+    let guard = Guard::acquire(&cache, GUARD_LIMIT, || {
         progress("waiting for another needlebench that is setting MuJoCo up");
     });
-    let guard = guard.map_err(|source| unwritable(&cache, source))?;
-    let Some(_guard) = guard else {
+    let Some(_guard) = guard.map_err(failed)? else {
         return Err(EnvironmentError::Busy {
-            path: target,
+            path: cache,
             seconds: GUARD_LIMIT.as_secs(),
         });
     };
-    match state(&target, &key) {
-        State::Complete => return Ok(environment),
-        State::Damaged(reason) => progress(&format!(
-            "the MuJoCo environment in {} is damaged and is made again: {reason}",
-            target.display()
+    let folder = target.display();
+    match seal::look(&target, &key) {
+        Found::Complete => return Ok(environment),
+        Found::Damaged(reason) => progress(&format!(
+            "the MuJoCo environment in {folder} is damaged and is made again: {reason}"
         )),
-        State::Absent => {}
+        Found::Nothing => {}
     }
-    guard::remove_dead_staging(&target);
     progress(&format!(
-        "setting MuJoCo {MUJOCO_VERSION} up for Python {} in {} (once)",
-        python.version,
-        target.display()
+        "setting MuJoCo {MUJOCO_VERSION} up for Python {} in {folder} (once)",
+        python.version
     ));
-    let staging = Staging::beside(&target).map_err(|source| unwritable(&cache, source))?;
-    build(options, &python, &staging.folder, &target, progress)?;
-    let stamp = staging.folder.join(STAMP);
-    fs::write(&stamp, &key).map_err(|source| unwritable(&stamp, source))?;
-    staging
-        .publish(&target, || state(&target, &key) == State::Complete)
-        .map_err(|source| unwritable(&target, source))?;
+    let staging = Staging::beside(&target).map_err(failed)?;
+    install::install(options, &python, &staging.folder, progress)?;
+    let package =
+        install::site_packages(&staging.folder, python.wheels).join("needlebench_harness");
+    let write = || {
+        fs::create_dir_all(&package)?;
+        SOURCES
+            .iter()
+            .try_for_each(|(name, text)| fs::write(package.join(name), text))
+    };
+    write().map_err(|source| unwritable(&package, source))?;
+    progress("checking that MuJoCo works");
+    verify(&install::venv_python(&staging.folder), &target)?;
+    let publish = || {
+        seal::seal(&staging.folder, &key)?;
+        staging.publish(&target, || seal::look(&target, &key) == Found::Complete)
+    };
+    publish().map_err(|source| unwritable(&target, source))?;
     progress("MuJoCo is ready");
     Ok(environment)
 }
 
-/// Makes everything but the stamp.
-fn build(
-    options: &EnvironmentOptions,
-    python: &Python,
-    folder: &Path,
-    target: &Path,
-    progress: &mut dyn FnMut(&str),
-) -> Result<(), EnvironmentError> {
-    let requirements = folder.join("requirements.lock");
-    fs::write(&requirements, REQUIREMENTS).map_err(|source| unwritable(&requirements, source))?;
-    install::install(options, python, folder, &requirements, progress)?;
-    let venv_python = install::venv_python(&folder.join("venv"));
-    install::install_package(&venv_python, &SOURCES, target)?;
-    progress("checking that MuJoCo works");
-    verify(&venv_python, target)
-}
-
-fn verify(venv_python: &Path, target: &Path) -> Result<(), EnvironmentError> {
-    const ASK: &str = "import mujoco, needlebench_harness.server; print(mujoco.mj_versionString())";
-    let answer = command::run(
-        Command::new(venv_python).args(["-I", "-c", ASK]),
-        VERIFY_LIMIT,
-    );
-    let reason = match answer {
+fn verify(python: &Path, target: &Path) -> Result<(), EnvironmentError> {
+    let said = ask(python, CHECK_RECORDS, &["mujoco-core", "numpy"])
+        .and_then(|_| ask(python, SAY_VERSION, &[]));
+    let reason = match said {
         Ok(version) if version == MUJOCO_VERSION => return Ok(()),
         Ok(version) => format!("it is version {version:?}, not {MUJOCO_VERSION}"),
-        Err(failure) => failure.to_string(),
+        Err(reason) => reason,
     };
-    let folder = target.to_owned();
-    Err(EnvironmentError::Verify { folder, reason })
+    Err(EnvironmentError::Failed {
+        what: format!("MuJoCo was installed in {} and", target.display()),
+        reason,
+        hint: "set NEEDLEBENCH_PYTHON to another Python of 3.11 or newer".to_owned(),
+    })
 }
 
-/// What there is of an environment.
-#[derive(Debug, PartialEq, Eq)]
-enum State {
-    /// Nothing that was ever complete.
-    Absent,
-    /// All of it, as it was installed.
-    Complete,
-    /// It was complete; why it is not any more.
-    Damaged(String),
-}
-
-fn state(target: &Path, key: &str) -> State {
-    if !fs::read_to_string(target.join(STAMP)).is_ok_and(|stamp| stamp == key) {
-        return State::Absent;
-    }
-    match installed::check(target, &pinned(), &SOURCES) {
-        Ok(()) => State::Complete,
-        Err(reason) => State::Damaged(reason),
-    }
-}
-
-/// Names and versions that the requirements pin.
-fn pinned() -> Vec<(String, String)> {
-    let lines = REQUIREMENTS.lines();
-    lines
-        .filter_map(|line| {
-            let (name, rest) = line.split_once("==")?;
-            let version = rest.split([' ', ';', '\\']).next()?;
-            Some((name.trim().to_owned(), version.to_owned()))
-        })
-        .collect()
+/// What an environment's Python answers to a script.
+fn ask(python: &Path, script: &str, arguments: &[&str]) -> Result<String, String> {
+    let mut command = Command::new(python);
+    command.args(["-I", "-c", script]).args(arguments);
+    command::run(&mut command, VERIFY_LIMIT)
 }
 
 /// Hash of all that an environment is made of, so that a change of any makes a new environment.
@@ -450,25 +337,12 @@ fn key(python: &Python) -> String {
     let parts = [
         ("python", python.version.as_str()),
         ("executable", executable.as_ref()),
-        ("requirements", REQUIREMENTS),
+        ("requirements", install::requirements(python.wheels)),
     ];
-    let mut hash = Sha256::new();
-    for (name, text) in parts.into_iter().chain(SOURCES) {
-        for part in [name, text] {
-            hash.update((part.len() as u64).to_le_bytes());
-            hash.update(part);
-        }
-    }
-    hex(&hash.finalize())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    use std::fmt::Write;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
+    let parts = parts.into_iter().chain(SOURCES);
+    let texts = parts.flat_map(|(name, text)| [name, text]);
+    let told_apart: String = texts.map(|text| format!("{}:{text}", text.len())).collect();
+    sha256_hex(told_apart.as_bytes())
 }
 
 /// An environment variable that is set to something.
@@ -518,4 +392,87 @@ fn split_words(command: &str) -> Vec<String> {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quotes_keep_blanks_in_a_word() {
+        assert_eq!(
+            split_words(r#" "C:\my python\python.exe"  -c "" x"#),
+            [r"C:\my python\python.exe", "-c", "", "x"]
+        );
+        assert!(split_words("  ").is_empty());
+    }
+
+    #[test]
+    fn every_source_of_the_harness_is_carried() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("harness/needlebench_harness");
+        let mut on_disk: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .filter(|path| path.extension().is_some_and(|extension| extension == "py"))
+            .map(|path| path.file_name().unwrap().to_str().unwrap().to_owned())
+            .collect();
+        on_disk.sort();
+        assert_eq!(on_disk, SOURCES.map(|(name, _)| name));
+    }
+
+    #[test]
+    fn key_depends_on_the_python() {
+        let python = |version: &str| Python {
+            executable: PathBuf::from("/p"),
+            version: version.to_owned(),
+            wheels: version.parse().unwrap(),
+        };
+        assert_eq!(key(&python("3.11.7")), key(&python("3.11.7")));
+        assert_ne!(key(&python("3.11.7")), key(&python("3.11.8")));
+    }
+
+    /// Writes a wheel of an empty package, and returns its path and hash.
+    fn tiny_wheel(folder: &Path, python: &Python) -> (PathBuf, String) {
+        const WRITE: &str = "
+import base64, hashlib, sys, zipfile
+text, info = 'here = True\\n', 'tiny-1.0.dist-info/'
+sha256 = base64.urlsafe_b64encode(hashlib.sha256(text.encode()).digest()).decode().rstrip('=')
+with zipfile.ZipFile(sys.argv[1], 'w') as wheel:
+    wheel.writestr('tiny.py', text)
+    wheel.writestr(info + 'METADATA', 'Metadata-Version: 2.1\\nName: tiny\\nVersion: 1.0\\n')
+    wheel.writestr(info + 'WHEEL', 'Wheel-Version: 1.0\\nRoot-Is-Purelib: true\\nTag: py3-none-any\\n')
+    wheel.writestr(info + 'RECORD', f'tiny.py,sha256={sha256},{len(text)}\\n')
+";
+        let wheel = folder.join("tiny-1.0-py3-none-any.whl");
+        ask(&python.executable, WRITE, &[wheel.to_str().unwrap()]).unwrap();
+        let sha256 = sha256_hex(&fs::read(&wheel).unwrap());
+        (wheel, sha256)
+    }
+
+    #[test]
+    fn package_with_other_hashes_than_the_lock_or_its_record_says_is_refused() {
+        let python = python::find(&EnvironmentOptions::from_process()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        install::make_venv(&python, folder.path()).unwrap();
+        let venv_python = install::venv_python(folder.path());
+        let (wheel, sha256) = tiny_wheel(folder.path(), &python);
+        let install = |hash: &str| {
+            let lock = format!("{} --hash=sha256:{hash}\n", wheel.display());
+            let ask = |pip: &mut Command| {
+                pip.arg("install");
+            };
+            install::run_pip(&venv_python, folder.path(), &lock, ask).unwrap()
+        };
+        let import = || ask(&venv_python, "import tiny", &[]);
+        let check = || ask(&venv_python, CHECK_RECORDS, &["tiny"]);
+
+        let refused = install(&"0".repeat(64)).unwrap_err();
+        assert!(refused.contains("HASHES"), "{refused}");
+        assert!(import().is_err());
+
+        install(&sha256).unwrap();
+        import().unwrap();
+        check().unwrap();
+        let site = install::site_packages(folder.path(), python.wheels);
+        fs::write(site.join("tiny.py"), "here = Fals\n").unwrap();
+        let refused = check().unwrap_err();
+        assert!(refused.contains("tiny.py is not what its wheel has"));
+    }
+}

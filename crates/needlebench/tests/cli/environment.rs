@@ -1,5 +1,7 @@
 //! A MuJoCo that cannot be had, or fails: rapier's results are kept and the exit status is 3.
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -181,11 +183,29 @@ fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
         ("ALL_PROXY", Some(nowhere)),
         ("PIP_RETRIES", Some("0")),
     ];
+    // uv is asked for what has the hashes; where it fails, as this one does, pip is tried.
+    bench.write(
+        "bin/uv",
+        "#!/bin/sh\necho \"$@\" >> uv.log\ntest $1 = venv\n",
+    );
+    std::fs::set_permissions(bench.path("bin/uv"), Permissions::from_mode(0o755)).unwrap();
+    let path = std::env::var("PATH").unwrap();
+    let path = format!("{}:{path}", bench.path("bin").display());
+    let with_uv = [&offline[..], &[("PATH", Some(path.as_str()))]].concat();
     let prepare = ["doctor", "--prepare", "--wheels", "wheels", "--json"];
     let refused = bench
-        .run_with(&offline, &["doctor", "--prepare"])
+        .run_with(&with_uv, &["doctor", "--prepare"])
         .exits_with(3);
-    refused.complains(["needlebench doctor --download", "--prepare --wheels"]);
+    refused.complains([
+        "uv failed, trying pip instead",
+        "needlebench doctor --download",
+        "--prepare --wheels",
+    ]);
+    let asked = String::from_utf8(bench.read("uv.log")).unwrap();
+    assert!(
+        asked.contains("--no-cache") && asked.contains("--require-hashes"),
+        "{asked}"
+    );
 
     let ready = bench.run_with(&offline, &prepare).exits_with(0).json();
     assert_eq!(ready["made"], true);

@@ -9,117 +9,63 @@ use crate::mujoco::tail::Tail;
 /// Variables that would let foreign packages or settings of another environment in.
 ///
 /// Index, proxy and certificate settings of pip and uv stay: they are how a site reaches packages.
-const FOREIGN_VARIABLES: [&str; 10] = [
-    "PYTHONHOME",
-    "PYTHONPATH",
-    "PYTHONSTARTUP",
-    "VIRTUAL_ENV",
-    "__PYVENV_LAUNCHER__",
-    "PIP_PREFIX",
-    "PIP_PYTHON",
-    "PIP_ROOT",
-    "PIP_TARGET",
-    "UV_PYTHON",
-];
+const FOREIGN_VARIABLES: &str = "PYTHONHOME PYTHONPATH PYTHONSTARTUP VIRTUAL_ENV __PYVENV_LAUNCHER__ \
+                                 PIP_PREFIX PIP_PYTHON PIP_ROOT PIP_TARGET UV_PYTHON";
 
-/// Why a command did not do its work.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum CommandFailure {
-    /// It could not be started.
-    #[error("it cannot be started: {reason}")]
-    Start {
-        /// What the operating system says.
-        reason: String,
-    },
-    /// It ended with an error.
-    #[error("{status}\n{stderr_tail}")]
-    Exit {
-        /// Exit status or signal.
-        status: String,
-        /// The last that it wrote to standard error.
-        stderr_tail: String,
-    },
-    /// It took too long and was killed.
-    #[error("it took longer than {seconds} s and was stopped\n{stderr_tail}")]
-    TimedOut {
-        /// The limit, s.
-        seconds: f64,
-        /// The last that it wrote to standard error.
-        stderr_tail: String,
-    },
-}
-
-/// Runs a command to its end and returns what it wrote to standard output.
+/// Runs a command to its end; what it wrote to standard output, or why it did not do its work.
 ///
 /// Only the end of long output is kept; the commands here answer in a line or two.
-pub(super) fn run(command: &mut Command, limit: Duration) -> Result<String, CommandFailure> {
-    for name in FOREIGN_VARIABLES {
+pub(super) fn run(command: &mut Command, limit: Duration) -> Result<String, String> {
+    for name in FOREIGN_VARIABLES.split(' ') {
         command.env_remove(name);
     }
-    let start_failure = |error: std::io::Error| CommandFailure::Start {
-        reason: error.to_string(),
-    };
+    let not_started = |error: std::io::Error| format!("it cannot be started: {error}");
     let mut child = command
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .map_err(start_failure)?;
+        .map_err(not_started)?;
     let stdout = child.stdout.take().map(Tail::of);
     let stderr = child.stderr.take().map(Tail::of);
     let text = |tail: &Option<Tail>| tail.as_ref().map_or_else(String::new, Tail::after_exit);
     let started = Instant::now();
     loop {
-        if let Some(status) = child.try_wait().map_err(start_failure)? {
-            if status.success() {
-                return Ok(text(&stdout));
+        match child.try_wait().map_err(not_started)? {
+            Some(status) if status.success() => return Ok(text(&stdout)),
+            Some(status) => return Err(format!("{status}\n{}", text(&stderr))),
+            None if started.elapsed() > limit => {
+                // It may have ended just now; either way it is gone afterwards.
+                let _ = child.kill();
+                let _ = child.wait();
+                let seconds = limit.as_secs_f64();
+                return Err(format!(
+                    "it took longer than {seconds} s and was stopped\n{}",
+                    text(&stderr)
+                ));
             }
-            return Err(CommandFailure::Exit {
-                status: status.to_string(),
-                stderr_tail: text(&stderr),
-            });
+            None => thread::sleep(Duration::from_millis(5)),
         }
-        if started.elapsed() > limit {
-            // It may have ended just now; either way it is gone afterwards.
-            let _ = child.kill();
-            let _ = child.wait();
-            return Err(CommandFailure::TimedOut {
-                seconds: limit.as_secs_f64(),
-                stderr_tail: text(&stderr),
-            });
-        }
-        thread::sleep(Duration::from_millis(5));
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
 
-    #[cfg(unix)]
     #[test]
     fn late_command_is_stopped_at_its_limit() {
         let started = Instant::now();
         let failure = run(Command::new("sleep").arg("30"), Duration::from_millis(100));
-        assert!(matches!(failure, Err(CommandFailure::TimedOut { .. })));
+        assert!(failure.unwrap_err().contains("longer than 0.1 s"));
         assert!(started.elapsed() < Duration::from_secs(10));
     }
 
-    #[cfg(unix)]
     #[test]
     fn failing_command_reports_status_and_last_words() {
-        let failure = run(
-            Command::new("sh").args(["-c", "echo why >&2; exit 7"]),
-            Duration::from_secs(10),
-        );
-        let Err(CommandFailure::Exit {
-            status,
-            stderr_tail,
-        }) = failure
-        else {
-            panic!("{failure:?}");
-        };
-        assert!(status.contains('7'), "{status}");
-        assert_eq!(stderr_tail, "why");
+        let mut command = Command::new("sh");
+        command.args(["-c", "echo why >&2; exit 7"]);
+        let failure = run(&mut command, Duration::from_secs(10));
+        assert_eq!(failure.unwrap_err(), "exit status: 7\nwhy");
     }
 }

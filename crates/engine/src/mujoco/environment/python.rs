@@ -8,29 +8,20 @@ use std::process::Command;
 use std::str::FromStr;
 use std::time::Duration;
 
-use super::command::{CommandFailure, run};
+use super::command::run;
 use super::{EnvironmentError, EnvironmentOptions, MUJOCO_VERSION};
-
-/// Oldest and newest Python that MuJoCo 4.0.0 has wheels for.
-const OLDEST: PythonVersion = PythonVersion {
-    major: 3,
-    minor: 11,
-};
-const NEWEST: PythonVersion = PythonVersion {
-    major: 3,
-    minor: 15,
-};
 
 /// The part of a Python's version that wheels are made for, such as 3.12.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct PythonVersion {
-    major: u32,
-    minor: u32,
-}
+pub struct PythonVersion(pub(super) u32, pub(super) u32);
+
+/// Oldest and newest Python that MuJoCo 4.0.0 has wheels for.
+const OLDEST: PythonVersion = PythonVersion(3, 11);
+const NEWEST: PythonVersion = PythonVersion(3, 15);
 
 impl fmt::Display for PythonVersion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}", self.major, self.minor)
+        write!(f, "{}.{}", self.0, self.1)
     }
 }
 
@@ -41,11 +32,8 @@ impl FromStr for PythonVersion {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let version =
             leading(text).ok_or_else(|| format!("`{text}` is no version such as 3.12"))?;
-        if version < OLDEST || version > NEWEST {
-            return Err(format!(
-                "MuJoCo {MUJOCO_VERSION} is made for Python {}",
-                made_for()
-            ));
+        if !(OLDEST..=NEWEST).contains(&version) {
+            return Err(made_for());
         }
         Ok(version)
     }
@@ -55,29 +43,21 @@ impl FromStr for PythonVersion {
 fn leading(version: &str) -> Option<PythonVersion> {
     let mut numbers = version.split('.').map(str::parse::<u32>);
     match (numbers.next(), numbers.next()) {
-        (Some(Ok(major)), Some(Ok(minor))) => Some(PythonVersion { major, minor }),
+        (Some(Ok(major)), Some(Ok(minor))) => Some(PythonVersion(major, minor)),
         _ => None,
     }
 }
 
 /// The Pythons that there are wheels for, in words.
 pub(super) fn made_for() -> String {
-    format!("{OLDEST} to {NEWEST}")
+    format!("MuJoCo {MUJOCO_VERSION} is made for Python {OLDEST} to {NEWEST}")
 }
 
 /// In the order in which they are tried.
 ///
 /// `python3` is what the user means by Python, and nearly always suits: asking it alone keeps the
 /// start short. The others help where it is too old.
-const NAMES: [&str; 7] = [
-    "python3",
-    "python3.13",
-    "python3.12",
-    "python3.11",
-    "python3.14",
-    "python3.15",
-    "python",
-];
+const NAMES: &str = "python3 python3.13 python3.12 python3.11 python3.14 python3.15 python";
 
 /// Answers one line: version, bits, implementation, whether there is a GIL, executable.
 const PROBE: &str = "import platform, sys, sysconfig
@@ -97,42 +77,29 @@ pub(super) struct Python {
     pub(super) wheels: PythonVersion,
 }
 
-/// A Python that was tried and will not do.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RejectedPython {
-    /// What was tried.
-    pub path: PathBuf,
-    /// Why it will not do.
-    pub reason: String,
-}
-
-impl fmt::Display for RejectedPython {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "\n  {}: {}", self.path.display(), self.reason)
-    }
-}
-
 /// The Python that the options name, or else the first on the search path that will do.
 pub(super) fn find(options: &EnvironmentOptions) -> Result<Python, EnvironmentError> {
     if let Some(chosen) = &options.python {
-        let path = if chosen.components().count() == 1 {
-            on_path(options, chosen.as_os_str()).next()
-        } else {
-            None
-        };
-        let path = path.unwrap_or_else(|| chosen.clone());
+        let is_name = chosen.components().count() == 1;
+        let named = is_name.then(|| on_path(options, chosen.as_os_str()).next());
+        let path = named.flatten().unwrap_or_else(|| chosen.clone());
         return probe(&path).map_err(|reason| EnvironmentError::ChosenPython { path, reason });
     }
-    let mut rejected = Vec::new();
-    for name in NAMES {
+    let mut rejected = String::new();
+    for name in NAMES.split(' ') {
         for path in on_path(options, OsStr::new(name)) {
             match probe(&path) {
                 Ok(python) => return Ok(python),
-                Err(reason) => rejected.push(RejectedPython { path, reason }),
+                Err(reason) => rejected += &format!("\n  {}: {reason}", path.display()),
             }
         }
     }
-    Err(EnvironmentError::NoPython { rejected })
+    let tried = if rejected.is_empty() {
+        "found none at all".to_owned()
+    } else {
+        format!("tried:{rejected}")
+    };
+    Err(EnvironmentError::NoPython { tried })
 }
 
 /// Files of a name on the search path, in its order.
@@ -152,29 +119,20 @@ pub(super) fn on_path<'a>(
 
 fn probe(path: &Path) -> Result<Python, String> {
     let answer = run(Command::new(path).args(["-I", "-c", PROBE]), PROBE_LIMIT);
-    match answer {
-        Ok(line) => judge(&line),
-        Err(CommandFailure::Exit {
-            status,
-            stderr_tail,
-        }) => {
-            let first_line = stderr_tail.lines().next().unwrap_or_default();
-            Err(format!("does not run: {status} {first_line}"))
-        }
-        Err(failure) => Err(format!("does not run: {failure}")),
-    }
+    judge(&answer.map_err(|failure| {
+        let lines: Vec<&str> = failure.lines().take(2).collect();
+        format!("does not run: {}", lines.join(" "))
+    })?)
 }
 
 fn judge(answer: &str) -> Result<Python, String> {
     let unreadable = || format!("does not answer like a Python: {answer:?}");
-    let mut words = answer.splitn(5, ' ');
-    let mut word = || words.next().filter(|word| !word.is_empty());
-    let (Some(version), Some(bits), Some(implementation), Some(gil), Some(executable)) =
-        (word(), word(), word(), word(), word())
-    else {
+    let words = answer.splitn(5, ' ').filter(|word| !word.is_empty());
+    let words: Vec<&str> = words.collect();
+    let [version, bits, implementation, gil, executable] = words[..] else {
         return Err(unreadable());
     };
-    let short = leading(version).ok_or_else(unreadable)?;
+    let wheels = leading(version).ok_or_else(unreadable)?;
     let name = format!("{implementation} {version}, {bits} bit");
     if implementation != "cpython" || gil != "1" {
         return Err(format!("{name}: not the standard CPython"));
@@ -182,17 +140,16 @@ fn judge(answer: &str) -> Result<Python, String> {
     if bits != "64" {
         return Err(format!("{name}: MuJoCo needs 64 bit"));
     }
-    let wheels = format!("MuJoCo {MUJOCO_VERSION} is made for Python {}", made_for());
-    if short < OLDEST {
-        return Err(format!("Python {version} is too old: {wheels}"));
+    if wheels < OLDEST {
+        return Err(format!("Python {version} is too old: {}", made_for()));
     }
-    if short > NEWEST {
-        return Err(format!("Python {version} is too new: {wheels}"));
+    if wheels > NEWEST {
+        return Err(format!("Python {version} is too new: {}", made_for()));
     }
     Ok(Python {
         executable: PathBuf::from(executable),
         version: version.to_owned(),
-        wheels: short,
+        wheels,
     })
 }
 

@@ -1,0 +1,221 @@
+//! Whether an environment still is what was installed.
+//!
+//! Once everything is in place it is sealed: size, times and SHA-256 of each file are written down, under a hash of
+//! all that. Later starts only look at sizes and times. A file that anybody writes to, cuts off or replaces has other
+//! ones, and is hashed again.
+
+use std::fmt::Write as _;
+use std::fs::{self, Metadata};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use needlebench_cell::sha256_hex;
+
+use super::install::venv_python;
+
+/// A line for each file, `STATE SHA-256 PATH`, below the hash of these and of what the environment is made of.
+const SEAL: &str = "complete";
+
+/// What there is of an environment.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Found {
+    /// Nothing that was ever complete.
+    Nothing,
+    /// All of it, as it was installed.
+    Complete,
+    /// It was complete; why it is not any more.
+    Damaged(String),
+}
+
+/// Seals what is in `folder`, made of what `key` stands for.
+pub(super) fn seal(folder: &Path, key: &str) -> io::Result<()> {
+    let mut lines = String::new();
+    for (path, metadata) in files(folder)? {
+        let name = path.strip_prefix(folder).unwrap_or(&path).display();
+        // Python renews its bytecode as it likes.
+        if !path
+            .components()
+            .any(|part| part.as_os_str() == "__pycache__")
+        {
+            let sha256 = sha256_hex(&fs::read(&path)?);
+            // Writing to a String cannot fail.
+            let _ = writeln!(lines, "{} {sha256} {name}", state(&metadata));
+        }
+    }
+    write(folder, key, &lines)
+}
+
+/// What there is in `folder` of the environment that `key` stands for.
+pub(super) fn look(folder: &Path, key: &str) -> Found {
+    let seal = fs::read_to_string(folder.join(SEAL)).unwrap_or_default();
+    match seal.split_once('\n') {
+        Some((hash, lines)) if hash == sha256_hex(format!("{key}\n{lines}").as_bytes()) => {
+            match check(folder, key, lines) {
+                Ok(()) => Found::Complete,
+                Err(reason) => Found::Damaged(reason),
+            }
+        }
+        // Cut off or garbled, it is evidence of nothing.
+        _ => Found::Nothing,
+    }
+}
+
+fn check(folder: &Path, key: &str, lines: &str) -> Result<(), String> {
+    let missing = |path: &Path, error: io::Error| format!("{}: {error}", path.display());
+    let python = venv_python(folder);
+    // A link to an interpreter that has gone is none.
+    let interpreter = fs::metadata(&python).map_err(|error| missing(&python, error))?;
+    if !interpreter.is_file() {
+        return Err(format!("{} is no file", python.display()));
+    }
+    let mut renewed = String::new();
+    for line in lines.lines() {
+        let mut words = line.splitn(3, ' ');
+        let [known, sha256, name] = std::array::from_fn(|_| words.next().unwrap_or_default());
+        let path = folder.join(name);
+        let metadata = fs::symlink_metadata(&path).map_err(|error| missing(&path, error))?;
+        let now = state(&metadata);
+        if now != known {
+            let bytes = fs::read(&path).map_err(|error| missing(&path, error))?;
+            if sha256_hex(&bytes) != sha256 {
+                return Err(format!("{} is not what was installed", path.display()));
+            }
+        }
+        let _ = writeln!(renewed, "{now} {sha256} {name}");
+    }
+    if renewed != lines {
+        // Copied, for instance; where it cannot be written, the next start hashes again.
+        let _ = write(folder, key, &renewed);
+    }
+    Ok(())
+}
+
+/// Replaces the seal as a whole: others may be reading it.
+fn write(folder: &Path, key: &str, lines: &str) -> io::Result<()> {
+    let hash = sha256_hex(format!("{key}\n{lines}").as_bytes());
+    let new = folder.join(format!("{SEAL}.{}", std::process::id()));
+    fs::write(&new, format!("{hash}\n{lines}"))?;
+    fs::rename(&new, folder.join(SEAL))
+}
+
+/// All files below a folder, sorted; no links.
+pub(super) fn files(folder: &Path) -> io::Result<Vec<(PathBuf, Metadata)>> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let metadata = entry.metadata()?;
+        if metadata.is_dir() {
+            found.extend(files(&entry.path())?);
+        } else if metadata.is_file() {
+            found.push((entry.path(), metadata));
+        }
+    }
+    found.sort_by(|(a, _), (b, _)| a.cmp(b));
+    Ok(found)
+}
+
+/// Size and times of a file: whoever writes to it changes one of them.
+fn state(metadata: &Metadata) -> String {
+    let modified = metadata.modified().ok();
+    let modified = modified.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+    let modified = modified.map_or(0, |time| time.as_nanos());
+    format!("{}:{modified}:{}", metadata.len(), changed(metadata))
+}
+
+/// When the file's entry was changed last, which nobody can set back.
+#[cfg(unix)]
+fn changed(metadata: &Metadata) -> String {
+    use std::os::unix::fs::MetadataExt;
+    format!("{}.{}", metadata.ctime(), metadata.ctime_nsec())
+}
+
+#[cfg(not(unix))]
+fn changed(_: &Metadata) -> String {
+    String::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILES: [&str; 3] = ["venv/pyvenv.cfg", "venv/lib/tiny/a.py", "requirements.lock"];
+
+    fn sealed() -> tempfile::TempDir {
+        let cache = tempfile::tempdir().unwrap();
+        let python = venv_python(cache.path());
+        for file in FILES
+            .map(|name| cache.path().join(name))
+            .iter()
+            .chain([&python])
+        {
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, "a = 1\n").unwrap();
+        }
+        seal(cache.path(), "key").unwrap();
+        cache
+    }
+
+    #[track_caller]
+    fn is_damaged(cache: &Path, file: &Path) {
+        let found = look(cache, "key");
+        let Found::Damaged(reason) = &found else {
+            panic!("{}: {found:?}", file.display());
+        };
+        assert!(reason.contains(file.to_str().unwrap()), "{reason}");
+    }
+
+    #[test]
+    fn every_file_that_is_not_what_was_installed_is_named() {
+        let ways: [fn(&Path); 3] = [
+            |file| fs::remove_file(file).unwrap(),
+            // Cut off, and changed in place.
+            |file| fs::write(file, "a = 1").unwrap(),
+            |file| fs::write(file, "a = 2\n").unwrap(),
+        ];
+        for damage in ways {
+            for name in FILES {
+                let cache = sealed();
+                assert_eq!(look(cache.path(), "key"), Found::Complete);
+                let file = cache.path().join(name);
+                damage(&file);
+                is_damaged(cache.path(), &file);
+            }
+        }
+        let cache = sealed();
+        let python = venv_python(cache.path());
+        fs::remove_file(&python).unwrap();
+        is_damaged(cache.path(), &python);
+    }
+
+    #[test]
+    fn a_seal_that_was_changed_or_is_for_something_else_is_none() {
+        let cache = sealed();
+        assert_eq!(look(cache.path(), "another key"), Found::Nothing);
+        let seal = cache.path().join(SEAL);
+        let text = fs::read_to_string(&seal).unwrap();
+        let shorter = &text[..text.trim_end().rfind('\n').unwrap() + 1];
+        for changed in [shorter, &text.replace(" venv", " Venv"), ""] {
+            fs::write(&seal, changed).unwrap();
+            assert_eq!(look(cache.path(), "key"), Found::Nothing);
+        }
+        fs::remove_file(&seal).unwrap();
+        assert_eq!(look(cache.path(), "key"), Found::Nothing);
+    }
+
+    #[test]
+    fn files_with_other_times_are_hashed_once_more_and_not_again() {
+        let cache = sealed();
+        let seal = || fs::read_to_string(cache.path().join(SEAL)).unwrap();
+        let before = seal();
+        let file = fs::File::options()
+            .append(true)
+            .open(cache.path().join(FILES[1]));
+        file.unwrap().set_modified(UNIX_EPOCH).unwrap();
+        assert_eq!(look(cache.path(), "key"), Found::Complete);
+        let after = seal();
+        assert_ne!(before, after);
+        assert_eq!(look(cache.path(), "key"), Found::Complete);
+        assert_eq!(seal(), after);
+    }
+}
