@@ -24,12 +24,12 @@ use super::replan::replan;
 use crate::junit::study_junit;
 use crate::markdown::study::summary_markdown;
 use crate::page::study::{CasePictures, StudyPage};
+use crate::table::blocks_text;
 use crate::table::study::answer::Answer;
 use crate::table::study::criteria::requirements_blocks;
 use crate::table::study::document::{Document, Parts};
 use crate::table::study::postures::{Postures, postures_blocks, postures_headline};
 use crate::table::study::robustness::{robustness_blocks, robustness_method};
-use crate::table::study::text::summary_text;
 use crate::table::verdict::capitals;
 use needlebench_bench::progress::Progress;
 
@@ -105,10 +105,10 @@ impl FinishedStudy {
     pub fn text(&self, all: bool) -> String {
         let mut text = String::new();
         if all {
-            text.push_str(&summary_text(&self.document.more));
+            text.push_str(&blocks_text(&self.document.more));
             text.push('\n');
         }
-        text.push_str(&summary_text(&self.document.first));
+        text.push_str(&blocks_text(&self.document.first));
         text
     }
 }

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use needlebench_evaluation::report::Verdict;
 
 use super::escape::inline;
-use crate::table::study::block::Block;
 use crate::table::study::document::Document;
+use crate::table::{Block, has_words, heading};
 
 /// Text that breaks no table.
 fn cell_text(text: &str) -> String {
@@ -18,7 +18,7 @@ fn headings(header: &[String]) -> Vec<String> {
     let mut first = "";
     let mut names = Vec::new();
     for name in header {
-        let name = name.trim_start_matches('<');
+        let name = heading(name);
         if let Some(second) = name.strip_prefix('\n') {
             names.push(cell_text(&format!("{first} {second}")));
         } else {
@@ -73,7 +73,7 @@ fn write_blocks(out: &mut String, blocks: &[Block]) -> std::fmt::Result {
                 writeln!(out, "| {} |", headings(header).join(" | "))?;
                 out.push('|');
                 for (at, name) in header.iter().enumerate() {
-                    let text = at == 0 || name.starts_with('<');
+                    let text = has_words(at, name);
                     out.push_str(if text { "---|" } else { "--:|" });
                 }
                 writeln!(out)?;

@@ -19,6 +19,7 @@ mod motion;
 #[cfg(test)]
 mod number_tests;
 mod pack;
+pub mod parts;
 mod replay;
 mod room;
 mod run;

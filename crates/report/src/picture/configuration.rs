@@ -145,7 +145,7 @@ pub fn placement_picture(resolved: &ResolvedScenario, q: &Joints) -> Image {
 }
 
 /// The cell with the arm in a posture.
-pub(super) fn posture_scene(resolved: &ResolvedScenario, backdrop: &Backdrop, q: &Joints) -> Scene {
+pub fn posture_scene(resolved: &ResolvedScenario, backdrop: &Backdrop, q: &Joints) -> Scene {
     let robot = &resolved.cell.robot;
     let mut scene = Scene {
         surfaces: backdrop.surfaces.clone(),

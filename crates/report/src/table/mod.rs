@@ -1,6 +1,7 @@
 //! Tables and lines for a terminal.
 
 pub mod atlas;
+mod block;
 pub(crate) mod budget;
 pub mod comparison;
 pub(crate) mod engine_headings;
@@ -23,6 +24,8 @@ pub mod suggest;
 pub(crate) mod true_target;
 pub(crate) mod verdict;
 
+pub use block::{Block, blocks_text};
+pub(crate) use block::{has_words, heading};
 pub use plain::{Table, plain_table};
 pub(crate) use run::route_wanted_m;
 pub use run::{fissures_in_words, rejected_in_words, report_screen, report_text, route_in_words};

@@ -1,34 +1,11 @@
-//! Headings, tables and lines that a study's statistics are shown as, and numbers in them.
+//! Numbers in the tables of a study's statistics.
 
 use needlebench_study::statistics::{Interval, Rate};
 
 use crate::number::{in_percent, three_digits};
 
-/// One part of a document.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Block {
-    /// The answer, in a sentence.
-    Answer(String),
-    /// A heading.
-    Heading(String),
-    /// A table: its first column is text, the others are numbers unless their heading starts with `<`.
-    Table {
-        header: Vec<String>,
-        rows: Vec<Vec<String>>,
-    },
-    /// Lines of text.
-    Lines(Vec<String>),
-}
-
 /// Reasons that are shown of each configuration.
 pub(super) const MOST_REASONS: usize = 3;
-
-pub fn table<const N: usize>(header: [&str; N], rows: Vec<Vec<String>>) -> Block {
-    Block::Table {
-        header: header.map(str::to_owned).to_vec(),
-        rows,
-    }
-}
 
 pub(super) fn between(interval: Interval, text: impl Fn(f64) -> String) -> String {
     format!("{} .. {}", text(interval.low), text(interval.high))

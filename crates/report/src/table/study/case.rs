@@ -11,9 +11,9 @@ use needlebench_study::{CaseResult, Design, FactorKind, FactorValue, Row};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::block::Block;
-use super::text::summary_text;
 use crate::number::three_digits;
+use crate::table::Block;
+use crate::table::blocks_text;
 
 /// A case as a JSON value: its factors, and its rows with every metric that they have.
 #[derive(Debug, Serialize)]
@@ -161,6 +161,6 @@ pub fn case_text(
         header,
         rows: rows.collect(),
     };
-    text.push_str(&summary_text(&[table]));
+    text.push_str(&blocks_text(&[table]));
     text
 }

@@ -3,8 +3,9 @@
 use needlebench_study::statistics::{Choice, QuantileValue, Summary};
 
 use super::answer::{Answer, Comparison, has_tip_errors, percents, spaced};
-use super::block::{Block, case_list, or_dash, rate_text};
+use super::block::{case_list, or_dash, rate_text};
 use crate::number::in_percent;
+use crate::table::Block;
 
 /// Choices on the first screen, and in the whole table.
 const MOST_FIRST: usize = 5;

@@ -5,8 +5,9 @@ use needlebench_study::statistics::{BEST, ConfigurationCounts, Summary};
 use needlebench_study::{Measure, MetricColumn};
 
 use super::answer::{Answer, has_tip_errors, spaced};
-use super::block::{Block, MOST_REASONS, or_dash, rate_text, table};
+use super::block::{MOST_REASONS, or_dash, rate_text};
 use crate::number::in_percent;
+use crate::table::Block;
 
 /// Share of the layouts below which a reason is not worth a word on the first screen.
 const WORTH_A_WORD: f64 = 0.01;
@@ -181,6 +182,6 @@ fn reasons(summary: &Summary, blocks: &mut Vec<Block>) {
         blocks.push(Block::Heading(
             "why a configuration does not work, % of layouts".to_owned(),
         ));
-        blocks.push(table(["configuration", "<because of"], rows));
+        blocks.push(Block::table(["configuration", "<because of"], rows));
     }
 }

@@ -5,8 +5,9 @@ use needlebench_evaluation::report::TraceOutcome;
 use needlebench_study::statistics::{BEST, CriterionResult};
 
 use super::answer::spaced;
-use super::block::{Block, case_list, table};
+use super::block::case_list;
 use crate::number::{in_percent, measured};
+use crate::table::Block;
 
 /// Whether the limit of a criterion is the least that is allowed; the other limits are the most.
 fn is_lower_limit(criterion: &str) -> bool {
@@ -170,7 +171,7 @@ pub(crate) fn requirements_blocks(
     rows.sort();
     vec![
         Block::Heading("requirements".to_owned()),
-        table(
+        Block::table(
             [
                 "requirement",
                 "<criterion",

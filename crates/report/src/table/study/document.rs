@@ -4,11 +4,12 @@ use needlebench_study::statistics::{BEST, BinMean, CriterionResult, RegionMap, S
 
 use super::ROUNDING_MM;
 use super::answer::{Answer, has_tip_errors, spaced};
-use super::block::{Block, MOST_REASONS, case_list, rate_text, table};
+use super::block::{MOST_REASONS, case_list, rate_text};
 use super::choices::{all_choices, compared_first};
 use super::configurations::{all_configurations, configurations_first};
 use super::criteria::{criteria_first, criteria_in_full};
 use crate::number::{in_percent, rounded, three_digits};
+use crate::table::Block;
 
 /// Interactions that are shown of each response.
 const MOST_INTERACTIONS: usize = 3;
@@ -172,7 +173,7 @@ fn goals(summary: &Summary, blocks: &mut Vec<Block>) {
         ]
     });
     blocks.push(Block::Heading("goals".to_owned()));
-    blocks.push(table(
+    blocks.push(Block::table(
         [
             "goal",
             "valid\nlayouts",
@@ -295,7 +296,7 @@ fn regions(summary: &Summary, blocks: &mut Vec<Block>) {
         summary,
         "where another configuration is the best",
     )));
-    blocks.push(table(
+    blocks.push(Block::table(
         [
             "factor",
             "<from .. to",

@@ -9,7 +9,6 @@ pub(crate) mod criteria;
 pub(crate) mod document;
 pub(crate) mod postures;
 pub(crate) mod robustness;
-pub(crate) mod text;
 
 pub use case::{CaseReport, case_text};
 

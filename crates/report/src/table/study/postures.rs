@@ -4,8 +4,8 @@ use needlebench_bench::study::{PreparedStudy, Replanned};
 use needlebench_cell::study::StudyMode;
 use needlebench_study::statistics::{ANY, Gap};
 
-use super::block::{Block, table};
 use crate::number::in_percent;
+use crate::table::Block;
 
 /// Which cases are of postures only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,7 +104,7 @@ pub(crate) fn postures_blocks(found: Option<&Replanned>) -> Vec<Block> {
         "what postures alone overstate: {} cases, drawn from {}, planned too",
         found.cases, found.of
     ));
-    let table = table(
+    let table = Block::table(
         [
             "configuration",
             "ok by\nposture (%)",

@@ -4,7 +4,7 @@ use needlebench_bench::study::RobustnessResult;
 use needlebench_bench::study::robustness::{RESOLUTION, Robustness, SmallestFound, Unaware};
 use needlebench_study::statistics::Method;
 
-use super::block::{Block, table};
+use crate::table::Block;
 
 /// All radii of a result.
 fn radii(found: &Robustness) -> impl Iterator<Item = &SmallestFound> {
@@ -105,7 +105,7 @@ pub fn robustness_blocks(results: &[RobustnessResult]) -> Vec<Block> {
             "robustness: smallest moves of the patient of the base scenario found to break"
                 .to_owned(),
         ),
-        table(
+        Block::table(
             [
                 "goal",
                 "<configuration",
