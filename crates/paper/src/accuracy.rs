@@ -7,13 +7,10 @@ use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, UrGeometry, base_from_base_link};
 use serde::Serialize;
 
-use super::convergence::median;
+use super::closed_form::{Mended, solve};
 use super::dh::{Arm, Target, origin, rotation};
 use super::equations::SEED;
-use super::equations::side::Mended;
-use super::printed;
-use super::solver::solve;
-use super::{Interrupted, Watch};
+use super::{Watch, printed};
 
 /// Where a figure comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -45,35 +42,35 @@ pub struct AccuracyRow {
     pub remark: &'static str,
 }
 
-/// Errors of poses that are to be equal.
+/// Position errors, m, and orientation errors of poses that are to be equal.
 #[derive(Default)]
-struct Tally {
-    position_m: Vec<f64>,
-    orientation: Vec<f64>,
-}
+struct Tally([Vec<f64>; 2]);
 
 impl Tally {
     fn add(&mut self, reached: &Matrix4<f64>, wanted: &Matrix4<f64>) {
-        self.position_m
-            .push((origin(reached) - origin(wanted)).amax());
-        self.orientation
-            .push((rotation(reached) - rotation(wanted)).amax());
+        self.0[0].push((origin(reached) - origin(wanted)).amax());
+        self.0[1].push((rotation(reached) - rotation(wanted)).amax());
     }
 
-    fn row(mut self, name: &'static str, source: Source, remark: &'static str) -> AccuracyRow {
-        let most = |values: &[f64]| values.iter().copied().reduce(f64::max);
+    fn row(self, name: &'static str, source: Source, remark: &'static str) -> AccuracyRow {
+        let samples = self.0[0].len();
+        let [position, orientation] = self.0.map(|mut errors| (median(&mut errors), errors));
         AccuracyRow {
-            name,
-            source,
-            samples: Some(self.position_m.len()),
-            position_max_m: most(&self.position_m),
-            orientation_max: most(&self.orientation),
-            position_median_m: Some(median(&mut self.position_m)),
-            orientation_median: Some(median(&mut self.orientation)),
+            samples: Some(samples),
+            position_median_m: Some(position.0),
+            position_max_m: position.1.last().copied(),
+            orientation_median: Some(orientation.0),
+            orientation_max: orientation.1.last().copied(),
             stated: None,
-            remark,
+            ..stated(name, source, f64::NAN, remark)
         }
     }
+}
+
+/// Middle value; not a number for none. Leaves them sorted.
+pub fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn stated(name: &'static str, source: Source, value: f64, remark: &'static str) -> AccuracyRow {
@@ -94,29 +91,22 @@ fn stated(name: &'static str, source: Source, value: f64, remark: &'static str) 
 const GUESS_RAD: f64 = 0.05;
 
 /// Position repeatability of the UR3, m: the figure usually quoted.
-pub const REPEATABILITY_M: f64 = 1e-4;
+const REPEATABILITY_M: f64 = 1e-4;
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
-fn to_single(matrix: &Matrix4<f64>) -> Matrix4<f32> {
-    matrix.map(|entry| entry as f32)
+fn to_single(number: f64) -> f32 {
+    number as f32
 }
 
 /// Measures `count` random poses.
-pub(super) fn evaluate(count: usize, watch: &Watch<'_>) -> Result<Vec<AccuracyRow>, Interrupted> {
+pub fn evaluate(count: usize, watch: &Watch<'_>) -> Vec<AccuracyRow> {
     let geometry = UrGeometry::UR3;
     let numerical = Numerical::new(&geometry.chain());
-    let (arm, arm_single) = (Arm::<f64>::of(&geometry), Arm::<f32>::of(&geometry));
+    let (arm, arm_single) = (Arm::<f64>::ur3(), Arm::<f32>::ur3());
     let mut random = SplitMix64::new(SEED + 9);
-    let [
-        mut library,
-        mut mended,
-        mut newton,
-        mut floor,
-        mut single,
-        mut single_floor,
-    ] = std::array::from_fn(|_| Tally::default());
-    for _ in 0..count {
-        watch.check()?;
+    let mut tallies: [Tally; 6] = Default::default();
+    let [library, mended, newton, floor, single, single_floor] = &mut tallies;
+    for _ in watch.each(0..count) {
         let made_of = PoseSet::Generic.sample(&geometry, &mut random, 0.0);
         let pose = geometry.base_from_flange(&made_of);
         let wanted = pose.to_homogeneous();
@@ -131,38 +121,36 @@ pub(super) fn evaluate(count: usize, watch: &Watch<'_>) -> Result<Vec<AccuracyRo
         }
         let guess = Joints::from_fn(|i, _| made_of[i] + GUESS_RAD * random.uniform(-1.0, 1.0));
         let in_base_link = base_from_base_link() * pose;
-        let options = GaussNewtonOptions::default();
-        let found = numerical.gauss_newton(&in_base_link, &guess, &options);
+        let found = numerical.gauss_newton(&in_base_link, &guess, &GaussNewtonOptions::default());
         if found.converged {
             newton.add(&arm.base_from_flange(&found.joints.into()), &wanted);
         }
-        floor.add(&arm.base_from_flange(&made_of.into()), &wanted);
-        let wanted_single = to_single(&wanted);
-        for joints in solve(&arm_single, &Target::of(&wanted_single), Mended::ALL)
-            .iter()
-            .flatten()
-        {
+        let made_of: [f64; 6] = made_of.into();
+        floor.add(&arm.base_from_flange(&made_of), &wanted);
+        let target = Target::of(&wanted.map(to_single));
+        for joints in solve(&arm_single, &target, Mended::ALL).iter().flatten() {
             single.add(&arm.base_from_flange(&joints.map(f64::from)), &wanted);
         }
-        #[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
-        let rounded: [f32; 6] = std::array::from_fn(|i| made_of[i] as f32);
+        let rounded = made_of.map(to_single);
         single_floor.add(
             &arm_single.base_from_flange(&rounded).map(f64::from),
             &arm.base_from_flange(&rounded.map(f64::from)),
         );
     }
-    Ok(vec![
+    let [library, mended, newton, floor, single, single_floor] = tallies;
+    let unstated = "unit not stated";
+    vec![
         stated(
             "paper: closed form",
             Source::Paper,
             printed::CLOSED_FORM_ERROR,
-            "unit not stated",
+            unstated,
         ),
         stated(
             "paper: numerical",
             Source::Paper,
             printed::NUMERICAL_ERROR,
-            "unit not stated",
+            unstated,
         ),
         library.row("library: closed form", Source::ThisRun, "all solutions"),
         mended.row(
@@ -202,5 +190,5 @@ pub(super) fn evaluate(count: usize, watch: &Watch<'_>) -> Result<Vec<AccuracyRo
             REPEATABILITY_M,
             "usually quoted, ±0.1 mm: the arm cannot show any of the differences above",
         ),
-    ])
+    ]
 }

@@ -4,30 +4,34 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use needlebench_kinematics::ik::{
-    Configuration, DampedOptions, GaussNewtonOptions, Numerical, NumericalResult, closed_form,
+    ClosedFormSolution, Configuration, DampedOptions, GaussNewtonOptions, Numerical, closed_form,
     wrap_angle,
 };
 use needlebench_kinematics::pose_sets::PoseSet;
 use needlebench_kinematics::random::SplitMix64;
-use needlebench_kinematics::{Chain, Joints, Pose, UrGeometry};
+use needlebench_kinematics::{Chain, Joints, UrGeometry};
 use serde::Serialize;
 
+use super::Watch;
+use super::accuracy::median;
 use super::dh::Arm;
 use super::equations::{SEED, angle_error, well_conditioned};
-use super::newton::{EARLY_STEPS, Ended, gauss_newton, levenberg_marquardt, trace};
+use super::numerical::{
+    CONTENT, Ended, gauss_newton, jacobian, jacobian_printed, levenberg_marquardt,
+};
 use super::solver::same_joints;
-use super::{Interrupted, Watch};
 
 /// Distances of guesses, rad: every joint is off by up to this.
-pub const DISTANCES_RAD: [f64; 9] = [0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, PI];
-
+const DISTANCES_RAD: [f64; 9] = [0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, PI];
+/// Steps that are told apart: who gives up after these finds the undamped method worse than it is.
+const EARLY_STEPS: u32 = 50;
 /// Poses of each set of the convergence table.
 const POSES: usize = 400;
 /// Poses of the histograms of branches.
 const BRANCH_POSES: usize = 1000;
 
 /// The numerical methods that are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Equation 39 as printed (the rest mended).
@@ -42,66 +46,79 @@ pub enum Method {
     LibraryDamped,
 }
 
-impl Method {
-    pub const ALL: [Self; 5] = [
-        Self::Equation39AsPrinted,
-        Self::Mended,
-        Self::LevenbergMarquardt,
-        Self::LibraryGaussNewton,
-        Self::LibraryDamped,
-    ];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Equation39AsPrinted => "equation 39 as printed",
-            Self::Mended => "39 and 45 mended, undamped",
-            Self::LevenbergMarquardt => "the same, Levenberg-Marquardt",
-            Self::LibraryGaussNewton => "library: Gauss-Newton",
-            Self::LibraryDamped => "library: damped, restarted",
-        }
-    }
-
-    /// Solves for the pose of `wanted`, from a guess.
-    fn run(self, bench: &Bench, wanted: &Joints, guess: &[f64; 6]) -> Ended {
-        let pose = UrGeometry::UR3.base_from_flange(wanted).to_homogeneous();
-        match self {
-            Self::Equation39AsPrinted => gauss_newton(&bench.arm, &pose, guess, true),
-            Self::Mended => gauss_newton(&bench.arm, &pose, guess, false),
-            Self::LevenbergMarquardt => levenberg_marquardt(&bench.arm, &pose, guess),
-            Self::LibraryGaussNewton => {
-                let (pose, guess) = (bench.pose(wanted), Joints::from(*guess));
-                let options = GaussNewtonOptions::default();
-                Ended::of(&bench.numerical.gauss_newton(&pose, &guess, &options))
-            }
-            Self::LibraryDamped => {
-                let (pose, guess) = (bench.pose(wanted), Joints::from(*guess));
-                let options = DampedOptions::default();
-                Ended::of(&bench.numerical.damped(&pose, &guess, &options))
-            }
-        }
-    }
-}
-
-impl Ended {
-    fn of(found: &NumericalResult) -> Self {
-        Self {
-            joints: found.joints.map(wrap_angle).into(),
-            iterations: found.iterations,
-            converged: found.converged,
-        }
-    }
-}
+const METHODS: [(Method, &str); 5] = [
+    (Method::Equation39AsPrinted, "equation 39 as printed"),
+    (Method::Mended, "39 and 45 mended, undamped"),
+    (Method::LevenbergMarquardt, "the same, Levenberg-Marquardt"),
+    (Method::LibraryGaussNewton, "library: Gauss-Newton"),
+    (Method::LibraryDamped, "library: damped, restarted"),
+];
 
 /// The arm in both notations.
-struct Bench {
+struct Bench<'a> {
     arm: Arm<f64>,
     chain: Chain,
     numerical: Numerical,
+    watch: &'a Watch<'a>,
 }
 
-impl Bench {
-    fn pose(&self, wanted: &Joints) -> Pose {
-        self.chain.base_link_from_flange(wanted)
+impl Bench<'_> {
+    /// Solves for the pose of `wanted`, from a guess.
+    fn solve(&self, method: Method, wanted: &Joints, guess: &[f64; 6]) -> Option<Ended> {
+        let plain = |jacobian| {
+            let pose = UrGeometry::UR3.base_from_flange(wanted).to_homogeneous();
+            gauss_newton(&self.arm, &pose, guess, jacobian, CONTENT, |_| {})
+        };
+        let (pose, start) = (
+            self.chain.base_link_from_flange(wanted),
+            Joints::from(*guess),
+        );
+        let found = match method {
+            Method::Equation39AsPrinted => return plain(jacobian_printed),
+            Method::Mended => return plain(jacobian),
+            Method::LevenbergMarquardt => {
+                let pose = UrGeometry::UR3.base_from_flange(wanted).to_homogeneous();
+                return levenberg_marquardt(&self.arm, &pose, guess);
+            }
+            Method::LibraryGaussNewton => {
+                self.numerical
+                    .gauss_newton(&pose, &start, &GaussNewtonOptions::default())
+            }
+            Method::LibraryDamped => {
+                self.numerical
+                    .damped(&pose, &start, &DampedOptions::default())
+            }
+        };
+        found.converged.then(|| Ended {
+            joints: found.joints.map(wrap_angle).into(),
+            steps: found.iterations,
+        })
+    }
+
+    /// Where a method ends for each posture's pose, from a guess for each.
+    fn ends(
+        &self,
+        method: Method,
+        postures: &[Joints],
+        mut guess: impl FnMut(&Joints) -> [f64; 6],
+    ) -> Vec<Option<Ended>> {
+        let postures = self.watch.each(postures);
+        postures
+            .map(|wanted| self.solve(method, wanted, &guess(wanted)))
+            .collect()
+    }
+
+    /// The same from guesses off by up to `distance_rad`, the same for every method.
+    fn ends_from(
+        &self,
+        method: Method,
+        postures: &[Joints],
+        distance_rad: f64,
+    ) -> Vec<Option<Ended>> {
+        let mut random = SplitMix64::new(SEED + 5);
+        self.ends(method, postures, |wanted| {
+            guess_near(wanted, distance_rad, &mut random)
+        })
     }
 }
 
@@ -181,42 +198,59 @@ pub struct ConvergenceReport {
     pub steering: Vec<SteeringReport>,
 }
 
+/// A start away from every singularity, as the command `ik` takes it.
+const REGULAR_START: [f64; 6] = [0.1, -1.2, -1.2, -1.0, 1.2, 0.1];
+
+/// The first two are singular at elbow and wrist, as starts that people take often are.
+const STARTS: [(&str, [f64; 6]); 3] = [
+    ("zeros", [0.0; 6]),
+    ("upright home", [0.0, -0.5 * PI, 0.0, -0.5 * PI, 0.0, 0.0]),
+    ("regular", REGULAR_START),
+];
+
 /// Measures all of it.
-pub(super) fn evaluate(watch: &Watch<'_>) -> Result<ConvergenceReport, Interrupted> {
+pub fn evaluate(watch: &Watch<'_>) -> ConvergenceReport {
+    let chain = UrGeometry::UR3.chain();
     let bench = Bench {
         arm: Arm::ur3(),
-        chain: UrGeometry::UR3.chain(),
-        numerical: Numerical::new(&UrGeometry::UR3.chain()),
+        numerical: Numerical::new(&chain),
+        chain,
+        watch,
     };
     let regular = postures(true, POSES, SEED + 2);
     let all = postures(false, POSES, SEED + 3);
-    let mut curves = Vec::new();
-    for method in Method::ALL {
-        curves.push(Curve {
-            method,
-            name: method.name(),
-            well_conditioned: curve(&bench, method, &regular, watch)?,
-            all: curve(&bench, method, &all, watch)?,
-        });
-    }
-    let mut iterations = Vec::new();
-    for distance_rad in [0.1, 0.5, 1.5] {
-        iterations.push(histogram(&bench, &regular, distance_rad, watch)?);
-    }
     let poses = postures(false, BRANCH_POSES, SEED + 4);
-    let mut starts = Vec::new();
-    for (name, start_rad) in STARTS {
-        starts.push(from_start(&bench, name, start_rad, &poses, watch)?);
-    }
-    Ok(ConvergenceReport {
+    let curve = |(method, name)| Curve {
+        method,
+        name,
+        well_conditioned: points(&bench, method, &regular),
+        all: points(&bench, method, &all),
+    };
+    let histogram = |distance_rad| {
+        let mut count_by_iterations = BTreeMap::new();
+        for ended in bench
+            .ends_from(Method::Mended, &regular, distance_rad)
+            .iter()
+            .flatten()
+        {
+            *count_by_iterations.entry(ended.steps).or_default() += 1;
+        }
+        IterationHistogram {
+            distance_rad,
+            count_by_iterations,
+        }
+    };
+    ConvergenceReport {
         poses: POSES,
-        curves,
+        curves: METHODS.map(curve).into(),
         order: order(&bench, &regular),
-        iterations,
-        starts,
+        iterations: [0.1, 0.5, 1.5].map(histogram).into(),
+        starts: STARTS
+            .map(|(name, start)| from_start(&bench, name, start, &poses))
+            .into(),
         steering_trials: poses.len(),
-        steering: steering(&bench, &poses, watch)?,
-    })
+        steering: steering(&bench, &poses),
+    }
 }
 
 fn postures(regular: bool, count: usize, seed: u64) -> Vec<Joints> {
@@ -232,67 +266,32 @@ fn guess_near(wanted: &Joints, distance_rad: f64, random: &mut SplitMix64) -> [f
     std::array::from_fn(|i| wanted[i] + distance_rad * random.uniform(-1.0, 1.0))
 }
 
-fn curve(
-    bench: &Bench,
-    method: Method,
-    postures: &[Joints],
-    watch: &Watch<'_>,
-) -> Result<Vec<Point>, Interrupted> {
-    let mut points = Vec::new();
-    for distance_rad in DISTANCES_RAD {
-        // The same guesses for every method.
-        let mut random = SplitMix64::new(SEED + 5);
-        let (mut converged, mut early, mut same, mut iterations) =
-            (0_usize, 0_usize, 0_usize, 0_u32);
-        for wanted in postures {
-            watch.check()?;
-            let guess = guess_near(wanted, distance_rad, &mut random);
-            let ended = method.run(bench, wanted, &guess);
-            if ended.converged {
-                converged += 1;
-                early += usize::from(ended.iterations <= EARLY_STEPS);
-                iterations += ended.iterations;
-                same += usize::from(same_joints(&ended.joints, wanted));
-            }
-        }
-        let share = |part: usize| part as f64 / postures.len() as f64;
-        points.push(Point {
+/// One method at all distances.
+fn points(bench: &Bench<'_>, method: Method, set: &[Joints]) -> Vec<Point> {
+    let point = |distance_rad| {
+        let ends = bench.ends_from(method, set, distance_rad);
+        let share = |counts: &dyn Fn(&Ended, &Joints) -> bool| {
+            let pairs = ends.iter().zip(set);
+            let part =
+                pairs.filter(|(ended, wanted)| ended.is_some_and(|ended| counts(&ended, wanted)));
+            part.count() as f64 / set.len() as f64
+        };
+        let steps = || ends.iter().flatten().map(|ended| f64::from(ended.steps));
+        Point {
             distance_rad,
-            converged: share(converged),
-            converged_in_50_steps: share(early),
-            same_branch: share(same),
-            mean_iterations: f64::from(iterations) / converged as f64,
-        });
-    }
-    Ok(points)
-}
-
-fn histogram(
-    bench: &Bench,
-    postures: &[Joints],
-    distance_rad: f64,
-    watch: &Watch<'_>,
-) -> Result<IterationHistogram, Interrupted> {
-    let mut random = SplitMix64::new(SEED + 5);
-    let mut count_by_iterations = BTreeMap::new();
-    for wanted in postures {
-        watch.check()?;
-        let guess = guess_near(wanted, distance_rad, &mut random);
-        let ended = Method::Mended.run(bench, wanted, &guess);
-        if ended.converged {
-            *count_by_iterations.entry(ended.iterations).or_default() += 1;
+            converged: share(&|_, _| true),
+            converged_in_50_steps: share(&|ended, _| ended.steps <= EARLY_STEPS),
+            same_branch: share(&|ended, wanted| same_joints(&ended.joints, wanted)),
+            mean_iterations: steps().sum::<f64>() / steps().count() as f64,
         }
-    }
-    Ok(IterationHistogram {
-        distance_rad,
-        count_by_iterations,
-    })
+    };
+    DISTANCES_RAD.map(point).into()
 }
 
 /// Joint errors below this are rounding, rad.
 const ROUNDING_RAD: f64 = 1e-13;
 
-fn order(bench: &Bench, postures: &[Joints]) -> Order {
+fn order(bench: &Bench<'_>, postures: &[Joints]) -> Order {
     let mut random = SplitMix64::new(SEED + 6);
     let mut orders = Vec::new();
     let mut errors_by_step: [Vec<f64>; 5] = Default::default();
@@ -300,27 +299,27 @@ fn order(bench: &Bench, postures: &[Joints]) -> Order {
         let guess = guess_near(wanted, 0.1, &mut random);
         let pose = UrGeometry::UR3.base_from_flange(wanted).to_homogeneous();
         let mut errors: Vec<f64> = Vec::new();
-        let ended = trace(&bench.arm, &pose, &guess, false, ROUNDING_RAD, |joints| {
-            let differences = joints.iter().zip(wanted.iter());
-            errors.push(
-                differences
-                    .map(|(a, b)| angle_error(*a, *b))
-                    .fold(0.0, f64::max),
-            );
-        });
-        if !(ended.converged && same_joints(&ended.joints, wanted)) {
+        let ended = gauss_newton(
+            &bench.arm,
+            &pose,
+            &guess,
+            jacobian,
+            ROUNDING_RAD,
+            |joints| {
+                let differences = joints.iter().zip(wanted.iter());
+                let differences = differences.map(|(a, b)| angle_error(*a, *b));
+                errors.push(differences.fold(0.0, f64::max));
+            },
+        );
+        if !ended.is_some_and(|ended| same_joints(&ended.joints, wanted)) {
             continue;
         }
         for (step, of_step) in errors_by_step.iter_mut().enumerate() {
             // An iteration that has ended stays where it is.
             of_step.extend(errors.get(step).or(errors.last()));
         }
-        let above: Vec<f64> = errors
-            .iter()
-            .copied()
-            .take_while(|error| *error > ROUNDING_RAD)
-            .collect();
-        if let [.., first, second, third] = above[..] {
+        let rounding = errors.iter().position(|error| *error <= ROUNDING_RAD);
+        if let [.., first, second, third] = errors[..rounding.unwrap_or(errors.len())] {
             orders.push(libm::log(third / second) / libm::log(second / first));
         }
     }
@@ -331,49 +330,31 @@ fn order(bench: &Bench, postures: &[Joints]) -> Order {
     }
 }
 
-/// Middle value; not a number for none.
-pub fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
-/// A start away from every singularity, as the command `ik` takes it.
-const REGULAR_START: [f64; 6] = [0.1, -1.2, -1.2, -1.0, 1.2, 0.1];
-
-/// The first two are singular at elbow and wrist, as starts that people take often are.
-const STARTS: [(&str, [f64; 6]); 3] = [
-    ("zeros", [0.0; 6]),
-    ("upright home", [0.0, -0.5 * PI, 0.0, -0.5 * PI, 0.0, 0.0]),
-    ("regular", REGULAR_START),
-];
-
 fn from_start(
-    bench: &Bench,
+    bench: &Bench<'_>,
     name: &'static str,
     start_rad: [f64; 6],
     poses: &[Joints],
-    watch: &Watch<'_>,
-) -> Result<StartReport, Interrupted> {
-    let mut counts = [0_usize; 8];
-    let mut failed = 0_usize;
-    for wanted in poses {
-        watch.check()?;
-        let ended = Method::Mended.run(bench, wanted, &start_rad);
-        if ended.converged {
-            let joints = Joints::from(ended.joints);
-            counts[Configuration::of(&UrGeometry::UR3, &joints).index()] += 1;
-        } else {
-            failed += 1;
-        }
-    }
-    let share = |count: usize| count as f64 / poses.len() as f64;
-    Ok(StartReport {
+) -> StartReport {
+    let ends = bench.ends(Method::Mended, poses, |_| start_rad);
+    let found: Vec<usize> = ends
+        .iter()
+        .flatten()
+        .map(|ended| configuration(ended).index())
+        .collect();
+    let share = |part: usize| part as f64 / poses.len() as f64;
+    let of = |index: usize| share(found.iter().filter(|each| **each == index).count());
+    StartReport {
         name,
         start_rad,
         poses: poses.len(),
-        share_by_configuration: counts.into_iter().map(share).enumerate().collect(),
-        not_converged: share(failed),
-    })
+        share_by_configuration: (0..8).map(|index| (index, of(index))).collect(),
+        not_converged: share(poses.len() - found.len()),
+    }
+}
+
+fn configuration(ended: &Ended) -> Configuration {
+    Configuration::of(&UrGeometry::UR3, &Joints::from(ended.joints))
 }
 
 /// Which joints of the guess are those of the wanted solution; the others are the regular start's.
@@ -388,85 +369,49 @@ const STEERING: [(&str, &[usize]); 5] = [
 /// The last row of the steering table: every joint within this of the wanted one, rad.
 const NEAR_RAD: f64 = 0.5;
 
-fn steering(
-    bench: &Bench,
-    poses: &[Joints],
-    watch: &Watch<'_>,
-) -> Result<Vec<SteeringReport>, Interrupted> {
+fn steering(bench: &Bench<'_>, poses: &[Joints]) -> Vec<SteeringReport> {
     // The wanted solution: any of the pose's, drawn evenly.
     let mut random = SplitMix64::new(SEED + 7);
-    let wanted: Vec<(Joints, Configuration)> = poses
-        .iter()
-        .filter_map(|made_of| {
-            let pose = UrGeometry::UR3.base_from_flange(made_of);
-            let answers: Vec<_> = closed_form(&UrGeometry::UR3, &pose, None)
-                .solutions()
-                .collect();
-            let bound = u32::try_from(answers.len())
-                .ok()
-                .filter(|bound| *bound > 0)?;
-            let chosen = answers.get(random.below(bound) as usize)?;
-            Some((chosen.joints, chosen.configuration))
-        })
-        .collect();
-    let mut rows = Vec::new();
-    for (name, given) in STEERING {
-        let guess = |wanted: &Joints, _: &mut SplitMix64| {
-            std::array::from_fn(|i| {
-                if given.contains(&i) {
-                    wanted[i]
-                } else {
-                    REGULAR_START[i]
-                }
-            })
+    let drawn = poses.iter().filter_map(|made_of| {
+        let pose = UrGeometry::UR3.base_from_flange(made_of);
+        let answers = closed_form(&UrGeometry::UR3, &pose, None);
+        let bound = Some(answers.count()).filter(|bound| *bound > 0)?;
+        answers.solutions().nth(random.below(bound) as usize)
+    });
+    let wanted: Vec<ClosedFormSolution> = drawn.collect();
+    let joints: Vec<Joints> = wanted.iter().map(|each| each.joints).collect();
+    let steer = |guess_name, guess: &mut dyn FnMut(&Joints) -> [f64; 6]| {
+        let ends = bench.ends(Method::Mended, &joints, guess);
+        let pairs = ends.iter().zip(&wanted);
+        let pairs = pairs.filter_map(|(ended, wanted)| {
+            Some([configuration(ended.as_ref()?), wanted.configuration])
+        });
+        let pairs: Vec<[Configuration; 2]> = pairs.collect();
+        let share = |same: fn(&[Configuration; 2]) -> bool| {
+            pairs.iter().filter(|pair| same(pair)).count() as f64 / pairs.len() as f64
         };
-        rows.push(steer(bench, name, &wanted, guess, watch)?);
-    }
-    rows.push(steer(
-        bench,
-        "all six within 0.5 rad",
-        &wanted,
-        |wanted, random| guess_near(wanted, NEAR_RAD, random),
-        watch,
-    )?);
-    Ok(rows)
-}
-
-fn steer(
-    bench: &Bench,
-    name: &'static str,
-    wanted: &[(Joints, Configuration)],
-    guess: impl Fn(&Joints, &mut SplitMix64) -> [f64; 6],
-    watch: &Watch<'_>,
-) -> Result<SteeringReport, Interrupted> {
+        SteeringReport {
+            guess: guess_name,
+            converged: pairs.len() as f64 / joints.len() as f64,
+            wanted_shoulder: share(|[found, wanted]| found.shoulder == wanted.shoulder),
+            wanted_elbow: share(|[found, wanted]| found.elbow == wanted.elbow),
+            wanted_wrist: share(|[found, wanted]| found.wrist == wanted.wrist),
+            wanted_configuration: share(|[found, wanted]| found == wanted),
+        }
+    };
+    let given = STEERING.map(|(name, given)| {
+        let of = |wanted: &Joints, i| {
+            if given.contains(&i) {
+                wanted[i]
+            } else {
+                REGULAR_START[i]
+            }
+        };
+        steer(name, &mut |wanted| std::array::from_fn(|i| of(wanted, i)))
+    });
     let mut random = SplitMix64::new(SEED + 8);
-    let mut converged = 0_usize;
-    let mut hits = [0_usize; 4];
-    for (joints, configuration) in wanted {
-        watch.check()?;
-        let ended = Method::Mended.run(bench, joints, &guess(joints, &mut random));
-        if !ended.converged {
-            continue;
-        }
-        converged += 1;
-        let found = Configuration::of(&UrGeometry::UR3, &Joints::from(ended.joints));
-        let same = [
-            found.shoulder == configuration.shoulder,
-            found.elbow == configuration.elbow,
-            found.wrist == configuration.wrist,
-            found == *configuration,
-        ];
-        for (hit, same) in hits.iter_mut().zip(same) {
-            *hit += usize::from(same);
-        }
-    }
-    let of_converged = |count: usize| count as f64 / converged as f64;
-    Ok(SteeringReport {
-        guess: name,
-        converged: converged as f64 / wanted.len() as f64,
-        wanted_shoulder: of_converged(hits[0]),
-        wanted_elbow: of_converged(hits[1]),
-        wanted_wrist: of_converged(hits[2]),
-        wanted_configuration: of_converged(hits[3]),
-    })
+    let near = steer("all six within 0.5 rad", &mut |wanted| {
+        guess_near(wanted, NEAR_RAD, &mut random)
+    });
+    given.into_iter().chain([near]).collect()
 }

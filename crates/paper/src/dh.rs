@@ -3,7 +3,7 @@
 //! Written apart from the library's kinematics, which use quaternions, so that each checks the
 //! other; generic in the number type, so that single precision can be looked at too.
 
-use nalgebra::{Matrix3, Matrix4, RealField, Vector3};
+use nalgebra::{Matrix3, Matrix4, RealField, RowVector4, Vector3};
 use needlebench_kinematics::UrGeometry;
 
 /// Lengths of Table 1, m, with the `d6` that the table leaves out.
@@ -18,60 +18,39 @@ pub struct Arm<T> {
 }
 
 /// Sine and cosine of the link twists `alpha`: exact, where those of a rounded `pi/2` are not.
-const TWISTS: [(f64, f64); 6] = [
-    (1.0, 0.0),
-    (0.0, 1.0),
-    (0.0, 1.0),
-    (1.0, 0.0),
-    (-1.0, 0.0),
-    (0.0, 1.0),
+const TWISTS: [[f64; 6]; 2] = [
+    [1.0, 0.0, 0.0, 1.0, -1.0, 0.0],
+    [0.0, 1.0, 1.0, 0.0, 0.0, 1.0],
 ];
 
 impl<T: RealField + Copy> Arm<T> {
-    /// The nominal UR3.
+    /// The nominal UR3, rounded to the number type.
     pub fn ur3() -> Self {
-        Self::of(&UrGeometry::UR3)
-    }
-
-    /// The lengths of a geometry, rounded to the number type.
-    pub fn of(geometry: &UrGeometry) -> Self {
-        let number = nalgebra::convert::<f64, T>;
+        let (ur3, number) = (UrGeometry::UR3, nalgebra::convert::<f64, T>);
         Self {
-            d1: number(geometry.d1),
-            a2: number(geometry.a2),
-            a3: number(geometry.a3),
-            d4: number(geometry.d4),
-            d5: number(geometry.d5),
-            d6: number(geometry.d6),
+            d1: number(ur3.d1),
+            a2: number(ur3.a2),
+            a3: number(ur3.a3),
+            d4: number(ur3.d4),
+            d5: number(ur3.d5),
+            d6: number(ur3.d6),
         }
     }
 
-    /// `d` and `a` of the six links, m.
-    fn lengths(&self) -> [(T, T); 6] {
-        let zero = T::zero();
-        [
-            (self.d1, zero),
-            (zero, self.a2),
-            (zero, self.a3),
-            (self.d4, zero),
-            (self.d5, zero),
-            (self.d6, zero),
-        ]
-    }
-
-    /// The six matrices of equation 2, frame `i` in frame `i - 1`.
+    /// The six matrices of equation 2, second line: frame `i` in frame `i - 1`.
     pub fn links(&self, q: &[T; 6]) -> [Matrix4<T>; 6] {
-        let lengths = self.lengths();
+        let (zero, one) = (T::zero(), T::one());
+        let d = [self.d1, zero, zero, self.d4, self.d5, self.d6];
+        let a = [zero, self.a2, self.a3, zero, zero, zero];
         std::array::from_fn(|i| {
-            let (d, a) = lengths[i];
-            let (sine, cosine) = TWISTS[i];
-            link_matrix(
-                q[i],
-                d,
-                a,
-                nalgebra::convert(sine),
-                nalgebra::convert(cosine),
-            )
+            let (s, c) = q[i].sin_cos();
+            let [sa, ca] = TWISTS.map(|of_links| nalgebra::convert::<f64, T>(of_links[i]));
+            Matrix4::from_rows(&[
+                RowVector4::new(c, -ca * s, sa * s, a[i] * c),
+                RowVector4::new(s, ca * c, -sa * c, a[i] * s),
+                RowVector4::new(zero, sa, ca, d[i]),
+                RowVector4::new(zero, zero, zero, one),
+            ])
         })
     }
 
@@ -86,40 +65,16 @@ impl<T: RealField + Copy> Arm<T> {
 
     /// Equation 3: the flange in the base frame.
     pub fn base_from_flange(&self, q: &[T; 6]) -> Matrix4<T> {
-        self.links(q)
-            .iter()
-            .fold(Matrix4::identity(), |product, link| product * link)
+        self.frames(q)[6]
     }
 }
 
-/// The second line of equation 2.
-fn link_matrix<T: RealField + Copy>(
-    theta: T,
-    d: T,
-    a: T,
-    sin_alpha: T,
-    cos_alpha: T,
-) -> Matrix4<T> {
-    let (s, c) = theta.sin_cos();
-    let (zero, one) = (T::zero(), T::one());
-    Matrix4::new(
-        c,
-        -cos_alpha * s,
-        sin_alpha * s,
-        a * c,
-        s,
-        cos_alpha * c,
-        -sin_alpha * c,
-        a * s,
-        zero,
-        sin_alpha,
-        cos_alpha,
-        d,
-        zero,
-        zero,
-        zero,
-        one,
-    )
+impl Arm<f64> {
+    /// As one may read Table 1, which states no signs.
+    pub fn with_positive_lengths(self) -> Self {
+        let (a2, a3) = (self.a2.abs(), self.a3.abs());
+        Self { a2, a3, ..self }
+    }
 }
 
 /// A wanted pose of the flange, by the columns of equation 4.
@@ -133,13 +88,9 @@ pub struct Target<T: RealField> {
 
 impl<T: RealField + Copy> Target<T> {
     pub fn of(base_from_flange: &Matrix4<T>) -> Self {
-        let column = |i: usize| base_from_flange.fixed_view::<3, 1>(0, i).into_owned();
-        Self {
-            n: column(0),
-            o: column(1),
-            a: column(2),
-            p: column(3),
-        }
+        let [n, o, a, p] =
+            std::array::from_fn(|i| base_from_flange.fixed_view::<3, 1>(0, i).into_owned());
+        Self { n, o, a, p }
     }
 }
 
@@ -147,9 +98,8 @@ impl<T: RealField + Copy> Target<T> {
 pub fn inverse(frame: &Matrix4<f64>) -> Matrix4<f64> {
     let turned_back = rotation(frame).transpose();
     let mut inverse = turned_back.to_homogeneous();
-    inverse
-        .fixed_view_mut::<3, 1>(0, 3)
-        .copy_from(&(-(turned_back * origin(frame))));
+    let moved_back = -(turned_back * origin(frame));
+    inverse.fixed_view_mut::<3, 1>(0, 3).copy_from(&moved_back);
     inverse
 }
 
@@ -165,12 +115,13 @@ pub fn origin(frame: &Matrix4<f64>) -> Vector3<f64> {
 
 /// Largest entry of a difference of two poses: m and 1 alike, the paper's "max absolute error".
 pub fn largest_entry(a: &Matrix4<f64>, b: &Matrix4<f64>) -> f64 {
-    (a - b).iter().fold(0.0, |largest: f64, entry| {
-        // `max` would drop a NaN.
+    // `max` drops a NaN, and what is not a number is not right.
+    let entries = (a - b).map(|entry| {
         if entry.is_nan() {
-            f64::NAN
+            f64::INFINITY
         } else {
-            largest.max(entry.abs())
+            entry.abs()
         }
-    })
+    });
+    entries.max()
 }

@@ -4,19 +4,14 @@ use std::sync::Arc;
 
 use nalgebra::{Point2, Point3, Vector3};
 use needlebench_cell::ResolvedScenario;
-use needlebench_evaluation::room::VoxelGrid;
-use needlebench_geometry::Visual;
 use needlebench_kinematics::{Joints, Pose};
-
-use super::free_space::{BASE_HEIGHT_M, ConfigurationSpace, Space};
-use needlebench_render::{
-    Anchor, Camera, Floor, Image, Label, Line3, Scene, SurfaceInstance, render,
-};
+use needlebench_render::{Anchor, Camera, Floor, Image, Label, Line3, SurfaceInstance, render};
+use needlebench_report::picture::configuration::{Backdrop, posture_scene};
 use needlebench_report::picture::voxel_surface;
 
+use super::free_space::{BASE_HEIGHT_M, ConfigurationSpace, Space};
+
 const SIZE_PX: [u32; 2] = [800, 660];
-/// Fineness of curved surfaces, m.
-const CHORD_ERROR_M: f64 = 3e-4;
 /// Translucent green of the gained room.
 const GAINED: [f32; 4] = [0.1, 0.62, 0.35, 0.2];
 const NEEDLE: [f32; 4] = [0.82, 0.2, 0.1, 1.0];
@@ -25,24 +20,25 @@ const NEEDLE_SHOWN_M: [f64; 2] = [0.12, 0.086];
 
 /// All eight pictures, each with its file name.
 pub fn pictures(resolved: &ResolvedScenario, space: &Space) -> Vec<(String, Image)> {
-    let camera = camera(resolved, space);
+    let (camera, backdrop) = (&camera(resolved, space), &Backdrop::new(resolved));
     std::thread::scope(|scope| {
-        let threads: Vec<_> = space
-            .report
-            .configurations
-            .iter()
-            .zip(&space.gained)
+        let configurations = space.report.configurations.iter().zip(&space.gained);
+        let threads: Vec<_> = configurations
             .map(|(configuration, gained)| {
-                let camera = &camera;
                 scope.spawn(move || {
-                    let image = picture(resolved, configuration, &space.grid, gained, camera);
+                    let room = SurfaceInstance {
+                        mesh: Arc::new(voxel_surface(&space.grid, gained)),
+                        world_from_surface: Pose::identity(),
+                        color_rgba: GAINED,
+                    };
+                    let image = picture(resolved, backdrop, configuration, room, camera);
                     (format!("{}.png", configuration.label), image)
                 })
             })
             .collect();
-        threads
-            .into_iter()
-            .map(|thread| thread.join().expect("drawing does not panic"))
+        let drawn = threads.into_iter().map(|thread| thread.join());
+        drawn
+            .map(|image| image.expect("drawing does not panic"))
             .collect()
     })
 }
@@ -50,90 +46,50 @@ pub fn pictures(resolved: &ResolvedScenario, space: &Space) -> Vec<(String, Imag
 /// One camera for all, so that pictures can be compared: from the patient's far side and feet,
 /// where Figure 6 is seen from, a little above.
 fn camera(resolved: &ResolvedScenario, space: &Space) -> Camera {
-    let robot = &resolved.cell.robot;
+    let cell = &resolved.cell;
     let mut points = Vec::new();
     for configuration in &space.report.configurations {
         let q = Joints::from(configuration.joints_rad);
-        points.extend(
-            robot
-                .world_from_links(&q)
-                .map(|pose| Point3::from(pose.translation.vector)),
-        );
-        let exit = Point3::from(resolved.cell.world_from_guide_exit(&q).translation.vector);
-        points.push(exit);
+        let links = cell.robot.world_from_links(&q);
+        for pose in links.into_iter().chain([cell.world_from_guide_exit(&q)]) {
+            // The surfaces reach beyond the joints' origins.
+            for away in [Vector3::x(), Vector3::y(), Vector3::z()] {
+                points.extend(
+                    [-0.09, 0.09].map(|by_m| Point3::from(pose.translation.vector + away * by_m)),
+                );
+            }
+        }
     }
-    // The surfaces reach beyond the joints' origins.
-    let grown: Vec<Point3<f64>> = points
-        .iter()
-        .flat_map(|point| {
-            [-0.09, 0.09].into_iter().flat_map(move |away_m| {
-                (0..3).map(move |axis| {
-                    let mut moved = *point;
-                    moved[axis] += away_m;
-                    moved
-                })
-            })
-        })
-        .collect();
-    Camera::framing(&grown, Vector3::new(0.8, 0.75, -0.5), SIZE_PX)
-}
-
-fn add(scene: &mut Scene, visuals: &[Visual], world_from_parent: &Pose) {
-    scene
-        .surfaces
-        .extend(visuals.iter().map(|visual| SurfaceInstance {
-            mesh: Arc::clone(&visual.mesh),
-            world_from_surface: world_from_parent * visual.parent_from_visual,
-            color_rgba: visual.color_rgba,
-        }));
+    Camera::framing(&points, Vector3::new(0.8, 0.75, -0.5), SIZE_PX)
 }
 
 fn picture(
     resolved: &ResolvedScenario,
+    backdrop: &Backdrop,
     configuration: &ConfigurationSpace,
-    grid: &VoxelGrid,
-    gained: &[bool],
+    room: SurfaceInstance,
     camera: &Camera,
 ) -> Image {
-    let (robot, tool) = (&resolved.cell.robot, &resolved.cell.tool);
     let q = Joints::from(configuration.joints_rad);
-    let mut scene = Scene::default();
-    add(&mut scene, &robot.base.visuals, &robot.world_from_base_link);
-    for (link, pose) in robot.links.iter().zip(robot.world_from_links(&q)) {
-        add(&mut scene, &link.visuals, &pose);
-    }
-    add(&mut scene, &tool.visuals, &robot.world_from_flange(&q));
-    for solid in resolved.fixtures.iter().flat_map(|fixture| &fixture.solids) {
-        scene.surfaces.push(SurfaceInstance {
-            mesh: Arc::new(solid.shape.surface(CHORD_ERROR_M)),
-            world_from_surface: solid.parent_from_shape,
-            color_rgba: [0.62, 0.64, 0.68, 1.0],
-        });
-    }
-    scene.surfaces.push(SurfaceInstance {
-        mesh: Arc::new(voxel_surface(grid, gained)),
-        world_from_surface: Pose::identity(),
-        color_rgba: GAINED,
-    });
+    let mut scene = posture_scene(resolved, backdrop, &q);
+    scene.surfaces.push(room);
     let exit = resolved.cell.world_from_guide_exit(&q);
     let on_line = |along_m: f64| exit * Point3::new(0.0, 0.0, along_m);
     scene.lines.push(Line3 {
-        from_m: on_line(-tool.guide_length_m() - NEEDLE_SHOWN_M[0]),
+        from_m: on_line(-resolved.cell.tool.guide_length_m() - NEEDLE_SHOWN_M[0]),
         to_m: on_line(NEEDLE_SHOWN_M[1]),
         color_rgba: NEEDLE,
         width_px: 3.0,
     });
-    scene.labels.push(Label {
-        text: format!(
-            "{}\nelbow {:+.2} m",
-            configuration.label, configuration.elbow_m
-        ),
-        anchor: Anchor::TopLeft,
-    });
-    scene.labels.push(Label {
-        text: format!("room: {}", configuration.room()),
-        anchor: Anchor::BottomLeft,
-    });
+    let elbow = format!(
+        "{}\nelbow {:+.2} m",
+        configuration.label, configuration.elbow_m
+    );
+    let room = format!("room: {}", configuration.room());
+    let labels = [(elbow, Anchor::TopLeft), (room, Anchor::BottomLeft)];
+    scene
+        .labels
+        .extend(labels.map(|(text, anchor)| Label { text, anchor }));
     scene.floor = Some(Floor {
         center_m: Point2::new(0.1, -0.2),
         // A little below the base plane: low elbows stay visible.

@@ -1,45 +1,39 @@
-//! Figure 6 in numbers: how high the arm stands and where it leaves room.
+//! Figure 6 in numbers: how high the arm stands, where it leaves room, and what roll about the needle changes.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::path::Path;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use needlebench_cell::{BodyKind, Cell, Finding, Overrides, ResolvedScenario, resolve_scenario};
 use needlebench_evaluation::room::{Obstacles, VoxelGrid};
-use needlebench_kinematics::Joints;
+use needlebench_kinematics::ik::closed_form;
+use needlebench_kinematics::{Joints, UrGeometry};
 use serde::Serialize;
 
 use super::dh::{Arm, origin};
-use super::table_3::Table3Report;
-use super::{Interrupted, Watch};
+use super::equations::SEED;
+use super::printed::FIGURE_6;
+use super::table_3::{Table3Report, exact_pose, pose_of};
+use super::{PaperError, Watch};
 
 /// Height of the base plane in the world, m.
 pub const BASE_HEIGHT_M: f64 = 0.8;
 
 /// The shipped UR3 on a column with a shipped tool; the world's x and y are the controller's.
-fn scenario_text(tool: &str) -> String {
-    format!(
-        "name = \"paper\"\nseed = {seed}\n\
-         [robot]\nbase_position_mm = [0, 0, 800]\nbase_rpy_deg = [0, 0, 180]\n[mount]\n\
-         [tool]\nurdf = \"{tool}\"\nmount_rotation_deg = 90\n\
-         [[goals]]\nname = \"pose\"\ninsertion_length_mm = 86\n\
-         [goals.flange_pose]\nposition_mm = [194.2, -359.3, 170.1]\n\
-         rotation_vector_rad = [-0.8567, 2.7197, -1.1407]\n",
-        seed = super::equations::SEED
-    )
-}
-
-/// The cell of the pictures.
 ///
 /// # Errors
 /// Findings about the shipped models, which would be our own bug.
 pub fn resolve(tool: &str) -> Result<ResolvedScenario, Vec<Finding>> {
-    let overrides = Overrides::default();
-    resolve_scenario(
-        "builtin:paper",
-        &scenario_text(tool),
-        std::path::Path::new(""),
-        &overrides,
-    )
+    let text = format!(
+        "name = \"paper\"\nseed = {SEED}\n\
+         [robot]\nbase_position_mm = [0, 0, 800]\nbase_rpy_deg = [0, 0, 180]\n[mount]\n\
+         [tool]\nurdf = \"{tool}\"\nmount_rotation_deg = 90\n\
+         [[goals]]\nname = \"pose\"\ninsertion_length_mm = 86\n\
+         [goals.flange_pose]\nposition_mm = [194.2, -359.3, 170.1]\n\
+         rotation_vector_rad = [-0.8567, 2.7197, -1.1407]\n"
+    );
+    resolve_scenario("builtin:paper", &text, Path::new(""), &Overrides::default())
 }
 
 /// Where a doctor may want room, seen from the guide's exit. The patient lies as in
@@ -60,23 +54,18 @@ pub enum Region {
     Above,
 }
 
-impl Region {
-    pub const ALL: [Self; 5] = [
-        Self::HeadLeft,
-        Self::FeetRight,
-        Self::FarSide,
-        Self::RobotSide,
-        Self::Above,
-    ];
+/// Regions and their names.
+pub const REGIONS: [(Region, &str); 5] = [
+    (Region::HeadLeft, "head (left)"),
+    (Region::FeetRight, "feet (right)"),
+    (Region::FarSide, "far side"),
+    (Region::RobotSide, "robot side"),
+    (Region::Above, "above"),
+];
 
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::HeadLeft => "head (left)",
-            Self::FeetRight => "feet (right)",
-            Self::FarSide => "far side",
-            Self::RobotSide => "robot side",
-            Self::Above => "above",
-        }
+impl Region {
+    fn all() -> impl Iterator<Item = Self> {
+        REGIONS.into_iter().map(|(region, _)| region)
     }
 
     /// `offset` is from the guide's exit; `entry_height_m` that of the guide's entry over it.
@@ -118,12 +107,12 @@ pub struct ConfigurationSpace {
 impl ConfigurationSpace {
     /// Names of the regions with room.
     pub fn room(&self) -> String {
-        let names: Vec<&str> = self
-            .room_is_left
+        let name = |region: &Region| REGIONS[*region as usize].1;
+        self.room_is_left
             .iter()
-            .map(|region| region.name())
-            .collect();
-        names.join(", ")
+            .map(name)
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 }
 
@@ -162,28 +151,10 @@ pub struct FreeSpaceReport {
 const BOX_HALF_WIDTH_M: f64 = 0.6;
 const BOX_HEIGHT_M: f64 = 0.8;
 const CELL_M: f64 = 0.025;
+/// Cubes across and up the box.
+const CELLS: [usize; 3] = [48, 48, 32];
 /// Room for a hand or a forearm.
 const MARGIN_M: f64 = 0.1;
-
-/// The box cut into cubes.
-fn grid_about(guide_exit_m: &Point3<f64>) -> VoxelGrid {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a few dozen"
-    )]
-    let along = |length_m: f64| (length_m / CELL_M).round() as usize;
-    let across = along(2.0 * BOX_HALF_WIDTH_M);
-    VoxelGrid {
-        corner_m: Point3::new(
-            guide_exit_m.x - BOX_HALF_WIDTH_M,
-            guide_exit_m.y - BOX_HALF_WIDTH_M,
-            BASE_HEIGHT_M,
-        ),
-        cells: [across, across, along(BOX_HEIGHT_M)],
-        voxel_m: CELL_M,
-    }
-}
 
 /// What pictures need besides the numbers.
 pub struct Space {
@@ -194,76 +165,80 @@ pub struct Space {
 }
 
 /// Measures all eight configurations.
-pub(super) fn measure(
+pub fn measure(
     resolved: &ResolvedScenario,
     table: &Table3Report,
     watch: &Watch<'_>,
-) -> Result<Space, Interrupted> {
+) -> Result<Space, PaperError> {
     let cell = &resolved.cell;
-    let Some(first) = table.rows.first() else {
-        unreachable!("the pose of row 1 is reached by row 1");
-    };
-    let first = Joints::from(first.joints_rad);
-    let exit = cell.world_from_guide_exit(&first);
-    let exit_m = Point3::from(exit.translation.vector);
+    let postures = table.rows.iter().map(|row| Joints::from(row.joints_rad));
+    let first = Joints::from(table.rows[0].joints_rad);
+    let exit_m = Point3::from(cell.world_from_guide_exit(&first).translation.vector);
     let entry = cell.robot.world_from_flange(&first) * cell.tool.flange_from_guide_entry;
     let entry_height_m = entry.translation.vector.z - exit_m.z;
-    let grid = grid_about(&exit_m);
+    let grid = VoxelGrid {
+        corner_m: Point3::new(
+            exit_m.x - BOX_HALF_WIDTH_M,
+            exit_m.y - BOX_HALF_WIDTH_M,
+            BASE_HEIGHT_M,
+        ),
+        cells: CELLS,
+        voxel_m: CELL_M,
+    };
     let obstacles = Obstacles::new(cell);
-    let mut taken = Vec::new();
-    for row in &table.rows {
-        watch.check()?;
-        let robot = obstacles.robot(&Joints::from(row.joints_rad));
-        taken.push(robot.taken(&grid, MARGIN_M));
-    }
-    let gained: Vec<Vec<bool>> = (0..taken.len())
-        .map(|own| {
-            (0..grid.len())
-                .map(|index| {
-                    let others = taken.iter().filter(|each| each[index]).count();
-                    !taken[own][index] && 2 * others >= taken.len() - 1
-                })
-                .collect()
-        })
-        .collect();
-    let regions: Vec<Vec<Region>> = (0..grid.len())
-        .map(|index| {
-            let offset = grid.center_m(index) - exit_m;
-            let contains = |region: &Region| region.contains(&offset, entry_height_m);
-            Region::ALL.into_iter().filter(contains).collect()
-        })
-        .collect();
-    let free: Vec<BTreeMap<Region, f64>> = taken
+    let taken = |q| obstacles.robot(&q).taken(&grid, MARGIN_M);
+    let taken: Vec<Vec<bool>> = postures.map(taken).collect();
+    watch.check()?;
+    let free: Vec<Vec<bool>> = taken
         .iter()
-        .map(|cells| free_shares(cells, &regions))
+        .map(|cells| cells.iter().map(|taken| !taken).collect())
         .collect();
-    let gained_m3: Vec<BTreeMap<Region, f64>> = gained
+    let is_gained = |own: &Vec<bool>, index: usize| {
+        let others = taken.iter().filter(|each| each[index]).count();
+        own[index] && 2 * others >= taken.len() - 1
+    };
+    let gained: Vec<Vec<bool>> = free
         .iter()
-        .map(|cells| volumes(cells, &regions))
+        .map(|own| (0..grid.len()).map(|index| is_gained(own, index)).collect())
         .collect();
-    let configurations = table
-        .rows
-        .iter()
-        .enumerate()
-        .map(|(index, row)| {
-            let joint_heights_m = joint_heights_m(&row.joints_rad);
-            let (lowest_surface_m, highest_surface_m) =
-                surface_heights_m(cell, &Joints::from(row.joints_rad));
-            ConfigurationSpace {
-                label: row.label,
-                figure_6: figure_6(row.label),
-                joints_rad: row.joints_rad,
-                joint_heights_m,
-                lowest_joint_m: joint_heights_m.into_iter().fold(f64::INFINITY, f64::min),
-                elbow_m: joint_heights_m[1],
-                lowest_surface_m,
-                highest_surface_m,
-                free: free[index].clone(),
-                gained_m3: gained_m3[index].clone(),
-                room_is_left: room_is_left(&gained_m3, index),
-            }
+    let cells_by_region = |set: &[bool]| {
+        REGIONS.map(|(region, _)| {
+            let inside = |index: &usize| {
+                set[*index] && region.contains(&(grid.center_m(*index) - exit_m), entry_height_m)
+            };
+            (0..grid.len()).filter(inside).count() as f64
         })
-        .collect();
+    };
+    let by_region = |values: [f64; 5]| Region::all().zip(values).collect::<BTreeMap<_, _>>();
+    let all = cells_by_region(&vec![true; grid.len()]);
+    let volumes = |set: &Vec<bool>| cells_by_region(set).map(|cells| cells * CELL_M.powi(3));
+    let gained_m3: Vec<_> = gained.iter().map(|set| by_region(volumes(set))).collect();
+    let rows = table.rows.iter().zip(&free).enumerate();
+    let configurations = rows.map(|(index, (row, free))| {
+        let joint_heights_m = joint_heights_m(&row.joints_rad);
+        let [lowest_surface_m, highest_surface_m] =
+            surface_heights_m(cell, &Joints::from(row.joints_rad));
+        let mut figure_6 = FIGURE_6.into_iter();
+        let free = cells_by_region(free);
+        ConfigurationSpace {
+            label: row.label,
+            figure_6: figure_6
+                .find(|(_, label)| *label == row.label)
+                .unwrap_or_default()
+                .0,
+            joints_rad: row.joints_rad,
+            joint_heights_m,
+            lowest_joint_m: lowest(joint_heights_m),
+            elbow_m: joint_heights_m[1],
+            lowest_surface_m,
+            highest_surface_m,
+            free: by_region(std::array::from_fn(|region| {
+                free[region] / all[region].max(1.0)
+            })),
+            gained_m3: gained_m3[index].clone(),
+            room_is_left: room_is_left(&gained_m3, index),
+        }
+    });
     Ok(Space {
         report: FreeSpaceReport {
             box_half_width_m: BOX_HALF_WIDTH_M,
@@ -271,8 +246,8 @@ pub(super) fn measure(
             cell_m: CELL_M,
             margin_m: MARGIN_M,
             guide_exit_m: (exit_m - Vector3::z() * BASE_HEIGHT_M).coords.into(),
-            configurations,
-            roll: Vec::new(),
+            configurations: configurations.collect(),
+            roll: TOOLS.into_iter().map(roll).collect::<Result<_, _>>()?,
             roll_remark: "Roll about the needle is free: the task has five degrees of freedom. \
                           A guide on the flange axis turns that freedom into wrist 3 alone; any \
                           other guide turns it into a choice of postures.",
@@ -282,37 +257,6 @@ pub(super) fn measure(
     })
 }
 
-fn free_shares(taken: &[bool], regions: &[Vec<Region>]) -> BTreeMap<Region, f64> {
-    Region::ALL
-        .into_iter()
-        .map(|region| {
-            let (mut all, mut free) = (0_usize, 0_usize);
-            for (taken, _) in taken
-                .iter()
-                .zip(regions)
-                .filter(|(_, of)| of.contains(&region))
-            {
-                all += 1;
-                free += usize::from(!taken);
-            }
-            (region, free as f64 / all.max(1) as f64)
-        })
-        .collect()
-}
-
-fn volumes(cells: &[bool], regions: &[Vec<Region>]) -> BTreeMap<Region, f64> {
-    Region::ALL
-        .into_iter()
-        .map(|region| {
-            let pairs = cells.iter().zip(regions);
-            let count = pairs
-                .filter(|(cell, of)| **cell && of.contains(&region))
-                .count();
-            (region, count as f64 * CELL_M.powi(3))
-        })
-        .collect()
-}
-
 /// A region has room if a configuration gains this many times the mean there.
 const HAS_ROOM: f64 = 1.2;
 /// Regions where configurations gain less than this on average do not tell them apart, m^3.
@@ -320,8 +264,7 @@ const LEAST_MEAN_M3: f64 = 1e-3;
 
 /// See [`ConfigurationSpace::room_is_left`].
 fn room_is_left(gained: &[BTreeMap<Region, f64>], own: usize) -> Vec<Region> {
-    let mut ratios: Vec<(Region, f64)> = Region::ALL
-        .into_iter()
+    let mut ratios: Vec<(Region, f64)> = Region::all()
         .filter_map(|region| {
             let sum: f64 = gained.iter().map(|each| each[&region]).sum();
             let mean = sum / gained.len() as f64;
@@ -337,53 +280,85 @@ fn room_is_left(gained: &[BTreeMap<Region, f64>], own: usize) -> Vec<Region> {
     ratios.into_iter().map(|(region, _)| region).collect()
 }
 
-/// Letter of the paper's Figure 6 that bears a label.
-fn figure_6(label: &str) -> &'static str {
-    match label {
-        "Left-Up-Unfold" => "a",
-        "Left-Up-Fold" => "b",
-        "Left-Down-Unfold" => "c",
-        "Left-Down-Fold" => "d",
-        "Right-Up-Unfold" => "e",
-        "Right-Up-Fold" => "f",
-        "Right-Down-Unfold" => "g",
-        _ => "h",
-    }
-}
-
 fn joint_heights_m(joints_rad: &[f64; 6]) -> [f64; 6] {
     let frames = Arm::<f64>::ur3().frames(joints_rad);
     std::array::from_fn(|i| origin(&frames[i + 1]).z)
 }
 
-pub(super) fn lowest_joint_m(joints_rad: &[f64; 6]) -> f64 {
-    joint_heights_m(joints_rad)
-        .into_iter()
-        .fold(f64::INFINITY, f64::min)
+fn lowest(heights_m: [f64; 6]) -> f64 {
+    heights_m.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// Fineness of curved collision shapes, m.
 const CHORD_ERROR_M: f64 = 1e-3;
 
-fn surface_heights_m(cell: &Cell, q: &Joints) -> (f64, f64) {
-    let poses = cell.world_from_bodies(q);
-    let moving = cell.bodies.iter().zip(&poses).filter(|(body, _)| {
-        matches!(
+/// Lowest and highest point of all that moves, m.
+fn surface_heights_m(cell: &Cell, q: &Joints) -> [f64; 2] {
+    let mut bounds = [f64::INFINITY, f64::NEG_INFINITY];
+    for (body, pose) in cell.bodies.iter().zip(cell.world_from_bodies(q)) {
+        if !matches!(
             body.kind,
             BodyKind::Link | BodyKind::Tool | BodyKind::GuideTube
-        )
-    });
-    moving
-        .flat_map(|(body, pose)| body.solids.iter().map(move |solid| (solid, pose)))
-        .fold(
-            (f64::INFINITY, f64::NEG_INFINITY),
-            |bounds, (solid, pose)| {
-                let world_from_shape = pose * solid.parent_from_shape;
-                let vertices = solid.shape.surface(CHORD_ERROR_M).vertices_m;
-                vertices.iter().fold(bounds, |(low, high), vertex| {
-                    let height = (world_from_shape * vertex).z - BASE_HEIGHT_M;
-                    (low.min(height), high.max(height))
-                })
-            },
-        )
+        ) {
+            continue;
+        }
+        for solid in &body.solids {
+            let world_from_shape = pose * solid.parent_from_shape;
+            for vertex in &solid.shape.surface(CHORD_ERROR_M).vertices_m {
+                let height = (world_from_shape * vertex).z - BASE_HEIGHT_M;
+                bounds = [bounds[0].min(height), bounds[1].max(height)];
+            }
+        }
+    }
+    bounds
+}
+
+/// Rolls tried about the needle.
+const ROLL_STEPS: usize = 360;
+
+/// Tools that hold the needle in different ways.
+const TOOLS: [&str; 3] = ["offset", "perpendicular", "inline"];
+
+/// What roll about the needle of the paper's pose changes, with a shipped tool.
+fn roll(name: &str) -> Result<RollReport, PaperError> {
+    let tool = resolve(name)?.cell.tool;
+    let flange_from_guide = tool.flange_from_guide_exit;
+    let base_from_guide = pose_of(&exact_pose()) * flange_from_guide;
+    let (mut fewest, mut most) = (usize::MAX, 0);
+    let (mut worst, mut best) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut ranges: BTreeMap<&str, [[f64; 2]; 5]> = BTreeMap::new();
+    for step in 0..ROLL_STEPS {
+        let roll_rad = TAU * step as f64 / ROLL_STEPS as f64;
+        let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll_rad);
+        let wanted = base_from_guide * turned * flange_from_guide.inverse();
+        let found: Vec<_> = closed_form(&UrGeometry::UR3, &wanted, None)
+            .solutions()
+            .collect();
+        fewest = fewest.min(found.len());
+        most = most.max(found.len());
+        for solution in found {
+            let joints: [f64; 6] = solution.joints.into();
+            let lowest_m = lowest(joint_heights_m(&joints));
+            worst = worst.min(lowest_m);
+            best = best.max(lowest_m);
+            let range = ranges.entry(solution.configuration.label());
+            let range = range.or_insert_with(|| std::array::from_fn(|joint| [joints[joint]; 2]));
+            for (range, joint) in range.iter_mut().zip(joints) {
+                *range = [range[0].min(joint), range[1].max(joint)];
+            }
+        }
+    }
+    let moves = ranges.values().flatten().map(|[low, high]| high - low);
+    let other_joints_move_rad = moves.fold(0.0, f64::max);
+    Ok(RollReport {
+        tool: tool.name,
+        steps: ROLL_STEPS,
+        fewest_solutions: fewest,
+        most_solutions: most,
+        lowest_joint_worst_m: worst,
+        lowest_joint_best_m: best,
+        other_joints_move_rad,
+        // Rounding of the closed form, nothing else.
+        roll_is_wrist_3: other_joints_move_rad < 1e-9,
+    })
 }

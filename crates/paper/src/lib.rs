@@ -6,40 +6,34 @@
 //! asked for, from fixed seeds: two runs differ in their timings only.
 
 mod accuracy;
+mod charts;
+mod closed_form;
 mod convergence;
 mod dh;
+mod document;
 mod equations;
 mod figure_6;
-mod files;
 mod free_space;
-mod html;
-mod newton;
+mod numerical;
 mod printed;
 mod report;
-mod roll;
 mod solver;
 mod table_3;
-mod text;
 mod timing;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use needlebench_cell::Finding;
-
-pub use files::write_paper;
-use report::Findings;
-pub use report::PaperReport;
-pub use text::text;
-
 use needlebench_bench::progress::Progress;
 use needlebench_bench::provenance::provenance;
-use needlebench_render::Image;
+use needlebench_cell::Finding;
+use needlebench_evaluation::report::Verdict;
+use needlebench_render::{Image, tile};
+use needlebench_report::files::{FilesError, Folder};
+use needlebench_report::page::parts::{Part, parts_page};
+use needlebench_report::table::blocks_text;
 
-/// Somebody asked to stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("interrupted")]
-pub struct Interrupted;
+pub use report::PaperReport;
 
 /// Why there is no result.
 #[derive(Debug, thiserror::Error)]
@@ -50,12 +44,6 @@ pub enum PaperError {
     /// A shipped model does not resolve: our own bug.
     #[error("the shipped robot or tool cannot be used: {0}")]
     Model(String),
-}
-
-impl From<Interrupted> for PaperError {
-    fn from(_: Interrupted) -> Self {
-        Self::Interrupted
-    }
 }
 
 impl From<Vec<Finding>> for PaperError {
@@ -74,18 +62,23 @@ pub struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    fn check(&self) -> Result<(), Interrupted> {
+    fn check(&self) -> Result<(), PaperError> {
         if self.cancel.load(Ordering::Relaxed) {
-            Err(Interrupted)
+            Err(PaperError::Interrupted)
         } else {
             Ok(())
         }
     }
 
-    fn stage(&self, name: &str) -> Result<(), Interrupted> {
+    fn stage(&self, name: &str) -> Result<(), PaperError> {
         self.progress.message(name);
         self.progress.step();
         self.check()
+    }
+
+    /// Items until somebody asks to stop: what is made of fewer does not get beyond the stage.
+    fn each<I: IntoIterator>(&self, items: I) -> impl Iterator<Item = I::Item> {
+        items.into_iter().take_while(|_| self.check().is_ok())
     }
 }
 
@@ -95,6 +88,8 @@ const POSES: usize = 20_000;
 const ACCURACY_POSES: usize = 5_000;
 /// Stages of a run, for the progress bar.
 const STAGES: u64 = 8;
+/// Columns of the sheet with all configurations.
+const SHEET_COLUMNS: usize = 4;
 
 /// Results and pictures of a run.
 pub struct Reproduction {
@@ -114,35 +109,42 @@ pub fn reproduce(pictures: bool, watch: &Watch<'_>) -> Result<Reproduction, Pape
     watch.stage("Table 3")?;
     let table_3 = table_3::reproduce();
     watch.stage("equations")?;
-    let equations = equations::evaluate(POSES, watch)?;
+    let equations = equations::evaluate(POSES, watch);
     watch.stage("whole solver")?;
-    let (solver_variants, solution_counts) = solver::evaluate(POSES, watch)?;
+    let (solver_variants, solution_counts) = solver::evaluate(POSES, watch);
     watch.stage("accuracy")?;
-    let accuracy = accuracy::evaluate(ACCURACY_POSES, watch)?;
+    let accuracy = accuracy::evaluate(ACCURACY_POSES, watch);
     watch.stage("convergence")?;
-    let convergence = convergence::evaluate(watch)?;
+    let convergence = convergence::evaluate(watch);
     watch.stage("time")?;
-    let times = timing::measure(watch)?;
+    let times = timing::measure(watch);
     watch.stage("free space")?;
     let resolved = free_space::resolve("offset")?;
-    let mut space = free_space::measure(&resolved, &table_3, watch)?;
-    space.report.roll = roll::evaluate(watch)?;
+    let space = free_space::measure(&resolved, &table_3, watch)?;
     watch.stage("drawing")?;
-    let drawn = if pictures {
+    let pictures = if pictures {
         figure_6::pictures(&resolved, &space)
     } else {
         Vec::new()
     };
     watch.check()?;
-    let report = PaperReport::new(Findings {
+    let mut report = PaperReport {
+        schema_version: 1,
+        paper: report::Citation {
+            authors: "O. Abdelaziz, M. Luo, G. Jiang and S. Chen",
+            title: "Multiple configurations for puncturing robot positioning",
+        },
+        verdict: Verdict::Fail,
+        checks: Vec::new(),
         table_3,
         equations,
-        equation_45: equations::differential::turns_as_printed(),
+        equation_45: equations::turns_as_printed(),
         solver_variants,
         solution_counts,
         accuracy,
         convergence,
         free_space: space.report,
+        files: Vec::new(),
         provenance: provenance(&resolved, Vec::new()),
         timings: timing::Timings {
             cpu: timing::cpu_name(),
@@ -150,9 +152,47 @@ pub fn reproduce(pictures: bool, watch: &Watch<'_>) -> Result<Reproduction, Pape
             rows: times,
             run_s: started.elapsed().as_secs_f64(),
         },
-    });
-    Ok(Reproduction {
-        report,
-        pictures: drawn,
-    })
+    };
+    report.checks = report.checks();
+    if report.checks.iter().all(|check| check.pass) {
+        report.verdict = Verdict::Pass;
+    }
+    Ok(Reproduction { report, pictures })
+}
+
+impl Reproduction {
+    /// The results for a terminal.
+    pub fn text(&self) -> String {
+        let parts = document::parts(&self.report, &[]);
+        blocks_text(parts.iter().filter_map(Part::block))
+    }
+
+    /// Writes pictures, page and report, and the names of the files into the report.
+    ///
+    /// # Errors
+    /// What cannot be written.
+    pub fn write(&mut self, folder: Folder<'_>) -> Result<(), FilesError> {
+        let mut pictures = Vec::new();
+        let mut sheet = Vec::new();
+        for (name, image) in &self.pictures {
+            let png = image.to_png()?;
+            folder.write(name, &png)?;
+            self.report.files.push(name.clone());
+            pictures.push(png);
+            sheet.push((image.clone(), name.trim_end_matches(".png").to_owned()));
+        }
+        if !sheet.is_empty() {
+            let name = "figure_6.png";
+            folder.write_image(name, &tile(&sheet, SHEET_COLUMNS))?;
+            self.report.files.push(name.to_owned());
+        }
+        let name = "paper.html";
+        self.report.files.push(name.to_owned());
+        let title = format!("{}: reproduced", self.report.paper.title);
+        folder.write(
+            name,
+            parts_page(&title, &document::parts(&self.report, &pictures)),
+        )?;
+        folder.write_json("paper.json", &self.report)
+    }
 }

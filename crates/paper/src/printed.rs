@@ -13,53 +13,42 @@ pub const T_DESIRED: Matrix4<f64> = Matrix4::new(
 /// Rotation vector of `X_desired`, rad.
 pub const ROTATION_VECTOR_RAD: [f64; 3] = [-0.8567, 2.7197, -1.1407];
 
-/// A row of Table 3.
-pub struct Row {
-    /// As printed.
-    pub label: &'static str,
-    /// As printed, rad.
-    pub joints_rad: [f64; 6],
-}
-
-/// Table 3, in its order and with its labels.
-pub const TABLE_3: [Row; 8] = [
-    row(
-        "Right-Down-Fold",
-        [-0.73508, 2.370465, 1.882823, -1.96721, 1.274286, 0.113862],
-    ),
-    row(
-        "Right-Up-Fold",
-        [-0.73508, -2.21214, -1.88282, 6.381036, 1.274286, 0.113862],
-    ),
-    row(
-        "Left-Down-Fold",
-        [-0.73508, 3.086748, 0.813237, -4.7555, -1.27429, -3.02773],
-    ),
-    row(
-        "Left-Up-Fold",
-        [-0.73508, -2.44049, -0.81324, 2.398207, -1.27429, -3.02773],
-    ),
-    row(
-        "Right-Down-Unfold",
-        [1.756916, 0.776095, -1.87212, -1.22744, -1.42357, -0.36595],
-    ),
-    row(
-        "Right-Up-Unfold",
-        [1.756916, 5.367374, 1.872123, -9.56297, -1.42357, -0.36595],
-    ),
-    row(
-        "Left-Down-Unfold",
-        [1.756916, 0.054278, -0.82719, 1.591031, 1.423566, 2.775645],
-    ),
-    row(
-        "Left-Up-Unfold",
-        [1.756916, 5.568666, 0.827187, -5.57773, 1.423566, 2.775645],
-    ),
+/// Labels of Table 3, in its order.
+pub const LABELS: [&str; 8] = [
+    "Right-Down-Fold",
+    "Right-Up-Fold",
+    "Left-Down-Fold",
+    "Left-Up-Fold",
+    "Right-Down-Unfold",
+    "Right-Up-Unfold",
+    "Left-Down-Unfold",
+    "Left-Up-Unfold",
 ];
 
-const fn row(label: &'static str, joints_rad: [f64; 6]) -> Row {
-    Row { label, joints_rad }
-}
+/// Joints of Table 3, rad.
+#[rustfmt::skip]
+pub const JOINTS_RAD: [[f64; 6]; 8] = [
+    [-0.73508, 2.370465, 1.882823, -1.96721, 1.274286, 0.113862],
+    [-0.73508, -2.21214, -1.88282, 6.381036, 1.274286, 0.113862],
+    [-0.73508, 3.086748, 0.813237, -4.7555, -1.27429, -3.02773],
+    [-0.73508, -2.44049, -0.81324, 2.398207, -1.27429, -3.02773],
+    [1.756916, 0.776095, -1.87212, -1.22744, -1.42357, -0.36595],
+    [1.756916, 5.367374, 1.872123, -9.56297, -1.42357, -0.36595],
+    [1.756916, 0.054278, -0.82719, 1.591031, 1.423566, 2.775645],
+    [1.756916, 5.568666, 0.827187, -5.57773, 1.423566, 2.775645],
+];
+
+/// Pictures of Figure 6, `a` to `h`, by their labels.
+pub const FIGURE_6: [(&str, &str); 8] = [
+    ("a", "Left-Up-Unfold"),
+    ("b", "Left-Up-Fold"),
+    ("c", "Left-Down-Unfold"),
+    ("d", "Left-Down-Fold"),
+    ("e", "Right-Up-Unfold"),
+    ("f", "Right-Up-Fold"),
+    ("g", "Right-Down-Unfold"),
+    ("h", "Right-Down-Fold"),
+];
 
 /// "Max absolute error" of the closed form; the unit is not stated.
 pub const CLOSED_FORM_ERROR: f64 = 0.2e-7;

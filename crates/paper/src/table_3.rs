@@ -1,16 +1,16 @@
 //! Table 3: the eight configurations of the paper's pose, under their true labels.
 
-use nalgebra::{Matrix3, Matrix4};
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector3};
 use needlebench_kinematics::ik::{Configuration, closed_form, wrap_angle};
-use needlebench_kinematics::{Joints, UrGeometry, rotation_vector};
+use needlebench_kinematics::{Joints, Pose, UrGeometry, rotation_vector};
 use serde::Serialize;
 
+use super::closed_form::{Mended, solve};
 use super::dh::{Arm, Target, largest_entry, origin, rotation};
-use super::equations::angle_error;
-use super::equations::differential::turn;
-use super::equations::side::Mended;
-use super::printed::{ROTATION_VECTOR_RAD, T_DESIRED, TABLE_3};
-use super::solver::solve;
+use super::numerical::turn;
+use super::printed::{JOINTS_RAD, LABELS, ROTATION_VECTOR_RAD, T_DESIRED};
 
 /// One configuration beside the printed row that it is.
 #[derive(Debug, Clone, Serialize)]
@@ -80,67 +80,76 @@ pub struct Table3Report {
 /// over the joints.
 const TOLERANCE_RAD: f64 = 3e-5;
 
+/// The pose that row 1 makes: the printed one before it was rounded.
+pub fn exact_pose() -> Matrix4<f64> {
+    Arm::ur3().base_from_flange(&JOINTS_RAD[0])
+}
+
+/// A matrix as a pose.
+pub fn pose_of(base_from_flange: &Matrix4<f64>) -> Pose {
+    let turn = Rotation3::from_matrix_unchecked(rotation(base_from_flange));
+    let turn = UnitQuaternion::from_rotation_matrix(&turn);
+    Isometry3::from_parts(origin(base_from_flange).into(), turn)
+}
+
 /// Reproduces the table.
-pub(super) fn reproduce() -> Table3Report {
-    let geometry = UrGeometry::UR3;
-    let arm = Arm::<f64>::of(&geometry);
-    let exact = arm.base_from_flange(&TABLE_3[0].joints_rad);
+pub fn reproduce() -> Table3Report {
+    let (arm, exact) = (Arm::<f64>::ur3(), exact_pose());
     let solutions = solve(&arm, &Target::of(&exact), Mended::ALL);
-    let mut rows = Vec::new();
-    for joints in solutions.iter().flatten() {
-        let joints_rad = joints.map(wrap_angle);
-        let label = Configuration::of(&geometry, &Joints::from(joints_rad)).label();
-        let (index, printed) = TABLE_3
-            .iter()
-            .enumerate()
-            .min_by(|(_, a), (_, b)| {
-                let distance = |row: &[f64; 6]| largest(&differences(row, &joints_rad));
-                distance(&a.joints_rad).total_cmp(&distance(&b.joints_rad))
-            })
-            .expect("Table 3 has rows");
-        let reached = arm.base_from_flange(&printed.joints_rad);
-        let angle = |wanted: &Matrix4<f64>| {
-            turn(&nearest_rotation(&rotation(wanted)), &rotation(&reached)).norm()
-        };
-        let distance = |wanted: &Matrix4<f64>| (origin(wanted) - origin(&reached)).norm();
-        rows.push(RowReport {
-            label,
-            joints_rad,
-            printed_row: index + 1,
-            printed_label: printed.label,
-            label_is_right: printed.label == label,
-            printed_joints_rad: printed.joints_rad,
-            printed_joints_wrapped_rad: printed.joints_rad.map(wrap_angle),
-            printed_outside_two_turns: (1..=6)
-                .filter(|joint| printed.joints_rad[joint - 1].abs() > std::f64::consts::TAU)
-                .collect(),
-            difference_rad: differences(&printed.joints_rad, &joints_rad),
-            residual_to_printed_pose_m: distance(&T_DESIRED),
-            residual_to_printed_pose_rad: angle(&T_DESIRED),
-            residual_to_exact_pose_m: distance(&exact),
-            residual_to_exact_pose_rad: angle(&exact),
-            our_residual: largest_entry(&arm.base_from_flange(joints), &exact),
-        });
-    }
-    let mut swapped_rows: Vec<usize> = rows
+    let rows: Vec<RowReport> = solutions
         .iter()
-        .filter(|row| !row.label_is_right)
-        .map(|row| row.printed_row)
+        .flatten()
+        .map(|joints| row(&arm, &exact, joints))
         .collect();
-    swapped_rows.sort_unstable();
+    let mut found: Vec<usize> = rows.iter().map(|row| row.printed_row).collect();
+    found.sort_unstable();
+    let is_swapped = |number: &usize| {
+        rows.iter()
+            .any(|row| row.printed_row == *number && !row.label_is_right)
+    };
     let largest_difference_rad = rows
         .iter()
         .map(|row| largest(&row.difference_rad))
         .fold(0.0, f64::max);
-    let mut found: Vec<usize> = rows.iter().map(|row| row.printed_row).collect();
-    found.sort_unstable();
     Table3Report {
         matches: found == [1, 2, 3, 4, 5, 6, 7, 8] && largest_difference_rad <= TOLERANCE_RAD,
+        swapped_rows: found.into_iter().filter(is_swapped).collect(),
         rows,
-        swapped_rows,
         largest_difference_rad,
         tolerance_rad: TOLERANCE_RAD,
-        pose: pose_report(&geometry, &exact),
+        pose: pose_report(&arm, &exact),
+    }
+}
+
+fn row(arm: &Arm<f64>, exact: &Matrix4<f64>, joints: &[f64; 6]) -> RowReport {
+    let joints_rad = joints.map(wrap_angle);
+    let label = Configuration::of(&UrGeometry::UR3, &Joints::from(joints_rad)).label();
+    let off = |row: &usize| largest(&differences(&JOINTS_RAD[*row], &joints_rad));
+    let nearest = (0..8).min_by(|a, b| off(a).total_cmp(&off(b)));
+    let index = nearest.expect("Table 3 has rows");
+    let printed = JOINTS_RAD[index];
+    let reached = arm.base_from_flange(&printed);
+    let angle = |wanted: &Matrix4<f64>| {
+        turn(&nearest_rotation(&rotation(wanted)), &rotation(&reached)).norm()
+    };
+    let distance = |wanted: &Matrix4<f64>| (origin(wanted) - origin(&reached)).norm();
+    RowReport {
+        label,
+        joints_rad,
+        printed_row: index + 1,
+        printed_label: LABELS[index],
+        label_is_right: LABELS[index] == label,
+        printed_joints_rad: printed,
+        printed_joints_wrapped_rad: printed.map(wrap_angle),
+        printed_outside_two_turns: (1..=6)
+            .filter(|joint| printed[joint - 1].abs() > TAU)
+            .collect(),
+        difference_rad: differences(&printed, &joints_rad),
+        residual_to_printed_pose_m: distance(&T_DESIRED),
+        residual_to_printed_pose_rad: angle(&T_DESIRED),
+        residual_to_exact_pose_m: distance(exact),
+        residual_to_exact_pose_rad: angle(exact),
+        our_residual: largest_entry(&arm.base_from_flange(joints), exact),
     }
 }
 
@@ -149,6 +158,7 @@ fn differences(printed: &[f64; 6], ours: &[f64; 6]) -> [f64; 6] {
     std::array::from_fn(|i| wrap_angle(printed[i] - ours[i]))
 }
 
+/// Largest absolute value.
 fn largest(values: &[f64]) -> f64 {
     values
         .iter()
@@ -164,61 +174,44 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
     }
 }
 
-fn pose_report(geometry: &UrGeometry, exact: &Matrix4<f64>) -> PoseReport {
+fn pose_report(arm: &Arm<f64>, exact: &Matrix4<f64>) -> PoseReport {
     let printed = rotation(&T_DESIRED);
     let nearest = nearest_rotation(&printed);
-    let as_pose = |orientation: &Matrix3<f64>, position: &Matrix4<f64>| {
-        let rotation = nalgebra::Rotation3::from_matrix_unchecked(*orientation);
-        nalgebra::Isometry3::from_parts(
-            origin(position).into(),
-            nalgebra::UnitQuaternion::from_rotation_matrix(&rotation),
-        )
-    };
-    let projected = as_pose(&nearest, &T_DESIRED);
-    let of_exact = closed_form(geometry, &as_pose(&rotation(exact), exact), None);
-    let of_projected = closed_form(geometry, &projected, None);
-    let moved = Configuration::ALL
+    let mut projected = T_DESIRED;
+    projected.fixed_view_mut::<3, 3>(0, 0).copy_from(&nearest);
+    let projected = pose_of(&projected);
+    let [of_exact, of_projected] =
+        [pose_of(exact), projected].map(|pose| closed_form(&UrGeometry::UR3, &pose, None));
+    let projection_moves_joints_rad = Configuration::ALL
         .iter()
         .filter_map(|configuration| {
-            let (a, b) = (
-                of_exact.solution(*configuration)?.joints,
-                of_projected.solution(*configuration)?.joints,
-            );
-            let moved = (0..6).map(|joint| angle_error(a[joint], b[joint]));
-            moved.reduce(f64::max)
+            let [a, b] = [of_exact, of_projected].map(|of| of.solution(*configuration));
+            Some(largest(&differences(&a?.joints.into(), &b?.joints.into())))
         })
         .fold(0.0, f64::max);
-    let arm = Arm::<f64>::of(geometry);
-    let missed = |other: Arm<f64>| {
-        let reached = other.base_from_flange(&TABLE_3[0].joints_rad);
-        origin(&reached) - origin(&T_DESIRED)
-    };
-    let without_d6 = missed(Arm { d6: 0.0, ..arm });
-    let unprojected = solve(&arm, &Target::of(&T_DESIRED), Mended::ALL);
-    let unprojected_moves_joints_rad = solve(&arm, &Target::of(exact), Mended::ALL)
+    let [of_exact, of_printed] =
+        [exact, &T_DESIRED].map(|pose| solve(arm, &Target::of(pose), Mended::ALL));
+    let unprojected_moves_joints_rad = of_exact
         .iter()
-        .zip(&unprojected)
+        .zip(&of_printed)
         .filter_map(|(a, b)| Some(largest(&differences(&(*a)?, &(*b)?))))
         .fold(0.0, f64::max);
+    let missed = |arm: Arm<f64>| origin(&arm.base_from_flange(&JOINTS_RAD[0])) - origin(&T_DESIRED);
+    let without_d6 = missed(Arm { d6: 0.0, ..*arm });
+    let positive = arm.with_positive_lengths();
     let rotvec = rotation_vector(&projected.rotation);
-    let components = ROTATION_VECTOR_RAD.iter().zip(rotvec.iter());
     PoseReport {
         exact: rows_of(exact),
         printed: rows_of(&T_DESIRED),
         orthonormality_defect: (printed.transpose() * printed - Matrix3::identity()).amax(),
         angle_to_exact_rad: turn(&nearest, &rotation(exact)).norm(),
         distance_to_exact_m: (origin(&T_DESIRED) - origin(exact)).norm(),
-        projection_moves_joints_rad: moved,
+        projection_moves_joints_rad,
         unprojected_moves_joints_rad,
         without_d6_m: without_d6.norm(),
         without_d6_largest_coordinate_m: without_d6.amax(),
-        with_positive_lengths_m: missed(Arm {
-            a2: arm.a2.abs(),
-            a3: arm.a3.abs(),
-            ..arm
-        })
-        .norm(),
-        rotation_vector_difference_rad: components.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max),
+        with_positive_lengths_m: missed(positive).norm(),
+        rotation_vector_difference_rad: (rotvec - Vector3::from(ROTATION_VECTOR_RAD)).amax(),
     }
 }
 

@@ -12,13 +12,12 @@ use needlebench_kinematics::random::SplitMix64;
 use needlebench_kinematics::{Joints, Pose, UrGeometry};
 use serde::Serialize;
 
-use super::convergence::median;
+use super::accuracy::median;
+use super::closed_form::{Mended, solve};
 use super::dh::{Arm, Target};
 use super::equations::SEED;
-use super::equations::side::Mended;
-use super::newton::levenberg_marquardt;
-use super::solver::solve;
-use super::{Interrupted, Watch};
+use super::numerical::levenberg_marquardt;
+use super::{Watch, printed};
 
 /// Whose figure a time is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -47,17 +46,6 @@ pub struct TimeRow {
     pub poses_per_repetition: Option<usize>,
 }
 
-impl TimeRow {
-    /// Makes the time of a call for many poses that of one.
-    fn share(&mut self, poses: usize) {
-        let count = poses as f64;
-        self.time_s /= count;
-        self.least_s = self.least_s.map(|time| time / count);
-        self.p90_s = self.p90_s.map(|time| time / count);
-        self.poses_per_repetition = Some(poses);
-    }
-}
-
 /// The only part of the results that differs between two runs.
 #[derive(Debug, Clone, Serialize)]
 pub struct Timings {
@@ -68,32 +56,32 @@ pub struct Timings {
     pub run_s: f64,
 }
 
-const fn peer(name: &'static str, numerical: bool, time_s: f64, up_to_s: Option<f64>) -> TimeRow {
+/// Other solvers: 100 000 random UR3 poses, every solution, native loops, one core of one machine;
+/// numerical ones from random starts to 1e-6.
+const PEERS: [(&str, bool, f64); 8] = [
+    ("ur_kinematics (C++), recorded", false, 1186e-9),
+    ("ik-geo 0.1.2 (Rust), recorded", false, 1647e-9),
+    ("ur-analytic-ik (C++), recorded", false, 2839e-9),
+    ("EAIK (C++), recorded", false, 3009e-9),
+    ("Robotics Toolbox LM (C++), recorded", true, 60e-6),
+    ("optik (Rust), recorded", true, 92e-6),
+    ("KDL LMA (C++), recorded", true, 140e-6),
+    ("TRAC-IK (C++), recorded", true, 226e-6),
+];
+
+fn stated(name: &'static str, source: Source, numerical: bool, time_s: f64) -> TimeRow {
     TimeRow {
         name,
-        source: Source::Peer,
+        source,
         numerical,
         time_s,
-        up_to_s,
+        up_to_s: None,
         least_s: None,
         p90_s: None,
         repetitions: None,
         poses_per_repetition: None,
     }
 }
-
-/// Other solvers: 100 000 random UR3 poses, every solution, native loops, one core of one machine;
-/// numerical ones from random starts to 1e-6.
-const PEERS: [TimeRow; 8] = [
-    peer("ur_kinematics (C++), recorded", false, 1186e-9, None),
-    peer("ik-geo 0.1.2 (Rust), recorded", false, 1647e-9, None),
-    peer("ur-analytic-ik (C++), recorded", false, 2839e-9, None),
-    peer("EAIK (C++), recorded", false, 3009e-9, None),
-    peer("Robotics Toolbox LM (C++), recorded", true, 60e-6, None),
-    peer("optik (Rust), recorded", true, 92e-6, None),
-    peer("KDL LMA (C++), recorded", true, 140e-6, None),
-    peer("TRAC-IK (C++), recorded", true, 226e-6, None),
-];
 
 const POSES: usize = 200;
 /// Runs over all poses; the median of their means is reported.
@@ -110,145 +98,99 @@ struct Case {
 }
 
 /// Measures our own methods and puts them beside the others.
-pub(super) fn measure(watch: &Watch<'_>) -> Result<Vec<TimeRow>, Interrupted> {
-    let geometry = UrGeometry::UR3;
+pub fn measure(watch: &Watch<'_>) -> Vec<TimeRow> {
+    let (geometry, arm) = (UrGeometry::UR3, Arm::<f64>::ur3());
     let chain = geometry.chain();
-    let arm = Arm::<f64>::of(&geometry);
     let mut random = SplitMix64::new(SEED + 10);
-    let cases: Vec<Case> = (0..POSES)
-        .map(|_| {
-            let q = PoseSet::Generic.sample(&geometry, &mut random, 0.0);
-            let base_from_flange = geometry.base_from_flange(&q);
-            let matrix = base_from_flange.to_homogeneous();
-            Case {
-                base_from_flange,
-                base_link_from_flange: chain.base_link_from_flange(&q),
-                target: Target::of(&matrix),
-                matrix,
-                guess: Joints::from_fn(|i, _| q[i] + 0.1 * random.uniform(-1.0, 1.0)),
-                anywhere: PoseSet::Generic.sample(&geometry, &mut random, 0.0),
-            }
-        })
-        .collect();
-    let options = GaussNewtonOptions::default();
-    let numerical = Numerical::new(&chain);
-    let mut rows = vec![
-        time("paper: closed form", false),
-        time("paper: numerical", true),
-    ];
-    for (row, [from, to]) in rows.iter_mut().zip([
-        super::printed::CLOSED_FORM_TIME_S,
-        super::printed::NUMERICAL_TIME_S,
-    ]) {
-        (row.source, row.time_s, row.up_to_s) = (Source::Paper, from, Some(to));
-    }
-    rows.push(run(
-        watch,
-        "library: closed form, all solutions",
-        false,
-        &cases,
-        |case| {
-            black_box(closed_form(
-                &geometry,
-                black_box(&case.base_from_flange),
-                None,
-            ));
-        },
-    )?);
-    // Poses per call, so that the time of a call over their number is that of one.
-    let poses: Vec<Pose> = cases.iter().map(|case| case.base_from_flange).collect();
-    let mut answers = vec![ClosedForm::BLANK; poses.len()];
-    let mut batch = run(
-        watch,
-        "library: closed form, in a batch",
-        false,
-        &[()],
-        |()| {
-            let preference = Preference::default();
-            closed_form_batch(&geometry, black_box(&poses), preference, &mut answers);
-            black_box(&answers);
-        },
-    )?;
-    batch.share(poses.len());
-    rows.push(batch);
-    rows.push(run(
-        watch,
-        "equations 9 to 38 mended, plain",
-        false,
-        &cases,
-        |case| {
-            black_box(solve(&arm, black_box(&case.target), Mended::ALL));
-        },
-    )?);
-    rows.push(run(
-        watch,
-        "library: Gauss-Newton within 0.1 rad",
-        true,
-        &cases,
-        |case| {
-            let pose = black_box(&case.base_link_from_flange);
-            black_box(numerical.gauss_newton(pose, &case.guess, &options));
-        },
-    )?);
-    rows.push(run(
-        watch,
-        "library: damped, from a random start",
-        true,
-        &cases,
-        |case| {
-            let pose = black_box(&case.base_link_from_flange);
-            black_box(numerical.damped(pose, &case.anywhere, &DampedOptions::default()));
-        },
-    )?);
-    rows.push(run(
-        watch,
-        "Levenberg-Marquardt within 0.1 rad, plain",
-        true,
-        &cases,
-        |case| {
-            black_box(levenberg_marquardt(
-                &arm,
-                black_box(&case.matrix),
-                &case.guess.into(),
-            ));
-        },
-    )?);
-    rows.extend(PEERS);
-    Ok(rows)
-}
-
-fn time(name: &'static str, numerical: bool) -> TimeRow {
-    TimeRow {
-        source: Source::ThisRun,
-        ..peer(name, numerical, f64::NAN, None)
-    }
-}
-
-fn run<T>(
-    watch: &Watch<'_>,
-    name: &'static str,
-    numerical: bool,
-    cases: &[T],
-    mut solve: impl FnMut(&T),
-) -> Result<TimeRow, Interrupted> {
-    let mut times_s = Vec::with_capacity(REPETITIONS);
-    for _ in 0..REPETITIONS {
-        watch.check()?;
-        let started = Instant::now();
-        for case in cases {
-            solve(case);
+    let cases: [Case; POSES] = std::array::from_fn(|_| {
+        let q = PoseSet::Generic.sample(&geometry, &mut random, 0.0);
+        let base_from_flange = geometry.base_from_flange(&q);
+        let matrix = base_from_flange.to_homogeneous();
+        Case {
+            base_from_flange,
+            base_link_from_flange: chain.base_link_from_flange(&q),
+            target: Target::of(&matrix),
+            matrix,
+            guess: Joints::from_fn(|i, _| q[i] + 0.1 * random.uniform(-1.0, 1.0)),
+            anywhere: PoseSet::Generic.sample(&geometry, &mut random, 0.0),
         }
-        times_s.push(started.elapsed().as_secs_f64() / cases.len() as f64);
+    });
+    let numerical = Numerical::new(&chain);
+    let poses = cases.each_ref().map(|case| case.base_from_flange);
+    let mut answers = vec![ClosedForm::BLANK; POSES];
+    let paper = |name, numerical, [from, to]: [f64; 2]| TimeRow {
+        up_to_s: Some(to),
+        ..stated(name, Source::Paper, numerical, from)
+    };
+    let mut rows = vec![
+        paper("paper: closed form", false, printed::CLOSED_FORM_TIME_S),
+        paper("paper: numerical", true, printed::NUMERICAL_TIME_S),
+        run(watch, "library: closed form, all solutions", false, || {
+            for pose in &poses {
+                black_box(closed_form(&geometry, black_box(pose), None));
+            }
+        }),
+        run(watch, "library: closed form, in a batch", false, || {
+            closed_form_batch(
+                &geometry,
+                black_box(&poses),
+                Preference::default(),
+                &mut answers,
+            );
+            black_box(&answers);
+        }),
+        run(watch, "equations 9 to 38 mended, plain", false, || {
+            for case in &cases {
+                black_box(solve(&arm, black_box(&case.target), Mended::ALL));
+            }
+        }),
+        run(watch, "library: Gauss-Newton within 0.1 rad", true, || {
+            let options = GaussNewtonOptions::default();
+            for case in &cases {
+                let pose = black_box(&case.base_link_from_flange);
+                black_box(numerical.gauss_newton(pose, &case.guess, &options));
+            }
+        }),
+        run(watch, "library: damped, from a random start", true, || {
+            for case in &cases {
+                let pose = black_box(&case.base_link_from_flange);
+                black_box(numerical.damped(pose, &case.anywhere, &DampedOptions::default()));
+            }
+        }),
+        run(
+            watch,
+            "Levenberg-Marquardt within 0.1 rad, plain",
+            true,
+            || {
+                for case in &cases {
+                    let pose = black_box(&case.matrix);
+                    black_box(levenberg_marquardt(&arm, pose, &case.guess.into()));
+                }
+            },
+        ),
+    ];
+    rows.extend(
+        PEERS.map(|(name, numerical, time_s)| stated(name, Source::Peer, numerical, time_s)),
+    );
+    rows
+}
+
+/// Times something that solves all poses.
+fn run(watch: &Watch<'_>, name: &'static str, numerical: bool, mut solve: impl FnMut()) -> TimeRow {
+    let mut times_s = Vec::with_capacity(REPETITIONS);
+    for _ in watch.each(0..REPETITIONS) {
+        let started = Instant::now();
+        solve();
+        times_s.push(started.elapsed().as_secs_f64() / POSES as f64);
     }
-    let middle = median(&mut times_s);
-    Ok(TimeRow {
-        time_s: middle,
+    let middle_s = median(&mut times_s);
+    TimeRow {
         least_s: times_s.first().copied(),
         p90_s: times_s.get(REPETITIONS * 9 / 10).copied(),
         repetitions: Some(REPETITIONS),
-        poses_per_repetition: Some(cases.len()),
-        ..time(name, numerical)
-    })
+        poses_per_repetition: Some(POSES),
+        ..stated(name, Source::ThisRun, numerical, middle_s)
+    }
 }
 
 /// Name of the processor, where the system tells.

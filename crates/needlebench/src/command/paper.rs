@@ -14,7 +14,7 @@ use crate::exit::ExitStatus;
 use crate::findings::print_findings;
 use crate::interrupts::watch_interrupts;
 use crate::progress::TerminalProgress;
-use needlebench_paper::{PaperError, Watch, reproduce, text, write_paper};
+use needlebench_paper::{PaperError, Watch, reproduce};
 use needlebench_report::files::Folder;
 
 #[derive(Debug, Args)]
@@ -54,13 +54,14 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
         }
         Err(error) => return Err(error.into()),
     };
-    write_paper(&mut found, Folder(&arguments.out))
+    found
+        .write(Folder(&arguments.out))
         .with_context(|| format!("cannot write the results to {}", arguments.out.display()))?;
     if arguments.json {
         print_json(&found.report)?;
     } else {
         let out = shown(&arguments.out);
-        print_text(&format!("{}results: {out}", text(&found.report)))?;
+        print_text(&format!("{}results: {out}", found.text()))?;
     }
     Ok(if found.report.passes() {
         ExitStatus::Success
