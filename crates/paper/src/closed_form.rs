@@ -179,7 +179,7 @@ pub fn solve<T: RealField + Copy>(
     mended: Mended,
 ) -> [Option<[T; 6]>; 8] {
     let mut rows = [None; 8];
-    let finite = |joints: [T; 6]| joints.iter().all(|q| q.is_finite()).then_some(joints);
+    let finite = |joints: [T; 6]| joints.iter().all(T::is_finite).then_some(joints);
     let signs = [T::one(), -T::one()];
     // q5,1 and q5,2 first, then their negatives q5,3 and q5,4.
     for (half, flip) in signs.into_iter().enumerate() {

@@ -1,6 +1,7 @@
 //! Figure 6 as pictures: the arm in its eight configurations, with the room that each gains.
 
 use std::sync::Arc;
+use std::thread::ScopedJoinHandle;
 
 use nalgebra::{Point2, Point3, Vector3};
 use needlebench_cell::ResolvedScenario;
@@ -36,7 +37,7 @@ pub fn pictures(resolved: &ResolvedScenario, space: &Space) -> Vec<(String, Imag
                 })
             })
             .collect();
-        let drawn = threads.into_iter().map(|thread| thread.join());
+        let drawn = threads.into_iter().map(ScopedJoinHandle::join);
         drawn
             .map(|image| image.expect("drawing does not panic"))
             .collect()
