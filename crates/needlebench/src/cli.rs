@@ -19,6 +19,7 @@ use crate::command::{
     VIEW_HELP, ViewArguments,
 };
 use crate::exit::ExitStatus;
+use crate::failure::Failure;
 use crate::host::{Invocation, hosted};
 use crate::output::{complain, keep_to_width, print_as_it_is};
 
@@ -230,47 +231,38 @@ fn run(cli: Cli) -> ExitStatus {
     clock::start();
     keep_to_width();
     let result = match cli.command {
-        Command::Init(arguments) => command::init(&arguments),
+        Command::Init(arguments) => command::init(&arguments).map_err(Failure::from),
         Command::Suggest(arguments) => command::suggest(&arguments),
-        Command::Run(arguments) => command::run(&arguments),
-        Command::Check(arguments) => command::check(&arguments),
-        Command::Ik(arguments) => command::ik(&arguments),
-        Command::Fk(arguments) => command::fk(&arguments),
-        Command::Clearance(arguments) => command::clearance(&arguments),
-        Command::Atlas(arguments) => command::atlas(&arguments),
-        Command::Export(arguments) => command::export(&arguments),
-        Command::Compare(arguments) => command::compare(&arguments),
-        Command::Ct(arguments) => command::ct(&arguments),
+        Command::Run(arguments) => command::run(&arguments).map_err(Failure::from),
+        Command::Check(arguments) => command::check(&arguments).map_err(Failure::from),
+        Command::Ik(arguments) => command::ik(&arguments).map_err(Failure::from),
+        Command::Fk(arguments) => command::fk(&arguments).map_err(Failure::from),
+        Command::Clearance(arguments) => command::clearance(&arguments).map_err(Failure::from),
+        Command::Atlas(arguments) => command::atlas(&arguments).map_err(Failure::from),
+        Command::Export(arguments) => command::export(&arguments).map_err(Failure::from),
+        Command::Compare(arguments) => command::compare(&arguments).map_err(Failure::from),
+        Command::Ct(arguments) => command::ct(&arguments).map_err(Failure::from),
         Command::View(arguments) => command::view(&arguments),
         Command::Study(arguments) => command::study(&arguments),
         Command::Search(arguments) => command::search(&arguments),
         Command::Merge(arguments) => command::merge(&arguments),
-        Command::Iso9283(arguments) => command::iso9283(&arguments),
-        Command::RecordPlan(arguments) => command::record_plan(&arguments),
-        Command::Replay(arguments) => command::replay(&arguments),
-        Command::Pairs(arguments) => command::pairs(&arguments),
-        Command::Servo(arguments) => command::servo(&arguments),
-        Command::Report(arguments) => command::report(&arguments),
-        Command::Paper(arguments) => command::paper(&arguments),
-        Command::Schema { format, markdown } => command::schema(format, markdown),
-        Command::Doctor(arguments) => command::doctor(&arguments),
-        Command::Licences => command::licences(),
-        Command::Completions { shell } => command::completions(shell, &mut command_line()),
-    };
-    match result {
-        Ok(status) => status,
-        Err(error) => {
-            // A closed pipe (`needlebench ... | head`) is the reader's choice.
-            let closed = error
-                .downcast_ref::<std::io::Error>()
-                .is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe);
-            if closed {
-                return ExitStatus::Success;
-            }
-            complain(&format!("error: {error:#}"));
-            ExitStatus::EnvironmentFailed
+        Command::Iso9283(arguments) => command::iso9283(&arguments).map_err(Failure::from),
+        Command::RecordPlan(arguments) => command::record_plan(&arguments).map_err(Failure::from),
+        Command::Replay(arguments) => command::replay(&arguments).map_err(Failure::from),
+        Command::Pairs(arguments) => command::pairs(&arguments).map_err(Failure::from),
+        Command::Servo(arguments) => command::servo(&arguments).map_err(Failure::from),
+        Command::Report(arguments) => command::report(&arguments).map_err(Failure::from),
+        Command::Paper(arguments) => command::paper(&arguments).map_err(Failure::from),
+        Command::Schema { format, markdown } => {
+            command::schema(format, markdown).map_err(Failure::from)
         }
-    }
+        Command::Doctor(arguments) => command::doctor(&arguments).map_err(Failure::from),
+        Command::Licences => command::licences().map_err(Failure::from),
+        Command::Completions { shell } => {
+            command::completions(shell, &mut command_line()).map_err(Failure::from)
+        }
+    };
+    result.unwrap_or_else(Failure::tell)
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod cli;
 mod clock;
 mod command;
 pub mod exit;
+mod failure;
 mod findings;
 mod host;
 mod interrupts;

@@ -15,13 +15,13 @@ use needlebench_study::{
 };
 
 use super::run::prepare_folder;
-use super::study::{ShardArgument, failed, shard_of, show};
+use super::study::{ShardArgument, shard_of, show};
 use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
-use crate::output::{complain, shown};
+use crate::output::shown;
 use crate::progress::TerminalProgress;
 use needlebench_bench::progress::Progress as _;
 use needlebench_bench::search::{GenerationEvaluator, PreparedSearch, out_of_reach, worth_of};
@@ -75,38 +75,20 @@ pub(crate) struct SearchArguments {
 }
 
 /// Searches the choices of a study.
-pub(crate) fn search(arguments: &SearchArguments) -> Result<ExitStatus> {
-    let prepared = overrides(&arguments.robot)
-        .map_err(|finding| vec![finding])
-        .and_then(|overrides| load_study(&arguments.study, &overrides))
-        .and_then(PreparedSearch::new);
-    let prepared = match prepared {
-        Ok(prepared) => prepared,
-        Err(findings) => {
-            print_findings(&findings);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+pub(crate) fn search(arguments: &SearchArguments) -> Result<ExitStatus, Failure> {
+    let overrides = overrides(&arguments.robot)?;
+    let prepared = PreparedSearch::new(load_study(&arguments.study, &overrides)?)?;
     let folder = arguments.out.join(&prepared.study.file.name);
-    if let Err(finding) = prepare_folder(&folder) {
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
-    }
+    prepare_folder(&folder)?;
     let generations = folder.join(GENERATIONS);
     // A shard is asked for again and again, one generation after the other.
     if generations.exists() && !arguments.resume && arguments.shard.is_none() {
-        return Ok(failed(&StudyError::Exists {
+        return Err(Failure::from(StudyError::Exists {
             folder: generations,
             what: "a search".to_owned(),
         }));
     }
-    let shard = match arguments.shard.map(shard_of).transpose() {
-        Ok(shard) => shard,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let shard = arguments.shard.map(shard_of).transpose()?;
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.quiet);
     let mut judge = GenerationJudge {
@@ -124,10 +106,7 @@ pub(crate) fn search(arguments: &SearchArguments) -> Result<ExitStatus> {
     let log = match found {
         Ok(log) => log,
         Err(SearchError::Stopped(stop)) => return stop.status(&folder),
-        Err(error) => {
-            print_findings(&[prepared.finding(&error)]);
-            return Ok(ExitStatus::BadInput);
-        }
+        Err(error) => return Err(prepared.finding(&error).into()),
     };
     let text = write_search(&prepared, &log, &folder, !arguments.no_page)
         .with_context(|| format!("cannot write the results to {}", folder.display()))?;
@@ -171,15 +150,12 @@ enum Stop {
 }
 
 impl Stop {
-    fn status(self, folder: &Path) -> Result<ExitStatus> {
+    fn status(self, folder: &Path) -> Result<ExitStatus, Failure> {
         match self {
-            Self::Interrupted => {
-                complain(&format!(
-                    "interrupted: what is done is in {}; --resume goes on",
-                    shown(folder)
-                ));
-                Ok(ExitStatus::Interrupted)
-            }
+            Self::Interrupted => Err(Failure::interrupted(format!(
+                "interrupted: what is done is in {}; --resume goes on",
+                shown(folder)
+            ))),
             Self::Part {
                 generation,
                 shard,
@@ -199,10 +175,10 @@ impl Stop {
                 ))?;
                 Ok(ExitStatus::Success)
             }
-            Self::Study(error) => Ok(failed(&error)),
-            Self::Files(error) => {
-                Err(error).with_context(|| format!("cannot write to {}", folder.display()))
-            }
+            Self::Study(error) => Err(error.into()),
+            Self::Files(error) => Err(anyhow::Error::from(error)
+                .context(format!("cannot write to {}", folder.display()))
+                .into()),
         }
     }
 }

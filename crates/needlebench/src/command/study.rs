@@ -21,6 +21,7 @@ use super::{overrides, print_json, print_text};
 use crate::arguments::{RobotArguments, leave};
 use crate::clock::elapsed;
 use crate::exit::ExitStatus;
+use crate::failure::Failure;
 use crate::findings::print_findings;
 use crate::interrupts::{threads, watch_interrupts};
 use crate::output::{complain, print_wide, shown};
@@ -44,10 +45,8 @@ const WITHOUT_ASKING: Duration = Duration::from_mins(20);
 const FEW_CASES: u64 = 200;
 
 /// Computes a study, or some of its cases.
-pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
-    let Some(prepared) = prepare(&arguments.study, &arguments.robot) else {
-        return Ok(ExitStatus::BadInput);
-    };
+pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus, Failure> {
+    let prepared = prepare(&arguments.study, &arguments.robot)?;
     if !arguments.case.is_empty() {
         return cases(arguments, &prepared);
     }
@@ -57,33 +56,17 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
     if let Some(request) = arguments.launch {
         return launch::launch(arguments, &prepared, request);
     }
-    let (shard, out) = match asked_shard(arguments) {
-        Ok(asked) => asked,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let (shard, out) = asked_shard(arguments)?;
     if let Some(note) = choice_with_range(&prepared) {
         complain(&note);
     }
     let folder = out.join(&prepared.study.file.name);
-    if let Err(finding) = prepare_outputs(&folder, &prepared, &arguments.results) {
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
-    }
+    prepare_outputs(&folder, &prepared, &arguments.results)?;
     let evaluator = StudyEvaluator::new(&prepared.study, &prepared.design, &prepared.columns);
     let threads = threads(arguments.results.jobs);
     let manifest = prepared.manifest(shard);
     if !arguments.yes && !arguments.resume {
-        match too_long(&prepared, &evaluator, manifest.own_cases(), threads) {
-            Ok(None) => {}
-            Ok(Some(finding)) => {
-                print_findings(&[finding]);
-                return Ok(ExitStatus::BadInput);
-            }
-            Err(message) => anyhow::bail!(message),
-        }
+        refuse_if_long(&prepared, &evaluator, manifest.own_cases(), threads)?;
     }
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.results.quiet);
@@ -96,19 +79,15 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
     };
     let end = run.run(&folder, &cancel, &|event| show(&progress, event));
     progress.finish();
-    match end {
-        Err(error) => Ok(failed(&error)),
-        Ok(RunEnd::Partial { done, total }) => {
-            complain(&format!(
-                "interrupted: {done} of {total} cases are in {}; --resume goes on",
-                shown(&folder)
-            ));
-            Ok(ExitStatus::Interrupted)
-        }
-        Ok(RunEnd::Finished {
+    match end? {
+        RunEnd::Partial { done, total } => Err(Failure::interrupted(format!(
+            "interrupted: {done} of {total} cases are in {}; --resume goes on",
+            shown(&folder)
+        ))),
+        RunEnd::Finished {
             cases,
             results: None,
-        }) => {
+        } => {
             print_text(&format!(
                 "{cases} of {} cases are in {}; `needlebench merge` joins all shards",
                 prepared.design.cases(),
@@ -116,10 +95,10 @@ pub(crate) fn study(arguments: &StudyArguments) -> Result<ExitStatus> {
             ))?;
             Ok(ExitStatus::Success)
         }
-        Ok(RunEnd::Finished {
+        RunEnd::Finished {
             results: Some(results),
             ..
-        }) => finish(
+        } => finish(
             &prepared,
             &folder,
             &results,
@@ -143,15 +122,10 @@ fn choice_with_range(prepared: &PreparedStudy) -> Option<String> {
 }
 
 /// Joins the shards of a study.
-pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
-    let Some(prepared) = prepare(&arguments.study, &arguments.robot) else {
-        return Ok(ExitStatus::BadInput);
-    };
+pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus, Failure> {
+    let prepared = prepare(&arguments.study, &arguments.robot)?;
     let folder = arguments.out.join(&prepared.study.file.name);
-    if let Err(finding) = prepare_outputs(&folder, &prepared, &arguments.results) {
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
-    }
+    prepare_outputs(&folder, &prepared, &arguments.results)?;
     let threads = threads(arguments.results.jobs);
     let progress = TerminalProgress::new(arguments.results.quiet);
     let end = merge_shards(
@@ -166,13 +140,12 @@ pub(crate) fn merge(arguments: &MergeArguments) -> Result<ExitStatus> {
         },
     );
     progress.finish();
-    match end {
-        Err(error) => Ok(failed(&error)),
-        Ok(RunEnd::Finished {
+    match end? {
+        RunEnd::Finished {
             results: Some(results),
             ..
-        }) => finish(&prepared, &folder, &results, &arguments.results, None),
-        Ok(_) => unreachable!("a merge writes a table or fails"),
+        } => finish(&prepared, &folder, &results, &arguments.results, None),
+        _ => unreachable!("a merge writes a table or fails"),
     }
 }
 
@@ -206,19 +179,10 @@ fn variable(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|value| !value.is_empty())
 }
 
-/// Reads a study; prints what is wrong with it.
-fn prepare(path: &Path, robot: &RobotArguments) -> Option<PreparedStudy> {
-    let prepared = overrides(robot)
-        .map_err(|finding| vec![finding])
-        .and_then(|overrides| load_study(path, &overrides))
-        .and_then(PreparedStudy::new);
-    match prepared {
-        Ok(prepared) => Some(prepared),
-        Err(findings) => {
-            print_findings(&findings);
-            None
-        }
-    }
+/// Reads a study.
+fn prepare(path: &Path, robot: &RobotArguments) -> Result<PreparedStudy, Failure> {
+    let overrides = overrides(robot)?;
+    Ok(PreparedStudy::new(load_study(path, &overrides)?)?)
 }
 
 fn prepare_outputs(
@@ -234,20 +198,20 @@ fn prepare_outputs(
     junit.map_or(Ok(()), |path| probe_file(path, "--junit"))
 }
 
-/// A finding if the study will take long, or an error if its cases cannot be computed.
-fn too_long(
+/// Refuses a study that will take long, and one whose cases cannot be computed.
+fn refuse_if_long(
     prepared: &PreparedStudy,
     evaluator: &dyn CaseEvaluator,
     cases: u64,
     threads: usize,
-) -> Result<Option<Finding>, String> {
+) -> Result<(), Failure> {
     if cases <= FEW_CASES {
-        return Ok(None);
+        return Ok(());
     }
-    let each = time_per_case(evaluator, prepared.design.cases())?;
+    let each = time_per_case(evaluator, prepared.design.cases()).map_err(anyhow::Error::msg)?;
     let time = each.mul_f64(cases as f64 / threads as f64);
     if time <= WITHOUT_ASKING {
-        return Ok(None);
+        return Ok(());
     }
     let finding = Finding::new(
         &prepared.study.source.file,
@@ -257,9 +221,10 @@ fn too_long(
             in_words(time)
         ),
     );
-    Ok(Some(finding.key("factors").hint(
-        "--yes starts all the same; --shard K/N computes a part; fewer levels or samples cost less",
-    )))
+    Err(finding
+        .key("factors")
+        .hint("--yes starts all the same; --shard K/N computes a part; fewer levels or samples cost less")
+        .into())
 }
 
 pub(super) fn show(progress: &TerminalProgress, event: Event<'_>) {
@@ -290,15 +255,6 @@ pub(super) fn show(progress: &TerminalProgress, event: Event<'_>) {
     }
 }
 
-pub(super) fn failed(error: &StudyError) -> ExitStatus {
-    complain(&format!("error: {error}"));
-    if error.is_input() {
-        ExitStatus::BadInput
-    } else {
-        ExitStatus::EnvironmentFailed
-    }
-}
-
 /// Statistics, page and verdict of a table that is there.
 fn finish(
     prepared: &PreparedStudy,
@@ -306,18 +262,13 @@ fn finish(
     results: &Path,
     arguments: &StudyResultArguments,
     cancel: Option<&AtomicBool>,
-) -> Result<ExitStatus> {
+) -> Result<ExitStatus, Failure> {
     let threads = threads(arguments.jobs);
     let progress = TerminalProgress::new(arguments.quiet);
-    let results = match ParquetResults::open(results) {
-        Ok(results) => results,
-        Err(error) => return Ok(failed(&error.into())),
-    };
+    let results = ParquetResults::open(results).map_err(StudyError::from)?;
     if arguments.csv {
         progress.message("csv");
-        if let Err(error) = write_csv(&results, &folder.join(CSV_FILE), threads) {
-            return Ok(failed(&error));
-        }
+        write_csv(&results, &folder.join(CSV_FILE), threads)?;
     }
     let output = StudyOutput {
         folder,
@@ -330,11 +281,10 @@ fn finish(
     let written = write_study(prepared, &results, &output, &progress);
     progress.finish();
     if matches!(written, Err(FilesError::Interrupted)) {
-        complain(&format!(
+        return Err(Failure::interrupted(format!(
             "interrupted: all cases are in {}, their summary is not; --resume goes on",
             shown(folder)
-        ));
-        return Ok(ExitStatus::Interrupted);
+        )));
     }
     let finished =
         written.with_context(|| format!("cannot write the results to {}", folder.display()))?;
@@ -353,20 +303,18 @@ fn finish(
         print_text(&format!("{text}results: {}{more}", shown(folder)))?;
     }
     if let Some(request) = arguments.table.request() {
-        match accuracy_of_study(prepared, &results, &request) {
-            Ok(table) => leave(&table, folder, !arguments.json)?,
-            Err(AccuracyError::Results(error)) => return Ok(failed(&error.into())),
-            Err(AccuracyError::Request(finding)) => {
-                print_findings(&[finding]);
-                return Ok(ExitStatus::BadInput);
-            }
-        }
+        let table =
+            accuracy_of_study(prepared, &results, &request).map_err(|error| match error {
+                AccuracyError::Results(error) => Failure::from(StudyError::from(error)),
+                AccuracyError::Request(finding) => Failure::from(finding),
+            })?;
+        leave(&table, folder, !arguments.json)?;
     }
     Ok(ExitStatus::of(finished.verdict))
 }
 
 /// Computes cases alone.
-fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus> {
+fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus, Failure> {
     let total = prepared.design.cases();
     if let Some(case) = arguments.case.iter().find(|&&case| case >= total) {
         let finding = Finding::new(
@@ -379,8 +327,7 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
             total - 1,
             prepared.product()
         ));
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
+        return Err(finding.into());
     }
     if arguments.run {
         return run_cases(arguments, prepared);
@@ -390,7 +337,7 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
     let mut reports = Vec::new();
     for &number in &arguments.case {
         let layout = StudyCase::new(&prepared.study, &prepared.design, number);
-        let result = worker.evaluate(number)?;
+        let result = worker.evaluate(number).map_err(anyhow::Error::from)?;
         if arguments.results.json {
             reports.push(CaseReport::new(
                 &prepared.design,
@@ -420,7 +367,7 @@ fn cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitSta
 }
 
 /// Runs cases as `run` does.
-fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus> {
+fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus, Failure> {
     let mut runs: Vec<(Runnable, PathBuf, RunOptions)> = Vec::new();
     let folder = arguments.out.join(&prepared.study.file.name).join("cases");
     let mut last = LastScan::default();
@@ -446,8 +393,7 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
             }
             Err(findings) => {
                 complain(&format!("case {number} cannot exist:"));
-                print_findings(&findings);
-                return Ok(ExitStatus::BadInput);
+                return Err(findings.into());
             }
         }
     }
@@ -467,10 +413,7 @@ fn run_cases(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<Exi
         quiet: arguments.results.quiet,
     };
     for (runnable, folder, options) in &runs {
-        if let Err(finding) = prepare_folder(folder) {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
+        prepare_folder(folder)?;
         let (outcome, report) = run_into(runnable, options, folder, outputs, &cancel)?;
         status = status.max(outcome);
         reports.push(report);

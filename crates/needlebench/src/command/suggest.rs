@@ -25,9 +25,9 @@ use super::run::prepare_folder;
 use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
-use crate::output::{complain, shown};
+use crate::output::shown;
 use crate::progress::TerminalProgress;
 
 #[derive(Debug, Args)]
@@ -105,7 +105,7 @@ impl Found {
 }
 
 /// Proposes entries and places for a scenario.
-pub(crate) fn suggest(arguments: &SuggestArguments) -> Result<ExitStatus> {
+pub(crate) fn suggest(arguments: &SuggestArguments) -> Result<ExitStatus, Failure> {
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(false);
     let control = Control {
@@ -121,26 +121,14 @@ pub(crate) fn suggest(arguments: &SuggestArguments) -> Result<ExitStatus> {
             Ok((found, written))
         });
     progress.finish();
-    let (found, written) = match answer {
-        Ok(answer) => answer,
-        Err(Stop::Interrupted) => {
-            complain("interrupted");
-            return Ok(ExitStatus::Interrupted);
-        }
-        Err(Stop::Refused(findings)) => {
-            print_findings(&findings);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let (found, written) = answer.map_err(|stop| Failure::of_stop(stop, "interrupted"))?;
     let name = &found.resolved.scenario.name;
     if let Some(out) = &arguments.out {
         let folder = out.join(name);
-        if let Err(finding) = prepare_folder(&folder) {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
+        prepare_folder(&folder)?;
         let places = found.places.as_ref();
-        write_suggestions(&found.resolved, &found.entries, places, Folder(&folder))?;
+        write_suggestions(&found.resolved, &found.entries, places, Folder(&folder))
+            .map_err(anyhow::Error::from)?;
     }
     if arguments.json {
         print_json(&SuggestAnswer {

@@ -16,9 +16,9 @@ use crate::arguments::RobotArguments;
 use crate::command::run::prepare_folder;
 use crate::command::{overrides, print_text};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::threads;
-use crate::output::{complain, shown};
+use crate::output::shown;
 use crate::progress::TerminalProgress;
 
 /// What `view --help` says after the options.
@@ -49,14 +49,8 @@ pub(crate) struct ViewArguments {
 }
 
 /// Serves the planning page until it is interrupted.
-pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus> {
-    let overrides = match overrides(&arguments.robot) {
-        Ok(overrides) => overrides,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus, Failure> {
+    let overrides = overrides(&arguments.robot)?;
     let cancel = Arc::new(AtomicBool::new(false));
     let stopper: Arc<std::sync::OnceLock<Stopper>> = Arc::default();
     let (requested, stops) = (Arc::clone(&cancel), Arc::clone(&stopper));
@@ -71,29 +65,17 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus> {
         let case = Case::open(&folder, &overrides, &cancel)?;
         Ok((folder, case))
     });
-    let (folder, case) = match opened {
-        Ok(opened) => opened,
-        Err(Stop::Interrupted) => {
-            complain("interrupted while the scan was made");
-            return Ok(ExitStatus::Interrupted);
-        }
-        Err(Stop::Refused(findings)) => {
-            print_findings(&findings);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let (folder, case) =
+        opened.map_err(|stop| Failure::of_stop(stop, "interrupted while the scan was made"))?;
     let program = std::env::current_exe().context("this program does not find itself")?;
-    let server = match Server::new(case, arguments.port, program) {
-        Ok(server) => server,
-        Err(error) => {
-            let hint = error.hint();
-            complain(&format!(
-                "error: {error}{}",
-                hint.map_or_else(String::new, |hint| format!("\nhint: {hint}"))
-            ));
-            return Ok(ExitStatus::EnvironmentFailed);
+    let server = Server::new(case, arguments.port, program).map_err(|error| {
+        let hint = error.hint();
+        let hint = hint.map_or_else(String::new, |hint| format!("\nhint: {hint}"));
+        Failure::Ended {
+            status: ExitStatus::EnvironmentFailed,
+            message: format!("error: {error}{hint}"),
         }
-    };
+    })?;
     let _ = stopper.set(server.stopper());
     // Interrupted while the folder was read: nobody was there to be stopped.
     if cancel.load(Ordering::Relaxed) {
@@ -107,7 +89,7 @@ pub(crate) fn view(arguments: &ViewArguments) -> Result<ExitStatus> {
     if !arguments.no_open {
         open(&url);
     }
-    server.run()?;
+    server.run().map_err(anyhow::Error::from)?;
     Ok(ExitStatus::Success)
 }
 

@@ -15,7 +15,7 @@ use super::super::{print_json, print_text};
 use super::{StudyArguments, prepare_folder};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::host;
 use crate::output::{complain, shown};
 
@@ -42,7 +42,7 @@ pub(super) fn launch(
     arguments: &StudyArguments,
     prepared: &PreparedStudy,
     request: LaunchRequest,
-) -> Result<ExitStatus> {
+) -> Result<ExitStatus, Failure> {
     let manifest = prepared.manifest(None);
     let blocks = manifest.blocks();
     if u64::from(request.shards) > blocks {
@@ -58,8 +58,7 @@ pub(super) fn launch(
             "{}:{blocks} at most; a shard has at least one block",
             request.launcher.name()
         ));
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
+        return Err(finding.into());
     }
     let here = std::env::current_dir().context("cannot tell the current folder")?;
     // Inside another program the command line is what is on the path.
@@ -84,25 +83,19 @@ pub(super) fn launch(
         cache: cache.as_deref(),
         needs_mujoco: prepared.needs_mujoco(),
     };
-    let written = launch_plan(&plan).and_then(|plan| {
-        prepare_folder(&plan.folder)?;
-        for folder in &plan.folders {
-            prepare_folder(folder)?;
-        }
-        Ok(plan)
-    });
-    let plan = match written {
-        Ok(plan) => plan,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let plan = launch_plan(&plan)?;
+    prepare_folder(&plan.folder)?;
+    for folder in &plan.folders {
+        prepare_folder(folder)?;
+    }
     for name in &plan.stale {
         let path = plan.folder.join(name);
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(error).with_context(|| format!("cannot remove {}", path.display()));
+                let error = anyhow::Error::from(error);
+                return Err(error
+                    .context(format!("cannot remove {}", path.display()))
+                    .into());
             }
             _ => {}
         }

@@ -9,9 +9,9 @@ use needlebench_study::{Shard, ShardState, Survey, ranges, survey};
 use serde::Serialize;
 
 use super::super::{print_json, print_text};
-use super::{StudyArguments, failed, variable};
+use super::{StudyArguments, variable};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::threads;
 use crate::output::{complain, shown};
 
@@ -57,20 +57,14 @@ fn word(state: ShardState) -> &'static str {
 }
 
 /// Prints how far the shards are: 0 if all cases are there.
-pub(super) fn status(arguments: &StudyArguments, prepared: &PreparedStudy) -> Result<ExitStatus> {
+pub(super) fn status(
+    arguments: &StudyArguments,
+    prepared: &PreparedStudy,
+) -> Result<ExitStatus, Failure> {
     let manifest = prepared.manifest(None);
-    let parts = match shards_of(&variable) {
-        Ok(parts) => parts,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let parts = shards_of(&variable)?;
     let threads = threads(arguments.results.jobs);
-    let found = match survey(&manifest, &arguments.status, parts, threads) {
-        Ok(found) => found,
-        Err(error) => return Ok(failed(&error)),
-    };
+    let found = survey(&manifest, &arguments.status, parts, threads)?;
     let end = if found.is_complete() {
         ExitStatus::Success
     } else {
@@ -81,8 +75,7 @@ pub(super) fn status(arguments: &StudyArguments, prepared: &PreparedStudy) -> Re
     }
     if arguments.missing {
         if found.parts.is_none() && !found.is_complete() {
-            print_findings(&[nobody_says(arguments)]);
-            return Ok(ExitStatus::BadInput);
+            return Err(nobody_says(arguments).into());
         }
         if !found.running.is_empty() {
             complain(&format!(

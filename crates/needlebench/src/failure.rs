@@ -1,0 +1,100 @@
+//! Why a command has no answer.
+
+use needlebench_bench::Stop;
+use needlebench_cell::Finding;
+use needlebench_study::StudyError;
+
+use crate::exit::ExitStatus;
+use crate::findings::print_findings;
+use crate::output::complain;
+
+/// Why a command ends without an answer: what standard error says, and the exit status.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The input is wrong.
+    BadInput(Vec<Finding>),
+    /// It ended with this status, as the message says.
+    Ended {
+        /// What the program ends with.
+        status: ExitStatus,
+        /// What there is to say.
+        message: String,
+    },
+    /// The environment failed.
+    Environment(anyhow::Error),
+}
+
+impl Failure {
+    /// It was interrupted; the message says what became of the results.
+    pub(crate) fn interrupted(message: impl Into<String>) -> Self {
+        Self::Ended {
+            status: ExitStatus::Interrupted,
+            message: message.into(),
+        }
+    }
+
+    /// Work that stopped, with the message of an interruption.
+    pub(crate) fn of_stop(stop: Stop, interrupted: &str) -> Self {
+        match stop {
+            Stop::Interrupted => Self::interrupted(interrupted),
+            Stop::Refused(findings) => Self::BadInput(findings),
+        }
+    }
+
+    /// Tells it, and gives the exit status.
+    pub(crate) fn tell(self) -> ExitStatus {
+        match self {
+            Self::BadInput(findings) => {
+                print_findings(&findings);
+                ExitStatus::BadInput
+            }
+            Self::Ended { status, message } => {
+                complain(&message);
+                status
+            }
+            Self::Environment(error) => {
+                // A closed pipe (`needlebench ... | head`) is the reader's choice.
+                let closed = error
+                    .downcast_ref::<std::io::Error>()
+                    .is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe);
+                if closed {
+                    return ExitStatus::Success;
+                }
+                complain(&format!("error: {error:#}"));
+                ExitStatus::EnvironmentFailed
+            }
+        }
+    }
+}
+
+impl From<Finding> for Failure {
+    fn from(finding: Finding) -> Self {
+        Self::BadInput(vec![finding])
+    }
+}
+
+impl From<Vec<Finding>> for Failure {
+    fn from(findings: Vec<Finding>) -> Self {
+        Self::BadInput(findings)
+    }
+}
+
+impl From<anyhow::Error> for Failure {
+    fn from(error: anyhow::Error) -> Self {
+        Self::Environment(error)
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        let status = if error.is_input() {
+            ExitStatus::BadInput
+        } else {
+            ExitStatus::EnvironmentFailed
+        };
+        Self::Ended {
+            status,
+            message: format!("error: {error}"),
+        }
+    }
+}
