@@ -231,32 +231,32 @@ fn run(cli: Cli) -> ExitStatus {
     clock::start();
     keep_to_width();
     let result = match cli.command {
-        Command::Init(arguments) => command::init(&arguments).map_err(Failure::from),
+        Command::Init(arguments) => command::init(&arguments),
         Command::Suggest(arguments) => command::suggest(&arguments),
         Command::Run(arguments) => command::run(&arguments).map_err(Failure::from),
         Command::Check(arguments) => command::check(&arguments).map_err(Failure::from),
-        Command::Ik(arguments) => command::ik(&arguments).map_err(Failure::from),
-        Command::Fk(arguments) => command::fk(&arguments).map_err(Failure::from),
+        Command::Ik(arguments) => command::ik(&arguments),
+        Command::Fk(arguments) => command::fk(&arguments),
         Command::Clearance(arguments) => command::clearance(&arguments).map_err(Failure::from),
         Command::Atlas(arguments) => command::atlas(&arguments).map_err(Failure::from),
         Command::Export(arguments) => command::export(&arguments).map_err(Failure::from),
         Command::Compare(arguments) => command::compare(&arguments).map_err(Failure::from),
-        Command::Ct(arguments) => command::ct(&arguments).map_err(Failure::from),
+        Command::Ct(arguments) => command::ct(&arguments),
         Command::View(arguments) => command::view(&arguments),
         Command::Study(arguments) => command::study(&arguments),
         Command::Search(arguments) => command::search(&arguments),
         Command::Merge(arguments) => command::merge(&arguments),
-        Command::Iso9283(arguments) => command::iso9283(&arguments).map_err(Failure::from),
-        Command::RecordPlan(arguments) => command::record_plan(&arguments).map_err(Failure::from),
-        Command::Replay(arguments) => command::replay(&arguments).map_err(Failure::from),
-        Command::Pairs(arguments) => command::pairs(&arguments).map_err(Failure::from),
+        Command::Iso9283(arguments) => command::iso9283(&arguments),
+        Command::RecordPlan(arguments) => command::record_plan(&arguments),
+        Command::Replay(arguments) => command::replay(&arguments),
+        Command::Pairs(arguments) => command::pairs(&arguments),
         Command::Servo(arguments) => command::servo(&arguments).map_err(Failure::from),
-        Command::Report(arguments) => command::report(&arguments).map_err(Failure::from),
-        Command::Paper(arguments) => command::paper(&arguments).map_err(Failure::from),
+        Command::Report(arguments) => command::report(&arguments),
+        Command::Paper(arguments) => command::paper(&arguments),
         Command::Schema { format, markdown } => {
             command::schema(format, markdown).map_err(Failure::from)
         }
-        Command::Doctor(arguments) => command::doctor(&arguments).map_err(Failure::from),
+        Command::Doctor(arguments) => command::doctor(&arguments),
         Command::Licences => command::licences().map_err(Failure::from),
         Command::Completions { shell } => {
             command::completions(shell, &mut command_line()).map_err(Failure::from)

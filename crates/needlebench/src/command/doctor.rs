@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::{print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::output::complain;
 use needlebench_bench::provenance::GIT_REVISION;
 
@@ -91,7 +91,7 @@ struct Check {
 }
 
 /// Checks what the engines need, makes it, or fetches what it is made of.
-pub(crate) fn doctor(arguments: &DoctorArguments) -> Result<ExitStatus> {
+pub(crate) fn doctor(arguments: &DoctorArguments) -> Result<ExitStatus, Failure> {
     if let Some(folder) = &arguments.download {
         return fetch_wheels(folder, arguments);
     }
@@ -101,20 +101,15 @@ pub(crate) fn doctor(arguments: &DoctorArguments) -> Result<ExitStatus> {
     check_engines(arguments.json)
 }
 
-fn prepare_environment(arguments: &DoctorArguments) -> Result<ExitStatus> {
+fn prepare_environment(arguments: &DoctorArguments) -> Result<ExitStatus, Failure> {
     if let Some(wheels) = arguments.wheels.as_ref().filter(|folder| !folder.is_dir()) {
-        let finding = Finding::new(
-            "--wheels",
-            format!("there is no folder {}", wheels.display()),
-        )
-        .hint("`needlebench doctor --download DIR` fetches the wheels on a machine with a network");
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
+        let message = format!("there is no folder {}", wheels.display());
+        return Err(Finding::new("--wheels", message)
+            .hint("`needlebench doctor --download DIR` fetches the wheels on a machine with a network")
+            .into());
     }
-    let prepared = match prepare(arguments.wheels.as_deref(), &mut told(arguments.json)) {
-        Ok(prepared) => prepared,
-        Err(error) => return Ok(environment_failed(&error)),
-    };
+    let prepared = prepare(arguments.wheels.as_deref(), &mut told(arguments.json))
+        .map_err(|error| environment_failed(&error))?;
     let environment = prepared.environment;
     if arguments.json {
         print_json(&PrepareAnswer {
@@ -145,15 +140,13 @@ fn prepare_environment(arguments: &DoctorArguments) -> Result<ExitStatus> {
     Ok(ExitStatus::Success)
 }
 
-fn fetch_wheels(folder: &Path, arguments: &DoctorArguments) -> Result<ExitStatus> {
+fn fetch_wheels(folder: &Path, arguments: &DoctorArguments) -> Result<ExitStatus, Failure> {
     let wanted = WheelsFor {
         python: arguments.for_python,
         platform: arguments.for_platform,
     };
-    let fetched = match download_wheels(folder, &wanted, &mut told(arguments.json)) {
-        Ok(fetched) => fetched,
-        Err(error) => return Ok(environment_failed(&error)),
-    };
+    let fetched = download_wheels(folder, &wanted, &mut told(arguments.json))
+        .map_err(|error| environment_failed(&error))?;
     if arguments.json {
         let files = fetched.files.into_iter();
         print_json(&DownloadAnswer {
@@ -185,9 +178,11 @@ fn told(json: bool) -> impl FnMut(&str) {
     }
 }
 
-fn environment_failed(error: &EnvironmentError) -> ExitStatus {
-    complain(&format!("error: {error}"));
-    ExitStatus::EnvironmentFailed
+fn environment_failed(error: &EnvironmentError) -> Failure {
+    Failure::Ended {
+        status: ExitStatus::EnvironmentFailed,
+        message: format!("error: {error}"),
+    }
 }
 
 fn megabytes(bytes: u64) -> String {
@@ -195,7 +190,7 @@ fn megabytes(bytes: u64) -> String {
 }
 
 /// Checks what the engines need.
-fn check_engines(json: bool) -> Result<ExitStatus> {
+fn check_engines(json: bool) -> Result<ExitStatus, Failure> {
     let mut checks = vec![
         Check {
             name: "needlebench",

@@ -17,9 +17,10 @@ use super::schema::{SchemaFormat, document};
 use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
+use crate::failure::Failure;
 use crate::findings::print_findings;
 use crate::interrupts::watch_interrupts;
-use crate::output::{complain, shown};
+use crate::output::shown;
 use crate::progress::TerminalProgress;
 
 #[derive(Debug, Args)]
@@ -100,14 +101,8 @@ struct LesionChoice {
 }
 
 /// Writes a first scenario, or says what there is.
-pub(crate) fn init(arguments: &InitArguments) -> Result<ExitStatus> {
-    let choices = match choices(arguments) {
-        Ok(choices) => choices,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+pub(crate) fn init(arguments: &InitArguments) -> Result<ExitStatus, Failure> {
+    let choices = choices(arguments)?;
     if arguments.list {
         if arguments.json {
             print_json(&choices)?;
@@ -116,13 +111,7 @@ pub(crate) fn init(arguments: &InitArguments) -> Result<ExitStatus> {
         }
         return Ok(ExitStatus::Success);
     }
-    let (path, options) = match options(arguments, &choices) {
-        Ok(wanted) => wanted,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let (path, options) = options(arguments, &choices)?;
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(false);
     let control = Control {
@@ -130,13 +119,7 @@ pub(crate) fn init(arguments: &InitArguments) -> Result<ExitStatus> {
         cancel: &cancel,
         progress: &progress,
     };
-    let overrides = match overrides(&RobotArguments::default()) {
-        Ok(overrides) => overrides,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let overrides = overrides(&RobotArguments::default())?;
     let made = starter(&path.display().to_string(), &options, &overrides, &control);
     progress.finish();
     match made {
@@ -145,10 +128,7 @@ pub(crate) fn init(arguments: &InitArguments) -> Result<ExitStatus> {
             print_text(&said(arguments, &path, &options, &starter))?;
             Ok(ExitStatus::Success)
         }
-        Err(SuggestError::Interrupted) => {
-            complain("interrupted");
-            Ok(ExitStatus::Interrupted)
-        }
+        Err(SuggestError::Interrupted) => Err(Failure::interrupted("interrupted")),
         Err(SuggestError::Refused { message, hint }) => {
             let message = format!("no scenario with these options passes: {message}");
             print_findings(&[Finding::new("the command line", message).hint(hint)]);

@@ -19,7 +19,7 @@ use super::{print_json, print_text};
 use crate::arguments::PicturesArguments;
 use crate::clock::elapsed;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use needlebench_report::files::{Folder, write_measured};
 use needlebench_report::table::iso9283::measured_text;
 use needlebench_report::{JudgedLimit, limits_junit, write_atomically};
@@ -167,20 +167,11 @@ impl Limit {
 }
 
 /// Evaluates a tracker's log.
-pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus> {
-    if let Some(path) = &arguments.junit
-        && let Err(finding) = probe_file(path, "--junit")
-    {
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
+pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus, Failure> {
+    if let Some(path) = &arguments.junit {
+        probe_file(path, "--junit")?;
     }
-    let (report, attained) = match measured(arguments) {
-        Ok(measured) => measured,
-        Err(findings) => {
-            print_findings(&findings);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let (report, attained) = measured(arguments)?;
     let limits = limits(arguments, &report);
     let missed = limits
         .iter()
@@ -198,7 +189,8 @@ pub(crate) fn iso9283(arguments: &Iso9283Arguments) -> Result<ExitStatus> {
     }
     if let Some(path) = &arguments.junit {
         let limits: Vec<JudgedLimit> = judged.limits.iter().map(Limit::in_words).collect();
-        let document = limits_junit(&arguments.csv.display().to_string(), &limits, elapsed())?;
+        let document = limits_junit(&arguments.csv.display().to_string(), &limits, elapsed())
+            .map_err(anyhow::Error::from)?;
         write_atomically(path, document.as_bytes())
             .with_context(|| format!("cannot write {}", path.display()))?;
     }

@@ -23,7 +23,7 @@ use self::target::{target, tolerance};
 use super::{print_json, print_text};
 
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 
 /// Methods of inverse kinematics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -109,14 +109,8 @@ pub(crate) struct FkArguments {
 }
 
 /// Solves the inverse kinematics of a pose or a goal.
-pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus> {
-    let answer = match solve(arguments) {
-        Ok(answer) => answer,
-        Err(findings) => {
-            print_findings(&findings);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus, Failure> {
+    let answer = solve(arguments)?;
     if arguments.json {
         print_json(&answer)?;
     } else {
@@ -125,12 +119,13 @@ pub(crate) fn ik(arguments: &IkArguments) -> Result<ExitStatus> {
     Ok(ExitStatus::Success)
 }
 
-fn solve(arguments: &IkArguments) -> Result<IkAnswer, Vec<Finding>> {
+fn solve(arguments: &IkArguments) -> Result<IkAnswer, Failure> {
     if arguments.method != IkMethod::ClosedForm && arguments.wraps {
-        return Err(vec![
+        return Err(
             Finding::new("--wraps", "a numerical method finds one posture only")
-                .hint("whole turns are those of the closed form: leave --method out"),
-        ]);
+                .hint("whole turns are those of the closed form: leave --method out")
+                .into(),
+        );
     }
     if arguments.method == IkMethod::ClosedForm {
         let given = [
@@ -138,22 +133,22 @@ fn solve(arguments: &IkArguments) -> Result<IkAnswer, Vec<Finding>> {
             ("--time-limit-ms", arguments.time_limit_ms),
         ];
         if let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) {
-            return Err(vec![
-                Finding::new(*option, "the closed form does not iterate")
-                    .hint("choose a numerical method, such as --method gauss-newton"),
-            ]);
+            return Err(Finding::new(*option, "the closed form does not iterate")
+                .hint("choose a numerical method, such as --method gauss-newton")
+                .into());
         }
     }
     if arguments.method != IkMethod::ClosedForm && arguments.tolerance.is_some() {
-        return Err(vec![
+        return Err(
             Finding::new("--tolerance", "a numerical method goes on to rounding")
-                .hint("the tolerance is the closed form's: leave --method out"),
-        ]);
+                .hint("the tolerance is the closed form's: leave --method out")
+                .into(),
+        );
     }
-    let tolerance = tolerance(arguments).map_err(|finding| vec![finding])?;
+    let tolerance = tolerance(arguments)?;
     let (arm, base_link_from_flange) = target(arguments)?;
     let kinematics = Kinematics::new(arm.chain)
-        .map_err(|error| vec![Finding::new(&arm.file, error.to_string())])?
+        .map_err(|error| Finding::new(&arm.file, error.to_string()))?
         .within(arm.limits)
         .touching_within(tolerance);
     Ok(match arguments.method {
@@ -305,14 +300,8 @@ fn numerical(
 }
 
 /// Prints forward kinematics.
-pub(crate) fn fk(arguments: &FkArguments) -> Result<ExitStatus> {
-    let arm = match KinematicArm::new(&arguments.arm) {
-        Ok(arm) => arm,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+pub(crate) fn fk(arguments: &FkArguments) -> Result<ExitStatus, Failure> {
+    let arm = KinematicArm::new(&arguments.arm)?;
     arguments.joints.doubt_degrees();
     let answer = FkAnswer::new(&arm, &Joints::from_column_slice(&arguments.joints.0));
     if arguments.json {

@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::{overrides, print_json, print_text};
 
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use needlebench_report::plain_table;
 use needlebench_report::write_atomically;
 use quick_xml::escape::escape;
@@ -102,21 +102,11 @@ struct SrdfPairAnswer {
 }
 
 /// Prints every pair of bodies with what becomes of it and why, and checks an SRDF.
-pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus> {
-    let read = || -> Result<_, Vec<Finding>> {
-        let overrides = overrides(&arguments.robot).map_err(|finding| vec![finding])?;
-        // Unlike for a run, the start posture may collide: a wrong model is what is looked for.
-        let resolved = load_scenario(&arguments.scenario, &overrides)?;
-        let srdf = arguments.srdf.as_deref().map(Srdf::load).transpose();
-        Ok((resolved, srdf.map_err(|finding| vec![finding])?))
-    };
-    let (resolved, srdf) = match read() {
-        Ok(read) => read,
-        Err(findings) => {
-            print_findings(&findings);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus, Failure> {
+    let overrides = overrides(&arguments.robot)?;
+    // Unlike for a run, the start posture may collide: a wrong model is what is looked for.
+    let resolved = load_scenario(&arguments.scenario, &overrides)?;
+    let srdf = arguments.srdf.as_deref().map(Srdf::load).transpose()?;
     let cell = &resolved.cell;
     let settings = PairSettings {
         samples: arguments.samples as usize,
@@ -152,12 +142,11 @@ pub(crate) fn pairs(arguments: &PairsArguments) -> Result<ExitStatus> {
         .iter()
         .filter_map(|answer| answer.finding.clone())
         .collect();
-    print_findings(&findings);
-    Ok(if findings.is_empty() {
-        ExitStatus::Success
+    if findings.is_empty() {
+        Ok(ExitStatus::Success)
     } else {
-        ExitStatus::BadInput
-    })
+        Err(findings.into())
+    }
 }
 
 fn names(cell: &Cell, pair: &PairExamination) -> [String; 2] {

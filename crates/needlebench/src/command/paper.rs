@@ -7,11 +7,11 @@ use anyhow::{Context, Result};
 
 use super::run::prepare_folder;
 use super::{print_json, print_text};
-use crate::output::{complain, shown};
+use crate::output::shown;
 
 use crate::arguments::PicturesArguments;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::watch_interrupts;
 use crate::progress::TerminalProgress;
 use needlebench_paper::{PaperError, Watch, reproduce};
@@ -33,12 +33,9 @@ pub(crate) struct PaperArguments {
 }
 
 /// Reproduces the paper, writes the results and prints them.
-pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
+pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus, Failure> {
     let cancel = watch_interrupts()?;
-    if let Err(finding) = prepare_folder(&arguments.out) {
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
-    }
+    prepare_folder(&arguments.out)?;
     let progress = TerminalProgress::new(arguments.quiet);
     let watch = Watch {
         cancel: &cancel,
@@ -46,14 +43,10 @@ pub(crate) fn paper(arguments: &PaperArguments) -> Result<ExitStatus> {
     };
     let found = reproduce(arguments.pictures.are_wanted(arguments.quiet), &watch);
     progress.finish();
-    let mut found = match found {
-        Ok(found) => found,
-        Err(PaperError::Interrupted) => {
-            complain("interrupted: nothing was written");
-            return Ok(ExitStatus::Interrupted);
-        }
-        Err(error) => return Err(error.into()),
-    };
+    let mut found = found.map_err(|error| match error {
+        PaperError::Interrupted => Failure::interrupted("interrupted: nothing was written"),
+        error => Failure::Environment(error.into()),
+    })?;
     found
         .write(Folder(&arguments.out))
         .with_context(|| format!("cannot write the results to {}", arguments.out.display()))?;

@@ -26,7 +26,7 @@ use super::run::prepare_folder;
 use super::{overrides, print_json, print_text};
 use crate::arguments::RobotArguments;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::output::{complain, shown};
 
 /// Speeds of sweeps, deg/s: the section's defaults, where the arm may go as fast.
@@ -113,18 +113,8 @@ impl std::str::FromStr for Three {
 }
 
 /// Finds a run, writes it as a scenario and as a program, and says what it keeps and what it tells.
-pub(crate) fn record_plan(arguments: &RecordPlanArguments) -> Result<ExitStatus> {
-    let made = match overrides(&arguments.robot) {
-        Ok(overrides) => plan(arguments, &overrides),
-        Err(finding) => Err(vec![finding]),
-    };
-    let mut made = match made {
-        Ok(made) => made,
-        Err(findings) => {
-            print_findings(&findings);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+pub(crate) fn record_plan(arguments: &RecordPlanArguments) -> Result<ExitStatus, Failure> {
+    let mut made = plan(arguments, &overrides(&arguments.robot)?)?;
     let folder = Folder(&made.folder);
     write_plan(&mut made.report, &made.scenario, &made.script, folder)
         .with_context(|| format!("cannot write the run to {}", made.folder.display()))?;
@@ -152,10 +142,9 @@ struct Made {
     notes: Vec<String>,
 }
 
-fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, Vec<Finding>> {
-    let one = |finding: Finding| vec![finding];
-    let wanted = wanted(arguments).map_err(one)?;
-    let cell = cell_text(arguments, overrides).map_err(one)?;
+fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, Failure> {
+    let wanted = wanted(arguments)?;
+    let cell = cell_text(arguments, overrides)?;
     // What replaces the robot stands in the text by now.
     let others = Overrides {
         robot_urdf: None,
@@ -189,7 +178,7 @@ fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, 
         resolve_scenario(&file, &draft, Path::new(""), &others).map_err(without_lines)?;
     let protocol = resolved.excitation.clone().expect("the draft has a run");
     let folder = arguments.out.join(&name);
-    prepare_folder(&folder).map_err(one)?;
+    prepare_folder(&folder)?;
     let seed = arguments.seed.unwrap_or(resolved.scenario.seed);
     let model = ClearanceModel::new(&resolved.cell);
     let mut refused = None;
@@ -199,7 +188,7 @@ fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, 
             seed: seed ^ (attempt << 32),
         };
         let mut found = search(&resolved, &protocol, &model, options)
-            .map_err(|error| one(not_found(&file, &error)))?;
+            .map_err(|error| not_found(&file, &error))?;
         let section = section_of(&wanted, &found);
         let text = |head: &str, remarks: &[String]| {
             cell.with(
@@ -237,7 +226,7 @@ fn plan(arguments: &RecordPlanArguments, overrides: &Overrides) -> Result<Made, 
             notes: resolved.notes.clone(),
         });
     }
-    Err(refused.into_iter().collect())
+    Err(Failure::BadInput(refused.into_iter().collect()))
 }
 
 /// The section but for its postures and sweeps.

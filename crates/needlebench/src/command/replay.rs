@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use needlebench_bench::RunOptions;
-use needlebench_bench::replay::{arm_files, named_by, replay as replay_run};
+use needlebench_bench::replay::{ReplayError, arm_files, named_by, replay as replay_run};
 use needlebench_cell::scenario::ReplaySection;
 use needlebench_cell::{
     Arm, FileKind, Finding, LogColumns, Overrides, ResolvedScenario, load_scenario, or_wrong_kind,
@@ -24,7 +24,7 @@ use super::{overrides, print_json, print_text};
 use crate::arguments::{EngineArgument, EngineParser, PicturesArguments, RobotArguments};
 use crate::clock::elapsed;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::output::{complain, shown};
 use crate::progress::TerminalProgress;
 
@@ -157,20 +157,14 @@ fn not_negative(text: &str) -> Result<f64, String> {
 }
 
 /// Reads a log, says what it shows of the arm, and replays it.
-pub(crate) fn replay(arguments: &ReplayArguments) -> Result<ExitStatus> {
-    match prepared(arguments) {
-        Ok((run, resolved, found, folder)) => replayed(arguments, run, &resolved, &found, &folder),
-        Err(findings) => {
-            print_findings(&findings);
-            Ok(ExitStatus::BadInput)
-        }
-    }
+pub(crate) fn replay(arguments: &ReplayArguments) -> Result<ExitStatus, Failure> {
+    let (run, resolved, found, folder) = prepared(arguments)?;
+    replayed(arguments, run, &resolved, &found, &folder)
 }
 
 type Prepared = (RecordedRun, ResolvedScenario, String, PathBuf);
 
-fn prepared(arguments: &ReplayArguments) -> Result<Prepared, Vec<Finding>> {
-    let one = |finding: Finding| vec![finding];
+fn prepared(arguments: &ReplayArguments) -> Result<Prepared, Failure> {
     let options = ReadOptions {
         time: arguments.time_unit.map(|unit| match unit {
             TimeArgument::S => TimeUnit::Seconds,
@@ -196,7 +190,7 @@ fn prepared(arguments: &ReplayArguments) -> Result<Prepared, Vec<Finding>> {
             .map(LogColumns::load)
             .transpose()?,
     };
-    let overrides = overrides(&arguments.robot).map_err(one)?;
+    let overrides = overrides(&arguments.robot)?;
     // What is wrong with the scenario is found before a long log is read.
     let of_scenario = match &arguments.scenario {
         Some(path) => Some(load_scenario(path, &overrides)?),
@@ -204,7 +198,7 @@ fn prepared(arguments: &ReplayArguments) -> Result<Prepared, Vec<Finding>> {
     };
     let name = file_name(&arguments.log);
     let folder = arguments.out.join(name);
-    prepare_folder(&folder).map_err(one)?;
+    prepare_folder(&folder)?;
     let run = read_log(&arguments.log, &options).map_err(|findings| {
         match FileKind::of(&arguments.log) {
             Some(FileKind::Mcap) => findings,
@@ -289,7 +283,7 @@ fn replayed(
     resolved: &ResolvedScenario,
     found: &str,
     folder: &Path,
-) -> Result<ExitStatus> {
+) -> Result<ExitStatus, Failure> {
     let cancel = Arc::new(AtomicBool::new(false));
     let requested = Arc::clone(&cancel);
     // Without a handler an interruption still ends the program.
@@ -299,7 +293,9 @@ fn replayed(
         engines: arguments.engine.as_ref().map(EngineArgument::names),
         ..RunOptions::default()
     };
-    let engines = options.chosen_engines(resolved)?;
+    let engines = options
+        .chosen_engines(resolved)
+        .map_err(anyhow::Error::from)?;
     let own = &resolved.scenario.replay;
     let criteria = ReplaySection {
         max_moment_rms_nm: arguments.max_moment_rms.or(own.max_moment_rms_nm),
@@ -314,13 +310,7 @@ fn replayed(
     };
     let done = replay_run(run, resolved, found, &criteria, &engines, &control);
     progress.finish();
-    let done = match done {
-        Ok(done) => done,
-        Err(needlebench_bench::replay::ReplayError::Arm(finding)) => {
-            print_findings(&[*finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let done = done.map_err(|ReplayError::Arm(finding)| *finding)?;
     let arm = arm_files(&done.report, &resolved.cell.robot, CALIBRATION_FILE);
     write_replay(
         &done,

@@ -12,7 +12,7 @@ use needlebench_report::files::Folder;
 use super::run::prepare_folder;
 use super::{print_as_it_is, print_json};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::output::shown;
 
 pub(crate) const REPORT_HELP: &str = "\
@@ -46,7 +46,7 @@ pub(crate) struct ReportArguments {
 }
 
 /// Collects evidence, writes and prints it.
-pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitStatus> {
+pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitStatus, Failure> {
     if arguments.template {
         print_as_it_is(Judgement::template().trim_end())?;
         return Ok(ExitStatus::Success);
@@ -56,19 +56,10 @@ pub(crate) fn report(arguments: &ReportArguments) -> Result<ExitStatus> {
         None => Ok(Judgement::default()),
     };
     let collected = judgement.and_then(|judged| Credibility::collect(&arguments.folders, judged));
-    let document = match collected {
-        Ok(document) => document,
-        Err(findings) => {
-            print_findings(&findings);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let document = collected?;
     let first = arguments.folders.first();
     let folder = arguments.out.as_ref().or(first).context("no folder")?;
-    if let Err(finding) = prepare_folder(folder) {
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
-    }
+    prepare_folder(folder)?;
     let markdown = credibility_markdown(&document);
     let written = Folder(folder)
         .write("credibility.md", &markdown)

@@ -31,9 +31,9 @@ use crate::arguments::{PicturesArguments, RobotArguments};
 use crate::command::run::prepare_folder;
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::watch_interrupts;
-use crate::output::{complain, shown};
+use crate::output::shown;
 use crate::progress::TerminalProgress;
 
 /// What `ct build --help` says after the options.
@@ -174,7 +174,7 @@ struct BuildAnswer<'a> {
 }
 
 /// Builds a patient from a CT.
-pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus> {
+pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus, Failure> {
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.json);
     let control = Control {
@@ -201,25 +201,21 @@ pub(crate) fn build_scan(arguments: &BuildArguments) -> Result<ExitStatus> {
             }
             Ok(ExitStatus::Success)
         }
-        Err(Stop::Interrupted) => {
-            complain("interrupted: there is no scenario.toml yet");
-            Ok(ExitStatus::Interrupted)
-        }
-        Err(Stop::Refused(findings)) => {
-            if arguments.json {
-                print_json(&BuildAnswer {
-                    schema_version: 1,
-                    ok: false,
-                    findings,
-                    folder: arguments.out.display().to_string(),
-                    scenario: None,
-                    report: None,
-                })?;
-            } else {
-                print_findings(&findings);
-            }
+        Err(Stop::Refused(findings)) if arguments.json => {
+            print_json(&BuildAnswer {
+                schema_version: 1,
+                ok: false,
+                findings,
+                folder: arguments.out.display().to_string(),
+                scenario: None,
+                report: None,
+            })?;
             Ok(ExitStatus::BadInput)
         }
+        Err(stop) => Err(Failure::of_stop(
+            stop,
+            "interrupted: there is no scenario.toml yet",
+        )),
     }
 }
 
@@ -452,11 +448,7 @@ fn draw(built: &ScanBuild, out: &Path) -> Result<(), Stop> {
     Ok(())
 }
 
-fn in_words(
-    built: &ScanBuild,
-    arguments: &BuildArguments,
-    file: &Path,
-) -> Result<String, std::fmt::Error> {
+fn in_words(built: &ScanBuild, arguments: &BuildArguments, file: &Path) -> Result<String> {
     let mut text = String::new();
     let report = BuildReport::of(built, arguments.files());
     let out = &arguments.out;

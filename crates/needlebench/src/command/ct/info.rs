@@ -15,9 +15,9 @@ use serde::Serialize;
 
 use crate::command::{print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
-use crate::output::{complain, shown};
+use crate::output::shown;
 
 /// Shares of the voxels whose Hounsfield units are printed.
 const QUANTILES: [f64; 7] = [0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99];
@@ -129,29 +129,22 @@ struct Quantile {
 }
 
 /// Reads a CT, and says what it is.
-pub(crate) fn info(arguments: &InfoArguments) -> Result<ExitStatus> {
+pub(crate) fn info(arguments: &InfoArguments) -> Result<ExitStatus, Failure> {
     let cancel = watch_interrupts()?;
     let read = arguments.reading.read(&arguments.path, &cancel);
     let read = match read.map_err(|error| Stop::of_scan(&arguments.path, error)) {
         Ok(read) => read,
-        Err(Stop::Interrupted) => {
-            complain("interrupted");
-            return Ok(ExitStatus::Interrupted);
-        }
-        Err(Stop::Refused(findings)) => {
-            if arguments.json {
-                print_json(&InfoAnswer {
-                    schema_version: 1,
-                    ok: false,
-                    findings,
-                    remarks: Vec::new(),
-                    volume: None,
-                })?;
-            } else {
-                print_findings(&findings);
-            }
+        Err(Stop::Refused(findings)) if arguments.json => {
+            print_json(&InfoAnswer {
+                schema_version: 1,
+                ok: false,
+                findings,
+                remarks: Vec::new(),
+                volume: None,
+            })?;
             return Ok(ExitStatus::BadInput);
         }
+        Err(stop) => return Err(Failure::of_stop(stop, "interrupted")),
     };
     let volume = answer(&read);
     if arguments.json {
@@ -205,11 +198,7 @@ fn answer(read: &ReadVolume) -> VolumeAnswer {
     }
 }
 
-fn in_words(
-    path: &Path,
-    volume: &VolumeAnswer,
-    remarks: &[Remark],
-) -> Result<String, std::fmt::Error> {
+fn in_words(path: &Path, volume: &VolumeAnswer, remarks: &[Remark]) -> Result<String> {
     let mut text = String::new();
     let [columns, rows, slices] = volume.size;
     let [x, y, z] = volume.spacing_m.map(|each| each * 1e3);

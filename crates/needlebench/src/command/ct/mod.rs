@@ -9,6 +9,7 @@ use anyhow::Result;
 use clap::{Args, Subcommand};
 
 use crate::exit::ExitStatus;
+use crate::failure::Failure;
 
 use build::{BUILD_HELP, BuildArguments, build_scan};
 use info::{InfoArguments, info};
@@ -47,7 +48,7 @@ enum CtCommand {
 }
 
 /// Runs what is asked for of a CT.
-pub(crate) fn ct(arguments: &CtArguments) -> Result<ExitStatus> {
+pub(crate) fn ct(arguments: &CtArguments) -> Result<ExitStatus, Failure> {
     match &arguments.command {
         CtCommand::Info(arguments) => info(arguments),
         CtCommand::Build(arguments) => build_scan(arguments),

@@ -30,9 +30,9 @@ use crate::command::run::prepare_folder;
 use crate::command::suggest::{ChosenEntry, set_entries, unplaced};
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
-use crate::output::{complain, shown};
+use crate::output::shown;
 use crate::progress::TerminalProgress;
 
 /// What `ct routes --help` says after the options.
@@ -136,7 +136,7 @@ impl Found {
 }
 
 /// Plans routes.
-pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus> {
+pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus, Failure> {
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.json);
     let control = Control {
@@ -150,34 +150,21 @@ pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus> {
     progress.finish();
     let mut found = match found {
         Ok(found) => found,
-        Err(Stop::Interrupted) => {
-            complain("interrupted");
-            return Ok(ExitStatus::Interrupted);
-        }
-        Err(Stop::Refused(findings)) => {
-            if arguments.json {
-                print_json(&RoutesAnswer {
-                    schema_version: 1,
-                    ok: false,
-                    findings: &findings,
-                    scenario: None,
-                    targets: &[],
-                    remarks: &[],
-                    written: None,
-                })?;
-            } else {
-                print_findings(&findings);
-            }
+        Err(Stop::Refused(findings)) if arguments.json => {
+            print_json(&RoutesAnswer {
+                schema_version: 1,
+                ok: false,
+                findings: &findings,
+                scenario: None,
+                targets: &[],
+                remarks: &[],
+                written: None,
+            })?;
             return Ok(ExitStatus::BadInput);
         }
+        Err(stop) => return Err(Failure::of_stop(stop, "interrupted")),
     };
-    let files = match written_files(arguments, &found)? {
-        Ok(files) => files,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let files = written_files(arguments, &found)?;
     if arguments.json {
         for plan in &mut found.plans {
             plan.map = None;
@@ -194,25 +181,21 @@ pub(crate) fn routes(arguments: &RoutesArguments) -> Result<ExitStatus> {
 }
 
 /// Writes `routes.json` and the maps; the folder that they are in, if they are wanted.
-fn written_files(
-    arguments: &RoutesArguments,
-    found: &Found,
-) -> Result<std::result::Result<Option<PathBuf>, Finding>> {
+fn written_files(arguments: &RoutesArguments, found: &Found) -> Result<Option<PathBuf>, Failure> {
     let own = arguments.path.is_dir().then(|| arguments.path.clone());
     let Some(folder) = arguments.out.clone().or(own) else {
-        return Ok(Ok(None));
+        return Ok(None);
     };
-    if let Err(finding) = prepare_folder(&folder) {
-        return Ok(Err(finding));
-    }
-    let text = serde_json::to_string(&found.answer())?;
+    prepare_folder(&folder)?;
+    let text = serde_json::to_string(&found.answer()).map_err(anyhow::Error::from)?;
     let path = folder.join("routes.json");
     write_atomically(&path, format!("{text}\n").as_bytes())
         .with_context(|| format!("cannot write {}", path.display()))?;
     if arguments.pictures.are_wanted(arguments.json) {
-        write_route_maps(&found.name, &found.plans, Folder(&folder))?;
+        write_route_maps(&found.name, &found.plans, Folder(&folder))
+            .map_err(anyhow::Error::from)?;
     }
-    Ok(Ok(Some(folder)))
+    Ok(Some(folder))
 }
 
 fn in_words(arguments: &RoutesArguments, found: &Found, folder: Option<&Path>) -> String {

@@ -25,9 +25,9 @@ use crate::arguments::RobotArguments;
 use crate::command::run::prepare_folder;
 use crate::command::{overrides, print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::watch_interrupts;
-use crate::output::{complain, shown};
+use crate::output::shown;
 use crate::progress::TerminalProgress;
 
 /// What `ct synth --help` says after the options.
@@ -266,25 +266,10 @@ struct Listed<'l, T> {
 }
 
 /// Makes a synthetic CT.
-pub(crate) fn synth(arguments: &SynthArguments) -> Result<ExitStatus> {
-    let subject = match subject(arguments) {
-        Ok(subject) => subject,
-        Err(findings) => {
-            print_findings(&findings);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
-    let scan = match described(arguments, &subject) {
-        Ok(scan) => scan,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
-    if let Err(finding) = prepare_folder(&arguments.out) {
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
-    }
+pub(crate) fn synth(arguments: &SynthArguments) -> Result<ExitStatus, Failure> {
+    let subject = subject(arguments)?;
+    let scan = described(arguments, &subject)?;
+    prepare_folder(&arguments.out)?;
     let cancel = watch_interrupts()?;
     let progress = TerminalProgress::new(arguments.json);
     let made = make(arguments, &scan, &cancel, &progress);
@@ -294,10 +279,9 @@ pub(crate) fn synth(arguments: &SynthArguments) -> Result<ExitStatus> {
             write_truth(&arguments.out, &scan, &files, arguments)?;
             Ok(ExitStatus::Success)
         }
-        Err(ImagingError::Interrupted) => {
-            complain("interrupted: what was not complete was not written");
-            Ok(ExitStatus::Interrupted)
-        }
+        Err(ImagingError::Interrupted) => Err(Failure::interrupted(
+            "interrupted: what was not complete was not written",
+        )),
         Err(ImagingError::Refused {
             place,
             message,
@@ -305,33 +289,31 @@ pub(crate) fn synth(arguments: &SynthArguments) -> Result<ExitStatus> {
         }) => {
             let place = place.unwrap_or_else(|| shown(&arguments.subject));
             let finding = Finding::new(place, message);
-            print_findings(&[match hint {
+            Err(Failure::from(match hint {
                 Some(hint) => finding.hint(hint),
                 None => finding,
-            }]);
-            Ok(ExitStatus::BadInput)
+            }))
         }
     }
 }
 
-fn subject(arguments: &SynthArguments) -> Result<Subject, Vec<Finding>> {
-    let one = |finding: Finding| vec![finding];
+fn subject(arguments: &SynthArguments) -> Result<Subject, Failure> {
     let path = &arguments.subject;
     let name = path.to_string_lossy();
     if SIZE_PRESETS.contains(&&*name) && !path.exists() {
         let parameters = Phantom::size_preset(&name);
         return parameters
             .and_then(|parameters| build(parameters, arguments))
-            .map_err(|error| one(Finding::new(name.clone(), error.to_string())));
+            .map_err(|error| Finding::new(name.clone(), error.to_string()).into());
     }
     if FileKind::of(path) == Some(FileKind::PhantomSizes) {
         let file = path.display().to_string();
-        let text = read_text(path).map_err(|error| one(Finding::new(&file, error.to_string())))?;
+        let text = read_text(path).map_err(|error| Finding::new(&file, error.to_string()))?;
         return PhantomParameters::from_toml(&text)
             .and_then(|parameters| build(parameters, arguments))
-            .map_err(|error| one(Finding::new(&file, error.to_string())));
+            .map_err(|error| Finding::new(&file, error.to_string()).into());
     }
-    let overrides = overrides(&arguments.robot).map_err(one)?;
+    let overrides = overrides(&arguments.robot)?;
     let resolved = load_scenario(path, &overrides)?;
     Ok(Subject::Scenario(Box::new(resolved)))
 }

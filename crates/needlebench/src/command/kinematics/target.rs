@@ -16,6 +16,7 @@ use super::super::urdf_overrides;
 use super::IkArguments;
 use super::arm::KinematicArm;
 use crate::arguments::{PoseMatrix, Six};
+use crate::failure::Failure;
 
 /// A coordinate beyond this is in another unit.
 const FARTHEST_M: f64 = 10.0;
@@ -60,18 +61,16 @@ pub(super) fn tolerance(arguments: &IkArguments) -> Result<Tolerance, Finding> {
 }
 
 /// The arm, and the pose of its flange in `base_link`.
-pub(super) fn target(arguments: &IkArguments) -> Result<(KinematicArm, Pose), Vec<Finding>> {
+pub(super) fn target(arguments: &IkArguments) -> Result<(KinematicArm, Pose), Failure> {
     if let Some(path) = &arguments.scenario {
         return goal_pose(arguments, path);
     }
-    let one = |finding| vec![finding];
     let base_from_flange = match (&arguments.pose, &arguments.matrix) {
         (Some(pose), _) => of_vector(pose),
         (None, Some(matrix)) => of_matrix(matrix, arguments.nearest_rotation),
         (None, None) => unreachable!("clap asks for one of them without a scenario"),
-    }
-    .map_err(one)?;
-    let arm = KinematicArm::new(&arguments.arm).map_err(one)?;
+    }?;
+    let arm = KinematicArm::new(&arguments.arm)?;
     Ok((arm, Robot::base_link_from_base() * base_from_flange))
 }
 
@@ -136,8 +135,8 @@ fn check_position(argument: &str, position_m: &Vector3<f64>) -> Result<(), Findi
     Err(Finding::new(argument, message).hint("x, y and z are in metres"))
 }
 
-fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(KinematicArm, Pose), Vec<Finding>> {
-    let overrides = urdf_overrides(&arguments.arm.robot).map_err(|finding| vec![finding])?;
+fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(KinematicArm, Pose), Failure> {
+    let overrides = urdf_overrides(&arguments.arm.robot)?;
     let resolved = needlebench_cell::load_scenario(path, &overrides)?;
     let name = arguments.goal.as_deref().unwrap_or_default();
     let Some(goal) = resolved.goals.iter().find(|goal| goal.name == name) else {
@@ -146,21 +145,14 @@ fn goal_pose(arguments: &IkArguments, path: &Path) -> Result<(KinematicArm, Pose
             .iter()
             .map(|goal| goal.name.as_str())
             .collect();
-        return Err(vec![
-            Finding::new(
-                path.display().to_string(),
-                format!("it has no goal `{name}`"),
-            )
-            .hint(format!("goals: {}", names.join(", "))),
-        ]);
+        let file = path.display().to_string();
+        return Err(Finding::new(file, format!("it has no goal `{name}`"))
+            .hint(format!("goals: {}", names.join(", ")))
+            .into());
     };
     let model = ClearanceModel::new(&resolved.cell);
-    let planner = Planner::new(&resolved, &model).map_err(|error| {
-        vec![Finding::new(
-            &resolved.cell.robot.source.file,
-            error.to_string(),
-        )]
-    })?;
+    let planner = Planner::new(&resolved, &model)
+        .map_err(|error| Finding::new(&resolved.cell.robot.source.file, error.to_string()))?;
     let roll_rad = match goal.roll {
         Roll::Fixed(roll_rad) => roll_rad,
         Roll::Free => 0.0,
