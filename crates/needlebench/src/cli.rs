@@ -233,14 +233,14 @@ fn run(cli: Cli) -> ExitStatus {
     let result = match cli.command {
         Command::Init(arguments) => command::init(&arguments),
         Command::Suggest(arguments) => command::suggest(&arguments),
-        Command::Run(arguments) => command::run(&arguments).map_err(Failure::from),
-        Command::Check(arguments) => command::check(&arguments).map_err(Failure::from),
+        Command::Run(arguments) => command::run(&arguments),
+        Command::Check(arguments) => command::check(&arguments),
         Command::Ik(arguments) => command::ik(&arguments),
         Command::Fk(arguments) => command::fk(&arguments),
-        Command::Clearance(arguments) => command::clearance(&arguments).map_err(Failure::from),
-        Command::Atlas(arguments) => command::atlas(&arguments).map_err(Failure::from),
-        Command::Export(arguments) => command::export(&arguments).map_err(Failure::from),
-        Command::Compare(arguments) => command::compare(&arguments).map_err(Failure::from),
+        Command::Clearance(arguments) => command::clearance(&arguments),
+        Command::Atlas(arguments) => command::atlas(&arguments),
+        Command::Export(arguments) => command::export(&arguments),
+        Command::Compare(arguments) => command::compare(&arguments),
         Command::Ct(arguments) => command::ct(&arguments),
         Command::View(arguments) => command::view(&arguments),
         Command::Study(arguments) => command::study(&arguments),
@@ -250,17 +250,13 @@ fn run(cli: Cli) -> ExitStatus {
         Command::RecordPlan(arguments) => command::record_plan(&arguments),
         Command::Replay(arguments) => command::replay(&arguments),
         Command::Pairs(arguments) => command::pairs(&arguments),
-        Command::Servo(arguments) => command::servo(&arguments).map_err(Failure::from),
+        Command::Servo(arguments) => command::servo(&arguments),
         Command::Report(arguments) => command::report(&arguments),
         Command::Paper(arguments) => command::paper(&arguments),
-        Command::Schema { format, markdown } => {
-            command::schema(format, markdown).map_err(Failure::from)
-        }
+        Command::Schema { format, markdown } => command::schema(format, markdown),
         Command::Doctor(arguments) => command::doctor(&arguments),
-        Command::Licences => command::licences().map_err(Failure::from),
-        Command::Completions { shell } => {
-            command::completions(shell, &mut command_line()).map_err(Failure::from)
-        }
+        Command::Licences => command::licences(),
+        Command::Completions { shell } => command::completions(shell, &mut command_line()),
     };
     result.unwrap_or_else(Failure::tell)
 }

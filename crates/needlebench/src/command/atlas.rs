@@ -14,7 +14,7 @@ use super::{load, overrides, print_json, print_text};
 use crate::output::{print_wide, shown};
 
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use needlebench_bench::atlas::{AtlasReport, GoalAtlas, GoalAtlasReport, goal_atlas};
 use needlebench_report::files::{Folder, write_atlas};
 use needlebench_report::table::atlas::text;
@@ -72,25 +72,13 @@ pub(crate) enum AimArgument {
 }
 
 /// Computes and writes the atlas of one or all goals.
-pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
+pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus, Failure> {
     if arguments.wide {
         print_wide();
     }
-    let refuse = |finding: Finding| {
-        print_findings(&[finding]);
-        Ok(ExitStatus::BadInput)
-    };
-    let overrides = match overrides(&arguments.robot) {
-        Ok(overrides) => overrides,
-        Err(finding) => return refuse(finding),
-    };
-    let Some(resolved) = load(&arguments.scenario, &overrides) else {
-        return Ok(ExitStatus::BadInput);
-    };
-    let goals = match goals(&resolved, arguments.goal.as_deref()) {
-        Ok(goals) => goals,
-        Err(finding) => return refuse(finding),
-    };
+    let overrides = overrides(&arguments.robot)?;
+    let resolved = load(&arguments.scenario, &overrides)?;
+    let goals = goals(&resolved, arguments.goal.as_deref())?;
     let aim = arguments
         .aim
         .map_or(resolved.scenario.planning.roll_aim, aim_of);
@@ -99,21 +87,13 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
         usize::from,
     );
     let folder = arguments.out.join(&resolved.scenario.name);
-    if let Err(finding) = prepare_folder(&folder) {
-        return refuse(finding);
-    }
+    prepare_folder(&folder)?;
     let model = ClearanceModel::new(&resolved.cell);
     let mut atlases: Vec<(&Goal, GoalAtlas)> = Vec::new();
     for goal in goals {
-        match goal_atlas(&resolved, &model, goal, arguments.rolls, aim, threads) {
-            Ok(atlas) => atlases.push((goal, atlas)),
-            Err(error) => {
-                return refuse(Finding::new(
-                    &resolved.cell.robot.source.file,
-                    error.to_string(),
-                ));
-            }
-        }
+        let atlas = goal_atlas(&resolved, &model, goal, arguments.rolls, aim, threads)
+            .map_err(|error| Finding::new(&resolved.cell.robot.source.file, error.to_string()))?;
+        atlases.push((goal, atlas));
     }
     let reports = atlases
         .iter()
@@ -126,7 +106,8 @@ pub(crate) fn atlas(arguments: &AtlasArguments) -> Result<ExitStatus> {
         &report,
         Folder(&folder),
         [arguments.pictures.are_wanted(false), !arguments.no_page],
-    )?;
+    )
+    .map_err(anyhow::Error::from)?;
     if arguments.json {
         print_json(&report)?;
     } else {

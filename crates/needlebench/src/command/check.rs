@@ -12,10 +12,10 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::{load_checked, overrides, print_json, print_text};
+use super::{load, overrides, print_json, print_text};
 
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::host::take_findings;
 
 #[derive(Debug, Args)]
@@ -49,7 +49,7 @@ struct CheckedScenario {
 }
 
 /// Parses, resolves and validates scenarios, and says what can be known of them without a simulation.
-pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
+pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus, Failure> {
     let mut findings = Vec::new();
     let mut notes = Vec::new();
     let mut scenarios = Vec::new();
@@ -57,14 +57,14 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
         Err(finding) => findings.push(finding),
         Ok(overrides) => {
             for path in &arguments.scenarios {
-                let resolved = match load_checked(path, &overrides) {
-                    Ok(runnable) => runnable.into_scenario(),
+                let resolved = match load(path, &overrides) {
+                    Ok(resolved) => resolved,
                     Err(found) => {
                         findings.extend(found.into_iter().map(|finding| placed(path, finding)));
                         continue;
                     }
                 };
-                let (preview, found) = Preview::of(&resolved)?;
+                let (preview, found) = Preview::of(&resolved).map_err(anyhow::Error::from)?;
                 if !arguments.json {
                     let is_ok = found.is_empty();
                     print_text(&in_words(path, &resolved, &preview, is_ok)?)?;
@@ -80,18 +80,21 @@ pub(crate) fn check(arguments: &CheckArguments) -> Result<ExitStatus> {
         }
     }
     let ok = findings.is_empty();
-    if arguments.json {
-        take_findings(&findings);
-        print_json(&CheckAnswer {
-            schema_version: 1,
-            ok,
-            findings,
-            notes,
-            scenarios,
-        })?;
-    } else {
-        print_findings(&findings);
+    if !arguments.json {
+        return if ok {
+            Ok(ExitStatus::Success)
+        } else {
+            Err(findings.into())
+        };
     }
+    take_findings(&findings);
+    print_json(&CheckAnswer {
+        schema_version: 1,
+        ok,
+        findings,
+        notes,
+        scenarios,
+    })?;
     Ok(if ok {
         ExitStatus::Success
     } else {
@@ -116,7 +119,7 @@ fn in_words(
     resolved: &ResolvedScenario,
     preview: &Preview,
     is_ok: bool,
-) -> Result<String, std::fmt::Error> {
+) -> Result<String> {
     let mut text = String::new();
     let purpose = match (&resolved.iso9283, &resolved.excitation) {
         (Some(_), _) => "test by ISO 9283".to_owned(),

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::{load, overrides, print_json, print_text};
 
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 
 #[derive(Debug, Args)]
 pub(crate) struct ClearanceArguments {
@@ -67,17 +67,9 @@ fn solids(cell: &Cell, pair: &PairClearance) -> [String; 2] {
 }
 
 /// Prints the clearance of one posture.
-pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus> {
-    let overrides = match overrides(&arguments.robot) {
-        Ok(overrides) => overrides,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
-    let Some(resolved) = load(&arguments.scenario, &overrides) else {
-        return Ok(ExitStatus::BadInput);
-    };
+pub(crate) fn clearance(arguments: &ClearanceArguments) -> Result<ExitStatus, Failure> {
+    let overrides = overrides(&arguments.robot)?;
+    let resolved = load(&arguments.scenario, &overrides)?;
     let cell = &resolved.cell;
     let model = ClearanceModel::new(cell);
     let q = Joints::from_column_slice(&arguments.joints.0);

@@ -8,7 +8,7 @@ mod thresholds;
 pub(crate) use help::compare_help;
 
 use crate::arguments::{EngineArgument, EngineParser};
-use crate::output::{complain, print_wide};
+use crate::output::print_wide;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -19,14 +19,14 @@ use needlebench_evaluation::compare::{CompareOptions, compare as compare_reports
 use needlebench_evaluation::{Compared, StoredReport};
 
 use super::run::probe_file;
-use super::{load_checked, print_json, print_text};
+use super::{load_runnable, print_json, print_text};
 use case::case_of_study;
 use studies::{compare_if_studies, is_study};
 use thresholds::thresholds;
 
 use crate::clock::elapsed;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::progress::TerminalProgress;
 use needlebench_bench::{RunOptions, Runnable};
 use needlebench_report::table::comparison::{comparison_screen, comparison_text};
@@ -107,20 +107,6 @@ impl std::str::FromStr for Pair {
     }
 }
 
-/// Why there is nothing to compare.
-enum Refused {
-    /// The input is wrong.
-    Input(Vec<Finding>),
-    /// An engine failed while a scenario was run.
-    Engine(String),
-}
-
-impl From<Finding> for Refused {
-    fn from(finding: Finding) -> Self {
-        Self::Input(vec![finding])
-    }
-}
-
 impl CompareArguments {
     fn is_wide(&self) -> bool {
         self.wide || self.all
@@ -128,62 +114,47 @@ impl CompareArguments {
 }
 
 /// Compares two results.
-pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus> {
+pub(crate) fn compare(arguments: &CompareArguments) -> Result<ExitStatus, Failure> {
     if arguments.is_wide() {
         print_wide();
     }
     if let Some(status) = compare_if_studies(arguments)? {
         return Ok(status);
     }
-    match compared(arguments) {
-        Ok((options, a, b)) => {
-            let comparison = match compare_reports(&a, &b, &options) {
-                Ok(comparison) => comparison,
-                Err(error) => {
-                    let finding = Finding::new(b.source(), error.to_string())
-                        .key("--goal")
-                        .hint("name goals that changed their name with --goal A=B");
-                    print_findings(&[finding]);
-                    return Ok(ExitStatus::BadInput);
-                }
-            };
-            let write = |path: &Path, text: String| {
-                write_atomically(path, text.as_bytes())
-                    .with_context(|| format!("cannot write {}", path.display()))
-            };
-            if let Some(path) = &arguments.junit {
-                write(path, comparison_junit(&comparison, elapsed())?)?;
-            }
-            if let Some(path) = &arguments.markdown {
-                write(path, comparison_markdown(&comparison))?;
-            }
-            if arguments.json {
-                print_json(&comparison)?;
-            } else {
-                let text = if arguments.is_wide() {
-                    comparison_text(&comparison, arguments.all)
-                } else {
-                    comparison_screen(&comparison)
-                };
-                print_text(text.trim_end())?;
-            }
-            Ok(ExitStatus::of(comparison.verdict))
-        }
-        Err(Refused::Input(findings)) => {
-            print_findings(&findings);
-            Ok(ExitStatus::BadInput)
-        }
-        Err(Refused::Engine(message)) => {
-            complain(&format!("error: {message}"));
-            Ok(ExitStatus::EnvironmentFailed)
-        }
+    let (options, a, b) = compared(arguments)?;
+    let comparison = compare_reports(&a, &b, &options).map_err(|error| {
+        Finding::new(b.source(), error.to_string())
+            .key("--goal")
+            .hint("name goals that changed their name with --goal A=B")
+    })?;
+    let write = |path: &Path, text: String| {
+        write_atomically(path, text.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))
+    };
+    if let Some(path) = &arguments.junit {
+        let junit = comparison_junit(&comparison, elapsed()).map_err(anyhow::Error::from)?;
+        write(path, junit)?;
     }
+    if let Some(path) = &arguments.markdown {
+        write(path, comparison_markdown(&comparison))?;
+    }
+    if arguments.json {
+        print_json(&comparison)?;
+    } else {
+        let text = if arguments.is_wide() {
+            comparison_text(&comparison, arguments.all)
+        } else {
+            comparison_screen(&comparison)
+        };
+        print_text(text.trim_end())?;
+    }
+    Ok(ExitStatus::of(comparison.verdict))
 }
 
 /// What to compare, read or run. Everything that can be wrong on the command line comes first.
 fn compared(
     arguments: &CompareArguments,
-) -> Result<(CompareOptions, StoredReport, StoredReport), Refused> {
+) -> Result<(CompareOptions, StoredReport, StoredReport), Failure> {
     let options = options(arguments)?;
     for (path, argument) in [
         (&arguments.junit, "--junit"),
@@ -211,8 +182,8 @@ fn compared(
     Ok((options, a, b))
 }
 
-fn options(arguments: &CompareArguments) -> Result<CompareOptions, Refused> {
-    let given = thresholds(arguments, Compared::Runs).map_err(Refused::Input)?;
+fn options(arguments: &CompareArguments) -> Result<CompareOptions, Vec<Finding>> {
+    let given = thresholds(arguments, Compared::Runs)?;
     Ok(CompareOptions {
         renamed_goals: arguments.goal.iter().map(|pair| pair.0.clone()).collect(),
         thresholds: given.thresholds,
@@ -229,10 +200,9 @@ enum Input {
     Scenario(PathBuf, Box<Runnable>),
 }
 
-fn input(path: &Path, case: Option<u64>) -> Result<Input, Refused> {
+fn input(path: &Path, case: Option<u64>) -> Result<Input, Failure> {
     if is_study(path) {
-        let report = case_of_study(path, case).map_err(Refused::Input)?;
-        return Ok(Input::Stored(report));
+        return Ok(Input::Stored(case_of_study(path, case)?));
     }
     let name = path.display().to_string();
     if path
@@ -243,7 +213,7 @@ fn input(path: &Path, case: Option<u64>) -> Result<Input, Refused> {
             engines: engine_names(ENGINES),
             ..Overrides::default()
         };
-        let runnable = load_checked(path, &overrides).map_err(Refused::Input)?;
+        let runnable = load_runnable(path, &overrides)?;
         return Ok(Input::Scenario(path.to_owned(), Box::new(runnable)));
     }
     let file = if path.is_dir() {
@@ -261,11 +231,10 @@ fn input(path: &Path, case: Option<u64>) -> Result<Input, Refused> {
             || hint.to_owned(),
             |below| format!("`{name}` has the results of several scenarios: try {below}"),
         ));
-        Refused::from(finding)
+        finding
     })?;
     let stored = StoredReport::parse(&file.display().to_string(), &text)
-        .map_err(|finding| or_wrong_kind(&file, FileKind::Report, vec![finding]))
-        .map_err(Refused::Input)?;
+        .map_err(|finding| or_wrong_kind(&file, FileKind::Report, vec![finding]))?;
     Ok(Input::Stored(stored))
 }
 
@@ -281,7 +250,7 @@ fn results_below(folder: &Path) -> Option<String> {
 }
 
 impl Input {
-    fn report(self, arguments: &CompareArguments) -> Result<StoredReport, Refused> {
+    fn report(self, arguments: &CompareArguments) -> Result<StoredReport, Failure> {
         let (path, runnable) = match self {
             Self::Stored(stored) => return Ok(stored),
             Self::Scenario(path, runnable) => (path, runnable),
@@ -300,9 +269,10 @@ impl Input {
             .map_err(|error| Finding::new(&name, error.to_string()))?
             .report;
         if let Some(failure) = report.engine_failures.first() {
-            return Err(Refused::Engine(format!(
+            return Err(Failure::Environment(anyhow::anyhow!(
                 "{name}: engine {} failed: {}",
-                failure.engine, failure.message
+                failure.engine,
+                failure.message
             )));
         }
         Ok(StoredReport::of(name, &report))

@@ -18,7 +18,7 @@ use super::run::prepare_folder;
 use super::{load, overrides, print_json, print_text};
 use crate::arguments::{EngineArgument, EngineParser, RobotArguments, Six};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::output::shown;
 
 #[derive(Debug, Args)]
@@ -192,51 +192,26 @@ impl Wanted<'_> {
 }
 
 /// Writes a scenario in the format of another tool.
-pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus> {
-    let refuse = |finding: Finding| {
-        print_findings(&[finding]);
-        Ok(ExitStatus::BadInput)
-    };
-    if let Err(finding) = check_options(arguments) {
-        return refuse(finding);
-    }
-    let overrides = match overrides(&arguments.robot) {
-        Ok(overrides) => overrides,
-        Err(finding) => return refuse(finding),
-    };
-    let Some(resolved) = load(&arguments.scenario, &overrides) else {
-        return Ok(ExitStatus::BadInput);
-    };
+pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus, Failure> {
+    check_options(arguments)?;
+    let overrides = overrides(&arguments.robot)?;
+    let resolved = load(&arguments.scenario, &overrides)?;
     if arguments.format.traits().motion {
         return motion::export(arguments, &resolved);
     }
-    let chosen = match chosen(arguments, &resolved) {
-        Ok(chosen) => chosen,
-        Err(finding) => return refuse(finding),
-    };
-    let joints = match joints(arguments, &resolved) {
-        Ok(joints) => joints,
-        Err(finding) => return refuse(finding),
-    };
-    let (folder, stem, extension) = match place(arguments, &resolved) {
-        Ok(place) => place,
-        Err(finding) => return refuse(finding),
-    };
-    if let Err(finding) = prepare_folder(&folder) {
-        return refuse(finding);
-    }
+    let chosen = chosen(arguments, &resolved)?;
+    let joints = joints(arguments, &resolved)?;
+    let (folder, stem, extension) = place(arguments, &resolved)?;
+    prepare_folder(&folder)?;
     let wanted = Wanted {
         resolved: &resolved,
         stem: &stem,
         chosen,
         joints,
     };
-    let mut files = match wanted.files(arguments.format) {
-        Ok(files) => files,
-        Err(error) => {
-            return refuse(Finding::new(&resolved.source.file, error.to_string()));
-        }
-    };
+    let mut files = wanted
+        .files(arguments.format)
+        .map_err(|error| Finding::new(&resolved.source.file, error.to_string()))?;
     if let Some((first, others)) = files.split_first_mut() {
         first.name = format!("{stem}{extension}");
         if others.iter().any(|other| other.name == first.name) {
@@ -244,11 +219,10 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<ExitStatus> {
                 "the export writes another file beside it of the name {}",
                 first.name
             );
-            return refuse(
-                Finding::new(&resolved.source.file, message)
-                    .key("--out")
-                    .hint("choose another extension, such as the format's own"),
-            );
+            return Err(Finding::new(&resolved.source.file, message)
+                .key("--out")
+                .hint("choose another extension, such as the format's own")
+                .into());
         }
     }
     finish(arguments, &resolved, &folder, &files)
@@ -260,7 +234,7 @@ fn finish(
     resolved: &ResolvedScenario,
     folder: &Path,
     files: &[ExportedFile],
-) -> Result<ExitStatus> {
+) -> Result<ExitStatus, Failure> {
     let written = write(folder, files)?;
     let traits = arguments.format.traits();
     if arguments.json {

@@ -61,27 +61,16 @@ use needlebench_bench::choose_entry;
 
 use crate::arguments::{RobotArguments, UrdfArguments};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::output::{print_as_it_is, print_text};
 
-/// Reads a scenario; prints what is wrong with it and gives `None` if it cannot be used.
-fn load(path: &Path, overrides: &Overrides) -> Option<ResolvedScenario> {
+/// Reads a scenario and refuses one that cannot be run.
+fn load(path: &Path, overrides: &Overrides) -> Result<ResolvedScenario, Vec<Finding>> {
     load_runnable(path, overrides).map(Runnable::into_scenario)
 }
 
 /// The same, ready to be run.
-fn load_runnable(path: &Path, overrides: &Overrides) -> Option<Runnable> {
-    match load_checked(path, overrides) {
-        Ok(runnable) => Some(runnable),
-        Err(findings) => {
-            print_findings(&findings);
-            None
-        }
-    }
-}
-
-/// Reads a scenario and refuses one that cannot be run.
-fn load_checked(path: &Path, overrides: &Overrides) -> Result<Runnable, Vec<Finding>> {
+fn load_runnable(path: &Path, overrides: &Overrides) -> Result<Runnable, Vec<Finding>> {
     let resolved = load_scenario(path, overrides)?;
     Runnable::checked(resolved).map_err(|finding| vec![finding])
 }
@@ -115,7 +104,7 @@ fn print_json(value: &impl Serialize) -> Result<()> {
 const NOTICES: &str = include_str!("../../THIRD-PARTY-NOTICES");
 
 /// Prints the licences of what is inside the program.
-pub(crate) fn licences() -> Result<ExitStatus> {
+pub(crate) fn licences() -> Result<ExitStatus, Failure> {
     print_as_it_is(NOTICES.trim_end())?;
     Ok(ExitStatus::Success)
 }
@@ -124,7 +113,7 @@ pub(crate) fn licences() -> Result<ExitStatus> {
 pub(crate) fn completions(
     shell: clap_complete::Shell,
     command_line: &mut clap::Command,
-) -> Result<ExitStatus> {
+) -> Result<ExitStatus, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(shell, command_line, "needlebench", &mut script);
     print_as_it_is(String::from_utf8_lossy(&script).trim_end())?;

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::{load_runnable, overrides, print_json, print_text};
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
 use crate::progress::TerminalProgress;
 use needlebench_bench::Stop;
@@ -91,28 +91,25 @@ struct SeveralReports<'a> {
 }
 
 /// Runs scenarios, writes their results and prints them.
-pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
+pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus, Failure> {
     if arguments.wide {
         print_wide();
     }
-    let overrides = match overrides(&arguments.robot) {
-        Ok(overrides) => overrides,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
+    let overrides = overrides(&arguments.robot)?;
     // All inputs are read before anything long starts.
     let mut scenarios = Vec::new();
+    let mut wrong = Vec::new();
     for path in &arguments.scenarios {
-        scenarios.push(load_runnable(path, &overrides));
+        match load_runnable(path, &overrides) {
+            Ok(scenario) => scenarios.push(scenario),
+            Err(findings) => wrong.extend(findings),
+        }
     }
-    let Some(scenarios) = scenarios.into_iter().collect::<Option<Vec<Runnable>>>() else {
-        return Ok(ExitStatus::BadInput);
-    };
+    if !wrong.is_empty() {
+        return Err(wrong.into());
+    }
     if let Some(finding) = repeated_name(&scenarios) {
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
+        return Err(finding.into());
     }
     let table = arguments.table.request();
     if let Some(request) = &table {
@@ -120,22 +117,12 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
         let wrong = all.filter_map(|each| check_run(request, each.scenario()).err());
         let wrong: Vec<Finding> = wrong.collect();
         if !wrong.is_empty() {
-            print_findings(&wrong);
-            return Ok(ExitStatus::BadInput);
+            return Err(wrong.into());
         }
     }
-    let folders = match prepare_folders(arguments, &scenarios) {
-        Ok(folders) => folders,
-        Err(finding) => {
-            print_findings(&[finding]);
-            return Ok(ExitStatus::BadInput);
-        }
-    };
-    if let Some(path) = &arguments.junit
-        && let Err(finding) = probe_file(path, "--junit")
-    {
-        print_findings(&[finding]);
-        return Ok(ExitStatus::BadInput);
+    let folders = prepare_folders(arguments, &scenarios)?;
+    if let Some(path) = &arguments.junit {
+        probe_file(path, "--junit")?;
     }
     let cancel = watch_interrupts()?;
     let jobs = threads(arguments.jobs);
@@ -169,7 +156,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
         };
         let scanned = match scanned(scenario, &scan, &cancel) {
             Ok(scanned) => scanned,
-            Err(outcome) => {
+            Err(failure) => {
+                let outcome = failure.tell();
                 status = status.max(outcome);
                 if outcome == ExitStatus::Interrupted {
                     break;
@@ -204,7 +192,8 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<ExitStatus> {
     }
     let all: Vec<&Report> = reports.iter().collect();
     if let Some(path) = &arguments.junit {
-        write_atomically(path, junit(&all)?.as_bytes())
+        let junit = junit(&all).map_err(anyhow::Error::from)?;
+        write_atomically(path, junit.as_bytes())
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     append_to_step_summary(&all)?;
@@ -225,7 +214,7 @@ fn scanned(
     scenario: &Runnable,
     scan: &Scan<'_>,
     cancel: &AtomicBool,
-) -> Result<Option<Runnable>, ExitStatus> {
+) -> Result<Option<Runnable>, Failure> {
     if scenario.scenario().scenario.ct.is_none() {
         return Ok(None);
     }
@@ -255,17 +244,12 @@ fn scanned(
         let runnable = Runnable::checked(made.scenario);
         runnable.map_err(|finding| Stop::Refused(vec![finding]))
     });
-    match checked {
-        Ok(runnable) => Ok(Some(runnable)),
-        Err(Stop::Interrupted) => {
-            complain("interrupted while the scan was made: there are no results");
-            Err(ExitStatus::Interrupted)
-        }
-        Err(Stop::Refused(findings)) => {
-            print_findings(&findings);
-            Err(ExitStatus::BadInput)
-        }
-    }
+    checked.map(Some).map_err(|stop| {
+        Failure::of_stop(
+            stop,
+            "interrupted while the scan was made: there are no results",
+        )
+    })
 }
 
 /// What a run leaves besides its report.

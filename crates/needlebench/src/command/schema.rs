@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::print_json;
 use crate::exit::ExitStatus;
+use crate::failure::Failure;
 use crate::output::print_text;
 
 /// What can be described.
@@ -49,7 +50,7 @@ impl SchemaFormat {
 }
 
 /// Prints what is asked for, as JSON or as Markdown.
-pub(crate) fn schema(format: SchemaFormat, markdown: bool) -> Result<ExitStatus> {
+pub(crate) fn schema(format: SchemaFormat, markdown: bool) -> Result<ExitStatus, Failure> {
     if !markdown {
         print_json(&document(format))?;
     } else if format == SchemaFormat::Metrics {

@@ -15,7 +15,7 @@ use super::run::prepare_folder;
 use super::{load, overrides, print_json, print_text};
 
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use needlebench_bench::RunOptions;
 use needlebench_bench::servo::linear::{Linear, Margins};
 use needlebench_bench::servo::settings::settings;
@@ -47,30 +47,13 @@ pub(crate) struct ServoArguments {
 }
 
 /// Measures the servo and writes its data sheet.
-pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus> {
-    let refuse = |finding: Finding| {
-        print_findings(&[finding]);
-        Ok(ExitStatus::BadInput)
-    };
-    let overrides = match overrides(&arguments.robot) {
-        Ok(overrides) => overrides,
-        Err(finding) => return refuse(finding),
-    };
-    let wanted = match wanted_joints(arguments.joint.as_deref()) {
-        Ok(wanted) => wanted,
-        Err(finding) => return refuse(finding),
-    };
-    let Some(resolved) = load(&arguments.scenario, &overrides) else {
-        return Ok(ExitStatus::BadInput);
-    };
+pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus, Failure> {
+    let overrides = overrides(&arguments.robot)?;
+    let wanted = wanted_joints(arguments.joint.as_deref())?;
+    let resolved = load(&arguments.scenario, &overrides)?;
     let folder = arguments.out.join(&resolved.scenario.name).join("servo");
-    if let Err(finding) = prepare_folder(&folder) {
-        return refuse(finding);
-    }
-    let (described, posture) = match posture(&resolved) {
-        Ok(found) => found,
-        Err(finding) => return refuse(finding),
-    };
+    prepare_folder(&folder)?;
+    let (described, posture) = posture(&resolved)?;
     let servo = needlebench_bench::servo_of(&resolved);
     let timestep_s = resolved.scenario.engines.timestep_ms * 1e-3;
     let linear = Linear::new(&servo, &posture, timestep_s);
@@ -92,7 +75,8 @@ pub(crate) fn servo(arguments: &ServoArguments) -> Result<ExitStatus> {
             engines: arguments.engine.as_ref().map(EngineArgument::names),
             ..RunOptions::default()
         };
-        for engine in options.chosen_engines(&resolved)? {
+        let engines = options.chosen_engines(&resolved);
+        for engine in engines.map_err(anyhow::Error::from)? {
             if let Err(error) =
                 measure_in(&resolved, engine, &mut report, &servo, &linear, &posture)
             {

@@ -18,7 +18,7 @@ use super::CompareArguments;
 use super::thresholds::{Given, thresholds};
 use crate::clock::elapsed;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::output::{print_wide, shown};
 use needlebench_report::table::study_comparison::{Listed, study_comparison_text};
 use needlebench_report::{study_comparison_junit, study_comparison_markdown, write_atomically};
@@ -32,7 +32,9 @@ pub(super) fn is_study(path: &Path) -> bool {
 }
 
 /// Compares two studies; none if either is not one.
-pub(super) fn compare_if_studies(arguments: &CompareArguments) -> Result<Option<ExitStatus>> {
+pub(super) fn compare_if_studies(
+    arguments: &CompareArguments,
+) -> Result<Option<ExitStatus>, Failure> {
     let studies = [&arguments.a, &arguments.b].map(|path| is_study(path));
     if studies != [true, true] {
         return Ok(None);
@@ -40,26 +42,15 @@ pub(super) fn compare_if_studies(arguments: &CompareArguments) -> Result<Option<
     if arguments.is_wide() {
         print_wide();
     }
-    let prepared = match prepare(arguments) {
-        Ok(prepared) => prepared,
-        Err(findings) => {
-            print_findings(&findings);
-            return Ok(Some(ExitStatus::BadInput));
-        }
-    };
-    let comparison = match compared(arguments, &prepared) {
-        Ok(comparison) => comparison,
-        Err(error) => {
-            print_findings(&[finding(error)]);
-            return Ok(Some(ExitStatus::BadInput));
-        }
-    };
+    let prepared = prepare(arguments)?;
+    let comparison = compared(arguments, &prepared).map_err(finding)?;
     let write = |path: &Path, text: String| {
         write_atomically(path, text.as_bytes())
             .with_context(|| format!("cannot write {}", path.display()))
     };
     if let Some(path) = &arguments.junit {
-        write(path, study_comparison_junit(&comparison, elapsed())?)?;
+        let junit = study_comparison_junit(&comparison, elapsed()).map_err(anyhow::Error::from)?;
+        write(path, junit)?;
     }
     if let Some(path) = &arguments.markdown {
         write(path, study_comparison_markdown(&comparison))?;
@@ -156,14 +147,14 @@ fn on_columns(threshold: &Threshold, pair: &StudyPair<'_>) -> (StudyThreshold, O
 }
 
 /// Everything that can be wrong before a table is read.
-fn prepare(arguments: &CompareArguments) -> Result<Prepared, Vec<Finding>> {
+fn prepare(arguments: &CompareArguments) -> Result<Prepared, Failure> {
     let given = given(arguments)?;
     for (path, argument) in [
         (&arguments.junit, "--junit"),
         (&arguments.markdown, "--markdown"),
     ] {
         if let Some(path) = path {
-            probe_file(path, argument).map_err(|finding| vec![finding])?;
+            probe_file(path, argument)?;
         }
     }
     let results = [open(&arguments.a)?, open(&arguments.b)?];

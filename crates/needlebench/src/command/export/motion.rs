@@ -13,9 +13,8 @@ use needlebench_export::{mcap, motion_script, trajectory};
 use super::{ExportArguments, Format, configuration_named, finish, place};
 use crate::arguments::EngineArgument;
 use crate::exit::ExitStatus;
-use crate::findings::print_findings;
+use crate::failure::Failure;
 use crate::interrupts::{threads, watch_interrupts};
-use crate::output::complain;
 use crate::progress::TerminalProgress;
 
 use super::super::run::prepare_folder;
@@ -35,24 +34,15 @@ const NOTATIONS: [(&str, TrajectoryNotation); 4] = [
 pub(super) fn export(
     arguments: &ExportArguments,
     resolved: &ResolvedScenario,
-) -> Result<ExitStatus> {
-    let refuse = |finding: Finding| {
-        print_findings(&[finding]);
-        Ok(ExitStatus::BadInput)
-    };
-    let (choice, named) =
-        match choice(arguments).and_then(|choice| Ok((choice, named(arguments, resolved)?))) {
-            Ok(both) => both,
-            Err(finding) => return refuse(finding),
-        };
+) -> Result<ExitStatus, Failure> {
+    let choice = choice(arguments)?;
+    let named = named(arguments, resolved)?;
     // Before a run that takes seconds.
     let folder = named.as_ref().map_or_else(
         || Path::new("out").join(&resolved.scenario.name),
         |named| named.folder.clone(),
     );
-    if let Err(finding) = prepare_folder(&folder) {
-        return refuse(finding);
-    }
+    prepare_folder(&folder)?;
     let progress = TerminalProgress::new(false);
     let cancel = watch_interrupts()?;
     let control = Control {
@@ -62,23 +52,18 @@ pub(super) fn export(
     };
     let working = WorkingMotion::of(resolved, &choice, &control);
     progress.finish();
-    let working = match working {
-        Ok(working) => working,
-        Err(NoMotion::Refused(finding)) => return refuse(finding),
-        Err(NoMotion::Engine(message)) => {
-            complain(&format!("the engine failed: {message}"));
-            return Ok(ExitStatus::EnvironmentFailed);
-        }
-        Err(NoMotion::Interrupted) => {
-            complain("interrupted: there is no export");
-            return Ok(ExitStatus::Interrupted);
-        }
-    };
+    let working = working.map_err(|reason| match reason {
+        NoMotion::Refused(finding) => finding.into(),
+        NoMotion::Engine(message) => Failure::Ended {
+            status: ExitStatus::EnvironmentFailed,
+            message: format!("the engine failed: {message}"),
+        },
+        NoMotion::Interrupted => Failure::interrupted("interrupted: there is no export"),
+    })?;
     let motion = Motion::of(&working);
-    match files(arguments.format, &motion, named.as_ref()) {
-        Ok(files) => finish(arguments, resolved, &folder, &files),
-        Err(error) => refuse(Finding::new(&resolved.source.file, error.to_string())),
-    }
+    let files = files(arguments.format, &motion, named.as_ref())
+        .map_err(|error| Finding::new(&resolved.source.file, error.to_string()))?;
+    finish(arguments, resolved, &folder, &files)
 }
 
 /// The file that is named.
