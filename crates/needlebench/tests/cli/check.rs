@@ -35,6 +35,11 @@ fn sound_scenario_has_no_findings() {
     assert_eq!(answer["findings"].as_array().unwrap().len(), 0);
     let answer = bench.run(&["check", "s.toml"]).exits_with(0);
     assert!(answer.stdout.starts_with("s.toml: ok"), "{answer:#?}");
+    // Without a name of its own it has its file's.
+    bench.write("short.toml", "[[goals]]\nlesion = \"right_upper_lobe\"\n");
+    let answer = bench.run(&["check", "short.toml", "--json"]);
+    let answer = answer.exits_with(0).json();
+    assert_eq!(answer["scenarios"][0]["name"], "short");
 }
 
 #[test]

@@ -8,8 +8,9 @@ mod arms;
 mod atlas;
 mod bad_mesh;
 mod bad_robot;
-mod bad_scenario;
 mod calibration;
+#[cfg(unix)]
+mod cases;
 mod check;
 mod clearance;
 #[cfg(target_os = "linux")]
@@ -27,7 +28,6 @@ mod environment;
 mod events;
 mod export;
 mod export_motion;
-mod first_slips;
 mod help;
 mod imperfect;
 mod init;
@@ -35,6 +35,7 @@ mod init;
 mod interrupt;
 mod iso9283;
 mod kinematics;
+mod made;
 mod names_of_metrics;
 mod page;
 mod pairs;

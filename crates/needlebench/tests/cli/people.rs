@@ -2,71 +2,11 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, Finding, SMALL, with_edit};
+use crate::support::{Bench, SMALL, with_edit};
 
 /// `SMALL` with people.
 fn with_people(people: &str) -> String {
     format!("{SMALL}\n{people}")
-}
-
-#[track_caller]
-fn refused(people: &str) -> Finding {
-    let text = with_people(people);
-    let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(2);
-    Finding::only(&answer, &text).in_file("s.toml")
-}
-
-#[test]
-fn person_inside_the_table_is_refused() {
-    refused("[[people.persons]]\nposition_mm = [146, -598]")
-        .at("position_mm = [146,")
-        .key("people.persons[0].position_mm")
-        .says("would stand inside the");
-    refused("[[people.persons]]\nside = \"left\"\ndistance_mm = 150")
-        .at("distance_mm")
-        .key("people.persons[0].distance_mm")
-        .hints("leave the distance out");
-}
-
-#[test]
-fn person_inside_the_robots_base_is_refused() {
-    refused("[[people.persons]]\nrole = \"assistant\"\nposition_mm = [0, 0]")
-        .key("people.persons[0].position_mm")
-        .says("the assistant would stand inside the mount");
-}
-
-#[test]
-fn stature_in_metres_is_refused() {
-    refused("[[people.persons]]\nstatures_mm = [1.75]")
-        .at("statures_mm")
-        .key("people.persons[0].statures_mm[0]")
-        .hints("did you give metres?");
-}
-
-#[test]
-fn two_places_and_two_statures_are_refused() {
-    refused("[[people.persons]]\nside = \"left\"\nposition_mm = [0, -1300]")
-        .key("people.persons[0].position_mm")
-        .hints("leave one of them out");
-    refused("[[people.persons]]\nstature = \"male-p50\"\nstatures_mm = [1750]")
-        .key("people.persons[0].stature")
-        .hints("leave one of them out");
-}
-
-#[test]
-fn side_that_faces_the_table_is_refused() {
-    refused("[[people.persons]]\nside = \"back\"")
-        .at("side = ")
-        .key("people.persons[0].side")
-        .hints("one of head, feet, left, right");
-    refused("[people]\nprefer_side = \"front\"").key("people.prefer_side");
-}
-
-#[test]
-fn unknown_words_are_refused_with_those_that_are_known() {
-    refused("[[people.persons]]\nrole = \"docter\"").hints("did you mean `doctor`?");
-    refused("[people]\nprefer_elbow = \"high\"").hints("one of up, down");
 }
 
 fn rooms(report: &Value) -> Vec<&Value> {

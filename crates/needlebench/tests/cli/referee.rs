@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, Finding, SMALL, has_keys, mujoco_is_ready, with_edit};
+use crate::support::{Bench, SMALL, has_keys, mujoco_is_ready, with_edit};
 
 /// `SMALL` with another envelope.
 fn with_envelope(keys: &str) -> String {
@@ -111,23 +111,4 @@ fn difference_beyond_the_envelope_fails_and_is_explained() {
             }
         }
     }
-}
-
-#[test]
-fn envelope_outside_its_range_is_refused() {
-    let refused = |keys: &str| {
-        let text = with_envelope(keys);
-        let bench = Bench::with_scenario(&text);
-        let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(2);
-        Finding::only(&answer, &text).in_file("s.toml")
-    };
-    refused("peak_tip_um = 0")
-        .at("peak_tip_um")
-        .key("engines.envelope.peak_tip_um")
-        .says("is 0 um, outside")
-        .hints("in um");
-    refused("contact_force_relative = 5")
-        .key("engines.envelope.contact_force_relative")
-        .says("is 5, outside")
-        .hints("0.01 is one percent");
 }
