@@ -114,31 +114,3 @@ fn a_study_of_postures_says_so_and_counts_each_case_once() {
         .unwrap();
     assert!(csv[1..].iter().all(|row| row[at].is_empty()));
 }
-
-#[test]
-fn what_cannot_be_grouped_is_refused_before_anything_is_computed() {
-    let bench = Bench::with_scenario(SMALL);
-    bench.write("study.toml", STUDY);
-    let run = ["run", "s.toml", "--engine", "rapier", "--table", "accuracy"];
-    let answer = bench.run(&[&run[..], &["--by", "configurtion"]].concat());
-    answer
-        .exits_with(2)
-        .complains(["did you mean `configuration`?"]);
-    assert!(!bench.path("out/small").exists());
-    let study = ["study", "study.toml", "--table", "accuracy"];
-    for (by, part) in [("along", "is a continuum"), ("tool", "groups are of goal")] {
-        let answer = bench.run(&[&study[..], &["--by", by]].concat());
-        answer.exits_with(2).complains([part]);
-    }
-    for wrong in [
-        &["--hit-radius", "-1"][..],
-        &["--hit-radius", "NaN"],
-        &["--of", "worst"],
-    ] {
-        bench.run(&[&run[..], wrong].concat()).exits_with(2);
-    }
-    bench
-        .run(&["run", "s.toml", "--by", "goal"])
-        .exits_with(2)
-        .complains(["--table"]);
-}

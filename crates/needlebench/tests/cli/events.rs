@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::support::{Bench, Finding, SMALL, has_keys, mujoco_is_ready, with_edit};
+use crate::support::{Bench, SMALL, has_keys, mujoco_is_ready, with_edit};
 
 /// Contacts as in `scenarios/contact.toml`, a stop at its worst moment, and the way back.
 const EVENTS: &str = r#"
@@ -213,41 +213,4 @@ fn limit_that_is_missed_fails_the_run() {
     assert!(answer.stdout.contains("events.stop.max_tip_distance_mm"));
     let all = bench.run(&["run", "s.toml", "--wide"]).exits_with(1);
     assert!(all.stdout.contains("emergency stop"));
-}
-
-#[track_caller]
-fn refused(from: &str, to: &str) -> Finding {
-    let text = scenario(from, to);
-    let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(2);
-    Finding::only(&answer, &text).in_file("s.toml")
-}
-
-#[test]
-fn contact_without_its_obstacle_is_refused() {
-    refused("\"robot_table\"", "\"robot_gantry\"")
-        .key("events.press[0].class")
-        .says("there is no `[gantry]`")
-        .hints("add a section `[gantry]`");
-}
-
-#[test]
-fn stop_at_two_moments_is_refused() {
-    refused("category = 0", "category = 0\nat_s = 1\nat_progress = 0.5")
-        .key("events.stop.at_progress")
-        .says("both `at_s` and `at_progress`");
-}
-
-#[test]
-fn stop_of_a_category_that_there_is_not_is_refused() {
-    refused("category = 0", "category = 3")
-        .key("events.stop.category")
-        .says("`events.stop.category` is 3");
-}
-
-#[test]
-fn observation_shorter_than_the_stop_is_refused() {
-    refused("category = 0", "category = 1\nobserve_s = 0.2")
-        .key("events.stop.observe_s")
-        .says("less than `deceleration_ms`");
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Bench, Finding, SMALL, mujoco_is_ready, with_edit};
+use crate::support::{Bench, SMALL, mujoco_is_ready, with_edit};
 
 /// Every block with its defaults, few samples; the criteria of a nominal robot do not hold.
 const BLOCKS: &str = "
@@ -141,58 +141,6 @@ fn unstable_gains_are_explained_before_anything_moves() {
     answer.exits_with(3);
 }
 
-#[track_caller]
-fn refused(blocks: &str) -> Finding {
-    let text = imperfect(blocks);
-    let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["check", "s.toml", "--json"]).exits_with(2);
-    Finding::only(&answer, &text).in_file("s.toml")
-}
-
-#[test]
-fn negative_stiffness_is_refused() {
-    refused("[imperfections.elasticity]\nstiffness_nm_rad = [-1, 1e4, 1e4, 1e4, 1e4, 1e4]\n")
-        .key("imperfections.elasticity.stiffness_nm_rad[0]")
-        .says("-1 N m/rad")
-        .hints("N m/rad");
-}
-
-#[test]
-fn noise_above_its_range_is_refused() {
-    refused("[imperfections.encoder]\nnoise_deg = [0, 0, 0, 0, 0, 5]\n")
-        .key("imperfections.encoder.noise_deg[5]")
-        .says("outside 0 to 0.1");
-}
-
-#[test]
-fn friction_that_holds_less_than_it_slides_is_refused() {
-    refused("[imperfections.friction]\nstiction_nm = [1, 5, 5, 5, 5, 5]\n")
-        .key("imperfections.friction.stiction_nm[0]")
-        .says("below the sliding friction")
-        .hints("at rest");
-}
-
-#[test]
-fn markers_on_a_line_are_refused() {
-    refused("[imperfections.registration]\nmarkers_mm = [[0, 0, 0], [0, 0, 50], [0, 0, 120]]\n")
-        .key("imperfections.registration.markers_mm")
-        .says("on one line");
-}
-
-#[test]
-fn unknown_arm_is_refused_with_the_one_that_was_meant() {
-    refused("[imperfections.calibration]\narm = \"ur3-11\"\n")
-        .key("imperfections.calibration.arm")
-        .hints("did you mean");
-}
-
-#[test]
-fn set_points_closer_than_steps_are_refused() {
-    refused("[imperfections.control]\nperiod_ms = 0.1\n")
-        .key("imperfections.control.period_ms")
-        .says("closer than the time step");
-}
-
 #[test]
 fn the_small_scenario_is_sound_before_it_is_spoilt() {
     let bench = Bench::with_scenario(&with_edit(&imperfect(BLOCKS), "budget_samples = 200", ""));
@@ -214,14 +162,6 @@ covariance_mm2 = [
 ]
 [imperfections.imaging]
 ";
-
-#[test]
-fn what_is_no_covariance_is_refused_with_its_marker() {
-    refused(&MEASURED.replace("[0.03, 0.01, 0.01, 0, 0, 0]", "[0.03, 0.01, 0, 0, 0, 0]"))
-        .key("imperfections.registration.covariance_mm2[2]")
-        .says("not positive definite")
-        .hints("[xx, yy, zz, xy, xz, yz] in mm^2");
-}
 
 /// The small scenario with a lesion that really is there, mm.
 fn with_lesion_at([x, y, z]: [f64; 3]) -> String {

@@ -135,21 +135,6 @@ fn an_imperfect_robot_misses_its_poses_and_scatters() {
     assert_eq!(measured("b"), found);
 }
 
-#[test]
-fn commands_about_goals_say_that_there_are_none() {
-    let bench = Bench::with_scenario(SMALL);
-    bench
-        .run(&["atlas", "s.toml"])
-        .exits_with(2)
-        .complains(["no goals", "[iso9283]"]);
-    let answer = bench.run(&["check", "s.toml"]).exits_with(0);
-    assert!(
-        answer.stdout.contains("ok (test by ISO 9283, "),
-        "{}",
-        answer.stdout
-    );
-}
-
 /// The same numbers, whether they stay in the program or go through a file.
 #[test]
 fn the_log_of_a_run_is_analysed_to_the_same_numbers() {
@@ -262,111 +247,6 @@ fn a_limit_that_is_missed_fails_the_run() {
         "{}",
         answer.stdout
     );
-}
-
-#[test]
-fn protocols_that_cannot_be_carried_out_are_refused_before_anything_runs() {
-    for (keys, said) in [
-        (
-            "configuration = \"Right-Up-Fold\"\ncube_centre_mm = [0, -700, 150]",
-            "P1 is out of reach",
-        ),
-        ("configuration = \"Right-Up-Unfold\"", "Right-Up-Fold"),
-        (
-            "configuration = \"Right-Up\"",
-            "`Right-Up` is not a value that `iso9283.configuration` can have",
-        ),
-        (
-            "cube_centre_mm = [0, -300, 0.15]\napproach_mm = 500",
-            "cannot be approached along",
-        ),
-        (
-            "cube_edge_mm = 0.25",
-            "`iso9283.cube_edge_mm` is 0.25 mm, outside 10 to 2000",
-        ),
-        ("measuring_s = 0.4", "outside 0 to 0.3"),
-        ("load_kg = 0.1", "the tool alone has 0.2"),
-        ("guide_axis = [0, 0, 0]", "the direction has no length"),
-        (
-            "plane_rises_towards = \"up\"",
-            "iso9283.plane_rises_towards",
-        ),
-        ("speed = 1", "did you mean `speed_share`?"),
-    ] {
-        let bench = Bench::with_scenario(&with_keys(keys));
-        let answer = bench.run(&["run", "s.toml"]).exits_with(2);
-        answer.complains([said, "s.toml", "hint:"]);
-        assert!(!bench.path("out").exists());
-    }
-    let bench = Bench::with_scenario(&SMALL.replace("cycles = 4", "cycles = 1"));
-    bench
-        .run(&["check", "s.toml"])
-        .exits_with(2)
-        .complains(["`iso9283.cycles` is 1"]);
-    let goal = "[[goals]]\nname = \"a\"\nentry_mm = [0, 0, 0]\ntarget_mm = [0, 0, 0]\n";
-    let bench = Bench::with_scenario(&format!("{SMALL}{goal}"));
-    bench
-        .run(&["check", "s.toml"])
-        .exits_with(2)
-        .complains(["either goals or [iso9283]"]);
-}
-
-#[test]
-fn logs_that_are_wrong_are_refused_with_line_and_column() {
-    let bench = Bench::new();
-    bench.write(
-        "commanded.csv",
-        "pose,x_mm,y_mm,z_mm\nP1,0,0,0\nP2,100,0,0\n",
-    );
-    let analysed = |log: &str| {
-        bench.write("log.csv", log);
-        let arguments = [
-            "iso9283",
-            "--csv",
-            "log.csv",
-            "--commanded",
-            "commanded.csv",
-        ];
-        bench.run(&arguments)
-    };
-    for (rows, parts) in [
-        (
-            "1,P1,0,0,0\n2,P1,0,NaN,0\n",
-            ["log.csv:3:8", "NaN is not a finite number", "hint:"],
-        ),
-        (
-            "1,P1,0,0,0\n2,P9,0,0,0\n",
-            ["log.csv:3:3", "none of the commanded poses", "P1, P2"],
-        ),
-        (
-            "1,P1,0,0,0\n2,P1,0,0",
-            ["log.csv:3:1", "4 values", "cut off"],
-        ),
-        (
-            "1,P1,0,0,0\n1,P2,0,0,0\n",
-            ["log.csv", "P1 was measured 1 times", "30"],
-        ),
-    ] {
-        analysed(&format!("cycle,pose,x_mm,y_mm,z_mm\n{rows}"))
-            .exits_with(2)
-            .complains(parts);
-    }
-    analysed("pose,x,y,z\n1,0,0,0\n").exits_with(2).complains([
-        "log.csv:1:6",
-        "does not say its unit",
-        "--length-unit",
-    ]);
-    let arguments = [
-        "iso9283",
-        "--csv",
-        "none.csv",
-        "--commanded",
-        "commanded.csv",
-    ];
-    bench
-        .run(&arguments)
-        .exits_with(2)
-        .complains(["none.csv", "cannot read the file"]);
 }
 
 #[test]

@@ -114,27 +114,8 @@ fn threads_shards_and_breaks_give_the_same_bytes() {
 }
 
 #[test]
-fn what_cannot_be_searched_says_why() {
-    let bench = Bench::with_study(&STUDY.replace("budget = 112", "budget = 50"));
-    run(&bench, &[])
-        .exits_with(2)
-        .complains(["budget", "50", "search.budget"]);
-    let no_choice = STUDY.replace("role = \"choice\"\n", "");
-    bench.write("study.toml", no_choice);
-    run(&bench, &[])
-        .exits_with(2)
-        .complains(["study.toml", "nothing to choose"]);
-    bench.write(
-        "study.toml",
-        STUDY.replace("fresh = 16", "classes = [\"robot_phantm\"]"),
-    );
-    run(&bench, &[])
-        .exits_with(2)
-        .complains(["study.toml", "robot_phantm", "robot_phantom"]);
-    bench.write("study.toml", STUDY.replace("samples = 16", "samples = 8"));
-    run(&bench, &[])
-        .exits_with(2)
-        .complains(["sampling.samples", "8 layouts", "16"]);
+fn a_study_of_a_choice_with_a_range_names_the_search() {
+    let bench = Bench::with_study("");
     let ranges = STUDY.replace("values = [790, 800, 810]", "range = [790, 810]");
     bench.write("study.toml", ranges);
     let study = bench.run(&["study", "study.toml", "--quiet"]).exits_with(0);
