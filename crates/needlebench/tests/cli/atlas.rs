@@ -134,32 +134,3 @@ fn nothing_that_works_is_a_failed_criterion() {
     assert!(answer.stdout.contains("nowhere"), "{}", answer.stdout);
     assert!(answer.stdout.contains("out of reach"), "{}", answer.stdout);
 }
-
-#[test]
-fn a_goal_that_is_not_there_gets_the_nearest_name() {
-    let bench = Bench::with_scenario(SMALL);
-    let answer = bench
-        .run(&["atlas", "s.toml", "--goal", "pos"])
-        .exits_with(2);
-    answer.complains(["`pos`", "did you mean `pose`?", "s.toml"]);
-    assert!(!bench.path("out").exists());
-}
-
-#[test]
-fn senseless_numbers_and_aims_are_refused() {
-    let bench = Bench::with_scenario(SMALL);
-    for arguments in [
-        ["--rolls", "2"],
-        ["--rolls", "1e9"],
-        ["--aim", "speed"],
-        ["--jobs", "0"],
-    ] {
-        let mut all = vec!["atlas", "s.toml"];
-        all.extend(arguments);
-        bench.run(&all).exits_with(2).complains([arguments[0]]);
-    }
-    let text = with_edit(SMALL, "[planning]", "[planning]\nroll_aim = \"speed\"");
-    let bench = Bench::with_scenario(&text);
-    let answer = bench.run(&["atlas", "s.toml"]).exits_with(2);
-    answer.complains(["roll_aim", "speed", "joint_margin"]);
-}

@@ -84,13 +84,3 @@ fn class_without_a_part_in_the_cell_is_absent() {
     }
     assert!(!classes.contains(&"robot_gantry"), "{classes:?}");
 }
-
-#[test]
-fn table_for_people_has_a_row_per_class() {
-    let bench = Bench::with_scenario(SMALL);
-    let text = bench.run(&["clearance", "s.toml", "--joints", POSTURE]);
-    let text = text.exits_with(0).stdout;
-    for class in answer()["classes"].as_object().unwrap().keys() {
-        assert!(text.contains(class.as_str()), "{text}");
-    }
-}

@@ -43,16 +43,6 @@ fn requirements_are_carried_to_every_report() {
 }
 
 #[test]
-fn requirements_of_criteria_that_there_are_not_are_refused() {
-    let bench = Bench::with_scenario(&format!(
-        "{SMALL}[requirements]\nmax_tip_eror_mm = \"SRS-1\"\n"
-    ));
-    let answer = bench.run(&["check", "s.toml"]).exits_with(2);
-    let line = SMALL.lines().count() + 2;
-    answer.complains([&format!("s.toml:{line}:"), "max_tip_eror_mm"]);
-}
-
-#[test]
 fn credibility_is_collected_from_a_run_and_a_replay() {
     let bench = Bench::with_scenario(&with_requirements());
     bench.run(&RUN).exits_with(0);
@@ -97,31 +87,4 @@ fn credibility_is_collected_from_a_run_and_a_replay() {
         text.contains("not fitted: 0.082 mm") && !text.contains("No comparator"),
         "{text}"
     );
-}
-
-#[test]
-fn what_cannot_be_collected_is_said_with_line_and_key() {
-    let bench = Bench::new();
-    bench
-        .run(&["report", "nowhere", "--credibility"])
-        .exits_with(2)
-        .complains(["nowhere", "report.json"]);
-    bench
-        .run(&["report", "nowhere"])
-        .exits_with(2)
-        .complains(["--credibility"]);
-    bench.write("j.toml", "author = \"A\"\n\nmodel_influenze = \"high\"\n");
-    let report = [
-        "report",
-        "nowhere",
-        "--credibility",
-        "--judgement",
-        "j.toml",
-    ];
-    let answer = bench.run(&report).exits_with(2);
-    answer.complains([
-        "j.toml:3:",
-        "model_influenze",
-        "did you mean `model_influence`?",
-    ]);
 }

@@ -239,25 +239,6 @@ fn mujoco_is_set_up_from_a_folder_of_wheels_without_a_network() {
 }
 
 #[test]
-fn wheels_for_what_there_are_none_are_refused_before_anything_is_fetched() {
-    let bench = Bench::new();
-    let download = ["doctor", "--download", "wheels"];
-    for (option, value, reason) in [
-        ("--for-python", "3.9", "3.11 to 3.15"),
-        ("--for-platform", "amiga", "linux-x86_64"),
-    ] {
-        let arguments = [&download[..], &[option, value]].concat();
-        bench.run(&arguments).exits_with(2).complains([reason]);
-    }
-    let prepare = ["doctor", "--prepare", "--wheels", "nowhere"];
-    bench
-        .run(&prepare)
-        .exits_with(2)
-        .complains(["nowhere", "hint: "]);
-    assert!(!bench.path("wheels").exists());
-}
-
-#[test]
 fn doctor_exits_with_3_and_the_same_advice() {
     let bench = Bench::new();
     let variables = [("NEEDLEBENCH_PYTHON", Some("/nonexistent/python"))];

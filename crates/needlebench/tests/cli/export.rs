@@ -68,53 +68,6 @@ fn a_file_can_be_named_and_what_belongs_to_it_is_beside_it() {
 }
 
 #[test]
-fn options_that_mean_nothing_to_a_format_are_refused() {
-    let bench = Bench::with_scenario(SMALL);
-    let still = "0,-1.57,-1,-1.57,1.57,0";
-    for (format, option, value) in [
-        ("mjcf", "--goal", "pose"),
-        ("mjcf", "--joints", still),
-        ("urdf", "--configuration", "Right-Up-Fold"),
-        ("urdf", "--engine", "mujoco"),
-        ("gltf", "--engine", "rapier"),
-    ] {
-        let words = ["export", "s.toml", "--as", format, option, value];
-        let answer = bench.run(&words).exits_with(2);
-        answer.complains([option, "does not apply", "hint"]);
-    }
-    assert!(!bench.path("out").exists());
-}
-
-#[test]
-fn wrong_goals_configurations_and_postures_are_refused_with_what_there_is() {
-    let bench = Bench::with_scenario(SMALL);
-    let gltf = ["export", "s.toml", "--as", "gltf"];
-    let refused = |words: &[&str]| bench.run(&[&gltf, words].concat()).exits_with(2);
-    refused(&["--goal", "pos", "--configuration", "Right-Up-Fold"])
-        .complains(["no goal `pos`", "did you mean `pose`?"]);
-    refused(&["--configuration", "Right-Up-Fld"]).complains([
-        "no configuration `Right-Up-Fld`",
-        "did you mean `Right-Up-Fold`?",
-    ]);
-    refused(&["--goal", "pose"]).complains(["--configuration", "Left-Down-Unfold"]);
-    refused(&["--joints", "0,0,0,0,0,7"]).complains(["wrist_3 is 7 rad", "limits"]);
-    refused(&["--joints", "0,0,0"]).complains(["needs six numbers"]);
-    refused(&["--joints", "0,0,0,0,0,0", "--goal", "pose"]).complains(["cannot be used with"]);
-    refused(&["--out", "."]).complains(["it is a folder", "cell.glb"]);
-    bench
-        .run(&["export", "s.toml"])
-        .exits_with(2)
-        .complains(["--as"]);
-    let unknown = ["export", "s.toml", "--as", "fbx"];
-    bench
-        .run(&unknown)
-        .exits_with(2)
-        .complains(["fbx", "mjcf", "gltf"]);
-    let missing = ["export", "t.toml", "--as", "mjcf"];
-    bench.run(&missing).exits_with(2).complains(["t.toml"]);
-}
-
-#[test]
 fn the_only_goal_need_not_be_named() {
     let bench = Bench::with_scenario(SMALL);
     let words = [

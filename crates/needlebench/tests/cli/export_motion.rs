@@ -10,53 +10,6 @@ fn scenario(name: &str) -> String {
 }
 
 #[test]
-fn what_is_no_motion_is_refused_before_anything_is_run() {
-    let bench = Bench::new();
-    let one = scenario("table3.toml");
-    let two = scenario("ur5e.toml");
-    let protocol = scenario("iso9283.toml");
-    for (arguments, says) in [
-        (
-            vec![&*two, "--as", "mcap"],
-            ["2 goals", "right_upper_anterior, left_upper_anterior"],
-        ),
-        (
-            vec![&*two, "--as", "urscript", "--goal", "upper"],
-            ["no goal `upper`", "left_upper_anterior"],
-        ),
-        (
-            vec![&*one, "--as", "mcap", "--configuration", "Right-Up-Fald"],
-            [
-                "no configuration `Right-Up-Fald`",
-                "did you mean `Right-Up-Fold`",
-            ],
-        ),
-        (
-            vec![&*one, "--as", "mcap", "--engine", "rapier,mujoco"],
-            ["2 engines", "name one engine"],
-        ),
-        (
-            vec![&*one, "--as", "trajectory", "--out", "motion.txt"],
-            ["JSON, YAML or CSV", ".json, .yaml or .csv"],
-        ),
-        (
-            vec![&*one, "--as", "mcap", "--joints", "0,0,0,0,0,0"],
-            ["--joints does not apply to mcap", "leave --joints out"],
-        ),
-        (
-            vec![&*protocol, "--as", "trajectory"],
-            ["no goals", "[[goals]]"],
-        ),
-    ] {
-        let arguments: Vec<&str> = ["export"].into_iter().chain(arguments).collect();
-        let answer = bench.run(&arguments).exits_with(2);
-        answer.complains(says);
-    }
-    let left = bench.tree(".");
-    assert!(left.is_empty(), "{left:?}");
-}
-
-#[test]
 fn a_configuration_that_does_not_work_is_refused_with_its_reason() {
     let bench = Bench::new();
     let answer = bench

@@ -152,31 +152,3 @@ fn a_small_study_comes_with_it_and_runs() {
     );
     bench.run(&["study", "first_study.toml"]).exits_with(0);
 }
-
-#[test]
-fn what_there_is_is_listed_and_what_is_not_is_refused_with_the_nearest() {
-    let bench = Bench::new();
-    let list = bench.run(&["init", "--list"]).exits_with(0).stdout;
-    for word in [
-        "ur5e",
-        "perpendicular",
-        "male-p50-supine",
-        "pleural_based",
-        "hanging",
-    ] {
-        assert!(list.contains(word), "{word}: {list}");
-    }
-    for (arguments, near) in [
-        (["--arm", "ur5"], "ur5e"),
-        (["--phantom", "male-p50-supin"], "male-p50-supine"),
-        (["--lesion", "plural_based"], "pleural_based"),
-    ] {
-        let hint = format!("did you mean `{near}`?");
-        let answer = bench.run(&[&["init"][..], &arguments[..]].concat());
-        answer.exits_with(2).complains([&hint]);
-    }
-    bench
-        .run(&["init", "my first.toml"])
-        .exits_with(2)
-        .complains(["letters"]);
-}

@@ -173,13 +173,6 @@ fn goal_of_a_scenario_is_solved_like_its_pose() {
 }
 
 #[test]
-fn unknown_goal_is_refused_with_the_goals_there_are() {
-    let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["ik", "s.toml", "--goal", "poes"]).exits_with(2);
-    answer.complains(["s.toml", "no goal `poes`", "hint: goals: pose"]);
-}
-
-#[test]
 fn unreachable_pose_says_how_much_is_missing() {
     let bench = Bench::new();
     let answer = bench.run(&["ik", "--pose", "0.9,0,0.1,0,0,0", "--json"]);
@@ -228,12 +221,6 @@ const PRINTED_MATRIX: &str = "[[-0.8421 -0.4673  0.2693  0.1942]
 fn rounded_matrix_is_refused_with_a_pose_that_is_accepted() {
     let bench = Bench::new();
     let refused = bench.run(&["ik", "--matrix", PRINTED_MATRIX]).exits_with(2);
-    refused.complains([
-        "not a rotation",
-        "up to 8.5e-5",
-        "1.000014",
-        "--nearest-rotation",
-    ]);
     let offered = refused.stderr.split("--pose ").nth(1).unwrap();
     let offered = offered.split(';').next().unwrap();
     let by_pose = bench.run(&["ik", "--pose", offered, "--json"]);
@@ -295,44 +282,6 @@ fn exact_matrix_is_solved_like_its_vector() {
 }
 
 #[test]
-fn matrices_that_are_no_pose_are_refused_with_the_reason() {
-    let bench = Bench::new();
-    for (matrix, reason) in [
-        (
-            "1 0 0 0.3 0 1 0 0.2 0 0 -1 0.1",
-            "mirrored: its determinant is -1",
-        ),
-        ("1 0 0 0.3 0 1 0 0.2 0 0 0 0.1", "do not span space"),
-        ("1 0 0 0.3 0 nan 0 0.2 0 0 1 0.1", "`nan` is not finite"),
-        ("1 0 0 0.3 0 one 0 0.2 0 0 1 0.1", "`one` is not a number"),
-        ("1 0 0 300 0 1 0 200 0 0 1 100", "x, y and z are in metres"),
-        ("1 0 0 0.3 0 1 0 0.2 0 0 1", "got 11"),
-        ("1 0 0 0 0 1 0 0 0 0 1 0 .3 .2 .1 1", "give them row by row"),
-        ("1 0 0 .3 0 1 0 .2 0 0 1 .1 0 0 0 2", "the last row"),
-    ] {
-        let answer = bench.run(&["ik", "--matrix", matrix]).exits_with(2);
-        answer.complains([reason]);
-    }
-    let mirrored = "1 0 0 0.3 0 1 0 0.2 0 0 -1 0.1";
-    let both = ["ik", "--matrix", mirrored, "--nearest-rotation"];
-    bench.run(&both).exits_with(2).complains(["mirrored"]);
-    let both = ["ik", "--matrix", mirrored, "--pose", TABLE_3_POSE];
-    bench
-        .run(&both)
-        .exits_with(2)
-        .complains(["cannot be used with"]);
-}
-
-#[test]
-fn rotation_vector_in_degrees_is_refused() {
-    let bench = Bench::new();
-    let answer = bench
-        .run(&["ik", "--pose", "0.3,0.2,0.1,0,180,0"])
-        .exits_with(2);
-    answer.complains(["180.0000 rad", "radians"]);
-}
-
-#[test]
 fn every_arm_inverts_its_own_forward_kinematics() {
     let bench = Bench::new();
     let posture = "0.4,-1.3,1.5,-0.9,1.1,0.2";
@@ -359,25 +308,6 @@ fn every_arm_inverts_its_own_forward_kinematics() {
 }
 
 #[test]
-fn arms_that_are_not_known_or_ambiguous_are_refused() {
-    let bench = Bench::with_scenario(SMALL);
-    let answer = bench.run(&["fk", "--arm", "UR4", "--joints", "0,0,0,0,0,0"]);
-    answer.exits_with(2).complains(["`UR4`", "UR3, UR3e, UR5"]);
-    for other in [
-        ["--robot", "x.urdf"],
-        ["--package-path", "a=b"],
-        ["--missing-inertia", "nominal-ur3"],
-    ] {
-        let mut arguments = vec!["fk", "--joints", "0,0,0,0,0,0", "--arm", "UR5"];
-        arguments.extend(other);
-        let answer = bench.run(&arguments).exits_with(2);
-        answer.complains(["--arm", "cannot be used with"]);
-    }
-    let answer = bench.run(&["ik", "s.toml", "--goal", "pose", "--arm", "UR5"]);
-    answer.exits_with(2).complains(["cannot be used with"]);
-}
-
-#[test]
 fn iteration_limit_is_kept_and_its_row_is_no_solution() {
     let bench = Bench::new();
     let run = |method: &str, limit: &str| {
@@ -397,19 +327,6 @@ fn iteration_limit_is_kept_and_its_row_is_no_solution() {
     assert_eq!(answer["certificate"], "not_converged");
     assert_eq!(answer["nearest"][0]["kind"], "nearest");
     assert_eq!(answer["nearest"][0]["iterations"], 1);
-    run("gauss-newton", "0").exits_with(2);
-    let refused = run("closed-form", "5").exits_with(2);
-    refused.complains(["does not iterate", "--method gauss-newton"]);
-    let wraps = [
-        "ik",
-        "--pose",
-        TABLE_3_POSE,
-        "--method",
-        "gauss-newton",
-        "--wraps",
-    ];
-    let refused = bench.run(&wraps).exits_with(2);
-    refused.complains(["--wraps", "one posture only"]);
 }
 
 #[test]
@@ -455,15 +372,4 @@ fn gauss_newton_finds_the_solution_next_to_its_seed() {
         assert_eq!(solution["kind"], "exact");
         assert!(solution["residual_m"].as_f64().unwrap() <= RESIDUAL);
     }
-}
-
-#[test]
-fn tables_for_people_have_a_row_per_solution() {
-    let bench = Bench::new();
-    let answer = bench.run(&["ik", "--pose", TABLE_3_POSE]).exits_with(0);
-    for (label, _) in TABLE_3 {
-        assert!(answer.stdout.contains(label), "{}", answer.stdout);
-    }
-    let answer = bench.run(&["fk", "--joints", "0,0,0,0,0,0"]).exits_with(0);
-    assert!(answer.stdout.contains("flange in base_link"));
 }

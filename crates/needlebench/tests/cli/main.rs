@@ -3,7 +3,6 @@
 mod accuracy;
 #[cfg(unix)]
 mod action;
-mod arguments;
 mod arms;
 mod atlas;
 mod bad_mesh;
@@ -54,4 +53,3 @@ mod search;
 mod study;
 mod suggest;
 mod support;
-mod view;

@@ -109,13 +109,3 @@ fn what_it_writes_it_agrees_with() {
             .any(|pair| pair["links"][0] == "wrist_1_link")
     );
 }
-
-#[test]
-fn a_file_that_is_no_srdf_is_refused() {
-    let bench = Bench::with_scenario(SMALL);
-    bench.write("arm.srdf", "<robot name=\"x\"><link name=\"a\"/></robot>");
-    let answer = run(&bench, &["--srdf", "arm.srdf"]).exits_with(2);
-    answer.complains(["a URDF, not an SRDF"]);
-    let answer = run(&bench, &["--srdf", "none.srdf"]).exits_with(2);
-    answer.complains(["cannot read the SRDF"]);
-}

@@ -359,14 +359,6 @@ fn pictures_are_written_and_within_the_page() {
     }
 }
 
-#[test]
-fn folder_that_cannot_be_made_is_refused_before_the_run() {
-    let bench = Bench::new();
-    bench.write("taken", "");
-    let answer = bench.run(&["paper", "--out", "taken"]).exits_with(2);
-    answer.complains(["taken", "--out"]);
-}
-
 #[cfg(target_os = "linux")]
 #[test]
 fn interrupted_reproduction_ends_with_130_and_writes_nothing() {

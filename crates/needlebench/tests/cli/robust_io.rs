@@ -88,15 +88,6 @@ fn refused_everywhere(bench: &Bench, file: &str, part: &str) {
     }
 }
 
-#[test]
-fn a_folder_is_no_file() {
-    let bench = Bench::new();
-    std::fs::create_dir(bench.path("folder.toml")).unwrap();
-    // A folder may be one of results.
-    let refused = bench.run(&["check", "folder.toml"]).exits_with(2);
-    refused.complains(["this is a folder, not a scenario"]);
-}
-
 #[cfg(unix)]
 #[test]
 fn a_device_without_end_is_no_file() {

@@ -191,28 +191,6 @@ fn where_there_is_no_entry_it_says_which_rule_refuses_most() {
     );
 }
 
-#[test]
-fn targets_that_are_none_are_refused() {
-    let bench = Bench::with_scenario(SHORT);
-    let refused = |arguments: &[&str], parts: [&str; 2]| {
-        let answer = bench.run(&[&["suggest", "s.toml"][..], arguments].concat());
-        answer.exits_with(2).complains(parts);
-    };
-    refused(
-        &["--lesion", "plural_based"],
-        ["no lesion `plural_based`", "pleural_based"],
-    );
-    refused(
-        &["--target", "400,0,0"],
-        ["outside the phantom", "phantom frame"],
-    );
-    refused(
-        &["--goal", "right_uper_lobe"],
-        ["no goal `right_uper_lobe`", "right_upper_lobe"],
-    );
-    refused(&["--target", "1,2"], ["three numbers", ""]);
-}
-
 /// Half an hour in a debug build.
 #[test]
 #[ignore = "long: every shipped phantom and lesion"]
