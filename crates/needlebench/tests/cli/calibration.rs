@@ -2,15 +2,10 @@
 
 use serde_json::Value;
 
-use crate::support::{
-    Answer, Bench, SMALL, TABLE_3_POSE, files, mujoco_is_ready, numbers, with_edit,
-};
+use crate::support::{Bench, SMALL, TABLE_3_POSE, files, mujoco_is_ready, numbers, with_edit};
 
 /// A real UR3.
 const UR3: &str = include_str!("../../../cell/tests/cell/calibration/ur3_half_turns.yaml");
-
-/// A real UR3e.
-const UR3E: &str = include_str!("../../../cell/tests/cell/calibration/ur3e.yaml");
 
 /// What the inverse kinematics promises, m and rad.
 const RESIDUAL: f64 = 1e-12;
@@ -21,7 +16,6 @@ const ENGINES_AGREE_M: f64 = 1e-9;
 fn bench() -> Bench {
     let bench = Bench::with_scenario(SMALL);
     bench.write("ur3.yaml", UR3);
-    bench.write("ur3e.yaml", UR3E);
     bench
 }
 
@@ -95,100 +89,6 @@ fn calibrated_solutions_place_the_calibrated_flange() {
         let nominal = &nominal["flange_in_base"]["position_m"];
         assert!(distance(nominal, &flange["position_m"]) > 1e-4);
     }
-}
-
-#[test]
-fn named_arm_takes_its_own_calibration() {
-    let bench = bench();
-    let arguments = [
-        "fk",
-        "--arm",
-        "ur3e",
-        "--joints",
-        "0,0,0,0,0,0",
-        "--calibration",
-    ];
-    let run = |file| {
-        let mut arguments = arguments.to_vec();
-        arguments.push(file);
-        bench.run(&arguments)
-    };
-    let own = run("ur3e.yaml").exits_with(0);
-    assert!(
-        own.stdout
-            .contains("UR3e, calibrated by ur3e.yaml (calib_8672619134213134139)")
-    );
-    run("ur3.yaml").exits_with(2).complains([
-        "another robot, a UR3 ",
-        "the UR3e in use",
-        "--arm UR3`",
-    ]);
-}
-
-#[test]
-fn every_command_refuses_the_calibration_of_another_robot() {
-    let bench = bench();
-    let commands: [&[&str]; 6] = [
-        &["run", "s.toml"],
-        &["check", "s.toml"],
-        &["clearance", "s.toml", "--joints", "0,-1.57,-1,-1.57,1.57,0"],
-        &["ik", "--pose", TABLE_3_POSE],
-        &["ik", "s.toml", "--goal", "pose"],
-        &["fk", "--joints", "0,0,0,0,0,0"],
-    ];
-    for command in commands {
-        let run = |file| -> Answer {
-            let mut arguments = command.to_vec();
-            arguments.extend(["--calibration", file]);
-            bench.run(&arguments)
-        };
-        let wrong = run("ur3e.yaml").exits_with(2);
-        let message = wrong.stderr.clone() + &wrong.stdout;
-        for part in [
-            "another robot, a UR3e",
-            "18.7 mm",
-            "wrist_1",
-            "--arm UR3e",
-            "ur3e.yaml",
-        ] {
-            assert!(
-                message.contains(part),
-                "{command:?}: no `{part}` in {message}"
-            );
-        }
-        let missing = run("none.yaml").exits_with(2);
-        missing.complains(["none.yaml", "cannot read the calibration"]);
-    }
-}
-
-#[test]
-fn mistakes_are_shown_where_they_are() {
-    let bench = bench();
-    let text = with_edit(UR3, "roll: 1.571184458807471", "roll: 90.02");
-    bench.write("degrees.yaml", &text);
-    let line = text
-        .lines()
-        .position(|line| line.contains("90.02"))
-        .unwrap()
-        + 1;
-    let arguments = ["check", "s.toml", "--calibration", "degrees.yaml", "--json"];
-    let answer = bench.run(&arguments).exits_with(2).json();
-    let finding = &answer["findings"][0];
-    assert_eq!(finding["file"], "degrees.yaml");
-    assert_eq!(finding["line"], line);
-    assert_eq!(finding["key"], "kinematics.upper_arm.roll");
-    assert!(finding["message"].as_str().unwrap().contains("degrees"));
-    let shown = bench.run(&[
-        "fk",
-        "--joints",
-        "0,0,0,0,0,0",
-        "--calibration",
-        "degrees.yaml",
-    ]);
-    let place = format!("degrees.yaml:{line}:11");
-    shown
-        .exits_with(2)
-        .complains([&place, "roll: 90.02", "^^^^^"]);
 }
 
 #[test]
@@ -281,18 +181,11 @@ fn goal_of_a_scenario_is_solved_for_the_calibrated_robot() {
 #[test]
 fn a_scenario_may_name_the_calibration_of_its_robot() {
     let bench = bench();
-    let naming = |file: &str| {
-        let section = format!("[robot]\ncalibration = \"{file}\"\n");
-        with_edit(SMALL, "[robot]\n", &section)
-    };
-    bench.write("c.toml", naming("ur3.yaml"));
+    let naming = "[robot]\ncalibration = \"ur3.yaml\"\n";
+    bench.write("c.toml", with_edit(SMALL, "[robot]\n", naming));
     let solve = |arguments: &[&str]| bench.run(arguments).exits_with(0).json();
     let by_key = solve(&["ik", "c.toml", "--goal", "pose", "--json"]);
     let by_option = ["ik", "s.toml", "--goal", "pose", "--json", "--calibration"];
     let by_option = solve(&[&by_option[..], &["ur3.yaml"]].concat());
     assert_eq!(by_key["solutions"], by_option["solutions"]);
-
-    bench.write("d.toml", naming("ur4.yaml"));
-    let answer = bench.run(&["check", "d.toml"]).exits_with(2);
-    answer.complains(["d.toml", "robot.calibration", "ur4.yaml"]);
 }

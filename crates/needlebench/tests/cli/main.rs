@@ -5,8 +5,6 @@ mod accuracy;
 mod action;
 mod arms;
 mod atlas;
-mod bad_mesh;
-mod bad_robot;
 mod calibration;
 #[cfg(unix)]
 mod cases;
@@ -39,6 +37,7 @@ mod names_of_metrics;
 mod page;
 mod pairs;
 mod paper;
+mod parts;
 mod people;
 #[cfg(target_os = "linux")]
 mod process;
